@@ -1,0 +1,130 @@
+"""What cameras and microphones recorded, behind one lazy interface."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ico3d.common.camera import Camera
+from ico3d.errors import CaptureError
+
+EYE_NAMES = (
+    "browDownLeft",
+    "browDownRight",
+    "browInnerUp",
+    "browOuterUpLeft",
+    "browOuterUpRight",
+    "eyeBlinkLeft",
+    "eyeBlinkRight",
+)
+"""The seven eye and brow values that complete the expression vector (ARKit names, 0 to 1)."""
+
+
+@dataclass(frozen=True)
+class Sound:
+    """Mono sound.
+
+    Attributes:
+        samples: (S,) float32 in [-1, 1]; sample 0 is heard at the time of frame 0.
+        rate: Samples per second; captures give 16,000.
+    """
+
+    samples: np.ndarray
+    rate: int
+
+
+@dataclass(frozen=True)
+class Split:
+    """Which frames train and which test (design section 2); indices ascend."""
+
+    train: tuple[int, ...]
+    test: tuple[int, ...]
+
+
+class Capture(ABC):
+    """A recording. Images are read when asked for and never kept.
+
+    Frames are numbered 0 … num_frames − 1; frame i is at i / fps seconds. What a source lacks is
+    None. Images are float32 RGB (H, W, 3) in [0, 1]; masks float32 (H, W) in [0, 1].
+    """
+
+    kind: str
+    path: Path
+    cameras: Sequence[Camera]
+    fps: float
+    num_frames: int
+    split: Split
+    blendshape_names: tuple[str, ...] | None = None
+
+    @abstractmethod
+    def image(self, camera: int, frame: int) -> np.ndarray | None:
+        """The picture, or None where this camera has no view of this frame."""
+
+    def mask(self, camera: int, frame: int) -> np.ndarray | None:
+        """The person: 1 inside."""
+        return None
+
+    def head_mask(self, camera: int, frame: int) -> np.ndarray | None:
+        """Where `psnr_mask` is measured: the person, for portraits face + hair + mouth."""
+        return self.mask(camera, frame)
+
+    def background(self, camera: int) -> np.ndarray | None:
+        """What the camera sees without the person (H, W, 3)."""
+        return None
+
+    def audio(self) -> Sound | None:
+        """The whole sound, 16 kHz mono."""
+        return None
+
+    def world_from_head(self, frame: int) -> np.ndarray | None:
+        """W_i (4, 4): takes canonical head space (metres, fixed to the skull) to the world."""
+        return None
+
+    def eyes(self, frame: int) -> np.ndarray | None:
+        """(7,) values in the order of `EYE_NAMES`."""
+        return None
+
+    def blendshapes(self, frame: int) -> np.ndarray | None:
+        """(len(blendshape_names),) weights."""
+        return None
+
+    def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
+        """(68, 2) Multi-PIE landmarks in pixels of this camera, also for views without image."""
+        return None
+
+    def points(self) -> np.ndarray | None:
+        """(P, 3) initial surface points in canonical head space (bodies: the world, frame 0)."""
+        return None
+
+    @property
+    def provenance(self) -> dict:
+        """Who was recorded, how, and under which licence: goes into the bundle's manifest."""
+        return {"kind": self.kind, "sources": [], "consent": "", "licence": ""}
+
+    @staticmethod
+    def open(path: Path | str) -> "Capture":
+        """Opens a capture, whatever its format.
+
+        Raises:
+            CaptureError: If there is none, or the format is not recognised, or it is damaged.
+        """
+        from ico3d.capture.formats import FORMATS
+
+        path = Path(path)
+        if not path.exists():
+            raise CaptureError(f"there is no capture at {path}.")
+        for recognises, reader in FORMATS:
+            if recognises(path):
+                return reader(path)
+        raise CaptureError(
+            f"{path} is in no format known here: expected a talking-portrait folder "
+            "(transforms_train.json) or a synthetic capture (capture.json)."
+        )
+
+
+def last_eleventh(num_frames: int) -> Split:
+    """The test split of heads: the last 1/11 of the frames."""
+    first_test = num_frames * 10 // 11
+    return Split(tuple(range(first_test)), tuple(range(first_test, num_frames)))

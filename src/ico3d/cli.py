@@ -1,0 +1,73 @@
+"""The command line: one verb per step; each room is imported only when its verb is used."""
+
+import importlib
+import sys
+from dataclasses import dataclass
+
+import tyro
+
+from ico3d.errors import Ico3dError
+
+
+@dataclass(frozen=True)
+class Verb:
+    """Where a verb's settings class lives; calling the settings runs the verb."""
+
+    module: str
+    name: str
+    help: str
+
+
+VERBS: dict[str, Verb] = {
+    "demo": Verb("ico3d.chat.commands", "Demo", "talk with the avatar that comes in the package"),
+    "capture portrait": Verb("ico3d.capture.commands", "Portrait", "track a talking-head video"),
+    "capture synthetic": Verb("ico3d.capture.commands", "Synthetic", "record a synthetic person"),
+    "capture check": Verb("ico3d.capture.commands", "Check", "check a capture, draw a contact sheet"),
+    "train head": Verb("ico3d.head.commands", "TrainHead", "train HeadGaS++ on a capture"),
+    "train speech": Verb("ico3d.speech.commands", "TrainSpeech", "train the built-in speech encoder"),
+    "evaluate": Verb("ico3d.measure.commands", "Evaluate", "measure a model on held-out frames"),
+    "bake": Verb("ico3d.avatar.commands", "Bake", "make the bundle that browsers play"),
+    "serve": Verb("ico3d.chat.commands", "Serve", "serve a bundle and talk with it"),
+    "bench raster": Verb("ico3d.measure.commands", "BenchRaster", "time the rasteriser"),
+    "bench talk": Verb("ico3d.measure.commands", "BenchTalk", "time question to answer"),
+}
+
+
+def usage() -> str:
+    """The list of verbs that `ico3d --help` prints."""
+    width = max(map(len, VERBS))
+    lines = [f"  {verb:<{width}}  {entry.help}" for verb, entry in VERBS.items()]
+    return "usage: ico3d VERB ... (ico3d VERB --help tells the rest)\n\n" + "\n".join(lines)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Runs one verb.
+
+    Args:
+        arguments: The words after `ico3d`; those of the process by default.
+
+    Returns:
+        The exit status: 0, 1 for an error the user can mend, 2 for an unknown verb.
+    """
+    words = sys.argv[1:] if arguments is None else arguments
+    verb = next((v for v in VERBS if words[: len(v.split())] == v.split()), None)
+    if verb is None:
+        known = not words or words[0] in ("-h", "--help")
+        print(usage() if known else f"ico3d: no such verb: {' '.join(words[:2])}\n\n{usage()}")
+        return 0 if known else 2
+    entry = VERBS[verb]
+    try:
+        settings_class = getattr(importlib.import_module(entry.module), entry.name)
+        rest = words[len(verb.split()) :]
+        settings = tyro.cli(settings_class, prog=f"ico3d {verb}", args=rest)
+        settings.run()
+    except Ico3dError as error:
+        print(f"ico3d: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,49 @@
+"""Writing files so that a crash never leaves half of one, and finding model files."""
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from ico3d.errors import MissingModelError
+
+
+def write_atomic(path: Path | str, write: Callable[[Path], None] | bytes) -> None:
+    """Writes a file by way of a temporary one: write, fsync, rename.
+
+    Args:
+        path: Where the file shall lie; its folder is made.
+        write: The bytes, or a function that writes to the path it is given.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        if isinstance(write, bytes):
+            temporary.write_bytes(write)
+        else:
+            write(temporary)
+        with temporary.open("rb") as file:
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def model_file(name: str, purpose: str) -> Path:
+    """Finds a model file in `$ICO3D_MODELS` or the user's cache (`~/.cache/ico3d/models`).
+
+    Raises:
+        MissingModelError: If it lies in neither; the sentence says where to put it.
+    """
+    folders = [Path(p) for p in (os.environ.get("ICO3D_MODELS"),) if p]
+    folders.append(Path.home() / ".cache" / "ico3d" / "models")
+    for folder in folders:
+        if (folder / name).is_file():
+            return folder / name
+    raise MissingModelError(
+        f"{purpose} needs the model file '{name}': put it into {folders[-1]} "
+        "or name its folder in the environment variable ICO3D_MODELS."
+    )

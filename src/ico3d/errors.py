@@ -1,0 +1,39 @@
+"""Errors that a user can cause. Each carries one clear sentence: what, where, what to do."""
+
+
+class Ico3dError(Exception):
+    """Base of every error the command line prints as one sentence, without a traceback."""
+
+
+class CaptureError(Ico3dError):
+    """A recording is missing, damaged or inconsistent."""
+
+
+class ModelError(Ico3dError):
+    """A trained model or checkpoint cannot be used."""
+
+
+class BundleError(Ico3dError):
+    """A bundle is damaged, unsafe, or of an unknown version."""
+
+
+class SettingsError(Ico3dError):
+    """Settings contradict one another or the data."""
+
+
+class ProtocolError(Ico3dError):
+    """A message on the wire is malformed or over its limits."""
+
+
+class MissingExtraError(Ico3dError):
+    """An optional package is needed and not installed."""
+
+    def __init__(self, package: str, extra: str, purpose: str):
+        """Names the package, the extra that brings it, and what it is needed for."""
+        super().__init__(
+            f"{purpose} needs the package '{package}': install it with pip install 'ico3d[{extra}]'."
+        )
+
+
+class MissingModelError(Ico3dError):
+    """A model file (weights) is needed and not there."""
