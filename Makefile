@@ -1,0 +1,47 @@
+# Everything a fresh machine needs comes with these targets; each sets up what it uses.
+VENV := .venv
+PY := $(VENV)/bin/python
+export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
+export ICO3D_PYTHON := $(CURDIR)/$(PY)
+
+.PHONY: demo test install viewer lint unit e2e bench clean
+
+demo: $(VENV)/.serve src/ico3d/chat/static/index.html ## talk with the packaged avatar
+	$(VENV)/bin/ico3d demo
+
+test: lint unit e2e ## everything CI runs
+
+install: $(VENV)/.develop src/ico3d/chat/static/index.html ## training, tracking, tests
+
+viewer: src/ico3d/chat/static/index.html ## the page that servers serve
+
+lint: $(VENV)/.develop
+	ruff check . && ruff format --check .
+	pyright
+	lint-imports
+
+unit: $(VENV)/.develop src/ico3d/chat/static/index.html
+	cd viewer && npm run --silent check && npm run --silent test
+	$(PY) -m pytest
+
+e2e: $(VENV)/.develop src/ico3d/chat/static/index.html
+	cd viewer && npm run --silent e2e
+
+bench: install ## long quality and speed runs; figures go to docs/benchmarks.md
+	$(PY) bench/run_all.py
+
+clean:
+	rm -rf $(VENV) viewer/node_modules src/ico3d/chat/static
+
+$(VENV)/.serve: pyproject.toml scripts/setup.sh
+	scripts/setup.sh serve
+
+$(VENV)/.develop: pyproject.toml scripts/setup.sh
+	scripts/setup.sh develop
+
+viewer/node_modules/.package-lock.json: viewer/package-lock.json | $(VENV)/.serve
+	cd viewer && npm ci --no-audit --no-fund --silent
+
+VIEWER_SOURCES := $(shell find viewer/src viewer/index.html viewer/public -type f 2>/dev/null)
+src/ico3d/chat/static/index.html: viewer/node_modules/.package-lock.json $(VIEWER_SOURCES) viewer/vite.config.ts
+	cd viewer && npm run --silent build && touch ../$@

