@@ -8,18 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.common.camera import Camera
+from ico3d.common.expression import EYE_NAMES as EYE_NAMES
 from ico3d.errors import CaptureError
-
-EYE_NAMES = (
-    "browDownLeft",
-    "browDownRight",
-    "browInnerUp",
-    "browOuterUpLeft",
-    "browOuterUpRight",
-    "eyeBlinkLeft",
-    "eyeBlinkRight",
-)
-"""The seven eye and brow values that complete the expression vector (ARKit names, 0 to 1)."""
 
 
 @dataclass(frozen=True)

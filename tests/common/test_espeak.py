@@ -1,0 +1,93 @@
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from ico3d.common.espeak import synthesize
+from ico3d.errors import SettingsError
+
+pytest.importorskip("espeakng_loader")
+
+
+def loudness(speech, start, end):
+    stretch = speech.samples[int(start * speech.rate) : int(end * speech.rate)]
+    return float(np.sqrt(np.mean(stretch**2)))
+
+
+def spans(speech):
+    ends = [event.time for event in speech.events[1:]] + [len(speech.samples) / speech.rate]
+    return [(event.symbol, event.time, end) for event, end in zip(speech.events, ends, strict=True)]
+
+
+def test_samples_and_phonemes_cover_the_text():
+    speech = synthesize("Hello world.")
+    assert speech.rate == 22050
+    assert speech.samples.dtype == np.float32
+    assert 0.05 < np.abs(speech.samples).max() <= 1
+    assert " ".join(e.symbol for e in speech.events if e.symbol) == "h ə l ˈoʊ w ˈɜː l d"
+    times = [e.time for e in speech.events]
+    assert times == sorted(times)
+    assert times[0] >= 0 and times[-1] <= len(speech.samples) / speech.rate
+
+
+@pytest.mark.parametrize("voice", ["en-us", "en-us+f3", "en-us+klatt2", "it"])
+def test_a_voiceless_stop_begins_with_its_silent_closure(voice):
+    speech = synthesize("a papa papa", voice)
+    stops = [(start, end) for symbol, start, end in spans(speech) if symbol == "p"]
+    assert len(stops) == 4
+    loudest = float(np.abs(speech.samples).max())
+    for start, end in stops:
+        assert 0.05 < end - start < 0.15
+        assert loudness(speech, start, start + 0.03) < 0.04 * loudest
+        assert loudness(speech, start - 0.03, start) > 0.04 * loudest
+
+
+def test_a_pause_is_an_event_without_symbol_and_silent():
+    speech = synthesize("One. Two.")
+    pauses = [
+        (start, end) for symbol, start, end in spans(speech)[:-2] if not symbol and end > start
+    ]
+    start, end = max(pauses, key=lambda span: span[1] - span[0])
+    assert end - start > 0.1
+    assert loudness(speech, start + 0.02, end) < 1e-3
+
+
+def test_rate_and_pitch_change_the_sound():
+    slow, fast = synthesize("Good morning.", rate=120), synthesize("Good morning.", rate=240)
+    assert len(fast.samples) < 0.75 * len(slow.samples)
+    low, high = synthesize("ah", pitch=10), synthesize("ah", pitch=90)
+    crossings = [np.count_nonzero(np.diff(np.signbit(s.samples))) for s in (low, high)]
+    assert not np.array_equal(low.samples, high.samples) and crossings[0] != crossings[1]
+
+
+def test_nothing_to_say_is_no_error():
+    assert len([e for e in synthesize("").events if e.symbol]) == 0
+
+
+def test_threads_get_their_own_text_and_repeat_it_exactly():
+    texts = ["one", "two three four", "papa", "a long sentence about the weather"]
+    alone = [synthesize(text) for text in texts]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(synthesize, texts * 5))
+    for expected, found in zip(alone * 5, together, strict=True):
+        assert found.events == expected.events
+        np.testing.assert_array_equal(found.samples, expected.samples)
+
+
+def test_an_unknown_voice_is_one_sentence():
+    with pytest.raises(SettingsError, match="no voice 'xx-nowhere'"):
+        synthesize("hello", "xx-nowhere")
+
+
+def test_a_missing_package_names_its_extra():
+    code = (
+        "import sys; sys.modules['espeakng_loader'] = None\n"
+        "from ico3d.common.espeak import synthesize\n"
+        "from ico3d.errors import MissingExtraError\n"
+        "try: synthesize('hello')\n"
+        "except MissingExtraError as error: print(error)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "ico3d[voice]" in done.stdout
