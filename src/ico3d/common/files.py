@@ -1,7 +1,7 @@
 """Writing files so that a crash never leaves half of one, and finding model files."""
 
 import os
-import tempfile
+import secrets
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,9 +17,8 @@ def write_atomic(path: Path | str, write: Callable[[Path], None] | bytes) -> Non
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
-    os.close(handle)
-    temporary = Path(name)
+    # Not mkstemp: its files are readable by their owner only, and stay so after the rename.
+    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(8)}{path.suffix}")
     try:
         if isinstance(write, bytes):
             temporary.write_bytes(write)

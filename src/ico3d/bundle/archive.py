@@ -1,0 +1,201 @@
+"""A folder or an uncompressed zip as a set of named files, read without trusting any of it."""
+
+import contextlib
+import os
+import re
+import stat
+import struct
+import zipfile
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from ico3d.bundle import limits
+from ico3d.common.files import write_atomic
+from ico3d.errors import BundleError
+
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,99}(/[A-Za-z0-9_][A-Za-z0-9_.\-]{0,99}){0,3}")
+_END_RECORD = struct.Struct("<4s4H2LH")
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+
+
+class Archive(ABC):
+    """Named files with their sizes; names are checked before anything is read."""
+
+    sizes: Mapping[str, int]
+
+    @abstractmethod
+    def read(self, name: str) -> bytes:
+        """The content of one of `sizes`.
+
+        Raises:
+            BundleError: If it cannot be read, or has not the size it had.
+        """
+
+
+def open_archive(path: Path) -> Archive:
+    """Lists a bundle's files.
+
+    Raises:
+        BundleError: If there is nothing, or a name, link or entry is refused.
+    """
+    if path.is_dir():
+        return _Folder(path)
+    if path.is_file():
+        return _Zip(path)
+    raise BundleError(f"there is no bundle at {path}.")
+
+
+def write_zip(path: Path, files: Mapping[str, bytes]) -> None:
+    """Writes a stored zip in one step; the same files give the same bytes."""
+    sizes = {name: len(data) for name, data in files.items()}
+    _check_names(list(sizes), path)
+    _check_sizes(sizes, path)
+    write_atomic(path, lambda temporary: _write_zip(temporary, files))
+
+
+def _write_zip(path: Path, files: Mapping[str, bytes]) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
+        for name, data in files.items():
+            info = zipfile.ZipInfo(name, _EPOCH)
+            info.create_system = 3  # Unix, wherever this runs
+            info.external_attr = (stat.S_IFREG | 0o644) << 16
+            archive.writestr(info, data)
+
+
+class _Folder(Archive):
+    def __init__(self, path: Path):
+        self.path = path
+        sizes: dict[str, int] = {}
+        try:
+            for name, size in _walk(path, "", path):
+                sizes[name] = size
+                if len(sizes) > limits.MAX_FILES:
+                    raise BundleError(f"{path}: holds more than {limits.MAX_FILES} files.")
+        except OSError as error:
+            raise BundleError(f"{path}: cannot be read ({error.strerror}).") from error
+        _check_names(list(sizes), path)
+        _check_sizes(sizes, path)
+        self.sizes = sizes
+
+    def read(self, name: str) -> bytes:
+        flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
+        try:
+            with open(os.open(self.path / name, flags), "rb") as file:
+                data = file.read(self.sizes[name] + 1)
+        except OSError as error:
+            raise BundleError(f"{name}: cannot be read ({error.strerror}).") from error
+        return _whole(data, self.sizes[name], name)
+
+
+class _Zip(Archive):
+    def __init__(self, path: Path):
+        self.path = path
+        with _reading(path.name), path.open("rb") as file:
+            _check_directory(file, path)
+            with zipfile.ZipFile(file) as archive:
+                self.entries = archive.infolist()
+        _check_names([entry.orig_filename for entry in self.entries], path)
+        for entry in self.entries:
+            _check_entry(entry)
+        self.sizes = {entry.filename: entry.file_size for entry in self.entries}
+        _check_sizes(self.sizes, path)
+        if sum(self.sizes.values()) > path.stat().st_size:
+            raise BundleError(f"{path.name}: its entries overlap.")
+
+    def read(self, name: str) -> bytes:
+        with _reading(name), zipfile.ZipFile(self.path) as archive:
+            entry = next(e for e in self.entries if e.filename == name)
+            with archive.open(entry) as file:
+                data = file.read(self.sizes[name] + 1)
+        return _whole(data, self.sizes[name], name)
+
+
+def _walk(folder: Path, prefix: str, root: Path) -> Iterator[tuple[str, int]]:
+    """All regular files below a folder; deeper levels than names allow are refused."""
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            name = prefix + entry.name
+            if entry.is_symlink():
+                raise BundleError(f"{name}: links are not allowed in a bundle.")
+            if entry.is_dir():
+                if name.count("/") > 3:
+                    raise BundleError(f"{name}: folders of a bundle must not be nested so deep.")
+                yield from _walk(Path(entry.path), name + "/", root)
+            elif entry.is_file():
+                yield name, entry.stat().st_size
+            else:
+                raise BundleError(f"{name}: is not a regular file.")
+
+
+def _check_directory(file, path: Path) -> None:
+    """Refuses what makes zipfile read a huge directory: the end record must be the plain one."""
+    size = file.seek(0, os.SEEK_END)
+    if size > limits.MAX_BUNDLE_BYTES:
+        raise BundleError(f"{path.name}: is larger than {limits.MAX_BUNDLE_BYTES} bytes.")
+    if size < _END_RECORD.size:
+        raise BundleError(f"{path.name}: is too short to be a bundle.")
+    file.seek(size - _END_RECORD.size)
+    signature, disk, first_disk, here, count, length, start, comment = _END_RECORD.unpack(
+        file.read(_END_RECORD.size)
+    )
+    if signature != b"PK\5\6" or comment or disk or first_disk or here != count:
+        raise BundleError(f"{path.name}: is not a plain zip archive, or it was cut off.")
+    if count > limits.MAX_FILES or length > limits.MAX_MANIFEST_BYTES:
+        raise BundleError(f"{path.name}: holds more than {limits.MAX_FILES} files.")
+    if start + length + _END_RECORD.size != size:
+        raise BundleError(f"{path.name}: its directory is not where it should be.")
+    file.seek(0)
+
+
+def _check_entry(entry: zipfile.ZipInfo) -> None:
+    mode = entry.external_attr >> 16
+    if stat.S_ISLNK(mode):
+        raise BundleError(f"{entry.filename}: links are not allowed in a bundle.")
+    if mode and stat.S_IFMT(mode) not in (0, stat.S_IFREG):
+        raise BundleError(f"{entry.filename}: is not a regular file.")
+    if entry.flag_bits & 0x1:
+        raise BundleError(f"{entry.filename}: is encrypted.")
+    if entry.compress_type != zipfile.ZIP_STORED or entry.compress_size != entry.file_size:
+        raise BundleError(f"{entry.filename}: is compressed; a bundle's files must be stored.")
+
+
+def _check_names(names: list[str], path: Path) -> None:
+    seen: set[str] = set()
+    for name in names:
+        if not _NAME.fullmatch(name):
+            raise BundleError(f"{path.name}: the file name {name[:80]!r} is not allowed.")
+        if name.casefold() in seen:
+            raise BundleError(f"{path.name}: the file name {name[:80]!r} occurs twice.")
+        seen.add(name.casefold())
+
+
+def _check_sizes(sizes: Mapping[str, int], path: Path) -> None:
+    for name, size in sizes.items():
+        if size > limits.MAX_FILE_BYTES:
+            raise BundleError(f"{name}: is larger than {limits.MAX_FILE_BYTES} bytes.")
+    if sum(sizes.values()) > limits.MAX_BUNDLE_BYTES:
+        raise BundleError(f"{path.name}: is larger than {limits.MAX_BUNDLE_BYTES} bytes.")
+
+
+def _whole(data: bytes, size: int, name: str) -> bytes:
+    if len(data) != size:
+        raise BundleError(f"{name}: has {len(data)} bytes where {size} were expected.")
+    return data
+
+
+@contextlib.contextmanager
+def _reading(name: str) -> Iterator[None]:
+    """Whatever zipfile raises on damaged input becomes one sentence."""
+    try:
+        yield
+    except (
+        zipfile.BadZipFile,
+        NotImplementedError,
+        RuntimeError,
+        EOFError,
+        OSError,
+        ValueError,
+        struct.error,
+    ) as error:
+        raise BundleError(f"{name}: is damaged or cannot be read ({error}).") from error

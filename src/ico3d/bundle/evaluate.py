@@ -1,0 +1,38 @@
+"""The reference evaluator of the baked head; shaders are tested against it."""
+
+import numpy as np
+
+from ico3d.bundle.head import BakedHead
+
+LEAKY_SLOPE = 0.02
+
+
+def coefficients(head: BakedHead, expression: np.ndarray) -> np.ndarray:
+    """c(e) = LeakyReLU(e·w1 + b1)·w2 + b2.
+
+    Args:
+        head: The baked head.
+        expression: (B,) or (T, B).
+
+    Returns:
+        (K,) or (T, K) float32.
+    """
+    hidden = np.asarray(expression, np.float32) @ head.w1 + head.b1  # (..., H)
+    hidden = np.where(hidden > 0, hidden, np.float32(LEAKY_SLOPE) * hidden)
+    return hidden @ head.w2 + head.b2  # (..., K)
+
+
+def logits(head: BakedHead, expression: np.ndarray) -> np.ndarray:
+    """Ȳ + scale · Σ_k c_k(e) · basis[k] of one expression (B,) → (N, 4) float32."""
+    blend = np.tensordot(coefficients(head, expression), head.basis.astype(np.float32), 1)  # (N, 4)
+    return head.mean_logits.astype(np.float32) + head.basis_scale[:, None] * blend
+
+
+def attributes(head: BakedHead, expression: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What is drawn for one expression (B,).
+
+    Returns:
+        rgb (N, 3) and opacity (N,), float32 in [0, 1].
+    """
+    values = 1 / (1 + np.exp(-logits(head, expression)))  # (N, 4)
+    return values[:, :3], values[:, 3]

@@ -1,0 +1,160 @@
+"""Opening and writing bundles (docs/bundle.md)."""
+
+import hashlib
+import struct
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ico3d.bundle import limits
+from ico3d.bundle.archive import Archive, open_archive, write_zip
+from ico3d.bundle.head import HEAD, POSES, BakedHead, poses_from_bytes
+from ico3d.bundle.manifest import MANIFEST, FileEntry, Manifest, check_manifest
+from ico3d.errors import BundleError
+
+SPEECH = "speech.onnx"
+THUMBNAIL = "thumbnail.png"
+LICENSES = "LICENSES.txt"
+
+
+class Bundle:
+    """An avatar that has passed every check of docs/bundle.md.
+
+    Attributes:
+        manifest: What the bundle says of itself.
+        head: The baked head.
+        world_from_head: (F, 4, 4) float32 head poses at `manifest.head.fps`, to be played back
+            and forth.
+    """
+
+    manifest: Manifest
+    head: BakedHead
+    world_from_head: np.ndarray
+
+    def __init__(self, archive: Archive):
+        """Reads and checks every file; use `Bundle.open`.
+
+        Raises:
+            BundleError: In one sentence that names the file.
+        """
+        self._archive = archive
+        if MANIFEST not in archive.sizes:
+            raise BundleError(f"{MANIFEST}: is missing.")
+        if archive.sizes[MANIFEST] > limits.MAX_MANIFEST_BYTES:
+            raise BundleError(f"{MANIFEST}: is larger than {limits.MAX_MANIFEST_BYTES} bytes.")
+        self._manifest_bytes = archive.read(MANIFEST)
+        self.manifest = Manifest.from_json(self._manifest_bytes)
+        _check_listing(self.manifest, archive)
+        self._check_contents()
+
+    @staticmethod
+    def open(path: Path | str) -> "Bundle":
+        """Opens a folder or an uncompressed zip and checks all of it.
+
+        Raises:
+            BundleError: If there is none, or it is damaged, unsafe or of another version.
+        """
+        return Bundle(open_archive(Path(path)))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names that `read` knows, the manifest first."""
+        return (MANIFEST, *self.manifest.files)
+
+    def read(self, name: str) -> bytes:
+        """The content of one file, verified again against its hash at each reading.
+
+        Raises:
+            BundleError: If the bundle has no such file, or it has changed since it was opened.
+        """
+        if name == MANIFEST:
+            return self._manifest_bytes
+        entry = self.manifest.files.get(name)
+        if entry is None:
+            raise BundleError(f"the bundle has no file {name[:80]!r}.")
+        data = self._archive.read(name)
+        if hashlib.sha256(data).hexdigest() != entry.sha256:
+            raise BundleError(f"{name}: its content does not match the manifest's hash.")
+        return data
+
+    def _check_contents(self) -> None:
+        info = self.manifest.head
+        checks = {
+            HEAD: lambda data: BakedHead.from_bytes(data, info),
+            POSES: lambda data: poses_from_bytes(data, info.num_poses),
+            THUMBNAIL: _check_thumbnail,
+            LICENSES: _check_text,
+        }
+        results = {}
+        for name in self.manifest.files:
+            data = self.read(name)
+            results[name] = checks[name](data) if name in checks else None
+        self.head, self.world_from_head = results[HEAD], results[POSES]
+
+
+def write_bundle(path: Path | str, manifest: Manifest, files: Mapping[str, bytes]) -> Manifest:
+    """Writes a bundle as one stored zip, in one step; the same parts give the same bytes.
+
+    Args:
+        path: The file, usually NAME.ico3d.
+        manifest: Its `files` are filled in here.
+        files: Content by name, without the manifest.
+
+    Returns:
+        The manifest as written.
+
+    Raises:
+        BundleError: If the manifest contradicts itself, or a name or size is not allowed.
+    """
+    entries = {
+        name: FileEntry(hashlib.sha256(data).hexdigest(), len(data))
+        for name, data in sorted(files.items())
+    }
+    written = replace(manifest, files=entries)
+    check_manifest(written)
+    _check_required(written)
+    write_zip(Path(path), {MANIFEST: written.to_json(), **dict(sorted(files.items()))})
+    return written
+
+
+def _check_listing(manifest: Manifest, archive: Archive) -> None:
+    """The files that are there must be just those the manifest lists, with their sizes."""
+    _check_required(manifest)
+    for name in archive.sizes:
+        if name != MANIFEST and name not in manifest.files:
+            raise BundleError(f"{name}: is not listed in the manifest.")
+    for name, entry in manifest.files.items():
+        if name not in archive.sizes or name == MANIFEST:
+            raise BundleError(f"{name[:80]}: is listed in the manifest and missing.")
+        if archive.sizes[name] != entry.size:
+            raise BundleError(
+                f"{name}: has {archive.sizes[name]} bytes, but the manifest says {entry.size}."
+            )
+
+
+def _check_required(manifest: Manifest) -> None:
+    required = {HEAD, POSES, THUMBNAIL} | ({SPEECH} if manifest.speech else set())
+    for name in sorted(required - set(manifest.files)):
+        raise BundleError(f"{name}: is missing.")
+    for name in manifest.files:
+        if name not in required | {LICENSES}:
+            raise BundleError(f"{name[:80]}: does not belong into this bundle.")
+
+
+def _check_thumbnail(data: bytes) -> None:
+    """Reads the size from the PNG header; the picture itself is decoded by the browser only."""
+    if len(data) < 33 or data[:8] != b"\x89PNG\r\n\x1a\n" or data[12:16] != b"IHDR":
+        raise BundleError(f"{THUMBNAIL}: is not a PNG picture.")
+    width, height = struct.unpack_from(">II", data, 16)
+    side = limits.MAX_THUMBNAIL_SIDE
+    if not (1 <= width <= side and 1 <= height <= side):
+        raise BundleError(f"{THUMBNAIL}: is {width}×{height}, larger than {side}×{side}.")
+
+
+def _check_text(data: bytes) -> None:
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise BundleError(f"{LICENSES}: is not UTF-8 text.") from error

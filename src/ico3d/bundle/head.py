@@ -1,0 +1,152 @@
+"""The baked head: tensors that a shader blends (docs/bundle.md, head.safetensors)."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from ico3d.bundle.manifest import HeadInfo
+from ico3d.bundle.tensors import Spec, decode_tensors, encode_tensors
+from ico3d.errors import BundleError
+
+HEAD = "head.safetensors"
+POSES = "head_poses.safetensors"
+_MAX_LOG_SCALE = 10.0
+_MAX_LENGTH = 1e4
+"""Metres; anything farther is no person, and overflows when it is squared in a shader."""
+
+
+@dataclass(frozen=True)
+class BakedHead:
+    """N Gaussians in canonical head space whose look is a low-rank function of the expression.
+
+    Attributes:
+        means: (N, 3) float32 metres.
+        quats: (N, 4) float16 wxyz, normalised.
+        scales: (N, 3) float16, logarithms of metres.
+        mean_logits: (N, 4) float16 logits of r, g, b, opacity.
+        basis: (K, N, 4) int8.
+        basis_scale: (N,) float32.
+        w1: (B, H) float32.
+        b1: (H,) float32.
+        w2: (H, K) float32.
+        b2: (K,) float32.
+    """
+
+    means: np.ndarray
+    quats: np.ndarray
+    scales: np.ndarray
+    mean_logits: np.ndarray
+    basis: np.ndarray
+    basis_scale: np.ndarray
+    w1: np.ndarray
+    b1: np.ndarray
+    w2: np.ndarray
+    b2: np.ndarray
+
+    @property
+    def num_gaussians(self) -> int:
+        """N."""
+        return self.means.shape[0]
+
+    @property
+    def rank(self) -> int:
+        """K."""
+        return self.basis.shape[0]
+
+    @property
+    def hidden(self) -> int:
+        """H."""
+        return self.b1.shape[0]
+
+    @property
+    def expression_size(self) -> int:
+        """B."""
+        return self.w1.shape[0]
+
+    def to_bytes(self) -> bytes:
+        """The content of `head.safetensors`.
+
+        Raises:
+            BundleError: If shapes or dtypes disagree, or a value is out of range.
+        """
+        tensors = {f.name: getattr(self, f.name) for f in fields(self)}
+        spec = _head_spec(self.num_gaussians, self.rank, self.hidden, self.expression_size)
+        data = encode_tensors(tensors, spec, HEAD)
+        _check_values(self)
+        return data
+
+    @staticmethod
+    def from_bytes(data: bytes, info: HeadInfo) -> "BakedHead":
+        """Reads `head.safetensors`; the counts must be those of the manifest.
+
+        Raises:
+            BundleError: If anything does not fit.
+        """
+        spec = _head_spec(info.num_gaussians, info.rank, info.hidden, info.expression_size)
+        head = BakedHead(**decode_tensors(data, spec, HEAD))
+        _check_values(head)
+        return head
+
+
+def poses_to_bytes(world_from_head: np.ndarray) -> bytes:
+    """The content of `head_poses.safetensors` from (F, 4, 4) rigid transforms.
+
+    Raises:
+        BundleError: If one is not rigid.
+    """
+    spec = _poses_spec(len(world_from_head))
+    poses = np.asarray(world_from_head, np.float32)
+    _check_rigid(poses)
+    return encode_tensors({"world_from_head": poses}, spec, POSES)
+
+
+def poses_from_bytes(data: bytes, num_poses: int) -> np.ndarray:
+    """Reads `head_poses.safetensors` → (F, 4, 4) float32.
+
+    Raises:
+        BundleError: If it does not fit, or a pose is not rigid.
+    """
+    poses = decode_tensors(data, _poses_spec(num_poses), POSES)["world_from_head"]
+    _check_rigid(poses)
+    return poses
+
+
+def _head_spec(n: int, k: int, h: int, b: int) -> Spec:
+    return {
+        "means": ("F32", (n, 3)),
+        "quats": ("F16", (n, 4)),
+        "scales": ("F16", (n, 3)),
+        "mean_logits": ("F16", (n, 4)),
+        "basis": ("I8", (k, n, 4)),
+        "basis_scale": ("F32", (n,)),
+        "w1": ("F32", (b, h)),
+        "b1": ("F32", (h,)),
+        "w2": ("F32", (h, k)),
+        "b2": ("F32", (k,)),
+    }
+
+
+def _poses_spec(f: int) -> Spec:
+    return {"world_from_head": ("F32", (f, 4, 4))}
+
+
+def _check_values(head: BakedHead) -> None:
+    if np.abs(head.means).max() > _MAX_LENGTH:
+        raise BundleError(f"{HEAD}: 'means' reaches farther than {_MAX_LENGTH:g} m.")
+    if head.scales.max() > _MAX_LOG_SCALE:
+        raise BundleError(f"{HEAD}: 'scales' exceeds exp({_MAX_LOG_SCALE:g}) m.")
+    norms = np.linalg.norm(head.quats.astype(np.float32), axis=1)
+    if np.abs(norms - 1).max() > 1e-2:
+        raise BundleError(f"{HEAD}: 'quats' are not normalised.")
+
+
+def _check_rigid(poses: np.ndarray) -> None:
+    rotations = poses[:, :3, :3].astype(np.float64)
+    with np.errstate(over="ignore", invalid="ignore"):
+        gram = rotations @ rotations.transpose(0, 2, 1)  # (F, 3, 3)
+        off = np.abs(gram - np.eye(3)).max(axis=(1, 2))
+        last = np.abs(poses[:, 3] - (0, 0, 0, 1)).max(axis=1)
+        rigid = (off < 1e-3) & (last < 1e-6) & (np.linalg.det(rotations) > 0)
+    rigid &= np.abs(poses[:, :3, 3]).max(axis=1) < _MAX_LENGTH
+    if not rigid.all():
+        raise BundleError(f"{POSES}: pose {int(np.argmin(rigid))} is not a rigid transform.")

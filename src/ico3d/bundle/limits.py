@@ -1,0 +1,13 @@
+"""What a bundle may hold at most, so that a hostile one cannot exhaust memory."""
+
+MAX_FILES = 256
+MAX_FILE_BYTES = 256 << 20
+MAX_BUNDLE_BYTES = 512 << 20
+MAX_MANIFEST_BYTES = 1 << 20
+MAX_GAUSSIANS = 1_000_000
+MAX_RANK = 64
+MAX_HIDDEN = 1024
+MAX_EXPRESSION_SIZE = 512
+MAX_POSES = 100_000
+MAX_THUMBNAIL_SIDE = 512
+MAX_NOTES = 10_000

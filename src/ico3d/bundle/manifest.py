@@ -1,0 +1,227 @@
+"""The manifest of a bundle (docs/bundle.md) as typed data."""
+
+import json
+from dataclasses import dataclass, field
+from typing import Any
+
+from ico3d.bundle import limits
+from ico3d.bundle.decode import decode, encode, parse_json
+from ico3d.errors import BundleError
+
+FORMAT = "ico3d-bundle"
+VERSION = 1
+MANIFEST = "manifest.json"
+
+
+@dataclass(frozen=True)
+class FileEntry:
+    """One file: its SHA-256 in lower-case hexadecimal digits and its size in bytes."""
+
+    sha256: str
+    size: int
+
+
+@dataclass(frozen=True)
+class HeadInfo:
+    """The counts that the tensors must agree with.
+
+    Attributes:
+        num_gaussians: N.
+        rank: K, the number of basis vectors.
+        hidden: H, the width of the coefficient network.
+        inputs: `speech` or `blendshapes`.
+        expression_size: B.
+        eye_offset: Where the seven eye and brow values (`capture.EYE_NAMES`) start in the
+            expression; null where it has none.
+        expression_names: One name each for blendshapes; empty for speech.
+        fps: Rate of head poses.
+        num_poses: F, the number of head poses.
+        idle_expression: (B,) the neutral face in silence with open eyes.
+    """
+
+    num_gaussians: int
+    rank: int
+    hidden: int
+    inputs: str
+    expression_size: int
+    eye_offset: int | None
+    expression_names: tuple[str, ...]
+    fps: float
+    num_poses: int
+    idle_expression: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class SpeechInfo:
+    """How sound becomes expressions.
+
+    Attributes:
+        encoder: Name of the speech encoder.
+        sha256: Hash of the encoder's weights.
+        fps: Expression rows per second (25).
+        input: `mel` (windows (T, 80, 16)) or `features` (T, D).
+    """
+
+    encoder: str
+    sha256: str
+    fps: float
+    input: str
+
+
+@dataclass(frozen=True)
+class CameraInfo:
+    """Where the visitor starts: world space, metres, `fov_y` in degrees."""
+
+    eye: tuple[float, float, float]
+    target: tuple[float, float, float]
+    up: tuple[float, float, float]
+    fov_y: float
+
+
+@dataclass(frozen=True)
+class Persona:
+    """Who the avatar is: its name, what it says first, and notes to answer from.
+
+    Attributes:
+        name: How it calls itself.
+        greeting: Its first words.
+        notes: Each "question | question => answer".
+    """
+
+    name: str
+    greeting: str
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What baking costs on held-out frames, dB of whole-image PSNR; null where not measured.
+
+    Attributes:
+        psnr_exact: The exact model against ground truth.
+        psnr_baked: The baked head against ground truth.
+        psnr_baked_vs_exact: The baked head against the exact model's render.
+    """
+
+    psnr_exact: float | None
+    psnr_baked: float | None
+    psnr_baked_vs_exact: float | None
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where the avatar comes from: kind of subject, sources, consent, licence."""
+
+    kind: str
+    sources: tuple[str, ...]
+    consent: str
+    licence: str
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """`manifest.json`. `files` is filled in when the bundle is written."""
+
+    name: str
+    head: HeadInfo
+    speech: SpeechInfo | None
+    camera: CameraInfo
+    background: tuple[float, float, float]
+    persona: Persona
+    loss: Loss
+    provenance: Provenance
+    files: dict[str, FileEntry] = field(default_factory=dict)
+    format: str = FORMAT
+    version: int = VERSION
+
+    def to_json(self) -> bytes:
+        """UTF-8 JSON, the same bytes for the same manifest."""
+        return (json.dumps(encode(self), indent=1, ensure_ascii=False) + "\n").encode()
+
+    @staticmethod
+    def from_json(data: bytes) -> "Manifest":
+        """Parses and checks `manifest.json`.
+
+        Raises:
+            BundleError: If it is no manifest of this version, or contradicts itself.
+        """
+        if len(data) > limits.MAX_MANIFEST_BYTES:
+            raise BundleError(f"{MANIFEST}: is larger than {limits.MAX_MANIFEST_BYTES} bytes.")
+        value = parse_json(data, MANIFEST)
+        _check_version(value)
+        manifest = decode(Manifest, value, MANIFEST)
+        check_manifest(manifest)
+        return manifest
+
+
+def _check_version(value: Any) -> None:
+    """The format comes first: a newer version has other fields."""
+    if not isinstance(value, dict) or value.get("format") != FORMAT:
+        raise BundleError(f"{MANIFEST}: this is no ico3d bundle (format is not '{FORMAT}').")
+    if value.get("version") != VERSION:
+        raise BundleError(f"{MANIFEST}: this program reads bundles of version {VERSION} only.")
+
+
+def check_manifest(manifest: Manifest) -> None:
+    """Checks ranges and that the parts agree.
+
+    Raises:
+        BundleError: Naming the first field that is wrong.
+    """
+    _check_head(manifest.head)
+    _check_speech(manifest)
+    _check_camera(manifest.camera)
+    _require(all(0 <= c <= 1 for c in manifest.background), "background", "lie between 0 and 1")
+    _require(len(manifest.persona.notes) <= limits.MAX_NOTES, "persona.notes", "be fewer")
+    for name, entry in manifest.files.items():
+        _check_file(name, entry)
+
+
+def _check_head(head: HeadInfo) -> None:
+    ranges = {
+        "num_gaussians": limits.MAX_GAUSSIANS,
+        "rank": limits.MAX_RANK,
+        "hidden": limits.MAX_HIDDEN,
+        "expression_size": limits.MAX_EXPRESSION_SIZE,
+        "num_poses": limits.MAX_POSES,
+    }
+    for name, top in ranges.items():
+        _require(1 <= getattr(head, name) <= top, f"head.{name}", f"lie between 1 and {top}")
+    _require(head.inputs in ("speech", "blendshapes"), "head.inputs", "be speech or blendshapes")
+    _require(0 < head.fps <= 1000, "head.fps", "lie between 0 and 1000")
+    size = head.expression_size
+    _require(len(head.idle_expression) == size, "head.idle_expression", f"have {size} values")
+    named = len(head.expression_names)
+    _require(named in (0, size), "head.expression_names", f"be empty or have {size} names")
+    eyes = head.eye_offset
+    inside = eyes is None or 0 <= eyes <= size - 7
+    _require(inside, "head.eye_offset", f"leave room for 7 of the {size} values")
+
+
+def _check_speech(manifest: Manifest) -> None:
+    speech = manifest.speech
+    driven = manifest.head.inputs == "speech"
+    _require(driven == (speech is not None), "speech", "be there just for heads driven by speech")
+    if speech is not None:
+        _require(speech.input in ("mel", "features"), "speech.input", "be mel or features")
+        _require(0 < speech.fps <= 1000, "speech.fps", "lie between 0 and 1000")
+        _require(manifest.head.eye_offset == 32, "head.eye_offset", "be 32 for speech")
+
+
+def _check_camera(camera: CameraInfo) -> None:
+    _require(1 <= camera.fov_y <= 170, "camera.fov_y", "lie between 1 and 170 degrees")
+    _require(camera.eye != camera.target, "camera.eye", "differ from the target")
+    _require(any(camera.up), "camera.up", "have a length")
+
+
+def _check_file(name: str, entry: FileEntry) -> None:
+    digits = set("0123456789abcdef")
+    valid = len(entry.sha256) == 64 and set(entry.sha256) <= digits
+    _require(valid, f"files[{name[:80]!r}].sha256", "be 64 lower-case hexadecimal digits")
+    inside = 0 <= entry.size <= limits.MAX_FILE_BYTES
+    _require(inside, f"files[{name[:80]!r}].size", f"be at most {limits.MAX_FILE_BYTES}")
+
+
+def _require(holds: bool, where: str, what: str) -> None:
+    if not holds:
+        raise BundleError(f"{MANIFEST}: {where} must {what}.")

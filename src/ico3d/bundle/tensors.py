@@ -1,0 +1,109 @@
+"""Safetensors with exact expectations: each tensor's dtype, shape and finiteness."""
+
+import struct
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from safetensors.numpy import save
+
+from ico3d.bundle.decode import parse_json
+from ico3d.errors import BundleError
+
+_DTYPES = {"F32": np.dtype("<f4"), "F16": np.dtype("<f2"), "I8": np.dtype("i1")}
+_MAX_HEADER_BYTES = 1 << 16
+
+Spec = Mapping[str, tuple[str, tuple[int, ...]]]
+"""Name → (safetensors dtype, shape) of every tensor that a file must hold."""
+
+
+def encode_tensors(tensors: Mapping[str, np.ndarray], spec: Spec, name: str) -> bytes:
+    """Serialises tensors that fit `spec`; the same tensors give the same bytes.
+
+    Raises:
+        BundleError: If one has another dtype or shape, or is not finite.
+    """
+    for key, (dtype, shape) in spec.items():
+        array = tensors[key]
+        if array.dtype != _DTYPES[dtype] or array.shape != shape:
+            raise BundleError(
+                f"{name}: '{key}' must be {dtype} {shape}, not {array.dtype} {array.shape}."
+            )
+        _check_finite(array, key, name)
+    return save({key: np.ascontiguousarray(tensors[key]) for key in spec})
+
+
+def decode_tensors(data: bytes, spec: Spec, name: str) -> dict[str, np.ndarray]:
+    """Reads tensors as read-only views of `data`.
+
+    Args:
+        data: A whole safetensors file.
+        spec: What it must hold, no more and no less.
+        name: The file, for messages.
+
+    Raises:
+        BundleError: If header, dtypes, shapes or values are anything else.
+    """
+    header, start = _header(data, name)
+    if set(header) != set(spec):
+        odd = sorted(set(header) ^ set(spec))[0]
+        problem = "lacks" if odd in spec else "has the unknown"
+        raise BundleError(f"{name}: {problem} tensor {odd[:40]!r}.")
+    spans: list[tuple[int, int]] = []
+    tensors = {}
+    for key, (dtype, shape) in spec.items():
+        span = _check_entry(header[key], dtype, shape, f"{name}: '{key}'")
+        if start + span[1] > len(data):
+            raise BundleError(f"{name}: '{key}' lies outside the file.")
+        spans.append(span)
+        flat = np.frombuffer(data, _DTYPES[dtype], int(np.prod(shape)), start + span[0])
+        tensors[key] = flat.reshape(shape)
+        _check_finite(tensors[key], key, name)
+    _check_cover(spans, len(data) - start, name)
+    return tensors
+
+
+def _header(data: bytes, name: str) -> tuple[dict[str, Any], int]:
+    """The header without its free-text metadata, and where the values start."""
+    if len(data) < 8:
+        raise BundleError(f"{name}: is too short to hold tensors.")
+    (length,) = struct.unpack_from("<Q", data)
+    if length > min(_MAX_HEADER_BYTES, len(data) - 8):
+        raise BundleError(f"{name}: has a header of impossible length.")
+    header = parse_json(data[8 : 8 + length], name)
+    if not isinstance(header, dict):
+        raise BundleError(f"{name}: its header is not an object.")
+    header.pop("__metadata__", None)
+    return header, 8 + length
+
+
+def _check_entry(entry: Any, dtype: str, shape: tuple[int, ...], where: str) -> tuple[int, int]:
+    """Compares one header entry with the expectation; returns its byte span."""
+    if not isinstance(entry, dict) or set(entry) != {"dtype", "shape", "data_offsets"}:
+        raise BundleError(f"{where} has a malformed header entry.")
+    if entry["dtype"] != dtype or entry["shape"] != list(shape):
+        found = f"{entry['dtype']} {entry['shape']}"[:60]
+        raise BundleError(f"{where} must be {dtype} {list(shape)}, not {found}.")
+    span = entry["data_offsets"]
+    if not isinstance(span, list) or len(span) != 2 or not all(type(x) is int for x in span):
+        raise BundleError(f"{where} has malformed offsets.")
+    size = int(np.prod(shape)) * _DTYPES[dtype].itemsize
+    if span[0] < 0 or span[1] - span[0] != size:
+        raise BundleError(f"{where} must take {size} bytes.")
+    return span[0], span[1]
+
+
+def _check_cover(spans: list[tuple[int, int]], size: int, name: str) -> None:
+    """Tensors must fill the file without gap or overlap (the safetensors rule)."""
+    position = 0
+    for begin, end in sorted(spans):
+        if begin != position:
+            raise BundleError(f"{name}: its tensors overlap or leave a gap.")
+        position = end
+    if position != size:
+        raise BundleError(f"{name}: has bytes that belong to no tensor.")
+
+
+def _check_finite(array: np.ndarray, key: str, name: str) -> None:
+    if not np.isfinite(array).all():
+        raise BundleError(f"{name}: '{key}' holds a value that is not finite.")
