@@ -1,0 +1,317 @@
+"""The vocabulary of the wire: every message between page and server, and the limits.
+
+This file is the one source: `codec.py` reads the annotations to encode, decode and check, and
+`python -m ico3d.chat.protocol_typescript` writes `viewer/src/protocol.ts` from them.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+
+VERSION = 1
+MICROPHONE_RATE = 16_000  # Hz, PCM16 mono from the page
+SPEECH_RATE = 24_000  # Hz, PCM16 mono to the page
+EXPRESSION_FPS = 25  # rows per second of an utterance's sound
+MAX_TEXT_FRAME = 16 * 1024  # bytes
+MAX_BINARY_FRAME = 64 * 1024  # bytes
+MAX_RATE = 100  # messages per second a client may send for long
+MAX_BURST = 200  # messages it may send at once
+RESUME_SECONDS = 30  # how long a session waits for its page to come back
+MAX_AHEAD_SECONDS = 2.0  # how far speech may run ahead of its playback
+MAX_EXACT = 2**53  # largest whole number JavaScript holds
+
+
+@dataclass(frozen=True)
+class Range:
+    """Bounds of a number, both included."""
+
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Length:
+    """Bounds of a text's characters or a list's items, both included."""
+
+    low: int
+    high: int
+
+
+@dataclass(frozen=True)
+class Tensor:
+    """An array in the payload of a binary message; its header field holds the shape.
+
+    Attributes:
+        dtype: numpy name, little-endian: `<i2` or `<f2`.
+        dims: Number of dimensions.
+        max_size: Most elements.
+    """
+
+    dtype: str
+    dims: int
+    max_size: int
+
+
+Count = Annotated[int, Range(0, MAX_EXACT)]
+Seconds = Annotated[float, Range(0, 1e7)]
+Sentence = Annotated[str, Length(0, 4000)]
+Name = Annotated[str, Length(1, 200)]
+Milliseconds = Annotated[float, Range(-1e7, 1e7)]
+
+
+@dataclass(frozen=True)
+class Hello:
+    """First message of every connection.
+
+    Attributes:
+        version: Protocol version of the page.
+        session: The session to go on with after a dropped connection; null for a new one.
+        last_index: `index` of the last speech message that arrived; -1 when new.
+    """
+
+    version: Count
+    session: Annotated[str, Length(1, 64)] | None
+    last_index: Annotated[int, Range(-1, MAX_EXACT)]
+
+
+@dataclass(frozen=True, eq=False)
+class Audio:
+    """Sound from the microphone (binary).
+
+    Attributes:
+        sample: Index of the first sample since the microphone opened.
+        pcm: (n,) int16 at 16 kHz, at most 1 s.
+    """
+
+    sample: Count
+    pcm: Annotated[np.ndarray, Tensor("<i2", 1, MICROPHONE_RATE)]
+
+
+@dataclass(frozen=True)
+class Text:
+    """A typed question.
+
+    Attributes:
+        text: What was typed.
+    """
+
+    text: Annotated[str, Length(1, 2000)]
+
+
+@dataclass(frozen=True)
+class Interrupt:
+    """The visitor wants silence.
+
+    Attributes:
+        utterance: The utterance to stop; null for whatever speaks.
+    """
+
+    utterance: Count | None
+
+
+@dataclass(frozen=True)
+class Clock:
+    """How far the page has played; every 100-250 ms while it plays, and once at the very end.
+
+    Attributes:
+        utterance: The utterance that plays.
+        position: Seconds of it already heard (output latency included).
+        body_time: Seconds on the body's own time line; 0 without a body.
+    """
+
+    utterance: Count
+    position: Seconds
+    body_time: Seconds
+
+
+@dataclass(frozen=True)
+class Service:
+    """One of the three services that make the conversation.
+
+    Attributes:
+        name: For the visitor's eyes.
+        stand_in: True for the small offline ones that the page says plainly are in use.
+    """
+
+    name: Name
+    stand_in: bool
+
+
+@dataclass(frozen=True)
+class Services:
+    """Who listens, thinks and speaks.
+
+    Attributes:
+        recognition: Speech to text.
+        language: Question to answer.
+        voice: Text to speech.
+    """
+
+    recognition: Service
+    language: Service
+    voice: Service
+
+
+@dataclass(frozen=True)
+class Welcome:
+    """Answer to `hello`.
+
+    Attributes:
+        version: Protocol version of the server.
+        session: Name of the session, to be kept for a resume.
+        resumed: True if this goes on with the session that `hello` named.
+        services: Who listens, thinks and speaks.
+        notices: Sentences the page shows once (what this avatar cannot do).
+    """
+
+    version: Count
+    session: Annotated[str, Length(1, 64)]
+    resumed: bool
+    services: Services
+    notices: Annotated[list[Sentence], Length(0, 8)]
+
+
+@dataclass(frozen=True)
+class State:
+    """What the avatar does now.
+
+    Attributes:
+        state: `listening` while the visitor speaks, `thinking` until sound comes, `speaking`.
+    """
+
+    state: Literal["idle", "listening", "thinking", "speaking"]
+
+
+@dataclass(frozen=True)
+class Transcript:
+    """What the visitor was understood to say.
+
+    Attributes:
+        text: All words of this turn so far.
+        final: False while he still speaks: the next one replaces this one.
+    """
+
+    text: Sentence
+    final: bool
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One sentence of the answer, just before its sound.
+
+    Attributes:
+        utterance: Counts up by one for each answer in a session.
+        first_sample: Where in the utterance its sound starts (24 kHz).
+        text: The sentence.
+    """
+
+    utterance: Count
+    first_sample: Count
+    text: Sentence
+
+
+@dataclass(frozen=True, eq=False)
+class Speech:
+    """100-200 ms of sound and the face that belongs to it (binary).
+
+    Expression row `first_expression` + j belongs to the utterance's time
+    (first_expression + j) / 25 s.
+
+    Attributes:
+        utterance: Which answer.
+        index: Counts the session's speech messages.
+        first_sample: Of the utterance, at 24 kHz.
+        first_expression: Index in the utterance of the first row.
+        pcm: (n,) int16 at 24 kHz.
+        expressions: (rows, B) float16.
+    """
+
+    utterance: Count
+    index: Count
+    first_sample: Count
+    first_expression: Count
+    pcm: Annotated[np.ndarray, Tensor("<i2", 1, SPEECH_RATE)]
+    expressions: Annotated[np.ndarray, Tensor("<f2", 2, 8000)]
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """Which body time belongs to which time of the sound.
+
+    Attributes:
+        utterance: Which answer.
+        points: (audio time, body time) pairs, seconds.
+    """
+
+    utterance: Count
+    points: Annotated[list[tuple[Seconds, Seconds]], Length(0, 500)]
+
+
+@dataclass(frozen=True)
+class End:
+    """All sound of an utterance has been sent.
+
+    Attributes:
+        utterance: Which answer.
+        samples: Its length at 24 kHz.
+    """
+
+    utterance: Count
+    samples: Count
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Fall silent at once and drop everything that belongs to an utterance.
+
+    Attributes:
+        utterance: Which answer.
+    """
+
+    utterance: Count
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """How long something took.
+
+    Attributes:
+        name: What was measured.
+        values: Milliseconds by part.
+    """
+
+    name: Name
+    values: Annotated[dict[str, Milliseconds], Length(0, 32)]
+
+
+@dataclass(frozen=True)
+class Error:
+    """Something went wrong.
+
+    Attributes:
+        message: One sentence.
+        fatal: True if the server closes the connection after it.
+    """
+
+    message: Sentence
+    fatal: bool
+
+
+CLIENT_MESSAGES = (Hello, Audio, Text, Interrupt, Clock)
+SERVER_MESSAGES = (
+    Welcome,
+    State,
+    Transcript,
+    Answer,
+    Speech,
+    Timeline,
+    End,
+    Stop,
+    Metrics,
+    Error,
+)
+ClientMessage = Hello | Audio | Text | Interrupt | Clock
+ServerMessage = (
+    Welcome | State | Transcript | Answer | Speech | Timeline | End | Stop | Metrics | Error
+)

@@ -1,0 +1,191 @@
+"""The wire: what is encoded comes back the same; what is malformed is refused in one sentence."""
+
+import json
+import struct
+import typing
+from dataclasses import fields, is_dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ico3d.chat import protocol, protocol_typescript
+from ico3d.chat.codec import (
+    OversizedError,
+    decode_client,
+    decode_server,
+    encode,
+    field_types,
+    split_annotation,
+    tensor_of,
+)
+from ico3d.errors import ProtocolError
+
+
+def characters(low, high):
+    return st.text(st.characters(codec="utf-8"), min_size=low, max_size=min(high, 60))
+
+
+def values(annotation):
+    """A strategy for all values that an annotation of the protocol allows."""
+    tensor = tensor_of(annotation)
+    if tensor:
+        return arrays(tensor)
+    bare, marks = split_annotation(annotation)
+    origin, arguments = typing.get_origin(bare), typing.get_args(bare)
+    if origin is typing.Literal:
+        return st.sampled_from(arguments)
+    if origin is list:
+        return st.lists(values(arguments[0]), max_size=min(marks[0].high, 8))
+    if origin is tuple:
+        return st.tuples(*map(values, arguments))
+    if origin is dict:
+        return st.dictionaries(characters(1, 8), values(arguments[1]), max_size=8)
+    if is_dataclass(bare):
+        return messages(bare)
+    if arguments:  # T | None
+        return st.none() | values(arguments[0])
+    if bare is str:
+        return characters(marks[0].low, marks[0].high)
+    if bare is bool:
+        return st.booleans()
+    kind = st.integers if bare is int else st.floats
+    return kind(marks[0].low, marks[0].high)
+
+
+def arrays(tensor):
+    shapes = st.tuples(*[st.integers(0, 40)] * tensor.dims)
+    return shapes.flatmap(
+        lambda shape: st.integers(0, 2**32 - 1).map(
+            lambda seed: np.random.default_rng(seed).integers(-999, 999, shape).astype(tensor.dtype)
+        )
+    )
+
+
+def messages(kind):
+    return st.builds(kind, **{name: values(note) for name, note in field_types(kind).items()})
+
+
+def assert_same(a, b):
+    assert type(a) is type(b)
+    for field in fields(a):
+        x, y = getattr(a, field.name), getattr(b, field.name)
+        if isinstance(x, np.ndarray):
+            assert x.dtype == y.dtype and x.shape == y.shape
+            np.testing.assert_array_equal(x, y)
+        else:
+            assert x == y
+
+
+@given(st.one_of(*map(messages, protocol.CLIENT_MESSAGES)))
+def test_client_messages_come_back_the_same(message):
+    assert_same(decode_client(encode(message)), message)
+
+
+@given(st.one_of(*map(messages, protocol.SERVER_MESSAGES)))
+def test_server_messages_come_back_the_same(message):
+    assert_same(decode_server(encode(message)), message)
+
+
+def test_binary_layout_is_the_documented_one():
+    pcm = np.array([1, -2, 3], np.int16)
+    rows = np.array([[0.5, -1.0]], np.float16)
+    frame = encode(protocol.Speech(3, 7, 100, 4, pcm, rows))
+    (length,) = struct.unpack_from("<I", frame)
+    header = json.loads(frame[4 : 4 + length])
+    assert header == {
+        "type": "speech",
+        "utterance": 3,
+        "index": 7,
+        "first_sample": 100,
+        "first_expression": 4,
+        "pcm": [3],
+        "expressions": [1, 2],
+    }
+    assert frame[4 + length :] == pcm.tobytes() + rows.tobytes()
+
+
+@given(st.text() | st.binary())
+def test_garbage_is_refused_and_nothing_else_happens(frame):
+    with pytest.raises(ProtocolError):
+        decode_client(frame)
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+    max_leaves=8,
+)
+
+
+@given(
+    st.sampled_from(protocol.CLIENT_MESSAGES).flatmap(
+        lambda kind: st.tuples(
+            st.just(kind), st.dictionaries(st.sampled_from(sorted(field_types(kind))), json_values)
+        )
+    )
+)
+def test_wrong_fields_are_refused_or_valid(case):
+    kind, header = case
+    frame = json.dumps({"type": kind.__name__.lower(), **header})
+    try:
+        message = decode_client(frame)
+    except ProtocolError as error:
+        assert len(str(error)) < 400
+    else:
+        assert_same(decode_client(encode(message)), message)
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        '{"type":"text","text":""}',
+        '{"type":"text","text":"' + "x" * 2001 + '"}',
+        '{"type":"text","text":"a","more":1}',
+        '{"type":"text"}',
+        '{"type":"text","text":"\\ud800"}',
+        '{"type":["text"],"text":"a"}',
+        '{"type":"welcome"}',
+        '{"type":"clock","utterance":0,"position":NaN,"body_time":0}',
+        '{"type":"clock","utterance":0,"position":1e999,"body_time":0}',
+        '{"type":"clock","utterance":true,"position":0,"body_time":0}',
+        '{"type":"clock","utterance":0.5,"position":0,"body_time":0}',
+        '{"type":"clock","utterance":-1,"position":0,"body_time":0}',
+        '{"type":"audio","sample":0,"pcm":[2]}',
+        "[" * 16000,
+        "9" * 16000,
+        struct.pack("<I", 2**31) + b"{}",
+        struct.pack("<I", 2) + b"{}",
+    ],
+)
+def test_malformed_frames_are_refused(frame):
+    with pytest.raises(ProtocolError):
+        decode_client(frame)
+
+
+@pytest.mark.parametrize("shape", [[3], [1], [-1], [2, 1], [16001], [2.0], [True], None, [1e300]])
+def test_a_payload_must_match_its_shape(shape):
+    header = json.dumps({"type": "audio", "sample": 0, "pcm": shape}).encode()
+    with pytest.raises(ProtocolError):
+        decode_client(struct.pack("<I", len(header)) + header + bytes(4))
+
+
+def test_oversized_frames_are_told_apart():
+    with pytest.raises(OversizedError):
+        decode_client('{"type":"text","text":"' + "x" * 20000 + '"}')
+    with pytest.raises(OversizedError):
+        decode_client(bytes(70000))
+
+
+def test_own_mistakes_are_refused_when_encoding():
+    with pytest.raises(ProtocolError):
+        encode(protocol.Clock(0, float("nan"), 0.0))
+    with pytest.raises(ProtocolError):
+        encode(protocol.Audio(0, np.zeros(16001, np.int16)))
+
+
+def test_the_viewers_file_is_up_to_date():
+    assert protocol_typescript.TARGET.read_text(encoding="utf-8") == (
+        protocol_typescript.typescript()
+    ), "run python -m ico3d.chat.protocol_typescript"

@@ -1,0 +1,276 @@
+// Written by `python -m ico3d.chat.protocol_typescript` from src/ico3d/chat/protocol.py: edit that.
+
+export const VERSION = 1;
+export const MICROPHONE_RATE = 16000; // Hz
+export const SPEECH_RATE = 24000; // Hz
+export const EXPRESSION_FPS = 25; // rows per second
+export const MAX_TEXT_FRAME = 16384; // bytes
+export const MAX_BINARY_FRAME = 65536; // bytes
+export const MAX_RATE = 100; // messages per second
+export const MAX_BURST = 200; // messages
+export const RESUME_SECONDS = 30;
+export const MAX_AHEAD_SECONDS = 2;
+
+/** One of the three services that make the conversation. */
+export interface Service {
+  /** For the visitor's eyes. */
+  name: string;
+  /** True for the small offline ones that the page says plainly are in use. */
+  stand_in: boolean;
+}
+
+/** Who listens, thinks and speaks. */
+export interface Services {
+  /** Speech to text. */
+  recognition: Service;
+  /** Question to answer. */
+  language: Service;
+  /** Text to speech. */
+  voice: Service;
+}
+
+/** First message of every connection. */
+export interface HelloMessage {
+  type: "hello";
+  /** Protocol version of the page. */
+  version: number;
+  /** The session to go on with after a dropped connection; null for a new one. */
+  session: string | null;
+  /** `index` of the last speech message that arrived; -1 when new. */
+  last_index: number;
+}
+
+/** Sound from the microphone (binary). */
+export interface AudioMessage {
+  type: "audio";
+  /** Index of the first sample since the microphone opened. */
+  sample: number;
+  /** (n,) int16 at 16 kHz, at most 1 s. */
+  pcm: Int16Array;
+}
+
+/** A typed question. */
+export interface TextMessage {
+  type: "text";
+  /** What was typed. */
+  text: string;
+}
+
+/** The visitor wants silence. */
+export interface InterruptMessage {
+  type: "interrupt";
+  /** The utterance to stop; null for whatever speaks. */
+  utterance: number | null;
+}
+
+/** How far the page has played; every 100-250 ms while it plays, and once at the very end. */
+export interface ClockMessage {
+  type: "clock";
+  /** The utterance that plays. */
+  utterance: number;
+  /** Seconds of it already heard (output latency included). */
+  position: number;
+  /** Seconds on the body's own time line; 0 without a body. */
+  body_time: number;
+}
+
+/** Answer to `hello`. */
+export interface WelcomeMessage {
+  type: "welcome";
+  /** Protocol version of the server. */
+  version: number;
+  /** Name of the session, to be kept for a resume. */
+  session: string;
+  /** True if this goes on with the session that `hello` named. */
+  resumed: boolean;
+  /** Who listens, thinks and speaks. */
+  services: Services;
+  /** Sentences the page shows once (what this avatar cannot do). */
+  notices: string[];
+}
+
+/** What the avatar does now. */
+export interface StateMessage {
+  type: "state";
+  /** `listening` while the visitor speaks, `thinking` until sound comes, `speaking`. */
+  state: "idle" | "listening" | "thinking" | "speaking";
+}
+
+/** What the visitor was understood to say. */
+export interface TranscriptMessage {
+  type: "transcript";
+  /** All words of this turn so far. */
+  text: string;
+  /** False while he still speaks: the next one replaces this one. */
+  final: boolean;
+}
+
+/** One sentence of the answer, just before its sound. */
+export interface AnswerMessage {
+  type: "answer";
+  /** Counts up by one for each answer in a session. */
+  utterance: number;
+  /** Where in the utterance its sound starts (24 kHz). */
+  first_sample: number;
+  /** The sentence. */
+  text: string;
+}
+
+/** 100-200 ms of sound and the face that belongs to it (binary). Expression row `first_expression` + j belongs to the utterance's time (first_expression + j) / 25 s. */
+export interface SpeechMessage {
+  type: "speech";
+  /** Which answer. */
+  utterance: number;
+  /** Counts the session's speech messages. */
+  index: number;
+  /** Of the utterance, at 24 kHz. */
+  first_sample: number;
+  /** Index in the utterance of the first row. */
+  first_expression: number;
+  /** (n,) int16 at 24 kHz. */
+  pcm: Int16Array;
+  /** (rows, B) float16. */
+  expressions: Matrix;
+}
+
+/** Which body time belongs to which time of the sound. */
+export interface TimelineMessage {
+  type: "timeline";
+  /** Which answer. */
+  utterance: number;
+  /** (audio time, body time) pairs, seconds. */
+  points: [number, number][];
+}
+
+/** All sound of an utterance has been sent. */
+export interface EndMessage {
+  type: "end";
+  /** Which answer. */
+  utterance: number;
+  /** Its length at 24 kHz. */
+  samples: number;
+}
+
+/** Fall silent at once and drop everything that belongs to an utterance. */
+export interface StopMessage {
+  type: "stop";
+  /** Which answer. */
+  utterance: number;
+}
+
+/** How long something took. */
+export interface MetricsMessage {
+  type: "metrics";
+  /** What was measured. */
+  name: string;
+  /** Milliseconds by part. */
+  values: Record<string, number>;
+}
+
+/** Something went wrong. */
+export interface ErrorMessage {
+  type: "error";
+  /** One sentence. */
+  message: string;
+  /** True if the server closes the connection after it. */
+  fatal: boolean;
+}
+
+export type ClientMessage =
+  | HelloMessage
+  | AudioMessage
+  | TextMessage
+  | InterruptMessage
+  | ClockMessage;
+
+export type ServerMessage =
+  | WelcomeMessage
+  | StateMessage
+  | TranscriptMessage
+  | AnswerMessage
+  | SpeechMessage
+  | TimelineMessage
+  | EndMessage
+  | StopMessage
+  | MetricsMessage
+  | ErrorMessage;
+
+const SERVER_TYPES = ["welcome", "state", "transcript", "answer", "speech", "timeline", "end", "stop", "metrics", "error"];
+
+const TENSORS: Record<string, readonly Tensor[]> = {
+  audio: [["pcm", "int16"]],
+  speech: [["pcm", "int16"], ["expressions", "float16"]],
+};
+
+/** A matrix in row order. */
+export interface Matrix {
+  rows: number;
+  columns: number;
+  values: Float32Array;
+}
+
+type Header = { type: string } & Record<string, unknown>;
+type Tensor = readonly [field: string, kind: "int16" | "float16"];
+
+/** A message as a WebSocket frame. */
+export function encode(message: ClientMessage): string | ArrayBuffer {
+  const header: Header = { ...message };
+  const tensors = TENSORS[message.type];
+  if (!tensors) return JSON.stringify(header);
+  const parts: Int16Array[] = [];
+  for (const [field] of tensors) {
+    const values = header[field] as Int16Array;
+    parts.push(values);
+    header[field] = [values.length];
+  }
+  return joinFrame(new TextEncoder().encode(JSON.stringify(header)), parts);
+}
+
+function joinFrame(header: Uint8Array, parts: Int16Array[]): ArrayBuffer {
+  const length = parts.reduce((sum, part) => sum + part.byteLength, 4 + header.byteLength);
+  const frame = new Uint8Array(length);
+  new DataView(frame.buffer).setUint32(0, header.byteLength, true);
+  frame.set(header, 4);
+  let at = 4 + header.byteLength;
+  for (const part of parts) {
+    frame.set(new Uint8Array(part.buffer, part.byteOffset, part.byteLength), at);
+    at += part.byteLength;
+  }
+  return frame.buffer;
+}
+
+/** A frame as a message; throws an Error on one that is not from this protocol. */
+export function decode(frame: string | ArrayBuffer): ServerMessage {
+  if (typeof frame === "string") return known(JSON.parse(frame) as Header);
+  const length = new DataView(frame).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(frame, 4, length))) as Header;
+  let at = 4 + length;
+  for (const [field, kind] of TENSORS[header.type] ?? []) {
+    const shape = header[field] as number[];
+    const bytes = 2 * shape.reduce((product, size) => product * size, 1);
+    const words = new Uint16Array(frame.slice(at, at + bytes));
+    header[field] = kind === "int16" ? new Int16Array(words.buffer) : matrix(shape, words);
+    at += bytes;
+  }
+  return known(header);
+}
+
+function known(header: Header): ServerMessage {
+  if (!SERVER_TYPES.includes(header.type)) throw new Error(`unknown message ${header.type}`);
+  return header as unknown as ServerMessage;
+}
+
+function matrix(shape: number[], words: Uint16Array): Matrix {
+  const [rows = 0, columns = 0] = shape;
+  return { rows, columns, values: Float32Array.from(words, floatFromHalf) };
+}
+
+/** IEEE 754 half precision to a number. */
+export function floatFromHalf(word: number): number {
+  const sign = word & 0x8000 ? -1 : 1;
+  const exponent = (word >> 10) & 0x1f;
+  const fraction = word & 0x3ff;
+  if (exponent === 0) return sign * fraction * 2 ** -24;
+  if (exponent === 31) return fraction ? NaN : sign * Infinity;
+  return sign * (1 + fraction / 1024) * 2 ** (exponent - 15);
+}
