@@ -122,7 +122,7 @@ def synthesize(
 
     Args:
         text: What to say, in the language of the voice.
-        voice: Language and, after `+`, a variant: `en-us`, `de+f3`, `fr-fr+klatt2`.
+        voice: Language and, after `+`, a variant: `en-us`, `de+f3`, `fr+klatt2`.
         rate: Words per minute, 80 to 450.
         pitch: 0 to 100.
         pitch_range: How far the pitch moves: 0 (monotone) to 100.
