@@ -16,6 +16,7 @@ from ico3d.errors import BundleError
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,99}(/[A-Za-z0-9_][A-Za-z0-9_.\-]{0,99}){0,3}")
 _END_RECORD = struct.Struct("<4s4H2LH")
+_ZIP64_LOCATOR_BYTES = 20
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -143,6 +144,9 @@ def _check_directory(file, path: Path) -> None:
         raise BundleError(f"{path.name}: is not a plain zip archive, or it was cut off.")
     if count > limits.MAX_FILES or length > limits.MAX_MANIFEST_BYTES:
         raise BundleError(f"{path.name}: holds more than {limits.MAX_FILES} files.")
+    file.seek(max(0, size - _END_RECORD.size - _ZIP64_LOCATOR_BYTES))
+    if file.read(4) == b"PK\6\7":
+        raise BundleError(f"{path.name}: is a zip64 archive; no bundle is that large.")
     if start + length + _END_RECORD.size != size:
         raise BundleError(f"{path.name}: its directory is not where it should be.")
     file.seek(0)

@@ -34,5 +34,6 @@ def attributes(head: BakedHead, expression: np.ndarray) -> tuple[np.ndarray, np.
     Returns:
         rgb (N, 3) and opacity (N,), float32 in [0, 1].
     """
-    values = 1 / (1 + np.exp(-logits(head, expression)))  # (N, 4)
+    # The sigmoid, in the form that never overflows.
+    values = 0.5 + 0.5 * np.tanh(0.5 * logits(head, expression))  # (N, 4)
     return values[:, :3], values[:, 3]
