@@ -1,0 +1,117 @@
+"""The latent basis of the Gaussians: blending by an expression, and learning it.
+
+One image gives the basis a gradient of rank one, e ⊗ g. It is 40 to 60 times the size of g and
+never stored: `update_basis` takes e and g apart.
+"""
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ico3d.head.kernels import adam_rank_one, blend_rows, row_products
+from ico3d.training.optimiser import Optimiser, adam_reference, bias_corrections
+
+
+def blend(basis: Tensor, weights: Tensor) -> Tensor:
+    """Blends the rows of the basis (paper, the equation of f_i; the bias f_0 is the last row).
+
+    Args:
+        basis: (R, N, w).
+        weights: (R,) the expression with 1 appended.
+
+    Returns:
+        (N, w) features; differentiable in both arguments.
+    """
+    return _Blend.apply(basis, weights)  # type: ignore[no-any-return]
+
+
+class _Blend(torch.autograd.Function):
+    """Σ_r weights[r]·basis[r]."""
+
+    @staticmethod
+    def forward(ctx, basis: Tensor, weights: Tensor) -> Tensor:
+        ctx.save_for_backward(basis, weights)
+        if not _has_kernel(basis):
+            return torch.einsum("rnw,r->nw", basis, weights)
+        out = torch.empty(basis.shape[1:])  # (N, w)
+        values = weights.contiguous().numpy()
+        blend_rows(_rows(basis), values, np.flatnonzero(values), out.view(-1).numpy())
+        return out
+
+    @staticmethod
+    def backward(ctx, *gradients: Tensor):
+        basis, weights = ctx.saved_tensors
+        gradient = gradients[0].contiguous()  # (N, w)
+        for_basis = for_weights = None
+        if ctx.needs_input_grad[0]:
+            for_basis = weights[:, None, None] * gradient  # (R, N, w)
+        if ctx.needs_input_grad[1]:
+            for_weights = _weight_gradient(basis, gradient)  # (R,)
+        return for_basis, for_weights
+
+
+def _weight_gradient(basis: Tensor, gradient: Tensor) -> Tensor:
+    if not _has_kernel(basis):
+        return torch.einsum("rnw,nw->r", basis, gradient)
+    out = torch.empty(basis.shape[0])  # (R,)
+    row_products(_rows(basis), gradient.view(-1).numpy(), out.numpy())
+    return out
+
+
+def update_basis(
+    optimiser: Optimiser, basis: Tensor, weights: Tensor, gradient: Tensor, rate: float
+) -> None:
+    """One step on the basis with the gradient weights ⊗ gradient, in place.
+
+    Rows of weight 0 are left alone, moments included, and each row counts its own steps (lazy
+    Adam, as usual for sparse gradients): most blendshapes rest in most frames.
+
+    Args:
+        optimiser: Holds the moments under the name "basis".
+        basis: (R, N, w).
+        weights: (R,) the expression with 1 appended.
+        gradient: (N, w) of the blended features.
+        rate: Learning rate.
+    """
+    basis, weights, gradient = basis.detach(), weights.detach(), gradient.detach()
+    rows = torch.nonzero(weights)[:, 0]  # (active,)
+    if optimiser.kind == "sgd":
+        basis[rows] -= rate * weights[rows, None, None] * gradient
+        return
+    first, second, counts = _moments(optimiser, basis)
+    counts[rows.cpu()] += 1
+    if _has_kernel(basis):
+        corrections = np.array([bias_corrections(max(int(n), 1)) for n in counts])  # (R, 2)
+        adam_rank_one(
+            _rows(basis),
+            _rows(first),
+            _rows(second),
+            weights.contiguous().numpy(),
+            gradient.contiguous().view(-1).numpy(),
+            rows.numpy(),
+            np.float32(rate) * corrections[:, 0],
+            corrections[:, 1].copy(),
+        )
+        return
+    for row in rows.tolist():
+        parts = (basis[row], first[row], second[row], weights[row] * gradient)
+        adam_reference(*parts, rate, bias_corrections(int(counts[row])))
+
+
+def _moments(optimiser: Optimiser, basis: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Both moments (R, N, w) and the number of updates of each row (R,)."""
+    moments = optimiser.moments
+    if "basis.first" not in moments:
+        moments["basis.first"] = torch.zeros_like(basis)
+        moments["basis.second"] = torch.zeros_like(basis)
+        moments["basis.steps"] = torch.zeros(basis.shape[0], dtype=torch.int64)
+    return moments["basis.first"], moments["basis.second"], moments["basis.steps"]
+
+
+def _has_kernel(basis: Tensor) -> bool:
+    return basis.device.type == "cpu" and basis.dtype == torch.float32
+
+
+def _rows(basis: Tensor) -> np.ndarray:
+    """(R, N·w) view for the kernels."""
+    return basis.detach().view(basis.shape[0], -1).numpy()

@@ -1,0 +1,129 @@
+"""From a capture to the expression of each of its frames."""
+
+import logging
+from typing import Protocol
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ico3d.capture.capture import Capture
+from ico3d.errors import CaptureError
+
+FEATURE_RATE = 25.0
+"""Rows of speech features per second; everything else is resampled to it by time."""
+
+WINDOW = 8
+"""Rows of one attention window: [i − 4, i + 4)."""
+
+log = logging.getLogger(__name__)
+
+
+class ExpressionTrack(Protocol):
+    """The expressions of one capture.
+
+    Attributes:
+        size: B.
+    """
+
+    size: int
+
+    def at(self, frame: int) -> Tensor:
+        """The expression (B,) of a frame; carries gradients where something is trained."""
+        ...
+
+
+class BlendshapeTrack:
+    """Expressions that the capture itself gives, by name."""
+
+    def __init__(self, capture: Capture, names: tuple[str, ...]):
+        """Collects the named blendshapes of all frames.
+
+        Raises:
+            CaptureError: If the capture has no blendshapes, or lacks one of the names.
+        """
+        available = capture.blendshape_names
+        if available is None:
+            raise CaptureError(
+                f"{capture.path} has no blendshapes: train with --inputs speech, "
+                "or record it with ico3d capture portrait."
+            )
+        missing = [name for name in names if name not in available]
+        if missing:
+            raise CaptureError(
+                f"{capture.path} has no blendshape '{missing[0]}', the head needs it."
+            )
+        self.size = len(names)
+        self._path = capture.path
+        self._columns = [available.index(name) for name in names]
+        self._capture = capture
+
+    def at(self, frame: int) -> Tensor:
+        """The blendshape weights (B,) of a frame.
+
+        Raises:
+            CaptureError: If the frame has none, or one is not finite.
+        """
+        values = self._capture.blendshapes(frame)
+        if values is None or not np.isfinite(values).all():
+            raise CaptureError(
+                f"{self._path}: frame {frame} has no finite blendshapes: "
+                "look at it with ico3d capture check."
+            )
+        return torch.from_numpy(np.asarray(values, np.float32)[self._columns])  # (B,)
+
+
+class SpeechTrack:
+    """32 adapted speech features and 7 eye values, B = 39."""
+
+    size = 39
+
+    def __init__(self, capture: Capture, features: np.ndarray, adaptor: torch.nn.Module):
+        """Binds the capture's eyes, its speech features (T, D) at 25 rows/s and an adaptor."""
+        self._adaptor = adaptor
+        self._fps = capture.fps
+        self._eyes = eye_track(capture)  # (F, 7)
+        half = WINDOW // 2
+        padded = np.pad(features.astype(np.float32), ((half, half), (0, 0)))  # (T + 8, D)
+        windows = np.lib.stride_tricks.sliding_window_view(padded, WINDOW, axis=0)  # (T + 1, D, 8)
+        self._windows = torch.from_numpy(windows[: len(features)].transpose(0, 2, 1).copy())
+
+    def at(self, frame: int) -> Tensor:
+        """The expression (39,) of a frame, interpolated between rows of features by time."""
+        position = min(frame / self._fps * FEATURE_RATE, len(self._windows) - 1.0)
+        lower = int(position)
+        part = position - lower
+        upper = lower + 1 if part > 1e-6 else lower
+        adapted = self._adaptor(self._windows[lower : upper + 1])  # (1 or 2, 32)
+        speech = torch.lerp(adapted[0], adapted[-1], part)  # (32,)
+        return torch.cat([speech, self._eyes[frame]])
+
+
+def eye_track(capture: Capture) -> Tensor:
+    """The seven eye values (F, 7) of all frames; 0, with a warning, where there are none."""
+    rows = [capture.eyes(frame) for frame in range(capture.num_frames)]
+    lacking = [frame for frame, row in enumerate(rows) if row is None or not np.isfinite(row).all()]
+    if lacking:
+        log.warning(
+            "%s: %d frames have no eye values (first: %d); they count as open eyes.",
+            capture.path, len(lacking), lacking[0],
+        )  # fmt: skip
+    for frame in lacking:
+        rows[frame] = np.zeros(7, np.float32)
+    return torch.from_numpy(np.stack(rows).astype(np.float32))  # type: ignore[arg-type]
+
+
+def speech_features(capture: Capture, encoder: str) -> np.ndarray:
+    """The features (T, D) of a capture's sound, 25 rows/s.
+
+    Raises:
+        CaptureError: If the capture has no sound.
+    """
+    from ico3d.speech.encoder import load_encoder
+
+    sound = capture.audio()
+    if sound is None:
+        raise CaptureError(
+            f"{capture.path} has no sound: train with --inputs blendshapes, or add a recording."
+        )
+    return load_encoder(encoder).features(sound.samples, sound.rate)

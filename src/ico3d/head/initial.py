@@ -1,0 +1,64 @@
+"""The Gaussians a head starts with."""
+
+import math
+
+import numpy as np
+import torch
+from scipy.spatial import cKDTree
+
+from ico3d.capture.capture import Capture
+from ico3d.errors import CaptureError
+from ico3d.head.model import HeadModel, HeadShape, Variant
+from ico3d.head.settings import HeadSettings
+
+
+def initial_head(
+    capture: Capture,
+    settings: HeadSettings,
+    variant: Variant,
+    expression_size: int,
+    rng: np.random.Generator,
+) -> HeadModel:
+    """A head on the capture's surface points, round Gaussians as wide as their spacing.
+
+    Raises:
+        CaptureError: If the capture has no surface points or one is not finite.
+    """
+    surface = capture.points()
+    if surface is None or len(surface) < 4 or not np.isfinite(surface).all():
+        raise CaptureError(f"{capture.path} has no finite surface points to start from.")
+    points = _resampled(np.asarray(surface, np.float64), settings.initial_gaussians, rng)  # (N, 3)
+    low, high = points.min(0), points.max(0)
+    shape = HeadShape(
+        expression_size=expression_size,
+        variant=variant,
+        features=settings.features,
+        hidden=settings.hidden,
+        frequencies=settings.frequencies,
+        box_center=tuple(((low + high) / 2).tolist()),
+        box_size=float((high - low).max() / 2),
+    )
+    model = HeadModel(shape, len(points))
+    model.means.data = torch.from_numpy(points).float()
+    model.log_scales.data = torch.from_numpy(np.log(_spacing(points))).float()[:, None].repeat(1, 3)
+    return model
+
+
+def _resampled(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+    """`count` of the points; where there are fewer, further ones between neighbours."""
+    if len(points) >= count:
+        return points[np.sort(rng.choice(len(points), count, replace=False))]
+    _, neighbours = cKDTree(points).query(points, k=4)  # (P, 4), itself first
+    source = rng.integers(len(points), size=count - len(points))  # (extra,)
+    partner = neighbours[source, rng.integers(1, 4, size=len(source))]  # (extra,)
+    weight = rng.random((len(source), 1))
+    between = points[source] * weight + points[partner] * (1 - weight)
+    return np.concatenate([points, between])
+
+
+def _spacing(points: np.ndarray) -> np.ndarray:
+    """Root mean square distance (N,) to the three nearest neighbours, within sane bounds."""
+    distances, _ = cKDTree(points).query(points, k=4)
+    spacing = np.sqrt((distances[:, 1:] ** 2).mean(1))
+    typical = float(np.median(spacing))
+    return np.clip(spacing, max(typical / 10, math.ulp(1.0)), typical * 10)

@@ -1,0 +1,66 @@
+"""Numba kernels of the latent basis: blending, its gradients and a rank-one Adam step.
+
+All take the basis as (R, S): R rows, one per expression value and one for the bias, and S = N·w
+numbers, w per Gaussian. Work is cut into blocks of S that stay in the first-level cache while the
+rows pass by, and inner loops run over slices: indexing `basis[row, i]` there is four times slower.
+"""
+
+import numpy as np
+from numba import njit, prange
+
+from ico3d.training.optimiser import BETA1, BETA2, EPSILON
+
+BLOCK = 2048
+
+
+@njit(parallel=True, fastmath=True, cache=True)
+def blend_rows(basis, weights, rows, out):
+    """Writes Σ weights[r]·basis[r] over the listed rows to out (S,)."""
+    for block in prange((out.size + BLOCK - 1) // BLOCK):
+        target = out[block * BLOCK : (block + 1) * BLOCK]
+        target[:] = 0
+        for r in rows:
+            source = basis[r, block * BLOCK : (block + 1) * BLOCK]
+            weight = weights[r]
+            for i in range(target.size):
+                target[i] += weight * source[i]
+
+
+@njit(parallel=True, fastmath=True, cache=True)
+def row_products(basis, gradient, out):
+    """Writes basis · gradient to out (R,): the gradient of the row weights."""
+    for r in prange(basis.shape[0]):
+        source = basis[r]
+        total = np.float32(0)
+        for i in range(source.size):
+            total += source[i] * gradient[i]
+        out[r] = total
+
+
+@njit(parallel=True, fastmath=True, cache=True)
+def adam_rank_one(basis, first, second, weights, gradient, rows, steps, roots):
+    """Adam with the gradient weights ⊗ gradient, which is never stored; in place.
+
+    Args:
+        basis: (R, S).
+        first: (R, S) first moments.
+        second: (R, S) second moments.
+        weights: (R,) row weights.
+        gradient: (S,) gradient of the blended features.
+        rows: Rows to update.
+        steps: (R,) learning rate times the correction of the first moment.
+        roots: (R,) correction of the second moment's root.
+    """
+    beta1, beta2, epsilon = np.float32(BETA1), np.float32(BETA2), np.float32(EPSILON)
+    rest1, rest2 = np.float32(1.0 - BETA1), np.float32(1.0 - BETA2)
+    for block in prange((gradient.size + BLOCK - 1) // BLOCK):
+        low, high = block * BLOCK, min((block + 1) * BLOCK, gradient.size)
+        g = gradient[low:high]
+        for r in rows:
+            value, m, v = basis[r, low:high], first[r, low:high], second[r, low:high]
+            weight, step, root = weights[r], steps[r], roots[r]
+            for i in range(g.size):
+                d = weight * g[i]
+                m[i] = beta1 * m[i] + rest1 * d
+                v[i] = beta2 * v[i] + rest2 * d * d
+                value[i] -= step * m[i] / (np.sqrt(v[i]) * root + epsilon)

@@ -1,0 +1,182 @@
+"""HeadGaS++: Gaussians whose colour and opacity follow an expression (paper, head model)."""
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal
+
+import torch
+from torch import Tensor, nn
+
+from ico3d.errors import ModelError
+from ico3d.head.basis import blend
+from ico3d.splat.gaussians import Gaussians
+from ico3d.training.checkpoint import load_tensors, save_tensors
+
+Variant = Literal["full", "no-mlp", "no-blending", "static"]
+
+INITIAL_OPACITY = 0.1
+
+
+@dataclass(frozen=True)
+class HeadShape:
+    """What decides the sizes of a head model's parameters.
+
+    Attributes:
+        expression_size: B, values that drive the head.
+        variant: `full` is the paper's model; `no-mlp` blends colours and opacity directly;
+            `no-blending` gives the expression to the MLP instead of blending; `static` ignores it.
+        features: f, width of the latent basis.
+        hidden: Width of the MLP.
+        frequencies: L, octaves of the position encoding.
+        box_center: Middle of the head box in metres; positions are encoded relative to it.
+        box_size: Half the longest edge of that box in metres.
+    """
+
+    expression_size: int
+    variant: Variant = "full"
+    features: int = 32
+    hidden: int = 64
+    frequencies: int = 6
+    box_center: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    box_size: float = 1.0
+
+    @property
+    def blends(self) -> bool:
+        """Whether the expression weighs rows of the basis."""
+        return self.variant in ("full", "no-mlp")
+
+    @property
+    def has_mlp(self) -> bool:
+        """Whether an MLP turns features into colour and opacity."""
+        return self.variant in ("full", "no-blending")
+
+    @property
+    def rows(self) -> int:
+        """R: rows of the basis, the bias f_0 included."""
+        return (self.expression_size if self.blends else 0) + 1
+
+    @property
+    def width(self) -> int:
+        """w: numbers per row and Gaussian; without an MLP they are the logits themselves."""
+        return self.features if self.has_mlp else 4
+
+    @property
+    def mlp_inputs(self) -> int:
+        """Width of what enters the MLP."""
+        direct = 0 if self.blends else self.expression_size
+        return self.width + direct + 3 + 6 * self.frequencies
+
+
+class HeadModel(nn.Module):
+    """N Gaussians in canonical head space, driven by an expression.
+
+    Geometry is static; colour (SH degree 0) and opacity are those of φ(f, γ(μ)) with
+    f = Fᵀe + f_0 per Gaussian.
+
+    Attributes:
+        shape: Sizes and variant.
+        means: (N, 3) metres.
+        quats: (N, 4) wxyz, not normalised.
+        log_scales: (N, 3) log of metres.
+        basis: (R, N, w) latent basis, last row the bias.
+    """
+
+    def __init__(self, shape: HeadShape, num_gaussians: int):
+        """Makes a model with zero basis and identity rotations; set the geometry afterwards."""
+        super().__init__()
+        self.shape = shape
+        count = num_gaussians
+        self.means = nn.Parameter(torch.zeros(count, 3))
+        self.quats = nn.Parameter(torch.tensor([1.0, 0, 0, 0]).repeat(count, 1))
+        self.log_scales = nn.Parameter(torch.full((count, 3), -5.0))
+        self.basis = nn.Parameter(torch.zeros(shape.rows, count, shape.width))
+        bias = math.log(INITIAL_OPACITY / (1 - INITIAL_OPACITY))
+        if shape.has_mlp:
+            self.trunk = nn.Linear(shape.mlp_inputs, shape.hidden)
+            self.color_branch = nn.Linear(shape.hidden, 3)
+            self.opacity_branch = nn.Linear(shape.hidden, 1)
+            nn.init.constant_(self.opacity_branch.bias, bias)
+        else:
+            self.basis.data[-1, :, 3] = bias
+
+    def __len__(self) -> int:
+        """The number of Gaussians."""
+        return self.means.shape[0]
+
+    def forward(self, expression: Tensor) -> Gaussians:
+        """The head with this expression.
+
+        Args:
+            expression: (B,).
+
+        Returns:
+            Gaussians in canonical head space.
+        """
+        return self.gaussians(self.logits(expression))
+
+    def logits(self, expression: Tensor) -> Tensor:
+        """(N, 4) logits of red, green, blue and opacity for an expression (B,)."""
+        return self.decode(self.blended(expression), expression)
+
+    def blended(self, expression: Tensor) -> Tensor:
+        """(N, w) features f_i of an expression (B,)."""
+        return blend(self.basis, self.row_weights(expression))
+
+    def row_weights(self, expression: Tensor) -> Tensor:
+        """(R,) weights of the basis rows: the expression (B,) with 1 for the bias."""
+        one = torch.ones(1, dtype=self.basis.dtype, device=self.basis.device)
+        return torch.cat([expression, one]) if self.shape.blends else one
+
+    def decode(self, features: Tensor, expression: Tensor) -> Tensor:
+        """φ: features (N, w) of an expression (B,) to logits (N, 4)."""
+        if not self.shape.has_mlp:
+            return features
+        parts = [features, self.encoded_positions()]
+        if not self.shape.blends:
+            parts.append(expression.expand(len(self), -1))  # (N, B)
+        hidden = nn.functional.leaky_relu(self.trunk(torch.cat(parts, 1)), 0.01)  # (N, hidden)
+        return torch.cat([self.color_branch(hidden), self.opacity_branch(hidden)], 1)  # (N, 4)
+
+    def encoded_positions(self) -> Tensor:
+        """γ(μ): (N, 3 + 6·L), positions relative to the head box with their sines and cosines."""
+        center = self.means.new_tensor(self.shape.box_center)
+        positions = (self.means - center) / self.shape.box_size  # (N, 3), about −1 … 1
+        octaves = math.pi * 2.0 ** torch.arange(self.shape.frequencies, device=positions.device)
+        angles = (positions[:, None] * octaves[:, None]).flatten(1)  # (N, 3·L)
+        return torch.cat([positions, angles.sin(), angles.cos()], 1)
+
+    def gaussians(self, logits: Tensor) -> Gaussians:
+        """Renderable Gaussians with these logits (N, 4)."""
+        values = torch.sigmoid(logits)
+        return Gaussians(
+            means=self.means,
+            quats=self.quats,
+            scales=self.log_scales.exp(),
+            opacities=values[:, 3],
+            colors=values[:, :3],
+        )
+
+    def save(self, path: Path) -> None:
+        """Writes parameters and shape to one safetensors file."""
+        save_tensors(path, dict(self.state_dict()), {"shape": asdict(self.shape)})
+
+    @classmethod
+    def load(cls, path: Path) -> "HeadModel":
+        """Reads what `save` wrote.
+
+        Raises:
+            ModelError: If the file is missing, damaged, or does not hold a head model.
+        """
+        tensors, state = load_tensors(path)
+        try:
+            fields = dict(state["shape"])
+            fields["box_center"] = tuple(fields["box_center"])
+            model = cls(HeadShape(**fields), tensors["means"].shape[0])
+            model.load_state_dict(tensors)
+        except (KeyError, TypeError, RuntimeError) as error:
+            raise ModelError(
+                f"{path} does not hold a head model: {json.dumps(str(error))}."
+            ) from error
+        return model

@@ -1,0 +1,63 @@
+"""The perceptual loss: distance of VGG-16 features (Johnson et al., cited by the paper)."""
+
+import torch
+from safetensors.torch import load_file
+from torch import Tensor, nn
+
+from ico3d.common.files import model_file
+from ico3d.errors import ModelError
+
+WEIGHTS = "vgg16.safetensors"
+"""The convolutions of ImageNet VGG-16 under torchvision's names (`features.0.weight` …)."""
+
+CHANNELS = (64, 64, 0, 128, 128, 0, 256, 256, 256)
+"""Output channels of the convolutions up to relu3_3; 0 is a 2×2 max pooling."""
+
+TAPS = (3, 8, 15)
+"""Layers whose outputs are compared: relu1_2, relu2_2, relu3_3."""
+
+
+class PerceptualLoss(nn.Module):
+    """Mean squared difference of VGG-16 features at three depths."""
+
+    def __init__(self):
+        """Loads the weights.
+
+        Raises:
+            MissingModelError: If they are not installed.
+            ModelError: If the file holds something else.
+        """
+        super().__init__()
+        path = model_file(WEIGHTS, "the perceptual loss")
+        self.features = _convolutions()
+        tensors = load_file(path)
+        try:
+            self.load_state_dict({name: tensors[name] for name in self.state_dict()})
+        except (KeyError, RuntimeError) as error:
+            raise ModelError(f"{path} does not hold VGG-16 weights: {error}.") from error
+        self.requires_grad_(False)
+        self.register_buffer("mean", torch.tensor([0.485, 0.456, 0.406]).view(1, 3, 1, 1))
+        self.register_buffer("deviation", torch.tensor([0.229, 0.224, 0.225]).view(1, 3, 1, 1))
+
+    def forward(self, image: Tensor, target: Tensor) -> Tensor:
+        """The distance of two pictures (H, W, 3) in [0, 1]: a scalar."""
+        pair = torch.stack([image, target]).permute(0, 3, 1, 2)  # (2, 3, H, W)
+        values = (pair - self.mean) / self.deviation
+        total = values.new_zeros(())
+        for index, layer in enumerate(self.features):
+            values = layer(values)
+            if index in TAPS:
+                total = total + nn.functional.mse_loss(values[0], values[1])
+        return total
+
+
+def _convolutions() -> nn.Sequential:
+    layers: list[nn.Module] = []
+    width = 3
+    for channels in CHANNELS:
+        if channels == 0:
+            layers.append(nn.MaxPool2d(2))
+            continue
+        layers += [nn.Conv2d(width, channels, 3, padding=1), nn.ReLU()]
+        width = channels
+    return nn.Sequential(*layers)

@@ -1,0 +1,120 @@
+"""Settings of head training: the paper's, and those sized for two CPU cores."""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Literal
+
+from ico3d.errors import SettingsError
+from ico3d.training.optimiser import Rate
+
+
+@dataclass(frozen=True)
+class HeadSettings:
+    """How a head is trained; defaults are the paper's, with Adam instead of SGD.
+
+    Attributes:
+        steps: Optimisation steps, one image each.
+        optimiser: `adam`, or `sgd` as the paper says.
+        features: f, width of the latent basis.
+        hidden: Width of the MLP.
+        frequencies: L, octaves of the position encoding.
+        l1_weight: λ_1 of the loss.
+        ssim_weight: λ_s, of 1 − SSIM.
+        perceptual_weight: λ_p, of the VGG term.
+        perceptual_from: First step with the VGG term.
+        alpha_weight: Weight of the difference between rendered alpha and mask, where masks exist.
+        position_rate: Learning rate of the means, times the size of the head box.
+        position_decay: What it decays to, as a factor.
+        rotation_rate: Learning rate of the quaternions.
+        scale_rate: Learning rate of the log scales.
+        basis_rate: Learning rate of the latent basis F and f_0.
+        basis_decay: What it decays to, as a factor.
+        mlp_rate: Learning rate of the MLP.
+        mlp_decay: What it decays to, as a factor.
+        adaptor_rate: Learning rate of the speech adaptor.
+        initial_gaussians: Gaussians to start with, sampled from the capture's surface points.
+        max_gaussians: Densification stops at this number.
+        densify_from: First step of densification and pruning.
+        densify_until: Last step of densification and pruning.
+        densify_every: Steps between two densifications.
+        densify_gradient: Screen-space gradient above which a Gaussian is cloned or split.
+        prune_opacity: Gaussians whose predicted opacity stays below this are removed.
+        cache_gib: Images kept in memory, in GiB; further ones are read again at each use.
+    """
+
+    steps: int = 50_000
+    optimiser: Literal["adam", "sgd"] = "adam"
+    features: int = 32
+    hidden: int = 64
+    frequencies: int = 6
+    l1_weight: float = 0.8
+    ssim_weight: float = 0.2
+    perceptual_weight: float = 0.1
+    perceptual_from: int = 10_000
+    alpha_weight: float = 0.0
+    position_rate: float = 1.6e-4
+    position_decay: float = 0.01
+    rotation_rate: float = 1e-3
+    scale_rate: float = 5e-3
+    basis_rate: float = 2.5e-3
+    basis_decay: float = 1.0
+    mlp_rate: float = 1.6e-4
+    mlp_decay: float = 0.01
+    adaptor_rate: float = 1e-3
+    initial_gaussians: int = 2_500
+    max_gaussians: int = 100_000
+    densify_from: int = 500
+    densify_until: int = 15_000
+    densify_every: int = 100
+    densify_gradient: float = 2e-4
+    prune_opacity: float = 0.005
+    cache_gib: float = 2.0
+
+    @property
+    def rates(self) -> dict[str, Rate]:
+        """The learning rates by parameter group."""
+        return {
+            "means": Rate(self.position_rate, self.position_decay),
+            "quats": Rate(self.rotation_rate),
+            "log_scales": Rate(self.scale_rate),
+            "basis": Rate(self.basis_rate, self.basis_decay),
+            "mlp": Rate(self.mlp_rate, self.mlp_decay),
+            "adaptor": Rate(self.adaptor_rate),
+        }
+
+    def with_changes(self, changes: tuple[str, ...]) -> "HeadSettings":
+        """These settings with some values replaced.
+
+        Args:
+            changes: Words `name=value`.
+
+        Raises:
+            SettingsError: If a name is unknown or a value has the wrong type.
+        """
+        values = {}
+        fields = {field.name: field for field in dataclasses.fields(self)}
+        for change in changes:
+            name, _, text = change.partition("=")
+            if name not in fields:
+                raise SettingsError(f"there is no setting '{name}': known are {', '.join(fields)}.")
+            kind = type(getattr(self, name))
+            try:
+                values[name] = kind(text)
+            except ValueError:
+                raise SettingsError(f"'{change}': {name} takes {kind.__name__} values.") from None
+        return dataclasses.replace(self, **values)
+
+
+PRESETS: dict[str, HeadSettings] = {
+    "paper": HeadSettings(),
+    "cpu": HeadSettings(
+        steps=4_000,
+        perceptual_weight=0.0,
+        basis_rate=5e-3,
+        basis_decay=0.1,
+        mlp_rate=3e-3,
+        initial_gaussians=12_000,
+        max_gaussians=12_000,
+        densify_until=2_000,
+    ),
+}

@@ -1,0 +1,96 @@
+"""A trained head with everything needed to drive it: what a model folder holds."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from torch import nn
+
+from ico3d.capture.capture import Capture
+from ico3d.common.files import write_atomic
+from ico3d.errors import ModelError
+from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack, SpeechTrack, speech_features
+from ico3d.head.model import HeadModel
+from ico3d.training.checkpoint import load_tensors, save_tensors
+
+Inputs = Literal["speech", "blendshapes"]
+
+BUILTIN_ENCODER = "builtin"
+
+
+@dataclass
+class TrainedHead:
+    """A head model and how captures turn into its expressions.
+
+    Attributes:
+        model: The Gaussians.
+        inputs: What drives it.
+        blendshape_names: B names for `blendshapes`, else empty.
+        encoder: Name of the speech encoder for `speech`, else empty.
+        adaptor: The trained speech adaptor for `speech`, else None.
+        summary: How it was made: provenance of the capture, seconds of training, settings.
+    """
+
+    model: HeadModel
+    inputs: Inputs
+    blendshape_names: tuple[str, ...]
+    encoder: str
+    adaptor: nn.Module | None
+    summary: dict
+
+    def track(self, capture: Capture) -> ExpressionTrack:
+        """The expressions that drive this head through a capture.
+
+        Raises:
+            CaptureError: If the capture lacks the sound or the blendshapes this head needs.
+        """
+        if self.adaptor is None:
+            return BlendshapeTrack(capture, self.blendshape_names)
+        return SpeechTrack(capture, speech_features(capture, self.encoder), self.adaptor)
+
+    def save(self, folder: Path) -> None:
+        """Writes `model.safetensors`, `adaptor.safetensors` and `head.json` into a folder."""
+        self.model.save(folder / "model.safetensors")
+        if self.adaptor is not None:
+            size = {"features": self.adaptor.feature_size}
+            save_tensors(folder / "adaptor.safetensors", dict(self.adaptor.state_dict()), size)
+        about = {
+            "inputs": self.inputs,
+            "blendshape_names": list(self.blendshape_names),
+            "encoder": self.encoder,
+            "summary": self.summary,
+        }
+        write_atomic(folder / "head.json", json.dumps(about, indent=1).encode())
+
+    @classmethod
+    def load(cls, folder: Path | str) -> "TrainedHead":
+        """Reads what `save` wrote.
+
+        Raises:
+            ModelError: If the folder holds no trained head, or a damaged one.
+        """
+        folder = Path(folder)
+        try:
+            about = json.loads((folder / "head.json").read_text())
+            inputs, names = about["inputs"], tuple(about["blendshape_names"])
+            encoder, summary = about["encoder"], about["summary"]
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise ModelError(
+                f"{folder} holds no trained head ({error}): train one with ico3d train head."
+            ) from error
+        adaptor = _load_adaptor(folder / "adaptor.safetensors") if inputs == "speech" else None
+        model = HeadModel.load(folder / "model.safetensors")
+        return cls(model, inputs, names, encoder, adaptor, summary)
+
+
+def _load_adaptor(path: Path) -> nn.Module:
+    from ico3d.speech.adaptor import SpeechAdaptor
+
+    tensors, state = load_tensors(path)
+    try:
+        adaptor = SpeechAdaptor(int(state["features"]))
+        adaptor.load_state_dict(tensors)
+    except (KeyError, RuntimeError) as error:
+        raise ModelError(f"{path} does not hold a speech adaptor ({error}).") from error
+    return adaptor

@@ -1,0 +1,113 @@
+"""The pictures a head is trained on or measured with."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ico3d.capture.capture import Capture
+from ico3d.common.camera import Camera
+from ico3d.errors import CaptureError
+
+
+@dataclass(frozen=True)
+class View:
+    """One picture of one frame.
+
+    Attributes:
+        camera_index: Which camera took it.
+        frame: Which frame.
+        camera: That camera, in canonical head space.
+    """
+
+    camera_index: int
+    frame: int
+    camera: Camera
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a view shows.
+
+    Attributes:
+        image: (H, W, 3) in [0, 1].
+        mask: (H, W) in [0, 1], the person, or None.
+    """
+
+    image: Tensor
+    mask: Tensor | None
+
+
+def head_pose(capture: Capture, frame: int) -> np.ndarray:
+    """W_i (4, 4).
+
+    Raises:
+        CaptureError: If the frame has no finite head pose.
+    """
+    pose = capture.world_from_head(frame)
+    if pose is None or not np.isfinite(pose).all():
+        raise CaptureError(
+            f"{capture.path}: frame {frame} has no finite head pose: "
+            "look at it with ico3d capture check."
+        )
+    return pose
+
+
+def view_of(capture: Capture, camera: int, frame: int) -> View:
+    """The view of a frame by a camera, whether it was recorded or not."""
+    moved = capture.cameras[camera].moved(head_pose(capture, frame))
+    return View(camera, frame, moved)
+
+
+class PictureCache:
+    """Pictures of a capture, kept as bytes within a budget, else read again at each use."""
+
+    def __init__(self, capture: Capture, budget_gib: float):
+        """Keeps up to `budget_gib` GiB."""
+        self._capture = capture
+        self._left = int(budget_gib * 2**30)
+        self._kept: dict[tuple[int, int], tuple[np.ndarray, np.ndarray | None]] = {}
+
+    def views(self, frames: Sequence[int]) -> Iterator[View]:
+        """All views of these frames that were recorded, frame by frame."""
+        for frame in frames:
+            for camera in range(len(self._capture.cameras)):
+                if self._read(camera, frame) is not None:
+                    yield view_of(self._capture, camera, frame)
+
+    def picture(self, view: View) -> Picture:
+        """What a recorded view shows."""
+        pair = self._read(view.camera_index, view.frame)
+        if pair is None:
+            raise CaptureError(
+                f"{self._capture.path}: the picture of frame {view.frame} by camera "
+                f"{view.camera_index} has vanished."
+            )
+        image, mask = (None if part is None else _as_floats(part) for part in pair)
+        assert image is not None
+        return Picture(image, mask)
+
+    def _read(self, camera: int, frame: int) -> tuple[np.ndarray, np.ndarray | None] | None:
+        """Picture and mask as bytes, from memory or from the capture."""
+        if (camera, frame) in self._kept:
+            return self._kept[camera, frame]
+        image = self._capture.image(camera, frame)
+        if image is None:
+            return None
+        mask = self._capture.mask(camera, frame)
+        pair = (_as_bytes(image), None if mask is None else _as_bytes(mask))
+        size = sum(part.nbytes for part in pair if part is not None)
+        if size <= self._left:
+            self._left -= size
+            self._kept[camera, frame] = pair
+        return pair
+
+
+def _as_bytes(picture: np.ndarray) -> np.ndarray:
+    return (picture * 255 + 0.5).astype(np.uint8)
+
+
+def _as_floats(picture: np.ndarray) -> Tensor:
+    return torch.from_numpy(picture).float() / 255

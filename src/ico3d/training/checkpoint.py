@@ -1,0 +1,35 @@
+"""Checkpoints: one safetensors file with tensors and a JSON state, written atomically."""
+
+import json
+from pathlib import Path
+
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
+from torch import Tensor
+
+from ico3d.common.files import write_atomic
+from ico3d.errors import ModelError
+
+
+def save_tensors(path: Path, tensors: dict[str, Tensor], state: dict) -> None:
+    """Writes tensors and a JSON-serialisable state into one file: all of it or nothing."""
+    contiguous = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
+    write_atomic(path, save(contiguous, metadata={"state": json.dumps(state)}))
+
+
+def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict]:
+    """Reads what `save_tensors` wrote, onto the CPU.
+
+    Raises:
+        ModelError: If the file is missing, damaged, or was written by something else.
+    """
+    if not path.is_file():
+        raise ModelError(f"there is no model file at {path}.")
+    try:
+        with safe_open(path, framework="pt") as file:
+            state = json.loads((file.metadata() or {})["state"])
+            return {name: file.get_tensor(name) for name in file.keys()}, state  # noqa: SIM118
+    except (SafetensorError, KeyError, ValueError, OSError) as error:
+        raise ModelError(
+            f"{path} is damaged or no file of ico3d ({error}): train again."
+        ) from error

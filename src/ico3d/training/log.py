@@ -1,0 +1,57 @@
+"""Where the numbers of a run go: metrics.jsonl, TensorBoard and the progress bar."""
+
+import json
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+
+class MetricsLog:
+    """Appends to `metrics.jsonl` and TensorBoard.
+
+    A resumed run first drops what an interrupted one wrote after its last checkpoint.
+    """
+
+    def __init__(self, folder: Path, first_step: int):
+        """Opens both below `folder`; entries from `first_step` on are dropped."""
+        logging.getLogger("tensorboard").setLevel(logging.ERROR)
+        from torch.utils.tensorboard import SummaryWriter
+
+        path = folder / "metrics.jsonl"
+        kept = _entries_before(path, first_step)
+        self._file = path.open("w")
+        self._file.writelines(kept)
+        self._board = SummaryWriter(str(folder / "tensorboard"), purge_step=first_step)
+
+    def write(self, step: int, values: Mapping[str, float]) -> None:
+        """Records the values of one step."""
+        self._file.write(json.dumps({"step": step, **values}) + "\n")
+        self._file.flush()
+        for name, value in values.items():
+            self._board.add_scalar(name, value, step)
+
+    def close(self) -> None:
+        """Closes both."""
+        self._file.close()
+        self._board.close()
+
+
+def _entries_before(path: Path, step: int) -> list[str]:
+    """The whole lines of a metrics file that belong to earlier steps."""
+    if not path.exists():
+        return []
+    lines = path.read_text().splitlines(keepends=True)
+    return [line for line in lines if line.endswith("\n") and json.loads(line)["step"] < step]
+
+
+def progress_bar() -> Progress:
+    """A bar with steps, time left and a field `numbers` for what matters."""
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[numbers]}"),
+    )

@@ -1,0 +1,125 @@
+"""Adam and SGD over named tensors, with moments that can be saved, split and pruned.
+
+`torch.optim` keys its state by parameter objects and saves it as a pickle; density control needs
+to cut moments along the Gaussians, checkpoints need tensors by name, and on the CPU a step over
+large tensors must be one pass through memory.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numba import njit, prange
+from torch import Tensor
+
+BETA1 = 0.9
+BETA2 = 0.999
+EPSILON = 1e-15
+"""As in 3D Gaussian splatting: gradients of positions are far below Adam's usual 1e-8."""
+
+
+@dataclass(frozen=True)
+class Rate:
+    """A learning rate that decays exponentially.
+
+    Attributes:
+        initial: The rate at step 0.
+        decay: The factor it has reached at the last step.
+    """
+
+    initial: float
+    decay: float = 1.0
+
+    def at(self, progress: float) -> float:
+        """The rate when `progress` (0 to 1) of the steps are done."""
+        return self.initial * self.decay**progress
+
+
+class Optimiser:
+    """Adam, or plain SGD, over tensors named by the caller.
+
+    Attributes:
+        kind: "adam" or "sgd".
+        moments: name.first and name.second → tensors shaped like the parameter; name.steps → how
+            often the parameter was updated.
+    """
+
+    def __init__(self, kind: str = "adam"):
+        """Starts without moments: they are made at a parameter's first update."""
+        self.kind = kind
+        self.moments: dict[str, Tensor] = {}
+
+    def update(
+        self, name: str, value: Tensor, gradient: Tensor, rate: float, weight_decay: float = 0.0
+    ) -> None:
+        """Updates `value` in place.
+
+        Args:
+            name: Key of its moments.
+            value: The parameter, any shape, contiguous.
+            gradient: Of the same shape.
+            rate: Learning rate.
+            weight_decay: Factor of the parameter added to its gradient (L2).
+        """
+        value, gradient = value.detach(), gradient.detach()
+        if weight_decay:
+            gradient = gradient + weight_decay * value
+        if self.kind == "sgd":
+            value.sub_(gradient, alpha=rate)
+            return
+        first, second, corrections = self._moments(name, value)
+        if value.device.type == "cpu" and value.dtype == torch.float32:
+            tensors = (value, first, second, gradient.contiguous())
+            flat = [tensor.view(-1).numpy() for tensor in tensors]  # (size,) each
+            adam_kernel(*flat, np.float32(rate), *corrections)
+        else:
+            adam_reference(value, first, second, gradient, rate, corrections)
+
+    def _moments(self, name: str, value: Tensor) -> tuple[Tensor, Tensor, tuple]:
+        """Both moments and the bias corrections of this, the next update."""
+        if f"{name}.first" not in self.moments:
+            self.moments[f"{name}.first"] = torch.zeros_like(value)
+            self.moments[f"{name}.second"] = torch.zeros_like(value)
+            self.moments[f"{name}.steps"] = torch.zeros((), dtype=torch.int64)
+        steps = self.moments[f"{name}.steps"]
+        steps += 1
+        first, second = self.moments[f"{name}.first"], self.moments[f"{name}.second"]
+        return first, second, bias_corrections(int(steps))
+
+
+def bias_corrections(steps: int) -> tuple[np.float32, np.float32]:
+    """The factors of Adam's first moment and of the root of its second after `steps` updates."""
+    first = 1.0 / (1.0 - BETA1**steps)
+    second = 1.0 / math.sqrt(1.0 - BETA2**steps)
+    return np.float32(first), np.float32(second)
+
+
+def adam_reference(
+    value: Tensor,
+    first: Tensor,
+    second: Tensor,
+    gradient: Tensor,
+    rate: float,
+    corrections: tuple,
+) -> None:
+    """One Adam step in plain torch, in place; `adam_kernel` does the same in one pass."""
+    first.lerp_(gradient, 1.0 - BETA1)
+    second.mul_(BETA2).addcmul_(gradient, gradient, value=1.0 - BETA2)
+    denominator = second.sqrt().mul_(float(corrections[1])).add_(EPSILON)
+    value.addcdiv_(first, denominator, value=-rate * float(corrections[0]))
+
+
+@njit(parallel=True, fastmath=True, cache=True)
+def adam_kernel(value, first, second, gradient, rate, first_correction, second_correction):
+    """One Adam step over flat float32 arrays, in place."""
+    beta1, beta2, epsilon = np.float32(BETA1), np.float32(BETA2), np.float32(EPSILON)
+    rest1, rest2 = np.float32(1.0 - BETA1), np.float32(1.0 - BETA2)
+    step = rate * first_correction
+    for i in prange(value.size):
+        g = gradient[i]
+        m = beta1 * first[i] + rest1 * g
+        v = beta2 * second[i] + rest2 * g * g
+        first[i] = m
+        second[i] = v
+        value[i] -= step * m / (np.sqrt(v) * second_correction + epsilon)

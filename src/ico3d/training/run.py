@@ -1,0 +1,65 @@
+"""The folder of one optimisation: settings, checkpoint, metrics."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+from torch import Tensor
+
+from ico3d.common.files import write_atomic
+from ico3d.errors import SettingsError
+from ico3d.training.checkpoint import load_tensors, save_tensors
+
+
+class RunFolder:
+    """What lies on disk of one training run.
+
+    Attributes:
+        path: The folder; made when missing.
+        settings: What the run was started with; a resumed run must have the same.
+    """
+
+    def __init__(self, path: Path, settings: Mapping):
+        """Opens the folder for these settings.
+
+        Raises:
+            SettingsError: If the folder holds a run with other settings.
+        """
+        self.path = path
+        self.settings = json.loads(json.dumps(settings))
+        self.path.mkdir(parents=True, exist_ok=True)
+        file = path / "settings.json"
+        if not file.exists():
+            write_atomic(file, json.dumps(self.settings, indent=1).encode())
+            return
+        earlier = json.loads(file.read_text())
+        differing = [
+            key
+            for key in sorted({*earlier, *self.settings})
+            if earlier.get(key) != self.settings.get(key)
+        ]
+        if differing:
+            raise SettingsError(
+                f"{path} holds a run with another '{differing[0]}' "
+                f"({earlier.get(differing[0])}, not {self.settings.get(differing[0])}): "
+                "choose another folder, or remove it to start afresh."
+            )
+
+    def checkpoint(self) -> tuple[dict[str, Tensor], dict] | None:
+        """The latest checkpoint, or None before the first."""
+        file = self.path / "checkpoint.safetensors"
+        return load_tensors(file) if file.exists() else None
+
+    def save_checkpoint(self, tensors: dict[str, Tensor], state: dict) -> None:
+        """Replaces the checkpoint."""
+        save_tensors(self.path / "checkpoint.safetensors", tensors, state)
+
+    def finish(self, summary: dict) -> None:
+        """Marks the run as finished and drops its checkpoint."""
+        write_atomic(self.path / "finished.json", json.dumps(summary, indent=1).encode())
+        (self.path / "checkpoint.safetensors").unlink(missing_ok=True)
+
+    def finished(self) -> dict | None:
+        """The summary of a finished run, None while it is not."""
+        file = self.path / "finished.json"
+        return json.loads(file.read_text()) if file.exists() else None

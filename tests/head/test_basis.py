@@ -1,0 +1,64 @@
+"""Blending and learning the latent basis: kernels against plain torch in float64."""
+
+import pytest
+import torch
+
+from ico3d.head.basis import blend, update_basis
+from ico3d.training.optimiser import Optimiser
+
+ROWS, COUNT, WIDTH = 5, 700, 32  # more than one kernel block
+
+
+def _case(dtype: torch.dtype) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    generator = torch.Generator().manual_seed(1)
+    basis = torch.randn(ROWS, COUNT, WIDTH, generator=generator, dtype=torch.float64)
+    weights = torch.tensor([0.5, 0.0, -1.0, 0.25, 1.0], dtype=torch.float64)
+    gradient = torch.randn(COUNT, WIDTH, generator=generator, dtype=torch.float64)
+    return basis.to(dtype), weights.to(dtype), gradient.to(dtype)
+
+
+def test_blend_is_the_weighted_sum():
+    basis, weights, _ = _case(torch.float32)
+    expected = (weights[:, None, None].double() * basis.double()).sum(0)
+    torch.testing.assert_close(blend(basis, weights).double(), expected, rtol=1e-5, atol=1e-5)
+
+
+def test_gradients_by_finite_differences():
+    generator = torch.Generator().manual_seed(2)
+    basis = torch.randn(4, 3, 2, generator=generator, dtype=torch.float64, requires_grad=True)
+    weights = torch.randn(4, generator=generator, dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(blend, (basis, weights))
+
+
+def test_kernel_gradients_equal_the_reference():
+    found = []
+    for dtype in (torch.float32, torch.float64):
+        basis, weights, gradient = _case(dtype)
+        basis.requires_grad_()
+        weights.requires_grad_()
+        blend(basis, weights).backward(gradient)
+        found.append((basis.grad.double(), weights.grad.double()))
+    for kernel, reference in zip(*found, strict=True):
+        torch.testing.assert_close(kernel, reference, rtol=1e-4, atol=1e-3)
+
+
+@pytest.mark.parametrize("kind", ["adam", "sgd"])
+def test_rank_one_update_equals_the_reference(kind):
+    found = []
+    for dtype in (torch.float32, torch.float64):
+        basis, weights, gradient = _case(dtype)
+        optimiser = Optimiser(kind)
+        for step in range(4):
+            active = weights * (torch.arange(ROWS) != step)
+            update_basis(optimiser, basis, active, gradient * (1 + step), 0.01)
+        found.append(basis.double())
+    torch.testing.assert_close(found[0], found[1], rtol=1e-5, atol=1e-5)
+
+
+def test_rank_one_update_equals_a_dense_one_and_leaves_unused_rows_alone():
+    basis, weights, gradient = _case(torch.float64)
+    dense, before = basis.clone(), basis.clone()
+    update_basis(Optimiser(), basis, weights, gradient, 0.01)
+    Optimiser().update("x", dense, weights[:, None, None] * gradient, 0.01)
+    torch.testing.assert_close(basis, dense)
+    assert torch.equal(basis[1], before[1])

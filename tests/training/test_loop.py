@@ -1,0 +1,96 @@
+"""The loop: exact resume, files, and what happens when numbers break."""
+
+import json
+
+import numpy as np
+import pytest
+import torch
+
+from ico3d.errors import ModelError, SettingsError
+from ico3d.training.checkpoint import load_tensors, save_tensors
+from ico3d.training.loop import LoopSettings, run_loop
+from ico3d.training.optimiser import Optimiser
+from ico3d.training.run import RunFolder
+
+SETTINGS = LoopSettings(steps=20, log_every=5, checkpoint_every=4)
+
+
+class Walk:
+    """Fits a vector to noisy targets; dies where it is told to."""
+
+    def __init__(self, seed: int = 0, die_at: int | None = None, break_at: int | None = None):
+        self.seed, self.die_at, self.break_at = seed, die_at, break_at
+        self.weight, self.optimiser, self.calls = torch.zeros(3), Optimiser(), 0
+
+    def step(self, index: int) -> dict[str, float]:
+        if index == self.die_at:
+            raise KeyboardInterrupt
+        self.calls += 1
+        noise = np.random.default_rng([self.seed, index]).normal(size=3)
+        gradient = self.weight - torch.from_numpy(1 + noise).float()
+        if index == self.break_at:
+            gradient[1] = torch.nan
+        self.optimiser.update("weight", self.weight, gradient, 0.1)
+        return {"loss": float(self.weight.square().sum())}
+
+    def tensors(self) -> dict[str, torch.Tensor]:
+        return {"weight": self.weight, **self.optimiser.moments}
+
+    def state(self) -> dict:
+        return {"calls": self.calls}
+
+    def restore(self, tensors: dict[str, torch.Tensor], state: dict) -> None:
+        self.weight = tensors.pop("weight")
+        self.optimiser.moments = tensors
+        self.calls = state["calls"]
+
+
+def test_a_killed_run_resumes_to_the_same_weights_and_metrics(tmp_path):
+    whole = Walk()
+    run_loop(whole, RunFolder(tmp_path / "whole", {"seed": 0}), SETTINGS)
+    with pytest.raises(KeyboardInterrupt):
+        run_loop(Walk(die_at=14), RunFolder(tmp_path / "parts", {"seed": 0}), SETTINGS)
+    second = Walk()
+    run_loop(second, RunFolder(tmp_path / "parts", {"seed": 0}), SETTINGS)
+    assert torch.equal(second.weight, whole.weight)
+    assert second.calls == 20
+    logs = [(tmp_path / name / "metrics.jsonl").read_text() for name in ("whole", "parts")]
+    assert logs[0] == logs[1]
+    steps = [json.loads(line)["step"] for line in logs[0].splitlines()]
+    assert steps == [0, 5, 10, 15, 19]
+
+
+def test_nan_names_the_parameter(tmp_path):
+    with pytest.raises(ModelError, match="'weight' is not finite after step 6"):
+        run_loop(Walk(break_at=6), RunFolder(tmp_path, {}), SETTINGS)
+
+
+def test_a_folder_keeps_to_its_settings(tmp_path):
+    RunFolder(tmp_path, {"seed": 0, "steps": 10})
+    RunFolder(tmp_path, {"seed": 0, "steps": 10})
+    with pytest.raises(SettingsError, match=r"another 'seed' \(0, not 1\)"):
+        RunFolder(tmp_path, {"seed": 1, "steps": 10})
+
+
+def test_tensors_and_state_survive_a_file(tmp_path):
+    tensors = {"a": torch.arange(6.0).view(2, 3).T, "b": torch.tensor(3)}
+    save_tensors(tmp_path / "x.safetensors", tensors, {"step": 3})
+    loaded, state = load_tensors(tmp_path / "x.safetensors")
+    assert state == {"step": 3}
+    assert all(torch.equal(loaded[name], tensors[name]) for name in tensors)
+
+
+@pytest.mark.parametrize("content", [b"", b"garbage" * 10])
+def test_a_damaged_file_is_one_sentence(tmp_path, content):
+    (tmp_path / "x.safetensors").write_bytes(content)
+    with pytest.raises(ModelError, match=r"x\.safetensors is damaged"):
+        load_tensors(tmp_path / "x.safetensors")
+
+
+def test_finishing_drops_the_checkpoint(tmp_path):
+    run = RunFolder(tmp_path, {})
+    run_loop(Walk(), run, SETTINGS)
+    assert run.checkpoint() is not None
+    run.finish({"seconds": 1.0})
+    assert run.checkpoint() is None
+    assert run.finished() == {"seconds": 1.0}
