@@ -1,0 +1,36 @@
+import { MICROPHONE_RATE } from '../protocol.ts';
+import { Resampler, toPcm16 } from './resampler.ts';
+
+// The scope that audio worklets run in; TypeScript's DOM library does not know it.
+declare const sampleRate: number;
+declare class AudioWorkletProcessor {
+  readonly port: MessagePort;
+}
+declare function registerProcessor(name: string, processor: unknown): void;
+
+const CHUNK = MICROPHONE_RATE / 25; // 40 ms
+
+/** Resamples the microphone and posts it as PCM16 in 40-ms chunks. */
+class MicrophoneProcessor extends AudioWorkletProcessor {
+  private readonly resampler = new Resampler(sampleRate, MICROPHONE_RATE);
+  private readonly chunk = new Float32Array(CHUNK);
+  private filled = 0;
+
+  process(inputs: Float32Array[][]): boolean {
+    const block = inputs[0]?.[0];
+    if (!block) return true; // nothing is connected yet
+    for (const value of this.resampler.push(block)) {
+      this.chunk[this.filled++] = value;
+      if (this.filled === CHUNK) this.flush();
+    }
+    return true;
+  }
+
+  private flush(): void {
+    const pcm = toPcm16(this.chunk);
+    this.port.postMessage(pcm, [pcm.buffer as ArrayBuffer]);
+    this.filled = 0;
+  }
+}
+
+registerProcessor('microphone', MicrophoneProcessor);

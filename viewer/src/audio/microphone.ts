@@ -1,0 +1,71 @@
+import { PageError } from '../errors.ts';
+import workletUrl from './mic-worklet.ts?worker&url';
+
+/** The visitor's microphone as PCM16 at 16 kHz in 40-ms chunks. */
+export class Microphone {
+  private context: AudioContext | null = null;
+  private stream: MediaStream | null = null;
+  private readonly onChunk: (pcm: Int16Array) => void;
+  private readonly onLost: (error: PageError) => void;
+
+  /** @param onLost the device went away */
+  constructor(onChunk: (pcm: Int16Array) => void, onLost: (error: PageError) => void) {
+    this.onChunk = onChunk;
+    this.onLost = onLost;
+  }
+
+  get open(): boolean {
+    return this.stream !== null;
+  }
+
+  /**
+   * Asks for the microphone and starts it.
+   *
+   * @throws PageError saying what the visitor can do about it
+   */
+  async start(): Promise<void> {
+    this.stream = await askForMicrophone();
+    this.stream.getAudioTracks()[0]!.onended = () => {
+      this.stop();
+      this.onLost(new PageError('The microphone was disconnected; you can type instead.'));
+    };
+    // Its own context: some browsers refuse a source whose rate differs from the context's.
+    this.context = new AudioContext();
+    await this.context.audioWorklet.addModule(workletUrl);
+    const source = new MediaStreamAudioSourceNode(this.context, { mediaStream: this.stream });
+    const node = new AudioWorkletNode(this.context, 'microphone', {
+      numberOfOutputs: 0,
+      channelCount: 1,
+      channelCountMode: 'explicit',
+    });
+    node.port.onmessage = (event: MessageEvent<Int16Array>) => this.onChunk(event.data);
+    source.connect(node);
+    await this.context.resume();
+  }
+
+  stop(): void {
+    this.stream?.getTracks().forEach((track) => track.stop());
+    this.stream = null;
+    void this.context?.close();
+    this.context = null;
+  }
+}
+
+async function askForMicrophone(): Promise<MediaStream> {
+  if (!navigator.mediaDevices) {
+    throw new PageError('Browsers give the microphone only to HTTPS pages and localhost; you can type instead.');
+  }
+  try {
+    return await navigator.mediaDevices.getUserMedia({
+      audio: { channelCount: 1, echoCancellation: true, noiseSuppression: true, autoGainControl: true },
+    });
+  } catch (error) {
+    throw new PageError(REASONS[(error as DOMException).name] ?? 'The microphone could not be opened; you can type instead.');
+  }
+}
+
+const REASONS: Record<string, string> = {
+  NotAllowedError: 'The microphone is blocked for this page: allow it in the address bar, or type instead.',
+  NotFoundError: 'No microphone was found; plug one in, or type instead.',
+  NotReadableError: 'Another program holds the microphone; close it there, or type instead.',
+};

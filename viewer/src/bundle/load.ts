@@ -1,0 +1,84 @@
+import { PageError } from '../errors.ts';
+import { readBakedHead, type BakedHead } from '../head/baked.ts';
+import { checkManifest, type Manifest } from './manifest.ts';
+import { parseSafetensors, takeTensor } from './safetensors.ts';
+
+/** A bundle's content, checked and ready for the GPU. */
+export interface Bundle {
+  manifest: Manifest;
+  head: BakedHead;
+  poses: Float32Array; // (F,4,4) row-major world_from_head
+}
+
+const ROOT = 'bundle/';
+
+/** The thumbnail's address. */
+export const THUMBNAIL = `${ROOT}thumbnail.png`;
+
+/** Fetches and checks the manifest. */
+export async function loadManifest(): Promise<Manifest> {
+  const response = await get('manifest.json');
+  return checkManifest(await response.json().catch(() => null));
+}
+
+/**
+ * Fetches and checks what the page draws.
+ *
+ * @param onProgress called with the loaded fraction, 0 to 1
+ */
+export async function loadBundle(manifest: Manifest, onProgress: (fraction: number) => void): Promise<Bundle> {
+  const names = ['head.safetensors', 'head_poses.safetensors'];
+  const total = names.reduce((sum, name) => sum + (manifest.files[name]?.size ?? 0), 0);
+  let loaded = 0;
+  const [head, poses] = await Promise.all(
+    names.map((name) =>
+      loadFile(manifest, name, (bytes) => {
+        loaded += bytes;
+        onProgress(Math.min(1, loaded / total));
+      }),
+    ),
+  );
+  const shape = [manifest.head.num_poses, 4, 4];
+  const poseTensors = parseSafetensors(poses!, names[1]!);
+  return {
+    manifest,
+    head: readBakedHead(parseSafetensors(head!, names[0]!), manifest.head, names[0]!),
+    poses: takeTensor(poseTensors, 'world_from_head', 'F32', shape, names[1]!).data as Float32Array,
+  };
+}
+
+async function get(name: string): Promise<Response> {
+  let response: Response;
+  try {
+    response = await fetch(ROOT + name);
+  } catch {
+    throw new PageError(`The server does not answer, so ${name} could not be loaded; reload the page.`);
+  }
+  if (!response.ok) throw new PageError(`The server has no ${name} (status ${response.status}).`);
+  return response;
+}
+
+async function loadFile(manifest: Manifest, name: string, onBytes: (n: number) => void): Promise<ArrayBuffer> {
+  const entry = manifest.files[name];
+  if (!entry) throw new PageError(`manifest.json does not list ${name}.`);
+  const reader = (await get(name)).body!.getReader();
+  const bytes = new Uint8Array(entry.size);
+  let at = 0;
+  for (let part = await reader.read(); !part.done; part = await reader.read()) {
+    if (at + part.value.length > entry.size) throw new PageError(`${name} is longer than manifest.json says.`);
+    bytes.set(part.value, at);
+    at += part.value.length;
+    onBytes(part.value.length);
+  }
+  if (at !== entry.size) throw new PageError(`${name} is shorter than manifest.json says.`);
+  await checkHash(bytes, entry.sha256, name);
+  return bytes.buffer;
+}
+
+/** Compares the hash where the browser can compute one (HTTPS and localhost). */
+async function checkHash(bytes: Uint8Array<ArrayBuffer>, sha256: string, name: string): Promise<void> {
+  if (!globalThis.crypto?.subtle) return;
+  const digest = new Uint8Array(await crypto.subtle.digest('SHA-256', bytes));
+  const hex = Array.from(digest, (byte) => byte.toString(16).padStart(2, '0')).join('');
+  if (hex !== sha256) throw new PageError(`${name} differs from what manifest.json promises; reload the page.`);
+}

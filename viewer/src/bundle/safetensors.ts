@@ -1,0 +1,85 @@
+import { PageError } from '../errors.ts';
+import { floatFromHalf } from '../protocol.ts';
+
+/** One array of a safetensors file. */
+export interface Tensor {
+  dtype: 'F32' | 'F16' | 'I8';
+  shape: number[];
+  data: Float32Array | Int8Array; // half floats are widened on reading
+}
+
+interface Entry {
+  dtype: string;
+  shape: number[];
+  data_offsets: [number, number];
+}
+
+const BYTES: Record<string, number> = { F32: 4, F16: 2, I8: 1 };
+const HEADER_LIMIT = 1 << 20;
+
+/**
+ * Reads a safetensors file (u64 header length, JSON header, data; little-endian).
+ *
+ * @param file name for error sentences
+ * @throws PageError if the file contradicts itself or holds a type that bundles do not use
+ */
+export function parseSafetensors(buffer: ArrayBuffer, file: string): Map<string, Tensor> {
+  if (buffer.byteLength < 8) throw new PageError(`${file} is too short for a safetensors file.`);
+  const length = Number(new DataView(buffer).getBigUint64(0, true));
+  if (length > HEADER_LIMIT || 8 + length > buffer.byteLength) {
+    throw new PageError(`${file} ends before its header does.`);
+  }
+  const header = parseHeader(new Uint8Array(buffer, 8, length), file);
+  const tensors = new Map<string, Tensor>();
+  for (const [name, entry] of Object.entries(header)) {
+    if (name !== '__metadata__') tensors.set(name, readTensor(buffer, 8 + length, entry, `${file}: ${name}`));
+  }
+  return tensors;
+}
+
+function parseHeader(bytes: Uint8Array, file: string): Record<string, Entry> {
+  try {
+    return JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes)) as Record<string, Entry>;
+  } catch {
+    throw new PageError(`${file} has a header that is not JSON.`);
+  }
+}
+
+function readTensor(buffer: ArrayBuffer, base: number, entry: Entry, where: string): Tensor {
+  const { dtype, shape, data_offsets: [begin, end] } = entry;
+  const itemSize = BYTES[dtype];
+  if (itemSize === undefined) throw new PageError(`${where} has the unexpected type ${dtype}.`);
+  const count = shape.reduce((product, size) => product * size, 1);
+  if (end - begin !== count * itemSize || begin < 0 || base + end > buffer.byteLength) {
+    throw new PageError(`${where} does not fit its shape.`);
+  }
+  const bytes = buffer.slice(base + begin, base + end); // a copy is aligned whatever the header's length
+  if (dtype === 'I8') return { dtype, shape, data: new Int8Array(bytes) };
+  if (dtype === 'F16') return { dtype, shape, data: Float32Array.from(new Uint16Array(bytes), floatFromHalf) };
+  return { dtype: 'F32', shape, data: new Float32Array(bytes) };
+}
+
+/**
+ * Takes a tensor of known type and shape out of a file.
+ *
+ * @throws PageError if it is missing, of another type or shape, or not finite
+ */
+export function takeTensor(
+  tensors: Map<string, Tensor>,
+  name: string,
+  dtype: Tensor['dtype'],
+  shape: number[],
+  file: string,
+): Tensor {
+  const tensor = tensors.get(name);
+  if (!tensor) throw new PageError(`${file} lacks ${name}.`);
+  if (tensor.dtype !== dtype || tensor.shape.join() !== shape.join()) {
+    throw new PageError(
+      `${file}: ${name} is ${tensor.dtype} (${tensor.shape}) and should be ${dtype} (${shape}).`,
+    );
+  }
+  if (dtype !== 'I8' && !tensor.data.every(Number.isFinite)) {
+    throw new PageError(`${file}: ${name} holds numbers that are not finite.`);
+  }
+  return tensor;
+}

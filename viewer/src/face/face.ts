@@ -1,0 +1,56 @@
+import type { Director } from '../stage/stage.ts';
+import { smooth, type IdleFace } from './idle.ts';
+import { mix, type ExpressionTrack } from './track.ts';
+
+const EASE = 0.16; // s from one source of expressions to the next
+const DISPLAY_LEAD = 1 / 60; // s: what is drawn now lights the screen about one refresh later
+
+/** An utterance that is heard now. */
+export interface Heard {
+  utterance: number;
+  seconds: number; // of its sound, as it leaves the loudspeaker
+  track: ExpressionTrack;
+}
+
+/** The face's one decision: speech while sound is heard, rest otherwise, eased between. */
+export class Face implements Director {
+  private readonly idle: IdleFace;
+  private readonly heard: () => Heard | null;
+  private readonly clock: () => number;
+  private source = -1; // utterance that is shown, -1 at rest
+  private changedAt = -Infinity;
+  private readonly from: Float32Array;
+  private readonly target: Float32Array;
+  private readonly shown: Float32Array;
+
+  /**
+   * @param heard what is heard now
+   * @param clock seconds that only run forward
+   */
+  constructor(size: number, idle: IdleFace, heard: () => Heard | null, clock = () => performance.now() / 1000) {
+    this.idle = idle;
+    this.heard = heard;
+    this.clock = clock;
+    this.from = new Float32Array(size);
+    this.target = new Float32Array(size);
+    this.shown = new Float32Array(size);
+    idle.at(clock(), this.shown);
+  }
+
+  expression(out: Float32Array): boolean {
+    const now = this.clock();
+    const heard = this.heard();
+    const source = heard ? heard.utterance : -1;
+    if (source !== this.source) {
+      this.source = source;
+      this.changedAt = now;
+      this.from.set(this.shown);
+    }
+    if (heard) heard.track.at(heard.seconds + DISPLAY_LEAD, this.target);
+    else this.idle.at(now, this.target);
+    mix(this.from, this.target, smooth((now - this.changedAt) / EASE), this.shown);
+    const changed = this.shown.some((value, i) => value !== out[i]);
+    out.set(this.shown);
+    return changed;
+  }
+}

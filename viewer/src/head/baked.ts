@@ -1,0 +1,52 @@
+import type { Manifest } from '../bundle/manifest.ts';
+import { takeTensor, type Tensor } from '../bundle/safetensors.ts';
+
+/** A baked head (`docs/bundle.md`): N Gaussians, K basis vectors, a small network from B values. */
+export interface BakedHead {
+  count: number; // N
+  rank: number; // K
+  means: Float32Array; // (N,3) metres
+  quats: Float32Array; // (N,4) wxyz
+  scales: Float32Array; // (N,3) log of metres
+  meanLogits: Float32Array; // (N,4) r, g, b, opacity
+  basis: Int8Array; // (K,N,4)
+  basisScale: Float32Array; // (N,)
+  network: Network;
+}
+
+/** c(e) = LeakyReLU(e·w1 + b1)·w2 + b2. */
+export interface Network {
+  inputs: number; // B
+  hidden: number; // H
+  outputs: number; // K
+  w1: Float32Array; // (B,H)
+  b1: Float32Array; // (H,)
+  w2: Float32Array; // (H,K)
+  b2: Float32Array; // (K,)
+}
+
+/** Takes a head's tensors out of its file, checked against the manifest's counts. */
+export function readBakedHead(tensors: Map<string, Tensor>, head: Manifest['head'], file: string): BakedHead {
+  const { num_gaussians: n, rank: k, hidden: h, expression_size: b } = head;
+  const take = <T>(name: string, dtype: Tensor['dtype'], shape: number[]): T =>
+    takeTensor(tensors, name, dtype, shape, file).data as T;
+  return {
+    count: n,
+    rank: k,
+    means: take('means', 'F32', [n, 3]),
+    quats: take('quats', 'F16', [n, 4]),
+    scales: take('scales', 'F16', [n, 3]),
+    meanLogits: take('mean_logits', 'F16', [n, 4]),
+    basis: take('basis', 'I8', [k, n, 4]),
+    basisScale: take('basis_scale', 'F32', [n]),
+    network: {
+      inputs: b,
+      hidden: h,
+      outputs: k,
+      w1: take('w1', 'F32', [b, h]),
+      b1: take('b1', 'F32', [h]),
+      w2: take('w2', 'F32', [h, k]),
+      b2: take('b2', 'F32', [k]),
+    },
+  };
+}

@@ -1,0 +1,147 @@
+import { Microphone } from '../audio/microphone.ts';
+import { Player } from '../audio/player.ts';
+import type { PageError } from '../errors.ts';
+import type { ServerMessage, Services, StateMessage, WelcomeMessage } from '../protocol.ts';
+import { Connection } from './connection.ts';
+import { TurnTimer, VoiceMeter } from './latency.ts';
+
+const CLOCK_PERIOD = 200; // ms between reports of what has been heard
+
+/** What the page shows of a conversation. */
+export interface ConversationView {
+  state(state: StateMessage['state'] | 'connecting'): void;
+  question(text: string, final: boolean): void;
+  answer(utterance: number, text: string): void;
+  services(services: Services): void;
+  notice(sentence: string): void;
+  microphone(open: boolean): void;
+  latency(milliseconds: number): void;
+  metrics(name: string, values: Record<string, number>): void;
+  failed(error: PageError): void;
+}
+
+/** Microphone, wire and loudspeaker joined into a conversation. */
+export class Conversation {
+  readonly player = new Player();
+  /** Where the body is on its own time line; 0 without a body. */
+  bodyTime: () => number = () => 0;
+  private readonly view: ConversationView;
+  private readonly connection: Connection;
+  private readonly microphone: Microphone;
+  private readonly meter = new VoiceMeter();
+  private readonly timer = new TurnTimer();
+  private sample = 0; // of the microphone
+
+  constructor(url: string, view: ConversationView) {
+    this.view = view;
+    this.connection = new Connection(url, {
+      message: (message) => this.receive(message),
+      welcome: (message) => this.welcome(message),
+      lost: () => view.state('connecting'),
+      failed: (error) => view.failed(error),
+    });
+    this.microphone = new Microphone(
+      (pcm) => this.hear(pcm),
+      (error) => {
+        view.microphone(false);
+        view.notice(error.message);
+      },
+    );
+    this.player.onStart = (_, delay) => this.answerStarts(performance.now() + 1000 * delay);
+    this.player.onFinish = (utterance, seconds) => this.report(utterance, seconds);
+    setInterval(() => this.reportHeard(), CLOCK_PERIOD);
+  }
+
+  /** Connects; call it when sound may play. */
+  start(): void {
+    this.view.state('connecting');
+    this.connection.open();
+  }
+
+  /** Asks a typed question; false while there is no connection. */
+  ask(text: string): boolean {
+    const sent = this.connection.send({ type: 'text', text });
+    if (sent) {
+      this.timer.asked(performance.now());
+      this.view.question(text, true);
+    }
+    return sent;
+  }
+
+  /** Silences the avatar at once. */
+  interrupt(): void {
+    const utterance = this.player.current;
+    if (utterance !== null) this.player.stop(utterance);
+    this.connection.send({ type: 'interrupt', utterance });
+  }
+
+  /** Opens or closes the microphone; what hinders it is shown as a notice. */
+  async toggleMicrophone(): Promise<void> {
+    if (this.microphone.open) {
+      this.microphone.stop();
+      this.view.microphone(false);
+      return;
+    }
+    try {
+      this.sample = 0;
+      await this.microphone.start();
+    } catch (error) {
+      this.view.notice((error as Error).message);
+    }
+    this.view.microphone(this.microphone.open);
+  }
+
+  private hear(pcm: Int16Array): void {
+    this.meter.hear(pcm, performance.now());
+    this.connection.send({ type: 'audio', sample: this.sample, pcm });
+    this.sample += pcm.length;
+  }
+
+  private welcome(message: WelcomeMessage): void {
+    if (!message.resumed) this.player.reset();
+    this.view.services(message.services);
+    this.view.state('idle');
+    for (const notice of message.notices) this.view.notice(notice);
+  }
+
+  private receive(message: ServerMessage): void {
+    switch (message.type) {
+      case 'state':
+        return this.view.state(message.state);
+      case 'transcript':
+        return this.transcript(message.text, message.final);
+      case 'answer':
+        return this.view.answer(message.utterance, message.text);
+      case 'speech':
+        return this.player.play(message);
+      case 'end':
+        return this.player.end(message.utterance, message.samples);
+      case 'stop':
+        return this.player.stop(message.utterance);
+      case 'metrics':
+        return this.view.metrics(message.name, message.values);
+      case 'error':
+        return this.view.notice(message.message);
+    }
+  }
+
+  private transcript(text: string, final: boolean): void {
+    this.view.question(text, final);
+    if (final && this.meter.lastVoice !== null) this.timer.asked(this.meter.lastVoice);
+  }
+
+  private answerStarts(at: number): void {
+    const latency = this.timer.answered(at);
+    if (latency !== null) this.view.latency(latency);
+  }
+
+  private reportHeard(): void {
+    const heard = this.player.heard();
+    if (heard) this.report(heard.utterance, heard.seconds);
+  }
+
+  private report(utterance: number, seconds: number): void {
+    const position = Math.max(0, seconds);
+    this.connection.send({ type: 'clock', utterance, position, body_time: this.bodyTime() });
+  }
+}

@@ -1,0 +1,57 @@
+import type { Services } from '../protocol.ts';
+import type { ConversationView } from '../talk/conversation.ts';
+import { Captions } from './captions.ts';
+import { Controls } from './controls.ts';
+import { byId } from './elements.ts';
+import { Overlay } from './overlay.ts';
+import { Panel } from './panel.ts';
+
+const NOTICE_TIME = 9000; // ms
+
+const STATES = {
+  connecting: 'Connecting …',
+  idle: 'Ready',
+  listening: 'Listening',
+  thinking: 'Thinking',
+  speaking: 'Speaking',
+} as const;
+
+/** Everything on the page around the picture. */
+export function makePage(overlay: Overlay, frames: () => number): { view: ConversationView; controls: Controls } {
+  const captions = new Captions();
+  const controls = new Controls();
+  const panel = new Panel(frames);
+  const view: ConversationView = {
+    state(state) {
+      document.body.dataset.state = state;
+      byId('state').textContent = STATES[state];
+      controls.setSpeaking(state === 'speaking');
+    },
+    question: (text, final) => captions.question(text, final),
+    answer: (utterance, text) => captions.answer(utterance, text),
+    services: showStandIns,
+    notice: showNotice,
+    microphone: (open) => controls.setMicrophone(open),
+    latency: (milliseconds) => panel.latency(milliseconds),
+    metrics: (name, values) => panel.metrics(name, values),
+    failed: (error) => overlay.fail(error.message),
+  };
+  return { view, controls };
+}
+
+/** Says plainly which services are the small offline ones. */
+function showStandIns(services: Services): void {
+  const names = Object.entries(services)
+    .filter(([, service]) => service.stand_in)
+    .map(([role, service]) => `${role} (${service.name})`);
+  const note = byId('stand-ins');
+  note.hidden = names.length === 0;
+  note.textContent = `Offline stand-ins in use: ${names.join(', ')}`;
+}
+
+function showNotice(sentence: string): void {
+  const item = document.createElement('p');
+  item.textContent = sentence;
+  byId('notices').append(item);
+  setTimeout(() => item.remove(), NOTICE_TIME);
+}

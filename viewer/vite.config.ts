@@ -1,0 +1,32 @@
+import { defineConfig } from 'vitest/config';
+
+// `npm run dev` shows the page against a running `ico3d serve … --port 8700`.
+const SERVER = process.env.ICO3D_SERVER ?? 'http://127.0.0.1:8700';
+
+export default defineConfig({
+  base: './',
+  build: {
+    outDir: '../src/ico3d/chat/static',
+    emptyOutDir: true,
+    target: 'es2023',
+    chunkSizeWarningLimit: 4000, // three and Spark (with its sort worker) in one file
+  },
+  server: {
+    proxy: { '/bundle': SERVER, '/health': SERVER, '/ws': { target: SERVER, ws: true } },
+  },
+  test: {
+    projects: [
+      { extends: true, test: { name: 'unit', include: ['test/**/*.test.ts'] } },
+      {
+        extends: true,
+        test: {
+          name: 'e2e',
+          include: ['e2e/**/*.spec.ts'],
+          fileParallelism: false, // one software-rendered browser at a time
+          testTimeout: 120_000,
+          hookTimeout: 120_000,
+        },
+      },
+    ],
+  },
+});
