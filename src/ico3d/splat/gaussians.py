@@ -1,9 +1,13 @@
 """The Gaussian primitive: activated parameters, ready to render."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
 
+import numpy as np
 import torch
 from torch import Tensor
+
+from ico3d.splat import harmonics, quaternions
 
 
 @dataclass
@@ -30,5 +34,79 @@ class Gaussians:
         """The number of Gaussians."""
         return self.means.shape[0]
 
+    def map(self, change: Callable[[Tensor], Tensor]) -> "Gaussians":
+        """The Gaussians with `change` applied to every tensor."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return Gaussians(**{k: None if v is None else change(v) for k, v in values.items()})
 
-__all__ = ["Gaussians", "torch"]
+    def to(self, device: torch.device | str) -> "Gaussians":
+        """The same Gaussians on another device."""
+        return self.map(lambda tensor: tensor.to(device))
+
+    def detach(self) -> "Gaussians":
+        """The same Gaussians without gradient."""
+        return self.map(Tensor.detach)
+
+    def __getitem__(self, index: Tensor | slice) -> "Gaussians":
+        """Those that a mask, an index tensor or a slice selects."""
+        return self.map(lambda tensor: tensor[index])
+
+    def transform(self, a_from_b: Tensor | np.ndarray) -> "Gaussians":
+        """Moves Gaussians given in space b to space a.
+
+        Args:
+            a_from_b: (4, 4) similarity: rotation, uniform scale, translation. A tensor may carry
+                gradient, which reaches means and scales.
+
+        Returns:
+            Moved Gaussians: means, rotations, scales and harmonics; the rest is shared.
+
+        Raises:
+            ValueError: If the matrix is not a similarity or mirrors.
+        """
+        matrix = torch.as_tensor(a_from_b).to(self.means)
+        scale, rotation = _split_similarity(matrix)
+        turn = quaternions.from_matrix(rotation.detach().double()).to(self.quats)  # (4,)
+        return Gaussians(
+            self.means @ matrix[:3, :3].T + matrix[:3, 3],  # (N, 3)
+            quaternions.multiply(turn, self.quats),  # (N, 4)
+            self.scales * scale,  # (N, 3)
+            self.opacities,
+            self.colors,
+            None if self.sh is None else harmonics.rotate(self.sh, rotation),  # (N, K, 3)
+        )
+
+
+def _split_similarity(matrix: Tensor) -> tuple[Tensor, Tensor]:
+    """Scale () and rotation (3, 3) of a similarity.
+
+    Raises:
+        ValueError: If it is none, or mirrors.
+    """
+    linear = matrix[:3, :3]
+    determinant = torch.linalg.det(linear.double())
+    if not determinant > 0:
+        raise ValueError("a_from_b mirrors or flattens: expected a similarity")
+    scale = determinant.pow(1 / 3).to(matrix)
+    rotation = linear / scale
+    error = rotation @ rotation.T - torch.eye(3, dtype=matrix.dtype, device=matrix.device)
+    if error.abs().max() > 1e-3:
+        raise ValueError("a_from_b shears or scales unevenly: expected a similarity")
+    return scale, rotation
+
+
+def cat(parts: Sequence[Gaussians]) -> Gaussians:
+    """Several sets of Gaussians as one.
+
+    Raises:
+        ValueError: If some have colours and others harmonics, or harmonics of other degrees.
+    """
+    values = {}
+    for field in fields(Gaussians):
+        tensors = [getattr(part, field.name) for part in parts]
+        if any(t is None for t in tensors) != all(t is None for t in tensors):
+            raise ValueError(f"only some of the Gaussians to join have {field.name}")
+        if len({t.shape[1:] for t in tensors if t is not None}) > 1:
+            raise ValueError(f"the Gaussians to join differ in the shape of {field.name}")
+        values[field.name] = None if tensors[0] is None else torch.cat(tensors)
+    return Gaussians(**values)

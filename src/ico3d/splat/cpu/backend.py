@@ -1,0 +1,44 @@
+"""The CPU side of `splat.render`."""
+
+from collections.abc import Sequence
+
+from torch import Tensor
+
+from ico3d.common.camera import Camera
+from ico3d.splat.cpu.rasterise import Draw, Project, bin_views, camera_numbers
+from ico3d.splat.gaussians import Gaussians
+from ico3d.splat.rendering import Drawing, RenderInfo
+
+
+def draw_gaussians(gaussians: Gaussians, colors: Tensor, cameras: Sequence[Camera]) -> Drawing:
+    """Draws on black.
+
+    Args:
+        gaussians: Float32, on the CPU.
+        colors: (C, N, 3).
+        cameras: C of one size.
+
+    Returns:
+        The drawing.
+    """
+    width, height = cameras[0].width, cameras[0].height
+    means2d, conics, alphas, depths, extents = Project.apply(
+        gaussians.means,
+        gaussians.quats,
+        gaussians.scales,
+        gaussians.opacities,
+        camera_numbers(cameras),
+        width,
+        height,
+    )
+    if means2d.requires_grad:
+        means2d.retain_grad()
+    tiles = bin_views(means2d, conics, alphas, depths, extents, width, height)
+    images, light = Draw.apply(means2d, conics, alphas, colors, tiles)
+
+    def draw_depth() -> Tensor:
+        spread = depths[..., None].expand(*depths.shape, 3)  # (C, N, 3)
+        return Draw.apply(means2d, conics, alphas, spread, tiles)[0][..., 0]  # (C, H, W)
+
+    info = RenderInfo(extents.amax(-1).ceil().int(), means2d, width, height)  # radii (C, N)
+    return Drawing(images, 1 - light, draw_depth, info)

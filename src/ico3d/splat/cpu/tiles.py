@@ -1,0 +1,212 @@
+"""Which splats touch which tile, front to back."""
+
+from dataclasses import dataclass
+from math import floor, log, sqrt
+
+import numba
+import numpy as np
+
+from ico3d.splat.convention import MIN_ALPHA
+from ico3d.splat.cpu.compile import kernel
+
+TILE = 16
+"""Side of a tile in pixels: a row of it fills one or two vector registers."""
+
+SLACK = 0.01
+"""Pixels by which a splat's outline is widened, so that rounding cuts nothing off."""
+
+DIGIT = 11
+"""Bits sorted per pass."""
+
+
+@dataclass
+class Tiles:
+    """Splats by tile.
+
+    A *pair* is one splat in one tile. Pairs are numbered splat by splat, so that all pairs of a
+    splat are neighbours: its gradient is summed in one fixed order whatever thread made the parts.
+
+    Attributes:
+        width: Image width in pixels.
+        height: Image height in pixels.
+        first_pair: (N + 1,) int32, where a splat's pairs begin.
+        rows: (P, 2) int32, first and end row within the tile that the splat of a pair touches.
+        splats: (P,) int32, the splat of a pair.
+        first_entry: (tiles + 1,) int32, where a tile's entries of `pairs` begin.
+        pairs: (P,) int32, pairs by tile, front to back.
+    """
+
+    width: int
+    height: int
+    first_pair: np.ndarray
+    rows: np.ndarray
+    splats: np.ndarray
+    first_entry: np.ndarray
+    pairs: np.ndarray
+
+
+@kernel()
+def _reach(p, b, q, cut, low, high, v_max):
+    """Range of v in the ellipse p·u² + b·u·v + q·v² ≤ cut, given that u lies in [low, high].
+
+    Args:
+        p: Half the conic's entry of u.
+        b: The conic's mixed entry.
+        q: Half the conic's entry of v.
+        cut: The exponent at which the splat ends.
+        low: Least u.
+        high: Greatest u.
+        v_max: Greatest v of the whole ellipse.
+
+    Returns:
+        Least and greatest v; least > greatest where nothing is left.
+    """
+    tip = -0.5 * b / p * v_max
+    top, bottom = min(max(tip, low), high), min(max(-tip, low), high)
+    under_top = (b * b - 4 * p * q) * top * top + 4 * q * cut
+    under_bottom = (b * b - 4 * p * q) * bottom * bottom + 4 * q * cut
+    if under_top < 0 or under_bottom < 0:
+        return 1.0, -1.0
+    scale = 0.5 / q
+    return (-b * bottom - sqrt(under_bottom)) * scale, (-b * top + sqrt(under_top)) * scale
+
+
+@kernel()
+def _span(low, high, size):
+    """First and end index of the tiles that the pixel range [low, high] touches."""
+    return max(0, floor(low / TILE)), min(size, floor(high / TILE) + 1)
+
+
+@kernel()
+def _columns(mean, conic, cut, extent, row, across):
+    """First and end tile that a splat touches in one row of tiles."""
+    low = row * TILE + 0.5 - mean[1] - SLACK
+    high = low + TILE - 1 + 2 * SLACK
+    left, right = _reach(0.5 * conic[2], conic[1], 0.5 * conic[0], cut, low, high, extent[0])
+    if left > right:
+        return 0, 0
+    return _span(mean[0] + left - SLACK, mean[0] + right + SLACK, across)
+
+
+@kernel()
+def _rows(mean, conic, cut, extent, column, row):
+    """First and end pixel row within a tile that a splat touches."""
+    low = column * TILE + 0.5 - mean[0] - SLACK
+    high = low + TILE - 1 + 2 * SLACK
+    top, bottom = _reach(0.5 * conic[0], conic[1], 0.5 * conic[2], cut, low, high, extent[1])
+    if top > bottom:
+        return 0, 0
+    offset = mean[1] - row * TILE - 0.5
+    first = max(0, floor(offset + top - SLACK) + 1)
+    return first, max(first, min(TILE, floor(offset + bottom + SLACK) + 1))
+
+
+@kernel(parallel=True)
+def _count(means, conics, alphas, extents, across, down, counts):
+    """Counts the tiles that each splat touches."""
+    for i in numba.prange(means.shape[0]):
+        total = 0
+        if alphas[i] > 0:
+            cut = log(alphas[i] / MIN_ALPHA)
+            first, end = _span(means[i, 1] - extents[i, 1], means[i, 1] + extents[i, 1], down)
+            for row in range(first, end):
+                left, right = _columns(means[i], conics[i], cut, extents[i], row, across)
+                total += max(0, right - left)
+        counts[i] = total
+
+
+@kernel(parallel=True)
+def _list(means, conics, alphas, extents, across, down, first_pair, tiles, rows, splats):
+    """Lists each splat's tiles, and the rows it touches there."""
+    for i in numba.prange(means.shape[0]):
+        pair = first_pair[i]
+        if first_pair[i + 1] > pair:
+            cut = log(alphas[i] / MIN_ALPHA)
+            first, end = _span(means[i, 1] - extents[i, 1], means[i, 1] + extents[i, 1], down)
+            for row in range(first, end):
+                left, right = _columns(means[i], conics[i], cut, extents[i], row, across)
+                for column in range(left, right):
+                    tiles[pair] = row * across + column
+                    rows[pair, 0], rows[pair, 1] = _rows(
+                        means[i], conics[i], cut, extents[i], column, row
+                    )
+                    splats[pair] = i
+                    pair += 1
+
+
+@kernel()
+def _order(depths):
+    """Indices by ascending depth (radix sort of positive float32 bits; stable)."""
+    count = depths.shape[0]
+    keys, order = depths.view(np.uint32), np.arange(count).astype(np.uint32)
+    keys_out, order_out = np.empty_like(keys), np.empty_like(order)
+    for digit in range(3):
+        shift, starts = np.uint32(digit * DIGIT), np.zeros((1 << DIGIT) + 1, np.int64)
+        mask = np.uint32((1 << DIGIT) - 1)
+        for i in range(count):
+            starts[((keys[i] >> shift) & mask) + 1] += 1
+        for i in range(1 << DIGIT):
+            starts[i + 1] += starts[i]
+        for i in range(count):
+            bucket = (keys[i] >> shift) & mask
+            keys_out[starts[bucket]] = keys[i]
+            order_out[starts[bucket]] = order[i]
+            starts[bucket] += 1
+        if digit == 0:
+            keys, keys_out = keys_out, np.empty_like(keys)
+        else:
+            keys, keys_out = keys_out, keys
+        order, order_out = order_out, order
+    return order
+
+
+@kernel()
+def _fill(order, first_pair, tiles, first_entry, pairs):
+    """Sorts the pairs into their tiles, front to back."""
+    for pair in range(tiles.shape[0]):
+        first_entry[tiles[pair] + 1] += 1
+    for tile in range(first_entry.shape[0] - 1):
+        first_entry[tile + 1] += first_entry[tile]
+    following = first_entry.copy()
+    for k in range(order.shape[0]):
+        i = order[k]
+        for pair in range(first_pair[i], first_pair[i + 1]):
+            pairs[following[tiles[pair]]] = pair
+            following[tiles[pair]] += 1
+
+
+def bin_splats(
+    means2d: np.ndarray,
+    conics: np.ndarray,
+    alphas: np.ndarray,
+    depths: np.ndarray,
+    extents: np.ndarray,
+    width: int,
+    height: int,
+) -> Tiles:
+    """Finds each tile's splats, ordered front to back.
+
+    Args:
+        means2d: (N, 2) float32 pixels.
+        conics: (N, 3) float32.
+        alphas: (N,) float32; 0 takes no part.
+        depths: (N,) float32; those that take part are not negative.
+        extents: (N, 2) float32 half sizes of the splats' boxes in pixels.
+        width: Image width in pixels.
+        height: Image height in pixels.
+
+    Returns:
+        The tiles.
+    """
+    across, down = -(-width // TILE), -(-height // TILE)
+    counts = np.empty(len(means2d), np.int32)
+    _count(means2d, conics, alphas, extents, across, down, counts)
+    first_pair = np.zeros(len(means2d) + 1, np.int32)
+    np.cumsum(counts, out=first_pair[1:])
+    total = int(first_pair[-1])
+    tiles, splats = np.empty(total, np.int32), np.empty(total, np.int32)
+    rows, pairs = np.empty((total, 2), np.int32), np.empty(total, np.int32)
+    _list(means2d, conics, alphas, extents, across, down, first_pair, tiles, rows, splats)
+    first_entry = np.zeros(across * down + 1, np.int32)
+    _fill(_order(depths), first_pair, tiles, first_entry, pairs)
+    return Tiles(width, height, first_pair, rows, splats, first_entry, pairs)

@@ -1,0 +1,83 @@
+"""The CUDA side of `splat.render`: gsplat under the same contract."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ico3d.common.camera import Camera
+from ico3d.errors import MissingExtraError
+from ico3d.splat.convention import BLUR, NEAR
+from ico3d.splat.gaussians import Gaussians
+from ico3d.splat.rendering import Drawing, RenderInfo
+
+
+def _rasterization():
+    """Gsplat's entry point, imported at first need: gsplat may compile its kernels then.
+
+    Raises:
+        MissingExtraError: If gsplat is not installed.
+    """
+    try:
+        from gsplat import rasterization
+    except ImportError as error:
+        raise MissingExtraError("gsplat", "cuda", "rendering on a CUDA device") from error
+    return rasterization
+
+
+def _empty(colors: Tensor, cameras: Sequence[Camera]) -> Drawing:
+    """A drawing of nothing, which gsplat's kernels do not make."""
+    count, width, height = len(cameras), cameras[0].width, cameras[0].height
+    rgb = colors.new_zeros(count, height, width, 3)
+    radii = torch.zeros(count, 0, dtype=torch.int32, device=colors.device)
+    info = RenderInfo(radii, colors.new_zeros(count, 0, 2), width, height)
+    return Drawing(rgb, rgb[..., 0], lambda: rgb[..., 0], info)
+
+
+def draw_gaussians(gaussians: Gaussians, colors: Tensor, cameras: Sequence[Camera]) -> Drawing:
+    """Draws on black.
+
+    Args:
+        gaussians: Float32, on a CUDA device.
+        colors: (C, N, 3).
+        cameras: C of one size.
+
+    Returns:
+        The drawing.
+
+    Raises:
+        MissingExtraError: If gsplat is not installed.
+    """
+    if len(gaussians) == 0:
+        return _empty(colors, cameras)
+    rasterization = _rasterization()
+    width, height = cameras[0].width, cameras[0].height
+    views = np.stack([camera.world_to_camera for camera in cameras])  # (C, 4, 4)
+    intrinsics = np.stack([camera.intrinsics for camera in cameras])  # (C, 3, 3)
+
+    def rasterise(mode: str) -> tuple[Tensor, Tensor, dict]:
+        return rasterization(
+            gaussians.means,
+            gaussians.quats,
+            gaussians.scales,
+            gaussians.opacities,
+            colors,
+            torch.from_numpy(views).to(gaussians.means),
+            torch.from_numpy(intrinsics).to(gaussians.means),
+            width,
+            height,
+            near_plane=NEAR,
+            eps2d=BLUR,
+            packed=False,
+            render_mode=mode,
+            rasterize_mode="antialiased",
+        )
+
+    rgb, alpha, meta = rasterise("RGB")  # (C, H, W, 3), (C, H, W, 1)
+    if meta["means2d"].requires_grad:
+        meta["means2d"].retain_grad()
+    radii = meta["radii"]  # (C, N, 2) or, in older versions, (C, N)
+    radii = (radii.amax(-1) if radii.dim() == 3 else radii).int()  # (C, N)
+    info = RenderInfo(radii, meta["means2d"], width, height)
+    return Drawing(rgb, alpha[..., 0], lambda: rasterise("D")[0][..., 0], info)
