@@ -1,5 +1,7 @@
 """The numbers of the rendering convention that `render` describes; both backends read them."""
 
+from math import exp
+
 BLUR = 0.3
 """Low-pass added to both diagonal entries of the 2D covariance, pixels squared."""
 
@@ -17,3 +19,19 @@ MAX_ALPHA = 0.999
 
 MIN_TRANSMITTANCE = 1e-4
 """A pixel is finished before its transmittance would fall to this."""
+
+SSIM_RADIUS = 5
+"""The window of SSIM is 11 pixels wide."""
+
+SSIM_SIGMA = 1.5
+"""Standard deviation of SSIM's window, pixels."""
+
+SSIM_C1, SSIM_C2 = 0.01**2, 0.03**2
+"""SSIM's two small constants for images in [0, 1]."""
+
+
+def ssim_window() -> list[float]:
+    """SSIM's 11 Gaussian weights, which add up to 1."""
+    offsets = range(-SSIM_RADIUS, SSIM_RADIUS + 1)
+    weights = [exp(-(i**2) / (2 * SSIM_SIGMA**2)) for i in offsets]
+    return [weight / sum(weights) for weight in weights]

@@ -1,0 +1,155 @@
+"""SSIM and its gradient, fused: separable blurs over rows of interleaved RGB."""
+
+import numba
+import numpy as np
+
+from ico3d.splat.convention import SSIM_C1, SSIM_C2, SSIM_RADIUS, ssim_window
+from ico3d.splat.cpu.compile import kernel
+
+CHANNELS = 3
+PAD = SSIM_RADIUS * CHANNELS
+W0, W1, W2, W3, W4, W5 = map(np.float32, ssim_window()[SSIM_RADIUS:])
+C1, C2 = np.float32(SSIM_C1), np.float32(SSIM_C2)
+ONE, TWO = np.float32(1), np.float32(2)
+
+
+@kernel()
+def _blur_row(padded, out):
+    """Blurs a row along x; `padded` has `PAD` zeros at both ends."""
+    for i in range(out.size):
+        out[i] = (
+            W0 * padded[i + 15]
+            + W1 * (padded[i + 12] + padded[i + 18])
+            + W2 * (padded[i + 9] + padded[i + 21])
+            + W3 * (padded[i + 6] + padded[i + 24])
+            + W4 * (padded[i + 3] + padded[i + 27])
+            + W5 * (padded[i] + padded[i + 30])
+        )
+
+
+@kernel()
+def _blur_column(rows, out):
+    """Blurs along y: the weighted sum of 11 rows.
+
+    Few arrays at a time: LLVM gives up where it must check many for overlap.
+    """
+    middle = rows[5]
+    for i in range(out.size):
+        out[i] = W0 * middle[i]
+    weights = (W1, W2, W3, W4, W5)
+    for k in range(SSIM_RADIUS):
+        above, below, weight = rows[4 - k], rows[6 + k], weights[k]
+        for i in range(out.size):
+            out[i] += weight * (above[i] + below[i])
+
+
+@kernel()
+def _product(a, b, out):
+    for i in range(a.size):
+        out[i] = a[i] * b[i]
+
+
+@kernel()
+def _moments(x, y, padded, maps):
+    """Rows of x, y, x², y², xy, blurred along x."""
+    inner = padded[PAD : PAD + x.size]
+    inner[:] = x
+    _blur_row(padded, maps[0])
+    inner[:] = y
+    _blur_row(padded, maps[1])
+    _product(x, x, inner)
+    _blur_row(padded, maps[2])
+    _product(y, y, inner)
+    _blur_row(padded, maps[3])
+    _product(x, y, inner)
+    _blur_row(padded, maps[4])
+
+
+@kernel()
+def _similarity(stats, by_mean):
+    """Sum of SSIM over a row; overwrites the blurred x², xy with the derivatives by them.
+
+    `by_mean` gets the derivative by blurred x.
+    """
+    mean_x, mean_y, xx, yy, xy = stats[0], stats[1], stats[2], stats[3], stats[4]
+    total = np.float32(0)
+    for i in range(by_mean.size):
+        mx, my = mean_x[i], mean_y[i]
+        a1, b1 = TWO * mx * my + C1, mx * mx + my * my + C1
+        a2 = TWO * (xy[i] - mx * my) + C2
+        b2 = xx[i] - mx * mx + yy[i] - my * my + C2
+        scale = ONE / (b1 * b2)
+        value = a1 * a2 * scale
+        total += value
+        by_mean[i] = TWO * (my * scale * (a2 - a1) + mx * value * (ONE / b2 - ONE / b1))
+        xx[i] = -value / b2
+        xy[i] = TWO * a1 * scale
+    return total
+
+
+@kernel()
+def _combine(x, y, by_mean, by_xx, by_xy, scale, out):
+    for i in range(out.size):
+        out[i] = scale * (by_mean[i] + TWO * x[i] * by_xx[i] + y[i] * by_xy[i])
+
+
+@kernel(parallel=True)
+def _blur_moments(x, y, maps):
+    for row in numba.prange(x.shape[0]):
+        padded = np.zeros(x.shape[1] + 2 * PAD, np.float32)
+        _moments(x[row], y[row], padded, maps[SSIM_RADIUS + row])
+
+
+@kernel(parallel=True)
+def _compare(maps, sums, derivatives):
+    for row in numba.prange(sums.size):
+        width = maps.shape[2]
+        stats = np.empty((5, width), np.float32)
+        by_mean = np.empty(width, np.float32)
+        for k in range(5):
+            _blur_column(maps[row : row + 11, k], stats[k])
+        sums[row] = _similarity(stats, by_mean)
+        padded = np.zeros(width + 2 * PAD, np.float32)
+        padded[PAD : PAD + width] = by_mean
+        _blur_row(padded, derivatives[SSIM_RADIUS + row, 0])
+        padded[PAD : PAD + width] = stats[2]
+        _blur_row(padded, derivatives[SSIM_RADIUS + row, 1])
+        padded[PAD : PAD + width] = stats[4]
+        _blur_row(padded, derivatives[SSIM_RADIUS + row, 2])
+
+
+@kernel(parallel=True)
+def _pull_back(x, y, derivatives, scale, gradient):
+    for row in numba.prange(x.shape[0]):
+        blurred = np.empty((3, x.shape[1]), np.float32)
+        for k in range(3):
+            _blur_column(derivatives[row : row + 11, k], blurred[k])
+        _combine(x[row], y[row], blurred[0], blurred[1], blurred[2], scale, gradient[row])
+
+
+def _padded_rows(height: int, maps: int, width: int) -> np.ndarray:
+    """Room for rows of maps, with rows of zeros above and below."""
+    rows = np.empty((height + 2 * SSIM_RADIUS, maps, width), np.float32)
+    rows[:SSIM_RADIUS] = 0
+    rows[-SSIM_RADIUS:] = 0
+    return rows
+
+
+def ssim_with_gradient(x: np.ndarray, y: np.ndarray) -> tuple[float, np.ndarray]:
+    """Mean SSIM of two pictures and its gradient.
+
+    Args:
+        x: (H, W, 3) float32.
+        y: (H, W, 3) float32.
+
+    Returns:
+        Mean SSIM, and its gradient (H, W, 3) with respect to x.
+    """
+    height, width = x.shape[0], x.shape[1] * CHANNELS
+    x, y = x.reshape(height, width), y.reshape(height, width)
+    maps, derivatives = _padded_rows(height, 5, width), _padded_rows(height, 3, width)
+    sums, gradient = np.empty(height, np.float32), np.empty_like(x)
+    _blur_moments(x, y, maps)
+    _compare(maps, sums, derivatives)
+    _pull_back(x, y, derivatives, np.float32(1 / x.size), gradient)
+    return float(sums.sum(dtype=np.float64) / x.size), gradient.reshape(height, -1, CHANNELS)

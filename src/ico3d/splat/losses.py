@@ -1,0 +1,83 @@
+"""Image losses: L1 and SSIM (paper eq. 2 and 5, with 1 − SSIM)."""
+
+import torch
+from torch import Tensor
+from torch.autograd.function import once_differentiable
+
+from ico3d.splat.convention import SSIM_C1, SSIM_C2, SSIM_RADIUS, ssim_window
+
+
+def l1(rgb: Tensor, target: Tensor) -> Tensor:
+    """Mean absolute difference of two images of one shape."""
+    return (rgb - target).abs().mean()
+
+
+def ssim(rgb: Tensor, target: Tensor) -> Tensor:
+    """Mean structural similarity, differentiable in `rgb` only.
+
+    11×11 Gaussian window of σ = 1.5 pixels; outside of the picture both images count as 0, as is
+    usual in 3DGS. For evaluation by other definitions see the metrics.
+
+    Args:
+        rgb: (..., H, W, 3) in [0, 1].
+        target: Of the same shape.
+
+    Returns:
+        A scalar, 1 for equal images.
+
+    Raises:
+        ValueError: If the shapes differ or the last dimension is not 3.
+    """
+    if rgb.shape != target.shape or rgb.shape[-1] != 3:
+        raise ValueError(f"SSIM of {tuple(rgb.shape)} and {tuple(target.shape)}")
+    images = rgb.reshape(-1, *rgb.shape[-3:])  # (C, H, W, 3)
+    targets = target.detach().reshape(-1, *target.shape[-3:])
+    if rgb.is_cuda:
+        return _ssim_by_convolution(images, targets)
+    return _CpuSsim.apply(images.float(), targets.float())
+
+
+def photometric(rgb: Tensor, target: Tensor, ssim_weight: float = 0.2) -> Tensor:
+    """(1 − λ)·L1 + λ·(1 − SSIM), λ = `ssim_weight`; arguments as for `ssim`."""
+    return (1 - ssim_weight) * l1(rgb, target) + ssim_weight * (1 - ssim(rgb, target))
+
+
+class _CpuSsim(torch.autograd.Function):
+    """The fused kernel; the gradient is made along with the value."""
+
+    @staticmethod
+    def forward(ctx, images, targets):
+        from ico3d.splat.cpu.ssim import ssim_with_gradient
+
+        pairs = zip(images.detach().contiguous(), targets.contiguous(), strict=True)
+        values, gradients = zip(
+            *(ssim_with_gradient(x.numpy(), y.numpy()) for x, y in pairs), strict=True
+        )
+        stacked = [torch.from_numpy(gradient) for gradient in gradients]
+        ctx.gradient = torch.stack(stacked) / len(values)  # (C, H, W, 3)
+        return images.new_tensor(sum(values) / len(values))
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx, g_value):
+        return ctx.gradient * g_value, None
+
+
+def _blur(images: Tensor) -> Tensor:
+    """Blurs (C, 3, H, W) with SSIM's window."""
+    window = images.new_tensor(ssim_window()).expand(3, 1, 1, -1)  # (3, 1, 1, 11)
+    across = torch.nn.functional.conv2d(images, window, padding=(0, SSIM_RADIUS), groups=3)
+    return torch.nn.functional.conv2d(
+        across, window.transpose(2, 3), padding=(SSIM_RADIUS, 0), groups=3
+    )
+
+
+def _ssim_by_convolution(images: Tensor, targets: Tensor) -> Tensor:
+    """Mean SSIM of (C, H, W, 3) images on any device."""
+    x, y = images.movedim(-1, 1), targets.movedim(-1, 1)  # (C, 3, H, W)
+    mean_x, mean_y = _blur(x), _blur(y)
+    var_x, var_y = _blur(x * x) - mean_x**2, _blur(y * y) - mean_y**2
+    covariance = _blur(x * y) - mean_x * mean_y
+    above = (2 * mean_x * mean_y + SSIM_C1) * (2 * covariance + SSIM_C2)
+    below = (mean_x**2 + mean_y**2 + SSIM_C1) * (var_x + var_y + SSIM_C2)
+    return (above / below).mean()
