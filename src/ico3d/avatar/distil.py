@@ -1,0 +1,110 @@
+"""The small network from expression to coefficients, fitted to what the exact model does."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ico3d.bundle.evaluate import LEAKY_SLOPE
+
+
+@dataclass(frozen=True)
+class CoefficientNetwork:
+    """c(e) = LeakyReLU(e·w1 + b1)·w2 + b2 (docs/bundle.md); float32 arrays."""
+
+    w1: np.ndarray
+    b1: np.ndarray
+    w2: np.ndarray
+    b2: np.ndarray
+
+
+def augmented(expressions: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Expressions between and around recorded ones, as playback and blinking make them.
+
+    Args:
+        expressions: (T, B).
+        count: How many to make.
+        rng: Source of randomness.
+
+    Returns:
+        (count, B): each a mixture of two recorded ones, a tenth of whose deviation is jittered;
+        half of them take the eye values (the last seven) from a third one.
+    """
+    first, second, third = (expressions[rng.integers(len(expressions), size=count)] for _ in "abc")
+    share = rng.uniform(0, 1, (count, 1))
+    mixed = share * first + (1 - share) * second  # (count, B)
+    mixed += 0.1 * expressions.std(axis=0) * rng.normal(size=mixed.shape)
+    swap = rng.uniform(size=count) < 0.5
+    mixed[swap, -7:] = third[swap, -7:]
+    return mixed.astype(np.float32)
+
+
+def distil(
+    expressions: np.ndarray, scores: np.ndarray, hidden: int, steps: int, seed: int
+) -> CoefficientNetwork:
+    """Fits the network to (expression, scores) pairs.
+
+    The basis being orthonormal in the weighted norm, the plain squared error of the scores is
+    the weighted error of the logits: large components weigh more by themselves. Adam finds the
+    hidden layer; the output layer is then solved for exactly.
+
+    Args:
+        expressions: (S, B).
+        scores: (S, K).
+        hidden: H.
+        steps: Full-batch steps.
+        seed: Seed of the initial weights.
+    """
+    centre, spread = expressions.mean(axis=0), np.maximum(expressions.std(axis=0), 1e-3)
+    size = max(float(np.sqrt(np.square(scores).sum(axis=1).mean())), 1e-12)
+    inputs = torch.from_numpy(((expressions - centre) / spread).astype(np.float32))  # (S, B)
+    targets = torch.from_numpy((scores / size).astype(np.float32))  # (S, K)
+    w1, b1, w2, b2 = _descend(inputs, targets, hidden, steps, seed)
+    w2, b2 = _solve_output(_hidden(inputs, w1, b1), targets)
+    first = w1.numpy() / spread[:, None]  # (B, H)
+    return CoefficientNetwork(
+        first.astype(np.float32),
+        (b1.numpy() - centre @ first).astype(np.float32),
+        (w2.numpy() * size).astype(np.float32),
+        (b2.numpy() * size).astype(np.float32),
+    )
+
+
+def _hidden(inputs: Tensor, w1: Tensor, b1: Tensor) -> Tensor:
+    return torch.nn.functional.leaky_relu(inputs @ w1 + b1, LEAKY_SLOPE)  # (S, H)
+
+
+def _descend(
+    inputs: Tensor, targets: Tensor, hidden: int, steps: int, seed: int
+) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    generator = torch.Generator().manual_seed(seed)
+    size_in, size_out = inputs.shape[1], targets.shape[1]
+    weights = (
+        torch.randn(size_in, hidden, generator=generator) * size_in**-0.5,
+        torch.randn(hidden, generator=generator) * 0.5,
+        torch.randn(hidden, size_out, generator=generator) * hidden**-0.5 * 0.1,
+        targets.mean(dim=0).clone(),
+    )
+    for weight in weights:
+        weight.requires_grad_(True)
+    optimiser = torch.optim.Adam(weights, lr=1e-2)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
+    w1, b1, w2, b2 = weights
+    for _ in range(steps):
+        optimiser.zero_grad()
+        error = _hidden(inputs, w1, b1) @ w2 + b2 - targets  # (S, K)
+        error.square().sum(dim=1).mean().backward()
+        optimiser.step()
+        schedule.step()
+    return w1.detach(), b1.detach(), w2.detach(), b2.detach()
+
+
+def _solve_output(hidden: Tensor, targets: Tensor) -> tuple[Tensor, Tensor]:
+    """Ridge regression of the targets on the hidden layer, in float64."""
+    ones = torch.ones(len(hidden), 1, dtype=torch.float64)
+    features = torch.cat([hidden.double(), ones], dim=1)  # (S, H + 1)
+    gram = features.T @ features  # (H + 1, H + 1)
+    gram += 1e-6 * gram.diagonal().mean() * torch.eye(len(gram), dtype=torch.float64)
+    solution = torch.linalg.solve(gram, features.T @ targets.double())  # (H + 1, K)
+    return solution[:-1].float(), solution[-1].float()

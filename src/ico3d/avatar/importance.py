@@ -1,0 +1,53 @@
+"""How much the picture depends on each logit."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+
+from ico3d.common.camera import Camera
+from ico3d.head.model import HeadModel
+from ico3d.splat.render import render
+
+_FLOOR = 0.02
+"""Least importance, of the mean: what these views do not show must still look right."""
+
+
+def logit_importance(
+    model: HeadModel,
+    expressions: torch.Tensor,
+    cameras: Sequence[Camera],
+    background: torch.Tensor,
+    seed: int,
+) -> np.ndarray:
+    """Root mean square change of the picture per unit change of each logit.
+
+    For a random-sign picture v, the gradient of <v, image> squares in expectation to the
+    diagonal of JᵀJ, J being the Jacobian of the image (Hutchinson's estimate).
+
+    Args:
+        model: The exact head.
+        expressions: (P, B), one for each probe.
+        cameras: P cameras in canonical head space.
+        background: (3,) colour.
+        seed: Seed of the signs.
+
+    Returns:
+        (N, 4) float32 with mean 1, at least a small share of it.
+    """
+    generator = torch.Generator().manual_seed(seed)
+    total = torch.zeros(len(model), 4)
+    for expression, camera in zip(expressions, cameras, strict=True):
+        with torch.no_grad():
+            logits = model.logits(expression)
+        logits.requires_grad_(True)
+        gaussians = model.gaussians(logits)
+        still = (gaussians.means, gaussians.quats, gaussians.scales)
+        gaussians.means, gaussians.quats, gaussians.scales = (part.detach() for part in still)
+        image = render(gaussians, [camera], background).rgb[0]  # (H, W, 3)
+        signs = torch.randint(0, 2, image.shape, generator=generator) * 2 - 1
+        (gradient,) = torch.autograd.grad((image * signs).sum(), logits)
+        total += gradient.square()
+    importance = (total / len(cameras)).sqrt().numpy()
+    importance /= max(float(importance.mean()), 1e-12)
+    return np.maximum(importance, _FLOOR).astype(np.float32)

@@ -1,0 +1,72 @@
+"""Principal components of a head's logits over expressions (design section 3, baked head)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+_CHUNK = 8192
+"""Columns handled at a time: samples stay float16 in memory, arithmetic is float32."""
+
+_NOISE = 1e-6
+"""Share of the largest variance under which float32 sums are rounding only."""
+
+
+@dataclass(frozen=True)
+class LowRank:
+    """Y ≈ mean + scores @ basis.
+
+    Attributes:
+        mean: (D,) float32.
+        basis: (K, D) float32; orthonormal once its columns are multiplied by `weights`.
+        weights: (D,) float32, how much an error in each column matters.
+        scores: (T, K) float32 of the samples it was made from, in falling order of size.
+    """
+
+    mean: np.ndarray
+    basis: np.ndarray
+    weights: np.ndarray
+    scores: np.ndarray
+
+    def project(self, samples: np.ndarray) -> np.ndarray:
+        """Best scores (T, K), in the weighted norm, for samples (T, D)."""
+        scores = np.zeros((len(samples), len(self.basis)), np.float32)
+        for part in _chunks(self.mean.size):
+            centred = samples[:, part].astype(np.float32) - self.mean[part]  # (T, chunk)
+            scores += centred @ (self.basis[:, part] * self.weights[part] ** 2).T  # (T, K)
+        return scores
+
+
+def factorise(samples: np.ndarray, weights: np.ndarray, rank: int) -> LowRank:
+    """Weighted PCA by way of the T×T Gram matrix: memory beyond the samples is T² + K·D.
+
+    Args:
+        samples: (T, D) float16 or float32, T ≥ 2.
+        weights: (D,) positive.
+        rank: K ≤ T; components beyond what the samples span are zero.
+    """
+    mean = _mean(samples)
+    gram = np.zeros((len(samples),) * 2)
+    for part in _chunks(mean.size):
+        centred = (samples[:, part].astype(np.float32) - mean[part]) * weights[part]
+        gram += centred @ centred.T  # (T, T)
+    values, vectors = np.linalg.eigh(gram)
+    order = np.argsort(values)[::-1][:rank]
+    spanned = values[order] > max(_NOISE * values[-1], 1e-12)
+    sizes = np.sqrt(values[order], out=np.zeros(rank), where=spanned)  # (K,)
+    mixing = vectors[:, order] / np.where(spanned, sizes, np.inf)  # (T, K)
+    basis = np.empty((rank, mean.size), np.float32)
+    for part in _chunks(mean.size):
+        centred = samples[:, part].astype(np.float32) - mean[part]
+        basis[:, part] = mixing.T @ (centred * weights[part]) / weights[part]
+    return LowRank(mean, basis, weights, (vectors[:, order] * sizes).astype(np.float32))
+
+
+def _mean(samples: np.ndarray) -> np.ndarray:
+    mean = np.empty(samples.shape[1], np.float32)
+    for part in _chunks(mean.size):
+        mean[part] = samples[:, part].astype(np.float32).mean(axis=0)
+    return mean
+
+
+def _chunks(size: int) -> list[slice]:
+    return [slice(start, start + _CHUNK) for start in range(0, size, _CHUNK)]

@@ -1,0 +1,58 @@
+"""Eight-bit basis vectors that share one scale per Gaussian."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+_POWERS = (0.0, 0.25, 0.5, 0.75, 1.0)
+_LEAST = 1e-6
+
+
+@dataclass(frozen=True)
+class QuantisedBasis:
+    """basis_k ≈ gain_k · scale · values_k.
+
+    Attributes:
+        values: (K, N, 4) int8.
+        scale: (N,) float32.
+        gains: (K,) float32; the coefficient network absorbs them.
+    """
+
+    values: np.ndarray
+    scale: np.ndarray
+    gains: np.ndarray
+
+    def restored(self) -> np.ndarray:
+        """(K, N, 4) float32, what the eight bits stand for."""
+        return self.gains[:, None, None] * self.scale[None, :, None] * self.values
+
+
+def quantise(basis: np.ndarray, sizes: np.ndarray, weights: np.ndarray) -> QuantisedBasis:
+    """Rounds a basis so that the error of basis · scores is small.
+
+    All vectors of a Gaussian share its scale, so their relative lengths decide which one gets
+    the precision. Each is lengthened by sizes^p; the p with the least weighted error wins.
+
+    Args:
+        basis: (K, N, 4) float32.
+        sizes: (K,) root mean square of the scores.
+        weights: (N, 4) how much an error in each logit matters.
+    """
+    candidates = [_round(basis, sizes.astype(np.float32) ** power) for power in _POWERS]
+    return min(candidates, key=lambda candidate: _error(candidate, basis, sizes, weights))
+
+
+def _round(basis: np.ndarray, lengths: np.ndarray) -> QuantisedBasis:
+    lengths = np.maximum(lengths / max(lengths.max(), _LEAST), _LEAST)
+    longer = basis * lengths[:, None, None]  # (K, N, 4)
+    scale = np.abs(longer).max(axis=(0, 2)) / 127  # (N,)
+    scale = np.maximum(scale, np.float32(1e-12))
+    values = np.rint(longer / scale[None, :, None]).astype(np.int8)
+    return QuantisedBasis(values, scale.astype(np.float32), (1 / lengths).astype(np.float32))
+
+
+def _error(
+    rounded: QuantisedBasis, basis: np.ndarray, sizes: np.ndarray, weights: np.ndarray
+) -> float:
+    error = (rounded.restored() - basis) * weights
+    return float((np.square(error).sum(axis=(1, 2)) * sizes**2).sum())

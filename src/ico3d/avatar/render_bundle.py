@@ -1,0 +1,61 @@
+"""Rendering a baked head in Python: the picture that the page must show."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+
+from ico3d.bundle.evaluate import attributes
+from ico3d.bundle.format import Bundle
+from ico3d.bundle.head import BakedHead
+from ico3d.bundle.manifest import CameraInfo
+from ico3d.common.camera import Camera, look_at
+from ico3d.splat.gaussians import Gaussians
+from ico3d.splat.render import render
+
+
+def baked_gaussians(head: BakedHead, expression: np.ndarray) -> Gaussians:
+    """The Gaussians (N) of an expression (B,) in canonical head space."""
+    rgb, opacity = attributes(head, expression)
+    return Gaussians(
+        means=torch.tensor(head.means),
+        quats=torch.tensor(head.quats.astype(np.float32)),
+        scales=torch.tensor(head.scales.astype(np.float32)).exp(),
+        opacities=torch.from_numpy(opacity),
+        colors=torch.from_numpy(rgb),
+    )
+
+
+def render_bundle(
+    bundle: Bundle,
+    expression: Sequence[float] | np.ndarray,
+    camera: Camera,
+    background: np.ndarray | None = None,
+    world_from_head: np.ndarray | None = None,
+) -> np.ndarray:
+    """Renders a bundle as a viewer does.
+
+    Args:
+        bundle: The avatar.
+        expression: (B,).
+        camera: In world space.
+        background: (3,) or (H, W, 3); the bundle's own colour by default.
+        world_from_head: (4, 4); the bundle's first head pose by default.
+
+    Returns:
+        (H, W, 3) float32 display RGB.
+    """
+    pose = bundle.world_from_head[0] if world_from_head is None else world_from_head
+    behind = np.array(bundle.manifest.background) if background is None else background
+    gaussians = baked_gaussians(bundle.head, np.asarray(expression, np.float32))
+    with torch.no_grad():
+        picture = render(gaussians, [camera.moved(pose)], torch.tensor(behind).float()).rgb[0]
+    return picture.numpy()  # (H, W, 3)
+
+
+def visitor_camera(info: CameraInfo, width: int, height: int) -> Camera:
+    """The manifest's camera as a pinhole camera of this size."""
+    focal = 0.5 * height / np.tan(np.deg2rad(info.fov_y) / 2)
+    intrinsics = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
+    pose = look_at(np.array(info.eye), np.array(info.target), np.array(info.up))
+    return Camera(width, height, intrinsics, pose, "visitor")
