@@ -1,0 +1,228 @@
+"""Adaptive density control of 3D Gaussian Splatting: clone, split, prune.
+
+It works on plans. `densify_plan` says which Gaussians stay, are cloned or are split; `apply_plan`
+carries any per-Gaussian tensor over, so that parameters, optimiser states and whatever a model
+hangs on its Gaussians (HeadGaS++: the basis F) follow the same plan.
+"""
+
+from dataclasses import dataclass
+from math import log
+
+import torch
+from torch import Tensor
+
+from ico3d.splat import quaternions
+from ico3d.splat.rendering import RenderInfo
+
+SPLIT_PARTS = 2
+"""A Gaussian that is too large becomes this many."""
+
+SPLIT_SHRINK = 1.6
+"""... each smaller by this factor."""
+
+
+@dataclass(frozen=True)
+class DensitySettings:
+    """When Gaussians multiply and die.
+
+    Attributes:
+        max_gaussians: Never more than this many; the strongest gradients win.
+        gradient_threshold: Mean screen gradient (normalised device units) above which a Gaussian
+            multiplies.
+        clone_below: Gaussians whose largest scale is up to this are cloned, larger ones split,
+            metres. 3DGS: 1 % of the scene's extent.
+        prune_opacity: Those whose opacity falls below this die.
+        prune_scale: Those whose largest scale exceeds this die, metres. 3DGS: 10 % of the
+            scene's extent.
+    """
+
+    max_gaussians: int = 50_000
+    gradient_threshold: float = 2e-4
+    clone_below: float = 0.002
+    prune_opacity: float = 0.005
+    prune_scale: float = 0.05
+
+
+@dataclass
+class DensityStats:
+    """Screen gradients gathered between two densifications.
+
+    Attributes:
+        gradient_sum: (N,) sum over the views that saw a Gaussian.
+        views: (N,) number of those views.
+    """
+
+    gradient_sum: Tensor
+    views: Tensor
+
+    @staticmethod
+    def zeros(count: int, device: torch.device | str = "cpu") -> "DensityStats":
+        """Statistics of `count` Gaussians, nothing gathered."""
+        return DensityStats(torch.zeros(count, device=device), torch.zeros(count, device=device))
+
+    def add(self, info: RenderInfo) -> None:
+        """Gathers from a render after `backward`.
+
+        With a loss that averages over C cameras the gradients are C times too small; they are
+        scaled back, so that the threshold means the same for any number of cameras.
+
+        Raises:
+            RuntimeError: If `backward` has not run.
+        """
+        visible = info.visible  # (C, N)
+        norms = info.screen_gradients() * len(visible)  # (C, N)
+        self.gradient_sum += (norms * visible).sum(0)
+        self.views += visible.sum(0)
+
+    def mean_gradient(self) -> Tensor:
+        """(N,) mean over the views that saw a Gaussian; 0 where none did."""
+        return self.gradient_sum / self.views.clamp_min(1)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What becomes of N Gaussians; the new order is: kept, clones, parts of the split.
+
+    Attributes:
+        keep: (K,) indices of those that stay as they are.
+        clone_from: (A,) indices of which there is one more.
+        split_from: (2·B,) indices of the split, each twice: they do not stay.
+    """
+
+    keep: Tensor
+    clone_from: Tensor
+    split_from: Tensor
+
+    def __len__(self) -> int:
+        """How many Gaussians there are afterwards."""
+        return len(self.keep) + len(self.clone_from) + len(self.split_from)
+
+    @property
+    def sources(self) -> Tensor:
+        """(M,) the old index of each new Gaussian."""
+        return torch.cat([self.keep, self.clone_from, self.split_from])
+
+
+def densify_plan(
+    stats: DensityStats, scales: Tensor, opacities: Tensor, settings: DensitySettings
+) -> Plan:
+    """Decides what multiplies and what dies (3DGS section 5).
+
+    Pruned are the faint and those that would still be too large after their split; only the others
+    multiply. Where the cap leaves no room for all of them, those of the strongest gradient go
+    first; where even those that stay are too many, the faintest die.
+
+    Args:
+        stats: What was gathered since the last plan.
+        scales: (N, 3) activated, metres.
+        opacities: (N,) that decide who is faint. A model that predicts opacities gives the
+            greatest over sampled frames.
+        settings: Thresholds and the cap.
+
+    Returns:
+        The plan; the same for the same arguments.
+    """
+    size = scales.detach().amax(-1)  # (N,)
+    gradient = stats.mean_gradient()
+    wanted = gradient > settings.gradient_threshold
+    large = size > settings.clone_below
+    final_size = torch.where(wanted & large, size / SPLIT_SHRINK, size)
+    faint = opacities.detach() < settings.prune_opacity
+    alive = _under_cap(
+        ~(faint | (final_size > settings.prune_scale)), opacities.detach(), settings.max_gaussians
+    )
+    room = settings.max_gaussians - int(alive.sum())
+    grown = _strongest(wanted & alive, gradient, room)
+    return Plan(
+        (alive & ~(grown & large)).nonzero()[:, 0],
+        (grown & ~large).nonzero()[:, 0],
+        (grown & large).nonzero()[:, 0].repeat_interleave(SPLIT_PARTS),
+    )
+
+
+def _strongest(chosen: Tensor, strength: Tensor, count: int) -> Tensor:
+    """Mask (N,) of at most `count` of the chosen, the strongest; equals by their index."""
+    order = strength.masked_fill(~chosen, -1).argsort(descending=True, stable=True)
+    first = order[: min(count, int(chosen.sum()))]
+    return torch.zeros_like(chosen).index_fill(0, first, True)
+
+
+def _under_cap(alive: Tensor, opacities: Tensor, cap: int) -> Tensor:
+    """Those alive, without the faintest where they are more than the cap."""
+    return _strongest(alive, opacities, cap) if int(alive.sum()) > cap else alive
+
+
+def apply_plan(values: Tensor, plan: Plan) -> Tensor:
+    """Carries per-Gaussian values (N, ...) over: clones and parts copy their source's.
+
+    Returns:
+        (M, ...) without gradient.
+    """
+    return values.detach()[plan.sources.to(values.device)]
+
+
+def apply_plan_to_state(state: Tensor, plan: Plan) -> Tensor:
+    """Carries an optimiser's running values (N, ...) over; clones and parts begin at 0."""
+    new = apply_plan(state, plan)
+    new[len(plan.keep) :] = 0
+    return new
+
+
+def apply_plan_to_geometry(
+    means: Tensor, quats: Tensor, scales: Tensor, plan: Plan, generator: torch.Generator
+) -> tuple[Tensor, Tensor]:
+    """Carries means and activated scales over; parts of the split are drawn from their source.
+
+    Args:
+        means: (N, 3).
+        quats: (N, 4), need not be normalised.
+        scales: (N, 3) activated, metres.
+        plan: The plan.
+        generator: On the CPU; decides where the parts lie.
+
+    Returns:
+        Means (M, 3) and scales (M, 3), without gradient.
+    """
+    new_means, new_scales = apply_plan(means, plan), apply_plan(scales, plan)
+    parts = slice(len(plan) - len(plan.split_from), len(plan))
+    noise = torch.randn(len(plan.split_from), 3, generator=generator).to(means)
+    turns = quaternions.to_matrix(apply_plan(quats, plan)[parts])  # (2·B, 3, 3)
+    offsets = turns @ (noise * new_scales[parts])[..., None]  # (2·B, 3, 1)
+    new_means[parts] += offsets[..., 0]
+    new_scales[parts] /= SPLIT_SHRINK
+    return new_means, new_scales
+
+
+def replace_parameters(
+    optimizer: torch.optim.Optimizer,
+    parameters: dict[str, Tensor],
+    values: dict[str, Tensor],
+    plan: Plan,
+) -> dict[str, Tensor]:
+    """Puts new values in the place of a torch optimiser's per-Gaussian parameters.
+
+    Args:
+        optimizer: Holds every one of `parameters`; its running values follow the plan.
+        parameters: By name, (N, ...).
+        values: The new values by the same names, (M, ...).
+        plan: The plan they were made by.
+
+    Returns:
+        The new parameters by name.
+    """
+    new = {name: torch.nn.Parameter(values[name]) for name in parameters}
+    by_identity = {id(parameters[name]): new[name] for name in parameters}
+    for group in optimizer.param_groups:
+        group["params"] = [by_identity.get(id(p), p) for p in group["params"]]
+    for name, old in parameters.items():
+        state = optimizer.state.pop(old, {})
+        optimizer.state[new[name]] = {
+            key: apply_plan_to_state(v, plan) if torch.is_tensor(v) and v.dim() else v
+            for key, v in state.items()
+        }
+    return dict(new)
+
+
+def reset_opacity_logits(logits: Tensor, ceiling: float = 0.01) -> Tensor:
+    """Stored opacity logits (N,), none above that of `ceiling` (3DGS's opacity reset)."""
+    return logits.detach().clamp_max(log(ceiling / (1 - ceiling)))
