@@ -1,4 +1,7 @@
-"""The names of the values that drive a head beside its adapted speech features."""
+"""What the expression vector of a speech-driven head holds: speech values, then eye values."""
+
+SPEECH_SIZE = 32
+"""How many adapted speech features come first."""
 
 EYE_NAMES = (
     "browDownLeft",

@@ -1,0 +1,183 @@
+"""Speech networks as ONNX graphs, for servers that have no torch."""
+
+import numpy as np
+import torch
+from torch import nn
+
+from ico3d.errors import MissingExtraError
+from ico3d.speech.encoder import FrozenEncoder
+from ico3d.speech.mel import MELS, WINDOW
+from ico3d.speech.network import (
+    AFTER,
+    ATTENTION_WINDOW,
+    BEFORE,
+    SPEECH_SIZE,
+    AudioAttNet,
+    AudioEncoder,
+    BuiltinEncoder,
+    ConvBlock,
+    SpeechAdaptor,
+)
+
+_OPSET = 17
+_IR_VERSION = 8
+_HALF_FROM = 1024  # tensors of so many values are stored in half precision where that is exact
+_ROWS = "rows"
+
+
+def export_speech(adaptor: SpeechAdaptor, encoder: FrozenEncoder) -> bytes:
+    """The bundle's `speech.onnx` (docs/bundle.md).
+
+    Args:
+        adaptor: The subject's adaptor.
+        encoder: What its features come from. The built-in one goes into the graph; any other is
+            the user's, so the graph takes its features.
+
+    Returns:
+        A model from `mel` (T, 80, 16) or `features` (T, D) to `expression` (T, 32).
+    """
+    graph = _Graph()
+    if encoder.name == "builtin":
+        features = _encoder(graph, encoder.network, graph.input("mel", [_ROWS, MELS, WINDOW]))
+    else:
+        features = graph.input("features", [_ROWS, encoder.size])
+    return graph.model(_adaptor(graph, adaptor, features), "expression", SPEECH_SIZE)
+
+
+def export_encoder(encoder: FrozenEncoder) -> bytes:
+    """An encoder alone: a model from `mel` (T, 80, 16) to `features` (T, D)."""
+    graph = _Graph()
+    mel = graph.input("mel", [_ROWS, MELS, WINDOW])
+    return graph.model(_encoder(graph, encoder.network, mel), "features", encoder.size)
+
+
+class _Graph:
+    """Collects nodes and weights; each method returns the name of what its node gives."""
+
+    def __init__(self):
+        try:
+            import onnx
+        except ImportError:
+            raise MissingExtraError("onnx", "train", "writing speech.onnx") from None
+        self._onnx = onnx
+        self._nodes = []
+        self._weights = []
+        self._inputs = []
+        self._count = 0
+
+    def input(self, name: str, shape: list[int | str]) -> str:
+        """Declares a float32 input."""
+        kind = self._onnx.TensorProto.FLOAT
+        self._inputs.append(self._onnx.helper.make_tensor_value_info(name, kind, shape))
+        return name
+
+    def weight(self, value: torch.Tensor | np.ndarray) -> str:
+        """Stores a constant."""
+        array = value if isinstance(value, np.ndarray) else value.detach().cpu().numpy()
+        name = self._name()
+        half = array.astype(np.float16) if array.dtype == np.float32 else array
+        if array.size < _HALF_FROM or not np.array_equal(half, array):
+            self._weights.append(self._onnx.numpy_helper.from_array(array, name))
+            return name
+        self._weights.append(self._onnx.numpy_helper.from_array(half, name))
+        return self.add("Cast", name, to=self._onnx.TensorProto.FLOAT)
+
+    def add(self, operator: str, *inputs: str, **attributes) -> str:
+        """Adds a node."""
+        name = self._name()
+        node = self._onnx.helper.make_node(operator, list(inputs), [name], **attributes)
+        self._nodes.append(node)
+        return name
+
+    def ints(self, *values: int) -> str:
+        """Stores int64 values, as shapes and axes are."""
+        return self.weight(np.array(values, np.int64))
+
+    def linear(self, layer: nn.Linear, x: str) -> str:
+        """A fully connected layer on rows (b, inputs)."""
+        weight, bias = self.weight(layer.weight), self.weight(layer.bias)
+        return self.add("Gemm", x, weight, bias, transB=1)
+
+    def sequence(self, layers: nn.Sequential, x: str) -> str:
+        """Linear layers, 1-D convolutions and leaky ReLUs, one after the other."""
+        for layer in layers:
+            if isinstance(layer, nn.Linear):
+                x = self.linear(layer, x)
+            elif isinstance(layer, nn.Conv1d):
+                assert layer.bias is not None
+                weight, bias = self.weight(layer.weight), self.weight(layer.bias)
+                x = self.add("Conv", x, weight, bias, pads=[1, 1])
+            elif isinstance(layer, nn.LeakyReLU):
+                x = self.add("LeakyRelu", x, alpha=layer.negative_slope)
+        return x
+
+    def block(self, block: ConvBlock, x: str) -> str:
+        """A convolution block with its normalisation folded in."""
+        conv = block.conv_block[0]
+        assert isinstance(conv, nn.Conv2d)
+        weight, bias = (self.weight(value) for value in block.folded())
+        y = self.add(
+            "Conv",
+            x,
+            weight,
+            bias,
+            strides=list(conv.stride),
+            dilations=list(conv.dilation),
+            pads=[int(p) for p in conv.padding] * 2,
+        )
+        return self.add("Relu", self.add("Add", y, x) if block.residual else y)
+
+    def model(self, result: str, name: str, width: int) -> bytes:
+        """The finished model, whose output `name` is (T, width)."""
+        helper = self._onnx.helper
+        self._nodes.append(helper.make_node("Identity", [result], [name]))
+        kind = self._onnx.TensorProto.FLOAT
+        output = helper.make_tensor_value_info(name, kind, [_ROWS, width])
+        graph = helper.make_graph(self._nodes, "speech", self._inputs, [output], self._weights)
+        opset = [helper.make_opsetid("", _OPSET)]
+        model = helper.make_model(graph, opset_imports=opset, ir_version=_IR_VERSION)
+        self._onnx.checker.check_model(model)
+        return model.SerializeToString()
+
+    def _name(self) -> str:
+        self._count += 1
+        return f"v{self._count}"
+
+
+def _encoder(graph: _Graph, network: nn.Module, mel: str) -> str:
+    """Mel windows (T, 80, 16) to features (T, D)."""
+    x = graph.add("Unsqueeze", mel, graph.ints(1))  # (T, 1, 80, 16)
+    assert isinstance(network, BuiltinEncoder | AudioEncoder)
+    blocks = network.blocks if isinstance(network, BuiltinEncoder) else network
+    for block in blocks:
+        assert isinstance(block, ConvBlock)
+        x = graph.block(block, x)
+    x = graph.add("Flatten", x)  # (T, channels)
+    if isinstance(network, BuiltinEncoder):
+        weight, bias = network.project.weight, network.project.bias
+        assert bias is not None
+        x = graph.add("Gemm", x, graph.weight(weight.flatten(1)), graph.weight(bias), transB=1)
+    return x
+
+
+def _adaptor(graph: _Graph, network: SpeechAdaptor, features: str) -> str:
+    """Features (T, D) to expressions (T, 32)."""
+    padded = graph.add("Pad", features, graph.ints(BEFORE, 0, AFTER, 0))  # (T + 7, D)
+    adapted = graph.sequence(network.adaptor, padded)  # (T + 7, 32)
+    shifted = []
+    for offset in range(ATTENTION_WINDOW):
+        last = offset - ATTENTION_WINDOW + 1
+        end = graph.ints(last if last else np.iinfo(np.int64).max)
+        row = graph.add("Slice", adapted, graph.ints(offset), end, graph.ints(0))  # (T, 32)
+        shifted.append(graph.add("Unsqueeze", row, graph.ints(2)))  # (T, 32, 1)
+    windows = graph.add("Concat", *shifted, axis=2)  # (T, 32, 8)
+    return _attention(graph, network.attention, windows)
+
+
+def _attention(graph: _Graph, network: AudioAttNet, windows: str) -> str:
+    """Windows (T, 32, 8) to their weighted means (T, 32)."""
+    scores = graph.add("Flatten", graph.sequence(network.convolutions, windows))  # (T, 8)
+    weights = graph.add("Softmax", graph.linear(network.scores, scores), axis=1)  # (T, 8)
+    weights = graph.add("Unsqueeze", weights, graph.ints(1))  # (T, 1, 8)
+    weighted = graph.add("Mul", windows, weights)  # (T, 32, 8)
+    return graph.add("ReduceSum", weighted, graph.ints(2), keepdims=0)
