@@ -1,0 +1,39 @@
+"""Command line of the capture room."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+
+@dataclass(frozen=True)
+class Portrait:
+    """Track a talking-head video: poses, expressions, masks, background, sound.
+
+    The camera should stand still, one person face it. Pictures are resampled to 25 per second and
+    scaled down to at most `size`. The result is a folder in the talking-portrait layout.
+
+    Attributes:
+        video: The video file.
+        out: Folder to make.
+        intrinsics: Focal length in pixels of the video, or "estimated".
+        size: Longest short side of the pictures in pixels.
+        consent: What the person agreed to; goes into the avatar's manifest.
+        licence: Licence of the recording; likewise.
+    """
+
+    video: Annotated[Path, tyro.conf.Positional]
+    out: Annotated[Path, tyro.conf.Positional]
+    intrinsics: float | Literal["estimated"] = "estimated"
+    size: int = 512
+    consent: str = "not stated"
+    licence: str = "not stated"
+
+    def run(self) -> None:
+        """Runs it."""
+        from ico3d.capture.portrait import PortraitSettings, track_portrait
+
+        focal = None if self.intrinsics == "estimated" else self.intrinsics
+        settings = PortraitSettings(self.size, focal, self.consent, self.licence)
+        track_portrait(self.video, self.out, settings)

@@ -1,0 +1,169 @@
+"""MediaPipe's face model: landmarks and blendshapes of a picture, and its canonical face."""
+
+import struct
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ico3d.errors import CaptureError, MissingExtraError
+
+LANDMARKS = 478
+MESH_LANDMARKS = 468
+"""The landmarks on the face; the ten after them are the irises."""
+
+
+@dataclass(frozen=True)
+class Face:
+    """One face in one picture.
+
+    Attributes:
+        landmarks: (478, 2) pixels, pixel centres at +0.5.
+        blendshapes: (52,) weights.
+        pose: (4, 4) canonical face (cm) to a camera of 63 degrees vertical field of view, OpenGL
+            axes: good enough to start from, no more.
+    """
+
+    landmarks: np.ndarray
+    blendshapes: np.ndarray
+    pose: np.ndarray
+
+
+class FaceReader:
+    """Finds the face in pictures, each one for itself.
+
+    MediaPipe's video mode filters landmarks over time, which delays them by about half a frame
+    (measured on a 25-fps clip); pictures one by one have no delay, and we smooth without one.
+    """
+
+    def __init__(self, model: Path):
+        """Loads the model.
+
+        Args:
+            model: `face_landmarker.task`.
+
+        Raises:
+            MissingExtraError: If MediaPipe is not installed.
+            CaptureError: If the model file cannot be used.
+        """
+        try:
+            import mediapipe
+            from mediapipe.tasks.python import BaseOptions, vision
+        except ImportError as error:
+            raise MissingExtraError("mediapipe", "face", "tracking a portrait") from error
+        self._mediapipe = mediapipe
+        options = vision.FaceLandmarkerOptions(
+            base_options=BaseOptions(model_asset_path=str(model)),
+            running_mode=vision.RunningMode.IMAGE,
+            output_face_blendshapes=True,
+            output_facial_transformation_matrixes=True,
+        )
+        try:
+            self._landmarker = vision.FaceLandmarker.create_from_options(options)
+        except (RuntimeError, ValueError, OSError) as error:
+            raise CaptureError(f"{model} is no usable face landmarker model: {error}.") from error
+        self.names: tuple[str, ...] = ()
+
+    def __enter__(self) -> "FaceReader":
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._landmarker.close()
+
+    def read(self, image: np.ndarray) -> Face | None:
+        """The face in a picture, the largest if there are several.
+
+        Args:
+            image: uint8 RGB (H, W, 3), contiguous.
+
+        Returns:
+            The face, or None where there is none.
+        """
+        height, width = image.shape[:2]
+        packed = self._mediapipe.Image(
+            image_format=self._mediapipe.ImageFormat.SRGB, data=np.ascontiguousarray(image)
+        )
+        found = self._landmarker.detect(packed)
+        if not found.face_landmarks:
+            return None
+        self.names = tuple(shape.category_name for shape in found.face_blendshapes[0])
+        return Face(
+            np.array([(p.x * width, p.y * height) for p in found.face_landmarks[0]]),
+            np.array([shape.score for shape in found.face_blendshapes[0]], np.float32),
+            np.asarray(found.facial_transformation_matrixes[0], np.float64),
+        )
+
+
+@dataclass(frozen=True)
+class CanonicalFace:
+    """The mean face that MediaPipe's landmarks belong to.
+
+    Attributes:
+        vertices: (468, 3) metres; +X the person's left, +Y up, +Z facing, origin mid-head.
+        triangles: (T, 3) vertex indices.
+        rigidity: (468,) weights in [0, 1] of the landmarks that MediaPipe itself aligns heads by.
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    rigidity: np.ndarray
+
+
+def canonical_face(model: Path) -> CanonicalFace:
+    """Reads the canonical face out of the model file.
+
+    Args:
+        model: `face_landmarker.task`, a zip that holds the mesh as a protocol buffer.
+
+    Raises:
+        CaptureError: If the mesh is not where it should be.
+    """
+    try:
+        with zipfile.ZipFile(model) as archive:
+            data = archive.read("geometry_pipeline_metadata_landmarks.binarypb")
+        top = list(_fields(data))
+        mesh = list(_fields(next(value for key, value in top if key == 1)))
+        floats = [struct.unpack("<f", value)[0] for key, value in mesh if key == 3]
+        indices = [value for key, value in mesh if key == 4]
+        vertices = np.asarray(floats, np.float64).reshape(MESH_LANDMARKS, 5)  # x y z u v, cm
+        rigidity = np.zeros(MESH_LANDMARKS)
+        for key, value in top:
+            if key == 2:
+                basis = dict(_fields(value))
+                rigidity[basis[1]] = struct.unpack("<f", basis[2])[0]
+    except (zipfile.BadZipFile, KeyError, OSError, IndexError, struct.error, ValueError) as error:
+        raise CaptureError(f"{model} holds no canonical face mesh; is it damaged?") from error
+    triangles = np.asarray(indices, np.int64).reshape(-1, 3)
+    return CanonicalFace(vertices[:, :3] * 0.01, triangles, rigidity / rigidity.max())
+
+
+def _fields(data: bytes) -> Iterator[tuple[int, Any]]:
+    """The fields of one protocol-buffer message: (number, integer or bytes)."""
+    position = 0
+    while position < len(data):
+        key, position = _varint(data, position)
+        number, wire = key >> 3, key & 7
+        if wire == 0:
+            value, position = _varint(data, position)
+        else:
+            length = 4 if wire == 5 else 8
+            if wire == 2:
+                length, position = _varint(data, position)
+            value = data[position : position + length]
+            position += length
+        yield number, value
+
+
+def _varint(data: bytes, position: int) -> tuple[int, int]:
+    """One variable-length integer and the position after it."""
+    value = shift = 0
+    while True:
+        byte = data[position]
+        position += 1
+        value |= (byte & 127) << shift
+        shift += 7
+        if byte < 128:
+            return value, position

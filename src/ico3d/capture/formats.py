@@ -1,0 +1,32 @@
+"""Which reader opens which capture; each is imported only when its format is met."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from ico3d.capture.capture import Capture
+
+
+def _portrait(path: Path) -> Capture:
+    """Opens a talking-portrait folder."""
+    from ico3d.capture.talking_portrait import TalkingPortrait
+
+    return TalkingPortrait(path)
+
+
+def _synthetic(path: Path) -> Capture:
+    """Opens a synthetic capture."""
+    from ico3d.capture.synthetic_reader import SyntheticCapture
+
+    return SyntheticCapture(path)
+
+
+def _holds(name: str) -> Callable[[Path], bool]:
+    """Recognises a folder by a file in it."""
+    return lambda path: (path / name).is_file()
+
+
+FORMATS: list[tuple[Callable[[Path], bool], Callable[[Path], Capture]]] = [
+    (_holds("transforms_train.json"), _portrait),
+    (_holds("capture.json"), _synthetic),
+]
+"""Pairs of (recognises a path, opens it)."""

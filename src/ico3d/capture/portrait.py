@@ -1,0 +1,285 @@
+"""From a video of somebody talking to a tracked capture in the talking-portrait layout."""
+
+import json
+import shutil
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+from rich.console import Console
+from rich.progress import track as progress
+
+from ico3d.capture import matting, parsing, tracking
+from ico3d.capture.capture import Sound
+from ico3d.capture.face import LANDMARKS, MESH_LANDMARKS, FaceReader, canonical_face
+from ico3d.capture.multipie import MULTI_PIE
+from ico3d.capture.plate import SAMPLES, clean_plate
+from ico3d.capture.portrait_files import (
+    DETAILS,
+    save_landmarks,
+    save_picture,
+    save_torso,
+    save_transforms,
+)
+from ico3d.capture.surface import surface_points
+from ico3d.capture.video import Video, open_video, read_sound
+from ico3d.common.files import model_file
+from ico3d.errors import CaptureError
+
+FPS = 25.0
+console = Console(stderr=True)
+
+
+@dataclass(frozen=True)
+class PortraitSettings:
+    """How a video becomes a portrait capture.
+
+    Attributes:
+        size: Longest short side of the pictures in pixels; larger videos are scaled down.
+        focal: Focal length in pixels of the video as it is; estimated where None.
+        consent: What the person agreed to.
+        licence: Licence of the recording.
+    """
+
+    size: int = 512
+    focal: float | None = None
+    consent: str = "not stated"
+    licence: str = "not stated"
+
+
+@dataclass
+class Readings:
+    """What the face model says about a clip.
+
+    Attributes:
+        landmarks: One (478, 2) per frame with a face, pixels.
+        blendshapes: One (52,) each.
+        poses: One (4, 4) each, rough.
+        frames: The numbers of these frames.
+        missing: The numbers of the frames without a face.
+        names: Names of the blendshapes.
+    """
+
+    landmarks: list[np.ndarray] = field(default_factory=list)
+    blendshapes: list[np.ndarray] = field(default_factory=list)
+    poses: list[np.ndarray] = field(default_factory=list)
+    frames: list[int] = field(default_factory=list)
+    missing: list[int] = field(default_factory=list)
+    names: tuple[str, ...] = ()
+
+    @property
+    def total(self) -> int:
+        """All frames of the clip."""
+        return len(self.frames) + len(self.missing)
+
+
+def track_portrait(video: Path, out: Path, settings: PortraitSettings) -> None:
+    """Tracks a video and writes the capture; `out` appears only when everything is there.
+
+    Args:
+        video: A video file of one person, steady camera.
+        out: Folder to make.
+        settings: How.
+
+    Raises:
+        CaptureError: If `out` exists, or the video cannot be read or shows no face.
+        MissingExtraError: If MediaPipe is not installed.
+        MissingModelError: If the face model is not there.
+    """
+    if out.exists():
+        raise CaptureError(f"{out} exists already: remove it or choose another folder.")
+    model = model_file("face_landmarker.task", "tracking a portrait")
+    opened = open_video(video, settings.size)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    work = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
+    try:
+        _write(work, opened, model, settings)
+        work.chmod(0o755)
+        work.rename(out)
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+    console.print(f"[green]capture written to {out}[/]; look at it: ico3d capture check {out}")
+
+
+def _write(work: Path, video: Video, model: Path, settings: PortraitSettings) -> None:
+    """All files of the capture."""
+    readings = _read_faces(work, video, model)
+    notes = _notes(video, readings)
+    canonical = canonical_face(model)
+    given = settings.focal and settings.focal * video.scale
+    track = _track(readings, canonical, (video.width, video.height), given)
+    save_transforms(work, track.focal, track.center.tolist(), readings.frames, track.poses())
+    np.save(work / "points.npy", surface_points(track.shape, canonical.triangles))
+    _save_blendshapes(work, readings)
+    seen = _save_mattes(work, readings)
+    sound = read_sound(video.path)
+    if sound is None:
+        notes.append("the video has no sound: speech cannot drive a head trained on it")
+    else:
+        _save_sound(work, sound)
+    for note in notes:
+        console.print(f"[yellow]warning:[/] {video.path}: {note}.")
+    _save_details(work, video, readings, track, settings, notes, seen)
+
+
+def _read_faces(work: Path, video: Video, model: Path) -> Readings:
+    """Writes every picture and reads the face in it."""
+    readings = Readings()
+    total = video.announced or None
+    with FaceReader(model) as reader:
+        frames = progress(video.frames(FPS), "finding the face", total, console=console)
+        for number, image in enumerate(frames):
+            save_picture(work / "ori_imgs" / f"{number}.jpg", image)
+            face = reader.read(image)
+            if face is None:
+                readings.missing.append(number)
+                continue
+            readings.frames.append(number)
+            readings.landmarks.append(face.landmarks)
+            readings.blendshapes.append(face.blendshapes)
+            readings.poses.append(face.pose)
+            save_landmarks(work / "ori_imgs" / f"{number}.lms", face.landmarks[MULTI_PIE])
+        readings.names = reader.names
+    if not readings.frames:
+        raise CaptureError(
+            f"{video.path}: no face in any of its {readings.total} frames; "
+            "a portrait needs one person facing the camera."
+        )
+    return readings
+
+
+def _notes(video: Video, readings: Readings) -> list[str]:
+    """What the user should know about the clip."""
+    notes = []
+    if readings.missing:
+        some = ", ".join(map(str, readings.missing[:5])) + (", …" if readings.missing[5:] else "")
+        notes.append(
+            f"{len(readings.missing)} of {readings.total} frames show no face "
+            f"and are left out (frames {some})"
+        )
+    if video.damaged or video.decoded < video.announced:
+        whole = f" of {video.announced}" if video.announced else ""
+        notes.append(f"the file is damaged or cut off: {video.decoded}{whole} pictures decoded")
+    return notes
+
+
+def _track(readings: Readings, canonical, size: tuple[int, int], focal: float | None):
+    """The rigid head through all frames with a face, smoothed within each unbroken run."""
+    landmarks = np.stack(readings.landmarks)[:, :MESH_LANDMARKS]
+    start = np.stack(readings.poses)
+    start[:, :3, 3] *= 0.01  # centimetres
+    with console.status("fitting head pose, head shape and focal length"):
+        found = tracking.fit(landmarks, start, canonical.vertices, canonical.rigidity, size, focal)
+    return tracking.smoothed(found, np.asarray(readings.frames))
+
+
+def _save_blendshapes(work: Path, readings: Readings) -> None:
+    """`bs.npy`, a row per frame; frames without a face get what lies between their neighbours."""
+    values = np.stack(readings.blendshapes)
+    every = np.arange(readings.total)
+    rows = [np.interp(every, readings.frames, column) for column in values.T]
+    np.save(work / "bs.npy", np.stack(rows, 1).astype(np.float32))
+
+
+def _save_mattes(work: Path, readings: Readings) -> float:
+    """Person, parts, clean plate and composites; returns the share of background seen."""
+    landmarks = np.stack(readings.landmarks)
+    models = _learn(work, readings, landmarks)
+    chosen = set(_spread(len(readings.frames), SAMPLES))
+    images, alphas = [], []
+    steps = progress(range(len(readings.frames)), "cutting out the person", console=console)
+    for index in steps:
+        number = readings.frames[index]
+        image = load_uint8(work / "ori_imgs" / f"{number}.jpg")
+        alpha = matting.cut(image, landmarks[index], models)
+        parts = parsing.parse(image, alpha, landmarks[index])
+        torso = alpha * parsing.is_class(parts, parsing.NECK, parsing.CLOTH)
+        save_picture(work / "alpha" / f"{number}.png", (alpha * 255).round().astype(np.uint8))
+        save_picture(work / "parsing" / f"{number}.png", parts)
+        (work / "torso_imgs").mkdir(exist_ok=True)
+        save_torso(work / "torso_imgs" / f"{number}.png", image, torso)
+        if index in chosen:
+            images.append(image)
+            alphas.append(alpha)
+    plate, seen = clean_plate(images, alphas)
+    save_picture(work / "bc.jpg", plate)
+    _save_composites(work, readings, load_uint8(work / "bc.jpg"))
+    return seen
+
+
+def _learn(work: Path, readings: Readings, landmarks: np.ndarray) -> matting.Models:
+    """Colour models from a dozen frames."""
+    chosen = _spread(len(readings.frames), 12)
+    images = [
+        matting.working(load_uint8(work / "ori_imgs" / f"{readings.frames[i]}.jpg")) for i in chosen
+    ]
+    with Image.open(work / "ori_imgs" / f"{readings.frames[0]}.jpg") as picture:
+        scale = images[0].shape[1] / picture.width
+    with console.status("learning the colours of person and background"):
+        return matting.learn(images, landmarks[chosen] * scale)
+
+
+def _save_composites(work: Path, readings: Readings, plate: np.ndarray) -> None:
+    """`gt_imgs`: the person before the clean plate."""
+    for number in progress(readings.frames, "composing", console=console):
+        image = load_uint8(work / "ori_imgs" / f"{number}.jpg")
+        alpha = load_uint8(work / "alpha" / f"{number}.png")[..., None] / np.float32(255)
+        mixed = image * alpha + plate * (1 - alpha)
+        save_picture(work / "gt_imgs" / f"{number}.jpg", mixed.round().astype(np.uint8))
+
+
+def _save_sound(work: Path, sound: Sound) -> None:
+    """`aud.wav`, 16-bit."""
+    import soundfile
+
+    soundfile.write(work / "aud.wav", sound.samples, sound.rate, subtype="PCM_16")
+
+
+def _save_details(
+    work: Path,
+    video: Video,
+    readings: Readings,
+    track: tracking.Track,
+    settings: PortraitSettings,
+    notes: list[str],
+    seen: float,
+) -> None:
+    """`ico3d.json`."""
+    error = np.stack(readings.landmarks)[:, :MESH_LANDMARKS] - track.project()
+    rigid = track.sigmas <= np.quantile(track.sigmas, 0.25)
+    details = {
+        "format": "ico3d-portrait",
+        "version": 1,
+        "fps": FPS,
+        "num_frames": readings.total,
+        "frames_without_face": readings.missing,
+        "size": [video.width, video.height],
+        "blendshape_names": list(readings.names),
+        "tracker": {
+            "model": f"MediaPipe face landmarker, {LANDMARKS} landmarks",
+            "focal": "given" if settings.focal else "estimated",
+            "reprojection_px": float(np.sqrt((error[:, rigid] ** 2).sum(-1).mean())),
+        },
+        "background_seen": round(seen, 3),
+        "notes": notes,
+        "provenance": {
+            "kind": "portrait",
+            "sources": [video.path.name],
+            "consent": settings.consent,
+            "licence": settings.licence,
+        },
+    }
+    (work / DETAILS).write_text(json.dumps(details, indent=1))
+
+
+def load_uint8(path: Path) -> np.ndarray:
+    """A picture as uint8."""
+    with Image.open(path) as picture:
+        return np.asarray(picture)
+
+
+def _spread(total: int, count: int) -> list[int]:
+    """At most `count` indices spread evenly over `total`."""
+    return np.unique(np.linspace(0, total - 1, count).round().astype(int)).tolist()

@@ -1,0 +1,80 @@
+"""Writing the talking-portrait layout (reference: AD-NeRF, SyncTalk, TalkingGaussian)."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+DETAILS = "ico3d.json"
+"""What the layout has no place for."""
+OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
+
+
+def save_picture(path: Path, image: np.ndarray) -> None:
+    """Writes uint8 RGB(A) or grey; JPEGs with full colour resolution."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    extra = {"quality": 97, "subsampling": 0} if path.suffix == ".jpg" else {"compress_level": 3}
+    Image.fromarray(image).save(path, **extra)
+
+
+def save_landmarks(path: Path, landmarks: np.ndarray) -> None:
+    """Writes (68, 2) pixels as text, "x y" a line."""
+    path.write_text("".join(f"{x:.4f} {y:.4f}\n" for x, y in landmarks))
+
+
+def load_landmarks(path: Path) -> np.ndarray:
+    """Reads (68, 2) pixels."""
+    return np.loadtxt(path, dtype=np.float64).reshape(-1, 2)
+
+
+def camera_to_world(camera_from_head: np.ndarray) -> np.ndarray:
+    """`transform_matrix` of the layout, where the head stands still and the camera moves.
+
+    Args:
+        camera_from_head: (4, 4) rigid, OpenGL camera axes.
+    """
+    rotation, translation = camera_from_head[:3, :3], camera_from_head[:3, 3]
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation.T
+    matrix[:3, 3] = -rotation.T @ translation
+    return matrix
+
+
+def save_transforms(
+    folder: Path,
+    focal: float,
+    center: Sequence[float],
+    frames: Sequence[int],
+    poses: np.ndarray,
+) -> None:
+    """Writes `transforms_train.json` and `transforms_val.json` (the last 1/11 of the frames).
+
+    Args:
+        folder: The capture.
+        focal: Pixels.
+        center: Principal point in pixels.
+        frames: True frame numbers of those with a face, ascending.
+        poses: (len(frames), 4, 4) camera from head, OpenGL axes.
+    """
+    first_test = len(frames) * 10 // 11
+    for name, part in (("train", slice(0, first_test)), ("val", slice(first_test, None))):
+        entries = [
+            {"img_id": int(i), "aud_id": int(i), "transform_matrix": camera_to_world(p).tolist()}
+            for i, p in zip(frames[part], poses[part], strict=True)
+        ]
+        content = {"focal_len": focal, "cx": center[0], "cy": center[1], "frames": entries}
+        (folder / f"transforms_{name}.json").write_text(json.dumps(content, indent=1))
+
+
+def save_torso(path: Path, image: np.ndarray, torso: np.ndarray) -> None:
+    """Writes the torso as RGBA; colour is 0 where alpha is.
+
+    Args:
+        path: The PNG file.
+        image: uint8 RGB (H, W, 3).
+        torso: (H, W) float32 alpha of neck and cloth.
+    """
+    alpha = (torso * 255).round().astype(np.uint8)[..., None]
+    save_picture(path, np.concatenate([image * (alpha > 0), alpha], -1))

@@ -1,0 +1,69 @@
+"""First surface points of a person, from which Gaussians start."""
+
+import numpy as np
+
+PER_TRIANGLE = 6
+"""Points drawn in each triangle of the face."""
+
+
+def surface_points(face: np.ndarray, triangles: np.ndarray, seed: int = 0) -> np.ndarray:
+    """The tracked face, and around it a guess of head, neck and shoulders.
+
+    Args:
+        face: (468, 3) landmarks in canonical head space, metres.
+        triangles: (T, 3) indices.
+        seed: Where in the triangles the points lie.
+
+    Returns:
+        (P, 3) float32 metres.
+    """
+    random = np.random.default_rng(seed)
+    shares = random.dirichlet(np.ones(3), (len(triangles), PER_TRIANGLE))  # (T, n, 3)
+    drawn = np.einsum("tnk,tkd->tnd", shares, face[triangles]).reshape(-1, 3)
+    return np.concatenate([drawn, body_guess(face, random)]).astype(np.float32)
+
+
+def body_guess(face: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """(P, 3): an ellipsoid for skull and hair, a cylinder for the neck, a sheet for the chest."""
+    half = np.ptp(face[:, 0]) / 2
+    top, chin = face[:, 1].max(), face[:, 1].min()
+    depth = face[:, 2].min()
+    center = np.array([0.0, (top + 0.15 * chin) / 2 + 0.015, depth])
+    skull = _sphere(random, 4000) * [1.25 * half, 0.62 * (top - chin), 1.3 * half] + center
+    skull = skull[skull[:, 2] < depth + 0.6 * half]
+    return np.concatenate(
+        [skull, _neck(random, half, chin, depth), _chest(random, half, chin, depth)]
+    )
+
+
+def _sphere(random: np.random.Generator, count: int) -> np.ndarray:
+    """(count, 3) points on the unit sphere."""
+    points = random.normal(size=(count, 3))
+    return points / np.linalg.norm(points, axis=1, keepdims=True)
+
+
+def _neck(random: np.random.Generator, half: float, chin: float, depth: float) -> np.ndarray:
+    """(800, 3) points around the neck."""
+    turn = random.uniform(0, 2 * np.pi, 800)
+    height = random.uniform(chin - 0.09, chin + 0.05, 800)
+    radius = 0.75 * half
+    return np.stack([radius * np.sin(turn), height, depth + radius * np.cos(turn)], 1)
+
+
+def _chest(random: np.random.Generator, half: float, chin: float, depth: float) -> np.ndarray:
+    """(3000, 3) points on shoulders and chest, sloping away from the neck."""
+    aside = random.uniform(-3.2, 3.2, 3000) * half
+    slope = chin - 0.05 - 0.25 * np.abs(aside)
+    height = slope - random.uniform(0, 0.22, 3000)
+    front = depth + 0.9 * half - 0.18 * np.abs(aside) + 0.3 * (slope - height)
+    return np.stack([aside, height, front], 1)
+
+
+def unknown_person(seed: int = 0) -> np.ndarray:
+    """(P, 3) float32: a head of usual size where no tracked face tells better."""
+    random = np.random.default_rng(seed)
+    half, top, chin, front = 0.075, 0.083, -0.094, 0.06
+    face = _sphere(random, 5000) * [half, (top - chin) / 2, front] + [0, (top + chin) / 2, 0]
+    outline = np.array([[-half, chin, 0.0], [half, top, 0.0]])
+    front_face = face[face[:, 2] > 0]
+    return np.concatenate([front_face, body_guess(outline, random)]).astype(np.float32)

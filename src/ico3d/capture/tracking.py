@@ -1,0 +1,266 @@
+"""One rigid head through a whole clip: focal length, head shape and a pose per frame.
+
+Bundle adjustment over face landmarks. The head model that is trained on the result has static
+geometry, so the poses must be those of the skull: landmarks that move with the expression are
+recognised by their residuals and lose their say. Camera axes are OpenGL's (x right, y up, the
+camera looks along -z), as in the talking-portrait layout.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+FOCAL_GUESS = 2.3
+"""Focal length over the longer image side of a usual portrait video."""
+FOCAL_SPREAD = 0.4
+"""Standard deviation of the logarithm of that guess."""
+SHAPE_SPREAD = 0.004
+"""Metres by which a person's landmarks differ from the canonical face."""
+INDEPENDENT = 20
+"""Landmark errors repeat from frame to frame: a clip tells as much as this many separate frames."""
+FIT_FRAMES = 240
+"""Frames that shape and focal length are fitted on; poses are then found for all."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """A tracked head.
+
+    Attributes:
+        focal: Pixels.
+        center: (2,) principal point in pixels.
+        shape: (K, 3) the person's landmarks at rest in canonical head space, metres.
+        rotations: (F, 3, 3) camera from head, OpenGL axes.
+        translations: (F, 3) likewise, metres.
+        sigmas: (K,) pixels by which each landmark strays from the rigid head.
+    """
+
+    focal: float
+    center: np.ndarray
+    shape: np.ndarray
+    rotations: np.ndarray
+    translations: np.ndarray
+    sigmas: np.ndarray
+
+    def project(self) -> np.ndarray:
+        """(F, K, 2) pixels of the rigid landmarks in all frames."""
+        return _project(self, _local(self))
+
+    def poses(self) -> np.ndarray:
+        """(F, 4, 4) camera from head, OpenGL axes."""
+        poses = np.tile(np.eye(4), (len(self.rotations), 1, 1))
+        poses[:, :3, :3], poses[:, :3, 3] = self.rotations, self.translations
+        return poses
+
+
+def fit(
+    landmarks: np.ndarray,
+    start: np.ndarray,
+    shape: np.ndarray,
+    rigidity: np.ndarray,
+    image_size: tuple[int, int],
+    focal: float | None = None,
+) -> Track:
+    """Fits focal length, shape and poses.
+
+    Args:
+        landmarks: (F, K, 2) pixels.
+        start: (F, 4, 4) rough camera-from-head poses (OpenGL axes, metres, any focal length).
+        shape: (K, 3) the canonical face in metres.
+        rigidity: (K,) in [0, 1]: which landmarks to trust before anything is known.
+        image_size: (width, height) in pixels.
+        focal: Focal length in pixels where it is known.
+
+    Returns:
+        The track; its poses are not smoothed over time.
+    """
+    chosen = np.unique(np.linspace(0, len(landmarks) - 1, FIT_FRAMES).round().astype(int))
+    track = _start(start[chosen], shape, image_size, focal)
+    track = replace(track, sigmas=1.0 / np.maximum(rigidity, 0.05))
+    for _ in range(30):
+        track = _pose_step(track, landmarks[chosen])
+    for _ in range(4):
+        track = _reweighted(track, landmarks[chosen])
+        track = _refine(track, landmarks[chosen], shape, focal is None)
+    return place(track, landmarks, start)
+
+
+def place(track: Track, landmarks: np.ndarray, start: np.ndarray) -> Track:
+    """Poses for the landmarks of any frames, shape and focal length given.
+
+    Args:
+        track: Shape, focal length and weights.
+        landmarks: (F, K, 2) pixels.
+        start: (F, 4, 4) rough poses.
+    """
+    size = (2 * track.center[0], 2 * track.center[1])
+    placed = replace(_start(start, track.shape, size, track.focal), sigmas=track.sigmas)
+    for _ in range(30):
+        placed = _pose_step(placed, landmarks)
+    return placed
+
+
+def smooth(poses: np.ndarray, window: int = 7, order: int = 3) -> np.ndarray:
+    """Poses smoothed over time without delay (Savitzky-Golay on rotation vector and position).
+
+    Args:
+        poses: (F, 4, 4) rigid transforms of consecutive frames.
+        window: Frames, odd.
+        order: Degree of the fitted polynomials.
+
+    Returns:
+        (F, 4, 4); unchanged where there are fewer frames than `window`.
+    """
+    from scipy.signal import savgol_filter
+
+    if len(poses) < window:
+        return poses
+    middle = Rotation.from_matrix(poses[:, :3, :3]).mean()
+    turns = (Rotation.from_matrix(poses[:, :3, :3]) * middle.inv()).as_rotvec()
+    smoothed = poses.copy()
+    turns = savgol_filter(turns, window, order, axis=0, mode="interp")
+    smoothed[:, :3, :3] = (Rotation.from_rotvec(turns) * middle).as_matrix()
+    smoothed[:, :3, 3] = savgol_filter(poses[:, :3, 3], window, order, axis=0, mode="interp")
+    return smoothed
+
+
+def smoothed(track: Track, frames: np.ndarray) -> Track:
+    """The track with poses smoothed within each run of consecutive frames.
+
+    Args:
+        track: Poses of the frames that could be tracked.
+        frames: (F,) their numbers, ascending.
+    """
+    poses = track.poses()
+    for run in np.split(np.arange(len(frames)), np.flatnonzero(np.diff(frames) != 1) + 1):
+        poses[run] = smooth(poses[run])
+    return replace(track, rotations=poses[:, :3, :3], translations=poses[:, :3, 3])
+
+
+def _start(start: np.ndarray, shape: np.ndarray, size: tuple, focal: float | None) -> Track:
+    """A first track: rotations as they come, depths scaled to the focal length."""
+    guessed = focal or FOCAL_GUESS * max(size)
+    assumed = size[1] / 2 / np.tan(np.radians(63 / 2))  # what MediaPipe's own poses assume
+    translations = start[:, :3, 3] * np.array([1.0, 1.0, guessed / assumed])
+    center = np.array([size[0] / 2, size[1] / 2])
+    return Track(guessed, center, shape, start[:, :3, :3], translations, np.ones(len(shape)))
+
+
+def _local(track: Track) -> np.ndarray:
+    """(F, K, 3) landmarks in camera axes."""
+    return track.shape @ track.rotations.transpose(0, 2, 1) + track.translations[:, None]
+
+
+def _project(track: Track, local: np.ndarray) -> np.ndarray:
+    """(F, K, 2) pixels of points in camera axes."""
+    x, y, z = np.moveaxis(local, -1, 0)
+    return track.center + track.focal * np.stack([-x / z, y / z], -1)
+
+
+def _jacobian(track: Track, local: np.ndarray) -> np.ndarray:
+    """(F, K, 2, 3) derivative of pixels by points in camera axes."""
+    x, y, z = np.moveaxis(local, -1, 0)
+    zero = np.zeros_like(x)
+    rows = [[-1 / z, zero, x / z**2], [zero, 1 / z, -y / z**2]]
+    return track.focal * np.stack([np.stack(row, -1) for row in rows], -2)
+
+
+def _weights(track: Track, residuals: np.ndarray) -> np.ndarray:
+    """(F, K) Cauchy weights in units of each landmark's own spread."""
+    normed = (residuals**2).sum(-1) / track.sigmas**2
+    return 1.0 / track.sigmas**2 / (1.0 + normed / 9.0)
+
+
+def _pose_step(track: Track, landmarks: np.ndarray) -> Track:
+    """One Gauss-Newton step of all poses."""
+    local = _local(track)  # (F, K, 3)
+    residuals = landmarks - _project(track, local)  # (F, K, 2)
+    by_point = _jacobian(track, local)  # (F, K, 2, 3)
+    turned = local - track.translations[:, None]
+    by_turn = np.cross(turned[..., None, :], by_point)  # (F, K, 2, 3): d(w x p) . J = w . (p x J)
+    jacobian = np.concatenate([by_turn, by_point], -1)  # (F, K, 2, 6)
+    weighted = jacobian * _weights(track, residuals)[..., None, None]
+    normal = np.einsum("fkia,fkib->fab", weighted, jacobian)
+    normal += 1e-9 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(6)
+    step = np.linalg.solve(normal, np.einsum("fkia,fki->fa", weighted, residuals)[..., None])[
+        ..., 0
+    ]
+    length = np.linalg.norm(step[:, :3], axis=1, keepdims=True)
+    turn = step[:, :3] * np.minimum(1.0, 0.3 / np.maximum(length, 1e-12))
+    rotations = Rotation.from_rotvec(turn).as_matrix() @ track.rotations
+    translations = track.translations + step[:, 3:]
+    translations[:, 2] = np.minimum(translations[:, 2], -0.05)  # in front of the camera
+    return replace(track, rotations=rotations, translations=translations)
+
+
+def _shape_step(track: Track, landmarks: np.ndarray, canonical: np.ndarray) -> Track:
+    """One Gauss-Newton step of the shape, held to the canonical face."""
+    local = _local(track)
+    residuals = landmarks - _project(track, local)
+    by_shape = _jacobian(track, local) @ track.rotations[:, None]  # (F, K, 2, 3)
+    share = min(1.0, INDEPENDENT / len(landmarks))
+    weighted = by_shape * (share * _weights(track, residuals))[..., None, None]
+    normal = np.einsum("fkia,fkib->kab", weighted, by_shape) + np.eye(3) / SHAPE_SPREAD**2
+    pull = np.einsum("fkia,fki->ka", weighted, residuals)
+    pull += (canonical - track.shape) / SHAPE_SPREAD**2
+    step = np.linalg.solve(normal, pull[..., None])[..., 0]  # (K, 3)
+    return replace(track, shape=track.shape + step)
+
+
+def _reweighted(track: Track, landmarks: np.ndarray) -> Track:
+    """Each landmark's spread, measured: robust standard deviation of its residuals over time."""
+    residuals = landmarks - track.project()
+    lengths = np.median(np.linalg.norm(residuals, axis=-1), axis=0)  # (K,)
+    return replace(track, sigmas=np.maximum(lengths / 1.18, 0.3))
+
+
+def _refine(track: Track, landmarks: np.ndarray, canonical: np.ndarray, focal: bool) -> Track:
+    """Alternates shape and poses; the focal length by search over the cost that remains."""
+    track = _alternate(track, landmarks, canonical, 10)
+    if not focal:
+        return track
+    for factor in (1.25, 1.1, 1.04):
+        track = _focal_search(track, landmarks, canonical, factor)
+    return track
+
+
+def _alternate(track: Track, landmarks: np.ndarray, canonical: np.ndarray, rounds: int) -> Track:
+    """Shape and pose steps in turn."""
+    for _ in range(rounds):
+        track = _pose_step(_shape_step(track, landmarks, canonical), landmarks)
+    return track
+
+
+def _focal_search(
+    track: Track, landmarks: np.ndarray, canonical: np.ndarray, factor: float
+) -> Track:
+    """Walks the focal length up or down by `factor` while the cost falls."""
+    best, cost = track, _cost(track, landmarks, canonical)
+    for ratio in (factor, 1 / factor):
+        for _ in range(8):
+            moved = _alternate(_refocused(best, ratio), landmarks, canonical, 6)
+            moved_cost = _cost(moved, landmarks, canonical)
+            if moved_cost >= cost:
+                break
+            best, cost = moved, moved_cost
+    return best
+
+
+def _refocused(track: Track, ratio: float) -> Track:
+    """The same pictures through a lens of another focal length: the head moves along."""
+    translations = track.translations * np.array([1.0, 1.0, ratio])
+    return replace(track, focal=track.focal * ratio, translations=translations)
+
+
+def _cost(track: Track, landmarks: np.ndarray, canonical: np.ndarray) -> float:
+    """Minus the logarithm of the posterior, up to a constant."""
+    residuals = landmarks - track.project()
+    normed = (residuals**2).sum(-1) / track.sigmas**2
+    share = min(1.0, INDEPENDENT / len(landmarks))
+    data = share * 4.5 * np.log1p(normed / 9.0).sum()
+    shape = 0.5 * ((track.shape - canonical) ** 2).sum() / SHAPE_SPREAD**2
+    guess = FOCAL_GUESS * 2 * track.center.max()
+    lens = 0.5 * (np.log(track.focal / guess) / FOCAL_SPREAD) ** 2
+    # Neighbouring landmarks err together, some thirty groups of them on a face.
+    return float((data + shape) * 30 / len(canonical) + lens)

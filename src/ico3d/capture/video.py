@@ -1,0 +1,173 @@
+"""Reading a video file: pictures by time, sound from the moment of the first picture."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ico3d.capture.capture import Sound
+from ico3d.errors import CaptureError
+
+SOUND_RATE = 16_000
+
+
+@dataclass
+class Video:
+    """What a video file says about itself, completed while it is read.
+
+    Attributes:
+        path: The file.
+        width: Width in pixels of what `frames` gives, display rotation applied.
+        height: Height likewise.
+        scale: Pixels given over pixels of the file.
+        announced: Pictures the file says it has; 0 where it does not say.
+        damaged: Packets that could not be decoded.
+        decoded: Pictures that could be decoded.
+    """
+
+    path: Path
+    width: int
+    height: int
+    scale: float
+    announced: int
+    damaged: int = field(default=0)
+    decoded: int = field(default=0)
+
+    def frames(self, fps: float) -> Iterator[np.ndarray]:
+        """Pictures resampled by time: number k is the one nearest to k / fps seconds.
+
+        Args:
+            fps: Pictures per second to give.
+
+        Yields:
+            uint8 RGB (height, width, 3), contiguous.
+
+        Raises:
+            CaptureError: If not one picture can be decoded.
+        """
+        count, before = 0, None
+        for now in self._timed():
+            while before is not None and count / fps < (before[0] + now[0]) / 2:
+                yield before[1]
+                count += 1
+            before = now
+        if before is None:
+            raise CaptureError(f"{self.path}: no picture can be decoded; is the file damaged?")
+        if count / fps <= before[0] + 0.5 / fps:
+            yield before[1]
+
+    def _timed(self) -> Iterator[tuple[float, np.ndarray]]:
+        """Every picture of the file with its seconds after the first one."""
+        import av
+
+        with av.open(str(self.path)) as container:
+            stream = container.streams.video[0]
+            stream.thread_type = "AUTO"
+            first = None
+            for frame in _decode(self, container, stream):
+                self.decoded += 1
+                seconds = frame.time if frame.time is not None else (first or 0.0) + self.decoded
+                first = seconds if first is None else first
+                yield seconds - first, self._picture(frame)
+
+    def _picture(self, frame) -> np.ndarray:
+        """One decoded frame, scaled and turned as it is to be displayed."""
+        turns = frame.rotation // 90 % 4
+        size = (self.width, self.height) if turns % 2 == 0 else (self.height, self.width)
+        scaled = frame.reformat(*size, format="rgb24", interpolation="AREA")
+        # Rows are padded in the decoder's buffer; MediaPipe needs them without gaps.
+        return np.ascontiguousarray(np.rot90(scaled.to_ndarray(), turns))
+
+
+def open_video(path: Path, size: int) -> Video:
+    """Looks into a video file.
+
+    Args:
+        path: The file.
+        size: Longest short side to give, in pixels; larger videos are scaled down.
+
+    Raises:
+        CaptureError: If it is missing, no video, or damaged beyond opening.
+    """
+    import av
+
+    if not path.is_file():
+        raise CaptureError(f"there is no video file at {path}.")
+    try:
+        with av.open(str(path)) as container:
+            if not container.streams.video:
+                raise CaptureError(f"{path} holds no video stream.")
+            stream = container.streams.video[0]
+            width, height = stream.codec_context.width, stream.codec_context.height
+            frame = next(container.decode(stream), None)
+            turned = frame is not None and frame.rotation // 90 % 2 == 1
+            announced = stream.frames
+    except (av.FFmpegError, OSError) as error:
+        raise CaptureError(f"{path} cannot be decoded as a video: {error}.") from error
+    if frame is None or width * height == 0:
+        raise CaptureError(f"{path}: no picture can be decoded; is the file damaged?")
+    scale = min(1.0, size / min(width, height))
+    width, height = round(width * scale), round(height * scale)
+    return Video(path, *((height, width) if turned else (width, height)), scale, announced)
+
+
+def read_sound(path: Path) -> Sound | None:
+    """The sound of a video file, mono at 16 kHz; sample 0 is heard with the first picture.
+
+    Returns:
+        The sound, or None where the file has none.
+    """
+    import av
+    import soxr
+
+    with av.open(str(path)) as container:
+        if not container.streams.audio:
+            return None
+        stream, offset = container.streams.audio[0], _sound_offset(container)
+        mono = av.AudioResampler("flt", "mono", stream.rate)
+        parts = [
+            out.to_ndarray()[0]
+            for frame in _decode(None, container, stream)
+            for out in mono.resample(frame)
+        ]
+        rate = stream.rate
+    if not parts:
+        return None
+    samples = soxr.resample(np.concatenate(parts), rate, SOUND_RATE, quality="VHQ")
+    return Sound(_shifted(samples, round(offset * SOUND_RATE)), SOUND_RATE)
+
+
+def _sound_offset(container) -> float:
+    """Seconds by which the sound starts after the first picture."""
+    starts = [
+        float((stream.start_time or 0) * stream.time_base)
+        for stream in (container.streams.audio[0], container.streams.video[0])
+    ]
+    return starts[0] - starts[1]
+
+
+def _shifted(samples: np.ndarray, later: int) -> np.ndarray:
+    """Samples moved `later` places to the right: silence put in front, or the front cut off."""
+    if later >= 0:
+        return np.concatenate([np.zeros(later, np.float32), samples]).astype(np.float32)
+    return samples[-later:].astype(np.float32)
+
+
+def _decode(video: Video | None, container, stream) -> Iterator:
+    """Decodes packet by packet, so that a damaged one costs only itself."""
+    import av
+
+    packets = container.demux(stream)
+    while True:
+        try:
+            packet = next(packets, None)
+            if packet is None:
+                return
+            frames = packet.decode()
+        except (av.FFmpegError, EOFError):
+            if video is None:
+                continue
+            video.damaged += 1
+            continue
+        yield from frames
