@@ -1,7 +1,7 @@
 import './style.css';
 import { blinkIndices } from './bundle/manifest.ts';
 import { loadBundle, loadManifest } from './bundle/load.ts';
-import { sentenceOf } from './errors.ts';
+import { PageError, sentenceOf } from './errors.ts';
 import { Face } from './face/face.ts';
 import { IdleFace } from './face/idle.ts';
 import { readAttributes } from './stage/readback.ts';
@@ -21,7 +21,7 @@ declare global {
 
 const overlay = new Overlay();
 run().catch((error: unknown) => {
-  console.error(error);
+  if (!(error instanceof PageError)) console.error(error);
   overlay.fail(sentenceOf(error));
 });
 

@@ -4,7 +4,8 @@ import type { Heard } from '../face/face.ts';
 import { heardTime } from './clock.ts';
 import { Schedule } from './schedule.ts';
 
-const LEAD = 0.06; // s from a first piece's arrival to its sound: room for the next one to be late
+const GUARD = 0.02; // s: a start nearer than this may miss the block that is being rendered
+const LEAD = 0.05; // s more for a first piece: room for the next one to be late
 const FADE = 0.02; // s to silence when stopped
 
 /** 100–200 ms of an utterance: sound and face. */
@@ -42,7 +43,7 @@ export class Player {
     voice.track.add(piece.first_expression, piece.expressions);
     if (piece.pcm.length === 0) return;
     const previous = this.voices[this.voices.indexOf(voice) - 1];
-    const now = Math.ceil(this.context.currentTime * SPEECH_RATE);
+    const now = Math.ceil((this.context.currentTime + GUARD) * SPEECH_RATE);
     const first = voice.schedule.end === 0;
     const start = voice.schedule.place(piece.first_sample, piece.pcm.length, now, previous?.schedule.end);
     this.sound(voice, piece.pcm, start);

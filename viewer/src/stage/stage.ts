@@ -64,10 +64,9 @@ export class Stage {
     this.expression.set(expression);
     this.head.express(this.expression);
     this.orbit.update();
-    // The second update sorts what the first has generated.
-    for (let pass = 0; pass < 2; pass++) {
-      await this.spark.update({ scene: this.scene, camera: this.orbit.camera });
-    }
+    await this.sorted(); // a sort of the picture before may still run
+    await this.spark.update({ scene: this.scene, camera: this.orbit.camera });
+    await this.sorted();
     this.draw();
   }
 
@@ -75,6 +74,10 @@ export class Stage {
   draw(): void {
     this.renderer.render(this.scene, this.orbit.camera);
     this.frames++;
+  }
+
+  private async sorted(): Promise<void> {
+    while (this.spark.sorting || this.spark.sortDirty) await new Promise((resolve) => setTimeout(resolve, 5));
   }
 
   private frame(now: number): void {

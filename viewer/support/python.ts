@@ -1,0 +1,17 @@
+import { execFileSync } from 'node:child_process';
+import { existsSync } from 'node:fs';
+import { fileURLToPath } from 'node:url';
+
+export const REPOSITORY = fileURLToPath(new URL('../../', import.meta.url));
+
+/** The Python that has ico3d: $ICO3D_PYTHON, or the checkout's own. */
+export const PYTHON = process.env.ICO3D_PYTHON ?? `${REPOSITORY}.venv/bin/python`;
+
+if (!existsSync(PYTHON)) throw new Error(`no Python at ${PYTHON}: run make install or set ICO3D_PYTHON`);
+
+/** Runs a script of `support/` to its end; what it printed. */
+export function runPython(script: string, ...args: string[]): string {
+  const path = `${REPOSITORY}viewer/support/${script}`;
+  const stdio = ['ignore', 'pipe', 'inherit'] as const;
+  return execFileSync(PYTHON, [path, ...args], { cwd: REPOSITORY, stdio: [...stdio], encoding: 'utf8' });
+}

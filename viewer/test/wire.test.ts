@@ -1,0 +1,70 @@
+import { readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { expect, test } from 'vitest';
+import { decode, encode, floatFromHalf, type SpeechMessage } from '../src/protocol.ts';
+import { runPython } from '../support/python.ts';
+import { arrayBuffer } from '../support/reference.ts';
+import { scratchFolder } from '../support/scratch.ts';
+
+test('frames of the server mean here what they meant there', () => {
+  const folder = scratchFolder();
+  runPython('wire_fixtures.py', 'encode', folder);
+  const text = (name: string) => decode(readFileSync(join(folder, name), 'utf8'));
+
+  const service = { name: 'offline', stand_in: true };
+  expect(text('0.json')).toEqual({
+    type: 'welcome',
+    version: 1,
+    session: 'session',
+    resumed: false,
+    services: { recognition: service, language: service, voice: { name: 'cloud', stand_in: false } },
+    notices: ['No speech in this avatar, sagt sie – schade.'],
+  });
+  expect(text('1.json')).toEqual({ type: 'state', state: 'thinking' });
+  const speech = decode(arrayBuffer(readFileSync(join(folder, '2.bin')))) as SpeechMessage;
+  expect(speech).toMatchObject({ utterance: 3, index: 7, first_sample: 4800, first_expression: 5 });
+  expect(speech.pcm).toEqual(Int16Array.from({ length: 2400 }, (_, i) => i - 1200));
+  expect(speech.expressions).toMatchObject({ rows: 3, columns: 39 });
+  expect(speech.expressions.values).toEqual(Float32Array.from({ length: 117 }, (_, i) => i / 64 - 1));
+  expect(text('3.json')).toEqual({ type: 'end', utterance: 3, samples: 7200 });
+});
+
+test('frames of the page mean there what they mean here', () => {
+  const folder = scratchFolder();
+  const messages = [
+    { type: 'hello', version: 1, session: null, last_index: -1 },
+    { type: 'audio', sample: 640, pcm: Int16Array.from({ length: 640 }, (_, i) => 100 * (i - 320)) },
+    { type: 'text', text: 'Wie spät ist es? 🙂' },
+    { type: 'clock', utterance: 2, position: 0.5, body_time: 0 },
+  ] as const;
+  const files = messages.map((message, i) => {
+    const frame = encode(message);
+    const file = join(folder, `${i}.${typeof frame === 'string' ? 'json' : 'bin'}`);
+    writeFileSync(file, typeof frame === 'string' ? frame : new Uint8Array(frame));
+    return file;
+  });
+  const understood = JSON.parse(runPython('wire_fixtures.py', 'decode', ...files)) as object[];
+  const expected = messages.map(({ type: _, ...fields }) =>
+    'pcm' in fields ? { ...fields, pcm: [...fields.pcm] } : fields,
+  );
+  expect(understood).toEqual(expected);
+});
+
+test.each([
+  [0x0000, 0],
+  [0x8000, -0],
+  [0x3c00, 1],
+  [0xc000, -2],
+  [0x3555, 0.333251953125],
+  [0x0001, 2 ** -24],
+  [0x03ff, 1023 * 2 ** -24],
+  [0x0400, 2 ** -14],
+  [0x7bff, 65504],
+  [0x7c00, Infinity],
+  [0xfc00, -Infinity],
+  [0x7e00, NaN],
+])('half float %i is %d', (bits, value) => expect(floatFromHalf(bits)).toBe(value));
+
+test('a message of no known type is refused', () => {
+  expect(() => decode('{"type": "hello"}')).toThrow(/unknown message hello/);
+});
