@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 import tyro
 
+from ico3d.capture.synthetic.command import Synthetic as Synthetic
+
 
 @dataclass(frozen=True)
 class Portrait:

@@ -15,7 +15,7 @@ def _portrait(path: Path) -> Capture:
 
 def _synthetic(path: Path) -> Capture:
     """Opens a synthetic capture."""
-    from ico3d.capture.synthetic_reader import SyntheticCapture
+    from ico3d.capture.synthetic.reader import SyntheticCapture
 
     return SyntheticCapture(path)
 

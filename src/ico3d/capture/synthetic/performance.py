@@ -1,0 +1,167 @@
+"""What a synthetic person does: speaks, blinks, moves the brows, and sways."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ico3d.capture.synthetic.articulation import articulate
+from ico3d.capture.synthetic.sentences import SENTENCES, sentences_of
+from ico3d.capture.synthetic.subject import Subject
+from ico3d.common.espeak import Phoneme, synthesize
+from ico3d.common.expression import EYE_NAMES
+from ico3d.errors import MissingExtraError
+
+SOUND_RATE = 16000
+PAUSE = 0.25
+"""Seconds of silence between sentences."""
+BLINK = (0.08, 0.03, 0.15)
+"""Seconds that a lid closes, stays shut, and opens."""
+YAW, PITCH, ROLL = 6.0, 3.5, 2.5
+"""Largest rotation of the sway, degrees."""
+SHIFT = (0.018, 0.006, 0.012)
+"""Largest shift of the sway, metres."""
+
+
+@dataclass(frozen=True)
+class Performance:
+    """F frames of a talking person.
+
+    Attributes:
+        samples: (S,) float32 sound at `SOUND_RATE`; sample 0 belongs to frame 0.
+        text: What is said.
+        phonemes: With times in seconds.
+        weights: (F, K) float32 blendshape weights.
+        eyes: (F, 7) float32 in the order of `EYE_NAMES`.
+        world_from_head: (F, 4, 4) float64.
+    """
+
+    samples: np.ndarray
+    text: str
+    phonemes: tuple[Phoneme, ...]
+    weights: np.ndarray
+    eyes: np.ndarray
+    world_from_head: np.ndarray
+
+
+def perform(subject: Subject, text: str, frames: int, fps: float, seed: int) -> Performance:
+    """Makes up a performance.
+
+    Args:
+        subject: Who speaks.
+        text: What to say, repeated until the time is over; empty for a long text of its own.
+        frames: How many frames.
+        fps: Frames per second.
+        seed: Decides voice, order of sentences, blinks, brows and sway.
+
+    Raises:
+        MissingExtraError: If espeakng-loader or soxr is not installed.
+    """
+    random = np.random.default_rng(seed)
+    seconds = frames / fps
+    voice = f"en-us+{'m' if subject.male else 'f'}{1 + seed % 3}"
+    samples, phonemes, said = _speak(text, seconds, voice, 45 + int(random.integers(15)), random)
+    times = np.arange(frames) / fps
+    weights = articulate(phonemes, seconds, subject.visemes, times)
+    eyes = _eyes(times, random)
+    for column, name in enumerate(EYE_NAMES):
+        if name in subject.blendshape_names:
+            weights[:, subject.blendshape_names.index(name)] = eyes[:, column]
+    poses = _sway(times, subject, random)
+    return Performance(samples, said, phonemes, weights, eyes, poses)
+
+
+def _speak(
+    text: str, seconds: float, voice: str, pitch: int, random: np.random.Generator
+) -> tuple[np.ndarray, tuple[Phoneme, ...], str]:
+    """Sound (S,) at 16 kHz of exactly `seconds`, its phonemes, and the text."""
+    try:
+        import soxr
+    except ImportError:
+        raise MissingExtraError("soxr", "train", "resampling the voice") from None
+    parts, phonemes, said, now = [np.zeros(int(PAUSE * SOUND_RATE), np.float32)], [], [], PAUSE
+    script = _script(text, random)
+    while now < seconds:
+        sentence = next(script)
+        speech = synthesize(sentence, voice, rate=165, pitch=pitch)
+        sound = soxr.resample(speech.samples, speech.rate, SOUND_RATE)
+        gap = np.zeros(int(PAUSE * SOUND_RATE), np.float32)
+        phonemes += [Phoneme(now + p.time, p.symbol) for p in speech.events]
+        phonemes.append(Phoneme(now + len(sound) / SOUND_RATE, ""))
+        parts += [sound.astype(np.float32), gap]
+        said.append(sentence)
+        now += (len(sound) + len(gap)) / SOUND_RATE
+    samples = np.concatenate(parts)[: round(seconds * SOUND_RATE)]
+    heard = tuple(p for p in phonemes if p.time < seconds)
+    return samples, heard, " ".join(said)
+
+
+def _script(text: str, random: np.random.Generator) -> Iterator[str]:
+    """Sentences without end: the given ones in order, or our own, shuffled anew each round."""
+    given = sentences_of(text)
+    while True:
+        yield from given or (SENTENCES[i] for i in random.permutation(len(SENTENCES)))
+
+
+def _eyes(times: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """(F, 7) brows that wander with the talk and lids that blink."""
+    lift = np.clip(_wander(times, 0.5, random), 0, None) ** 1.3
+    frown = np.clip(-_wander(times, 0.35, random) - 0.2, 0, None)
+    tilt = 0.12 * _wander(times, 0.3, random)
+    blink = _blinks(times, random)
+    columns = {
+        "browDownLeft": 0.55 * frown * (1 + tilt),
+        "browDownRight": 0.55 * frown * (1 - tilt),
+        "browInnerUp": 0.6 * lift,
+        "browOuterUpLeft": 0.5 * lift * (1 + 2 * tilt),
+        "browOuterUpRight": 0.5 * lift * (1 - 2 * tilt),
+        "eyeBlinkLeft": blink,
+        "eyeBlinkRight": blink * 0.98,
+    }
+    return np.clip(np.stack([columns[n] for n in EYE_NAMES], 1), 0, 1).astype(np.float32)
+
+
+def _blinks(times: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """(F,) lid closure with blinks every 1.2 s to about 6 s."""
+    closing, shut, opening = BLINK
+    lids = np.zeros(len(times))
+    start = random.uniform(0.3, 2.0)
+    while start < times[-1]:
+        since = times - start
+        down = np.clip(since / closing, 0, 1)
+        up = np.clip((since - closing - shut) / opening, 0, 1)
+        lids = np.maximum(lids, down * down * (3 - 2 * down) - up * up * (3 - 2 * up))
+        start += 1.2 + random.gamma(2.0, 1.1)
+    return lids
+
+
+def _wander(times: np.ndarray, fastest: float, random: np.random.Generator) -> np.ndarray:
+    """(F,) a smooth random curve in [-1, 1] without frequencies above `fastest` Hz."""
+    frequencies = random.uniform(0.15, 1.0, 5) * fastest
+    phases = random.uniform(0, 2 * np.pi, 5)
+    waves = np.sin(2 * np.pi * frequencies * times[:, None] + phases)  # (F, 5)
+    return np.clip(waves.sum(axis=1) / 3, -1, 1)
+
+
+def _sway(times: np.ndarray, subject: Subject, random: np.random.Generator) -> np.ndarray:
+    """(F, 4, 4) head poses: the whole bust turns about the base of the neck."""
+    yaw, pitch, roll = (
+        np.radians(limit) * _wander(times, 0.3, random) for limit in (YAW, PITCH, ROLL)
+    )
+    shift = np.stack([limit * _wander(times, 0.25, random) for limit in SHIFT], 1)  # (F, 3)
+    rotation = _about(1, yaw) @ _about(0, pitch) @ _about(2, roll)  # (F, 3, 3)
+    poses = np.tile(np.eye(4), (len(times), 1, 1))
+    poses[:, :3, :3] = rotation
+    poses[:, :3, 3] = (
+        subject.head_in_world + subject.neck_base - rotation @ subject.neck_base + shift
+    )
+    return poses
+
+
+def _about(axis: int, angles: np.ndarray) -> np.ndarray:
+    """(F, 3, 3) rotations about a coordinate axis."""
+    one, two = (axis + 1) % 3, (axis + 2) % 3
+    matrices = np.tile(np.eye(3), (len(angles), 1, 1))
+    matrices[:, one, one] = matrices[:, two, two] = np.cos(angles)
+    matrices[:, one, two], matrices[:, two, one] = -np.sin(angles), np.sin(angles)
+    return matrices

@@ -1,0 +1,198 @@
+"""Reads a synthetic capture: `docs/captures.md`, "Synthetic captures"."""
+
+import json
+import wave
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, UnidentifiedImageError
+from safetensors import SafetensorError
+from safetensors.numpy import load
+
+from ico3d.capture.capture import Capture, Sound, last_eleventh
+from ico3d.common.camera import Camera
+from ico3d.errors import CaptureError
+
+FORMAT, VERSION = "ico3d-synthetic", 1
+NEEDED = ("format", "version", "fps", "num_frames", "blendshape_names", "cameras", "sources")
+
+
+def is_synthetic(path: Path) -> bool:
+    """Whether a folder holds a synthetic capture."""
+    return (path / "capture.json").is_file()
+
+
+class SyntheticCapture(Capture):
+    """A synthetic person recorded by `ico3d capture synthetic`, with exact truth."""
+
+    kind = "synthetic"
+
+    def __init__(self, path: Path):
+        """Opens a capture; pictures and sound are read when asked for.
+
+        Raises:
+            CaptureError: If `capture.json` or `frames.safetensors` is missing or damaged.
+        """
+        self.path = path
+        about = _read_json(path / "capture.json")
+        self._about = about
+        self.fps = float(about["fps"])
+        self.num_frames = int(about["num_frames"])
+        self.blendshape_names = tuple(about["blendshape_names"])
+        self.cameras = tuple(_camera(c, path) for c in about["cameras"])
+        self.split = last_eleventh(self.num_frames)
+        self._frames = self._read_frames()
+
+    @property
+    def phonemes(self) -> tuple[tuple[float, str], ...]:
+        """(start in seconds, IPA symbol) of what is said; an empty symbol is a pause."""
+        return tuple((float(t), str(s)) for t, s in self._about.get("phonemes", ()))
+
+    @property
+    def provenance(self) -> dict:
+        """Sources of the geometry and the voice with their licences."""
+        return {
+            "kind": self.kind,
+            "sources": list(self._about["sources"]),
+            "consent": "not needed: no such person exists",
+            "licence": str(self._about.get("licence", "")),
+        }
+
+    def image(self, camera: int, frame: int) -> np.ndarray | None:
+        """The picture, or None where this camera took none of this frame."""
+        return self._picture("images", camera, frame, "RGB")
+
+    def mask(self, camera: int, frame: int) -> np.ndarray | None:
+        """(H, W) exact coverage of the person, or None where there is no picture."""
+        return self._picture("masks", camera, frame, "L")
+
+    def background(self, camera: int) -> np.ndarray | None:
+        """(H, W, 3) the backdrop."""
+        name = self.cameras[camera].name
+        file = self.path / "backgrounds" / f"{name}.png"
+        return _read_png(file, self.cameras[camera], "RGB", f"the background of camera {name}")
+
+    def audio(self) -> Sound | None:
+        """The sound, 16 kHz mono."""
+        file = self.path / "audio.wav"
+        try:
+            with wave.open(str(file), "rb") as sound:
+                if sound.getnchannels() != 1 or sound.getsampwidth() != 2:
+                    raise CaptureError(f"the sound {file} is not mono with 16 bits.")
+                rate, data = sound.getframerate(), sound.readframes(sound.getnframes())
+        except (OSError, EOFError, wave.Error) as error:
+            raise CaptureError(f"the sound {file} is missing or damaged: record again.") from error
+        return Sound(np.frombuffer(data, "<i2").astype(np.float32) / 32767, rate)
+
+    def world_from_head(self, frame: int) -> np.ndarray | None:
+        """(4, 4) float64 exact pose."""
+        return self._frames["world_from_head"][self._index(frame)]
+
+    def eyes(self, frame: int) -> np.ndarray | None:
+        """(7,) values in the order of `EYE_NAMES`."""
+        return self._frames["eyes"][self._index(frame)]
+
+    def blendshapes(self, frame: int) -> np.ndarray | None:
+        """(K,) the weights that made the face."""
+        return self._frames["blendshapes"][self._index(frame)]
+
+    def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
+        """(68, 2) exact landmarks in pixels, also where there is no picture."""
+        seen = self.cameras[camera].moved(self._frames["world_from_head"][self._index(frame)])
+        return seen.project(self._frames["landmarks"][frame])[0]
+
+    def landmarks_3d(self, frame: int) -> np.ndarray:
+        """(68, 3) landmarks in canonical head space, metres."""
+        return self._frames["landmarks"][self._index(frame)]
+
+    def points(self) -> np.ndarray | None:
+        """(P, 3) points on the neutral surface, canonical head space."""
+        return self._frames["points"]
+
+    def _index(self, frame: int) -> int:
+        if not 0 <= frame < self.num_frames:
+            raise CaptureError(f"{self.path} has frames 0 to {self.num_frames - 1}, not {frame}.")
+        return frame
+
+    def _picture(self, folder: str, camera: int, frame: int, mode: str) -> np.ndarray | None:
+        if not self._frames["views"][self._index(frame), camera]:
+            return None
+        seen = self.cameras[camera]
+        file = self.path / folder / seen.name / f"{frame:06d}.png"
+        return _read_png(file, seen, mode, f"frame {frame} of camera {seen.name}")
+
+    def _read_frames(self) -> dict[str, np.ndarray]:
+        file = self.path / "frames.safetensors"
+        try:
+            arrays = load(file.read_bytes())
+        except (OSError, SafetensorError) as error:
+            raise CaptureError(f"{file} is missing or damaged: record again.") from error
+        frames, shapes = self.num_frames, len(self._about["blendshape_names"])
+        expected = {
+            "world_from_head": (frames, 4, 4),
+            "eyes": (frames, 7),
+            "blendshapes": (frames, shapes),
+            "landmarks": (frames, 68, 3),
+            "views": (frames, len(self.cameras)),
+            "points": (None, 3),
+        }
+        for name, shape in expected.items():
+            _check_array(file, name, arrays.get(name), shape)
+        return arrays
+
+
+def _check_array(
+    file: Path, name: str, array: np.ndarray | None, shape: tuple[int | None, ...]
+) -> None:
+    if array is None:
+        raise CaptureError(f"{file} lacks '{name}': record again.")
+    fits = len(array.shape) == len(shape) and all(
+        wanted in (None, got) for wanted, got in zip(shape, array.shape, strict=True)
+    )
+    if not fits:
+        raise CaptureError(f"{file}: '{name}' must have shape {shape}, but has {array.shape}.")
+    if not np.isfinite(array).all():
+        bad = int(np.argwhere(~np.isfinite(array))[0][0])
+        raise CaptureError(f"{file}: row {bad} of '{name}' is not finite: record again.")
+
+
+def _read_json(file: Path) -> dict:
+    try:
+        about = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise CaptureError(f"{file} is missing or damaged: record again.") from error
+    if not isinstance(about, dict) or about.get("format") != FORMAT:
+        raise CaptureError(f"{file} does not describe a synthetic capture ('{FORMAT}').")
+    if about.get("version") != VERSION:
+        raise CaptureError(f"{file} has version {about.get('version')}; this reads {VERSION}.")
+    missing = [name for name in NEEDED if name not in about]
+    if missing:
+        raise CaptureError(f"{file} lacks {', '.join(missing)}: record again.")
+    return about
+
+
+def _camera(entry: dict, path: Path) -> Camera:
+    try:
+        return Camera(
+            int(entry["width"]),
+            int(entry["height"]),
+            np.array(entry["intrinsics"], float),
+            np.array(entry["world_to_camera"], float),
+            str(entry["name"]),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise CaptureError(f"{path / 'capture.json'}: a camera is damaged: {error}.") from error
+
+
+def _read_png(file: Path, camera: Camera, mode: str, what: str) -> np.ndarray:
+    try:
+        with Image.open(file) as image:
+            pixels = np.asarray(image.convert(mode), np.float32) / 255
+    except (OSError, UnidentifiedImageError, ValueError) as error:
+        raise CaptureError(f"{file} ({what}) is missing or damaged: record again.") from error
+    if pixels.shape[:2] != (camera.height, camera.width):
+        raise CaptureError(
+            f"{file} ({what}) is {pixels.shape[1]}×{pixels.shape[0]}, "
+            f"but its camera takes {camera.width}×{camera.height}."
+        )
+    return pixels

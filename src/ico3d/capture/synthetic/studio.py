@@ -1,0 +1,176 @@
+"""The studio: cameras, backdrop, and one picture of a person."""
+
+import numpy as np
+from numba import njit
+
+from ico3d.capture.synthetic.lighting import lights_on
+from ico3d.capture.synthetic.materials import Colors
+from ico3d.capture.synthetic.paint import lip_gap, paint
+from ico3d.capture.synthetic.raster import empty_buffers, rasterise, to_screen, vertex_normals
+from ico3d.capture.synthetic.shader import Scene, display, shade, shade_cards
+from ico3d.capture.synthetic.subject import CARDS, Subject
+from ico3d.capture.synthetic.textures import noise
+from ico3d.common.camera import Camera, look_at
+
+SUPERSAMPLING = 3
+DISTANCE = 1.35
+"""Metres from the head rig's cameras to the head."""
+VIEW_HEIGHT = 0.46
+"""Metres that the head rig's pictures cover from top to bottom at the head: twice a head."""
+AIM = np.array([0.0, -0.045, 0.0])
+"""What the head rig looks at, from the canonical origin at rest."""
+WIDEST_AZIMUTH = 60.0
+
+
+def head_rig(subject: Subject, count: int, size: int) -> tuple[Camera, ...]:
+    """Cameras on a frontal arc around the head; the first looks straight at the face.
+
+    Args:
+        subject: Its rest pose places the rig.
+        count: How many.
+        size: Width and height of the pictures.
+    """
+    target = subject.head_in_world + AIM
+    focal = size * DISTANCE / VIEW_HEIGHT
+    intrinsics = np.array([[focal, 0, size / 2], [0, focal, size / 2], [0, 0, 1]])
+    cameras = []
+    for index in range(count):
+        azimuth, elevation = np.radians(_direction(index, count))
+        towards = np.array(
+            [
+                np.sin(azimuth) * np.cos(elevation),
+                np.sin(elevation),
+                np.cos(azimuth) * np.cos(elevation),
+            ]
+        )
+        pose = look_at(target + DISTANCE * towards, target)
+        cameras.append(Camera(size, size, intrinsics, pose, str(index)))
+    return tuple(cameras)
+
+
+def _direction(index: int, count: int) -> tuple[float, float]:
+    """Azimuth and elevation in degrees: the front, then wider and wider, side by side."""
+    if index == 0:
+        return 0.0, 0.0
+    ring, rings = (index + 1) // 2, count // 2
+    side = 1.0 if index % 2 else -1.0
+    return side * WIDEST_AZIMUTH * ring / rings, (9.0, -7.0, 16.0)[index % 3]
+
+
+def backdrop(camera: Camera) -> np.ndarray:
+    """(H, W, 3) float32: a mottled grey cloth far behind the person, as the camera sees it."""
+    columns, rows = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+    pixels = np.stack([columns, rows, np.ones_like(rows)], axis=-1)  # (H, W, 3)
+    rays = pixels @ np.linalg.inv(camera.intrinsics).T @ camera.world_to_camera[:3, :3]
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    return _cloth_backdrop(rays.astype(np.float32))
+
+
+@njit(cache=True, nogil=True)
+def _cloth_backdrop(rays):
+    out = np.empty(rays.shape, np.float32)
+    for i in range(rays.shape[0]):
+        for j in range(rays.shape[1]):
+            x, y, z = rays[i, j, 0], rays[i, j, 1], rays[i, j, 2]
+            mottle = noise(3 * x, 3 * y, 3 * z) + 0.5 * noise(9 * x + 5, 9 * y, 9 * z)
+            value = 0.16 + 0.10 * mottle + 0.22 * (y + 0.1)
+            out[i, j, 0] = display(0.92 * value)
+            out[i, j, 1] = display(0.97 * value)
+            out[i, j, 2] = display(1.06 * value)
+    return out
+
+
+class Studio:
+    """Takes pictures of one person."""
+
+    def __init__(self, subject: Subject):
+        """Paints the person, which takes about a second."""
+        self.subject = subject
+        cards = np.isin(subject.materials, CARDS)
+        self._solid = np.ascontiguousarray(subject.faces[~cards])
+        self._cards = np.ascontiguousarray(subject.faces[cards])
+        self._solid_index = np.flatnonzero(~cards).astype(np.int32)
+        self._card_index = np.flatnonzero(cards).astype(np.int32)
+        self._paint = paint(subject)
+        look = subject.look
+        self._colors = Colors(
+            skin=np.array(look.skin, np.float32),
+            lips=np.array(look.lips, np.float32),
+            hair=np.array(look.hair, np.float32),
+            iris=np.array(look.iris, np.float32),
+            cloth=np.array(look.cloth, np.float32),
+            freckles=look.freckles,
+            stubble=look.stubble,
+        )
+        self._eyes = np.array(
+            [[*eye.centre, *eye.axis, eye.iris_radius] for eye in subject.eyes], np.float32
+        )
+
+    def picture(
+        self, camera: Camera, weights: np.ndarray, world_from_head: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """One picture.
+
+        Args:
+            camera: In the world.
+            weights: (K,) blendshape weights.
+            world_from_head: (4, 4) pose of the head; the whole bust moves with it.
+
+        Returns:
+            rgb (H, W, 3) float32 display values premultiplied by alpha, and alpha (H, W) float32,
+            the part of each pixel that the person covers.
+        """
+        subject = self.subject
+        vertices = subject.posed(weights)
+        local = camera.moved(world_from_head)
+        scene = self._scene(vertices)
+        lights = lights_on(vertices, self._solid, world_from_head)
+        screen = to_screen(vertices, local, SUPERSAMPLING)
+        size = (camera.height * SUPERSAMPLING, camera.width * SUPERSAMPLING)
+        centre = local.camera_to_world[:3, 3].astype(np.float32)
+        pixel = np.float32(np.linalg.norm(centre) / camera.intrinsics[0, 0])
+        nearest, triangle, barycentric = empty_buffers(*size)
+        rasterise(screen, self._solid, nearest, triangle, barycentric)
+        _renumber(triangle, self._solid_index)
+        out = np.zeros((*size, 4), np.float32)
+        shade(scene, self._colors, lights, screen, triangle, barycentric, centre, pixel, out)
+        front, triangle, barycentric = empty_buffers(*size)
+        rasterise(screen, self._cards, front, triangle, barycentric)
+        _renumber(triangle, self._card_index)
+        shade_cards(
+            scene, self._colors, lights, screen, front, triangle, barycentric, nearest, centre,
+            pixel, out,
+        )  # fmt: skip
+        averaged = _averaged(out, SUPERSAMPLING)  # (H, W, 4)
+        return averaged[..., :3], averaged[..., 3]
+
+    def _scene(self, vertices: np.ndarray) -> Scene:
+        subject = self.subject
+        gap = lip_gap(subject.landmarks(vertices))
+        return Scene(
+            subject.faces,
+            subject.materials,
+            subject.corner_uv,
+            subject.vertices,
+            vertices,
+            vertex_normals(vertices, subject.faces),
+            self._paint.channels,
+            self._paint.occlusion_at(gap),
+            self._eyes,
+        )
+
+
+@njit(cache=True, nogil=True)
+def _renumber(triangle, index):
+    """Turns numbers within a subset of faces into numbers within all faces, in place."""
+    for y in range(triangle.shape[0]):
+        for x in range(triangle.shape[1]):
+            if triangle[y, x] >= 0:
+                triangle[y, x] = index[triangle[y, x]]
+
+
+def _averaged(samples: np.ndarray, factor: int) -> np.ndarray:
+    """(H, W, C) means of factor × factor blocks of (H·factor, W·factor, C)."""
+    height, width, channels = samples.shape
+    blocks = samples.reshape(height // factor, factor, width // factor, factor, channels)
+    return blocks.mean(axis=(1, 3))

@@ -1,0 +1,143 @@
+"""A synthetic person: one deforming mesh with everything a studio needs to record it."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+
+import numpy as np
+
+
+class Material(IntEnum):
+    """What a face of the mesh is made of; the number is the one the shader switches on."""
+
+    SKIN = 0
+    MOUTH = 1
+    EYE = 2
+    TEETH = 3
+    GUMS = 4
+    TONGUE = 5
+    HAIR = 6
+    CLOTH = 7
+    BROW = 8
+    LASH = 9
+
+
+CARDS = (Material.BROW, Material.LASH)
+"""Materials that are drawn with an alpha over what lies behind them."""
+
+
+@dataclass(frozen=True)
+class Eye:
+    """An eyeball that does not turn.
+
+    Attributes:
+        centre: (3,) metres, canonical head space.
+        axis: (3,) unit vector through the middle of the pupil.
+        iris_radius: Metres, measured at right angles to the axis.
+    """
+
+    centre: np.ndarray
+    axis: np.ndarray
+    iris_radius: float
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colours of a person, linear RGB.
+
+    Attributes:
+        skin: (3,) albedo of the cheek.
+        lips: (3,) albedo of the lips.
+        hair: (3,) albedo of a strand.
+        iris: (3,) albedo of the iris.
+        cloth: (2, 3) albedo of the cloth and of its pattern.
+        freckles: How many, 0 to 1.
+        stubble: How much shaved beard shows, 0 to 1.
+    """
+
+    skin: tuple[float, float, float]
+    lips: tuple[float, float, float]
+    hair: tuple[float, float, float]
+    iris: tuple[float, float, float]
+    cloth: tuple[tuple[float, float, float], tuple[float, float, float]]
+    freckles: float
+    stubble: float
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A person in canonical head space: metres, +Y up, +Z as the face looks, +X their left.
+
+    Attributes:
+        name: Name used in reports.
+        vertices: (V, 3) float32, neutral.
+        faces: (F, 3) int32, counter-clockwise seen from outside.
+        materials: (F,) uint8 of `Material`.
+        corner_uv: (F, 3, 2) float32 texture coordinates; hair, brows and lashes run along them.
+        lip_mask: (V,) float32, 1 on the red of the lips.
+        blendshape_names: K ARKit names.
+        delta_vertices: (M,) int32, the vertices that blendshapes move.
+        deltas: (K, M, 3) float32 metres at weight 1.
+        visemes: Oculus viseme name to (K,) weights.
+        landmark_vertices: (68,) int32, Multi-PIE order.
+        eyes: Left and right (the person's).
+        neck_base: (3,) the point that the body sways about.
+        head_in_world: (3,) where the canonical origin is at rest; the floor is y = 0.
+        male: Whether a man's voice suits.
+        look: Colours.
+        sources: What the geometry was made from, with licences.
+        licence: Licence of pictures of this person.
+    """
+
+    name: str
+    vertices: np.ndarray
+    faces: np.ndarray
+    materials: np.ndarray
+    corner_uv: np.ndarray
+    lip_mask: np.ndarray
+    blendshape_names: tuple[str, ...]
+    delta_vertices: np.ndarray
+    deltas: np.ndarray
+    visemes: dict[str, np.ndarray]
+    landmark_vertices: np.ndarray
+    eyes: tuple[Eye, Eye]
+    neck_base: np.ndarray
+    head_in_world: np.ndarray
+    male: bool
+    look: Look
+    sources: tuple[str, ...]
+    licence: str
+
+    def posed(self, weights: np.ndarray) -> np.ndarray:
+        """Vertices (V, 3) float32 for blendshape weights (K,)."""
+        vertices = self.vertices.copy()
+        moved = np.einsum("k,kmc->mc", weights.astype(np.float32), self.deltas)  # (M, 3)
+        vertices[self.delta_vertices] += moved
+        return vertices
+
+    def landmarks(self, vertices: np.ndarray) -> np.ndarray:
+        """(68, 3) float32 landmarks on posed vertices (V, 3)."""
+        return vertices[self.landmark_vertices]
+
+    def weights(self, values: dict[str, float]) -> np.ndarray:
+        """(K,) float32 weights from names; names this person lacks are left out."""
+        return np.array([values.get(name, 0.0) for name in self.blendshape_names], np.float32)
+
+
+def load_subject(subject: str) -> Subject:
+    """Loads a person.
+
+    Args:
+        subject: `anny`, or the path of an `.npz` file in the layout of `subject_npz`.
+
+    Raises:
+        CaptureError: If there is no such file or it is not in that layout.
+        MissingExtraError: If `anny` is asked for and not installed.
+    """
+    if subject == "anny":
+        from ico3d.capture.synthetic.subject_anny import load_anny
+
+        return load_anny()
+    from ico3d.capture.synthetic.subject_npz import load_npz
+
+    return load_npz(Path(subject))
