@@ -1,0 +1,47 @@
+"""The reference itself against finite differences and closed forms."""
+
+import math
+
+import torch
+from conftest import camera_at
+from reference import render, scene
+
+from ico3d.splat.gaussians import Gaussians
+
+
+def test_gradients_are_finite_differences():
+    camera = camera_at((0.1, 0.2, 1.2), width=9, height=7, focal=11.0)
+    start = scene(4, seed=3, spread=0.2)
+    values = [v.requires_grad_() for v in vars(start).values() if v is not None]
+    weights = torch.randn(7, 9, 5, generator=torch.Generator().manual_seed(0)).double()
+
+    def loss(*parts):
+        rgb, alpha, depth = render(Gaussians(*parts), [camera])
+        return (torch.cat([rgb[0], alpha[0, ..., None], depth[0, ..., None]], -1) * weights).sum()
+
+    assert torch.autograd.gradcheck(loss, values, eps=1e-6, atol=1e-5, rtol=1e-4)
+
+
+def test_one_gaussian_in_closed_form():
+    """Seen head on, an isotropic Gaussian has variance (f·s/z)² + 0.3 and dims accordingly."""
+    camera = camera_at((0, 0, 2.0), width=21, height=21, focal=50.0)
+    u, v = camera.intrinsics[:2, 2]
+    center = torch.tensor([[1.0, 2, 3, 4]]).double()
+    splat = Gaussians(
+        torch.zeros(1, 3).double(),
+        center,
+        torch.full((1, 3), 0.06, dtype=torch.float64),
+        torch.tensor([0.8], dtype=torch.float64),
+        torch.tensor([[0.2, 0.5, 1.0]], dtype=torch.float64),
+    )
+    rgb, alpha, depth = render(splat, [camera], torch.ones(3).double())
+    pixel = (50 * 0.06 / 2) ** 2
+    pixel_y = (55 * 0.06 / 2) ** 2
+    share = math.sqrt(pixel * pixel_y / ((pixel + 0.3) * (pixel_y + 0.3)))
+    row, column = 9, 12
+    exponent = (column + 0.5 - u) ** 2 / (pixel + 0.3) + (row + 0.5 - v) ** 2 / (pixel_y + 0.3)
+    expected = 0.8 * share * math.exp(-0.5 * exponent)
+    assert abs(alpha[0, row, column] - expected) < 1e-12
+    assert abs(rgb[0, row, column, 1] - (0.5 * expected + 1 - expected)) < 1e-12
+    assert abs(depth[0, row, column] - 2) < 1e-12
+    assert alpha[0, 0, 0] == 0

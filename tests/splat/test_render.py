@@ -1,0 +1,161 @@
+"""Both backends against the float64 reference."""
+
+import sys
+
+import numpy as np
+import pytest
+import reference
+import torch
+from conftest import camera_at
+
+from ico3d.errors import MissingExtraError
+from ico3d.splat import cuda
+from ico3d.splat.gaussians import Gaussians
+from ico3d.splat.render import render
+
+PARAMETERS = ("means", "quats", "scales", "opacities", "colors")
+DEVICES = [
+    "cpu",
+    pytest.param(
+        "cuda",
+        marks=pytest.mark.skipif(not torch.cuda.is_available(), reason="no CUDA device here"),
+    ),
+]
+
+
+def leaves(gaussians, dtype, device="cpu"):
+    """A copy in which every parameter collects a gradient."""
+    return gaussians.map(lambda t: t.detach().to(device, dtype).requires_grad_())
+
+
+def weights_for(tensor, seed):
+    generator = torch.Generator().manual_seed(seed)
+    return torch.randn(tensor.shape, generator=generator, dtype=torch.float64).to(tensor)
+
+
+def loss_of(rgb, alpha, depth):
+    """A loss that weighs every output of every pixel differently."""
+    parts = [(t * weights_for(t, k)).sum() for k, t in enumerate((rgb, alpha, depth))]
+    return parts[0] + parts[1] + 0.3 * parts[2]
+
+
+def difference(a, b):
+    """Largest difference relative to the largest value."""
+    return float((a.detach().cpu() - b.detach()).abs().max() / b.detach().abs().max())
+
+
+@pytest.mark.parametrize("device", DEVICES)
+@pytest.mark.parametrize(("count", "seed", "spread"), [(60, 0, 0.35), (120, 1, 1.0), (400, 2, 0.2)])
+def test_values_and_gradients(cameras, device, count, seed, spread):
+    start = reference.scene(count, seed, spread)
+    exact, ours = leaves(start, torch.float64), leaves(start, torch.float32, device)
+    background = torch.rand(30, 44, 3, generator=torch.Generator().manual_seed(5))
+    wanted = reference.render(exact, cameras, background.double())
+    picture = render(ours, cameras, background.to(device))
+    got = (picture.rgb, picture.alpha, picture.depth)
+    for a, b in zip(got, wanted, strict=True):
+        assert difference(a, b) < 1e-4
+    loss_of(*wanted).backward()
+    loss_of(*got).backward()
+    for name in PARAMETERS:
+        assert difference(getattr(ours, name).grad, getattr(exact, name).grad) < 1e-4, name
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_screen_gradients_are_those_of_normalised_coordinates(cameras, device):
+    start = reference.scene(50, 4)
+    exact, ours = leaves(start, torch.float64), leaves(start, torch.float32, device)
+    picture = render(ours, cameras)
+    (picture.rgb * weights_for(picture.rgb, 0)).sum().backward()
+    for c, camera in enumerate(cameras):
+        means2d, covariances, opacities, depths = reference.project(exact, camera)
+        means2d.retain_grad()
+        rgb, _ = reference.composite(
+            means2d, covariances, opacities, depths, exact.colors, camera.width, camera.height
+        )
+        (rgb * weights_for(picture.rgb.double().cpu(), 0)[c]).sum().backward()
+        norms = (means2d.grad * torch.tensor([camera.width / 2, camera.height / 2])).norm(dim=-1)
+        assert difference(picture.info.screen_gradients()[c], norms) < 1e-4
+        unseen = ~picture.info.visible[c].cpu()
+        assert norms[unseen].abs().max() == 0 if unseen.any() else True
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_nothing_to_draw_leaves_the_background(cameras, device):
+    empty = reference.scene(0, dtype=torch.float32).to(device)
+    picture = render(empty, cameras, torch.tensor([0.1, 0.2, 0.3], device=device))
+    assert picture.rgb.shape == (2, 30, 44, 3)
+    assert torch.equal(picture.rgb[1, 7, 9].cpu(), torch.tensor([0.1, 0.2, 0.3]))
+    assert not picture.alpha.any() and not picture.depth.any()
+    assert picture.info.visible.shape == (2, 0)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_what_lies_behind_is_not_drawn_and_gets_no_gradient(device):
+    camera = camera_at((0, 0, 1.0))
+    gaussians = reference.scene(20, dtype=torch.float32)
+    gaussians.means[:, 2] = torch.linspace(0.995, 3, 20)  # from 5 mm before the camera to behind
+    ours = leaves(gaussians, torch.float32, device)
+    picture = render(ours, [camera])
+    assert not picture.rgb.any() and not picture.info.visible.any()
+    picture.rgb.sum().backward()
+    for name in PARAMETERS:
+        assert not getattr(ours, name).grad.any()
+
+
+def test_two_runs_give_the_same_bits(cameras):
+    def run():
+        ours = leaves(reference.scene(300, 7), torch.float32)
+        picture = render(ours, cameras)
+        (picture.rgb * weights_for(picture.rgb, 1)).sum().backward()
+        return [picture.rgb, *(getattr(ours, name).grad for name in PARAMETERS)]
+
+    for a, b in zip(run(), run(), strict=True):
+        assert torch.equal(a, b)
+
+
+def test_an_elongated_splat_loses_no_pixel():
+    """Tiles and rows are cut to the ellipse: a long diagonal one must not miss any."""
+    camera = camera_at((0, 0, 1.0), width=130, height=100, focal=120.0)
+    for angle in np.linspace(0, np.pi, 9):
+        turn = [np.cos(angle / 2), 0, 0, np.sin(angle / 2)]
+        needle = Gaussians(
+            torch.zeros(1, 3),
+            torch.tensor([turn]),
+            torch.tensor([[0.12, 0.004, 0.004]]),
+            torch.tensor([0.99]),
+            torch.ones(1, 3),
+        ).map(torch.Tensor.double)
+        wanted, _, _ = reference.render(needle, [camera])
+        assert (render(needle, [camera]).rgb - wanted).abs().max() < 1e-5
+
+
+def test_harmonics_depend_on_the_side(cameras):
+    gaussians = reference.scene(30, dtype=torch.float32)
+    sh = torch.zeros(30, 4, 3)
+    sh[:, 3] = -1  # degree 1, along x: bright when looked at towards +x
+    colored = Gaussians(*list(vars(gaussians).values())[:4], sh=sh)
+    from_left, from_right = camera_at((-1.2, 0, 0)), camera_at((1.2, 0, 0))
+    picture = render(colored, [from_left, from_right])
+    assert picture.rgb[0].sum() > 3 * picture.rgb[1].sum()
+
+
+def test_wrong_shapes_are_refused(cameras):
+    gaussians = reference.scene(5, dtype=torch.float32)
+    with pytest.raises(ValueError, match="one size"):
+        render(gaussians, [cameras[0], camera_at((0, 0, 1), width=50)])
+    with pytest.raises(ValueError, match="at least one camera"):
+        render(gaussians, [])
+    with pytest.raises(ValueError, match="background"):
+        render(gaussians, cameras, torch.zeros(44, 30, 3))
+    with pytest.raises(ValueError, match="quats"):
+        render(Gaussians(gaussians.means, gaussians.scales, *([gaussians.scales] * 3)), cameras)
+    with pytest.raises(ValueError, match="colors or sh"):
+        render(Gaussians(*list(vars(gaussians).values())[:4]), cameras)
+
+
+def test_a_missing_gsplat_names_the_extra(monkeypatch, cameras):
+    monkeypatch.setitem(sys.modules, "gsplat", None)
+    gaussians = reference.scene(3, dtype=torch.float32)
+    with pytest.raises(MissingExtraError, match=r"ico3d\[cuda\]"):
+        cuda.draw_gaussians(gaussians, gaussians.colors.expand(2, 3, 3), cameras)
