@@ -20,6 +20,12 @@ def test_samples_of_low_rank_come_back_exactly(rng):
     np.testing.assert_allclose(factors.mean + factors.scores @ factors.basis, samples, atol=1e-3)
 
 
+def test_more_components_than_samples_are_padded_with_zeros(rng):
+    factors = factorise(rng.normal(size=(4, 30)).astype(np.float32), np.ones(30, np.float32), 8)
+    assert factors.basis.shape == (8, 30) and factors.scores.shape == (4, 8)
+    assert not factors.basis[3:].any()
+
+
 def test_it_agrees_with_the_singular_value_decomposition(rng):
     samples = rng.normal(size=(30, 50)).astype(np.float32)
     weights = rng.uniform(0.5, 2, 50).astype(np.float32)

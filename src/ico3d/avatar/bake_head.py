@@ -46,6 +46,7 @@ class HeadBaker:
         model: HeadModel,
         expressions: np.ndarray,
         importance: np.ndarray,
+        rank: int = MAX_RANK,
         settings: BakeSettings = BakeSettings(),
     ):
         """Samples the model.
@@ -54,6 +55,7 @@ class HeadBaker:
             model: The exact head.
             expressions: (T, B) those of the training frames.
             importance: (N, 4) weights of logit errors.
+            rank: The largest that `baked` will be asked for.
             settings: See there.
         """
         chosen = _spread(expressions, settings.max_frames)
@@ -61,7 +63,6 @@ class HeadBaker:
         self._kept = (samples[:, :, 3] > np.log(LEAST_ALPHA / (1 - LEAST_ALPHA))).any(axis=0)
         self._model, self._weights = model, importance[self._kept]
         flat = _flat(samples[:, self._kept])
-        rank = min(MAX_RANK, len(flat))
         self._factors: LowRank = factorise(flat, self._weights.reshape(-1), rank)
         self._network = self._fit(chosen, settings)
 

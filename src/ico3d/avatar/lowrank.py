@@ -42,7 +42,7 @@ def factorise(samples: np.ndarray, weights: np.ndarray, rank: int) -> LowRank:
     Args:
         samples: (T, D) float16 or float32, T ≥ 2.
         weights: (D,) positive.
-        rank: K ≤ T; components beyond what the samples span are zero.
+        rank: K; components beyond what the samples span are zero.
     """
     mean = _mean(samples)
     gram = np.zeros((len(samples),) * 2)
@@ -51,14 +51,21 @@ def factorise(samples: np.ndarray, weights: np.ndarray, rank: int) -> LowRank:
         gram += centred @ centred.T  # (T, T)
     values, vectors = np.linalg.eigh(gram)
     order = np.argsort(values)[::-1][:rank]
-    spanned = values[order] > max(_NOISE * values[-1], 1e-12)
-    sizes = np.sqrt(values[order], out=np.zeros(rank), where=spanned)  # (K,)
-    mixing = vectors[:, order] / np.where(spanned, sizes, np.inf)  # (T, K)
+    values, vectors = _padded(values[order], vectors[:, order], rank)
+    spanned = values > max(_NOISE * values[0], 1e-12)
+    sizes = np.sqrt(values, out=np.zeros(rank), where=spanned)  # (K,)
+    mixing = vectors / np.where(spanned, sizes, np.inf)  # (T, K)
     basis = np.empty((rank, mean.size), np.float32)
     for part in _chunks(mean.size):
         centred = samples[:, part].astype(np.float32) - mean[part]
         basis[:, part] = mixing.T @ (centred * weights[part]) / weights[part]
-    return LowRank(mean, basis, weights, (vectors[:, order] * sizes).astype(np.float32))
+    return LowRank(mean, basis, weights, (vectors * sizes).astype(np.float32))
+
+
+def _padded(values: np.ndarray, vectors: np.ndarray, rank: int) -> tuple[np.ndarray, np.ndarray]:
+    """Zeros where there are fewer samples than components are wanted."""
+    lacking = rank - len(values)
+    return np.pad(values, (0, lacking)), np.pad(vectors, ((0, 0), (0, lacking)))
 
 
 def _mean(samples: np.ndarray) -> np.ndarray:

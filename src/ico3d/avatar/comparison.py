@@ -1,0 +1,142 @@
+"""What baking costs: exact and baked head beside the recorded pictures."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from ico3d.avatar.render_bundle import baked_gaussians
+from ico3d.bundle.head import BakedHead
+from ico3d.bundle.manifest import Loss
+from ico3d.capture.capture import Capture
+from ico3d.common.camera import Camera
+from ico3d.errors import CaptureError
+from ico3d.head.trained import TrainedHead
+from ico3d.head.views import PictureCache, View
+from ico3d.splat.gaussians import Gaussians
+from ico3d.splat.render import render
+
+MAX_DROP = 0.3
+"""dB that the baked head may lose against ground truth."""
+MIN_LIKENESS = 45.0
+"""dB of the baked against the exact picture, at least."""
+_CPU = torch.device("cpu")
+
+
+@dataclass(frozen=True)
+class Reference:
+    """One recorded picture and the exact model's; pictures (H, W, 3) float16.
+
+    Attributes:
+        camera: In canonical head space.
+        expression: (B,) float32.
+        background: (3,) or (H, W, 3).
+        truth: What was recorded.
+        exact: What the exact model shows.
+    """
+
+    camera: Camera
+    expression: np.ndarray
+    background: torch.Tensor
+    truth: np.ndarray
+    exact: np.ndarray
+
+
+def references(
+    head: TrainedHead, capture: Capture, neutral: tuple[float, float, float], count: int
+) -> list[Reference]:
+    """Views of test frames, evenly spread, with what the exact model makes of them.
+
+    Args:
+        head: The exact head.
+        capture: Where the pictures come from.
+        neutral: Background where the capture has none.
+        count: How many views at most.
+
+    Raises:
+        CaptureError: If no test frame has a picture.
+    """
+    pictures, track = PictureCache(capture, 0.0), head.track(capture)
+    frames = capture.split.test
+    chosen = (
+        {frames[i] for i in np.linspace(0, len(frames) - 1, count).astype(int)} if frames else {}
+    )
+    views = list(pictures.views(sorted(chosen)))[: 4 * count]
+    if not views:
+        raise CaptureError(f"{capture.path}: no test frame has a picture to measure baking with.")
+    spread = np.unique(np.linspace(0, len(views) - 1, count).astype(int))
+    with torch.no_grad():
+        return [
+            _reference(head, pictures, views[i], track.at(views[i].frame), neutral) for i in spread
+        ]
+
+
+def measure(head: BakedHead, views: list[Reference]) -> Loss:
+    """Mean PSNR over views, whole pictures."""
+    baked = [baked_picture(head, view) for view in views]
+    return Loss(
+        psnr_exact=_mean(psnr(view.exact, view.truth) for view in views),
+        psnr_baked=_mean(psnr(b, view.truth) for b, view in zip(baked, views, strict=True)),
+        psnr_baked_vs_exact=_mean(
+            psnr(b, view.exact) for b, view in zip(baked, views, strict=True)
+        ),
+    )
+
+
+def acceptable(loss: Loss) -> bool:
+    """Whether a measured loss is within the design's bounds."""
+    assert loss.psnr_exact and loss.psnr_baked and loss.psnr_baked_vs_exact
+    drop = loss.psnr_exact - loss.psnr_baked
+    return drop <= MAX_DROP and loss.psnr_baked_vs_exact >= MIN_LIKENESS
+
+
+def strip(head: BakedHead, views: list[Reference], rows: int = 4) -> np.ndarray:
+    """Ground truth | exact | baked of some views, one below the other: (rows·H, 3·W, 3) uint8."""
+    chosen = [views[i] for i in np.unique(np.linspace(0, len(views) - 1, rows).astype(int))]
+    lines = [np.hstack([v.truth, v.exact, baked_picture(head, v)]) for v in chosen]
+    return (np.vstack(lines).astype(np.float32).clip(0, 1) * 255 + 0.5).astype(np.uint8)
+
+
+def baked_picture(head: BakedHead, view: Reference) -> np.ndarray:
+    """The baked head where the reference is: (H, W, 3) float32."""
+    return _picture(baked_gaussians(head, view.expression), view.camera, view.background)
+
+
+def psnr(a: np.ndarray, b: np.ndarray) -> float:
+    """Peak signal-to-noise ratio in dB of two pictures in [0, 1], at most 100."""
+    error = np.square(a.astype(np.float64) - b.astype(np.float64)).mean()
+    return float(-10 * np.log10(max(error, 1e-10)))
+
+
+def _reference(
+    head: TrainedHead,
+    pictures: PictureCache,
+    view: View,
+    expression: torch.Tensor,
+    neutral: tuple[float, float, float],
+) -> Reference:
+    """Without a clean background, the person is cut out over the neutral colour."""
+    picture = pictures.picture(view, _CPU)
+    behind, truth = pictures.background(view, _CPU), picture.image
+    if behind is None:
+        behind = torch.tensor(neutral)
+        if picture.mask is not None:
+            mask = picture.mask[..., None]  # (H, W, 1)
+            truth = truth * mask + behind * (1 - mask)
+    exact = _picture(head.model(expression), view.camera, behind)
+    return Reference(
+        view.camera,
+        expression.numpy(),
+        behind,
+        truth.numpy().astype(np.float16),
+        exact.astype(np.float16),
+    )
+
+
+def _picture(gaussians: Gaussians, camera: Camera, background: torch.Tensor) -> np.ndarray:
+    with torch.no_grad():
+        return render(gaussians, [camera], background).rgb[0].numpy()  # (H, W, 3)
+
+
+def _mean(values) -> float:
+    return round(float(np.mean(list(values))), 4)

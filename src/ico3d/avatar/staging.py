@@ -1,0 +1,116 @@
+"""How a baked head is presented: its motion, the visitor's camera, the background."""
+
+import numpy as np
+
+from ico3d.bundle.manifest import CameraInfo
+from ico3d.capture.capture import Capture
+from ico3d.common.camera import Camera
+
+LONGEST = 10.0
+"""Seconds of head motion in a bundle."""
+_ARM = 0.1
+"""Metres from the head's centre at which a turn counts as a move."""
+_SMOOTHING = 1.5
+"""Standard deviation, in frames, of the smoothing of head poses (trackers jitter)."""
+NEUTRAL = (0.84, 0.86, 0.88)
+"""Background where the capture has none: a light grey."""
+
+
+def idle_motion(capture: Capture) -> np.ndarray:
+    """The stretch of head poses that best plays back and forth.
+
+    It turns around at both ends, so the head should be slow there, and smooth in between.
+
+    Returns:
+        (F, 4, 4) float64 at the capture's rate, F ≤ 10 s; one identity where there are no poses.
+    """
+    poses = _longest_run([capture.world_from_head(f) for f in range(capture.num_frames)])
+    if len(poses) == 0:
+        return np.eye(4)[None]
+    poses = _smoothed(poses)
+    length = min(len(poses), max(1, int(LONGEST * capture.fps)))
+    starts = range(len(poses) - length + 1)
+    best = min(starts, key=lambda start: _roughness(poses[start : start + length]))
+    return poses[best : best + length]
+
+
+def frontal_camera(capture: Capture) -> int:
+    """The camera that sees the face most from the front, by the symmetry of its landmarks."""
+    asymmetry = [_asymmetry(capture, camera) for camera in range(len(capture.cameras))]
+    return int(np.argmin(asymmetry))
+
+
+def visitor_view(camera: Camera, points: np.ndarray) -> CameraInfo:
+    """Where the visitor starts: at the capture's camera, turned and zoomed to frame the person.
+
+    Args:
+        camera: The frontal camera, in world space.
+        points: (P, 3) world positions of the Gaussians that are seen.
+    """
+    pixels, depths = camera.project(points)  # (P, 2), (P,)
+    inside = depths > 0
+    low, high = np.percentile(pixels[inside], (1, 99), axis=0)  # (2,), (2,)
+    size = np.array([camera.width, camera.height], float)
+    low, high = np.clip(low, 0, size), np.clip(high, 0, size)
+    centre, half = (low + high) / 2, (high - low).max() / 2 * 1.1
+    half = min(max(half, 1.0), size[1] / 2)  # never wider than what was recorded
+    ray = np.linalg.inv(camera.intrinsics) @ [*centre, 1.0]
+    rotation, eye = camera.world_to_camera[:3, :3], camera.camera_to_world[:3, 3]
+    target = eye + rotation.T @ ray * np.median(depths[inside])
+    fov = 2 * np.degrees(np.arctan(half / camera.intrinsics[1, 1]))
+    return CameraInfo(_triple(eye), _triple(target), _triple(-rotation[1]), round(float(fov), 3))
+
+
+def background_colour(capture: Capture, camera: int) -> tuple[float, float, float]:
+    """The mean colour of the clean background, or a light grey."""
+    picture = capture.background(camera)
+    return NEUTRAL if picture is None else _triple(picture.reshape(-1, 3).mean(axis=0))
+
+
+def _triple(values: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = (round(float(value), 5) for value in values)
+    return x, y, z
+
+
+def _longest_run(poses: list[np.ndarray | None]) -> np.ndarray:
+    """The longest stretch of consecutive frames that all have a finite pose (F, 4, 4)."""
+    runs: list[list[np.ndarray]] = [[]]
+    for pose in poses:
+        if pose is not None and np.isfinite(pose).all():
+            runs[-1].append(pose)
+        else:
+            runs.append([])
+    return np.array(max(runs, key=len), np.float64).reshape(-1, 4, 4)
+
+
+def _smoothed(poses: np.ndarray) -> np.ndarray:
+    """Gaussian smoothing over time; rotations are averaged as matrices and made rigid again."""
+    reach = int(3 * _SMOOTHING)
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / _SMOOTHING) ** 2)
+    padded = np.pad(poses, ((reach, reach), (0, 0), (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, len(kernel), axis=0)
+    mean = windows @ (kernel / kernel.sum())  # (F, 4, 4)
+    u, _, vt = np.linalg.svd(mean[:, :3, :3])
+    mean[:, :3, :3] = u @ vt
+    return mean
+
+
+def _roughness(poses: np.ndarray) -> float:
+    """Speed at both ends plus mean acceleration, in metres per frame."""
+    if len(poses) < 3:
+        return 0.0
+    tips = poses[:, :3, 3:] + _ARM * poses[:, :3, :3]  # (F, 3, 3): ends of the three axes
+    speed = np.linalg.norm(np.diff(tips, axis=0), axis=1).max(axis=1)  # (F − 1,)
+    jerk = np.linalg.norm(np.diff(tips, 2, axis=0), axis=1).max(axis=1)  # (F − 2,)
+    return float(speed[:2].mean() + speed[-2:].mean() + 4 * jerk.mean())
+
+
+def _asymmetry(capture: Capture, camera: int) -> float:
+    """How far the nose's tip is from the middle between both jaw ends; 1 where unknown."""
+    values = []
+    for frame in np.linspace(0, capture.num_frames - 1, 8).astype(int):
+        landmarks = capture.landmarks(camera, int(frame))
+        if landmarks is not None and np.isfinite(landmarks).all():
+            left, right = np.linalg.norm(landmarks[[0, 16]] - landmarks[30], axis=1)
+            values.append(abs(left - right) / max(left + right, 1e-9))
+    return float(np.mean(values)) if values else 1.0
