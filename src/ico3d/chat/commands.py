@@ -1,0 +1,117 @@
+"""The verbs `serve` and `demo`."""
+
+import sys
+import webbrowser
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from ico3d.errors import BundleError, MissingExtraError
+
+DEMO = Path(__file__).parent / "data" / "demo.ico3d"
+
+
+@dataclass(frozen=True)
+class Serve:
+    """Serves a bundle: opens a page where anyone can talk with it.
+
+    Attributes:
+        bundle: The avatar: NAME.ico3d or its folder.
+        host: Address to listen on; other machines reach it only if it is not 127.0.0.1.
+        port: Port to listen on; 0 takes any that is free.
+        settings: TOML or JSON file that chooses services and timing.
+        open: Open the page in a browser.
+        verbose: Print what happens inside.
+    """
+
+    bundle: Annotated[Path, tyro.conf.Positional]
+    host: str = "127.0.0.1"
+    port: int = 8765
+    settings: Path | None = None
+    open: bool = False
+    verbose: bool = False
+
+    def run(self) -> None:
+        """Serves until it is interrupted.
+
+        Raises:
+            Ico3dError: If the bundle, the settings or the port cannot be used.
+        """
+        set_up_log(self.verbose)
+        from ico3d.bundle.format import Bundle
+        from ico3d.chat import server
+        from ico3d.chat.settings import read_settings
+
+        settings = read_settings(self.settings)
+        listener = server.bind(self.host, self.port)
+        bundle = Bundle.open(self.bundle)
+        avatar = server.open_avatar(bundle, settings)
+        app = server.make_app(bundle, avatar, self.host)
+        url = server.address(listener)
+        print(f"{bundle.manifest.persona.name} is at {url} (Ctrl+C ends)")
+        for line in described(avatar.services.described()):
+            print(line)
+        if not (server.STATIC / "index.html").is_file():
+            print("The page is not built: run `make viewer`.", file=sys.stderr)
+        sys.stdout.flush()
+        if self.open:
+            webbrowser.open(url)
+        server.make_server(app).run(sockets=[listener])
+
+
+@dataclass(frozen=True)
+class Demo:
+    """Talks with the avatar that comes in the package.
+
+    Attributes:
+        host: Address to listen on.
+        port: Port to listen on; 0 takes any that is free.
+        settings: TOML or JSON file that chooses services and timing.
+        open: Open the page in a browser.
+        verbose: Print what happens inside.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 8765
+    settings: Path | None = None
+    open: bool = True
+    verbose: bool = False
+
+    def run(self) -> None:
+        """Serves the packaged avatar until it is interrupted.
+
+        Raises:
+            BundleError: If the package came without it.
+        """
+        if not DEMO.is_file():
+            raise BundleError(
+                "this installation has no demo avatar (chat/data/demo.ico3d): "
+                "make one with `ico3d bake` and serve it with `ico3d serve`."
+            )
+        Serve(DEMO, self.host, self.port, self.settings, self.open, self.verbose).run()
+
+
+def described(services) -> list[str]:
+    """One line for each service, and one that says it if they are only stand-ins."""
+    parts = {"listens": services.recognition, "thinks": services.language, "speaks": services.voice}
+    lines = [f"  {verb} with {service.name}" for verb, service in parts.items()]
+    if any(service.stand_in for service in parts.values()):
+        lines.append("  (small offline stand-ins; choose others with --settings)")
+    return lines
+
+
+def set_up_log(verbose: bool) -> None:
+    """Silences pipecat's log, which starts with its import, unless it is wanted.
+
+    Raises:
+        MissingExtraError: If the extra `chat` is not installed.
+    """
+    try:
+        from loguru import logger
+    except ImportError:
+        raise MissingExtraError("pipecat-ai", "chat", "talking with an avatar") from None
+    logger.remove()
+    if verbose:
+        logger.add(sys.stderr, level="DEBUG")

@@ -1,0 +1,163 @@
+"""One WebSocket: from `hello` to its end."""
+
+import asyncio
+import contextlib
+
+from fastapi import WebSocket, WebSocketDisconnect
+from loguru import logger
+
+from ico3d.chat import protocol
+from ico3d.chat.codec import OversizedError, decode_client, encode
+from ico3d.chat.limits import Limits
+from ico3d.chat.page import Outbox
+from ico3d.chat.protocol import (
+    Audio,
+    ClientMessage,
+    Clock,
+    Error,
+    Hello,
+    Interrupt,
+    Text,
+    Welcome,
+)
+from ico3d.chat.sessions import FullError, Session, Sessions
+from ico3d.errors import Ico3dError, ProtocolError
+
+HELLO_SECONDS = 10  # that a page may take to say hello
+GOING, BROKEN, TOO_BIG, BUSY = 1000, 1008, 1009, 1013  # WebSocket close codes
+
+
+class Hangup(Exception):
+    """The connection is to be closed with an error."""
+
+    def __init__(self, code: int, message: str):
+        """A close code and one sentence for the page."""
+        super().__init__(message)
+        self.code = code
+
+
+class Connection:
+    """Reads a page's messages and writes what its session has for it."""
+
+    def __init__(self, socket: WebSocket, sessions: Sessions, welcome: Welcome):
+        """A connection.
+
+        Args:
+            socket: An accepted WebSocket.
+            sessions: Where its session comes from.
+            welcome: What every page is told; its session and `resumed` are filled in.
+        """
+        self._socket, self._sessions, self._welcome = socket, sessions, welcome
+        self._limits = Limits()
+        self._outbox = Outbox()
+
+    async def run(self) -> None:
+        """Talks until one of both sides ends it."""
+        writer: asyncio.Task | None = None
+        session: Session | None = None
+        try:
+            hello = await self._hello()
+            session, resumed = await self._sessions.enter(hello, self._outbox)
+            await self._greet(session, resumed, hello.last_index)
+            writer = asyncio.create_task(self._write())
+            await self._read(session)
+        except Hangup as hangup:
+            await self._hang_up(hangup.code, str(hangup))
+        except FullError:
+            await self._hang_up(BUSY, "all places are taken: try again in a minute.")
+        except Ico3dError as error:
+            await self._hang_up(1011, str(error))
+        except WebSocketDisconnect:
+            pass
+        finally:
+            self._outbox.close()
+            if writer is not None:
+                writer.cancel()
+                await asyncio.gather(writer, return_exceptions=True)
+            if session is not None:
+                self._sessions.leave(session, self._outbox)
+
+    async def _hello(self) -> Hello:
+        try:
+            frame = await asyncio.wait_for(self._receive(), HELLO_SECONDS)
+            message = decode_client(frame)
+        except TimeoutError:
+            raise Hangup(BROKEN, "the page did not say hello.") from None
+        except ProtocolError as error:
+            raise Hangup(TOO_BIG if _is_big(error) else BROKEN, str(error)) from error
+        if not isinstance(message, Hello):
+            raise Hangup(BROKEN, "the first message must be hello.")
+        if message.version != protocol.VERSION:
+            raise Hangup(
+                BROKEN,
+                f"this page speaks version {message.version} of the protocol, "
+                f"the server version {protocol.VERSION}: reload the page.",
+            )
+        return message
+
+    async def _greet(self, session: Session, resumed: bool, last_index: int) -> None:
+        known = self._welcome
+        welcome = Welcome(known.version, session.id, resumed, known.services, known.notices)
+        await self._socket.send_text(str(encode(welcome)))
+        if resumed:
+            session.page.replay(last_index)
+        else:
+            await session.conversation.greet()
+
+    async def _read(self, session: Session) -> None:
+        while True:
+            frame = await self._receive()
+            try:
+                self._limits.check_frame()
+                message = decode_client(frame)
+                self._limits.check_message(message)
+                await self._handle(session, message)
+            except OversizedError as error:
+                raise Hangup(TOO_BIG, str(error)) from error
+            except ProtocolError as error:
+                if not self._limits.forgive():
+                    raise Hangup(BROKEN, str(error)) from error
+                self._outbox.put(Error(str(error), fatal=False))
+
+    async def _receive(self) -> str | bytes:
+        event = await self._socket.receive()
+        if event["type"] == "websocket.disconnect":
+            raise WebSocketDisconnect(event.get("code", GOING))
+        text = event.get("text")
+        return text if text is not None else event.get("bytes") or b""
+
+    async def _handle(self, session: Session, message: ClientMessage) -> None:
+        conversation = session.conversation
+        if isinstance(message, Audio):
+            await conversation.hear(message.pcm.tobytes())
+        elif isinstance(message, Clock):
+            conversation.clock(message)
+        elif isinstance(message, Text):
+            if not message.text.strip():
+                raise ProtocolError("text: is empty.")
+            await conversation.ask(message.text.strip())
+        elif isinstance(message, Interrupt):
+            await conversation.interrupt(message.utterance)
+        else:
+            raise ProtocolError("hello comes only once.")
+
+    async def _write(self) -> None:
+        """Sends until the outbox is closed, which ends the connection too."""
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # the page is gone
+            while (message := await self._outbox.get()) is not None:
+                frame = encode(message)
+                if isinstance(frame, str):
+                    await self._socket.send_text(frame)
+                else:
+                    await self._socket.send_bytes(frame)
+            await self._socket.close(GOING)
+
+    async def _hang_up(self, code: int, message: str) -> None:
+        logger.debug(f"closing a connection with {code}: {message}")
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            await self._socket.send_text(str(encode(Error(message, fatal=True))))
+            await self._socket.close(code)
+
+
+def _is_big(error: ProtocolError) -> bool:
+    return isinstance(error, OversizedError)

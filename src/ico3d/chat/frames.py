@@ -1,0 +1,62 @@
+"""Frames that only this pipeline has: sound with its face, and the end of an utterance."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pipecat.frames.frames import DataFrame
+
+
+@dataclass
+class SpeechFrame(DataFrame):
+    """100-200 ms of sound with the face that belongs to it: one thing, so it cannot drift.
+
+    Parameters:
+        utterance: Which answer.
+        first_sample: Of the utterance, at 24 kHz.
+        first_expression: Index of the first row.
+        pcm: (n,) int16.
+        expressions: (rows, B) float32.
+        text: The sentence that starts with this piece, if one does.
+    """
+
+    utterance: int
+    first_sample: int
+    first_expression: int
+    pcm: np.ndarray
+    expressions: np.ndarray
+    text: str | None = None
+
+
+@dataclass
+class UtteranceEndFrame(DataFrame):
+    """All sound of an utterance has been made.
+
+    Parameters:
+        utterance: Which answer.
+        samples: Its length at 24 kHz.
+    """
+
+    utterance: int
+    samples: int
+
+
+class Utterances:
+    """Numbers the answers of a session and knows which of them were stopped."""
+
+    def __init__(self):
+        """None yet."""
+        self.last = -1
+        self._stopped_through = -1
+
+    def begin(self) -> int:
+        """The number of a new answer."""
+        self.last += 1
+        return self.last
+
+    def stop_all(self) -> None:
+        """Everything begun so far is over."""
+        self._stopped_through = self.last
+
+    def is_stopped(self, utterance: int) -> bool:
+        """Whether pieces of an answer that still arrive are to be dropped."""
+        return utterance <= self._stopped_through

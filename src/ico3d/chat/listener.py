@@ -1,0 +1,85 @@
+"""The input of the pipeline, and the processor that shows the visitor what was understood."""
+
+import time
+
+from pipecat.frames.frames import (
+    Frame,
+    InputAudioRawFrame,
+    InterimTranscriptionFrame,
+    LLMFullResponseEndFrame,
+    LLMFullResponseStartFrame,
+    LLMMessagesAppendFrame,
+    LLMTextFrame,
+    TranscriptionFrame,
+    UserStartedSpeakingFrame,
+    UserStoppedSpeakingFrame,
+    VADUserStoppedSpeakingFrame,
+)
+from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
+
+from ico3d.chat.page import Page
+from ico3d.chat.protocol import MICROPHONE_RATE, Transcript
+from ico3d.chat.timing import TurnTimer
+
+
+class PageInput(FrameProcessor):
+    """Where the page's messages enter the pipeline."""
+
+    async def process_frame(self, frame: Frame, direction: FrameDirection):
+        """Passes everything on."""
+        await super().process_frame(frame, direction)
+        await self.push_frame(frame, direction)
+
+    async def hear(self, pcm: bytes) -> None:
+        """Sound from the microphone, PCM16 mono 16 kHz."""
+        await self.push_frame(InputAudioRawFrame(pcm, MICROPHONE_RATE, 1))
+
+    async def ask(self, text: str) -> None:
+        """A typed question: whatever is being said stops, then it is answered."""
+        await self.broadcast_interruption()
+        message = {"role": "user", "content": text}
+        await self.push_frame(LLMMessagesAppendFrame([message], run_llm=True))  # type: ignore[list-item]
+
+    async def say(self, text: str) -> None:
+        """Lets the avatar say something by itself, as if the language model had."""
+        for frame in (LLMFullResponseStartFrame(), LLMTextFrame(text), LLMFullResponseEndFrame()):
+            await self.push_frame(frame)
+
+
+class Captions(FrameProcessor):
+    """Sends transcripts and the listening state to the page; stands behind the recogniser."""
+
+    def __init__(self, page: Page, timer: TurnTimer):
+        """Captions for one session."""
+        super().__init__()
+        self._page, self._timer = page, timer
+        self._words = ""  # of the pieces of this turn that are final
+        self._listening = False
+
+    async def process_frame(self, frame: Frame, direction: FrameDirection):
+        """Looks at what passes; the aggregator's frames come from the other side."""
+        await super().process_frame(frame, direction)
+        if isinstance(frame, InterimTranscriptionFrame):
+            self._page.send(Transcript(self._joined(frame.text), final=False))
+        elif isinstance(frame, TranscriptionFrame):
+            self._timer.mark("recognition")
+            self._words = self._joined(frame.text)
+            self._page.send(Transcript(self._words, final=True))
+        elif isinstance(frame, VADUserStoppedSpeakingFrame) and self._is_down(direction):
+            noticed = time.time() - frame.timestamp
+            self._timer.start(ago=frame.stop_secs + noticed)
+            self._timer.mark("vad")
+        elif isinstance(frame, UserStartedSpeakingFrame):
+            self._page.show("listening")
+            self._words = ""
+        elif isinstance(frame, UserStoppedSpeakingFrame):
+            self._timer.mark("turn")
+            self._page.show("thinking" if self._words else "idle")
+        await self.push_frame(frame, direction)
+
+    def _joined(self, text: str) -> str:
+        return f"{self._words} {text}".strip()[:4000]
+
+    @staticmethod
+    def _is_down(direction: FrameDirection) -> bool:
+        return direction == FrameDirection.DOWNSTREAM

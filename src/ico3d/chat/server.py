@@ -1,0 +1,145 @@
+"""The HTTP server: the page, the bundle's files, and the WebSocket of the conversation."""
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import uvicorn
+from fastapi import FastAPI, Request, Response, WebSocket
+from fastapi.responses import JSONResponse, PlainTextResponse
+from fastapi.staticfiles import StaticFiles
+
+from ico3d.bundle.format import Bundle
+from ico3d.chat import protocol
+from ico3d.chat.connection import Connection
+from ico3d.chat.conversation import Avatar
+from ico3d.chat.face import open_face
+from ico3d.chat.guard import Guard
+from ico3d.chat.protocol import Welcome
+from ico3d.chat.services import choose
+from ico3d.chat.sessions import Sessions
+from ico3d.chat.settings import ChatSettings
+from ico3d.errors import BundleError, SettingsError
+
+STATIC = Path(__file__).parent / "static"
+TYPES = {".json": "application/json", ".png": "image/png", ".txt": "text/plain; charset=utf-8"}
+STILL = "This avatar is driven by blendshapes, not by sound: its lips do not move while it speaks."
+
+
+def open_avatar(bundle: Bundle, settings: ChatSettings) -> Avatar:
+    """What the sessions share.
+
+    Raises:
+        SettingsError: If a service is unknown.
+        ModelError: If the bundle's speech model cannot be used.
+    """
+    head, speech = open_face(bundle)
+    return Avatar(head, speech, bundle.manifest.persona, choose(settings), settings)
+
+
+def make_app(bundle: Bundle, avatar: Avatar, host: str, sessions: Sessions | None = None) -> Guard:
+    """The application.
+
+    Args:
+        bundle: What the page loads.
+        avatar: What the sessions share.
+        host: The address that the server is bound to.
+        sessions: Where sessions live; a new place by default.
+    """
+    sessions = sessions or Sessions(avatar)
+    notices = [] if avatar.speech else [STILL]
+    described = avatar.services.described()
+    welcome = Welcome(protocol.VERSION, "-", False, described, notices)
+
+    @contextlib.asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        yield
+        await sessions.close_all()
+
+    app = FastAPI(lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
+
+    @app.get("/health")
+    async def health() -> JSONResponse:
+        return JSONResponse({"ok": True})
+
+    @app.get("/bundle/{name}")
+    async def bundle_file(name: str, request: Request) -> Response:
+        return await asyncio.to_thread(serve_file, bundle, name, request)
+
+    @app.websocket("/ws")
+    async def conversation(socket: WebSocket) -> None:
+        await socket.accept()
+        await Connection(socket, sessions, welcome).run()
+
+    add_page(app)
+    return Guard(app, host)
+
+
+def serve_file(bundle: Bundle, name: str, request: Request) -> Response:
+    """One file of the bundle; browsers keep it as long as its hash stays the same."""
+    if name not in bundle.names:
+        return PlainTextResponse(f"The bundle has no file {name[:80]!r}.\n", 404)
+    entry = bundle.manifest.files.get(name)
+    headers = {"Cache-Control": "no-cache"}
+    if entry is not None:
+        headers["ETag"] = f'"{entry.sha256}"'
+        if request.headers.get("if-none-match") == headers["ETag"]:
+            return Response(status_code=304, headers=headers)
+    try:
+        data = bundle.read(name)
+    except BundleError as error:
+        return PlainTextResponse(f"{error}\n", 500)
+    media_type = TYPES.get(Path(name).suffix, "application/octet-stream")
+    return Response(data, media_type=media_type, headers=headers)
+
+
+def add_page(app: FastAPI) -> None:
+    """The viewer's files, or a sentence on how to build them."""
+    if (STATIC / "index.html").is_file():
+        app.mount("/", StaticFiles(directory=STATIC, html=True))
+        return
+
+    @app.get("/")
+    async def missing() -> PlainTextResponse:
+        return PlainTextResponse("The page is not built: run `make viewer` and reload.\n", 503)
+
+
+def bind(host: str, port: int) -> socket.socket:
+    """Takes the port before anything is loaded for it.
+
+    Raises:
+        SettingsError: If it cannot be had.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((host, port))
+    except OSError as error:
+        listener.close()
+        raise SettingsError(
+            f"port {port} on {host} cannot be used ({error.strerror}): "
+            "choose another one with --port, 0 takes any."
+        ) from error
+    return listener
+
+
+def address(listener: socket.socket) -> str:
+    """The URL to open."""
+    host, port = listener.getsockname()[:2]
+    shown = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)
+    return f"http://{shown}:{port}/"
+
+
+def make_server(app: Guard) -> uvicorn.Server:
+    """A server for `app`; run it with `server.run(sockets=[listener])`."""
+    config = uvicorn.Config(
+        app,
+        log_level="warning",
+        ws_max_size=protocol.MAX_BINARY_FRAME,
+        timeout_graceful_shutdown=2,
+        server_header=False,
+    )
+    return uvicorn.Server(config)

@@ -1,0 +1,146 @@
+"""Finds the note that answers a question: robust to other wording and to misheard words."""
+
+import math
+import re
+import unicodedata
+from collections import Counter
+from dataclasses import dataclass
+
+from ico3d.bundle.manifest import Persona
+
+CONFIDENT = 0.42  # score from which a note is taken as the answer
+WORDS, LETTERS = 0.7, 0.3  # weights of whole words and of letter triples
+EXAMPLES = 3  # questions that the avatar proposes when it has no answer
+ENDINGS = ("ingly", "edly", "ing", "ed", "es", "ly", "s")
+CONTRACTIONS = (
+    (r"\bwhat's\b", "what is"),
+    (r"\bwho's\b", "who is"),
+    (r"\bwhere's\b", "where is"),
+    (r"\bhow's\b", "how is"),
+    (r"\bit's\b", "it is"),
+    (r"'re\b", " are"),
+    (r"n't\b", " not"),
+    (r"'m\b", " am"),
+    (r"'ll\b", " will"),
+    (r"'ve\b", " have"),
+    (r"'s\b", ""),
+)
+HELLO = frozenset(["hello", "hi", "hey", "greetings", "howdy"])
+THANKS = frozenset(["thank", "thanks", "thx", "cheers"])
+GOODBYE = frozenset(["bye", "goodbye", "farewell"])
+
+
+@dataclass(frozen=True)
+class Note:
+    """One note of a persona.
+
+    Attributes:
+        questions: Ways to ask for it.
+        answer: What is said.
+    """
+
+    questions: tuple[str, ...]
+    answer: str
+
+
+class Notes:
+    """Answers from the persona's notes, or says honestly what it can talk about."""
+
+    def __init__(self, persona: Persona):
+        """Prepares the notes; those without `=>` are skipped."""
+        self._persona = persona
+        self.notes = [note for text in persona.notes if (note := parse_note(text))]
+        documents = [words(q) for note in self.notes for q in note.questions]
+        counts = Counter(word for document in documents for word in set(document))
+        self._rarity = {w: math.log(1 + len(documents) / n) for w, n in counts.items()}
+        self._unknown = math.log(1 + len(documents))  # words of no note are as rare as can be
+
+    def answer(self, question: str) -> str:
+        """The best answer there is to a question in natural language."""
+        best, score = self.best(question)
+        if best is not None and score >= CONFIDENT:
+            return best.answer
+        return self._pleasantry(question) or self.fallback()
+
+    def best(self, question: str) -> tuple[Note | None, float]:
+        """The note that fits best, and how well: 0 to 1."""
+        scored = [
+            (self._likeness(question, asked), note)
+            for note in self.notes
+            for asked in note.questions
+        ]
+        score, note = max(scored, key=lambda pair: pair[0], default=(0.0, None))
+        return note, score
+
+    def fallback(self) -> str:
+        """What is said when no note fits."""
+        if not self.notes:
+            return "I do not know that. I have no notes to answer from yet."
+        examples = [f"“{note.questions[0]}”" for note in self.notes[:EXAMPLES]]
+        listed = ", or ".join(examples)
+        return f"I do not know that. You can ask me, for example: {listed}."
+
+    def not_understood(self) -> str:
+        """What is said when nothing was understood."""
+        return "Sorry, I did not catch that. Could you say it again?"
+
+    def _pleasantry(self, question: str) -> str | None:
+        said = set(plain(question).split())
+        if said & GOODBYE:
+            return "Goodbye! It was nice talking with you."
+        if said & THANKS:
+            return "You are welcome."
+        if said & HELLO and len(said) <= 4:
+            return f"Hello! I am {self._persona.name}. What would you like to know?"
+        return None
+
+    def _likeness(self, said: str, asked: str) -> float:
+        by_words = cosine(self._weighted(words(said)), self._weighted(words(asked)))
+        by_letters = cosine(triples(said), triples(asked))
+        return WORDS * by_words + LETTERS * by_letters
+
+    def _weighted(self, found: list[str]) -> dict[str, float]:
+        return {word: self._rarity.get(word, self._unknown) for word in found}
+
+
+def parse_note(text: str) -> Note | None:
+    """A note from `question | question => answer`."""
+    asked, arrow, answer = text.partition("=>")
+    questions = tuple(q.strip() for q in asked.split("|") if q.strip())
+    if not arrow or not questions or not answer.strip():
+        return None
+    return Note(questions, answer.strip())
+
+
+def plain(text: str) -> str:
+    """Lower case, contractions written out, letters and digits of any script, single spaces."""
+    text = unicodedata.normalize("NFKC", text).casefold().replace("’", "'")
+    for pattern, full in CONTRACTIONS:
+        text = re.sub(pattern, full, text)
+    return " ".join(re.findall(r"\w+", text))
+
+
+def words(text: str) -> list[str]:
+    """The stems of a text's words."""
+    return [stem(word) for word in plain(text).split()]
+
+
+def stem(word: str) -> str:
+    """A word without its common English endings."""
+    for ending in ENDINGS:
+        if word.endswith(ending) and len(word) - len(ending) >= 3:
+            return word[: -len(ending)]
+    return word
+
+
+def triples(text: str) -> dict[str, float]:
+    """Letter triples of a text, which misheard words still share."""
+    spaced = f" {plain(text)} "
+    return dict(Counter(spaced[i : i + 3] for i in range(len(spaced) - 2)))
+
+
+def cosine(a: dict[str, float], b: dict[str, float]) -> float:
+    """Cosine of the angle between two sparse vectors."""
+    product = sum(value * b[key] for key, value in a.items() if key in b)
+    lengths = math.hypot(*a.values()) * math.hypot(*b.values()) if a and b else 0.0
+    return product / lengths if lengths else 0.0

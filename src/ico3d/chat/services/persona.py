@@ -1,0 +1,54 @@
+"""The offline language model: answers looked up in the persona's notes, sentence by sentence."""
+
+import re
+
+from pipecat.frames.frames import (
+    Frame,
+    LLMContextFrame,
+    LLMFullResponseEndFrame,
+    LLMFullResponseStartFrame,
+    LLMTextFrame,
+)
+from pipecat.processors.aggregators.llm_context import LLMContext
+from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
+
+from ico3d.bundle.manifest import Persona
+from ico3d.chat.services.notes import Notes
+from ico3d.chat.settings import ChatSettings
+
+
+class PersonaModel(FrameProcessor):
+    """Stands where a language model service stands in the pipeline."""
+
+    def __init__(self, notes: Notes):
+        """A model for one session."""
+        super().__init__()
+        self._notes = notes
+
+    async def process_frame(self, frame: Frame, direction: FrameDirection):
+        """Answers contexts, passes everything else."""
+        await super().process_frame(frame, direction)
+        if not isinstance(frame, LLMContextFrame):
+            await self.push_frame(frame, direction)
+            return
+        await self.push_frame(LLMFullResponseStartFrame())
+        for sentence in sentences(self._answer(frame.context)):
+            await self.push_frame(LLMTextFrame(sentence + " "))
+        await self.push_frame(LLMFullResponseEndFrame())
+
+    def _answer(self, context: LLMContext) -> str:
+        last = context.get_messages()[-1] if context.get_messages() else None
+        if not isinstance(last, dict) or last.get("role") != "user":
+            return self._notes.not_understood()  # the pipeline asks so when it heard no words
+        content = last.get("content")
+        return self._notes.answer(content if isinstance(content, str) else "")
+
+
+def sentences(text: str) -> list[str]:
+    """A text cut behind its sentences' ends."""
+    return [part for part in re.split(r"(?<=[.!?…])\s+", text.strip()) if part]
+
+
+def make(settings: ChatSettings, persona: Persona) -> PersonaModel:
+    """A model for one session."""
+    return PersonaModel(Notes(persona))

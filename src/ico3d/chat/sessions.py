@@ -1,0 +1,100 @@
+"""Who talks with the avatar: sessions that outlive a dropped connection for a while."""
+
+import asyncio
+import secrets
+
+from ico3d.chat.conversation import Avatar, Conversation
+from ico3d.chat.page import Outbox, Page
+from ico3d.chat.protocol import RESUME_SECONDS, Hello
+
+
+class FullError(Exception):
+    """There are as many visitors as the server takes."""
+
+
+class Session:
+    """One visitor: a page, a conversation, and nothing that another one could see."""
+
+    def __init__(self, avatar: Avatar):
+        """A session whose conversation has not started."""
+        self.id = secrets.token_urlsafe(16)
+        self.page = Page()
+        self.conversation = Conversation(avatar, self.page)
+        self.expiry: asyncio.TimerHandle | None = None
+
+
+class Sessions:
+    """Opens, keeps and closes sessions."""
+
+    def __init__(self, avatar: Avatar, resume_seconds: float = RESUME_SECONDS):
+        """No visitors yet."""
+        self._avatar = avatar
+        self._resume_seconds = resume_seconds
+        self._open: dict[str, Session] = {}
+        self._closing: set[asyncio.Task] = set()
+
+    def __len__(self) -> int:
+        """Visitors at this moment, those included that may come back."""
+        return len(self._open)
+
+    async def enter(self, hello: Hello, outbox: Outbox) -> tuple[Session, bool]:
+        """The session that a page goes on with, or a new one; its messages go to `outbox`.
+
+        Returns:
+            The session and whether it is an old one.
+
+        Raises:
+            FullError: If there is no room.
+        """
+        session = self._open.get(hello.session or "")
+        if session is not None:
+            self._cancel_expiry(session)
+            session.page.attach(outbox)
+            session.conversation.release()
+            return session, True
+        self._make_room()
+        session = Session(self._avatar)
+        self._open[session.id] = session
+        session.page.attach(outbox)
+        try:
+            await session.conversation.start()
+        except BaseException:
+            del self._open[session.id]
+            raise
+        return session, False
+
+    def leave(self, session: Session, outbox: Outbox) -> None:
+        """A connection closed; its session waits for the page to come back."""
+        if session.id in self._open and session.page.detach(outbox):
+            session.conversation.hold()
+            loop = asyncio.get_running_loop()
+            session.expiry = loop.call_later(self._resume_seconds, self._close_soon, session)
+
+    async def close_all(self) -> None:
+        """Ends every conversation."""
+        for session in list(self._open.values()):
+            self._close_soon(session)
+        await asyncio.gather(*self._closing, return_exceptions=True)
+
+    def _make_room(self) -> None:
+        if len(self._open) < self._avatar.settings.max_sessions:
+            return
+        for session in self._open.values():
+            if not session.page.is_attached:
+                self._close_soon(session)
+                return
+        raise FullError
+
+    def _close_soon(self, session: Session) -> None:
+        if self._open.pop(session.id, None) is None:
+            return
+        self._cancel_expiry(session)
+        task = asyncio.create_task(session.conversation.close())
+        self._closing.add(task)
+        task.add_done_callback(self._closing.discard)
+
+    @staticmethod
+    def _cancel_expiry(session: Session) -> None:
+        if session.expiry is not None:
+            session.expiry.cancel()
+            session.expiry = None

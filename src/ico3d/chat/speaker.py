@@ -1,0 +1,146 @@
+"""The output of the pipeline: sends speech ahead of its playback and knows when it has ended.
+
+pipecat's own output transports re-cut sound and pace it by sleeping; what belongs to a piece of
+sound would be lost on the way. Here sound and face travel in one message, at most 2 s ahead, the
+page schedules it, and its `clock` tells when the avatar has really fallen silent.
+"""
+
+import asyncio
+import time
+from collections.abc import Callable
+
+from pipecat.frames.frames import (
+    BotStartedSpeakingFrame,
+    BotStoppedSpeakingFrame,
+    Frame,
+    InterruptionFrame,
+    LLMFullResponseEndFrame,
+    LLMFullResponseStartFrame,
+)
+from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
+
+from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame, Utterances
+from ico3d.chat.page import Page
+from ico3d.chat.playback import Playback
+from ico3d.chat.protocol import Answer, Clock, End, Metrics, Stop
+from ico3d.chat.timing import TurnTimer
+
+SOONEST = 0.005  # s between two looks at the clock
+
+
+class Speaker(FrameProcessor):
+    """Sends `SpeechFrame`s to the page, paced by what it has played."""
+
+    def __init__(
+        self,
+        page: Page,
+        utterances: Utterances,
+        timer: TurnTimer,
+        now: Callable[[], float] = time.monotonic,
+    ):
+        """A speaker for one session."""
+        super().__init__()
+        self._page, self._utterances, self._timer, self._now = page, utterances, timer, now
+        self._playback = Playback()
+        self._moved = asyncio.Event()  # the page's clock or connection changed
+        self._speaking: int | None = None
+        self._turn_start: float | None = None  # of the turn that `played` is to be told of
+
+    def clock(self, message: Clock) -> None:
+        """The page says how far it has played."""
+        self._playback.clock(message.utterance, message.position, self._now())
+        self._moved.set()
+        if message.utterance == self._speaking and message.position > 0 and self._turn_start:
+            first_sample = self._now() - message.position
+            values = {"voice_to_voice": 1000 * (first_sample - self._turn_start)}
+            self._page.send(Metrics("played", values))
+            self._turn_start = None
+
+    def hold(self) -> None:
+        """The connection dropped: send nothing that nobody plays."""
+        self._playback.hold(self._now())
+
+    def release(self) -> None:
+        """The page is back."""
+        self._playback.release(self._now())
+        self._moved.set()
+
+    def is_speaking(self, utterance: int | None) -> bool:
+        """Whether an utterance (any, for null) is being played or about to be."""
+        if self._speaking is None:
+            return False
+        return utterance is None or utterance == self._speaking
+
+    async def process_frame(self, frame: Frame, direction: FrameDirection):
+        """Sends speech, ends and stops utterances, passes the rest on."""
+        await super().process_frame(frame, direction)
+        if isinstance(frame, SpeechFrame):
+            await self._send(frame)
+            return
+        if isinstance(frame, UtteranceEndFrame):
+            await self._end(frame)
+            return
+        if isinstance(frame, InterruptionFrame):
+            await self._stop()
+        elif isinstance(frame, LLMFullResponseStartFrame):
+            self._page.show("thinking")
+        elif isinstance(frame, LLMFullResponseEndFrame):
+            self._page.show("idle")
+        await self.push_frame(frame, direction)
+
+    async def _send(self, frame: SpeechFrame) -> None:
+        if self._utterances.is_stopped(frame.utterance):
+            return  # it was on its way when the interruption overtook it
+        end = frame.first_sample + len(frame.pcm)
+        if frame.utterance != self._speaking:
+            await self._begin(frame.utterance)
+        await self._wait(lambda: self._playback.wait_to_send(end, self._now()))
+        if frame.text is not None:
+            self._page.send(Answer(frame.utterance, frame.first_sample, frame.text))
+        self._page.send_speech(frame)
+        self._playback.sent(end, self._now())
+        if self._timer.is_running():
+            self._report()
+
+    async def _begin(self, utterance: int) -> None:
+        self._speaking = utterance
+        self._playback.begin(utterance)
+        self._page.show("speaking")
+        await self.broadcast_frame(BotStartedSpeakingFrame)
+
+    def _report(self) -> None:
+        self._timer.mark("send")
+        values = self._timer.finish()
+        self._turn_start = self._now() - values["total"] / 1000
+        self._page.send(Metrics("turn", values))
+
+    async def _end(self, frame: UtteranceEndFrame) -> None:
+        if self._utterances.is_stopped(frame.utterance):
+            return
+        self._page.send(End(frame.utterance, frame.samples))
+        await self._wait(lambda: self._playback.remaining(self._now()))
+        self._speaking = self._turn_start = None
+        self._page.show("idle")
+        await self.broadcast_frame(BotStoppedSpeakingFrame)
+
+    async def _stop(self) -> None:
+        self._utterances.stop_all()
+        utterance, self._speaking, self._turn_start = self._speaking, None, None
+        if self._page.state != "listening":
+            self._page.show("idle")
+        if utterance is not None:
+            self._page.send(Stop(utterance))
+            await self.broadcast_frame(BotStoppedSpeakingFrame)
+
+    async def _wait(self, seconds: Callable[[], float]) -> None:
+        """Waits until `seconds()` is no longer positive; the page's clock may change it."""
+        left = seconds()
+        while left > 0:
+            self._moved.clear()
+            held = not self._page.is_attached
+            try:
+                timeout = None if held else max(left, SOONEST)
+                await asyncio.wait_for(self._moved.wait(), timeout)
+            except TimeoutError:
+                pass
+            left = seconds()
