@@ -1,0 +1,1 @@
+"""One person from parts: baking trained models into the bundle that is deployed."""

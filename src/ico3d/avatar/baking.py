@@ -28,7 +28,7 @@ from ico3d.capture.capture import Capture
 from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
 from ico3d.errors import BundleError
 from ico3d.head.expressions import FEATURE_RATE
-from ico3d.head.trained import BUILTIN_ENCODER, TrainedHead
+from ico3d.head.trained import TrainedHead
 from ico3d.head.views import view_of
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.export import export_speech
@@ -202,7 +202,7 @@ def _open_eyes(capture: Capture) -> np.ndarray:
 def _speech(adaptor: SpeechAdaptor, encoder_name: str) -> tuple[bytes, SpeechInfo]:
     """`speech.onnx` and what the manifest says about it."""
     encoder = load_encoder(encoder_name)
-    kind = "mel" if encoder.name == BUILTIN_ENCODER else "features"
+    kind = "mel" if encoder.name == "builtin" else "features"
     info = SpeechInfo(encoder.name, encoder.sha256, FEATURE_RATE, kind)
     return export_speech(adaptor, encoder), info
 
