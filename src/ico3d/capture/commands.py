@@ -39,3 +39,29 @@ class Portrait:
         focal = None if self.intrinsics == "estimated" else self.intrinsics
         settings = PortraitSettings(self.size, focal, self.consent, self.licence)
         track_portrait(self.video, self.out, settings)
+
+
+@dataclass(frozen=True)
+class Check:
+    """Examine a capture of any format, and draw a contact sheet.
+
+    Exit status 1 where something is wrong; warnings leave it 0.
+
+    Attributes:
+        path: The capture.
+        out: The contact sheet, a PNG; `check.png` inside the capture by default.
+    """
+
+    path: Annotated[Path, tyro.conf.Positional]
+    out: Path | None = None
+
+    def run(self) -> None:
+        """Runs it.
+
+        Raises:
+            CaptureError: If anything is inconsistent; the sentence is the first such finding.
+        """
+        from ico3d.capture.capture import Capture
+        from ico3d.capture.check import report
+
+        report(Capture.open(self.path), self.out or self.path / "check.png")

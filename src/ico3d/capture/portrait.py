@@ -12,8 +12,15 @@ from rich.console import Console
 from rich.progress import track as progress
 
 from ico3d.capture import matting, parsing, tracking
+from ico3d.capture.alignment import align, rigid_landmarks
 from ico3d.capture.capture import Sound
-from ico3d.capture.face import LANDMARKS, MESH_LANDMARKS, FaceReader, canonical_face
+from ico3d.capture.face import (
+    LANDMARKS,
+    MESH_LANDMARKS,
+    CanonicalFace,
+    FaceReader,
+    canonical_face,
+)
 from ico3d.capture.multipie import MULTI_PIE
 from ico3d.capture.plate import SAMPLES, clean_plate
 from ico3d.capture.portrait_files import (
@@ -109,7 +116,7 @@ def _write(work: Path, video: Video, model: Path, settings: PortraitSettings) ->
     notes = _notes(video, readings)
     canonical = canonical_face(model)
     given = settings.focal and settings.focal * video.scale
-    track = _track(readings, canonical, (video.width, video.height), given)
+    track = _track(work, readings, canonical, video, given)
     save_transforms(work, track.focal, track.center.tolist(), readings.frames, track.poses())
     np.save(work / "points.npy", surface_points(track.shape, canonical.triangles))
     _save_blendshapes(work, readings)
@@ -165,14 +172,23 @@ def _notes(video: Video, readings: Readings) -> list[str]:
     return notes
 
 
-def _track(readings: Readings, canonical, size: tuple[int, int], focal: float | None):
-    """The rigid head through all frames with a face, smoothed within each unbroken run."""
+def _track(
+    work: Path, readings: Readings, canonical: CanonicalFace, video: Video, focal: float | None
+) -> tracking.Track:
+    """The rigid head through all frames with a face: by landmarks, then by the pictures."""
     landmarks = np.stack(readings.landmarks)[:, :MESH_LANDMARKS]
     start = np.stack(readings.poses)
     start[:, :3, 3] *= 0.01  # centimetres
+    size = (video.width, video.height)
     with console.status("fitting head pose, head shape and focal length"):
         found = tracking.fit(landmarks, start, canonical.vertices, canonical.rigidity, size, focal)
-    return tracking.smoothed(found, np.asarray(readings.frames))
+
+    def grey(index: int) -> np.ndarray:
+        with Image.open(work / "ori_imgs" / f"{readings.frames[index]}.jpg") as picture:
+            return np.asarray(picture.convert("L"))
+
+    with console.status("aligning the poses with the pictures"):
+        return align(found, rigid_landmarks(canonical.vertices), grey)
 
 
 def _save_blendshapes(work: Path, readings: Readings) -> None:

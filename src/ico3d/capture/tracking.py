@@ -19,8 +19,11 @@ SHAPE_SPREAD = 0.004
 """Metres by which a person's landmarks differ from the canonical face."""
 INDEPENDENT = 20
 """Landmark errors repeat from frame to frame: a clip tells as much as this many separate frames."""
-FIT_FRAMES = 240
+FIT_FRAMES = 120
 """Frames that shape and focal length are fitted on; poses are then found for all."""
+
+CHUNK = 256
+"""Frames whose poses are solved for at once."""
 
 
 @dataclass(frozen=True)
@@ -73,17 +76,20 @@ def fit(
         focal: Focal length in pixels where it is known.
 
     Returns:
-        The track; its poses are not smoothed over time.
+        The track; its poses are as noisy as the landmarks (see `alignment`).
     """
     chosen = np.unique(np.linspace(0, len(landmarks) - 1, FIT_FRAMES).round().astype(int))
     track = _start(start[chosen], shape, image_size, focal)
     track = replace(track, sigmas=1.0 / np.maximum(rigidity, 0.05))
     for _ in range(30):
         track = _pose_step(track, landmarks[chosen])
-    for _ in range(4):
+    for _ in range(3):
         track = _reweighted(track, landmarks[chosen])
-        track = _refine(track, landmarks[chosen], shape, focal is None)
-    return place(track, landmarks, start)
+        track = _alternate(track, landmarks[chosen], shape, 10)
+        for factor in (1.25, 1.06) if focal is None else ():
+            track = _focal_search(track, landmarks[chosen], shape, factor)
+    first = _start(start, track.shape, image_size, track.focal).poses()
+    return place(track, landmarks, first)
 
 
 def place(track: Track, landmarks: np.ndarray, start: np.ndarray) -> Track:
@@ -92,50 +98,23 @@ def place(track: Track, landmarks: np.ndarray, start: np.ndarray) -> Track:
     Args:
         track: Shape, focal length and weights.
         landmarks: (F, K, 2) pixels.
-        start: (F, 4, 4) rough poses.
+        start: (F, 4, 4) poses to start from.
     """
-    size = (2 * track.center[0], 2 * track.center[1])
-    placed = replace(_start(start, track.shape, size, track.focal), sigmas=track.sigmas)
-    for _ in range(30):
+    parts = [
+        _placed(track, landmarks[first : first + CHUNK], start[first : first + CHUNK])
+        for first in range(0, len(landmarks), CHUNK)
+    ]
+    rotations = np.concatenate([part.rotations for part in parts])
+    translations = np.concatenate([part.translations for part in parts])
+    return replace(track, rotations=rotations, translations=translations)
+
+
+def _placed(track: Track, landmarks: np.ndarray, start: np.ndarray) -> Track:
+    """`place` for as many frames as fit into memory at once."""
+    placed = replace(track, rotations=start[:, :3, :3], translations=start[:, :3, 3])
+    for _ in range(12):
         placed = _pose_step(placed, landmarks)
     return placed
-
-
-def smooth(poses: np.ndarray, window: int = 7, order: int = 3) -> np.ndarray:
-    """Poses smoothed over time without delay (Savitzky-Golay on rotation vector and position).
-
-    Args:
-        poses: (F, 4, 4) rigid transforms of consecutive frames.
-        window: Frames, odd.
-        order: Degree of the fitted polynomials.
-
-    Returns:
-        (F, 4, 4); unchanged where there are fewer frames than `window`.
-    """
-    from scipy.signal import savgol_filter
-
-    if len(poses) < window:
-        return poses
-    middle = Rotation.from_matrix(poses[:, :3, :3]).mean()
-    turns = (Rotation.from_matrix(poses[:, :3, :3]) * middle.inv()).as_rotvec()
-    smoothed = poses.copy()
-    turns = savgol_filter(turns, window, order, axis=0, mode="interp")
-    smoothed[:, :3, :3] = (Rotation.from_rotvec(turns) * middle).as_matrix()
-    smoothed[:, :3, 3] = savgol_filter(poses[:, :3, 3], window, order, axis=0, mode="interp")
-    return smoothed
-
-
-def smoothed(track: Track, frames: np.ndarray) -> Track:
-    """The track with poses smoothed within each run of consecutive frames.
-
-    Args:
-        track: Poses of the frames that could be tracked.
-        frames: (F,) their numbers, ascending.
-    """
-    poses = track.poses()
-    for run in np.split(np.arange(len(frames)), np.flatnonzero(np.diff(frames) != 1) + 1):
-        poses[run] = smooth(poses[run])
-    return replace(track, rotations=poses[:, :3, :3], translations=poses[:, :3, 3])
 
 
 def _start(start: np.ndarray, shape: np.ndarray, size: tuple, focal: float | None) -> Track:
@@ -215,16 +194,6 @@ def _reweighted(track: Track, landmarks: np.ndarray) -> Track:
     return replace(track, sigmas=np.maximum(lengths / 1.18, 0.3))
 
 
-def _refine(track: Track, landmarks: np.ndarray, canonical: np.ndarray, focal: bool) -> Track:
-    """Alternates shape and poses; the focal length by search over the cost that remains."""
-    track = _alternate(track, landmarks, canonical, 10)
-    if not focal:
-        return track
-    for factor in (1.25, 1.1, 1.04):
-        track = _focal_search(track, landmarks, canonical, factor)
-    return track
-
-
 def _alternate(track: Track, landmarks: np.ndarray, canonical: np.ndarray, rounds: int) -> Track:
     """Shape and pose steps in turn."""
     for _ in range(rounds):
@@ -239,7 +208,7 @@ def _focal_search(
     best, cost = track, _cost(track, landmarks, canonical)
     for ratio in (factor, 1 / factor):
         for _ in range(8):
-            moved = _alternate(_refocused(best, ratio), landmarks, canonical, 6)
+            moved = _alternate(_refocused(best, ratio), landmarks, canonical, 4)
             moved_cost = _cost(moved, landmarks, canonical)
             if moved_cost >= cost:
                 break
