@@ -83,7 +83,7 @@ def load_builtin(path: Path) -> FrozenEncoder:
     from safetensors.torch import load
 
     data = _read(path)
-    state = {key: value.float() for key, value in load(data).items()}
+    state = {key: value.float() for key, value in load(data).items() if "readout" not in key}
     return _frozen("builtin", BuiltinEncoder(), state, data, path)
 
 

@@ -1,0 +1,92 @@
+"""The verbs of this room."""
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TextIO
+
+import tyro
+
+from ico3d.speech.training import EncoderSettings, EncoderTraining, evaluate, save_encoder
+
+
+@dataclass(frozen=True)
+class TrainSpeech:
+    """Trains the built-in speech encoder on espeak-ng voices and measures it on held-out ones.
+
+    The same command goes on with an interrupted training. It needs no recordings.
+
+    Attributes:
+        out: Folder for encoder.safetensors, encoder.json (how it was made, how good it is) and
+            metrics.jsonl.
+        encoder: How it is trained.
+        test_batches: Batches of held-out voices, languages and words that it is measured on.
+    """
+
+    out: tyro.conf.Positional[Path]
+    encoder: EncoderSettings = field(default_factory=EncoderSettings)
+    test_batches: int = 32
+
+    def run(self) -> None:
+        """Trains, measures, writes."""
+        from rich import print as show
+
+        self.out.mkdir(parents=True, exist_ok=True)
+        training = EncoderTraining(self.encoder, self.out / "checkpoint.pt")
+        self._train(training)
+        network, readout = training.finished()
+        measured = evaluate(network, readout, self._held_out())
+        save_encoder(self.out, network, readout, self._card(measured))
+        show(measured)
+
+    def _train(self, training: EncoderTraining) -> None:
+        """Runs the optimisation under a progress bar, with a line of metrics per step."""
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+        from rich.progress import TimeRemainingColumn as Remaining
+
+        columns = (BarColumn(), MofNCompleteColumn(), Remaining(), TextColumn("{task.description}"))
+        with Progress(*columns) as bar, self._metrics(training.step) as metrics:
+            task = bar.add_task("", total=self.encoder.steps)
+            for numbers in training.run():
+                metrics.write(json.dumps({"step": training.step, **numbers}) + "\n")
+                text = " ".join(f"{name} {value:.3f}" for name, value in numbers.items())
+                bar.update(task, completed=training.step + 1, description=text)
+
+    def _metrics(self, step: int) -> TextIO:
+        """metrics.jsonl, without what an interrupted run wrote after its last checkpoint."""
+        path = self.out / "metrics.jsonl"
+        lines = path.read_text().splitlines(keepends=True) if path.exists() else []
+        file = path.open("w")
+        file.writelines(lines[:step])
+        return file
+
+    def _held_out(self):
+        """Batches that no training sees."""
+        import numpy as np
+
+        from ico3d.speech.corpus import make_batch
+
+        random = np.random.default_rng([self.encoder.seed, 2**32 - 1])
+        size, seconds = self.encoder.batch, self.encoder.seconds
+        return [make_batch(random, size, seconds, held_out=True) for _ in range(self.test_batches)]
+
+    def _card(self, measured: dict) -> dict:
+        """What encoder.json tells."""
+        from ico3d.speech.corpus import HELD_OUT_LANGUAGES, HELD_OUT_VARIANTS, LANGUAGES, VARIANTS
+
+        hours = self.encoder.steps * self.encoder.batch * self.encoder.seconds / 3600
+        return {
+            "made_by": "ico3d train speech",
+            "settings": asdict(self.encoder),
+            "data": "random words read by espeak-ng, with simulated voices, rooms and noise",
+            "hours_of_sound": round(hours, 1),
+            "languages": sorted(set(LANGUAGES)),
+            "voices": len(VARIANTS),
+            "held_out": {
+                "languages": list(HELD_OUT_LANGUAGES),
+                "voices": list(HELD_OUT_VARIANTS),
+                "words": "every eighth of words.txt",
+                "seconds": self.test_batches * self.encoder.batch * self.encoder.seconds,
+                **measured,
+            },
+        }
