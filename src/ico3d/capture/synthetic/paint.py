@@ -4,7 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from scipy.spatial import KDTree
 
+from ico3d.capture.synthetic.hair import hair_edge, strand_frames
 from ico3d.capture.synthetic.raster import empty_buffers, rasterise, vertex_normals
 from ico3d.capture.synthetic.subject import CARDS, Subject
 
@@ -16,6 +18,8 @@ REACH = 0.24
 """Half the side of a depth map, metres: the head and the neck; what lies outside is lit."""
 BIAS = 0.0015
 """Metres that a surface may lie behind the depth map and still count as lit."""
+SCALP_REACH = 0.006
+"""Metres over which the roots of hair shade the skin."""
 WIDE = 0.06
 """Part of the light that reaches the deepest fold by way of other skin."""
 
@@ -25,12 +29,15 @@ class Paint:
     """Values per vertex that textures need.
 
     Attributes:
-        channels: (V, 4) float32: lip, redness, freckles, beard, each 0 to 1.
+        channels: (V, 6) float32: lip, redness, freckles, beard, scalp, each 0 to 1, and metres
+            behind the lips.
+        strands: (V, 4) float32 of `strand_frames`.
         openings: (O,) float32 inner-lip gap in metres at each computed opening, ascending.
         occlusion: (O, V) float32: 1 = sees the whole sky, at each opening.
     """
 
     channels: np.ndarray
+    strands: np.ndarray
     openings: np.ndarray
     occlusion: np.ndarray
 
@@ -53,7 +60,9 @@ def paint(subject: Subject) -> Paint:
         vertices = subject.posed(subject.weights(shape))
         gaps.append(lip_gap(subject.landmarks(vertices)))
         occlusion.append(_sky_visibility(subject, vertices))
-    return Paint(_channels(subject), np.array(gaps, np.float32), np.stack(occlusion))
+    return Paint(
+        _channels(subject), strand_frames(subject), np.array(gaps, np.float32), np.stack(occlusion)
+    )
 
 
 def lip_gap(landmarks: np.ndarray) -> float:
@@ -76,6 +85,7 @@ def _channels(subject: Subject) -> np.ndarray:
         for eye in eyes
     ]
     ears = [np.array([s * 0.57 * width, marks[30, 1] / 2, -0.02]) for s in (1, -1)]
+    beside = np.maximum(*(_bump(vertices, ear, 0.2 * width) for ear in ears))
     redness = 0.8 * _bump(vertices, marks[30], 0.10 * width)
     for point, strength, radius in [
         *((c, 0.75, 0.17) for c in cheeks),
@@ -93,6 +103,8 @@ def _channels(subject: Subject) -> np.ndarray:
             np.clip(redness, 0, 1),
             np.clip(freckles, 0, 1),
             _beard(vertices, marks, width) * (1 - subject.lip_mask),
+            _scalp(subject) * (1 - beside),
+            np.maximum(marks[[62, 66], 2].mean() - vertices[:, 2], 0),
         ],
         axis=1,
     ).astype(np.float32)
@@ -108,6 +120,15 @@ def _beard(vertices: np.ndarray, marks: np.ndarray, width: float) -> np.ndarray:
         beside = lip + np.array([offset * width, 0, 0])
         beard = np.maximum(beard, _bump(vertices, beside, 0.07 * width))
     return np.clip(1.4 * beard, 0, 1)
+
+
+def _scalp(subject: Subject) -> np.ndarray:
+    """(V,) how much the roots of hair shade the skin: 1 where hair ends, falling to 0."""
+    edge = hair_edge(subject)
+    if len(edge) == 0:
+        return np.zeros(len(subject.vertices))
+    distance, _ = KDTree(subject.vertices[edge]).query(subject.vertices)
+    return np.exp(-0.5 * (distance / SCALP_REACH) ** 2)
 
 
 def _sky_visibility(subject: Subject, vertices: np.ndarray) -> np.ndarray:

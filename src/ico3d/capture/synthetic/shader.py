@@ -17,6 +17,10 @@ TEETH, GUMS, TONGUE = int(Material.TEETH), int(Material.GUMS), int(Material.TONG
 HAIR, CLOTH, BROW = int(Material.HAIR), int(Material.CLOTH), int(Material.BROW)
 
 
+MOUTH_DEPTH = 0.026
+"""Metres behind the lips over which light fades to 1/e in the mouth."""
+
+
 class Scene(NamedTuple):
     """One posed person as arrays for the shader.
 
@@ -27,7 +31,8 @@ class Scene(NamedTuple):
         rest: (V, 3) float32 neutral vertices: where textures are looked up.
         vertices: (V, 3) float32 posed, canonical head space.
         normals: (V, 3) float32.
-        channels: (V, 4) float32 of `Paint`.
+        channels: (V, 6) float32 of `Paint`.
+        strands: (V, 4) float32 of `Paint`.
         occlusion: (V,) float32 of `Paint`.
         eyes: (2, 7) float32: centre, axis, iris radius; left, right.
     """
@@ -39,6 +44,7 @@ class Scene(NamedTuple):
     vertices: np.ndarray
     normals: np.ndarray
     channels: np.ndarray
+    strands: np.ndarray
     occlusion: np.ndarray
     eyes: np.ndarray
 
@@ -80,22 +86,31 @@ def _uv(corner_uv, f, a, b, c):
 
 
 @njit(cache=True, nogil=True)
-def _strand_frame(scene, f):
-    """Unit vector along v on a face, and units of u per metre."""
-    p, uv = scene.vertices, scene.corner_uv[f]
-    a, b, c = scene.faces[f, 0], scene.faces[f, 1], scene.faces[f, 2]
-    du1, dv1 = uv[1, 0] - uv[0, 0], uv[1, 1] - uv[0, 1]
-    du2, dv2 = uv[2, 0] - uv[0, 0], uv[2, 1] - uv[0, 1]
-    determinant = du1 * dv2 - du2 * dv1
-    if abs(determinant) < 1e-14:
-        return 0.0, 1.0, 0.0, 10.0
-    along, across = np.empty(3), 0.0
-    for axis in range(3):
-        e1, e2 = p[b, axis] - p[a, axis], p[c, axis] - p[a, axis]
-        along[axis] = (e2 * du1 - e1 * du2) / determinant
-        across += ((e1 * dv2 - e2 * dv1) / determinant) ** 2
-    x, y, z = _unit(along[0], along[1], along[2])
-    return x, y, z, 1.0 / max(1e-6, math.sqrt(across))
+def _strand(scene, f, a, b, c):
+    """Unit vector along the strands, and units of u per metre."""
+    i, j, k = scene.faces[f, 0], scene.faces[f, 1], scene.faces[f, 2]
+    s = scene.strands
+    x, y, z = _unit(
+        a * s[i, 0] + b * s[j, 0] + c * s[k, 0],
+        a * s[i, 1] + b * s[j, 1] + c * s[k, 1],
+        a * s[i, 2] + b * s[j, 2] + c * s[k, 2],
+    )
+    return x, y, z, a * s[i, 3] + b * s[j, 3] + c * s[k, 3]
+
+
+@njit(cache=True, nogil=True)
+def _painted(scene, f, a, b, c):
+    """The six channels of `Paint` at a spot."""
+    i, j, k = scene.faces[f, 0], scene.faces[f, 1], scene.faces[f, 2]
+    ch = scene.channels
+    return (
+        a * ch[i, 0] + b * ch[j, 0] + c * ch[k, 0],
+        a * ch[i, 1] + b * ch[j, 1] + c * ch[k, 1],
+        a * ch[i, 2] + b * ch[j, 2] + c * ch[k, 2],
+        a * ch[i, 3] + b * ch[j, 3] + c * ch[k, 3],
+        a * ch[i, 4] + b * ch[j, 4] + c * ch[k, 4],
+        a * ch[i, 5] + b * ch[j, 5] + c * ch[k, 5],
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -112,6 +127,7 @@ def display(value):
 def _lit(spot, lights, n, v, p, occlusion):
     """Linear light (3) that a spot sends to the eye."""
     nx, ny, nz = n
+    o = 0.003  # metres off the surface: grazing light does not shade its own triangle
     up = 0.5 + 0.5 * (nx * lights.up[0] + ny * lights.up[1] + nz * lights.up[2])
     bounce = 0.10 * (1.0 - occlusion) * (0.3 + occlusion)  # folds glow in their own colour
     ambient_r = occlusion * (lights.ground[0] * (1 - up) + lights.sky[0] * up) + 1.3 * bounce
@@ -123,7 +139,9 @@ def _lit(spot, lights, n, v, p, occlusion):
         cosine = nx * lx + ny * ly + nz * lz
         reach = min(1.0, 1.6 * occlusion)
         if i == 0:
-            reach = key_visibility(lights, p[0], p[1], p[2]) * min(1.0, 0.35 + 1.3 * occlusion)
+            reach = key_visibility(lights, p[0] + o * nx, p[1] + o * ny, p[2] + o * nz) * min(
+                1.0, 0.35 + 1.3 * occlusion
+            )
         hx, hy, hz = _unit(lx + v[0], ly + v[1], lz + v[2])
         shine = 0.0
         if spot.facing > 0.0:
@@ -135,7 +153,7 @@ def _lit(spot, lights, n, v, p, occlusion):
                 spot.facing,
             )
         red = wrapped(cosine, spot.wrap)
-        other = wrapped(cosine, 0.35 * spot.wrap)
+        other = wrapped(cosine, 0.6 * spot.wrap)
         r += reach * lights.colors[i, 0] * (spot.red * red + shine)
         g += reach * lights.colors[i, 1] * (spot.green * other + shine)
         b += reach * lights.colors[i, 2] * (spot.blue * other + shine)
@@ -181,7 +199,8 @@ def _spot(scene, colors, f, a, b, c, rest, pixel):
     material = scene.materials[f]
     x, y, z = rest
     if material == CLOTH:
-        return paints.cloth(colors, x, y, z, pixel)
+        u, v = _uv(scene.corner_uv, f, a, b, c)
+        return paints.cloth(colors, u, v, x, y, z, pixel)
     if material == TEETH:
         return paints.teeth(x, y, z, pixel)
     if material == GUMS:
@@ -190,14 +209,7 @@ def _spot(scene, colors, f, a, b, c, rest, pixel):
         return paints.flesh(0.46, 0.18, 0.16, x, y, z, pixel)
     if material == MOUTH:
         return paints.flesh(0.34, 0.11, 0.10, x, y, z, pixel)
-    i, j, k = scene.faces[f, 0], scene.faces[f, 1], scene.faces[f, 2]
-    ch = scene.channels
-    values = (
-        a * ch[i, 0] + b * ch[j, 0] + c * ch[k, 0],
-        a * ch[i, 1] + b * ch[j, 1] + c * ch[k, 1],
-        a * ch[i, 2] + b * ch[j, 2] + c * ch[k, 2],
-        a * ch[i, 3] + b * ch[j, 3] + c * ch[k, 3],
-    )
+    values = _painted(scene, f, a, b, c)
     return paints.skin(colors, values, x, y, z, pixel)
 
 
@@ -219,16 +231,16 @@ def _shade_one(scene, colors, lights, f, a, b, c, camera, pixel):
         spot = paints.eye(colors, radius, angle, iris, rest[0], rest[1], rest[2], pixel)
         return _lit(spot, lights, n, v, p, occlusion)
     if material == HAIR:
-        tx, ty, tz, per_metre = _strand_frame(scene, f)
+        tx, ty, tz, per_metre = _strand(scene, f, a, b, c)
         uv = _uv(scene.corner_uv, f, a, b, c)
         spot = paints.hair(colors, uv[0], uv[1], rest[0], rest[1], rest[2], pixel * per_metre)
         shift = 0.10 * strands(uv[0], uv[1], 260.0, pixel * per_metre)
         white, tinted = _strand_shine(lights, (tx, ty, tz), v, p, shift, occlusion)
         r, g, bl = _lit(spot, lights, n, v, p, occlusion)
         return (
-            r + 0.035 * white + 1.1 * tinted * colors.hair[0],
-            g + 0.032 * white + 1.1 * tinted * colors.hair[1],
-            bl + 0.028 * white + 1.1 * tinted * colors.hair[2],
+            r + 0.022 * white + 0.9 * tinted * colors.hair[0],
+            g + 0.020 * white + 0.9 * tinted * colors.hair[1],
+            bl + 0.018 * white + 0.9 * tinted * colors.hair[2],
         )
     spot = _spot(scene, colors, f, a, b, c, rest, pixel)
     tilt = spot.bump * min(1.0, max(0.0, 0.0016 / pixel - 1.0))
@@ -240,7 +252,12 @@ def _shade_one(scene, colors, lights, f, a, b, c, camera, pixel):
             n[1] + tilt * (2.0 * noise(q[0] + 31.0, q[1], q[2]) - 1.0),
             n[2] + tilt * (2.0 * noise(q[0], q[1] + 57.0, q[2]) - 1.0),
         )
-    return _lit(spot, lights, n, v, p, occlusion)
+    if material in (SKIN, CLOTH):
+        return _lit(spot, lights, n, v, p, occlusion)
+    inward = math.exp(-_painted(scene, f, a, b, c)[5] / MOUTH_DEPTH)
+    r, g, bl = _lit(spot, lights, n, v, p, (0.35 + 0.65 * occlusion) * inward)
+    # Deep in the mouth, light has been red-tinted by lips and cheeks.
+    return r * (0.25 + 0.75 * inward), g * inward**1.4, bl * inward**1.6
 
 
 @njit(cache=True, nogil=True)
@@ -279,8 +296,9 @@ def _card_alpha(material, u, v, pixel_u):
         edge = smoothstep(0.0, 0.38, v) * (1.0 - smoothstep(0.55, 1.0, v))
         hairs = 0.72 + 0.55 * strands(u + 0.12 * v, v, 80.0, pixel_u)
         return min(1.0, max(0.0, ends * edge * hairs * 1.1))
-    fibre = 0.5 + 0.5 * strands(u, 0.0, 60.0, pixel_u)
-    return 0.45 * fibre
+    fibre = 0.9 + 0.9 * strands(u + 0.05 * v, 0.0, 110.0, pixel_u)
+    thick = 0.35 if u > 1.5 else 1.2
+    return min(1.0, max(0.0, thick * fibre * (1.0 - v) ** 1.3))
 
 
 @njit(cache=True, nogil=True)
@@ -301,7 +319,7 @@ def shade_cards(
             v, w = barycentric[y, x, 0], barycentric[y, x, 1]
             a, b, c = _weights(screen, scene.faces, f, v, w)
             uv = _uv(scene.corner_uv, f, a, b, c)
-            per_metre = _strand_frame(scene, f)[3]
+            per_metre = _strand(scene, f, a, b, c)[3]
             alpha = _card_alpha(scene.materials[f], uv[0], uv[1], pixel * per_metre)
             n = _mix3(scene.normals, scene.faces, f, a, b, c)
             n = _unit(n[0], n[1], n[2])

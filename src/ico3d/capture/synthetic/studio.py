@@ -99,6 +99,7 @@ class Studio:
             hair=np.array(look.hair, np.float32),
             iris=np.array(look.iris, np.float32),
             cloth=np.array(look.cloth, np.float32),
+            stripes=look.stripes,
             freckles=look.freckles,
             stubble=look.stubble,
         )
@@ -155,6 +156,7 @@ class Studio:
             vertices,
             vertex_normals(vertices, subject.faces),
             self._paint.channels,
+            self._paint.strands,
             self._paint.occlusion_at(gap),
             self._eyes,
         )

@@ -51,6 +51,7 @@ class Look:
         hair: (3,) albedo of a strand.
         iris: (3,) albedo of the iris.
         cloth: (2, 3) albedo of the cloth and of its pattern.
+        stripes: Whether the pattern is stripes; flowers otherwise.
         freckles: How many, 0 to 1.
         stubble: How much shaved beard shows, 0 to 1.
     """
@@ -60,6 +61,7 @@ class Look:
     hair: tuple[float, float, float]
     iris: tuple[float, float, float]
     cloth: tuple[tuple[float, float, float], tuple[float, float, float]]
+    stripes: bool
     freckles: float
     stubble: float
 
@@ -73,7 +75,9 @@ class Subject:
         vertices: (V, 3) float32, neutral.
         faces: (F, 3) int32, counter-clockwise seen from outside.
         materials: (F,) uint8 of `Material`.
-        corner_uv: (F, 3, 2) float32 texture coordinates; hair, brows and lashes run along them.
+        corner_uv: (F, 3, 2) float32 texture coordinates. Hair: strands run along v. Cloth: metres.
+            Brows: u from the nose outwards, v upwards. Lashes: u along the lid (plus 2 on the
+            lower one), v from root to tip.
         lip_mask: (V,) float32, 1 on the red of the lips.
         blendshape_names: K ARKit names.
         delta_vertices: (M,) int32, the vertices that blendshapes move.
@@ -137,7 +141,11 @@ def load_subject(subject: str) -> Subject:
     if subject == "anny":
         from ico3d.capture.synthetic.subject_anny import load_anny
 
-        return load_anny()
-    from ico3d.capture.synthetic.subject_npz import load_npz
+        loaded = load_anny()
+    else:
+        from ico3d.capture.synthetic.subject_npz import load_npz
 
-    return load_npz(Path(subject))
+        loaded = load_npz(Path(subject))
+    from ico3d.capture.synthetic.hair import with_smooth_hair
+
+    return with_smooth_hair(loaded)

@@ -30,6 +30,11 @@ MATERIAL_OF_PART = {
 BUST_DEPTH = 0.55
 """How far below the eyes the person is kept, metres; no camera of the head rig sees lower."""
 
+LASH_CARDS = (0.0235, 0.1665, 0.122)
+"""Where the first lash card begins in the atlas, how far apart cards lie, how high each is."""
+IRIS_SHOWN = 0.8
+"""Visible part of the iris mesh's radius; the rest lies behind the white."""
+
 RELAXED_ARMS = {
     "shoulder01.L": (0.0, 0.0, -6.0),
     "upperarm01.L": (8.0, 0.0, -30.0),
@@ -43,18 +48,20 @@ RELAXED_ARMS = {
 FAIR = Look(
     skin=(0.60, 0.37, 0.27),
     lips=(0.50, 0.17, 0.15),
-    hair=(0.115, 0.042, 0.020),
+    hair=(0.080, 0.028, 0.013),
     iris=(0.13, 0.21, 0.19),
-    cloth=((0.62, 0.60, 0.56), (0.035, 0.075, 0.20)),
+    cloth=((0.50, 0.47, 0.42), (0.045, 0.10, 0.20)),
+    stripes=False,
     freckles=0.55,
     stubble=0.0,
 )
 TANNED = Look(
     skin=(0.42, 0.235, 0.155),
     lips=(0.36, 0.135, 0.11),
-    hair=(0.030, 0.020, 0.015),
+    hair=(0.020, 0.012, 0.008),
     iris=(0.13, 0.065, 0.03),
     cloth=((0.035, 0.10, 0.16), (0.40, 0.36, 0.28)),
+    stripes=True,
     freckles=0.1,
     stubble=0.6,
 )
@@ -95,7 +102,7 @@ def _subject(name: str, arrays: dict[str, np.ndarray]) -> Subject:
         vertices=vertices.astype(np.float32),
         faces=faces.reshape(-1, 3).astype(np.int32),
         materials=materials[arrays["face_part"][kept]],
-        corner_uv=arrays["uv"][arrays["faces_uv"][kept]].astype(np.float32),
+        corner_uv=_texture_coordinates(arrays, kept),
         lip_mask=arrays["lip_mask"][used].astype(np.float32),
         blendshape_names=names,
         delta_vertices=moved,
@@ -124,6 +131,24 @@ def _kept_faces(arrays: dict[str, np.ndarray], lowest: float) -> np.ndarray:
     height = arrays["verts"][:, 1][arrays["faces"]].max(axis=1)  # (F,)
     shown = ~arrays["face_hidden"] & known[arrays["face_part"]]
     return np.flatnonzero(shown & (height > lowest))
+
+
+def _texture_coordinates(arrays: dict[str, np.ndarray], kept: np.ndarray) -> np.ndarray:
+    """(F, 3, 2) float32 texture coordinates, rewritten where `Subject.corner_uv` says more."""
+    uv = arrays["uv"][arrays["faces_uv"][kept]].astype(np.float32)
+    parts = np.array([str(p) for p in arrays["part_names"]])[arrays["face_part"][kept]]
+    cloth, lashes = parts == "shirt", parts == "lashes"
+    if cloth.any():
+        corners = arrays["verts"][arrays["faces"][kept]][cloth]  # (F, 3, 3)
+        length = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
+        in_atlas = np.linalg.norm(uv[cloth, 1] - uv[cloth, 0], axis=1)
+        uv[cloth] *= np.median(length / np.maximum(in_atlas, 1e-9))
+    # Six cards lie above one another in the atlas, tips down, those of the lower lid below.
+    card = (uv[lashes, :, 1] - LASH_CARDS[0]) / LASH_CARDS[1]  # (F, 3)
+    index = np.floor(card.mean(axis=1, keepdims=True) + 0.1)
+    uv[lashes, :, 0] += np.where(index < 3, 2.0, 0.0) - np.floor(uv[lashes, :, 0])
+    uv[lashes, :, 1] = 1 - np.clip((card - index) * LASH_CARDS[1] / LASH_CARDS[2], 0, 1)
+    return uv
 
 
 def _positions_in(used: np.ndarray, indices: np.ndarray) -> np.ndarray:
@@ -202,4 +227,4 @@ def _eye(arrays: dict[str, np.ndarray], centre: np.ndarray, tail: np.ndarray, or
     points = arrays["verts"][np.unique(arrays["faces"][iris])].astype(float) - centre
     points = points[points[:, 0] * np.sign(centre[0]) > -abs(centre[0])]  # this side only
     radius = float(np.linalg.norm(np.cross(points, axis), axis=1).max())
-    return Eye(centre - origin, axis, radius)
+    return Eye(centre - origin, axis, IRIS_SHOWN * radius)
