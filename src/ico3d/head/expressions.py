@@ -8,13 +8,13 @@ import torch
 from torch import Tensor
 
 from ico3d.capture.capture import Capture
+from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
 from ico3d.errors import CaptureError
+from ico3d.speech.encoder import FrozenEncoder
+from ico3d.speech.network import SpeechAdaptor, feature_windows
 
 FEATURE_RATE = 25.0
 """Rows of speech features per second; everything else is resampled to it by time."""
-
-WINDOW = 8
-"""Rows of one attention window: [i − 4, i + 4)."""
 
 log = logging.getLogger(__name__)
 
@@ -53,7 +53,7 @@ class BlendshapeTrack:
             raise CaptureError(
                 f"{capture.path} has no blendshape '{missing[0]}', the head needs it."
             )
-        self.size = len(names)
+        self.names, self.size = names, len(names)
         self._path = capture.path
         self._columns = [available.index(name) for name in names]
         self._capture = capture
@@ -76,25 +76,22 @@ class BlendshapeTrack:
 class SpeechTrack:
     """32 adapted speech features and 7 eye values, B = 39."""
 
-    size = 39
+    size = SPEECH_SIZE + len(EYE_NAMES)
 
-    def __init__(self, capture: Capture, features: np.ndarray, adaptor: torch.nn.Module):
+    def __init__(self, capture: Capture, features: np.ndarray, adaptor: SpeechAdaptor):
         """Binds the capture's eyes, its speech features (T, D) at 25 rows/s and an adaptor."""
         self._adaptor = adaptor
         self._fps = capture.fps
         self._eyes = eye_track(capture)  # (F, 7)
-        half = WINDOW // 2
-        padded = np.pad(features.astype(np.float32), ((half, half), (0, 0)))  # (T + 8, D)
-        windows = np.lib.stride_tricks.sliding_window_view(padded, WINDOW, axis=0)  # (T + 1, D, 8)
-        self._windows = torch.from_numpy(windows[: len(features)].transpose(0, 2, 1).copy())
+        self._features = torch.from_numpy(features)
 
     def at(self, frame: int) -> Tensor:
         """The expression (39,) of a frame, interpolated between rows of features by time."""
-        position = min(frame / self._fps * FEATURE_RATE, len(self._windows) - 1.0)
+        position = min(frame / self._fps * FEATURE_RATE, len(self._features) - 1.0)
         lower = int(position)
         part = position - lower
-        upper = lower + 1 if part > 1e-6 else lower
-        adapted = self._adaptor(self._windows[lower : upper + 1])  # (1 or 2, 32)
+        rows = torch.arange(lower, lower + 2 if part > 1e-6 else lower + 1)  # (1 or 2,)
+        adapted = self._adaptor(feature_windows(self._features, rows))  # (1 or 2, 32)
         speech = torch.lerp(adapted[0], adapted[-1], part)  # (32,)
         return torch.cat([speech, self._eyes[frame]])
 
@@ -109,21 +106,19 @@ def eye_track(capture: Capture) -> Tensor:
             capture.path, len(lacking), lacking[0],
         )  # fmt: skip
     for frame in lacking:
-        rows[frame] = np.zeros(7, np.float32)
+        rows[frame] = np.zeros(len(EYE_NAMES), np.float32)
     return torch.from_numpy(np.stack(rows).astype(np.float32))  # type: ignore[arg-type]
 
 
-def speech_features(capture: Capture, encoder: str) -> np.ndarray:
+def speech_features(capture: Capture, encoder: FrozenEncoder) -> np.ndarray:
     """The features (T, D) of a capture's sound, 25 rows/s.
 
     Raises:
         CaptureError: If the capture has no sound.
     """
-    from ico3d.speech.encoder import load_encoder
-
     sound = capture.audio()
     if sound is None:
         raise CaptureError(
             f"{capture.path} has no sound: train with --inputs blendshapes, or add a recording."
         )
-    return load_encoder(encoder).features(sound.samples, sound.rate)
+    return encoder.features(sound.samples, sound.rate)

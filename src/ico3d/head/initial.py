@@ -4,12 +4,13 @@ import math
 
 import numpy as np
 import torch
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from ico3d.capture.capture import Capture
 from ico3d.errors import CaptureError
 from ico3d.head.model import HeadModel, HeadShape, Variant
 from ico3d.head.settings import HeadSettings
+from ico3d.head.views import view_of
 
 
 def initial_head(
@@ -27,7 +28,8 @@ def initial_head(
     surface = capture.points()
     if surface is None or len(surface) < 4 or not np.isfinite(surface).all():
         raise CaptureError(f"{capture.path} has no finite surface points to start from.")
-    points = _resampled(np.asarray(surface, np.float64), settings.initial_gaussians, rng)  # (N, 3)
+    seen = _seen(capture, np.asarray(surface, np.float64))  # (P', 3)
+    points = _resampled(seen, settings.initial_gaussians, rng)  # (N, 3)
     low, high = points.min(0), points.max(0)
     shape = HeadShape(
         expression_size=expression_size,
@@ -44,11 +46,26 @@ def initial_head(
     return model
 
 
+def _seen(capture: Capture, points: np.ndarray) -> np.ndarray:
+    """The points (P', 3) of (P, 3) that lie within some picture: others would never be trained."""
+    frames = capture.split.train[:: max(1, len(capture.split.train) // 8)]
+    inside = np.zeros(len(points), bool)
+    for frame in frames:
+        for index in range(len(capture.cameras)):
+            camera = view_of(capture, index, frame).camera
+            pixels, depths = camera.project(points)  # (P, 2), (P,)
+            fits = (pixels >= 0) & (pixels <= (camera.width, camera.height))
+            inside |= fits.all(1) & (depths > 0)
+    if inside.sum() < 4:
+        raise CaptureError(f"{capture.path}: no camera sees the surface points; check the poses.")
+    return points[inside]
+
+
 def _resampled(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
     """`count` of the points; where there are fewer, further ones between neighbours."""
     if len(points) >= count:
         return points[np.sort(rng.choice(len(points), count, replace=False))]
-    _, neighbours = cKDTree(points).query(points, k=4)  # (P, 4), itself first
+    _, neighbours = KDTree(points).query(points, k=4)  # (P, 4), itself first
     source = rng.integers(len(points), size=count - len(points))  # (extra,)
     partner = neighbours[source, rng.integers(1, 4, size=len(source))]  # (extra,)
     weight = rng.random((len(source), 1))
@@ -58,7 +75,7 @@ def _resampled(points: np.ndarray, count: int, rng: np.random.Generator) -> np.n
 
 def _spacing(points: np.ndarray) -> np.ndarray:
     """Root mean square distance (N,) to the three nearest neighbours, within sane bounds."""
-    distances, _ = cKDTree(points).query(points, k=4)
+    distances, _ = KDTree(points).query(points, k=4)
     spacing = np.sqrt((distances[:, 1:] ** 2).mean(1))
     typical = float(np.median(spacing))
     return np.clip(spacing, max(typical / 10, math.ulp(1.0)), typical * 10)

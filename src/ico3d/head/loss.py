@@ -7,8 +7,8 @@ from torch import Tensor
 
 from ico3d.errors import MissingModelError
 from ico3d.head.settings import HeadSettings
-from ico3d.splat.losses import l1_loss, ssim_loss
-from ico3d.splat.render import Rendering
+from ico3d.splat.losses import l1, ssim
+from ico3d.splat.rendering import Rendering
 
 log = logging.getLogger(__name__)
 
@@ -39,8 +39,8 @@ class HeadLoss:
         """
         settings = self._settings
         image = rendering.rgb  # (1, H, W, 3)
-        loss = settings.l1_weight * l1_loss(image, target[None])
-        loss = loss + settings.ssim_weight * ssim_loss(image, target[None])
+        loss = settings.l1_weight * l1(image, target[None])
+        loss = loss + settings.ssim_weight * (1 - ssim(image, target[None]))
         if settings.alpha_weight and mask is not None:
             loss = loss + settings.alpha_weight * (rendering.alpha[0] - mask).abs().mean()
         if self._perceptual is not None and step >= settings.perceptual_from:

@@ -18,6 +18,9 @@ Variant = Literal["full", "no-mlp", "no-blending", "static"]
 
 INITIAL_OPACITY = 0.1
 
+GAUSSIAN_AXES = {"means": 0, "quats": 0, "log_scales": 0, "basis": 1}
+"""The parameters that exist per Gaussian, and the axis along which they do."""
+
 
 @dataclass(frozen=True)
 class HeadShape:
@@ -104,6 +107,14 @@ class HeadModel(nn.Module):
     def __len__(self) -> int:
         """The number of Gaussians."""
         return self.means.shape[0]
+
+    def resize(self, num_gaussians: int) -> None:
+        """Makes room for another number of Gaussians; their values are to be set afterwards."""
+        for name, axis in GAUSSIAN_AXES.items():
+            old = getattr(self, name)
+            size = list(old.shape)
+            size[axis] = num_gaussians
+            setattr(self, name, nn.Parameter(old.new_empty(size), old.requires_grad))
 
     def forward(self, expression: Tensor) -> Gaussians:
         """The head with this expression.

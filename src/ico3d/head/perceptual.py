@@ -13,6 +13,9 @@ WEIGHTS = "vgg16.safetensors"
 CHANNELS = (64, 64, 0, 128, 128, 0, 256, 256, 256)
 """Output channels of the convolutions up to relu3_3; 0 is a 2×2 max pooling."""
 
+MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
+"""Of ImageNet's colours."""
+
 TAPS = (3, 8, 15)
 """Layers whose outputs are compared: relu1_2, relu2_2, relu3_3."""
 
@@ -36,13 +39,12 @@ class PerceptualLoss(nn.Module):
         except (KeyError, RuntimeError) as error:
             raise ModelError(f"{path} does not hold VGG-16 weights: {error}.") from error
         self.requires_grad_(False)
-        self.register_buffer("mean", torch.tensor([0.485, 0.456, 0.406]).view(1, 3, 1, 1))
-        self.register_buffer("deviation", torch.tensor([0.229, 0.224, 0.225]).view(1, 3, 1, 1))
 
     def forward(self, image: Tensor, target: Tensor) -> Tensor:
         """The distance of two pictures (H, W, 3) in [0, 1]: a scalar."""
-        pair = torch.stack([image, target]).permute(0, 3, 1, 2)  # (2, 3, H, W)
-        values = (pair - self.mean) / self.deviation
+        pair = torch.stack([image, target])  # (2, H, W, 3)
+        values = (pair - pair.new_tensor(MEAN)) / pair.new_tensor(DEVIATION)
+        values = values.permute(0, 3, 1, 2)  # (2, 3, H, W)
         total = values.new_zeros(())
         for index, layer in enumerate(self.features):
             values = layer(values)

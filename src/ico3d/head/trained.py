@@ -5,18 +5,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from torch import nn
-
 from ico3d.capture.capture import Capture
 from ico3d.common.files import write_atomic
 from ico3d.errors import ModelError
 from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack, SpeechTrack, speech_features
 from ico3d.head.model import HeadModel
+from ico3d.speech.encoder import load_encoder
+from ico3d.speech.network import SpeechAdaptor
 from ico3d.training.checkpoint import load_tensors, save_tensors
 
 Inputs = Literal["speech", "blendshapes"]
-
-BUILTIN_ENCODER = "builtin"
 
 
 @dataclass
@@ -28,6 +26,7 @@ class TrainedHead:
         inputs: What drives it.
         blendshape_names: B names for `blendshapes`, else empty.
         encoder: Name of the speech encoder for `speech`, else empty.
+        encoder_sha256: Of its weights: an adaptor fits no other.
         adaptor: The trained speech adaptor for `speech`, else None.
         summary: How it was made: provenance of the capture, seconds of training, settings.
     """
@@ -36,7 +35,8 @@ class TrainedHead:
     inputs: Inputs
     blendshape_names: tuple[str, ...]
     encoder: str
-    adaptor: nn.Module | None
+    encoder_sha256: str
+    adaptor: SpeechAdaptor | None
     summary: dict
 
     def track(self, capture: Capture) -> ExpressionTrack:
@@ -44,21 +44,29 @@ class TrainedHead:
 
         Raises:
             CaptureError: If the capture lacks the sound or the blendshapes this head needs.
+            ModelError: If the speech encoder is not the one it was trained with.
         """
         if self.adaptor is None:
             return BlendshapeTrack(capture, self.blendshape_names)
-        return SpeechTrack(capture, speech_features(capture, self.encoder), self.adaptor)
+        encoder = load_encoder(self.encoder)
+        if encoder.sha256 != self.encoder_sha256:
+            raise ModelError(
+                f"this head was trained with another speech encoder '{self.encoder}' "
+                f"({self.encoder_sha256[:12]}, not {encoder.sha256[:12]}): train it again."
+            )
+        return SpeechTrack(capture, speech_features(capture, encoder), self.adaptor)
 
     def save(self, folder: Path) -> None:
         """Writes `model.safetensors`, `adaptor.safetensors` and `head.json` into a folder."""
         self.model.save(folder / "model.safetensors")
         if self.adaptor is not None:
-            size = {"features": self.adaptor.feature_size}
+            size = {"features": self.adaptor.adaptor[0].in_features}
             save_tensors(folder / "adaptor.safetensors", dict(self.adaptor.state_dict()), size)
         about = {
             "inputs": self.inputs,
             "blendshape_names": list(self.blendshape_names),
             "encoder": self.encoder,
+            "encoder_sha256": self.encoder_sha256,
             "summary": self.summary,
         }
         write_atomic(folder / "head.json", json.dumps(about, indent=1).encode())
@@ -74,19 +82,18 @@ class TrainedHead:
         try:
             about = json.loads((folder / "head.json").read_text())
             inputs, names = about["inputs"], tuple(about["blendshape_names"])
-            encoder, summary = about["encoder"], about["summary"]
+            encoder = about["encoder"], about["encoder_sha256"]
+            summary = about["summary"]
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ModelError(
                 f"{folder} holds no trained head ({error}): train one with ico3d train head."
             ) from error
         adaptor = _load_adaptor(folder / "adaptor.safetensors") if inputs == "speech" else None
         model = HeadModel.load(folder / "model.safetensors")
-        return cls(model, inputs, names, encoder, adaptor, summary)
+        return cls(model, inputs, names, *encoder, adaptor, summary)
 
 
-def _load_adaptor(path: Path) -> nn.Module:
-    from ico3d.speech.adaptor import SpeechAdaptor
-
+def _load_adaptor(path: Path) -> SpeechAdaptor:
     tensors, state = load_tensors(path)
     try:
         adaptor = SpeechAdaptor(int(state["features"]))

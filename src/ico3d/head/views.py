@@ -68,6 +68,7 @@ class PictureCache:
         """Keeps up to `budget_gib` GiB."""
         self._capture = capture
         self._left = int(budget_gib * 2**30)
+        self._backgrounds: dict[int, Tensor | None] = {}
         self._kept: dict[tuple[int, int], tuple[np.ndarray, np.ndarray | None]] = {}
 
     def views(self, frames: Sequence[int]) -> Iterator[View]:
@@ -77,7 +78,15 @@ class PictureCache:
                 if self._read(camera, frame) is not None:
                     yield view_of(self._capture, camera, frame)
 
-    def picture(self, view: View) -> Picture:
+    def background(self, view: View, device: torch.device) -> Tensor | None:
+        """(H, W, 3) what the view's camera sees without the person, where that is known."""
+        index = view.camera_index
+        if index not in self._backgrounds:
+            found = self._capture.background(index)
+            self._backgrounds[index] = None if found is None else torch.from_numpy(found).to(device)
+        return self._backgrounds[index]
+
+    def picture(self, view: View, device: torch.device) -> Picture:
         """What a recorded view shows."""
         pair = self._read(view.camera_index, view.frame)
         if pair is None:
@@ -85,9 +94,10 @@ class PictureCache:
                 f"{self._capture.path}: the picture of frame {view.frame} by camera "
                 f"{view.camera_index} has vanished."
             )
-        image, mask = (None if part is None else _as_floats(part) for part in pair)
-        assert image is not None
-        return Picture(image, mask)
+        image, mask = pair
+        return Picture(
+            _as_floats(image, device), None if mask is None else _as_floats(mask, device)
+        )
 
     def _read(self, camera: int, frame: int) -> tuple[np.ndarray, np.ndarray | None] | None:
         """Picture and mask as bytes, from memory or from the capture."""
@@ -109,5 +119,5 @@ def _as_bytes(picture: np.ndarray) -> np.ndarray:
     return (picture * 255 + 0.5).astype(np.uint8)
 
 
-def _as_floats(picture: np.ndarray) -> Tensor:
-    return torch.from_numpy(picture).float() / 255
+def _as_floats(picture: np.ndarray, device: torch.device) -> Tensor:
+    return torch.from_numpy(picture).to(device).float() / 255

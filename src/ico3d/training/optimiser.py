@@ -71,8 +71,8 @@ class Optimiser:
         first, second, corrections = self._moments(name, value)
         if value.device.type == "cpu" and value.dtype == torch.float32:
             tensors = (value, first, second, gradient.contiguous())
-            flat = [tensor.view(-1).numpy() for tensor in tensors]  # (size,) each
-            adam_kernel(*flat, np.float32(rate), *corrections)
+            arguments = [tensor.view(-1).numpy() for tensor in tensors]  # (size,) each
+            adam_kernel(*arguments, np.float32(rate), *corrections)  # type: ignore[call-arg]
         else:
             adam_reference(value, first, second, gradient, rate, corrections)
 

@@ -1,0 +1,47 @@
+"""The verb `ico3d train head`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+
+@dataclass(frozen=True)
+class TrainHead:
+    """Trains HeadGaS++ on a capture. The same command goes on where it was interrupted.
+
+    Attributes:
+        capture: A capture folder with head poses.
+        out: The model folder to write.
+        inputs: What drives the head: its own speech, or the capture's blendshapes.
+        variant: The paper's model, or what it is compared with: colours and opacity blended
+            directly, the expression fed to the MLP instead of blended, no expression at all.
+        preset: Settings of the paper, or sized for two CPU cores.
+        set: Changes to the preset, as name=value (names: ico3d.head.settings.HeadSettings).
+        encoder: Speech encoder for speech-driven heads.
+        seed: All randomness follows from it.
+    """
+
+    capture: tyro.conf.Positional[Path]
+    out: tyro.conf.Positional[Path]
+    inputs: Literal["speech", "blendshapes"] = "speech"
+    variant: Literal["full", "no-mlp", "no-blending", "static"] = "full"
+    preset: Literal["cpu", "paper"] = "cpu"
+    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
+    encoder: str = "builtin"
+    seed: int = 0
+
+    def run(self) -> None:
+        """Trains, or goes on training; writes the model folder."""
+        from rich.console import Console
+
+        from ico3d.capture.capture import Capture
+        from ico3d.head.settings import PRESETS
+        from ico3d.head.train import HeadJob, train_head
+
+        settings = PRESETS[self.preset].with_changes(self.set)
+        job = HeadJob(self.inputs, self.variant, self.encoder, self.seed, settings)
+        head = train_head(Capture.open(self.capture), self.out, job)
+        seconds = head.summary["train_seconds"]
+        Console().print(f"{self.out}: {len(head.model)} Gaussians, trained in {seconds:.0f} s.")

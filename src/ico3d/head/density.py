@@ -1,0 +1,99 @@
+"""Density control of a head: what splat plans, carried out on model and moments."""
+
+from collections.abc import Callable
+
+import torch
+from torch import Tensor
+
+from ico3d.head.model import GAUSSIAN_AXES, HeadModel
+from ico3d.head.settings import HeadSettings
+from ico3d.splat.density import (
+    DensitySettings,
+    DensityStats,
+    Plan,
+    apply_plan_to_geometry,
+    densify_plan,
+)
+from ico3d.splat.rendering import RenderInfo
+from ico3d.training.optimiser import Optimiser
+
+CLONE_BELOW = 0.01
+PRUNE_ABOVE = 0.1
+"""Sizes relative to the head box, as 3DGS has them relative to the scene."""
+
+
+class HeadDensity:
+    """Clones, splits and prunes; clones and parts copy F and f_0."""
+
+    def __init__(self, settings: HeadSettings, seed: int):
+        """Gathers nothing yet."""
+        self._settings, self._seed = settings, seed
+        self._stats = DensityStats.zeros(0)
+
+    def observe(self, info: RenderInfo, step: int) -> None:
+        """Gathers screen gradients after `backward`."""
+        if step >= self._settings.densify_until:
+            return
+        if len(self._stats.views) != info.radii.shape[1]:
+            self._stats = DensityStats.zeros(info.radii.shape[1], info.radii.device)
+        self._stats.add(info)
+
+    def adapt(
+        self,
+        model: HeadModel,
+        optimiser: Optimiser,
+        opacities: Callable[[int], Tensor],
+        step: int,
+    ) -> None:
+        """Densifies and prunes if it is time.
+
+        Args:
+            model: Changed in place.
+            optimiser: Its moments follow; those of new Gaussians begin at 0.
+            opacities: Gives the greatest predicted opacity (N,) over frames sampled for a step.
+            step: Number of the step just done.
+        """
+        settings = self._settings
+        due = settings.densify_from <= step < settings.densify_until
+        if not due or step % settings.densify_every:
+            return
+        thresholds = DensitySettings(
+            max_gaussians=settings.max_gaussians,
+            gradient_threshold=settings.densify_gradient,
+            clone_below=CLONE_BELOW * model.shape.box_size,
+            prune_opacity=settings.prune_opacity,
+            prune_scale=PRUNE_ABOVE * model.shape.box_size,
+        )
+        plan = densify_plan(self._stats, model.log_scales.exp(), opacities(step), thresholds)
+        generator = torch.Generator().manual_seed(hash((self._seed, step)) % 2**63)
+        _carry_out(plan, model, optimiser, generator)
+        self._stats = DensityStats.zeros(len(model), model.means.device)
+
+    def tensors(self) -> dict[str, Tensor]:
+        """What has been gathered."""
+        return {"gradient_sum": self._stats.gradient_sum, "views": self._stats.views}
+
+    def restore(self, tensors: dict[str, Tensor]) -> None:
+        """Takes back what `tensors` gave."""
+        self._stats = DensityStats(tensors["gradient_sum"], tensors["views"])
+
+
+def _carry_out(
+    plan: Plan, model: HeadModel, optimiser: Optimiser, generator: torch.Generator
+) -> None:
+    """Applies a plan to parameters and moments."""
+    means, scales = apply_plan_to_geometry(
+        model.means, model.quats, model.log_scales.exp(), plan, generator
+    )
+    sources = plan.sources.to(model.means.device)  # (M,)
+    values = {name: getattr(model, name).detach() for name in GAUSSIAN_AXES}
+    model.resize(len(plan))
+    for name, axis in GAUSSIAN_AXES.items():
+        getattr(model, name).data = values[name].index_select(axis, sources)
+    model.means.data, model.log_scales.data = means, scales.log()
+    for name, axis in GAUSSIAN_AXES.items():
+        for moment in (f"{name}.first", f"{name}.second"):
+            if moment in optimiser.moments:
+                moved = optimiser.moments[moment].index_select(axis, sources)
+                moved.narrow(axis, len(plan.keep), len(plan) - len(plan.keep)).zero_()
+                optimiser.moments[moment] = moved

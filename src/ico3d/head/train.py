@@ -1,0 +1,91 @@
+"""From a capture to a model folder: sets up, trains, saves."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from ico3d.capture.capture import Capture
+from ico3d.errors import CaptureError
+from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack, SpeechTrack, speech_features
+from ico3d.head.initial import initial_head
+from ico3d.head.model import Variant
+from ico3d.head.settings import HeadSettings
+from ico3d.head.trained import Inputs, TrainedHead
+from ico3d.head.trainer import HeadTrainer
+from ico3d.speech.encoder import load_encoder
+from ico3d.speech.network import SpeechAdaptor
+from ico3d.training.loop import LoopSettings, run_loop
+from ico3d.training.run import RunFolder
+
+
+@dataclass(frozen=True)
+class HeadJob:
+    """What to train.
+
+    Attributes:
+        inputs: What drives the head.
+        variant: The model.
+        encoder: Name of the speech encoder, for speech.
+        seed: All randomness follows from it.
+        settings: How to train.
+    """
+
+    inputs: Inputs
+    variant: Variant
+    encoder: str
+    seed: int
+    settings: HeadSettings
+
+
+def train_head(capture: Capture, folder: Path, job: HeadJob) -> TrainedHead:
+    """Trains a head, or goes on with an interrupted run of the same settings.
+
+    Args:
+        capture: Where pictures, poses and expressions come from.
+        folder: Model folder; also holds metrics and checkpoints.
+        job: What to train.
+
+    Returns:
+        The trained head, as the folder now holds it.
+
+    Raises:
+        CaptureError: If the capture lacks something that is needed.
+        SettingsError: If the folder holds a run with other settings.
+        ModelError: If training diverges.
+    """
+    run = RunFolder(folder, {"capture": str(capture.path.resolve()), **asdict(job)})
+    if run.finished() is not None:
+        return TrainedHead.load(folder)
+    torch.manual_seed(job.seed)  # layers draw their weights
+    track, adaptor, encoder = _inputs(capture, job)
+    rng = np.random.default_rng(job.seed)
+    model = initial_head(capture, job.settings, job.variant, track.size, rng)
+    model.to("cuda" if torch.cuda.is_available() else "cpu")
+    trainer = HeadTrainer(capture, model, track, adaptor, job.settings, job.seed)
+    seconds = run_loop(trainer, run, LoopSettings(job.settings.steps, label="head"))
+    names = track.names if isinstance(track, BlendshapeTrack) else ()
+    summary = {
+        "train_seconds": seconds,
+        "capture": capture.provenance,
+        "settings": asdict(job.settings),
+    }
+    head = TrainedHead(trainer.model, job.inputs, names, *encoder, adaptor, summary)
+    head.save(folder)
+    run.finish({"train_seconds": seconds, "num_gaussians": len(trainer.model)})
+    return head
+
+
+def _inputs(
+    capture: Capture, job: HeadJob
+) -> tuple[ExpressionTrack, SpeechAdaptor | None, tuple[str, str]]:
+    """What drives the head; for speech the adaptor to train and the encoder's name and sha256."""
+    if job.inputs == "blendshapes":
+        if capture.blendshape_names is None:
+            raise CaptureError(f"{capture.path} has no blendshapes: train with --inputs speech.")
+        return BlendshapeTrack(capture, capture.blendshape_names), None, ("", "")
+    encoder = load_encoder(job.encoder)
+    features = speech_features(capture, encoder)  # (T, D)
+    adaptor = SpeechAdaptor(encoder.size)
+    return SpeechTrack(capture, features, adaptor), adaptor, (encoder.name, encoder.sha256)

@@ -1,0 +1,183 @@
+"""Optimising a head: one picture per step (paper, head model and implementation details)."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ico3d.capture.capture import Capture
+from ico3d.errors import CaptureError
+from ico3d.head.basis import update_basis
+from ico3d.head.density import HeadDensity
+from ico3d.head.expressions import ExpressionTrack
+from ico3d.head.loss import HeadLoss
+from ico3d.head.model import HeadModel
+from ico3d.head.settings import HeadSettings
+from ico3d.head.views import Picture, PictureCache, View
+from ico3d.speech.network import SpeechAdaptor
+from ico3d.splat.render import render
+from ico3d.training.optimiser import Optimiser
+
+GEOMETRY = ("means", "quats", "log_scales")
+
+ATTENTION_FACTOR = 5
+ATTENTION_WEIGHT_DECAY = 1e-4
+
+
+class HeadTrainer:
+    """A `Trainee`: the head, its optimiser, and the pictures it learns from.
+
+    Every random choice of a step follows from the seed and the step's number.
+    """
+
+    def __init__(
+        self,
+        capture: Capture,
+        model: HeadModel,
+        track: ExpressionTrack,
+        adaptor: SpeechAdaptor | None,
+        settings: HeadSettings,
+        seed: int,
+    ):
+        """Finds the recorded views of the training frames.
+
+        Raises:
+            CaptureError: If there is no picture to train on.
+        """
+        self.model, self.adaptor = model, adaptor
+        self._track, self._settings, self._seed = track, settings, seed
+        self._pictures = PictureCache(capture, settings.cache_gib)
+        self._views = list(self._pictures.views(capture.split.train))
+        if not self._views:
+            raise CaptureError(f"{capture.path} has no picture among its training frames.")
+        self._loss = HeadLoss(settings)
+        self._optimiser = Optimiser(settings.optimiser)
+        self._density = HeadDensity(settings, seed)
+        model.basis.requires_grad_(False)
+
+    def step(self, index: int) -> Mapping[str, float]:
+        """Renders one picture and learns from the difference."""
+        view = self._view(index)
+        picture = self._pictures.picture(view, self.model.means.device)
+        background, target = self._staged(view, picture, index)
+        expression = self._expression(view)  # (B,)
+        features = self._features(expression)  # (N, w)
+        gaussians = self.model.gaussians(self.model.decode(features, expression))
+        rendering = render(gaussians, [view.camera], background)
+        loss = self._loss(rendering, target, picture.mask, index)
+        loss.backward()
+        self._density.observe(rendering.info, index)
+        self._update(expression, features, index)
+        self._density.adapt(self.model, self._optimiser, self._sampled_opacities, index)
+        error = float((rendering.rgb.detach()[0] - target).square().mean())
+        psnr = -10 * np.log10(max(error, 1e-12))
+        return {"loss": float(loss.detach()), "psnr": psnr, "gaussians": len(self.model)}
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Parameters, moments, and what density control has gathered."""
+        named = {f"model.{name}": value for name, value in self.model.state_dict().items()}
+        if self.adaptor is not None:
+            state = self.adaptor.state_dict()
+            named |= {f"adaptor.{name}": value for name, value in state.items()}
+        named |= {f"moments.{name}": value for name, value in self._optimiser.moments.items()}
+        return named | {f"density.{name}": t for name, t in self._density.tensors().items()}
+
+    def state(self) -> dict:
+        """Nothing beside the tensors: randomness follows from the step's number."""
+        return {}
+
+    def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
+        """Takes back what `tensors` gave."""
+        del state
+        self.model.resize(tensors["model.means"].shape[0])
+        self.model.load_state_dict(_below("model.", tensors))
+        if self.adaptor is not None:
+            self.adaptor.load_state_dict(_below("adaptor.", tensors))
+        self._optimiser.moments = _below("moments.", tensors)
+        self._density.restore(_below("density.", tensors))
+
+    def _view(self, index: int) -> View:
+        """Every view once per epoch, in an order of its own."""
+        epoch, place = divmod(index, len(self._views))
+        if place == 0 or not hasattr(self, "_order"):
+            rng = np.random.default_rng([self._seed, epoch])
+            self._order = rng.permutation(len(self._views))
+        return self._views[self._order[place]]
+
+    def _staged(self, view: View, picture: Picture, index: int) -> tuple[Tensor, Tensor]:
+        """What to render over, and the picture over the same.
+
+        The capture's own background; without one, the person cut out over a random colour, so
+        that no Gaussian can pass for background.
+        """
+        background = self._pictures.background(view, picture.image.device)
+        if background is not None:
+            return background, picture.image
+        if picture.mask is None:
+            return torch.zeros(3).to(picture.image), picture.image
+        rng = np.random.default_rng([self._seed, index, 1])
+        color = torch.from_numpy(rng.random(3)).to(picture.image)
+        mask = picture.mask[..., None]  # (H, W, 1)
+        return color, picture.image * mask + color * (1 - mask)
+
+    def _expression(self, view: View) -> Tensor:
+        """The expression (B,) of a view's frame, on the model's device."""
+        return self._track.at(view.frame).to(self.model.means.device)
+
+    def _features(self, expression: Tensor) -> Tensor:
+        """Blended features that keep their gradient: the basis learns from it."""
+        features = self.model.blended(expression)
+        if not features.requires_grad:
+            features.requires_grad_()
+        features.retain_grad()
+        return features
+
+    def _update(self, expression: Tensor, features: Tensor, index: int) -> None:
+        """One optimiser step on everything."""
+        progress = index / self._settings.steps
+        rates = {name: rate.at(progress) for name, rate in self._settings.rates.items()}
+        rates["means"] *= self.model.shape.box_size
+        weights = self.model.row_weights(expression)
+        assert features.grad is not None
+        update_basis(self._optimiser, self.model.basis, weights, features.grad, rates["basis"])
+        for name, parameter in self.model.named_parameters():
+            if parameter.grad is not None:
+                rate = rates[name if name in GEOMETRY else "mlp"]
+                self._optimiser.update(name, parameter, parameter.grad, rate)
+                parameter.grad = None
+        self._update_adaptor(rates["adaptor"])
+
+    def _update_adaptor(self, rate: float) -> None:
+        """The adaptor's step; its attention learns faster and decays (as in SyncTalk)."""
+        if self.adaptor is None:
+            return
+        for name, parameter in self.adaptor.named_parameters():
+            if parameter.grad is None:
+                continue
+            attends = name.startswith("attention")
+            self._optimiser.update(
+                f"adaptor.{name}",
+                parameter,
+                parameter.grad,
+                rate * (ATTENTION_FACTOR if attends else 1),
+                ATTENTION_WEIGHT_DECAY if attends else 0.0,
+            )
+            parameter.grad = None
+
+    @torch.no_grad()
+    def _sampled_opacities(self, index: int) -> Tensor:
+        """(N,) largest predicted opacity over some training frames."""
+        rng = np.random.default_rng([self._seed, index, 2])
+        chosen = rng.choice(len(self._views), size=min(16, len(self._views)), replace=False)
+        logits = [self.model.logits(self._expression(self._views[i]))[:, 3] for i in chosen]
+        return torch.sigmoid(torch.stack(logits).amax(0))
+
+
+def _below(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:
+    """The tensors whose names start with the prefix, without it."""
+    return {
+        name.removeprefix(prefix): tensor
+        for name, tensor in tensors.items()
+        if name.startswith(prefix)
+    }

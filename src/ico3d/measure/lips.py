@@ -1,0 +1,101 @@
+"""Do the lips move as they should, and when: opening of the mouth over time."""
+
+import logging
+
+import numpy as np
+
+from ico3d.errors import MissingExtraError, MissingModelError
+
+UPPER_INNER_LIP = (61, 62, 63)
+LOWER_INNER_LIP = (67, 66, 65)
+LONGEST_LAG = 0.4
+"""Seconds within which the correlation's peak is looked for."""
+
+log = logging.getLogger(__name__)
+
+
+def lip_gap(landmarks: np.ndarray) -> float:
+    """Opening between the inner lips in pixels, from the 68 landmarks (68, 2)."""
+    between = landmarks[list(UPPER_INNER_LIP)] - landmarks[list(LOWER_INNER_LIP)]  # (3, 2)
+    return float(np.linalg.norm(between, axis=1).mean())
+
+
+def lip_correlation(gaps: np.ndarray, truth: np.ndarray) -> float | None:
+    """Pearson correlation of two series (T,) at lag 0; frames with NaN in either are left out.
+
+    Returns:
+        The correlation, or None where fewer than 8 frames are left or a series is constant.
+    """
+    both = np.isfinite(gaps) & np.isfinite(truth)
+    a, b = gaps[both], truth[both]
+    if both.sum() < 8 or a.std() < 1e-9 or b.std() < 1e-9:
+        return None
+    return float(np.corrcoef(a, b)[0, 1])
+
+
+def lip_lag_ms(gaps: np.ndarray, truth: np.ndarray, fps: float) -> float | None:
+    """How late `gaps` (T,) is against `truth` (T,), in milliseconds.
+
+    Correlations at whole-frame shifts; a parabola through the highest and its neighbours gives
+    the fraction.
+
+    Returns:
+        The lag, positive where `gaps` is late, or None where correlations do not exist.
+    """
+    reach = min(round(LONGEST_LAG * fps), len(gaps) // 2)
+    values = [_shifted_correlation(gaps, truth, shift) for shift in range(-reach, reach + 1)]
+    if any(value is None for value in values):
+        return None
+    series = np.array(values, float)
+    peak = int(series.argmax())
+    offset = 0.0
+    if 0 < peak < len(series) - 1:
+        before, at, after = series[peak - 1 : peak + 2]
+        offset = 0.5 * (before - after) / (before - 2 * at + after)
+    return float((peak - reach + offset) / fps * 1000)
+
+
+def _shifted_correlation(gaps: np.ndarray, truth: np.ndarray, shift: int) -> float | None:
+    """Correlation of gaps[t + shift] with truth[t]."""
+    if shift < 0:
+        return lip_correlation(gaps[:shift], truth[-shift:])
+    return lip_correlation(gaps[shift:], truth[: len(truth) - shift])
+
+
+class LandmarkReader:
+    """The 68 landmarks that MediaPipe sees in a picture."""
+
+    def __init__(self):
+        """Loads MediaPipe and its model.
+
+        Raises:
+            MissingExtraError: If MediaPipe is not installed.
+            MissingModelError: If the model file is not there.
+        """
+        from ico3d.capture.face import FaceReader
+        from ico3d.common.files import model_file
+
+        model = model_file("face_landmarker.task", "measuring lips")
+        self._reader = FaceReader(model)
+
+    def __enter__(self) -> "LandmarkReader":
+        return self
+
+    def __exit__(self, *details) -> None:
+        self._reader.__exit__(*details)
+
+    def read(self, picture: np.ndarray) -> np.ndarray | None:
+        """Landmarks (68, 2) in a picture (H, W, 3) in [0, 1], or None where no face is seen."""
+        from ico3d.capture.multipie import MULTI_PIE
+
+        face = self._reader.read((np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8))
+        return None if face is None else face.landmarks[MULTI_PIE]
+
+
+def landmark_reader() -> LandmarkReader | None:
+    """A reader, or None, with a warning, where MediaPipe or its model is missing."""
+    try:
+        return LandmarkReader()
+    except (MissingExtraError, MissingModelError) as error:
+        log.warning("lips are not measured: %s", error)
+        return None

@@ -1,0 +1,131 @@
+"""Training end to end on a tiny capture."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+
+from ico3d.errors import CaptureError, SettingsError
+from ico3d.head.settings import PRESETS
+from ico3d.head.train import HeadJob, train_head
+from ico3d.head.trained import TrainedHead
+from ico3d.head.trainer import HeadTrainer
+from ico3d.splat.render import render
+
+SETTINGS = dataclasses.replace(
+    PRESETS["cpu"],
+    steps=160,
+    initial_gaussians=200,
+    max_gaussians=400,
+    densify_from=40,
+    densify_every=20,
+    densify_until=100,
+    densify_gradient=1e-5,
+)
+
+
+def _job(inputs="blendshapes", variant="full", **changes) -> HeadJob:
+    settings = dataclasses.replace(SETTINGS, **changes)
+    return HeadJob(inputs, variant, "builtin", 0, settings)
+
+
+def _held_out_psnr(head: TrainedHead, capture) -> float:
+    track, errors = head.track(capture), []
+    for frame in capture.split.test:
+        camera = frame % 2
+        view = capture.cameras[camera].moved(capture.world_from_head(frame))
+        background = torch.from_numpy(capture.background(camera))
+        with torch.no_grad():
+            picture = render(head.model(track.at(frame)), [view], background).rgb[0].numpy()
+        errors.append(((picture - capture.image(camera, frame)) ** 2).mean())
+    return float(-10 * np.log10(np.mean(errors)))
+
+
+def test_expressions_are_learnt_where_a_static_head_cannot(tiny, tmp_path):
+    scores = {
+        variant: _held_out_psnr(train_head(tiny, tmp_path / variant, _job(variant=variant)), tiny)
+        for variant in ("full", "no-mlp", "no-blending", "static")
+    }
+    assert scores["full"] > 27
+    assert scores["full"] > scores["static"] + 2
+    assert scores["no-mlp"] > scores["static"]
+    assert scores["no-blending"] > scores["static"]
+
+
+@pytest.mark.parametrize("inputs", ["blendshapes", "speech"])
+def test_a_killed_run_resumes_to_the_same_weights(tiny, tmp_path, inputs, monkeypatch):
+    job = _job(inputs, steps=1100, initial_gaussians=60, max_gaussians=90, densify_until=1050)
+    whole = train_head(tiny, tmp_path / "whole", job)
+    step = HeadTrainer.step
+
+    def dying_step(self, index):
+        if index == 1010:
+            raise KeyboardInterrupt
+        return step(self, index)
+
+    monkeypatch.setattr(HeadTrainer, "step", dying_step)
+    with pytest.raises(KeyboardInterrupt):
+        train_head(tiny, tmp_path / "parts", job)
+    monkeypatch.setattr(HeadTrainer, "step", step)
+    resumed = train_head(tiny, tmp_path / "parts", job)
+    for name, value in whole.model.state_dict().items():
+        assert torch.equal(resumed.model.state_dict()[name], value), name
+    if inputs == "speech":
+        for name, value in whole.adaptor.state_dict().items():
+            assert torch.equal(resumed.adaptor.state_dict()[name], value), name
+
+
+def test_a_saved_head_gives_the_same_expressions_and_gaussians(tiny, tmp_path):
+    head = train_head(tiny, tmp_path / "model", _job("speech", steps=30))
+    loaded = TrainedHead.load(tmp_path / "model")
+    expression = head.track(tiny).at(7)
+    assert expression.shape == (39,)
+    assert torch.equal(loaded.track(tiny).at(7), expression)
+    assert torch.equal(loaded.model.logits(expression), head.model.logits(expression))
+    assert len(loaded.model) <= SETTINGS.max_gaussians
+
+
+def test_the_adaptor_learns(tiny, tmp_path):
+    torch.manual_seed(0)
+    head = train_head(tiny, tmp_path / "model", _job("speech", steps=30))
+    torch.manual_seed(0)
+    from ico3d.speech.network import SpeechAdaptor
+
+    fresh = SpeechAdaptor(64).state_dict()
+    trained = head.adaptor.state_dict()
+    assert any(not torch.equal(fresh[name], trained[name]) for name in fresh)
+
+
+@pytest.mark.parametrize(
+    ("method", "inputs", "sentence"),
+    [
+        ("audio", "speech", "has no sound"),
+        ("points", "blendshapes", "no finite surface points"),
+        ("blendshapes", "blendshapes", "frame 0 has no finite blendshapes"),
+        ("world_from_head", "blendshapes", "frame 0 has no finite head pose"),
+    ],
+)
+def test_what_a_capture_lacks_is_one_sentence(
+    tiny, tmp_path, monkeypatch, method, inputs, sentence
+):
+    monkeypatch.setattr(type(tiny), method, lambda *_: None)
+    with pytest.raises(CaptureError, match=sentence):
+        train_head(tiny, tmp_path / "model", _job(inputs))
+
+
+def test_a_nan_pose_names_its_frame(tiny, tmp_path, monkeypatch):
+    pose = type(tiny).world_from_head
+    broken = lambda self, frame: pose(self, frame) * (np.nan if frame == 5 else 1)  # noqa: E731
+    monkeypatch.setattr(type(tiny), "world_from_head", broken)
+    with pytest.raises(CaptureError, match="frame 5 has no finite head pose"):
+        train_head(tiny, tmp_path / "model", _job())
+
+
+def test_settings_can_be_changed_by_name():
+    changed = PRESETS["cpu"].with_changes(("steps=7", "basis_rate=0.5", "optimiser=sgd"))
+    assert (changed.steps, changed.basis_rate, changed.optimiser) == (7, 0.5, "sgd")
+    with pytest.raises(SettingsError, match="no setting 'stepz'"):
+        changed.with_changes(("stepz=7",))
+    with pytest.raises(SettingsError, match="steps takes int values"):
+        changed.with_changes(("steps=x",))
