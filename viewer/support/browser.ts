@@ -27,7 +27,7 @@ export interface BrowserOptions {
 /** A software-rendered Chromium with one page. */
 export class Browser {
   private readonly profile: string;
-  private readonly context: BrowserContext;
+  readonly context: BrowserContext;
   readonly page: Page;
 
   private constructor(profile: string, context: BrowserContext, page: Page) {

@@ -34,12 +34,12 @@ export class Microphone {
     await this.context.audioWorklet.addModule(workletUrl);
     const source = new MediaStreamAudioSourceNode(this.context, { mediaStream: this.stream });
     const node = new AudioWorkletNode(this.context, 'microphone', {
-      numberOfOutputs: 0,
       channelCount: 1,
       channelCountMode: 'explicit',
     });
     node.port.onmessage = (event: MessageEvent<Int16Array>) => this.onChunk(event.data);
-    source.connect(node);
+    // It outputs silence; Chromium leaves out blocks of a node that leads nowhere when it is busy.
+    source.connect(node).connect(this.context.destination);
     await this.context.resume();
   }
 

@@ -125,6 +125,7 @@ function makeSpark(renderer: THREE.WebGLRenderer, onDirty: () => void): SparkRen
     maxStdDev: Math.sqrt(2 * Math.log(255)), // where an opaque splat's alpha reaches 1/255
     maxPixelRadius: 4096,
     sortRadial: false, // by depth, as in training
+    minSortIntervalMs: 50, // the head sways slowly, and each sort costs a picture drawn twice
     enableLod: false,
   });
 }

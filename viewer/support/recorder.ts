@@ -1,0 +1,87 @@
+import type { BrowserContext, Page } from 'playwright-core';
+
+/** A chunk of the microphone as it left the page. */
+export interface Heard {
+  sample: number;
+  at: number; // ms, when it was sent
+  level: number; // root mean square, full scale = 1
+}
+
+/** A message of the server as it reached the page. */
+export interface Received {
+  at: number;
+  type: string;
+  [field: string]: unknown;
+}
+
+/** How loud the avatar was. */
+export interface Loudness {
+  at: number;
+  level: number;
+}
+
+/** All that a test wants to know of a conversation; times are the page's performance clock. */
+export interface Record {
+  microphone: Heard[];
+  received: Received[];
+  loudness: Loudness[];
+  sockets: WebSocket[]; // only in the page
+}
+
+declare global {
+  interface Window {
+    record?: Record;
+  }
+}
+
+/** Watches the wire of every page that opens from now on. */
+export async function recordWire(context: BrowserContext): Promise<void> {
+  await context.addInitScript(() => {
+    const record: Record = { microphone: [], received: [], loudness: [], sockets: [] };
+    window.record = record;
+    const header = (frame: ArrayBuffer) => {
+      const length = new DataView(frame).getUint32(0, true);
+      return { length, fields: JSON.parse(new TextDecoder().decode(new Uint8Array(frame, 4, length))) };
+    };
+    const { send } = WebSocket.prototype;
+    WebSocket.prototype.send = function (data) {
+      if (data instanceof ArrayBuffer) {
+        const { length, fields } = header(data);
+        const pcm = new Int16Array(data.slice(4 + length));
+        const power = pcm.reduce((sum, value) => sum + (value / 0x8000) ** 2, 0) / pcm.length;
+        record.microphone.push({ sample: fields.sample, at: performance.now(), level: Math.sqrt(power) });
+      }
+      send.call(this, data);
+    };
+    window.WebSocket = class extends WebSocket {
+      constructor(url: string | URL) {
+        super(url);
+        record.sockets.push(this);
+        this.addEventListener('message', ({ data }: MessageEvent<string | ArrayBuffer>) => {
+          const fields = typeof data === 'string' ? JSON.parse(data) : header(data).fields;
+          record.received.push({ at: performance.now(), ...fields });
+        });
+      }
+    };
+  });
+}
+
+/** Watches how loud the avatar is, every 10 ms. */
+export function recordLoudness(page: Page): Promise<void> {
+  return page.evaluate(() => {
+    const { context, output } = window.ico3d!.conversation.player;
+    const analyser = new AnalyserNode(context, { fftSize: 256 });
+    output.connect(analyser);
+    const wave = new Float32Array(256);
+    setInterval(() => {
+      analyser.getFloatTimeDomainData(wave);
+      const power = wave.reduce((sum, value) => sum + value * value, 0) / wave.length;
+      window.record!.loudness.push({ at: performance.now(), level: Math.sqrt(power) });
+    }, 10);
+  });
+}
+
+/** Everything recorded so far. */
+export async function readRecord(page: Page): Promise<Record> {
+  return page.evaluate(() => ({ ...window.record!, sockets: [] }));
+}
