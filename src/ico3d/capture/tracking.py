@@ -160,17 +160,25 @@ def _pose_step(track: Track, landmarks: np.ndarray) -> Track:
     by_turn = np.cross(turned[..., None, :], by_point)  # (F, K, 2, 3): d(w x p) . J = w . (p x J)
     jacobian = np.concatenate([by_turn, by_point], -1)  # (F, K, 2, 6)
     weighted = jacobian * _weights(track, residuals)[..., None, None]
-    normal = np.einsum("fkia,fkib->fab", weighted, jacobian)
+    normal, pull = _normal_equations(weighted, jacobian, residuals)
     normal += 1e-9 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(6)
-    step = np.linalg.solve(normal, np.einsum("fkia,fki->fa", weighted, residuals)[..., None])[
-        ..., 0
-    ]
+    step = np.linalg.solve(normal, pull)[..., 0]  # (F, 6)
     length = np.linalg.norm(step[:, :3], axis=1, keepdims=True)
     turn = step[:, :3] * np.minimum(1.0, 0.3 / np.maximum(length, 1e-12))
     rotations = Rotation.from_rotvec(turn).as_matrix() @ track.rotations
     translations = track.translations + step[:, 3:]
     translations[:, 2] = np.minimum(translations[:, 2], -0.05)  # in front of the camera
     return replace(track, rotations=rotations, translations=translations)
+
+
+def _normal_equations(
+    weighted: np.ndarray, jacobian: np.ndarray, residuals: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(N, P, P) and (N, P, 1) of N independent problems from (N, M, 2, P) and (N, M, 2)."""
+    count, unknowns = len(jacobian), jacobian.shape[-1]
+    left = weighted.reshape(count, -1, unknowns).transpose(0, 2, 1)  # (N, P, 2M)
+    right = left @ residuals.reshape(count, -1, 1)
+    return left @ jacobian.reshape(count, -1, unknowns), right
 
 
 def _shape_step(track: Track, landmarks: np.ndarray, canonical: np.ndarray) -> Track:
@@ -180,10 +188,11 @@ def _shape_step(track: Track, landmarks: np.ndarray, canonical: np.ndarray) -> T
     by_shape = _jacobian(track, local) @ track.rotations[:, None]  # (F, K, 2, 3)
     share = min(1.0, INDEPENDENT / len(landmarks))
     weighted = by_shape * (share * _weights(track, residuals))[..., None, None]
-    normal = np.einsum("fkia,fkib->kab", weighted, by_shape) + np.eye(3) / SHAPE_SPREAD**2
-    pull = np.einsum("fkia,fki->ka", weighted, residuals)
-    pull += (canonical - track.shape) / SHAPE_SPREAD**2
-    step = np.linalg.solve(normal, pull[..., None])[..., 0]  # (K, 3)
+    swapped = [np.swapaxes(part, 0, 1) for part in (weighted, by_shape, residuals)]
+    normal, pull = _normal_equations(*swapped)
+    normal += np.eye(3) / SHAPE_SPREAD**2
+    pull += (canonical - track.shape)[..., None] / SHAPE_SPREAD**2
+    step = np.linalg.solve(normal, pull)[..., 0]  # (K, 3)
     return replace(track, shape=track.shape + step)
 
 

@@ -1,0 +1,102 @@
+"""The whole way from a video to a capture, where MediaPipe and its model are there."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ico3d.capture.capture import Capture
+from ico3d.capture.check import examine
+from ico3d.cli import main
+
+SHARED = Path(__file__).resolve().parents[3] / "shared"
+CLIP = SHARED / "clips" / "portrait_a.mp4"
+
+av = pytest.importorskip("av")
+pytest.importorskip("mediapipe")
+needs_clip = pytest.mark.skipif(not CLIP.is_file(), reason="../shared/clips is not here")
+
+
+@pytest.fixture(autouse=True)
+def model(monkeypatch):
+    folder = Path(os.environ.get("ICO3D_MODELS", SHARED / "models"))
+    if not (folder / "face_landmarker.task").is_file():
+        pytest.skip("face_landmarker.task is not here")
+    monkeypatch.setenv("ICO3D_MODELS", str(folder))
+
+
+def _faceless(path: Path, frames: int = 6) -> Path:
+    """A video of coloured noise."""
+    random = np.random.default_rng(0)
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 128, 128, "yuv420p"
+        for _ in range(frames):
+            picture = random.integers(0, 255, (128, 128, 3), np.uint8)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        container.mux(stream.encode())
+    return path
+
+
+def _shortened(path: Path, blank: range = range(0), frames: int = 30) -> Path:
+    """The first frames of the clip without sound, those in `blank` covered."""
+    with av.open(str(CLIP)) as source, av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=25, options={"crf": "10"})
+        stream.width, stream.height, stream.pix_fmt = 256, 256, "yuv420p"
+        for number, frame in enumerate(source.decode(video=0)):
+            if number == frames:
+                break
+            picture = frame.reformat(256, 256, format="rgb24").to_ndarray()
+            if number in blank:
+                picture[:] = 90
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        container.mux(stream.encode())
+    return path
+
+
+def _capture(video: Path, out: Path, *options: str) -> int:
+    return main(["capture", "portrait", str(video), str(out), *options])
+
+
+def test_video_without_a_face(tmp_path, capfd):
+    assert _capture(_faceless(tmp_path / "noise.mp4"), tmp_path / "out") == 1
+    message = capfd.readouterr().err
+    assert "noise.mp4: no face in any of its 6 frames" in message and "Traceback" not in message
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["noise.mp4"]
+
+
+def test_existing_folder_is_left_alone(tmp_path, capfd):
+    (tmp_path / "out").mkdir()
+    assert _capture(_faceless(tmp_path / "noise.mp4"), tmp_path / "out") == 1
+    assert "exists already" in capfd.readouterr().err
+
+
+@needs_clip
+def test_frames_without_a_face_and_without_sound(tmp_path, capfd):
+    video = _shortened(tmp_path / "v.mp4", blank=range(11, 14))
+    assert _capture(video, tmp_path / "out", "--consent", "tests", "--intrinsics", "600") == 0
+    said = " ".join(capfd.readouterr().err.split())
+    assert "3 of 30 frames show no face and are left out (frames 11, 12, 13)" in said
+    assert "no sound" in said
+    capture = Capture.open(tmp_path / "out")
+    assert capture.num_frames == 30 and capture.audio() is None
+    assert [f for f in range(30) if capture.image(0, f) is None] == [11, 12, 13]
+    assert len(capture.split.train) == 24 and capture.split.test == (27, 28, 29)
+    assert capture.cameras[0].intrinsics[0, 0] == 600.0
+    assert np.isfinite(capture.blendshapes(12)).all()
+    assert capture.provenance["consent"] == "tests"
+    details = json.loads((tmp_path / "out" / "ico3d.json").read_text())
+    assert details["frames_without_face"] == [11, 12, 13]
+    assert details["tracker"]["reprojection_px"] < 2
+    assert {f.what: f.level for f in examine(capture) if f.level == "error"} == {}
+
+
+@needs_clip
+def test_truncated_video(tmp_path, capfd):
+    whole = _shortened(tmp_path / "v.mkv", frames=24)
+    data = whole.read_bytes()
+    whole.write_bytes(data[: len(data) * 2 // 3])
+    assert _capture(whole, tmp_path / "out") == 0
+    assert 8 < Capture.open(tmp_path / "out").num_frames < 24

@@ -1,0 +1,192 @@
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.io import wavfile
+from scipy.spatial.transform import Rotation
+
+from ico3d.capture.capture import EYE_NAMES, Capture
+from ico3d.capture.expressions import BLENDSHAPES
+from ico3d.capture.portrait_files import camera_to_world, save_transforms
+from ico3d.errors import CaptureError
+
+
+def _fails(folder: Path, *words: str) -> None:
+    with pytest.raises(CaptureError) as error:
+        Capture.open(folder)
+    message = str(error.value)
+    assert all(word in message for word in words), message
+    assert "\n" not in message
+
+
+def test_what_a_folder_of_other_tools_holds(folder):
+    capture = Capture.open(folder)
+    assert (capture.kind, capture.fps, capture.num_frames) == ("portrait", 25.0, 22)
+    assert capture.split.train == tuple(range(20)) and capture.split.test == (20, 21)
+    image = capture.image(0, 3)
+    assert image.shape == (64, 64, 3) and image.dtype == np.float32 and image.max() <= 1
+    assert capture.mask(0, 3).sum() == 16 * 32 + 16 * 32 + 8 * 16 + 16 * 48
+    assert capture.head_mask(0, 3).sum() == 32 * 32
+    assert capture.background(0) == pytest.approx(200 / 255, abs=2 / 255)
+    assert capture.audio().rate == 16_000 and len(capture.audio().samples) == 22 * 640
+    assert np.isfinite(capture.points()).all() and capture.points().shape[1] == 3
+    assert capture.blendshapes(0) is None and capture.provenance["consent"] == "not stated"
+
+
+def test_landmarks_lie_where_pose_and_camera_project_the_head(folder, layout):
+    capture = Capture.open(folder)
+    for frame in (0, 7, 21):
+        camera = capture.cameras[0].moved(capture.world_from_head(frame))
+        pixels, depths = camera.project(layout.head_points())
+        assert (depths > 0).all()
+        np.testing.assert_allclose(pixels, capture.landmarks(0, frame), atol=1e-6)
+
+
+poses = st.builds(
+    lambda turn, move: _rigid(turn, move),
+    st.lists(st.floats(-3, 3), min_size=3, max_size=3),
+    st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(-5, -0.1)),
+)
+
+
+def _rigid(turn, move):
+    pose = np.eye(4)
+    pose[:3, :3] = Rotation.from_rotvec(turn).as_matrix()
+    pose[:3, 3] = move
+    return pose
+
+
+@settings(max_examples=40, deadline=None)
+@given(pose=poses)
+def test_any_pose_survives_the_layout(pose, tmp_path_factory, layout):
+    np.testing.assert_allclose(camera_to_world(pose) @ pose, np.eye(4), atol=1e-12)
+    folder = tmp_path_factory.mktemp("round") / "person"
+    (folder / "ori_imgs").mkdir(parents=True)
+    layout.Image.new("RGB", (64, 64)).save(folder / "ori_imgs" / "0.jpg")
+    save_transforms(folder, layout.FOCAL, (32.0, 32.0), [0, 1], np.stack([pose, pose]))
+    shutil.copy(folder / "ori_imgs" / "0.jpg", folder / "ori_imgs" / "1.jpg")
+    capture = Capture.open(folder)
+    np.testing.assert_allclose(capture.world_from_head(0), pose, atol=1e-12)
+    point = np.array([0.01, -0.02, 0.03])
+    seen, depth = capture.cameras[0].moved(capture.world_from_head(0)).project(point)
+    local = pose[:3, :3] @ point + pose[:3, 3]
+    assert depth == pytest.approx(-local[2])
+    if local[2] < -1e-3:
+        np.testing.assert_allclose(seen, layout.project(pose, point[None])[0], rtol=1e-9, atol=1e-6)
+    # Columns 1 and 2 of the camera negated, then inverted: OpenCV's world to camera.
+    opencv = np.linalg.inv(camera_to_world(pose) @ np.diag([1, -1, -1, 1]))
+    whole = capture.cameras[0].world_to_camera @ capture.world_from_head(0)
+    np.testing.assert_allclose(whole, opencv, atol=1e-12)
+
+
+def test_eyes_from_action_units(folder):
+    eyes = Capture.open(folder).eyes(4)
+    expected = {"browDown": 1.0, "browInnerUp": 0.5, "browOuterUp": 0.2, "eyeBlink": 0.5}
+    for name, value in zip(EYE_NAMES, eyes, strict=True):
+        assert value == pytest.approx(expected[name.removesuffix("Left").removesuffix("Right")])
+
+
+def test_blendshapes_come_before_action_units(folder):
+    rows = np.zeros((22, 52), np.float32)
+    rows[:, BLENDSHAPES.index("eyeBlinkLeft")] = np.arange(22) / 22  # a line: smoothing keeps it
+    np.save(folder / "bs.npy", rows)
+    capture = Capture.open(folder)
+    assert capture.blendshape_names == BLENDSHAPES
+    np.testing.assert_allclose(capture.eyes(11), [0, 0, 0, 0, 0, 0.5, 0], atol=1e-6)
+
+
+def test_sound_of_another_rate_is_resampled(folder):
+    wavfile.write(folder / "aud.wav", 48_000, np.zeros((48_000, 2), np.int16))
+    assert len(Capture.open(folder).audio().samples) == 16_000
+
+
+def test_no_sound_is_none(folder):
+    (folder / "aud.wav").unlink()
+    assert Capture.open(folder).audio() is None
+
+
+def test_frames_without_a_face_keep_their_number(folder, layout):
+    ids = [i for i in range(22) if i != 9]
+    layout.write_transforms(folder, ids, layout.head_poses()[ids])
+    (folder / "ori_imgs" / "9.lms").unlink()
+    capture = Capture.open(folder)
+    assert capture.num_frames == 22 and 9 not in capture.split.train
+    assert capture.image(0, 9) is None and capture.world_from_head(9) is None
+    np.testing.assert_allclose(capture.world_from_head(10), layout.head_poses()[10], atol=1e-9)
+
+
+def test_missing_frame(folder):
+    (folder / "ori_imgs" / "5.jpg").unlink()
+    (folder / "gt_imgs" / "5.jpg").unlink()
+    _fails(folder, "frame 5", "ori_imgs/5.jpg", "missing")
+
+
+def test_ids_off_by_one(folder, layout):
+    layout.write_transforms(folder, list(range(1, 23)), layout.head_poses())
+    _fails(folder, "frame 22", "missing")
+
+
+def test_ids_that_count_only_frames_with_landmarks(folder, layout):
+    (folder / "ori_imgs" / "9.lms").unlink()
+    kept = [i for i in range(22) if i != 9]
+    layout.write_transforms(folder, list(range(21)), layout.head_poses()[kept])
+    _fails(folder, "img_id", "off from frame 9", "9.lms")
+
+
+def test_rows_that_count_only_frames_with_a_face(folder):
+    np.save(folder / "bs.npy", np.zeros((21, 52), np.float32))
+    _fails(folder, "bs.npy", "21 rows", "22 frames")
+
+
+def test_action_unit_rows_are_counted(folder, layout):
+    layout.write_action_units(folder, 20)
+    _fails(folder, "au.csv", "20 rows", "22 frames")
+
+
+def test_nan_pose(folder, layout):
+    poses = layout.head_poses()
+    layout.write_transforms(folder, list(range(22)), poses)
+    file = folder / "transforms_val.json"
+    content = json.loads(file.read_text())
+    content["frames"][1]["transform_matrix"][0][3] = float("nan")
+    file.write_text(json.dumps(content))
+    _fails(folder, "transforms_val.json", "frame 21", "NaN")
+
+
+def test_pose_that_is_no_rotation(folder, layout):
+    poses = layout.head_poses()
+    poses[3, :3, :3] *= 1.1
+    layout.write_transforms(folder, list(range(22)), poses)
+    _fails(folder, "frame 3", "rotation")
+
+
+def test_nan_blendshapes(folder):
+    rows = np.zeros((22, 52), np.float32)
+    rows[6, 2] = np.nan
+    np.save(folder / "bs.npy", rows)
+    _fails(folder, "bs.npy", "row 6", "NaN")
+
+
+def test_pickled_arrays_are_refused(folder):
+    np.save(folder / "bs.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
+    _fails(folder, "bs.npy", "cannot be read")
+
+
+def test_damaged_json(folder):
+    (folder / "transforms_train.json").write_text('{"frames": [')
+    _fails(folder, "transforms_train.json", "cannot be read")
+
+
+def test_scaled_pictures_do_not_fit_the_lens(folder, layout):
+    for frame in range(22):
+        layout.Image.new("RGB", (16, 16)).save(folder / "gt_imgs" / f"{frame}.jpg")
+    _fails(folder, "principal point", "16x16")
+
+
+def test_nothing_there(tmp_path):
+    _fails(tmp_path / "nowhere", "there is no capture")
+    _fails(tmp_path, "in no format known here")
