@@ -1,7 +1,16 @@
 import numpy as np
 import pytest
 
-from ico3d.capture.multipie import CHIN, FACE_OVAL, FOREHEAD, INNER_LIPS, MULTI_PIE, SIDES
+from ico3d.capture.multipie import (
+    CHIN,
+    FACE_OVAL,
+    FOREHEAD,
+    INNER_LIPS,
+    JAW,
+    MULTI_PIE,
+    OUTER_LIPS,
+    SIDES,
+)
 from ico3d.capture.plate import clean_plate, filled
 
 cv2 = pytest.importorskip("cv2")
@@ -64,6 +73,9 @@ def _face():
     face[INNER_LIPS] = [120, 135] + 6 * np.stack(
         [np.cos(turn[:20] * 1.8), np.sin(turn[:20] * 1.8)], 1
     )
+    face[OUTER_LIPS] = 1.4 * (face[INNER_LIPS] - [120, 135]) + [120, 135]
+    low = np.linspace(0.6, 2 * np.pi - 0.6, 2 * len(JAW))[len(JAW) // 2 :][: len(JAW)]
+    face[JAW] = np.stack([120 + 40 * np.sin(low), 110 - 52 * np.cos(low)], 1)
     face[CHIN], face[FOREHEAD] = (120, 162), (120, 58)
     face[SIDES[0]], face[SIDES[1]] = (80, 110), (160, 110)
     return face
@@ -78,7 +90,8 @@ def test_person_is_cut_out_and_parsed():
     alpha = matting.cut(image, faces[0], models)
     both = ((alpha > 0.5) & truth).sum() / ((alpha > 0.5) | truth).sum()
     assert both > 0.95
-    parts = parsing.parse(image, alpha, faces[0])
+    colours = parsing.learn_colours(images, [alpha] * 4, faces)
+    parts = parsing.parse(image, alpha, faces[0], colours)
     at = {"face": (110, 95), "mouth": (135, 120), "hair": (40, 120), "neck": (170, 120)}
     colours = {name: tuple(parts[place].tolist()) for name, place in at.items()}
     assert colours == {

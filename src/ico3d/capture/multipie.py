@@ -20,13 +20,15 @@ FACE_OVAL = np.array([
 INNER_LIPS = np.array([
     78, 95, 88, 178, 87, 14, 317, 402, 318, 324, 308, 415, 310, 311, 312, 13, 82, 81, 80, 191,
 ])
+OUTER_LIPS = np.array([
+    61, 146, 91, 181, 84, 17, 314, 405, 321, 375, 291, 409, 270, 269, 267, 0, 37, 39, 40, 185,
+])
+JAW = np.array([
+    132, 58, 172, 136, 150, 149, 176, 148, 152, 377, 400, 378, 379, 365, 397, 288, 361,
+])
 # fmt: on
 CHIN = 152
 FOREHEAD = 10
 SIDES = (234, 454)
 """Outermost points of the face beside the ears, the person's right first."""
-EYE_CENTERS = (
-    np.array([33, 133, 159, 145]),
-    np.array([263, 362, 386, 374]),
-)
-"""Landmarks around the person's right eye, and the left one."""
+NOSE_BRIDGE = 168

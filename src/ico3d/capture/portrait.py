@@ -202,7 +202,7 @@ def _save_blendshapes(work: Path, readings: Readings) -> None:
 def _save_mattes(work: Path, readings: Readings) -> float:
     """Person, parts, clean plate and composites; returns the share of background seen."""
     landmarks = np.stack(readings.landmarks)
-    models = _learn(work, readings, landmarks)
+    models, colours = _learn(work, readings, landmarks)
     chosen = set(_spread(len(readings.frames), SAMPLES))
     images, alphas = [], []
     steps = progress(range(len(readings.frames)), "cutting out the person", console=console)
@@ -210,7 +210,7 @@ def _save_mattes(work: Path, readings: Readings) -> float:
         number = readings.frames[index]
         image = load_uint8(work / "ori_imgs" / f"{number}.jpg")
         alpha = matting.cut(image, landmarks[index], models)
-        parts = parsing.parse(image, alpha, landmarks[index])
+        parts = parsing.parse(image, alpha, landmarks[index], colours)
         torso = alpha * parsing.is_class(parts, parsing.NECK, parsing.CLOTH)
         save_picture(work / "alpha" / f"{number}.png", (alpha * 255).round().astype(np.uint8))
         save_picture(work / "parsing" / f"{number}.png", parts)
@@ -225,16 +225,18 @@ def _save_mattes(work: Path, readings: Readings) -> float:
     return seen
 
 
-def _learn(work: Path, readings: Readings, landmarks: np.ndarray) -> matting.Models:
-    """Colour models from a dozen frames."""
+def _learn(
+    work: Path, readings: Readings, landmarks: np.ndarray
+) -> tuple[matting.Models, parsing.PartColours]:
+    """Colours of background, person and parts, from a dozen frames."""
     chosen = _spread(len(readings.frames), 12)
-    images = [
-        matting.working(load_uint8(work / "ori_imgs" / f"{readings.frames[i]}.jpg")) for i in chosen
-    ]
-    with Image.open(work / "ori_imgs" / f"{readings.frames[0]}.jpg") as picture:
-        scale = images[0].shape[1] / picture.width
+    whole = [load_uint8(work / "ori_imgs" / f"{readings.frames[i]}.jpg") for i in chosen]
+    images = [matting.working(image) for image in whole]
+    faces = landmarks[chosen] * (images[0].shape[1] / whole[0].shape[1])
     with console.status("learning the colours of person and background"):
-        return matting.learn(images, landmarks[chosen] * scale)
+        models = matting.learn(images, faces)
+        alphas = [matting.cut(*view, models) for view in zip(images, faces, strict=True)]
+        return models, parsing.learn_colours(images, alphas, faces)
 
 
 def _save_composites(work: Path, readings: Readings, plate: np.ndarray) -> None:
