@@ -67,7 +67,7 @@ def _resampled(points: np.ndarray, count: int, rng: np.random.Generator) -> np.n
         return points[np.sort(rng.choice(len(points), count, replace=False))]
     _, neighbours = KDTree(points).query(points, k=4)  # (P, 4), itself first
     source = rng.integers(len(points), size=count - len(points))  # (extra,)
-    partner = neighbours[source, rng.integers(1, 4, size=len(source))]  # (extra,)
+    partner = np.asarray(neighbours)[source, rng.integers(1, 4, size=len(source))]  # (extra,)
     weight = rng.random((len(source), 1))
     between = points[source] * weight + points[partner] * (1 - weight)
     return np.concatenate([points, between])

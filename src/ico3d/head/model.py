@@ -154,7 +154,7 @@ class HeadModel(nn.Module):
         """γ(μ): (N, 3 + 6·L), positions relative to the head box with their sines and cosines."""
         center = self.means.new_tensor(self.shape.box_center)
         positions = (self.means - center) / self.shape.box_size  # (N, 3), about −1 … 1
-        octaves = math.pi * 2.0 ** torch.arange(self.shape.frequencies, device=positions.device)
+        octaves = math.pi * 2.0 ** torch.arange(self.shape.frequencies).to(positions)  # (L,)
         angles = (positions[:, None] * octaves[:, None]).flatten(1)  # (N, 3·L)
         return torch.cat([positions, angles.sin(), angles.cos()], 1)
 

@@ -45,3 +45,47 @@ class Evaluate:
         console = Console()
         for name, value in metrics.items():
             console.print(f"{name:16} {'not measured' if value is None else f'{value:.3f}'}")
+
+
+@dataclass(frozen=True)
+class BenchRaster:
+    """Times the CPU rasteriser against another program on the same projected Gaussians.
+
+    Attributes:
+        against: The opponent's Python script; it is run, so name only one that you trust.
+        json: File for the figures.
+        n: Gaussians.
+        size: Image width and height in pixels, a multiple of 16.
+        runs: Turns; medians are reported.
+        threads: Threads of either program.
+    """
+
+    against: Path
+    json: Path | None = None
+    n: int = 20_000
+    size: int = 256
+    runs: int = 40
+    threads: int = 2
+
+    def run(self) -> None:
+        """Prints the table, writes the figures."""
+        import json
+        import os
+
+        # Both read these when their thread pools come up, which is after this line.
+        os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = str(self.threads)
+
+        from rich.console import Console
+        from rich.table import Table
+
+        from ico3d.common.files import write_atomic
+        from ico3d.measure.raster import compare
+
+        figures = compare(self.against, self.n, self.size, self.runs)
+        figures |= {"gaussians": self.n, "size": self.size, "threads": self.threads}
+        if self.json is not None:
+            write_atomic(self.json, json.dumps(figures, indent=1).encode())
+        table = Table("figure", "value")
+        for name, value in figures.items():
+            table.add_row(name, f"{value:.3g}")
+        Console().print(table)

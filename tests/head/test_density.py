@@ -1,0 +1,60 @@
+"""Density control of a head: everything follows the plan."""
+
+import dataclasses
+
+import torch
+
+from ico3d.head.density import HeadDensity
+from ico3d.head.model import GAUSSIAN_AXES, HeadModel, HeadShape
+from ico3d.head.settings import PRESETS
+from ico3d.splat.density import DensityStats
+from ico3d.training.optimiser import Optimiser
+
+SETTINGS = dataclasses.replace(
+    PRESETS["cpu"], densify_from=0, densify_every=1, densify_until=9, densify_gradient=0.5,
+    prune_opacity=0.01, max_gaussians=10,
+)  # fmt: skip
+
+
+def _planned() -> tuple[HeadModel, HeadModel, Optimiser]:
+    """Three Gaussians: one stays, a small one is cloned, a faint one dies; before and after."""
+    models = [HeadModel(HeadShape(2, features=4), 3) for _ in range(2)]
+    for model in models:
+        model.log_scales.data.fill_(-9)
+        numbers = torch.arange(3.0)
+        model.means.data = numbers[:, None].repeat(1, 3)
+        model.basis.data = numbers[None, :, None].repeat(3, 1, 4).clone()
+    before, after = models
+    optimiser = Optimiser()
+    for name in GAUSSIAN_AXES:
+        optimiser.moments[f"{name}.first"] = getattr(after, name).detach().clone() + 1
+        optimiser.moments[f"{name}.second"] = getattr(after, name).detach().clone() + 2
+    density = HeadDensity(SETTINGS, 0)
+    density._stats = DensityStats(torch.tensor([0.0, 1.0, 1.0]), torch.ones(3))
+    density.adapt(after, optimiser, lambda step: torch.tensor([0.9, 0.9, 0.001]), 1)
+    return before, after, optimiser
+
+
+def test_clones_copy_basis_and_geometry():
+    before, after, _ = _planned()
+    assert len(after) == 3
+    sources = [0, 1, 1]
+    for name, axis in GAUSSIAN_AXES.items():
+        expected = getattr(before, name).index_select(axis, torch.tensor(sources))
+        torch.testing.assert_close(getattr(after, name), expected)
+
+
+def test_moments_follow_and_those_of_clones_begin_at_zero():
+    before, _, optimiser = _planned()
+    for name, axis in GAUSSIAN_AXES.items():
+        moment = optimiser.moments[f"{name}.first"].movedim(axis, 0)
+        old = getattr(before, name).detach().movedim(axis, 0) + 1
+        torch.testing.assert_close(moment[:2], old[:2])
+        assert not moment[2].any()
+
+
+def test_what_was_gathered_survives_a_checkpoint():
+    density, other = HeadDensity(SETTINGS, 0), HeadDensity(SETTINGS, 0)
+    density._stats = DensityStats(torch.tensor([1.0, 2.0]), torch.tensor([3.0, 4.0]))
+    other.restore(density.tensors())
+    torch.testing.assert_close(other._stats.mean_gradient(), density._stats.mean_gradient())

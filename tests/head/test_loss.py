@@ -1,0 +1,83 @@
+"""The loss: its parts, and the perceptual term with and without weights."""
+
+import dataclasses
+import logging
+
+import pytest
+import torch
+from safetensors.torch import save_file
+
+from ico3d.errors import ModelError
+from ico3d.head.loss import HeadLoss
+from ico3d.head.perceptual import WEIGHTS, PerceptualLoss
+from ico3d.head.settings import PRESETS
+from ico3d.splat.losses import ssim
+from ico3d.splat.rendering import Drawing, Rendering
+
+PAPER = PRESETS["paper"]
+
+
+def _rendering(image: torch.Tensor, alpha: torch.Tensor) -> Rendering:
+    return Rendering(image[None], alpha[None], Drawing(image[None], alpha[None], None, None))
+
+
+def _images() -> tuple[torch.Tensor, torch.Tensor]:
+    generator = torch.Generator().manual_seed(0)
+    return torch.rand(16, 20, 3, generator=generator), torch.rand(16, 20, 3, generator=generator)
+
+
+def test_l1_ssim_and_alpha_are_weighted():
+    image, target = _images()
+    settings = dataclasses.replace(PAPER, steps=10, alpha_weight=0.5)
+    alpha, mask = torch.full((16, 20), 0.25), torch.ones(16, 20)
+    loss = HeadLoss(settings)(_rendering(image, alpha), target, mask, 0)
+    expected = 0.8 * (image - target).abs().mean() + 0.2 * (1 - ssim(image, target)) + 0.5 * 0.75
+    torch.testing.assert_close(loss, expected)
+
+
+@pytest.fixture
+def models(tmp_path, monkeypatch):
+    monkeypatch.setenv("ICO3D_MODELS", str(tmp_path))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    return tmp_path
+
+
+def test_without_weights_training_goes_on_with_one_warning(models, caplog):
+    image, target = _images()
+    with caplog.at_level(logging.WARNING):
+        loss = HeadLoss(PAPER)
+    assert len(caplog.records) == 1
+    assert WEIGHTS in caplog.text
+    rendering = _rendering(image, torch.ones(16, 20))
+    assert loss(rendering, target, None, 20_000) == loss(rendering, target, None, 0)
+
+
+def _write_weights(folder) -> None:
+    generator = torch.Generator().manual_seed(0)
+    tensors, width, index = {}, 3, 0
+    for channels in (64, 64, 0, 128, 128, 0, 256, 256, 256):
+        if channels:
+            shape = (channels, width, 3, 3)
+            tensors[f"features.{index}.weight"] = torch.randn(shape, generator=generator) * 0.05
+            tensors[f"features.{index}.bias"] = torch.zeros(channels)
+            width, index = channels, index + 2
+        else:
+            index += 1
+    save_file(tensors, folder / WEIGHTS)
+
+
+def test_the_perceptual_term_starts_when_it_should(models):
+    _write_weights(models)
+    image, target = _images()
+    loss, rendering = HeadLoss(PAPER), _rendering(image, torch.ones(16, 20))
+    early, late = (loss(rendering, target, None, step) for step in (9_999, 10_000))
+    distance = PerceptualLoss()(image, target)
+    assert distance > 0
+    torch.testing.assert_close(late - early, 0.1 * distance)
+    assert PerceptualLoss()(target, target) == 0
+
+
+def test_other_weights_are_one_sentence(models):
+    save_file({"features.0.weight": torch.zeros(1)}, models / WEIGHTS)
+    with pytest.raises(ModelError, match="does not hold VGG-16 weights"):
+        PerceptualLoss()

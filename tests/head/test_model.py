@@ -1,0 +1,93 @@
+"""The head model: shapes, the paper's equations, files."""
+
+import math
+
+import pytest
+import torch
+
+from ico3d.errors import ModelError
+from ico3d.head.model import HeadModel, HeadShape
+from ico3d.training.checkpoint import save_tensors
+
+VARIANTS = ("full", "no-mlp", "no-blending", "static")
+
+
+def _model(variant: str, dtype=torch.float64, count: int = 5) -> HeadModel:
+    torch.manual_seed(0)
+    model = HeadModel(HeadShape(3, variant, features=8, hidden=6, frequencies=2), count).to(dtype)
+    model.means.data = torch.randn(count, 3, dtype=dtype)
+    model.basis.data += torch.randn_like(model.basis)
+    return model
+
+
+@pytest.mark.parametrize(
+    ("variant", "basis"),
+    [("full", (4, 5, 8)), ("no-mlp", (4, 5, 4)), ("no-blending", (1, 5, 8)), ("static", (1, 5, 4))],
+)
+def test_the_basis_has_a_row_per_expression_value_and_one_for_the_bias(variant, basis):
+    assert _model(variant).basis.shape == basis
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_a_new_head_is_faint_whatever_the_expression(variant):
+    model = HeadModel(HeadShape(3, variant), 4)
+    if model.shape.has_mlp:
+        torch.nn.init.zeros_(model.opacity_branch.weight)
+    for expression in (torch.zeros(3), torch.ones(3)):
+        torch.testing.assert_close(model(expression).opacities, torch.full((4,), 0.1))
+
+
+def test_full_follows_the_equations():
+    model, expression = _model("full"), torch.tensor([0.2, -0.5, 0.7], dtype=torch.float64)
+    features = torch.einsum("bnf,b->nf", model.basis[:3], expression) + model.basis[3]
+    position = model.means / model.shape.box_size
+    angles = [position * math.pi * 2**octave for octave in range(2)]
+    parts = [features, position, *(a.sin() for a in angles), *(a.cos() for a in angles)]
+    encoded = torch.cat(parts[1:], 1)
+    assert sorted(encoded[0].tolist()) == pytest.approx(
+        sorted(model.encoded_positions()[0].tolist())
+    )
+    inputs = torch.cat([features, model.encoded_positions()], 1)
+    hidden = torch.nn.functional.leaky_relu(model.trunk(inputs))
+    gaussians = model(expression)
+    torch.testing.assert_close(gaussians.colors, model.color_branch(hidden).sigmoid())
+    torch.testing.assert_close(gaussians.opacities, model.opacity_branch(hidden).sigmoid()[:, 0])
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_gradients_by_finite_differences(variant):
+    model = _model(variant)
+    names = [name for name, _ in model.named_parameters() if name not in ("quats", "log_scales")]
+
+    def appearance(expression, *values):
+        named = dict(zip(names, values, strict=True))
+        gaussians = torch.func.functional_call(model, named, expression)
+        return gaussians.colors, gaussians.opacities
+
+    expression = torch.tensor([0.2, -0.5, 0.7], dtype=torch.float64, requires_grad=True)
+    parameters = [dict(model.named_parameters())[name] for name in names]
+    assert torch.autograd.gradcheck(appearance, (expression, *parameters))
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_only_static_ignores_the_expression(variant):
+    model = _model(variant)
+    zeros, ones = (torch.full((3,), v, dtype=torch.float64) for v in (0.0, 1.0))
+    same = torch.equal(model.logits(zeros), model.logits(ones))
+    assert same == (variant == "static")
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_a_file_brings_the_same_head_back(tmp_path, variant):
+    model = _model(variant, torch.float32)
+    model.save(tmp_path / "model.safetensors")
+    loaded = HeadModel.load(tmp_path / "model.safetensors")
+    assert loaded.shape == model.shape
+    expression = torch.tensor([0.2, -0.5, 0.7])
+    assert torch.equal(loaded.logits(expression), model.logits(expression))
+
+
+def test_a_file_of_something_else_is_one_sentence(tmp_path):
+    save_tensors(tmp_path / "x.safetensors", {"a": torch.zeros(1)}, {"shape": {"nonsense": 1}})
+    with pytest.raises(ModelError, match="does not hold a head model"):
+        HeadModel.load(tmp_path / "x.safetensors")
