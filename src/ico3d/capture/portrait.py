@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import track as progress
 
 from ico3d.capture import matting, parsing, tracking
-from ico3d.capture.alignment import align, rigid_landmarks
+from ico3d.capture.alignment import align, rigid_landmarks, spread_poses
 from ico3d.capture.capture import Sound
 from ico3d.capture.face import (
     LANDMARKS,
@@ -25,13 +25,15 @@ from ico3d.capture.multipie import MULTI_PIE
 from ico3d.capture.plate import SAMPLES, clean_plate
 from ico3d.capture.portrait_files import (
     DETAILS,
+    OPENGL_FROM_OPENCV,
     save_landmarks,
     save_picture,
     save_torso,
     save_transforms,
 )
-from ico3d.capture.surface import surface_points
+from ico3d.capture.surface import face_points, silhouette_points
 from ico3d.capture.video import Video, open_video, read_sound
+from ico3d.common.camera import Camera
 from ico3d.common.files import model_file
 from ico3d.errors import CaptureError
 
@@ -118,9 +120,9 @@ def _write(work: Path, video: Video, model: Path, settings: PortraitSettings) ->
     given = settings.focal and settings.focal * video.scale
     track = _track(work, readings, canonical, video, given)
     save_transforms(work, track.focal, track.center.tolist(), readings.frames, track.poses())
-    np.save(work / "points.npy", surface_points(track.shape, canonical.triangles))
     _save_blendshapes(work, readings)
     seen = _save_mattes(work, readings)
+    _save_points(work, readings, track, canonical)
     sound = read_sound(video.path)
     if sound is None:
         notes.append("the video has no sound: speech cannot drive a head trained on it")
@@ -246,6 +248,27 @@ def _save_composites(work: Path, readings: Readings, plate: np.ndarray) -> None:
         alpha = load_uint8(work / "alpha" / f"{number}.png")[..., None] / np.float32(255)
         mixed = image * alpha + plate * (1 - alpha)
         save_picture(work / "gt_imgs" / f"{number}.jpg", mixed.round().astype(np.uint8))
+
+
+def _save_points(
+    work: Path, readings: Readings, track: tracking.Track, canonical: CanonicalFace
+) -> None:
+    """`points.npy`: the face as tracked; hair, neck and chest as the middle pose shows them."""
+    middle = spread_poses(track, 1)[0]
+    parts = load_uint8(work / "parsing" / f"{readings.frames[middle]}.png")
+    height, width = parts.shape[:2]
+    x, y = track.center
+    lens = np.array([[track.focal, 0, x], [0, track.focal, y], [0, 0, 1]])
+    camera = Camera(width, height, lens, OPENGL_FROM_OPENCV)
+    pose = track.poses()[middle]
+    hair = parsing.is_class(parts, parsing.HAIR) > 0
+    torso = parsing.is_class(parts, parsing.NECK, parsing.CLOTH) > 0
+    points = [
+        face_points(track.shape, canonical.triangles),
+        silhouette_points(hair, camera, pose, (-0.03, 0.04), 4000),
+        silhouette_points(torso, camera, pose, (-0.06, 0.0), 3000),
+    ]
+    np.save(work / "points.npy", np.concatenate(points))
 
 
 def _save_sound(work: Path, sound: Sound) -> None:

@@ -2,12 +2,16 @@
 
 import numpy as np
 
+from ico3d.common.camera import Camera
+
 PER_TRIANGLE = 6
 """Points drawn in each triangle of the face."""
+THICKNESS = 0.008
+"""Standard deviation in metres of the depth of points that are only guessed."""
 
 
-def surface_points(face: np.ndarray, triangles: np.ndarray, seed: int = 0) -> np.ndarray:
-    """The tracked face, and around it a guess of head, neck and shoulders.
+def face_points(face: np.ndarray, triangles: np.ndarray, seed: int = 0) -> np.ndarray:
+    """Points on the tracked face.
 
     Args:
         face: (468, 3) landmarks in canonical head space, metres.
@@ -19,8 +23,40 @@ def surface_points(face: np.ndarray, triangles: np.ndarray, seed: int = 0) -> np
     """
     random = np.random.default_rng(seed)
     shares = random.dirichlet(np.ones(3), (len(triangles), PER_TRIANGLE))  # (T, n, 3)
-    drawn = np.einsum("tnk,tkd->tnd", shares, face[triangles]).reshape(-1, 3)
-    return np.concatenate([drawn, body_guess(face, random)]).astype(np.float32)
+    drawn = np.einsum("tnk,tkd->tnd", shares, face[triangles])  # (T, n, 3)
+    return drawn.reshape(-1, 3).astype(np.float32)
+
+
+def silhouette_points(
+    mask: np.ndarray, camera: Camera, head: np.ndarray, depths: tuple[float, float], count: int
+) -> np.ndarray:
+    """Points on a bulging sheet that fills a part of the picture.
+
+    Args:
+        mask: (H, W) bool, the part.
+        camera: Who took the picture.
+        head: (4, 4) world from head in that picture.
+        depths: Metres by which outline and middle of the part lie nearer than the head's origin.
+        count: Points to draw.
+
+    Returns:
+        (count, 3) float32 in canonical head space; none where the part is empty.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    rows, columns = np.nonzero(mask)
+    if not len(rows):
+        return np.empty((0, 3), np.float32)
+    random = np.random.default_rng(count)
+    drawn = random.integers(0, len(rows), count)
+    inside = np.asarray(distance_transform_edt(mask))[rows[drawn], columns[drawn]]
+    bulge = depths[0] + (depths[1] - depths[0]) * np.sqrt(inside / inside.max())
+    moved = camera.moved(head)
+    depth = moved.world_to_camera[2, 3] - bulge + random.normal(0, THICKNESS, count)
+    pixels = np.stack([columns[drawn], rows[drawn]], 1) + random.random((count, 2))
+    rays = np.concatenate([pixels, np.ones((count, 1))], 1) @ np.linalg.inv(moved.intrinsics).T
+    local = np.concatenate([rays * depth[:, None], np.ones((count, 1))], 1)  # (count, 4)
+    return (local @ moved.camera_to_world.T)[:, :3].astype(np.float32)
 
 
 def body_guess(face: np.ndarray, random: np.random.Generator) -> np.ndarray:
