@@ -48,7 +48,7 @@ def make_app(bundle: Bundle, avatar: Avatar, host: str, sessions: Sessions | Non
         host: The address that the server is bound to.
         sessions: Where sessions live; a new place by default.
     """
-    sessions = sessions or Sessions(avatar)
+    sessions = Sessions(avatar) if sessions is None else sessions
     notices = [] if avatar.speech else [STILL]
     described = avatar.services.described()
     welcome = Welcome(protocol.VERSION, "-", False, described, notices)

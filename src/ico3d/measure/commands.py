@@ -89,3 +89,47 @@ class BenchRaster:
         for name, value in figures.items():
             table.add_row(name, f"{value:.3g}")
         Console().print(table)
+
+
+@dataclass(frozen=True)
+class BenchTalk:
+    """Times spoken questions to a served bundle, from their end to the answer's first sound.
+
+    Attributes:
+        bundle: The avatar to serve; the server runs as a process of its own.
+        turns: How many questions.
+        question: Recorded question (WAV, PCM16 mono 16 kHz); synthetic voices ask by default.
+        json: File for the figures.
+    """
+
+    bundle: tyro.conf.Positional[Path]
+    turns: int = 20
+    question: Path | None = None
+    json: Path | None = None
+
+    def run(self) -> None:
+        """Prints median and 95th percentile of the whole and of its parts."""
+        import asyncio
+        import json
+
+        from rich.console import Console
+        from rich.progress import Progress
+        from rich.table import Table
+
+        from ico3d.common.files import write_atomic
+        from ico3d.measure import talk
+
+        made = self.question is None
+        questions = talk.made_questions() if made else [talk.read_question(self.question)]
+        with talk.serving(self.bundle) as url, Progress() as progress:
+            task = progress.add_task("talking", total=self.turns)
+            turns = asyncio.run(
+                talk.talk(url, questions, self.turns, lambda _: progress.advance(task))
+            )
+        figures = talk.summary(turns)
+        if self.json is not None:
+            write_atomic(self.json, json.dumps(figures, indent=1).encode())
+        table = Table("part (ms)", "p50", "p95")
+        for name, values in figures.items():
+            table.add_row(name, f"{values['p50']:.0f}", f"{values['p95']:.0f}")
+        Console().print(table)

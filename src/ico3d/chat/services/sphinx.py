@@ -6,6 +6,7 @@ from collections.abc import AsyncGenerator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+import numpy as np
 from pipecat.frames.frames import (
     Frame,
     InterimTranscriptionFrame,
@@ -25,7 +26,39 @@ from ico3d.errors import MissingExtraError
 
 LEAD_IN = 0.7  # s of sound before the VAD noticed speech: it needs 0.2 s to be sure
 PARTIAL_EVERY = 0.25  # s of sound between partial transcripts
+LOUDNESS = 1500.0  # RMS of the loudest 0.2 s: what the acoustic model hears best
+MOST_GAIN = 10.0
+NOISE = 30.0  # RMS; the model was trained on rooms, digital silence derails it
 SLOWEST = 1.0  # s that the last words may take after speech has ended
+
+
+class Leveller:
+    """Brings speech to one loudness, over a little noise.
+
+    On 16 synthetic questions it took the word error rate from 0.68 to 0.15; on two recordings of
+    people, with 22 words, 3 errors became 5.
+    """
+
+    def __init__(self):
+        """Unit gain until the first utterance."""
+        self._random = np.random.default_rng(0)
+        self._gain = 1.0
+
+    def measure(self, lead_in: bytes) -> None:
+        """Sets the gain for an utterance from its first moments."""
+        energy = np.frombuffer(lead_in, np.int16).astype(np.float64) ** 2
+        count = min(len(energy), MICROPHONE_RATE // 5)
+        if count == 0:
+            return
+        sums = np.cumsum(np.concatenate([[0.0], energy]))
+        loudest = np.sqrt(max(1.0, (sums[count:] - sums[:-count]).max() / count))
+        self._gain = float(np.clip(LOUDNESS / loudest, 1 / MOST_GAIN, MOST_GAIN))
+
+    def apply(self, audio: bytes) -> bytes:
+        """The same sound, levelled."""
+        samples = np.frombuffer(audio, np.int16) * self._gain
+        samples = samples + self._random.normal(0, NOISE, len(samples))
+        return np.clip(samples, -32768, 32767).astype(np.int16).tobytes()
 
 
 class SphinxRecognition(STTService):
@@ -36,6 +69,7 @@ class SphinxRecognition(STTService):
         settings = STTSettings(model="en-us", language=None)
         super().__init__(ttfs_p99_latency=SLOWEST, settings=settings)
         self._decoder = decoder
+        self._leveller = Leveller()
         self._thread = ThreadPoolExecutor(1, "recognition")
         self._sound: asyncio.Queue[bytes | None] = asyncio.Queue()  # None: speech has ended
         self._before: deque[bytes] = deque()
@@ -74,8 +108,10 @@ class SphinxRecognition(STTService):
     async def _handle_vad_user_started_speaking(self, frame: VADUserStartedSpeakingFrame):
         await super()._handle_vad_user_started_speaking(frame)
         self._hearing = True
-        for audio in self._before:
-            self._sound.put_nowait(audio)
+        lead_in = b"".join(self._before)
+        self._leveller.measure(lead_in)
+        if lead_in:
+            self._sound.put_nowait(lead_in)
         self._before.clear()
         self._before_bytes = 0
 
@@ -113,7 +149,7 @@ class SphinxRecognition(STTService):
         if not self._decoding:
             self._decoder.start_utt()
             self._decoding = True
-        self._decoder.process_raw(audio, False, False)
+        self._decoder.process_raw(self._leveller.apply(audio), False, False)
         return self._words()
 
     def _finish(self) -> str:
