@@ -11,7 +11,7 @@ const CLOCK_PERIOD = 200; // ms between reports of what has been heard
 export interface ConversationView {
   state(state: StateMessage['state'] | 'connecting'): void;
   question(text: string, final: boolean): void;
-  answer(utterance: number, text: string): void;
+  answer(sentence: string): void;
   services(services: Services): void;
   notice(sentence: string): void;
   microphone(open: boolean): void;
@@ -111,7 +111,7 @@ export class Conversation {
       case 'transcript':
         return this.transcript(message.text, message.final);
       case 'answer':
-        return this.view.answer(message.utterance, message.text);
+        return this.view.answer(message.text);
       case 'speech':
         return this.player.play(message);
       case 'end':

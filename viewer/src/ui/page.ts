@@ -28,7 +28,7 @@ export function makePage(overlay: Overlay, frames: () => number): { view: Conver
       controls.setSpeaking(state === 'speaking');
     },
     question: (text, final) => captions.question(text, final),
-    answer: (utterance, text) => captions.answer(utterance, text),
+    answer: (sentence) => captions.answer(sentence),
     services: showStandIns,
     notice: showNotice,
     microphone: (open) => controls.setMicrophone(open),
