@@ -11,7 +11,7 @@ from ico3d.capture.multipie import (
     OUTER_LIPS,
     SIDES,
 )
-from ico3d.capture.plate import clean_plate, filled
+from ico3d.capture.plate import clean_plate, filled, mismatch
 
 cv2 = pytest.importorskip("cv2")
 
@@ -44,6 +44,9 @@ def test_clean_plate_is_the_background_wherever_it_was_seen():
     plate, seen = clean_plate(images, alphas)
     assert seen == 1.0
     np.testing.assert_array_equal(plate, background)
+    assert mismatch(plate, images, alphas) == 0.0
+    shifted = [np.roll(image, 3, axis=0) for image in images]
+    assert mismatch(plate, shifted, alphas) > 0.2
 
 
 def _scene():
@@ -102,3 +105,22 @@ def test_person_is_cut_out_and_parsed():
     }
     assert tuple(parts[225, 60].tolist()) == parsing.CLOTH
     assert tuple(parts[10, 10].tolist()) == parsing.BACKGROUND
+
+
+def test_silhouette_points_project_into_the_silhouette():
+    from ico3d.capture.surface import silhouette_points
+    from ico3d.common.camera import Camera
+
+    lens = np.array([[300.0, 0, 40], [0, 300.0, 30], [0, 0, 1]])
+    camera = Camera(80, 60, lens, np.diag([1.0, -1, -1, 1]))
+    head = np.eye(4)
+    head[:3, :3] = [[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]]
+    head[:3, 3] = [0.01, -0.02, -0.7]
+    mask = np.zeros((60, 80), bool)
+    mask[10:40, 20:50] = True
+    points = silhouette_points(mask, camera, head, (-0.03, 0.04), 500)
+    pixels, depths = camera.moved(head).project(points)
+    columns, rows = np.floor(pixels + 1e-4).astype(int).T
+    assert mask[rows, columns].mean() > 0.99
+    assert 0.62 < depths.min() < depths.max() < 0.77
+    assert not len(silhouette_points(mask & False, camera, head, (0.0, 0.0), 10))

@@ -74,7 +74,7 @@ class FaceReader:
         self._landmarker.close()
 
     def read(self, image: np.ndarray) -> Face | None:
-        """The face in a picture, the largest if there are several.
+        """The face in a picture; one of them if there are several.
 
         Args:
             image: uint8 RGB (H, W, 3), contiguous.

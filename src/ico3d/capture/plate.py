@@ -26,6 +26,19 @@ def clean_plate(images: list[np.ndarray], alphas: list[np.ndarray]) -> tuple[np.
     return filled(plate, seen).round().astype(np.uint8), float(seen.mean())
 
 
+def mismatch(plate: np.ndarray, images: list[np.ndarray], alphas: list[np.ndarray]) -> float:
+    """Median over pictures of the mean difference, 0 to 1, between plate and what is around."""
+    around = [alpha < 0.01 for alpha in alphas]
+    return float(
+        np.median(
+            [
+                np.abs(image[out].astype(np.float32) - plate[out]).mean() / 255 if out.any() else 0
+                for image, out in zip(images, around, strict=True)
+            ]
+        )
+    )
+
+
 def filled(image: np.ndarray, seen: np.ndarray) -> np.ndarray:
     """Fills what was not seen from its surroundings: halve until nothing is missing, and back.
 

@@ -22,7 +22,7 @@ from ico3d.capture.face import (
     canonical_face,
 )
 from ico3d.capture.multipie import MULTI_PIE
-from ico3d.capture.plate import SAMPLES, clean_plate
+from ico3d.capture.plate import SAMPLES, clean_plate, mismatch
 from ico3d.capture.portrait_files import (
     DETAILS,
     OPENGL_FROM_OPENCV,
@@ -38,6 +38,8 @@ from ico3d.common.files import model_file
 from ico3d.errors import CaptureError
 
 FPS = 25.0
+MOVING = 0.04
+"""Mean difference from the clean plate above which a camera cannot have stood still."""
 console = Console(stderr=True)
 
 
@@ -121,13 +123,19 @@ def _write(work: Path, video: Video, model: Path, settings: PortraitSettings) ->
     track = _track(work, readings, canonical, video, given)
     save_transforms(work, track.focal, track.center.tolist(), readings.frames, track.poses())
     _save_blendshapes(work, readings)
-    seen = _save_mattes(work, readings)
+    seen, moved = _save_mattes(work, readings)
+    if moved > MOVING:
+        notes.append("the background moves: use a steady camera, or expect a blurred background")
     _save_points(work, readings, track, canonical)
     sound = read_sound(video.path)
     if sound is None:
         notes.append("the video has no sound: speech cannot drive a head trained on it")
     else:
         _save_sound(work, sound)
+    console.print(
+        f"{len(readings.frames)} of {readings.total} frames tracked, focal length "
+        f"{track.focal:.0f} px, reprojection error {_reprojection_error(readings, track):.2f} px"
+    )
     for note in notes:
         console.print(f"[yellow]warning:[/] {video.path}: {note}.")
     _save_details(work, video, readings, track, settings, notes, seen)
@@ -136,7 +144,7 @@ def _write(work: Path, video: Video, model: Path, settings: PortraitSettings) ->
 def _read_faces(work: Path, video: Video, model: Path) -> Readings:
     """Writes every picture and reads the face in it."""
     readings = Readings()
-    total = video.announced or None
+    total = round(video.announced / video.rate * FPS) if video.announced * video.rate else None
     with FaceReader(model) as reader:
         frames = progress(video.frames(FPS), "finding the face", total, console=console)
         for number, image in enumerate(frames):
@@ -201,8 +209,8 @@ def _save_blendshapes(work: Path, readings: Readings) -> None:
     np.save(work / "bs.npy", np.stack(rows, 1).astype(np.float32))
 
 
-def _save_mattes(work: Path, readings: Readings) -> float:
-    """Person, parts, clean plate and composites; returns the share of background seen."""
+def _save_mattes(work: Path, readings: Readings) -> tuple[float, float]:
+    """Person, parts, clean plate, composites: share of background seen, and how much it moves."""
     landmarks = np.stack(readings.landmarks)
     models, colours = _learn(work, readings, landmarks)
     chosen = set(_spread(len(readings.frames), SAMPLES))
@@ -224,7 +232,7 @@ def _save_mattes(work: Path, readings: Readings) -> float:
     plate, seen = clean_plate(images, alphas)
     save_picture(work / "bc.jpg", plate)
     _save_composites(work, readings, load_uint8(work / "bc.jpg"))
-    return seen
+    return seen, mismatch(plate, images, alphas)
 
 
 def _learn(
@@ -288,8 +296,6 @@ def _save_details(
     seen: float,
 ) -> None:
     """`ico3d.json`."""
-    error = np.stack(readings.landmarks)[:, :MESH_LANDMARKS] - track.project()
-    rigid = track.sigmas <= np.quantile(track.sigmas, 0.25)
     details = {
         "format": "ico3d-portrait",
         "version": 1,
@@ -301,7 +307,8 @@ def _save_details(
         "tracker": {
             "model": f"MediaPipe face landmarker, {LANDMARKS} landmarks",
             "focal": "given" if settings.focal else "estimated",
-            "reprojection_px": float(np.sqrt((error[:, rigid] ** 2).sum(-1).mean())),
+            "focal_px": track.focal,
+            "reprojection_px": _reprojection_error(readings, track),
         },
         "background_seen": round(seen, 3),
         "notes": notes,
@@ -313,6 +320,13 @@ def _save_details(
         },
     }
     (work / DETAILS).write_text(json.dumps(details, indent=1))
+
+
+def _reprojection_error(readings: Readings, track: tracking.Track) -> float:
+    """Root mean square distance in pixels of the steadiest quarter of the landmarks."""
+    error = np.stack(readings.landmarks)[:, :MESH_LANDMARKS] - track.project()
+    steady = track.sigmas <= np.quantile(track.sigmas, 0.25)
+    return float(np.sqrt((error[:, steady] ** 2).sum(-1).mean()))
 
 
 def load_uint8(path: Path) -> np.ndarray:

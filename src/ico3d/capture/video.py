@@ -22,6 +22,7 @@ class Video:
         height: Height likewise.
         scale: Pixels given over pixels of the file.
         announced: Pictures the file says it has; 0 where it does not say.
+        rate: Pictures per second it says it has on average; 0 where it does not say.
         damaged: Packets that could not be decoded.
         decoded: Pictures that could be decoded.
     """
@@ -31,6 +32,7 @@ class Video:
     height: int
     scale: float
     announced: int
+    rate: float
     damaged: int = field(default=0)
     decoded: int = field(default=0)
 
@@ -102,14 +104,14 @@ def open_video(path: Path, size: int) -> Video:
             width, height = stream.codec_context.width, stream.codec_context.height
             frame = next(container.decode(stream), None)
             turned = frame is not None and frame.rotation // 90 % 2 == 1
-            announced = stream.frames
+            announced, rate = stream.frames, float(stream.average_rate or 0)
     except (av.FFmpegError, OSError) as error:
         raise CaptureError(f"{path} cannot be decoded as a video: {error}.") from error
     if frame is None or width * height == 0:
         raise CaptureError(f"{path}: no picture can be decoded; is the file damaged?")
     scale = min(1.0, size / min(width, height))
     width, height = round(width * scale), round(height * scale)
-    return Video(path, *((height, width) if turned else (width, height)), scale, announced)
+    return Video(path, *((height, width) if turned else (width, height)), scale, announced, rate)
 
 
 def read_sound(path: Path) -> Sound | None:
