@@ -1,58 +1,8 @@
-"""Makes the coarse hair of a mesh smooth, and finds where it ends."""
-
-from dataclasses import replace
+"""Hair: where its sheets end and where its strands run."""
 
 import numpy as np
 
-from ico3d.capture.synthetic.raster import vertex_normals
 from ico3d.capture.synthetic.subject import Material, Subject
-
-BULGE = 0.75
-"""How far split edges move from the flat triangle to the surface the normals tell of."""
-
-
-def with_smooth_hair(subject: Subject) -> Subject:
-    """Splits each hair triangle into four that follow the normals (Phong tessellation)."""
-    is_hair = subject.materials == Material.HAIR
-    hair = subject.faces[is_hair]
-    if len(hair) == 0:
-        return subject
-    corners = hair[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)  # (3F, 2)
-    edges, edge_of = np.unique(np.sort(corners, axis=1), axis=0, return_inverse=True)
-    middle = (len(subject.vertices) + edge_of).reshape(-1, 3)  # (F, 3): of edges 01, 12, 20
-    a, b, c = hair.T
-    ab, bc, ca = middle.T
-    split = np.stack([(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)])  # (4, 3, F)
-    faces = split.transpose(2, 0, 1).reshape(-1, 3)
-    uv = subject.corner_uv[is_hair]  # (F, 3, 2)
-    half = 0.5 * (uv + np.roll(uv, -1, axis=1))  # of edges 01, 12, 20
-    parts = [
-        np.stack([uv[:, 0], half[:, 0], half[:, 2]], 1),
-        np.stack([half[:, 0], uv[:, 1], half[:, 1]], 1),
-        np.stack([half[:, 2], half[:, 1], uv[:, 2]], 1),
-        half,
-    ]
-    split_uv = np.stack(parts, axis=1).reshape(-1, 3, 2)
-    new = _edge_middles(subject, edges)
-    return replace(
-        subject,
-        vertices=np.concatenate([subject.vertices, new]).astype(np.float32),
-        faces=np.concatenate([subject.faces[~is_hair], faces]).astype(np.int32),
-        materials=np.concatenate(
-            [subject.materials[~is_hair], np.full(len(faces), Material.HAIR, np.uint8)]
-        ),
-        corner_uv=np.concatenate([subject.corner_uv[~is_hair], split_uv]).astype(np.float32),
-        lip_mask=np.concatenate([subject.lip_mask, np.zeros(len(new), np.float32)]),
-    )
-
-
-def _edge_middles(subject: Subject, edges: np.ndarray) -> np.ndarray:
-    """(E, 3) points in the middle of edges, moved onto the curved surface."""
-    normals = vertex_normals(subject.vertices, subject.faces)
-    ends, across = subject.vertices[edges], normals[edges]  # (E, 2, 3) each
-    middle = ends.mean(axis=1)
-    above = ((ends - middle[:, None]) * across).sum(axis=2, keepdims=True)  # (E, 2, 1)
-    return middle + BULGE * (above * across).mean(axis=1)
 
 
 def hair_edge(subject: Subject) -> np.ndarray:

@@ -141,11 +141,7 @@ def load_subject(subject: str) -> Subject:
     if subject == "anny":
         from ico3d.capture.synthetic.subject_anny import load_anny
 
-        loaded = load_anny()
-    else:
-        from ico3d.capture.synthetic.subject_npz import load_npz
+        return load_anny()
+    from ico3d.capture.synthetic.subject_npz import load_npz
 
-        loaded = load_npz(Path(subject))
-    from ico3d.capture.synthetic.hair import with_smooth_hair
-
-    return with_smooth_hair(loaded)
+    return load_npz(Path(subject))

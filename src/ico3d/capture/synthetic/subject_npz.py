@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ico3d.capture.synthetic.smooth import smoothed
 from ico3d.capture.synthetic.subject import Eye, Look, Material, Subject
 from ico3d.errors import CaptureError
 
@@ -78,7 +79,8 @@ def load_npz(path: Path) -> Subject:
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
-        return _subject(path.stem, arrays)
+        subject = _subject(path.stem, arrays)
+        return smoothed(subject, subject.materials == Material.HAIR)
     except KeyError as error:
         raise CaptureError(f"the subject file {path} lacks the array {error}.") from error
     except (ValueError, OSError, IndexError) as error:

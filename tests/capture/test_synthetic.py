@@ -1,0 +1,193 @@
+"""Synthetic captures: what is written is exact, and the same every time."""
+
+import importlib.util
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ico3d.capture.capture import Capture
+from ico3d.capture.synthetic.points import surface_points
+from ico3d.capture.synthetic.recording import Recording, choose_views, record
+from ico3d.capture.synthetic.subject import load_subject
+from ico3d.errors import CaptureError, SettingsError
+
+_SPEC = importlib.util.spec_from_file_location(
+    "synthetic_people", Path(__file__).parent / "synthetic_people.py"
+)
+people = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(people)
+
+SUBJECTS = Path(__file__).parents[3] / "shared" / "subjects"
+
+
+def _settings(subject: Path, **changes) -> Recording:
+    values = dict(rig="head", cameras=3, frames=11, views_per_frame=1, size=40, text="", seed=3)
+    return Recording(str(subject), **(values | changes))
+
+
+@pytest.fixture(scope="module")
+def person(tmp_path_factory):
+    return people.write_person(tmp_path_factory.mktemp("people") / "block.npz")
+
+
+@pytest.fixture(scope="module")
+def folder(person, tmp_path_factory):
+    out = tmp_path_factory.mktemp("captures") / "one"
+    record(_settings(person), out, workers=2)
+    return out
+
+
+@pytest.fixture
+def copy(folder, tmp_path):
+    return Path(shutil.copytree(folder, tmp_path / "copy"))
+
+
+def _files(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def test_the_same_settings_write_the_same_bytes(folder, person, tmp_path):
+    record(_settings(person), tmp_path / "again", workers=1)
+    assert _files(tmp_path / "again") == _files(folder)
+
+
+def test_another_seed_writes_other_frames(folder, person, tmp_path):
+    record(_settings(person, seed=4, frames=2, cameras=1), tmp_path / "other", workers=1)
+    first, other = Capture.open(folder), Capture.open(tmp_path / "other")
+    assert not np.allclose(first.world_from_head(0), other.world_from_head(0))
+
+
+def test_reader_gives_what_was_recorded(folder):
+    capture = Capture.open(folder)
+    assert (capture.kind, capture.num_frames, capture.fps) == ("synthetic", 11, 25.0)
+    assert capture.split.test == (10,)
+    assert len(capture.cameras) == 3
+    sound = capture.audio()
+    assert sound.rate == 16000 and len(sound.samples) == 11 * 640
+    assert capture.points().shape == (6000, 3)
+    assert capture.eyes(0).shape == (7,)
+    assert capture.blendshapes(0).shape == (len(capture.blendshape_names),)
+    assert "espeak-ng" in str(capture.provenance["sources"])
+    for frame in range(11):
+        seen = [c for c in range(3) if capture.image(c, frame) is not None]
+        assert len(seen) == 1
+        pose = capture.world_from_head(frame)
+        np.testing.assert_allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-12)
+
+
+def test_outside_the_mask_the_picture_is_the_background(folder):
+    capture = Capture.open(folder)
+    camera = next(c for c in range(3) if capture.image(c, 0) is not None)
+    mask = capture.mask(camera, 0)
+    outside = mask == 0
+    assert 0.2 < mask.mean() < 0.9 and outside.any()
+    image, background = capture.image(camera, 0), capture.background(camera)
+    np.testing.assert_array_equal(image[outside], background[outside])
+
+
+def test_landmarks_are_the_projected_vertices(folder, person):
+    capture, subject = Capture.open(folder), load_subject(str(person))
+    for frame in (0, 7):
+        vertices = subject.posed(capture.blendshapes(frame))
+        pose = capture.world_from_head(frame)
+        world = subject.landmarks(vertices) @ pose[:3, :3].T + pose[:3, 3]
+        for index, camera in enumerate(capture.cameras):
+            expected = camera.project(world)[0]
+            np.testing.assert_allclose(capture.landmarks(index, frame), expected, atol=1e-3)
+
+
+def test_views_are_shared_out_evenly():
+    views = choose_views(90, 6, 2, seed=1)
+    assert (views.sum(axis=1) == 2).all()
+    assert (views.sum(axis=0) == 30).all()
+    assert (choose_views(90, 6, 2, seed=1) == views).all()
+
+
+def test_points_lie_on_the_surface(person):
+    subject = load_subject(str(person))
+    points = surface_points(subject, 500, seed=0)
+    face = points[points[:, 1] > -0.11]
+    face = face[np.abs(face[:, 0]) < 0.02]
+    assert len(face) > 10
+    assert (np.abs(face[:, 2] - (0.1 - 0.03)) < 0.02).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("capture.json", "capture.json"), ("frames.safetensors", "frames.safetensors")],
+)
+def test_a_damaged_file_is_named(copy, name, words):
+    (copy / name).write_bytes((copy / name).read_bytes()[:20])
+    with pytest.raises(CaptureError, match=words):
+        Capture.open(copy)
+
+
+def test_a_missing_picture_is_named_with_its_frame(copy):
+    capture = Capture.open(copy)
+    camera = next(c for c in range(3) if capture.image(c, 4) is not None)
+    (copy / "images" / str(camera) / "000004.png").unlink()
+    with pytest.raises(CaptureError, match=rf"frame 4 of camera {camera}"):
+        capture.image(camera, 4)
+
+
+def test_a_wrong_count_of_frames_is_told(copy):
+    about = json.loads((copy / "capture.json").read_text())
+    about["num_frames"] = 12
+    (copy / "capture.json").write_text(json.dumps(about))
+    with pytest.raises(CaptureError, match="must have shape"):
+        Capture.open(copy)
+
+
+def test_sound_missing_is_told(copy):
+    (copy / "audio.wav").unlink()
+    with pytest.raises(CaptureError, match=r"audio\.wav"):
+        Capture.open(copy).audio()
+
+
+@pytest.mark.parametrize("changes", [{"views_per_frame": 4}, {"frames": 0}, {"rig": "dome"}])
+def test_settings_that_make_no_sense_are_refused(person, tmp_path, changes):
+    with pytest.raises(SettingsError):
+        record(_settings(person, **changes), tmp_path / "x", workers=1)
+    assert not (tmp_path / "x").exists()
+
+
+def test_a_full_folder_is_not_overwritten(folder, person):
+    before = _files(folder)
+    with pytest.raises(SettingsError, match="holds something"):
+        record(_settings(person), folder, workers=1)
+    assert _files(folder) == before
+
+
+def test_subject_files_that_lack_an_array_are_told(tmp_path):
+    path = people.write_person(tmp_path / "bad.npz", lip_mask=None)
+    with pytest.raises(CaptureError, match="lip_mask"):
+        load_subject(str(path))
+    with pytest.raises(CaptureError, match="no subject file"):
+        load_subject(str(tmp_path / "none.npz"))
+
+
+@pytest.mark.skipif(not SUBJECTS.is_dir(), reason="the shared subjects are not here")
+@pytest.mark.parametrize("name", ["human_face_f", "human_face_m"])
+def test_shared_subjects_close_and_open_their_lips(name):
+    subject = load_subject(str(SUBJECTS / f"{name}.npz"))
+    gaps = {}
+    for viseme in ("PP", "aa"):
+        marks = subject.landmarks(subject.posed(subject.visemes[viseme]))
+        gaps[viseme] = np.linalg.norm(marks[62] - marks[66])
+    assert gaps["PP"] < 0.002 and gaps["aa"] > 0.012
+
+
+@pytest.mark.skipif(importlib.util.find_spec("anny") is None, reason="anny is not installed")
+def test_anny_closes_and_opens_the_lips():
+    subject = load_subject("anny")
+    gaps = {}
+    for viseme in ("sil", "PP", "aa"):
+        marks = subject.landmarks(subject.posed(subject.visemes[viseme]))
+        gaps[viseme] = np.linalg.norm(marks[62] - marks[66])
+    assert gaps["PP"] < 0.002 and gaps["sil"] < 0.002 and gaps["aa"] > 0.012
+    marks = subject.landmarks(subject.vertices)
+    assert marks[16, 0] > 0.05 > -0.05 > marks[0, 0]  # the person's left is +X
+    np.testing.assert_allclose(marks[36:42].mean(0)[1], 0, atol=0.01)  # eyes at the origin's height
