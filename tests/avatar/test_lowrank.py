@@ -82,7 +82,7 @@ def test_the_network_learns_a_smooth_function(rng):
     def truth(e):
         return np.tanh(e @ mixing) * (100, 30, 10, 3, 1)
 
-    network = distil(expressions, truth(expressions).astype(np.float32), 64, 800, seed=0)
+    network = distil(expressions, truth(expressions).astype(np.float32), 64, 600, seed=0)
     fresh = rng.uniform(0.1, 0.9, (200, 12)).astype(np.float32)
     hidden = fresh @ network.w1 + network.b1
     answer = np.where(hidden > 0, hidden, 0.02 * hidden) @ network.w2 + network.b2
@@ -90,7 +90,7 @@ def test_the_network_learns_a_smooth_function(rng):
         np.square(answer - truth(fresh)).sum()
         / np.square(truth(fresh) - truth(fresh).mean(0)).sum()
     )
-    assert error < 0.01
+    assert error < 0.02
 
 
 def test_one_seed_gives_one_network(rng):

@@ -9,6 +9,7 @@ from ico3d.avatar.distil import CoefficientNetwork, augmented, distil
 from ico3d.avatar.lowrank import LowRank, factorise
 from ico3d.avatar.quantise import quantise
 from ico3d.bundle.head import BakedHead
+from ico3d.errors import BundleError
 from ico3d.head.model import HeadModel
 
 CLIP = 8.0
@@ -57,10 +58,15 @@ class HeadBaker:
             importance: (N, 4) weights of logit errors.
             rank: The largest that `baked` will be asked for.
             settings: See there.
+
+        Raises:
+            BundleError: If no Gaussian is ever opaque enough to be drawn.
         """
         chosen = _spread(expressions, settings.max_frames)
         samples = sample_logits(model, chosen)  # (T, N, 4)
         self._kept = (samples[:, :, 3] > np.log(LEAST_ALPHA / (1 - LEAST_ALPHA))).any(axis=0)
+        if not self._kept.any():
+            raise BundleError("the head has no Gaussian that is ever seen: train it again.")
         self._model, self._weights = model, importance[self._kept]
         flat = _flat(samples[:, self._kept])
         self._factors: LowRank = factorise(flat, self._weights.reshape(-1), rank)

@@ -10,7 +10,7 @@ import torch
 from PIL import Image
 
 from ico3d.avatar import comparison, staging
-from ico3d.avatar.bake_head import MAX_RANK, HeadBaker, megabytes_per_10k
+from ico3d.avatar.bake_head import MAX_RANK, BakeSettings, HeadBaker, megabytes_per_10k
 from ico3d.avatar.importance import logit_importance
 from ico3d.avatar.render_bundle import baked_gaussians, visitor_camera
 from ico3d.bundle.format import HEAD, LICENSES, POSES, SPEECH, THUMBNAIL, write_bundle
@@ -75,6 +75,7 @@ def bake(
     capture: Capture,
     rank: int | None,
     report: Report,
+    settings: BakeSettings | None = None,
 ) -> BakedResult:
     """Bakes with the given rank, or with the smallest that keeps the bounds (else the best).
 
@@ -84,13 +85,12 @@ def bake(
         capture: Whose training frames give the expressions.
         rank: K, or None to choose.
         report: Is told each result.
+        settings: Of the fit; the usual ones where None.
     """
     report("sampling the exact head …")
+    recorded, importance = _training_expressions(head, capture), _importance(head, capture)
     baker = HeadBaker(
-        head.model,
-        _training_expressions(head, capture),
-        _importance(head, capture),
-        rank or MAX_RANK,
+        head.model, recorded, importance, rank or MAX_RANK, settings or BakeSettings()
     )
     results = []
     for candidate in (rank,) if rank else RANKS:
@@ -102,6 +102,20 @@ def bake(
         results.append(result)
     within = [result for result in results if result.megabytes <= MAX_MEGABYTES]
     return max(within or results, key=lambda result: result.loss.psnr_baked or 0)
+
+
+def check(result: BakedResult) -> None:
+    """Refuses a result that breaks a bound.
+
+    Raises:
+        BundleError: With what was measured.
+    """
+    if not result.acceptable:
+        raise BundleError(
+            f"baking costs too much ({result}; allowed are {comparison.MAX_DROP} dB lost, at least "
+            f"{comparison.MIN_LIKENESS:g} dB against exact, {MAX_MEGABYTES} MB): train longer, or "
+            "use --force."
+        )
 
 
 def write(

@@ -47,7 +47,7 @@ class Bake:
         from ico3d.bundle.format import Bundle
         from ico3d.bundle.limits import MAX_RANK
         from ico3d.capture.capture import Capture
-        from ico3d.errors import BundleError, SettingsError
+        from ico3d.errors import SettingsError
         from ico3d.head.trained import TrainedHead
 
         if self.rank is not None and not 1 <= self.rank <= MAX_RANK:
@@ -60,10 +60,8 @@ class Bake:
         result = baking.bake(head, views, capture, self.rank, console.print)
         if self.strip:
             _save_picture(comparison.strip(result.head, views), self.strip)
-        if not result.acceptable and not self.force:
-            raise BundleError(
-                f"{self.out}: not written, baking costs too much ({result}); --force writes it."
-            )
+        if not self.force:
+            baking.check(result)
         baking.write(self.out, self.name or persona.name, result, head, capture, persona, notices)
         Bundle.open(self.out)
         console.print(f"{self.out}: {self.out.stat().st_size / 1e6:.2f} MB.")

@@ -1,5 +1,7 @@
 """The small network from expression to coefficients, fitted to what the exact model does."""
 
+import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +9,8 @@ import torch
 from torch import Tensor
 
 from ico3d.bundle.evaluate import LEAKY_SLOPE
+
+_BATCH = 512
 
 
 @dataclass(frozen=True)
@@ -53,14 +57,15 @@ def distil(
         expressions: (S, B).
         scores: (S, K).
         hidden: H.
-        steps: Full-batch steps.
-        seed: Seed of the initial weights.
+        steps: Steps, of 512 pairs each.
+        seed: Seed of the initial weights and of the batches.
     """
     centre, spread = expressions.mean(axis=0), np.maximum(expressions.std(axis=0), 1e-3)
     size = max(float(np.sqrt(np.square(scores).sum(axis=1).mean())), 1e-12)
     inputs = torch.from_numpy(((expressions - centre) / spread).astype(np.float32))  # (S, B)
     targets = torch.from_numpy((scores / size).astype(np.float32))  # (S, K)
-    w1, b1, w2, b2 = _descend(inputs, targets, hidden, steps, seed)
+    with _one_thread():
+        w1, b1, w2, b2 = _descend(inputs, targets, hidden, steps, seed)
     w2, b2 = _solve_output(_hidden(inputs, w1, b1), targets)
     first = w1.numpy() / spread[:, None]  # (B, H)
     return CoefficientNetwork(
@@ -69,6 +74,17 @@ def distil(
         (w2.numpy() * size).astype(np.float32),
         (b2.numpy() * size).astype(np.float32),
     )
+
+
+@contextlib.contextmanager
+def _one_thread() -> Iterator[None]:
+    """Matrices this small are slower on more threads, which mostly wait for one another."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 def _hidden(inputs: Tensor, w1: Tensor, b1: Tensor) -> Tensor:
@@ -93,7 +109,8 @@ def _descend(
     w1, b1, w2, b2 = weights
     for _ in range(steps):
         optimiser.zero_grad()
-        error = _hidden(inputs, w1, b1) @ w2 + b2 - targets  # (S, K)
+        batch = torch.randint(len(inputs), (_BATCH,), generator=generator)
+        error = _hidden(inputs[batch], w1, b1) @ w2 + b2 - targets[batch]  # (batch, K)
         error.square().sum(dim=1).mean().backward()
         optimiser.step()
         schedule.step()

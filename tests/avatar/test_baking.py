@@ -1,0 +1,166 @@
+"""Baking a planted head, from its pictures to the bundle that is opened again."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from ico3d.avatar import baking, comparison
+from ico3d.avatar.bake_head import CLIP, BakeSettings, HeadBaker
+from ico3d.avatar.persona import load_persona
+from ico3d.avatar.render_bundle import render_bundle
+from ico3d.bundle.evaluate import logits
+from ico3d.bundle.manifest import Loss
+from ico3d.errors import BundleError
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "bundle"))
+from random_bundle import random_head
+
+QUICK = BakeSettings(hidden=64, augmented=100, steps=300)
+
+
+def expressions(head, capture, frames):
+    track = head.track(capture)
+    return np.stack([track.at(frame).detach().numpy() for frame in frames])
+
+
+def baker(head, capture, rank=16):
+    recorded = expressions(head, capture, capture.split.train)
+    return HeadBaker(head.model, recorded, np.ones((len(head.model), 4), np.float32), rank, QUICK)
+
+
+def test_baked_logits_are_the_exact_ones(blendshape_head):
+    head, capture = blendshape_head
+    baked = baker(head, capture).baked(16)
+    for e in expressions(head, capture, capture.split.test):
+        exact = head.model.logits(torch.from_numpy(e)).detach().clamp(-CLIP, CLIP).numpy()
+        error = logits(baked, e) - exact
+        assert np.sqrt(np.square(error).mean()) < 0.1 * exact.std()
+
+
+def test_a_higher_rank_is_better_and_larger(blendshape_head):
+    head, capture = blendshape_head
+    views = comparison.references(head, capture, (0.5, 0.5, 0.5), 6)
+    maker = baker(head, capture)
+    losses = [comparison.measure(maker.baked(rank), views) for rank in (1, 4, 16)]
+    likeness = [loss.psnr_baked_vs_exact for loss in losses]
+    assert likeness[0] + 2 < likeness[1] < likeness[2]
+
+
+def test_gaussians_that_are_never_drawn_are_dropped(blendshape_head):
+    head, capture = blendshape_head
+    with torch.no_grad():
+        head.model.opacity_branch.weight.zero_()
+        head.model.opacity_branch.bias.fill_(-7.0)  # alpha 0.0009 < 1/255
+    with pytest.raises(BundleError, match="no Gaussian"):
+        baker(head, capture)
+
+
+def test_one_seed_gives_one_bundle(blendshape_head):
+    head, capture = blendshape_head
+    first, second = (baker(head, capture).baked(8).to_bytes() for _ in "ab")
+    assert first == second
+
+
+def test_measured_pictures_are_the_noise_apart(blendshape_head):
+    """The exact model made the pictures, so its PSNR is that of the noise: −20·log10 σ."""
+    head, capture = blendshape_head
+    views = comparison.references(head, capture, (0.5, 0.5, 0.5), 6)
+    loss = comparison.measure(baker(head, capture).baked(16), views)
+    assert loss.psnr_exact == pytest.approx(-20 * np.log10(0.03), abs=0.3)
+    assert loss.psnr_baked <= loss.psnr_exact + 0.05
+    assert comparison.strip(baker(head, capture).baked(2), views, 2).shape == (96, 144, 3)
+
+
+@pytest.mark.parametrize(
+    ("loss", "megabytes", "good"),
+    [
+        (Loss(34.0, 33.8, 46.0), 1.2, True),
+        (Loss(34.0, 33.6, 46.0), 1.2, False),
+        (Loss(34.0, 33.8, 44.0), 1.2, False),
+        (Loss(34.0, 33.8, 46.0), 1.8, False),
+    ],
+)
+def test_bounds(loss, megabytes, good):
+    result = baking.BakedResult(random_head(5, rank=2), loss, megabytes)
+    assert result.acceptable is good
+    if not good:
+        with pytest.raises(BundleError, match="--force"):
+            baking.check(result)
+
+
+def speaks(baked):
+    head, capture, bundle = baked
+    if head.adaptor is None:
+        pytest.skip("driven by blendshapes")
+    return head, capture, bundle
+
+
+def test_a_bundle_says_what_it_is(baked):
+    head, capture, bundle = baked
+    manifest = bundle.manifest
+    assert (manifest.name, manifest.persona.name) == ("Planted", "Iris")
+    assert manifest.head.inputs == head.inputs and manifest.head.fps == 3.0
+    assert manifest.head.expression_names == tuple(capture.blendshape_names or ())
+    assert manifest.background == pytest.approx((0.3, 0.4, 0.5), abs=2e-5)
+    assert manifest.provenance.sources == ("a seed",)
+    assert bundle.read("LICENSES.txt") == b"A notice."
+    assert manifest.loss.psnr_baked_vs_exact > 30
+    assert (manifest.speech is None) == (head.adaptor is None)
+
+
+def test_a_rendered_bundle_looks_like_the_exact_head(baked):
+    head, capture, bundle = baked
+    frame = capture.split.test[1]
+    camera = frame % 2
+    picture = render_bundle(
+        bundle,
+        expressions(head, capture, [frame])[0],
+        capture.cameras[camera],
+        capture.background(camera),
+        capture.world_from_head(frame),
+    )
+    assert comparison.psnr(picture, capture.image(camera, frame)) > 27  # the noise is 30 dB
+
+
+def test_the_bundles_speech_graph_speaks_the_adaptors_language(baked):
+    from ico3d.speech.runtime import SpeechModel
+
+    head, capture, bundle = speaks(baked)
+    sound = capture.audio()
+    rows = SpeechModel(bundle.read("speech.onnx")).expressions(sound.samples, sound.rate)
+    for frame in (3, 30, 51):  # at 3 frames/s, every third frame is a row of 25/s
+        expected = expressions(head, capture, [frame])[0, :32]
+        np.testing.assert_allclose(rows[frame // 3 * 25], expected, atol=2e-3)
+
+
+def test_idle_is_silence_with_open_eyes(baked):
+    from ico3d.speech.runtime import SpeechModel
+
+    _, _, bundle = speaks(baked)
+    silence = np.zeros(32_000, np.float32)
+    rows = SpeechModel(bundle.read("speech.onnx")).expressions(silence, 16_000)
+    idle = bundle.manifest.head.idle_expression
+    np.testing.assert_allclose(rows[len(rows) // 2], idle[:32], atol=2e-3)
+    assert max(idle[32 + 5], idle[32 + 6]) < 0.1  # tracked lids go from 0 to 1
+
+
+def test_idle_of_blendshapes_is_the_most_neutral_face(baked):
+    head, capture, bundle = baked
+    if head.adaptor is not None:
+        pytest.skip("driven by speech")
+    sums = np.abs(expressions(head, capture, capture.split.train)).sum(1)
+    assert sum(bundle.manifest.head.idle_expression) == pytest.approx(sums.min(), abs=1e-4)
+
+
+def test_personas(tmp_path):
+    persona = load_persona(None)
+    assert persona.name and persona.greeting and len(persona.notes) >= 25
+    path = tmp_path / "persona.json"
+    path.write_text('{"name": "A", "greeting": "B", "notes": ["no arrow"]}')
+    with pytest.raises(BundleError, match="note 1"):
+        load_persona(path)
+    with pytest.raises(BundleError, match=r"nothing\.json"):
+        load_persona(tmp_path / "nothing.json")
