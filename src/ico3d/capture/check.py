@@ -52,11 +52,14 @@ def examine(capture: Capture) -> list[Finding]:
 def sampled_views(capture: Capture, count: int) -> list[tuple[int, int]]:
     """Up to `count` (camera, frame) pairs with a picture, spread over frames and cameras."""
     frames = sorted({*capture.split.train, *capture.split.test})
-    views = [(c, f) for f in frames for c in range(len(capture.cameras))]
-    wanted = np.unique(np.linspace(0, len(views) - 1, min(4 * count, len(views))).round())
-    shown = [views[int(i)] for i in wanted if capture.image(*views[int(i)]) is not None]
-    chosen = np.unique(np.linspace(0, len(shown) - 1, min(count, len(shown))).round())
-    return [shown[int(i)] for i in chosen]
+    chosen = np.unique(np.linspace(0, len(frames) - 1, min(count, len(frames))).round())
+    views = []
+    for turn, index in enumerate(chosen.astype(int)):
+        cameras = np.roll(np.arange(len(capture.cameras)), -turn).tolist()
+        # A capture may lack views: of each frame, the next camera that has one.
+        seen = (c for c in cameras if capture.image(c, frames[index]) is not None)
+        views += [(camera, frames[index]) for camera in seen][:1]
+    return views
 
 
 def _split(capture: Capture) -> Finding:
