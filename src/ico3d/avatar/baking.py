@@ -88,7 +88,7 @@ def bake(
         settings: Of the fit; the usual ones where None.
     """
     report("sampling the exact head …")
-    recorded, importance = _training_expressions(head, capture), _importance(head, capture)
+    recorded, importance = training_expressions(head, capture), importance_of(head, capture)
     baker = HeadBaker(
         head.model, recorded, importance, rank or MAX_RANK, settings or BakeSettings()
     )
@@ -169,14 +169,14 @@ def write(
     return write_bundle(out, manifest, files)
 
 
-def _training_expressions(head: TrainedHead, capture: Capture) -> np.ndarray:
+def training_expressions(head: TrainedHead, capture: Capture) -> np.ndarray:
     """(T, B) of the training frames."""
     track = head.track(capture)
     with torch.no_grad():
         return np.stack([track.at(frame).numpy() for frame in capture.split.train])
 
 
-def _importance(head: TrainedHead, capture: Capture) -> np.ndarray:
+def importance_of(head: TrainedHead, capture: Capture) -> np.ndarray:
     """(N, 4) as training frames see it, from all cameras in turn."""
     frames = capture.split.train
     frames = [frames[i] for i in np.linspace(0, len(frames) - 1, _PROBES).astype(int)]
@@ -192,7 +192,7 @@ def _importance(head: TrainedHead, capture: Capture) -> np.ndarray:
 def _idle_expression(head: TrainedHead, capture: Capture) -> np.ndarray:
     """(B,) silence with open eyes; for blendshapes, the most neutral face that was recorded."""
     if head.adaptor is None:
-        recorded = _training_expressions(head, capture)
+        recorded = training_expressions(head, capture)
         return recorded[np.abs(recorded).sum(axis=1).argmin()]
     silence = np.zeros(16_000 * _SILENCE_SECONDS, np.float32)
     features = torch.from_numpy(load_encoder(head.encoder).features(silence, 16_000))
