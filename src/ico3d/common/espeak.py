@@ -21,6 +21,7 @@ from ico3d.errors import MissingExtraError, SettingsError
 _SYNCHRONOUS = 2
 _OPTIONS = 0x1 | 0x2 | 0x8000  # phoneme events, in IPA, errors do not end the process
 _UTF8 = 1
+_BLOCK_MS = 500  # longer blocks, fewer calls back
 _RATE, _PITCH, _RANGE = 1, 3, 4  # numbers of espeak-ng's parameters
 _PHONEME = 7  # event type; 0 ends a list of events
 
@@ -104,7 +105,7 @@ def _library() -> Iterator[tuple[ctypes.CDLL, int]]:
                 "name one that allows it in the environment variable TMPDIR."
             ) from None
         try:
-            rate = library.espeak_Initialize(_SYNCHRONOUS, 0, data, _OPTIONS)
+            rate = library.espeak_Initialize(_SYNCHRONOUS, _BLOCK_MS, data, _OPTIONS)
             if rate <= 0:
                 raise SettingsError(f"espeak-ng cannot read its data in {data.decode()}.")
             yield library, rate

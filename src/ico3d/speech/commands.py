@@ -49,6 +49,7 @@ class TrainSpeech:
             task = bar.add_task("", total=self.encoder.steps)
             for numbers in training.run():
                 metrics.write(json.dumps({"step": training.step, **numbers}) + "\n")
+                metrics.flush()
                 text = " ".join(f"{name} {value:.3f}" for name, value in numbers.items())
                 bar.update(task, completed=training.step + 1, description=text)
 

@@ -20,7 +20,7 @@ from ico3d.speech.network import BUILTIN_SIZE, BuiltinEncoder, ConvBlock
 from ico3d.speech.targets import ARTICULATION
 
 _SHIFTS = (-4, 0, 4)  # mel rows (50 ms): each window also tells what was and what comes
-_CHECKPOINT_EVERY = 100
+_CHECKPOINT_EVERY = 50
 _READOUT = "readout."
 _STATISTICS_BATCHES = 8
 
