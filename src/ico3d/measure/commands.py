@@ -119,8 +119,8 @@ class BenchTalk:
         from ico3d.common.files import write_atomic
         from ico3d.measure import talk
 
-        made = self.question is None
-        questions = talk.made_questions() if made else [talk.read_question(self.question)]
+        recorded = self.question
+        questions = [talk.read_question(recorded)] if recorded else talk.made_questions()
         with talk.serving(self.bundle) as url, Progress() as progress:
             task = progress.add_task("talking", total=self.turns)
             turns = asyncio.run(

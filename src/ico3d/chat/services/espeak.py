@@ -14,6 +14,8 @@ from ico3d.chat.settings import ChatSettings
 from ico3d.common.espeak import synthesize
 from ico3d.errors import MissingExtraError
 
+STARVED = 60.0  # s that a sentence may take on a machine that is busy with other things
+
 
 class EspeakVoice(TTSService):
     """Speaks a sentence in about 20 ms."""
@@ -23,6 +25,7 @@ class EspeakVoice(TTSService):
         super().__init__(
             push_start_frame=True,
             push_stop_frames=True,
+            stop_frame_timeout_s=STARVED,
             sample_rate=SPEECH_RATE,
             settings=TTSSettings(model=None, voice=voice, language=None),
         )

@@ -25,6 +25,13 @@ CONTRACTIONS = (
     (r"'ve\b", " have"),
     (r"'s\b", ""),
 )
+COMMON = frozenset(
+    """a also an and are be can could did do does for have hello hi how i in is it just me my now of
+    oh ok on or please really say so tell that the then this to was well what when where which who
+    why will with would you your""".split()  # noqa: SIM905
+)
+COMMON_WEIGHT = 0.25  # of words that every question has, against the others
+UNKNOWN_WEIGHT = 0.5  # of words that no note has, against the rarest that one has
 HELLO = frozenset(["hello", "hi", "hey", "greetings", "howdy"])
 THANKS = frozenset(["thank", "thanks", "thx", "cheers"])
 GOODBYE = frozenset(["bye", "goodbye", "farewell"])
@@ -53,7 +60,7 @@ class Notes:
         documents = [words(q) for note in self.notes for q in note.questions]
         counts = Counter(word for document in documents for word in set(document))
         self._rarity = {w: math.log(1 + len(documents) / n) for w, n in counts.items()}
-        self._unknown = math.log(1 + len(documents))  # words of no note are as rare as can be
+        self._unknown = UNKNOWN_WEIGHT * math.log(1 + len(documents))
 
     def answer(self, question: str) -> str:
         """The best answer there is to a question in natural language."""
@@ -100,7 +107,8 @@ class Notes:
         return WORDS * by_words + LETTERS * by_letters
 
     def _weighted(self, found: list[str]) -> dict[str, float]:
-        return {word: self._rarity.get(word, self._unknown) for word in found}
+        weights = {word: self._rarity.get(word, self._unknown) for word in found}
+        return {w: v * COMMON_WEIGHT if w in COMMON else v for w, v in weights.items()}
 
 
 def parse_note(text: str) -> Note | None:
@@ -129,8 +137,9 @@ def stem(word: str) -> str:
     """A word without its common English endings."""
     for ending in ENDINGS:
         if word.endswith(ending) and len(word) - len(ending) >= 3:
-            return word[: -len(ending)]
-    return word
+            word = word[: -len(ending)]
+            break
+    return word[:-1] if word.endswith("e") and len(word) > 3 else word
 
 
 def triples(text: str) -> dict[str, float]:

@@ -1,0 +1,85 @@
+"""The persona's notes: other words and misheard ones find the answer, foreign ones do not."""
+
+import pytest
+
+from ico3d.bundle.manifest import Persona
+from ico3d.chat.services.notes import Notes, cosine, parse_note, plain, stem
+from ico3d.chat.services.persona import sentences
+
+PERSONA = Persona(
+    "Ada",
+    "Hello.",
+    (
+        "what is your name | who are you => I am Ada.",
+        "how do you work | what are you made of => I am made of Gaussians.",
+        "what can you do | how can you help me => I can answer questions.",
+        "who made you | who built you => Engineers did.",
+        "wie heißt du => Ich heiße Ada.",
+        "a note without an answer",
+    ),
+)
+
+
+@pytest.fixture
+def notes():
+    return Notes(PERSONA)
+
+
+@pytest.mark.parametrize(
+    ("question", "answer"),
+    [
+        ("What is your name?", "I am Ada."),
+        ("what's your name", "I am Ada."),
+        ("tell me your name please", "I am Ada."),
+        ("so who are you then", "I am Ada."),
+        ("your named", "I am Ada."),
+        ("HOW DO YOU WORK", "I am made of Gaussians."),
+        ("how are you working", "I am made of Gaussians."),
+        ("what can you do for me", "I can answer questions."),
+        ("who has made you", "Engineers did."),
+        ("Wie heisst du?", "Ich heiße Ada."),
+    ],
+)
+def test_the_best_note_answers(notes, question, answer):
+    assert notes.answer(question) == answer
+
+
+@pytest.mark.parametrize(
+    "question",
+    ["we must find a new home in the stars", "how high is the Eiffel tower", "", "?!", "你好吗"],
+)
+def test_what_no_note_knows_is_admitted_with_examples(notes, question):
+    answer = notes.answer(question)
+    assert answer.startswith("I do not know that.") and "what is your name" in answer
+
+
+def test_pleasantries(notes):
+    assert "Ada" in notes.answer("hello")
+    assert notes.answer("thank you very much") == "You are welcome."
+    assert notes.answer("good bye").startswith("Goodbye")
+    assert notes.answer("hello who are you") == "I am Ada."
+
+
+def test_a_persona_without_notes_says_so():
+    answer = Notes(Persona("Ada", "Hello.", ())).answer("what is your name")
+    assert "no notes" in answer
+
+
+def test_text_of_any_script_survives():
+    assert plain("Wie heißt du?  Ça va — 你好!") == "wie heisst du ça va 你好"
+    assert parse_note("no arrow") is None and parse_note("=> x") is None
+    assert (
+        stem("working") == "work"
+        and stem("named") == stem("names") == stem("name")
+        and stem("is") == "is"
+    )
+    assert cosine({"a": 1.0}, {"a": 2.0}) == pytest.approx(1.0) and cosine({}, {"a": 1.0}) == 0.0
+
+
+def test_answers_are_cut_into_sentences():
+    assert sentences("One. Two! Three? 3.5 is a number") == [
+        "One.",
+        "Two!",
+        "Three?",
+        "3.5 is a number",
+    ]

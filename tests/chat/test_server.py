@@ -1,0 +1,226 @@
+"""The server's edge: foreign pages, garbage, floods; and that it goes on serving."""
+
+import asyncio
+import json
+import os
+import signal
+import subprocess
+import sys
+from contextlib import closing
+
+import httpx
+import pytest
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from ico3d.chat.codec import decode_server, encode
+from ico3d.chat.guard import is_own
+from ico3d.chat.limits import FORGIVEN, Limits
+from ico3d.chat.protocol import Audio, Error, Hello, Speech, Text, Welcome
+from ico3d.cli import main
+from ico3d.errors import ProtocolError, SettingsError
+from ico3d.measure.page import open_page
+
+
+@pytest.mark.parametrize(
+    ("host", "origin", "own"),
+    [
+        ("127.0.0.1:8765", None, True),
+        ("localhost:8765", "http://localhost:8765", True),
+        ("localhost:8765", "http://127.0.0.1:8765", True),
+        ("[::1]:8765", "http://[::1]:8765", True),
+        ("localhost:8765", "http://localhost:3000", False),
+        ("localhost:8765", "http://evil.example", False),
+        ("localhost:8765", "null", False),
+        ("localhost:8765", "file://", False),
+        ("localhost:8765", "http://localhost.evil.example:8765", False),
+        ("evil.example:8765", "http://evil.example:8765", False),
+        ("evil.example:8765", None, False),
+        ("192.168.1.5:8765", None, False),
+        ("localhost:99999999", None, False),
+        ("user@localhost:8765", None, False),
+        (None, None, False),
+        ("", None, False),
+    ],
+)
+def test_only_own_names_pass_on_loopback(host, origin, own):
+    assert is_own(host, origin, "127.0.0.1") is own
+
+
+def test_numbers_pass_on_a_public_address_but_no_foreign_names():
+    assert is_own("192.168.1.5:80", "http://192.168.1.5:80", "0.0.0.0")
+    assert not is_own("evil.example:80", "http://evil.example:80", "0.0.0.0")
+    assert not is_own("192.168.1.5:80", "http://192.168.1.6:80", "0.0.0.0")
+
+
+async def test_http_serves_the_bundle_and_nothing_else(served, bundle):
+    url, _ = served
+    async with httpx.AsyncClient(base_url=url) as client:
+        assert (await client.get("/health")).json() == {"ok": True}
+        manifest = await client.get("/bundle/manifest.json")
+        assert manifest.json()["persona"]["name"] == "Random"
+        head = await client.get("/bundle/head.safetensors")
+        assert head.content == bundle.read("head.safetensors")
+        again = await client.get(
+            "/bundle/head.safetensors", headers={"If-None-Match": head.headers["etag"]}
+        )
+        assert again.status_code == 304 and not again.content
+        for name in ("nothing", "..%2f..%2fetc%2fpasswd", "%2e%2e/x"):
+            assert (await client.get(f"/bundle/{name}")).status_code == 404
+        assert "script-src 'self'" in head.headers["content-security-policy"]
+        assert (await client.get("/health", headers={"Host": "evil.example"})).status_code == 403
+        foreign = await client.get("/health", headers={"Origin": "http://evil.example"})
+        assert foreign.status_code == 403
+
+
+@pytest.mark.parametrize("header", [{"Origin": "http://evil.example"}, {"Host": "evil.example"}])
+async def test_a_foreign_page_gets_no_socket(served, header):
+    url, sessions = served
+    with pytest.raises(InvalidStatus) as refused:
+        if "Host" in header:
+            host, port = url.split("/")[2].split(":")
+            await connect(f"ws://evil.example:{port}/ws", host=host, port=int(port), proxy=None)
+        else:
+            await connect(address(url), additional_headers=header)
+    assert refused.value.response.status_code == 403
+    assert len(sessions) == 0
+
+
+def address(url):
+    return url.replace("http", "ws") + "ws"
+
+
+async def farewell(socket):
+    """The last error before the server closed, and the code."""
+    error = None
+    try:
+        while True:
+            message = decode_server(await asyncio.wait_for(socket.recv(), 10))
+            error = message if isinstance(message, Error) else error
+    except ConnectionClosed:
+        return error, socket.close_code
+
+
+@pytest.mark.parametrize(
+    ("first", "code"),
+    [
+        ("garbage", 1008),
+        (b"\xff\xff\xff\xff", 1008),
+        (json.dumps({"type": "text", "text": "a"}), 1008),
+        (json.dumps({"type": "hello", "version": 99, "session": None, "last_index": -1}), 1008),
+        (json.dumps({"type": "hello", "version": 1, "session": 5, "last_index": -1}), 1008),
+        ("x" * 20_000, 1009),
+        (b"x" * 70_000, 1009),
+    ],
+)
+async def test_a_bad_hello_is_answered_in_one_sentence(served, first, code):
+    url, sessions = served
+    async with connect(address(url)) as socket:
+        await socket.send(first)
+        error, closed = await farewell(socket)
+    assert closed == code and len(sessions) == 0
+    if len(first) < 65_536:  # beyond it the WebSocket library closes by itself
+        assert error.fatal and "\n" not in error.message and len(error.message) < 300
+
+
+async def test_garbage_and_floods_end_their_connection_only(served):
+    url, _ = served
+    good, _ = await open_page(url, microphone=False)
+    await good.wait(Speech)
+    hello = encode(Hello(1, None, -1))
+    text = encode(Text("who are you"))
+    frames = ["[" * 9999, "null", b"", b"\x02\0\0\0{}", encode(Error("mine", fatal=True)), hello]
+    for flood in (frames, [text] * 600):
+        async with connect(address(url)) as socket:
+            await socket.send(hello)
+            assert isinstance(decode_server(await socket.recv()), Welcome)
+            with pytest.raises(ConnectionClosed):
+                for frame in flood * 50:
+                    await socket.send(frame)
+                await socket.wait_closed()
+                raise ConnectionClosed(None, None)
+            assert socket.close_code == 1008
+    since = len(good.log)
+    await good.send(Text("who are you"))
+    _, speech = await good.wait(Speech, since)
+    assert speech.utterance == 1
+    await good.close()
+
+
+def test_a_page_may_be_clumsy_a_few_times_only():
+    limits = Limits()
+    assert [limits.forgive() for _ in range(FORGIVEN)] == [True] * (FORGIVEN - 1) + [False]
+
+
+def test_rates_are_limited_by_the_clock():
+    now = 0.0
+    limits = Limits(lambda: now)
+    for _ in range(200):
+        limits.check_frame()
+    with pytest.raises(ProtocolError):
+        limits.check_frame()
+    now = 1.0
+    for _ in range(100):
+        limits.check_frame()
+    with pytest.raises(ProtocolError):
+        limits.check_frame()
+
+
+def test_more_sound_than_a_microphone_makes_is_refused():
+    import numpy as np
+
+    now = 0.0
+    limits = Limits(lambda: now)
+    second = Audio(0, np.zeros(16000, np.int16))
+    for _ in range(5):
+        limits.check_message(second)
+    with pytest.raises(ProtocolError):
+        limits.check_message(second)
+    for _ in range(60):
+        now += 1.0
+        limits.check_message(second)
+
+
+def test_serve_prints_where_it_is_and_ends_on_interrupt(bundle_path):
+    command = [sys.executable, "-m", "ico3d.cli", "serve", str(bundle_path), "--port", "0"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    with closing(process.stdout), closing(process.stderr):
+        line = process.stdout.readline()
+        assert line.startswith("Random is at http://127.0.0.1:")
+        response = None
+        for _ in range(200):
+            try:
+                response = httpx.get(f"{line.split()[3]}health")
+                break
+            except httpx.ConnectError:
+                process.poll()
+        assert response is not None and response.json() == {"ok": True}
+        os.kill(process.pid, signal.SIGINT)
+        assert process.wait(10) in (0, 130, -signal.SIGINT)
+        assert "stand-ins" in process.stdout.read()
+        assert "Traceback" not in process.stderr.read()
+
+
+def test_a_taken_port_is_one_sentence():
+    from ico3d.chat.server import bind
+
+    with closing(bind("127.0.0.1", 0)) as listener:
+        listener.listen()
+        with pytest.raises(SettingsError, match="--port"):
+            bind("127.0.0.1", listener.getsockname()[1])
+
+
+def test_a_bundle_that_is_none_is_one_sentence(tmp_path, capsys):
+    (tmp_path / "x.ico3d").write_bytes(b"no bundle")
+    assert main(["serve", str(tmp_path / "x.ico3d"), "--port", "0"]) == 1
+    assert capsys.readouterr().err.startswith("ico3d: ")
+
+
+def test_a_server_needs_no_torch(bundle_path):
+    code = (
+        "import sys; from ico3d.chat import server; from ico3d.bundle.format import Bundle;"
+        "from ico3d.chat.settings import ChatSettings;"
+        f"server.open_avatar(Bundle.open({str(bundle_path)!r}), ChatSettings());"
+        "assert not {'torch', 'numba', 'scipy', 'transformers'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)

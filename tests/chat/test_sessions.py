@@ -1,0 +1,133 @@
+"""Sessions: resume after a drop, no leaks, no more than there is room for."""
+
+import asyncio
+import threading
+
+import pytest
+
+from ico3d.chat.protocol import Answer, Error, Speech, State, Stop, Text
+from ico3d.chat.settings import ChatSettings
+from ico3d.measure.page import open_page
+
+from .conftest import serving
+
+
+async def dropped(page):
+    """Cuts the connection as a broken network does."""
+    page._socket.transport.abort()
+    await page.close()
+
+
+async def test_a_dropped_page_gets_what_it_missed(bundle):
+    async with serving(bundle) as (url, sessions):
+        page, welcome = await open_page(url, microphone=False)
+        await page.wait(Speech)
+        await page.send(Text("nothing you know of, but a long answer"))
+        await page.wait(Speech, where=lambda m: m.utterance == 1 and m.first_sample > 10000)
+        await dropped(page)
+        last = page.messages(Speech)[-1].index
+        await asyncio.sleep(1.0)
+        again, second = await open_page(url, welcome.session, last - 3, microphone=False)
+        assert second.resumed and second.session == welcome.session and len(sessions) == 1
+        await again.heard(1)
+        indices = [m.index for m in again.messages(Speech)]
+        assert indices == list(range(last - 2, last - 2 + len(indices)))
+        assert again.messages(Answer)[-1].utterance == 1
+        await again.send(Text("who are you"))
+        await again.wait(Speech, where=lambda m: m.utterance == 2)
+        await again.close()
+
+
+async def test_nothing_is_sent_ahead_while_the_page_is_away(bundle):
+    async with serving(bundle) as (url, _):
+        page, welcome = await open_page(url, microphone=False)
+        await page.wait(Speech)
+        await page.send(Text("nothing you know of, but a long answer"))
+        await page.wait(Speech, where=lambda m: m.utterance == 1)
+        await dropped(page)
+        await asyncio.sleep(2.5)
+        again, _ = await open_page(url, welcome.session, -1, microphone=False)
+        await again.wait(State)
+        missed = [m for m in again.messages(Speech) if m.utterance == 1]
+        assert sum(len(m.pcm) for m in missed) / 24000 < 2.9
+        await again.close()
+
+
+async def test_what_was_stopped_is_not_sent_again(bundle):
+    async with serving(bundle) as (url, _):
+        page, welcome = await open_page(url, microphone=False)
+        await page.wait(Speech)
+        await page.send(Text("who are you"))
+        await page.wait(Stop)
+        await page.wait(Speech, where=lambda m: m.utterance == 1)
+        await dropped(page)
+        again, _ = await open_page(url, welcome.session, -1, microphone=False)
+        await again.wait(State)
+        assert {m.utterance for m in again.messages(Speech)} == {1}
+        assert [m.utterance for m in again.messages(Stop)] == [0]
+        await again.close()
+
+
+async def test_a_second_connection_takes_the_session_over(bundle):
+    async with serving(bundle) as (url, sessions):
+        page, welcome = await open_page(url, microphone=False)
+        again, second = await open_page(url, welcome.session, -1, microphone=False)
+        assert second.resumed
+        assert await asyncio.wait_for(page.closed(), 5) == 1000
+        await asyncio.sleep(0.1)
+        assert len(sessions) == 1
+        await again.send(Text("who are you"))
+        await again.wait(Answer, where=lambda m: m.utterance == 1)
+        await asyncio.gather(page.close(), again.close())
+
+
+async def test_sessions_end_and_leave_nothing_behind(bundle):
+    async with serving(bundle, resume_seconds=0.2) as (url, sessions):
+        await visit(url)  # the first one starts threads that serve all
+        await emptied(sessions)
+        tasks, threads = len(asyncio.all_tasks()), set(threading.enumerate())
+        for _ in range(3):
+            await visit(url)
+            await emptied(sessions)
+        await asyncio.sleep(0.3)
+        assert len(asyncio.all_tasks()) <= tasks
+        new = {t.name for t in set(threading.enumerate()) - threads}
+        assert all(name.startswith("asyncio_") for name in new)  # the loop's own pool, bounded
+
+
+async def visit(url):
+    page, _ = await open_page(url)
+    await page.wait(Speech)
+    await page.send(Text("who are you"))
+    await page.wait(Speech, where=lambda m: m.utterance == 1)
+    await dropped(page)
+
+
+async def emptied(sessions):
+    async with asyncio.timeout(10):
+        while len(sessions) or sessions._closing:
+            await asyncio.sleep(0.05)
+
+
+async def test_an_expired_session_starts_anew(bundle):
+    async with serving(bundle, resume_seconds=0.1) as (url, sessions):
+        page, welcome = await open_page(url, microphone=False)
+        await dropped(page)
+        await emptied(sessions)
+        again, second = await open_page(url, welcome.session, 3, microphone=False)
+        assert not second.resumed and second.session != welcome.session
+        await again.close()
+
+
+async def test_there_is_room_for_so_many_only(bundle):
+    async with serving(bundle, ChatSettings(max_sessions=1)) as (url, sessions):
+        page, _ = await open_page(url, microphone=False)
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(open_page(url, microphone=False), 2)
+        assert len(sessions) == 1
+        await page.close()
+        await asyncio.sleep(0.2)
+        again, _ = await open_page(url, microphone=False)  # the one that left makes room
+        assert len(sessions) == 1
+        assert not again.messages(Error)
+        await again.close()
