@@ -12,6 +12,7 @@ from ico3d.bundle import limits
 from ico3d.bundle.archive import Archive, open_archive, write_zip
 from ico3d.bundle.head import HEAD, POSES, BakedHead, poses_from_bytes
 from ico3d.bundle.manifest import MANIFEST, FileEntry, Manifest, check_manifest
+from ico3d.bundle.onnx_check import check_onnx
 from ico3d.errors import BundleError
 
 SPEECH = "speech.onnx"
@@ -81,11 +82,14 @@ class Bundle:
 
     def _check_contents(self) -> None:
         info = self.manifest.head
+        speech = self.manifest.speech
+        source = speech.input if speech else ""
         checks = {
             HEAD: lambda data: BakedHead.from_bytes(data, info),
             POSES: lambda data: poses_from_bytes(data, info.num_poses),
             THUMBNAIL: _check_thumbnail,
             LICENSES: _check_text,
+            SPEECH: lambda data: check_onnx(data, SPEECH, source, "expression"),
         }
         results = {}
         for name in self.manifest.files:

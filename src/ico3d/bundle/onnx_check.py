@@ -1,0 +1,128 @@
+"""A look into `speech.onnx` before a runtime loads it: standard operators, weights inside.
+
+Reads protobuf's wire format directly, so that a server needs no onnx package. Field numbers are
+those of onnx.proto (ModelProto, GraphProto, NodeProto, AttributeProto, TensorProto).
+"""
+
+from collections.abc import Iterator
+
+from ico3d.errors import BundleError
+
+_GRAPH, _FUNCTIONS = 7, 25
+_NODE, _INITIALIZER, _SPARSE, _INPUT, _OUTPUT = 1, 5, 15, 11, 12
+_OP_TYPE, _ATTRIBUTE, _DOMAIN = 4, 5, 7
+_TENSOR, _SUBGRAPHS = 5, (6, 11)
+_EXTERNAL, _LOCATION = 13, 14
+_NAME = 1
+OPERATORS = frozenset(
+    ("Add", "Cast", "Concat", "Constant", "Conv", "Flatten", "Gemm", "Identity", "LeakyRelu")
+    + ("MatMul", "Mul", "Pad", "ReduceSum", "Relu", "Slice", "Softmax", "Tanh", "Unsqueeze")
+)
+"""What feed-forward graphs such as those of `speech.export` need; no loops, no random numbers."""
+
+Value = int | memoryview
+
+
+def check_onnx(data: bytes, name: str, input_name: str, output_name: str) -> None:
+    """Checks that a model is self-contained and has the expected input and output.
+
+    Args:
+        data: The model.
+        name: The file, for messages.
+        input_name: Its only input.
+        output_name: Its only output.
+
+    Raises:
+        BundleError: If it is no ONNX model, uses other operators, or refers to other files.
+    """
+    try:
+        graphs = []
+        for field, value in _fields(memoryview(data)):
+            if field == _FUNCTIONS:
+                raise BundleError(f"{name}: defines functions of its own.")
+            if field == _GRAPH:
+                graphs.append(_bytes(value))
+        if len(graphs) != 1:
+            raise ValueError("no graph")
+        _check_graph(graphs[0], name, input_name, output_name)
+    except (ValueError, IndexError) as error:
+        raise BundleError(f"{name}: is not an ONNX model.") from error
+
+
+def _check_graph(graph: memoryview, name: str, input_name: str, output_name: str) -> None:
+    names: dict[int, list[str]] = {_INPUT: [], _OUTPUT: []}
+    for field, value in _fields(graph):
+        if field == _NODE:
+            _check_node(_bytes(value), name)
+        elif field == _INITIALIZER:
+            _check_tensor(_bytes(value), name)
+        elif field == _SPARSE:
+            raise BundleError(f"{name}: has sparse weights.")
+        elif field in names:
+            names[field].append(_text(_bytes(value), _NAME))
+    if names != {_INPUT: [input_name], _OUTPUT: [output_name]}:
+        raise BundleError(f"{name}: must lead from '{input_name}' to '{output_name}'.")
+
+
+def _check_node(node: memoryview, name: str) -> None:
+    if _text(node, _DOMAIN) not in ("", "ai.onnx") or _text(node, _OP_TYPE) not in OPERATORS:
+        raise BundleError(f"{name}: uses the operator {_text(node, _OP_TYPE)[:40]!r}.")
+    for field, value in _fields(node):
+        if field == _ATTRIBUTE:
+            for inner, part in _fields(_bytes(value)):
+                if inner in _SUBGRAPHS:
+                    raise BundleError(f"{name}: holds a graph within a graph.")
+                if inner == _TENSOR:
+                    _check_tensor(_bytes(part), name)
+
+
+def _check_tensor(tensor: memoryview, name: str) -> None:
+    for field, value in _fields(tensor):
+        if field == _EXTERNAL or (field == _LOCATION and value):
+            raise BundleError(f"{name}: keeps weights in another file.")
+
+
+def _text(message: memoryview, wanted: int) -> str:
+    """The last string in a field, which is the one that counts; empty where there is none."""
+    found = [_bytes(value) for field, value in _fields(message) if field == wanted]
+    return bytes(found[-1]).decode() if found else ""
+
+
+def _fields(message: memoryview) -> Iterator[tuple[int, Value]]:
+    """The (field number, value) pairs of a message; 32- and 64-bit numbers stay bytes."""
+    position = 0
+    while position < len(message):
+        key, position = _varint(message, position)
+        kind = key & 7
+        if kind == 0:
+            value, position = _varint(message, position)
+            yield key >> 3, value
+            continue
+        if kind == 2:
+            length, position = _varint(message, position)
+        elif kind in (1, 5):
+            length = 8 if kind == 1 else 4
+        else:
+            raise ValueError("no such wire type")
+        if position + length > len(message):
+            raise ValueError("cut off")
+        yield key >> 3, message[position : position + length]
+        position += length
+
+
+def _varint(message: memoryview, position: int) -> tuple[int, int]:
+    """A number of up to ten bytes and the position behind it."""
+    value = 0
+    for shift in range(0, 70, 7):
+        byte = message[position]
+        position += 1
+        value |= (byte & 0x7F) << shift
+        if byte < 0x80:
+            return value, position
+    raise ValueError("number too long")
+
+
+def _bytes(value: Value) -> memoryview:
+    if isinstance(value, int):
+        raise ValueError("a number where a message was expected")
+    return value

@@ -1,0 +1,106 @@
+"""What is refused in speech.onnx before a runtime sees it."""
+
+import numpy as np
+import onnx
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from onnx import TensorProto, helper, numpy_helper
+from random_bundle import speech_graph
+
+from ico3d.bundle.onnx_check import check_onnx
+from ico3d.errors import BundleError
+
+GRAPH = speech_graph()
+
+
+def check(data: bytes) -> None:
+    check_onnx(data, "speech.onnx", "mel", "expression")
+
+
+def refused(model: onnx.ModelProto, message: str) -> None:
+    with pytest.raises(BundleError, match=message):
+        check(model.SerializeToString())
+
+
+@pytest.fixture
+def model() -> onnx.ModelProto:
+    return onnx.load_from_string(GRAPH)
+
+
+def test_a_plain_graph_passes():
+    check(GRAPH)
+
+
+def test_exported_speech_passes():
+    import torch
+
+    from ico3d.speech.encoder import load_encoder
+    from ico3d.speech.export import export_speech
+    from ico3d.speech.network import SpeechAdaptor
+
+    torch.manual_seed(0)
+    encoder = load_encoder("builtin")
+    check(export_speech(SpeechAdaptor(encoder.size), encoder))
+
+
+def test_weights_in_another_file_are_refused(model):
+    weights = model.graph.initializer[0]
+    entry = weights.external_data.add()
+    entry.key, entry.value = "location", "/etc/passwd"
+    weights.data_location = TensorProto.EXTERNAL
+    refused(model, "another file")
+
+
+def test_a_constant_in_another_file_is_refused(model):
+    weights = numpy_helper.from_array(np.zeros(3, np.float32), "c")
+    weights.data_location = TensorProto.EXTERNAL
+    model.graph.node.append(helper.make_node("Constant", [], ["c"], value=weights))
+    refused(model, "another file")
+
+
+@pytest.mark.parametrize("operator", ["Loop", "If", "Scan", "ConstantOfShape", "RandomNormal", "X"])
+def test_other_operators_are_refused(model, operator):
+    model.graph.node.append(helper.make_node(operator, ["mel"], ["y"]))
+    refused(model, operator)
+
+
+def test_operators_of_other_domains_are_refused(model):
+    model.graph.node[0].domain = "com.microsoft"
+    refused(model, "Flatten")
+
+
+def test_graphs_within_graphs_are_refused(model):
+    attribute = helper.make_attribute("body", model.graph)
+    model.graph.node[0].attribute.append(attribute)
+    refused(model, "graph within a graph")
+
+
+def test_functions_are_refused(model):
+    function = helper.make_function("own", "F", ["a"], ["a"], [], [helper.make_opsetid("", 17)])
+    model.functions.append(function)
+    refused(model, "functions")
+
+
+@pytest.mark.parametrize("part", ["input", "output"])
+def test_other_inputs_and_outputs_are_refused(model, part):
+    getattr(model.graph, part)[0].name = "other"
+    refused(model, "'mel' to 'expression'")
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.binary(max_size=60) | st.integers(0, len(GRAPH) - 1).map(lambda n: GRAPH[:n]))
+def test_garbage_is_refused(data):
+    with pytest.raises(BundleError, match=r"speech\.onnx"):
+        check(data)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.integers(0, 300), st.integers(1, 255))
+def test_damage_is_refused_or_harmless(place, change):
+    data = bytearray(GRAPH)
+    data[place] ^= change
+    try:
+        check(bytes(data))
+    except BundleError as error:
+        assert str(error).startswith("speech.onnx: ")
