@@ -122,7 +122,7 @@ def _with_brow(subject: Subject, landmarks: list[int]) -> Subject:
     line = subject.landmarks(subject.vertices)[landmarks]  # (5, 3)
     along = np.linspace(0, 1, 17)
     middle = np.stack([np.interp(along, np.linspace(0, 1, 5), c) for c in line.T], 1)  # (17, 3)
-    middle[:, 1] += 0.002 * np.sin(np.pi * along) - 0.001
+    middle[:, 1] += 0.002 * np.sin(np.pi * along) + 0.002
     width = BROW_WIDTH * (1 - 0.45 * along)
     across = np.linspace(-0.5, 0.5, 5)
     grid = np.repeat(middle[:, None], 5, axis=1)  # (17, 5, 3)
@@ -132,7 +132,7 @@ def _with_brow(subject: Subject, landmarks: list[int]) -> Subject:
     skin = skin[(normals[skin, 2] > 0.0) & (subject.vertices[skin, 2] > 0.05)]
     points = grid.reshape(-1, 3)
     surface = LinearNDInterpolator(subject.vertices[skin, :2], subject.vertices[skin, 2])
-    points[:, 2] = surface(points[:, :2]) + 0.002
+    points[:, 2] = surface(points[:, :2]) + 0.003
     like = skin[KDTree(subject.vertices[skin]).query(points)[1]]
     faces, uv = _grid_faces(17, 5)
     return _appended(subject, points, faces, uv, Material.BROW, like)
@@ -167,13 +167,16 @@ def _with_hair(subject: Subject) -> Subject:
 
 
 def _inside_hairline(vertices: np.ndarray) -> np.ndarray:
-    """(V,) metres above the hairline; negative on face, ears and neck."""
+    """(V,) metres from the hairline; negative on face, ears and neck."""
     x, y, z = vertices.T
     angle = np.arctan2(np.abs(x), z - SKULL[2])
-    depth = y - np.interp(angle, HAIRLINE_ANGLE, HAIRLINE_HEIGHT)
-    ear = (np.abs(x) > SKULL_HALF_WIDTH) & (y < 0.045)
-    ear |= np.linalg.norm(np.stack([np.abs(x), y, z], 1) - EAR, axis=1) < EAR_RADIUS
-    return np.where(ear, -1.0, depth)
+    step = np.radians(3)
+    above, below = (np.interp(angle + d, HAIRLINE_ANGLE, HAIRLINE_HEIGHT) for d in (step, -step))
+    steepness = (above - below) / (2 * step * SKULL_HALF_WIDTH)
+    depth = (y - 0.5 * (above + below)) / np.hypot(1, steepness)
+    from_ear = np.linalg.norm(np.stack([np.abs(x), y, z], 1) - EAR, axis=1) - EAR_RADIUS
+    beside = (np.abs(x) > SKULL_HALF_WIDTH) & (y < 0.03)
+    return np.where(beside, -1.0, np.minimum(depth, from_ear))
 
 
 def _crown_uv(corners: np.ndarray) -> np.ndarray:
