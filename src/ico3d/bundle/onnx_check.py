@@ -14,10 +14,26 @@ _OP_TYPE, _ATTRIBUTE, _DOMAIN = 4, 5, 7
 _TENSOR, _SUBGRAPHS = 5, (6, 11)
 _EXTERNAL, _LOCATION = 13, 14
 _NAME = 1
-OPERATORS = frozenset(
-    ("Add", "Cast", "Concat", "Constant", "Conv", "Flatten", "Gemm", "Identity", "LeakyRelu")
-    + ("MatMul", "Mul", "Pad", "ReduceSum", "Relu", "Slice", "Softmax", "Tanh", "Unsqueeze")
-)
+OPERATORS = {
+    "Add",
+    "Cast",
+    "Concat",
+    "Constant",
+    "Conv",
+    "Flatten",
+    "Gemm",
+    "Identity",
+    "LeakyRelu",
+    "MatMul",
+    "Mul",
+    "Pad",
+    "ReduceSum",
+    "Relu",
+    "Slice",
+    "Softmax",
+    "Tanh",
+    "Unsqueeze",
+}
 """What feed-forward graphs such as those of `speech.export` need; no loops, no random numbers."""
 
 Value = int | memoryview
