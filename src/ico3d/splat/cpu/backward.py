@@ -17,7 +17,7 @@ from ico3d.splat.cpu.forward import (
     finished,
     pixel_positions,
 )
-from ico3d.splat.cpu.tiles import TILE, Tiles
+from ico3d.splat.cpu.tiles import TILE_HEIGHT, TILE_WIDTH, Tiles, dealt, dealt_turns
 
 GRADIENTS = 9
 """Per splat: mean (2), conic (3), opacity, colour (3)."""
@@ -41,20 +41,19 @@ def _gather(light, rest, red, green, blue, xs, ys, splat, left, top, out):
         raw = opacity * falloff(dx * (xx * dx + xy * dy) + yy * dy * dy)
         alpha = min(raw, MAX_ALPHA)
         alpha = alpha if alpha >= MIN_ALPHA else ZERO
-        before = light[p]
-        after = before * (ONE - alpha)
+        before, clear = light[p], ONE - alpha
+        after = before * clear
         alpha = alpha if after > MIN_TRANSMITTANCE else ZERO
+        light[p] = after if after > MIN_TRANSMITTANCE else -abs(before)
         weight = alpha * before
         sum_r += weight * red[p]
         sum_g += weight * green[p]
         sum_b += weight * blue[p]
-        seen = r * red[p] + g * green[p] + b * blue[p]
-        behind = rest[p] - weight * seen
-        by_alpha = before * seen - behind / (ONE - alpha)
-        by_exponent = raw * by_alpha if raw <= MAX_ALPHA else ZERO
-        by_exponent = by_exponent if alpha > ZERO else ZERO
+        seen = weight * (r * red[p] + g * green[p] + b * blue[p])
+        behind = rest[p] - seen
         rest[p] = behind
-        light[p] = after if after > MIN_TRANSMITTANCE else -abs(before)
+        by_exponent = seen - alpha * behind / clear
+        by_exponent = by_exponent if raw <= MAX_ALPHA else ZERO
         by_x, by_y = by_exponent * dx, by_exponent * dy
         sum_s += by_exponent
         sum_x += by_x
@@ -76,9 +75,9 @@ def _gather(light, rest, red, green, blue, xs, ys, splat, left, top, out):
 @kernel()
 def _read(state, left, top, image, light, g_image, g_light):
     """Reads a tile's pixel gradients and what the loss owes to the whole pixel."""
-    for y in range(min(TILE, image.shape[0] - top)):
-        for x in range(min(TILE, image.shape[1] - left)):
-            p, row, column = y * TILE + x, top + y, left + x
+    for y in range(min(TILE_HEIGHT, image.shape[0] - top)):
+        for x in range(min(TILE_WIDTH, image.shape[1] - left)):
+            p, row, column = y * TILE_WIDTH + x, top + y, left + x
             rest = g_light[row, column] * light[row, column]
             for k in range(3):
                 state[2 + k, p] = g_image[row, column, k]
@@ -92,7 +91,7 @@ def _collect(tile, across, records, rows, splats, entries, image, light, g_image
     state = np.zeros((7, PIXELS), np.float32)
     state[0] = ONE
     pixel_positions(state[5], state[6])
-    left, top = (tile % across) * TILE, (tile // across) * TILE
+    left, top = (tile % across) * TILE_WIDTH, (tile // across) * TILE_HEIGHT
     left_center, top_center = np.float32(left) + HALF, np.float32(top) + HALF
     _read(state, left, top, image, light, g_image, g_light)
     done = False
@@ -101,7 +100,7 @@ def _collect(tile, across, records, rows, splats, entries, image, light, g_image
         if done:
             parts[pair] = ZERO
             continue
-        low, high = rows[pair, 0] * TILE, rows[pair, 1] * TILE
+        low, high = rows[pair, 0] * TILE_WIDTH, rows[pair, 1] * TILE_WIDTH
         _gather(
             state[0, low:high],
             state[1, low:high],
@@ -120,19 +119,22 @@ def _collect(tile, across, records, rows, splats, entries, image, light, g_image
 
 @kernel(parallel=True)
 def _collect_all(
-    across, records, rows, splats, first_entry, pairs, image, light, g_image, g_light, parts
+    hands, across, records, rows, splats, first_entry, pairs, image, light, g_image, g_light, parts
 ):
-    for tile in numba.prange(first_entry.size - 1):
-        entries = pairs[first_entry[tile] : first_entry[tile + 1]]
-        _collect(
-            tile, across, records, rows, splats, entries, image, light, g_image, g_light, parts
-        )
+    count = first_entry.size - 1
+    for turn in numba.prange(dealt_turns(hands, count)):
+        tile = dealt(turn, hands, count)
+        if tile < count:
+            entries = pairs[first_entry[tile] : first_entry[tile + 1]]
+            _collect(
+                tile, across, records, rows, splats, entries, image, light, g_image, g_light, parts
+            )
 
 
-@kernel(parallel=True)
+@kernel()
 def _sum(first_pair, parts, gradients):
     """Sums each splat's pairs in their order."""
-    for i in numba.prange(first_pair.size - 1):
+    for i in range(first_pair.size - 1):
         for k in range(GRADIENTS):
             gradients[i, k] = ZERO
         for pair in range(first_pair[i], first_pair[i + 1]):
@@ -163,8 +165,9 @@ def draw_backward(
     """
     parts = np.empty((len(tiles.pairs), GRADIENTS), np.float32)
     gradients = np.empty((len(records), GRADIENTS), np.float32)
-    across = -(-tiles.width // TILE)
+    across = -(-tiles.width // TILE_WIDTH)
     _collect_all(
+        numba.get_num_threads(),
         across,
         records,
         tiles.rows,

@@ -3,14 +3,13 @@
 from dataclasses import dataclass
 from math import floor, log, sqrt
 
-import numba
 import numpy as np
 
 from ico3d.splat.convention import MIN_ALPHA
 from ico3d.splat.cpu.compile import kernel
 
-TILE = 16
-"""Side of a tile in pixels: a row of it fills one or two vector registers."""
+TILE_WIDTH, TILE_HEIGHT = 16, 32
+"""Pixels. A row fills one or two vector registers; tall tiles mean fewer pairs."""
 
 SLACK = 0.01
 """Pixels by which a splat's outline is widened, so that rounding cuts nothing off."""
@@ -46,6 +45,23 @@ class Tiles:
 
 
 @kernel()
+def dealt(turn, hands, count):
+    """The item of a turn when `count` items are dealt out among `hands`; may be past the end.
+
+    A thread gets neighbouring turns. Dealt like this, it gets every `hands`-th tile instead of one
+    part of the picture, and nobody waits for the thread with the busiest part.
+    """
+    share = -(-count // hands)
+    return turn % share * hands + turn // share
+
+
+@kernel()
+def dealt_turns(hands, count):
+    """How many turns deal out `count` items."""
+    return -(-count // hands) * hands
+
+
+@kernel()
 def _reach(p, b, q, cut, low, high, v_max):
     """Range of v in the ellipse p·u² + b·u·v + q·v² ≤ cut, given that u lies in [low, high].
 
@@ -72,66 +88,72 @@ def _reach(p, b, q, cut, low, high, v_max):
 
 
 @kernel()
-def _span(low, high, size):
-    """First and end index of the tiles that the pixel range [low, high] touches."""
-    return max(0, floor(low / TILE)), min(size, floor(high / TILE) + 1)
+def _span(low, high, tile, count):
+    """First and end of the `count` tiles that the pixel range [low, high] touches."""
+    return max(0, floor(low / tile)), min(count, floor(high / tile) + 1)
 
 
 @kernel()
 def _columns(mean, conic, cut, extent, row, across):
     """First and end tile that a splat touches in one row of tiles."""
-    low = row * TILE + 0.5 - mean[1] - SLACK
-    high = low + TILE - 1 + 2 * SLACK
+    low = row * TILE_HEIGHT + 0.5 - mean[1] - SLACK
+    high = low + TILE_HEIGHT - 1 + 2 * SLACK
     left, right = _reach(0.5 * conic[2], conic[1], 0.5 * conic[0], cut, low, high, extent[0])
     if left > right:
         return 0, 0
-    return _span(mean[0] + left - SLACK, mean[0] + right + SLACK, across)
+    return _span(mean[0] + left - SLACK, mean[0] + right + SLACK, TILE_WIDTH, across)
 
 
 @kernel()
 def _rows(mean, conic, cut, extent, column, row):
     """First and end pixel row within a tile that a splat touches."""
-    low = column * TILE + 0.5 - mean[0] - SLACK
-    high = low + TILE - 1 + 2 * SLACK
+    low = column * TILE_WIDTH + 0.5 - mean[0] - SLACK
+    high = low + TILE_WIDTH - 1 + 2 * SLACK
     top, bottom = _reach(0.5 * conic[0], conic[1], 0.5 * conic[2], cut, low, high, extent[1])
     if top > bottom:
         return 0, 0
-    offset = mean[1] - row * TILE - 0.5
+    offset = mean[1] - row * TILE_HEIGHT - 0.5
     first = max(0, floor(offset + top - SLACK) + 1)
-    return first, max(first, min(TILE, floor(offset + bottom + SLACK) + 1))
+    return first, max(first, min(TILE_HEIGHT, floor(offset + bottom + SLACK) + 1))
 
 
-@kernel(parallel=True)
-def _count(means, conics, alphas, extents, across, down, counts):
-    """Counts the tiles that each splat touches."""
-    for i in numba.prange(means.shape[0]):
-        total = 0
+@kernel()
+def _box(mean, extent, across, down):
+    """The tiles of a splat's box: first and end column, first and end row."""
+    across_by, down_by = extent[0] + SLACK, extent[1] + SLACK
+    left, right = _span(mean[0] - across_by, mean[0] + across_by, TILE_WIDTH, across)
+    top, bottom = _span(mean[1] - down_by, mean[1] + down_by, TILE_HEIGHT, down)
+    return left, right, top, bottom
+
+
+@kernel()
+def _most_pairs(means, alphas, extents, across, down):
+    """How many pairs there are at most: the tiles of all boxes."""
+    total = 0
+    for i in range(means.shape[0]):
         if alphas[i] > 0:
-            cut = log(alphas[i] / MIN_ALPHA)
-            first, end = _span(means[i, 1] - extents[i, 1], means[i, 1] + extents[i, 1], down)
-            for row in range(first, end):
-                left, right = _columns(means[i], conics[i], cut, extents[i], row, across)
-                total += max(0, right - left)
-        counts[i] = total
+            left, right, top, bottom = _box(means[i], extents[i], across, down)
+            total += max(0, right - left) * max(0, bottom - top)
+    return total
 
 
-@kernel(parallel=True)
+@kernel()
 def _list(means, conics, alphas, extents, across, down, first_pair, tiles, rows, splats):
     """Lists each splat's tiles, and the rows it touches there."""
-    for i in numba.prange(means.shape[0]):
-        pair = first_pair[i]
-        if first_pair[i + 1] > pair:
+    pair = 0
+    for i in range(means.shape[0]):
+        first_pair[i] = pair
+        if alphas[i] > 0:
             cut = log(alphas[i] / MIN_ALPHA)
-            first, end = _span(means[i, 1] - extents[i, 1], means[i, 1] + extents[i, 1], down)
+            leftmost, rightmost, first, end = _box(means[i], extents[i], across, down)
             for row in range(first, end):
                 left, right = _columns(means[i], conics[i], cut, extents[i], row, across)
-                for column in range(left, right):
-                    tiles[pair] = row * across + column
-                    rows[pair, 0], rows[pair, 1] = _rows(
-                        means[i], conics[i], cut, extents[i], column, row
-                    )
-                    splats[pair] = i
+                for column in range(max(left, leftmost), min(right, rightmost)):
+                    tiles[pair], splats[pair] = row * across + column, i
+                    low, high = _rows(means[i], conics[i], cut, extents[i], column, row)
+                    rows[pair, 0], rows[pair, 1] = low, high
                     pair += 1
+    first_pair[means.shape[0]] = pair
 
 
 @kernel()
@@ -198,15 +220,12 @@ def bin_splats(
     Returns:
         The tiles.
     """
-    across, down = -(-width // TILE), -(-height // TILE)
-    counts = np.empty(len(means2d), np.int32)
-    _count(means2d, conics, alphas, extents, across, down, counts)
-    first_pair = np.zeros(len(means2d) + 1, np.int32)
-    np.cumsum(counts, out=first_pair[1:])
-    total = int(first_pair[-1])
-    tiles, splats = np.empty(total, np.int32), np.empty(total, np.int32)
-    rows, pairs = np.empty((total, 2), np.int32), np.empty(total, np.int32)
+    across, down = -(-width // TILE_WIDTH), -(-height // TILE_HEIGHT)
+    most = _most_pairs(means2d, alphas, extents, across, down)
+    tiles, splats = np.empty(most, np.int32), np.empty(most, np.int32)
+    rows, first_pair = np.empty((most, 2), np.int32), np.empty(len(means2d) + 1, np.int32)
     _list(means2d, conics, alphas, extents, across, down, first_pair, tiles, rows, splats)
-    first_entry = np.zeros(across * down + 1, np.int32)
-    _fill(_order(depths), first_pair, tiles, first_entry, pairs)
-    return Tiles(width, height, first_pair, rows, splats, first_entry, pairs)
+    total = first_pair[-1]
+    first_entry, pairs = np.zeros(across * down + 1, np.int32), np.empty(total, np.int32)
+    _fill(_order(depths), first_pair, tiles[:total], first_entry, pairs)
+    return Tiles(width, height, first_pair, rows[:total], splats[:total], first_entry, pairs)

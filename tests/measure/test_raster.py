@@ -1,0 +1,34 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from ico3d.cli import main
+from ico3d.errors import SettingsError
+from ico3d.measure.raster import compare
+
+OPPONENT = Path(__file__).parents[3] / "shared" / "reference" / "raster_c" / "opponent.py"
+
+
+@pytest.mark.skipif(not OPPONENT.is_file(), reason="the C++ opponent is not beside the repository")
+def test_both_draw_the_same_picture(tmp_path, capsys):
+    out = tmp_path / "raster.json"
+    words = ["bench", "raster", "--against", str(OPPONENT), "--json", str(out)]
+    assert main([*words, "--n", "2000", "--size", "96", "--runs", "2"]) == 0
+    figures = json.loads(out.read_text())
+    assert figures["image_difference"] < 1e-3
+    assert figures["gradient_difference"] < 1e-3
+    total = figures["ours_binning_ms"] + figures["ours_forward_ms"] + figures["ours_backward_ms"]
+    assert figures["ours_total_ms"] == pytest.approx(total)
+    assert figures["ratio_2k_96"] == pytest.approx(total / figures["theirs_total_ms"])
+    assert "ratio_2k_96" in capsys.readouterr().out
+
+
+def test_what_is_no_opponent_is_refused(tmp_path):
+    with pytest.raises(SettingsError, match="names no Python file"):
+        compare(tmp_path / "nothing.py", 10, 32, 1)
+    (tmp_path / "empty.py").write_text("")
+    with pytest.raises(SettingsError, match="is no opponent"):
+        compare(tmp_path / "empty.py", 10, 32, 1)
+    with pytest.raises(SettingsError, match="multiple of 16"):
+        compare(tmp_path / "empty.py", 10, 33, 1)
