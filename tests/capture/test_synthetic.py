@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ico3d.capture.capture import Capture
+from ico3d.capture.synthetic import recording
 from ico3d.capture.synthetic.points import surface_points
 from ico3d.capture.synthetic.recording import Recording, choose_views, record
 from ico3d.capture.synthetic.subject import load_subject
@@ -52,6 +53,25 @@ def _files(folder: Path) -> dict[str, bytes]:
 def test_the_same_settings_write_the_same_bytes(folder, person, tmp_path):
     record(_settings(person), tmp_path / "again", workers=1)
     assert _files(tmp_path / "again") == _files(folder)
+
+
+def test_a_recording_that_was_cut_off_goes_on(folder, person, tmp_path, monkeypatch):
+    write, written = recording._write_png, []
+
+    def fails(path, values):
+        if len(written) == 12:
+            raise OSError("the disk is full")
+        written.append(path)
+        write(path, values)
+
+    monkeypatch.setattr(recording, "_write_png", fails)
+    with pytest.raises(OSError, match="full"):
+        record(_settings(person), tmp_path / "cut", workers=1)
+    with pytest.raises(CaptureError):
+        Capture.open(tmp_path / "cut")
+    monkeypatch.setattr(recording, "_write_png", write)
+    record(_settings(person), tmp_path / "cut", workers=1)
+    assert _files(tmp_path / "cut") == _files(folder)
 
 
 def test_another_seed_writes_other_frames(folder, person, tmp_path):

@@ -27,6 +27,8 @@ from ico3d.errors import SettingsError
 
 FPS = 25.0
 POINTS = 6000
+UNFINISHED = "unfinished.json"
+"""Settings of a recording that has not come to its end."""
 
 
 @dataclass(frozen=True)
@@ -55,11 +57,11 @@ class Recording:
 
 
 def record(recording: Recording, out: Path, workers: int) -> None:
-    """Records a person.
+    """Records a person; the same call goes on where an earlier one was cut off.
 
     Args:
         recording: What to record.
-        out: Folder to write; must not hold anything yet.
+        out: Folder to write; holds nothing yet, or what a cut-off call left.
         workers: Threads that draw pictures.
 
     Raises:
@@ -67,13 +69,14 @@ def record(recording: Recording, out: Path, workers: int) -> None:
         CaptureError: If the subject cannot be read.
         MissingExtraError: If an optional package is missing.
     """
-    _check(recording, out)
+    _check(recording)
     subject = load_subject(recording.subject)
     acted = perform(subject, recording.text, recording.frames, FPS, recording.seed)
     cameras = head_rig(subject, recording.cameras, recording.size)
     views = choose_views(
         recording.frames, recording.cameras, recording.views_per_frame, recording.seed
     )
+    _begin(recording, out)
     backdrops = [backdrop(camera) for camera in cameras]
     for camera, image in zip(cameras, backdrops, strict=True):
         _write_png(out / "backgrounds" / f"{camera.name}.png", image)
@@ -82,9 +85,10 @@ def record(recording: Recording, out: Path, workers: int) -> None:
     _draw(subject, acted, cameras, backdrops, views, out, workers)
     # Last: a folder with capture.json is complete.
     _write_json(out / "capture.json", recording, subject, acted, cameras)
+    (out / UNFINISHED).unlink()
 
 
-def _check(recording: Recording, out: Path) -> None:
+def _check(recording: Recording) -> None:
     if recording.rig != "head":
         raise SettingsError(f"there is no rig '{recording.rig}': use 'head'.")
     for name in ("cameras", "frames", "views_per_frame", "size"):
@@ -95,8 +99,17 @@ def _check(recording: Recording, out: Path) -> None:
             f"views_per_frame ({recording.views_per_frame}) cannot exceed "
             f"the number of cameras ({recording.cameras})."
         )
+
+
+def _begin(recording: Recording, out: Path) -> None:
+    """Marks a folder as being recorded, unless it is marked with the same settings already."""
+    settings = json.dumps(asdict(recording)).encode()
+    mark = out / UNFINISHED
+    if mark.is_file() and mark.read_bytes() == settings:
+        return
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise SettingsError(f"{out} holds something already: name a new folder.")
+    write_atomic(mark, settings)
 
 
 def choose_views(frames: int, cameras: int, per_frame: int, seed: int) -> np.ndarray:
@@ -131,13 +144,23 @@ def _draw(
         camera = cameras[index]
         rgb, alpha = studio.picture(camera, acted.weights[frame], acted.world_from_head[frame])
         image = rgb + (1 - alpha[..., None]) * backdrops[index]
-        _write_png(out / "images" / camera.name / f"{frame:06d}.png", image)
-        _write_png(out / "masks" / camera.name / f"{frame:06d}.png", alpha)
+        _write_png(out / "images" / camera.name / _png_name(frame), image)
+        # The mask comes last: where it is, the picture is whole.
+        _write_png(out / "masks" / camera.name / _png_name(frame), alpha)
 
     jobs = [(int(f), int(c)) for f, c in np.argwhere(views)]
+    jobs = [j for j in jobs if not (out / "masks" / cameras[j[1]].name / _png_name(j[0])).exists()]
     with ThreadPoolExecutor(workers) as pool:
-        for _ in _progress(pool.map(draw, jobs), len(jobs)):
-            pass
+        try:
+            for _ in _progress(pool.map(draw, jobs), len(jobs)):
+                pass
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def _png_name(frame: int) -> str:
+    return f"{frame:06d}.png"
 
 
 def _progress(steps: Iterator, total: int) -> Iterator:
@@ -152,8 +175,7 @@ def _write_png(path: Path, values: np.ndarray) -> None:
     Image.fromarray((np.clip(values, 0, 1) * 255 + 0.5).astype(np.uint8)).save(
         data, format="PNG", compress_level=4
     )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(data.getvalue())
+    write_atomic(path, data.getvalue())
 
 
 def _write_sound(path: Path, samples: np.ndarray) -> None:
