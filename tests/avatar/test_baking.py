@@ -45,7 +45,7 @@ def test_a_higher_rank_is_better_and_larger(blendshape_head):
     views = comparison.references(head, capture, (0.5, 0.5, 0.5), 6)
     maker = baker(head, capture)
     losses = [comparison.measure(maker.baked(rank), views) for rank in (1, 4, 16)]
-    likeness = [loss.psnr_baked_vs_exact for loss in losses]
+    likeness = [loss.psnr_baked_vs_exact or 0.0 for loss in losses]
     assert likeness[0] + 2 < likeness[1] < likeness[2]
 
 
@@ -70,7 +70,7 @@ def test_measured_pictures_are_the_noise_apart(blendshape_head):
     views = comparison.references(head, capture, (0.5, 0.5, 0.5), 6)
     loss = comparison.measure(baker(head, capture).baked(16), views)
     assert loss.psnr_exact == pytest.approx(-20 * np.log10(0.03), abs=0.3)
-    assert loss.psnr_baked <= loss.psnr_exact + 0.05
+    assert loss.psnr_baked == pytest.approx(loss.psnr_exact, abs=0.3)
     assert comparison.strip(baker(head, capture).baked(2), views, 2).shape == (96, 144, 3)
 
 

@@ -12,6 +12,7 @@ _ARM = 0.1
 """Metres from the head's centre at which a turn counts as a move."""
 _SMOOTHING = 1.5
 """Standard deviation, in frames, of the smoothing of head poses (trackers jitter)."""
+_MARGIN = 1.2
 NEUTRAL = (0.84, 0.86, 0.88)
 """Background where the capture has none: a light grey."""
 
@@ -49,11 +50,12 @@ def visitor_view(camera: Camera, points: np.ndarray) -> CameraInfo:
     """
     pixels, depths = camera.project(points)  # (P, 2), (P,)
     inside = depths > 0
-    low, high = np.percentile(pixels[inside], (1, 99), axis=0)  # (2,), (2,)
+    low, high = np.percentile(pixels[inside], (0.5, 99.5), axis=0)  # (2,), (2,)
     size = np.array([camera.width, camera.height], float)
     low, high = np.clip(low, 0, size), np.clip(high, 0, size)
-    centre, half = (low + high) / 2, (high - low).max() / 2 * 1.1
+    centre, half = (low + high) / 2, (high - low).max() / 2 * _MARGIN
     half = min(max(half, 1.0), size[1] / 2)  # never wider than what was recorded
+    centre[1] = min(centre[1], size[1] - half)  # nor lower: there the body just ends
     ray = np.linalg.inv(camera.intrinsics) @ [*centre, 1.0]
     rotation, eye = camera.world_to_camera[:3, :3], camera.camera_to_world[:3, 3]
     target = eye + rotation.T @ ray * np.median(depths[inside])
