@@ -14,9 +14,9 @@ class Bake:
         model: A model folder of ico3d train head.
         capture: The capture it was trained on.
         out: The bundle to write, NAME.ico3d.
-        rank: Number of basis vectors, 1 to 64; by default the smallest from 16 on that keeps the bounds:
-            at most 0.3 dB lost against ground truth, at least 45 dB against the exact model, at
-            most 1.7 MB per 10,000 Gaussians.
+        rank: Number of basis vectors, 1 to 64; by default the smallest from 16 on that keeps
+            the bounds: at most 0.3 dB lost against ground truth, at least 45 dB against the exact
+            model, at most 1.7 MB per 10,000 Gaussians.
         name: The avatar's name; by default the persona's.
         persona: JSON file with name, greeting and notes; by default that of the package.
         licences: Text files with notices that the sources ask for; they go into LICENSES.txt.
