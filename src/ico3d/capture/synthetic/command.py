@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 
 import tyro
 
+from ico3d.errors import MissingExtraError
+
 
 @dataclass(frozen=True)
 class Synthetic:
@@ -42,7 +44,12 @@ class Synthetic:
         """Records and says where the capture lies."""
         from rich import print as say
 
-        from ico3d.capture.synthetic.recording import Recording, record
+        try:
+            from ico3d.capture.synthetic.recording import Recording, record
+        except ModuleNotFoundError as error:
+            raise MissingExtraError(
+                error.name or "numba", "train", "recording synthetic people"
+            ) from None
 
         recording = Recording(
             self.subject,
