@@ -6,7 +6,7 @@ import { join } from 'node:path';
 import { expect, test } from 'vitest';
 import { Browser } from '../support/browser.ts';
 import { runPython } from '../support/python.ts';
-import { readRecord, recordLoudness, recordWire, type Record } from '../support/recorder.ts';
+import { pauseDrawing, readRecord, recordLoudness, recordWire, type Record } from '../support/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
 import { ChatServer } from '../support/server.ts';
 import { quantile } from '../support/statistics.ts';
@@ -29,6 +29,7 @@ test(`voice to voice over ${TURNS} turns`, async () => {
   await recordWire(browser.context);
   await browser.open(server.url);
   await recordLoudness(browser.page);
+  await pauseDrawing(browser.page);
   await browser.page.click('#microphone');
   await browser.page.waitForTimeout(1000 * (8 + TURNS * (PAUSE + 1.2)));
   const turns = turnsOf(await readRecord(browser.page));

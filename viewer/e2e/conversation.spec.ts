@@ -3,7 +3,7 @@ import { join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import { Browser } from '../support/browser.ts';
 import { REPOSITORY, runPython } from '../support/python.ts';
-import { readRecord, recordLoudness, recordWire, type Record } from '../support/recorder.ts';
+import { pauseDrawing, readRecord, recordLoudness, recordWire, type Record } from '../support/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
 import { ChatServer } from '../support/server.ts';
 
@@ -39,6 +39,12 @@ async function until(browser: Browser, condition: (record: Record) => boolean, t
     await browser.page.waitForTimeout(100);
   }
   throw new Error(`not within ${timeout} ms: ${condition}`);
+}
+
+/** When the visitor began to speak for the last time before `end`, after at least a second's pause. */
+function lastOnset({ microphone }: Record, end: number): number {
+  const voiced = microphone.filter(({ at, level }) => at < end && level > VOICE);
+  return voiced.findLast(({ at }, i) => i === 0 || at - voiced[i - 1]!.at > 1000)!.at;
 }
 
 const finished = (utterance: number) => (record: Record) =>
@@ -89,12 +95,14 @@ describe('a typed question', () => {
     await page.fill('#text', SENTENCE);
     await page.keyboard.press('Enter');
     await until(browser, ({ loudness }) => loudness.slice(-20).every(({ level }) => level > SILENCE), 30_000);
-    const pressed = await page.evaluate(() => performance.now());
+    const pressed = page.evaluate(
+      () => new Promise<number>((resolve) => addEventListener('keydown', ({ timeStamp }) => resolve(timeStamp))),
+    );
     await page.keyboard.press('Escape');
     await page.waitForTimeout(1500);
     const { loudness } = await readRecord(page);
     const last = loudness.findLast(({ level }) => level > SILENCE)!;
-    expect(last.at - pressed).toBeLessThan(250); // key press, fade and the analyser's window
+    expect(last.at - (await pressed)).toBeLessThan(250); // fade, the analyser's window, a busy machine
   });
 });
 
@@ -104,7 +112,8 @@ describe('a spoken question', () => {
   beforeAll(async () => {
     const voice = join(folder, 'voice.wav');
     const sentence = existsSync(RECORDING) ? RECORDING : SENTENCE;
-    runPython('voice.py', voice, '2', sentence, '4.5', sentence, '4');
+    // Again and again: on a busy machine nobody knows when the answer will come.
+    runPython('voice.py', voice, '2', ...Array.from({ length: 8 }, () => [sentence, '4.5']).flat());
     browser = await openPage({ microphone: voice });
   });
   afterAll(() => browser?.close());
@@ -112,6 +121,7 @@ describe('a spoken question', () => {
   test('is understood and answered, and the next one silences the answer', async () => {
     const { page } = browser;
     await until(browser, finished(0), 30_000);
+    await pauseDrawing(page);
     await page.click('#microphone');
     const speaking = ({ loudness }: Record) => loudness.slice(-20).every(({ level }) => level > SILENCE);
     await until(browser, speaking, 30_000);
@@ -124,11 +134,10 @@ describe('a spoken question', () => {
     await page.waitForTimeout(300);
     const record = await readRecord(page);
     const stop = record.received.find(({ type }) => type === 'stop')!;
-    const began = record.received.find((m) => m.type === 'speech' && m.utterance === stop.utterance)!;
-    const second = record.microphone.find(({ at, level }) => at > began.at && level > VOICE)!;
+    const onset = lastOnset(record, stop.at);
     const silent = record.loudness.findLast(({ at, level }) => at < stop.at + 290 && level > SILENCE)!;
-    console.log(`silent ${Math.round(silent.at - second.at)} ms after the first sound of the second question`);
-    expect(silent.at - second.at).toBeLessThan(600);
+    console.log(`silent ${Math.round(silent.at - onset)} ms after the first sound of the second question`);
+    expect(silent.at - onset).toBeLessThan(600);
   });
 });
 

@@ -85,3 +85,8 @@ export function recordLoudness(page: Page): Promise<void> {
 export async function readRecord(page: Page): Promise<Record> {
   return page.evaluate(() => ({ ...window.record!, sockets: [] }));
 }
+
+/** Stops drawing: software rendering takes its share of the processor from recogniser and voice. */
+export function pauseDrawing(page: Page): Promise<void> {
+  return page.evaluate(() => void window.ico3d!.stage.renderer.setAnimationLoop(null));
+}
