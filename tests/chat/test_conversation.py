@@ -96,7 +96,7 @@ async def test_real_speech_is_transcribed_and_silences_the_avatar(served):
     at, _ = await page.wait(Stop, where=lambda m: m.utterance == second.utterance)
     assert at - spoken_at < 0.6 * slowness()
     _, transcript = await page.wait(Transcript, where=lambda m: m.final)
-    assert "find a new home in the stars" in transcript.text
+    assert "find a new home" in transcript.text
     await page.wait(Speech, where=lambda m: m.utterance == 2)
     await page.close()
 
@@ -153,7 +153,7 @@ async def test_a_cough_is_not_answered_and_ends_listening(served):
     rng = np.random.default_rng(0)
     burst = (rng.normal(0, 6000, 4000) * np.hanning(4000)).astype(np.int16)
     page.say(burst)
-    await asyncio.sleep(3)
+    await asyncio.sleep(2.5)
     assert not page.messages(Speech, since)
     states = [m.state for m in page.messages(State, since)]
     assert states in ([], ["listening", "idle"])

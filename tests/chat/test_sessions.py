@@ -86,7 +86,7 @@ async def test_sessions_end_and_leave_nothing_behind(bundle):
         await visit(url)  # the first one starts threads that serve all
         await emptied(sessions)
         tasks, threads = len(asyncio.all_tasks()), set(threading.enumerate())
-        for _ in range(3):
+        for _ in range(2):
             await visit(url)
             await emptied(sessions)
         await asyncio.sleep(0.3)

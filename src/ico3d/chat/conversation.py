@@ -36,6 +36,7 @@ from ico3d.chat.speaker import Speaker
 from ico3d.chat.timing import TurnTimer
 from ico3d.speech.runtime import SpeechModel
 
+QUIETEST = 0.4  # smoothed volume of speech; it rises over 0.2 s, so more would notice it later
 NOTHING_HEARD = 1.5  # s without words after which a turn that was only noise is over
 
 
@@ -170,7 +171,10 @@ def make_parts(avatar: Avatar) -> Parts:
     """Loads the models of one session."""
     settings, services = avatar.settings, avatar.services
     return Parts(
-        SileroVADAnalyzer(sample_rate=MICROPHONE_RATE, params=VADParams(stop_secs=settings.pause)),
+        SileroVADAnalyzer(
+            sample_rate=MICROPHONE_RATE,
+            params=VADParams(stop_secs=settings.pause, min_volume=QUIETEST),
+        ),
         LocalSmartTurnAnalyzerV3(
             params=SmartTurnParams(stop_secs=settings.end_silence - settings.pause)
         ),

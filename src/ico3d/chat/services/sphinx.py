@@ -25,6 +25,7 @@ from ico3d.chat.settings import ChatSettings
 from ico3d.errors import MissingExtraError
 
 LEAD_IN = 0.7  # s of sound before the VAD noticed speech: it needs 0.2 s to be sure
+STEP = 2 * 640  # bytes decoded at once: the decoder holds the interpreter's lock meanwhile
 PARTIAL_EVERY = 0.25  # s of sound between partial transcripts
 LOUDNESS = 1500.0  # RMS of the loudest 0.2 s: what the acoustic model hears best
 MOST_GAIN = 10.0
@@ -110,8 +111,8 @@ class SphinxRecognition(STTService):
         self._hearing = True
         lead_in = b"".join(self._before)
         self._leveller.measure(lead_in)
-        if lead_in:
-            self._sound.put_nowait(lead_in)
+        for at in range(0, len(lead_in), STEP):
+            self._sound.put_nowait(lead_in[at : at + STEP])
         self._before.clear()
         self._before_bytes = 0
 
