@@ -38,7 +38,7 @@ class EncoderSettings:
         seed: Decides voices, texts, recordings and first weights.
     """
 
-    steps: int = 1500
+    steps: int = 600
     batch: int = 8
     seconds: float = 3.0
     learning_rate: float = 2e-3
@@ -72,7 +72,9 @@ class EncoderTraining:
         """
         torch.manual_seed(settings.seed)
         self.settings = settings
-        self.network = BuiltinEncoder(normalise=True).to(memory_format=torch.channels_last)
+        self.network = BuiltinEncoder(normalise=True).to(
+            memory_format=torch.channels_last  # type: ignore (missing in its stub)
+        )
         self.readout = Readout()
         parameters = [*self.network.parameters(), *self.readout.parameters()]
         self._optimiser = torch.optim.AdamW(parameters, settings.learning_rate, weight_decay=0.01)
@@ -189,7 +191,7 @@ def _standardise(network: BuiltinEncoder, readout: Readout, batches: list[Batch]
     network.project.weight /= deviation[:, None, None, None]
     network.project.bias.sub_(mean).div_(deviation)
     for layer in (readout.visemes, readout.articulation):
-        layer.bias += layer.weight @ mean
+        layer.bias.add_(layer.weight @ mean)
         layer.weight *= deviation
 
 
