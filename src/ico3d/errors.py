@@ -31,7 +31,8 @@ class MissingExtraError(Ico3dError):
     def __init__(self, package: str, extra: str, purpose: str):
         """Names the package, the extra that brings it, and what it is needed for."""
         super().__init__(
-            f"{purpose} needs the package '{package}': install it with pip install 'ico3d[{extra}]'."
+            f"{purpose} needs the package '{package}': "
+            f"install it with pip install 'ico3d[{extra}]'."
         )
 
 

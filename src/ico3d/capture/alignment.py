@@ -140,7 +140,7 @@ def _flow(
     start, first = ((p - 0.5).astype(np.float32)[:, None] for p in (points, guess))
     there, ok, _ = cv2.calcOpticalFlowPyrLK(before, after, start, first.copy(), **settings)
     back, ok_back, _ = cv2.calcOpticalFlowPyrLK(after, before, there, start.copy(), **settings)
-    sure = (ok & ok_back).ravel() > 0
+    sure = (np.asarray(ok) > 0).ravel() & (np.asarray(ok_back) > 0).ravel()
     sure &= np.linalg.norm(back - start, axis=-1).ravel() < 0.5
     return np.where(sure[:, None], there[:, 0].astype(np.float64) + 0.5, np.nan)
 

@@ -138,11 +138,11 @@ def cut(image: np.ndarray, landmarks: np.ndarray, models: Models) -> np.ndarray:
     cv2.grabCut(
         small,
         labels,
-        None,
+        None,  # type: ignore (its stub forgets that masks need no rectangle)
         background,
         person,
         1,
-        cv2.GC_EVAL_FREEZE_MODEL,  # type: ignore
+        cv2.GC_EVAL_FREEZE_MODEL,
     )
     rough = _largest(_inside(labels)).astype(np.float32)
     rough = cv2.resize(rough, image.shape[1::-1], interpolation=cv2.INTER_LINEAR)

@@ -15,8 +15,11 @@ OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 def save_picture(path: Path, image: np.ndarray) -> None:
     """Writes uint8 RGB(A) or grey; JPEGs with full colour resolution."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    extra = {"quality": 97, "subsampling": 0} if path.suffix == ".jpg" else {"compress_level": 3}
-    Image.fromarray(image).save(path, **extra)
+    picture = Image.fromarray(image)
+    if path.suffix == ".jpg":
+        picture.save(path, quality=97, subsampling=0)
+    else:
+        picture.save(path, compress_level=3)
 
 
 def save_landmarks(path: Path, landmarks: np.ndarray) -> None:

@@ -93,6 +93,7 @@ def open_video(path: Path, size: int) -> Video:
         CaptureError: If it is missing, no video, or damaged beyond opening.
     """
     import av
+    from av.error import FFmpegError
 
     if not path.is_file():
         raise CaptureError(f"there is no video file at {path}.")
@@ -105,7 +106,7 @@ def open_video(path: Path, size: int) -> Video:
             frame = next(container.decode(stream), None)
             turned = frame is not None and frame.rotation // 90 % 2 == 1
             announced, rate = stream.frames, float(stream.average_rate or 0)
-    except (av.FFmpegError, OSError) as error:
+    except (FFmpegError, OSError) as error:
         raise CaptureError(f"{path} cannot be decoded as a video: {error}.") from error
     if frame is None or width * height == 0:
         raise CaptureError(f"{path}: no picture can be decoded; is the file damaged?")
@@ -158,7 +159,7 @@ def _shifted(samples: np.ndarray, later: int) -> np.ndarray:
 
 def _decode(video: Video | None, container, stream) -> Iterator:
     """Decodes packet by packet, so that a damaged one costs only itself."""
-    import av
+    from av.error import FFmpegError
 
     packets = container.demux(stream)
     while True:
@@ -167,7 +168,7 @@ def _decode(video: Video | None, container, stream) -> Iterator:
             if packet is None:
                 return
             frames = packet.decode()
-        except (av.FFmpegError, EOFError):
+        except (FFmpegError, EOFError):
             if video is None:
                 continue
             video.damaged += 1

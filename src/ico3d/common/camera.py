@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True)
@@ -81,13 +82,11 @@ class Camera:
         return image[..., :2] / image[..., 2:], local[..., 2]
 
 
-def look_at(
-    eye: np.ndarray, target: np.ndarray, up: np.ndarray = np.array([0.0, 1.0, 0.0])
-) -> np.ndarray:
+def look_at(eye: ArrayLike, target: ArrayLike, up: ArrayLike = (0.0, 1.0, 0.0)) -> np.ndarray:
     """World-to-camera (4, 4) of a camera at `eye` that looks at `target` (OpenCV axes)."""
     eye, target = np.asarray(eye, float), np.asarray(target, float)
     forward = (target - eye) / np.linalg.norm(target - eye)
-    right = np.cross(forward, up)
+    right = np.cross(forward, np.asarray(up, float))
     right /= np.linalg.norm(right)
     rotation = np.stack([right, np.cross(forward, right), forward])  # (3, 3)
     matrix = np.eye(4)

@@ -37,7 +37,8 @@ class Gaussians:
     def map(self, change: Callable[[Tensor], Tensor]) -> "Gaussians":
         """The Gaussians with `change` applied to every tensor."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        return Gaussians(**{k: None if v is None else change(v) for k, v in values.items()})
+        present = {name: change(value) for name, value in values.items() if value is not None}
+        return Gaussians(**present)
 
     def to(self, device: torch.device | str) -> "Gaussians":
         """The same Gaussians on another device."""

@@ -1,6 +1,6 @@
 """The CPU rasteriser: numba kernels with analytic gradients behind torch autograd."""
 
-import numba
+from numba.core import config
 
 # The workqueue layer aborts when two Python threads start kernels; OpenMP and TBB do not.
-numba.config.THREADING_LAYER_PRIORITY = ["omp", "tbb", "workqueue"]
+config.THREADING_LAYER_PRIORITY = ["omp", "tbb", "workqueue"]  # type: ignore (set at run time)
