@@ -55,12 +55,12 @@ def test_expressions_are_learnt_where_a_static_head_cannot(tiny, tmp_path):
 
 @pytest.mark.parametrize("inputs", ["blendshapes", "speech"])
 def test_a_killed_run_resumes_to_the_same_weights(tiny, tmp_path, inputs, monkeypatch):
-    job = _job(inputs, steps=1100, initial_gaussians=60, max_gaussians=90, densify_until=1050)
+    job = _job(inputs, steps=60, checkpoint_every=25, densify_from=10, densify_every=10)
     whole = train_head(tiny, tmp_path / "whole", job)
     step = HeadTrainer.step
 
     def dying_step(self, index):
-        if index == 1010:
+        if index == 55:
             raise KeyboardInterrupt
         return step(self, index)
 

@@ -27,6 +27,7 @@ class HeadSettings:
         position_decay: What it decays to, as a factor.
         rotation_rate: Learning rate of the quaternions.
         scale_rate: Learning rate of the log scales.
+        shape_decay: What these two decay to, as a factor.
         basis_rate: Learning rate of the latent basis F and f_0.
         basis_decay: What it decays to, as a factor.
         mlp_rate: Learning rate of the MLP.
@@ -39,6 +40,7 @@ class HeadSettings:
         densify_every: Steps between two densifications.
         densify_gradient: Screen-space gradient above which a Gaussian is cloned or split.
         prune_opacity: Gaussians whose predicted opacity stays below this are removed.
+        checkpoint_every: Steps between checkpoints.
         cache_gib: Images kept in memory, in GiB; further ones are read again at each use.
     """
 
@@ -56,6 +58,7 @@ class HeadSettings:
     position_decay: float = 0.01
     rotation_rate: float = 1e-3
     scale_rate: float = 5e-3
+    shape_decay: float = 1.0
     basis_rate: float = 2.5e-3
     basis_decay: float = 1.0
     mlp_rate: float = 1.6e-4
@@ -68,6 +71,7 @@ class HeadSettings:
     densify_every: int = 100
     densify_gradient: float = 2e-4
     prune_opacity: float = 0.005
+    checkpoint_every: int = 1_000
     cache_gib: float = 2.0
 
     @property
@@ -75,8 +79,8 @@ class HeadSettings:
         """The learning rates by parameter group."""
         return {
             "means": Rate(self.position_rate, self.position_decay),
-            "quats": Rate(self.rotation_rate),
-            "log_scales": Rate(self.scale_rate),
+            "quats": Rate(self.rotation_rate, self.shape_decay),
+            "log_scales": Rate(self.scale_rate, self.shape_decay),
             "basis": Rate(self.basis_rate, self.basis_decay),
             "mlp": Rate(self.mlp_rate, self.mlp_decay),
             "adaptor": Rate(self.adaptor_rate),
@@ -108,13 +112,18 @@ class HeadSettings:
 PRESETS: dict[str, HeadSettings] = {
     "paper": HeadSettings(),
     "cpu": HeadSettings(
-        steps=4_000,
+        steps=5_000,
         perceptual_weight=0.0,
-        basis_rate=5e-3,
+        position_rate=4e-3,
+        rotation_rate=2e-2,
+        scale_rate=3e-2,
+        shape_decay=0.1,
+        basis_rate=1e-2,
         basis_decay=0.1,
-        mlp_rate=3e-3,
-        initial_gaussians=12_000,
+        mlp_rate=1e-2,
+        initial_gaussians=8_000,
         max_gaussians=12_000,
+        densify_from=400,
         densify_until=2_000,
     ),
 }

@@ -55,7 +55,9 @@ def train_head(capture: Capture, folder: Path, job: HeadJob) -> TrainedHead:
         SettingsError: If the folder holds a run with other settings.
         ModelError: If training diverges.
     """
-    run = RunFolder(folder, {"capture": str(capture.path.resolve()), **asdict(job)})
+    about = asdict(job)
+    about |= {"capture": str(capture.path.resolve()), **about.pop("settings")}
+    run = RunFolder(folder, about)
     if run.finished() is not None:
         return TrainedHead.load(folder)
     torch.manual_seed(job.seed)  # layers draw their weights
@@ -64,7 +66,9 @@ def train_head(capture: Capture, folder: Path, job: HeadJob) -> TrainedHead:
     model = initial_head(capture, job.settings, job.variant, track.size, rng)
     model.to("cuda" if torch.cuda.is_available() else "cpu")
     trainer = HeadTrainer(capture, model, track, adaptor, job.settings, job.seed)
-    seconds = run_loop(trainer, run, LoopSettings(job.settings.steps, label="head"))
+    every = job.settings.checkpoint_every
+    loop = LoopSettings(job.settings.steps, checkpoint_every=every, label="head")
+    seconds = run_loop(trainer, run, loop)
     names = track.names if isinstance(track, BlendshapeTrack) else ()
     summary = {
         "train_seconds": seconds,
@@ -84,7 +88,10 @@ def _inputs(
     if job.inputs == "blendshapes":
         if capture.blendshape_names is None:
             raise CaptureError(f"{capture.path} has no blendshapes: train with --inputs speech.")
-        return BlendshapeTrack(capture, capture.blendshape_names), None, ("", "")
+        track = BlendshapeTrack(capture, capture.blendshape_names)
+        for frame in capture.split.train:
+            track.at(frame)  # a frame without is better found now than after an hour
+        return track, None, ("", "")
     encoder = load_encoder(job.encoder)
     features = speech_features(capture, encoder)  # (T, D)
     adaptor = SpeechAdaptor(encoder.size)
