@@ -28,8 +28,15 @@ unit: $(VENV)/.develop src/ico3d/chat/static/index.html
 e2e: $(VENV)/.develop src/ico3d/chat/static/index.html
 	cd viewer && npm run --silent e2e
 
+SUBJECT ?= anny
+RESULTS ?= runs/bench
 bench: install ## long quality and speed runs; figures go to docs/benchmarks.md
-	$(PY) bench/run_all.py
+	ico3d capture synthetic $(RESULTS)/capture --subject $(SUBJECT) --cameras 6 --frames 1100 --views-per-frame 1 --size 256
+	$(PY) bench/head.py $(RESULTS)/capture $(RESULTS)/head
+	$(PY) bench/bake.py $(RESULTS)/head/blendshapes-full-0 $(RESULTS)/capture --json $(RESULTS)/bake.json
+	$(if $(OPPONENT),ico3d bench raster --against $(OPPONENT) --json $(RESULTS)/raster.json)
+	ico3d bench talk src/ico3d/chat/data/demo.ico3d --json $(RESULTS)/talk.json
+	cd viewer && npm run --silent bench
 
 clean:
 	rm -rf $(VENV) viewer/node_modules src/ico3d/chat/static
