@@ -39,7 +39,7 @@ class Demo:
     work: Path
     licences: tuple[Path, ...]
     out: Path = PACKAGED
-    frames: int = 2200
+    frames: int = 1600
     size: int = 384
     steps: int | None = None
     gaussians: int | None = None
@@ -60,7 +60,7 @@ class Demo:
         print(Bundle.open(self.out).manifest.loss, f"{size / 1e6:.2f} MB")
 
     def _record(self, capture: Path) -> None:
-        size = ("--frames", self.frames, "--size", self.size, "--cameras", 6)
+        size = ("--rig", "bust", "--frames", self.frames, "--size", self.size, "--cameras", 6)
         ico3d("capture synthetic", capture, "--subject", self.subject, *size, "--seed", self.seed)
 
     def _changes(self) -> list[str]:

@@ -22,8 +22,8 @@ class Synthetic:
     """Folder to write."""
     subject: str = "anny"
     """`anny` (the open body model, pip install 'ico3d[synthetic]') or an .npz subject file."""
-    rig: Literal["head"] = "head"
-    """Camera rig: `head` is a frontal arc around head and shoulders."""
+    rig: Literal["head", "bust"] = "head"
+    """Camera rig, a frontal arc: `head` fills the picture with it, `bust` shows the shoulders."""
     cameras: int = 6
     """How many cameras; the first looks straight at the face."""
     frames: int = 1100

@@ -19,7 +19,7 @@ from safetensors.numpy import save
 from ico3d.capture.synthetic.performance import SOUND_RATE, Performance, perform
 from ico3d.capture.synthetic.points import surface_points
 from ico3d.capture.synthetic.reader import FORMAT, VERSION
-from ico3d.capture.synthetic.studio import Studio, backdrop, head_rig
+from ico3d.capture.synthetic.studio import RIGS, Studio, backdrop, camera_arc
 from ico3d.capture.synthetic.subject import Subject, load_subject
 from ico3d.common.camera import Camera
 from ico3d.common.files import write_atomic
@@ -37,7 +37,7 @@ class Recording:
 
     Attributes:
         subject: `anny` or an `.npz` file.
-        rig: Name of the camera rig: `head`.
+        rig: Name of the camera rig: `head` or `bust`.
         cameras: How many cameras.
         frames: How many frames at 25 per second.
         views_per_frame: How many cameras take a picture of each frame.
@@ -72,7 +72,7 @@ def record(recording: Recording, out: Path, workers: int) -> None:
     _check(recording)
     subject = load_subject(recording.subject)
     acted = perform(subject, recording.text, recording.frames, FPS, recording.seed)
-    cameras = head_rig(subject, recording.cameras, recording.size)
+    cameras = camera_arc(subject, recording.rig, recording.cameras, recording.size)
     views = choose_views(
         recording.frames, recording.cameras, recording.views_per_frame, recording.seed
     )
@@ -89,8 +89,8 @@ def record(recording: Recording, out: Path, workers: int) -> None:
 
 
 def _check(recording: Recording) -> None:
-    if recording.rig != "head":
-        raise SettingsError(f"there is no rig '{recording.rig}': use 'head'.")
+    if recording.rig not in RIGS:
+        raise SettingsError(f"there is no rig '{recording.rig}': use {' or '.join(RIGS)}.")
     for name in ("cameras", "frames", "views_per_frame", "size"):
         if getattr(recording, name) < 1:
             raise SettingsError(f"{name} must be at least 1, not {getattr(recording, name)}.")

@@ -1,5 +1,7 @@
 """The studio: cameras, backdrop, and one picture of a person."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numba import njit
 
@@ -14,24 +16,39 @@ from ico3d.common.camera import Camera, look_at
 
 SUPERSAMPLING = 3
 DISTANCE = 1.35
-"""Metres from the head rig's cameras to the head."""
-VIEW_HEIGHT = 0.46
-"""Metres that the head rig's pictures cover from top to bottom at the head: twice a head."""
-AIM = np.array([0.0, -0.045, 0.0])
-"""What the head rig looks at, from the canonical origin at rest."""
+"""Metres from the cameras to the head."""
 WIDEST_AZIMUTH = 60.0
 
 
-def head_rig(subject: Subject, count: int, size: int) -> tuple[Camera, ...]:
+@dataclass(frozen=True)
+class Framing:
+    """What the pictures of a rig show.
+
+    Attributes:
+        height: Metres from their top to their bottom, at the head.
+        aim: What they look at: metres from the canonical origin at rest, upwards.
+    """
+
+    height: float
+    aim: float
+
+
+RIGS = {"head": Framing(0.31, -0.02), "bust": Framing(0.46, -0.045)}
+"""Head: three quarters of the picture are head. Bust: half, with the shoulders."""
+
+
+def camera_arc(subject: Subject, rig: str, count: int, size: int) -> tuple[Camera, ...]:
     """Cameras on a frontal arc around the head; the first looks straight at the face.
 
     Args:
         subject: Its rest pose places the rig.
+        rig: One of `RIGS`.
         count: How many.
         size: Width and height of the pictures.
     """
-    target = subject.head_in_world + AIM
-    focal = size * DISTANCE / VIEW_HEIGHT
+    framing = RIGS[rig]
+    target = subject.head_in_world + np.array([0.0, framing.aim, 0.0])
+    focal = size * DISTANCE / framing.height
     intrinsics = np.array([[focal, 0, size / 2], [0, focal, size / 2], [0, 0, 1]])
     cameras = []
     for index in range(count):
