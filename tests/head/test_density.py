@@ -2,8 +2,10 @@
 
 import dataclasses
 
+import pytest
 import torch
 
+from ico3d.errors import ModelError
 from ico3d.head.density import HeadDensity
 from ico3d.head.model import GAUSSIAN_AXES, HeadModel, HeadShape
 from ico3d.head.settings import PRESETS
@@ -51,6 +53,13 @@ def test_moments_follow_and_those_of_clones_begin_at_zero():
         old = getattr(before, name).detach().movedim(axis, 0) + 1
         torch.testing.assert_close(moment[:2], old[:2])
         assert not moment[2].any()
+
+
+def test_a_head_that_faded_is_one_sentence():
+    model, density = HeadModel(HeadShape(2, features=4), 3), HeadDensity(SETTINGS, 0)
+    density._stats = DensityStats.zeros(3)
+    with pytest.raises(ModelError, match="all Gaussians have faded by step 1"):
+        density.adapt(model, Optimiser(), lambda step: torch.zeros(3), 1)
 
 
 def test_what_was_gathered_survives_a_checkpoint():

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import torch
 from torch import Tensor
 
+from ico3d.errors import ModelError
 from ico3d.head.model import GAUSSIAN_AXES, HeadModel
 from ico3d.head.settings import HeadSettings
 from ico3d.splat.density import (
@@ -52,6 +53,9 @@ class HeadDensity:
             optimiser: Its moments follow; those of new Gaussians begin at 0.
             opacities: Gives the greatest predicted opacity (N,) over frames sampled for a step.
             step: Number of the step just done.
+
+        Raises:
+            ModelError: If no Gaussian is left.
         """
         settings = self._settings
         due = settings.densify_from <= step < settings.densify_until
@@ -65,6 +69,11 @@ class HeadDensity:
             prune_scale=PRUNE_ABOVE * model.shape.box_size,
         )
         plan = densify_plan(self._stats, model.log_scales.exp(), opacities(step), thresholds)
+        if len(plan) == 0:
+            raise ModelError(
+                f"all Gaussians have faded by step {step}: lower mlp_rate, or give "
+                "the capture masks and raise alpha_weight."
+            )
         generator = torch.Generator().manual_seed(hash((self._seed, step)) % 2**63)
         _carry_out(plan, model, optimiser, generator)
         self._stats = DensityStats.zeros(len(model), model.means.device)

@@ -29,6 +29,7 @@ class HeadSettings:
         scale_rate: Learning rate of the log scales.
         shape_decay: What these two decay to, as a factor.
         basis_rate: Learning rate of the latent basis F and f_0.
+        logit_rate: The same for variants without an MLP, whose basis holds the logits themselves.
         basis_decay: What it decays to, as a factor.
         mlp_rate: Learning rate of the MLP.
         mlp_decay: What it decays to, as a factor.
@@ -60,6 +61,7 @@ class HeadSettings:
     scale_rate: float = 5e-3
     shape_decay: float = 1.0
     basis_rate: float = 2.5e-3
+    logit_rate: float = 5e-2
     basis_decay: float = 1.0
     mlp_rate: float = 1.6e-4
     mlp_decay: float = 0.01
@@ -74,14 +76,14 @@ class HeadSettings:
     checkpoint_every: int = 1_000
     cache_gib: float = 2.0
 
-    @property
-    def rates(self) -> dict[str, Rate]:
-        """The learning rates by parameter group."""
+    def rates(self, has_mlp: bool) -> dict[str, Rate]:
+        """The learning rates by parameter group, for a model with or without an MLP."""
+        basis_rate = self.basis_rate if has_mlp else self.logit_rate
         return {
             "means": Rate(self.position_rate, self.position_decay),
             "quats": Rate(self.rotation_rate, self.shape_decay),
             "log_scales": Rate(self.scale_rate, self.shape_decay),
-            "basis": Rate(self.basis_rate, self.basis_decay),
+            "basis": Rate(basis_rate, self.basis_decay),
             "mlp": Rate(self.mlp_rate, self.mlp_decay),
             "adaptor": Rate(self.adaptor_rate),
         }
@@ -114,16 +116,19 @@ PRESETS: dict[str, HeadSettings] = {
     "cpu": HeadSettings(
         steps=5_000,
         perceptual_weight=0.0,
+        alpha_weight=0.1,
         position_rate=4e-3,
         rotation_rate=2e-2,
         scale_rate=3e-2,
         shape_decay=0.1,
         basis_rate=1e-2,
+        logit_rate=5e-2,
         basis_decay=0.1,
         mlp_rate=1e-2,
         initial_gaussians=8_000,
         max_gaussians=12_000,
         densify_from=400,
         densify_until=2_000,
+        densify_gradient=1e-3,
     ),
 }

@@ -136,7 +136,8 @@ class HeadTrainer:
     def _update(self, expression: Tensor, features: Tensor, index: int) -> None:
         """One optimiser step on everything."""
         progress = index / self._settings.steps
-        rates = {name: rate.at(progress) for name, rate in self._settings.rates.items()}
+        groups = self._settings.rates(self.model.shape.has_mlp)
+        rates = {name: rate.at(progress) for name, rate in groups.items()}
         rates["means"] *= self.model.shape.box_size
         weights = self.model.row_weights(expression)
         assert features.grad is not None
