@@ -23,8 +23,9 @@ import tyro
 
 from ico3d.head.settings import PRESETS
 
-STEP_FACTOR = {"full": 1.0, "no-mlp": 1.0, "no-blending": 1.0, "static": 1.0}
-"""Steps relative to those of `full`, such that all train for the same time."""
+STEP_FACTOR = {"full": 1.0, "no-mlp": 1.6, "no-blending": 1.0, "static": 1.6}
+"""Steps relative to those of `full`, such that all train for the same time: at 12,000 Gaussians
+and 256² a step takes 58 ms of one core with the MLP and 37 ms without."""
 
 KEYS = ("psnr", "psnr_mask", "psnr_mouth", "ssim", "lmd", "lip_correlation", "lip_lag_ms")
 COSTS = ("num_gaussians", "ms_per_frame", "train_seconds")

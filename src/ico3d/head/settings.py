@@ -130,5 +130,6 @@ PRESETS: dict[str, HeadSettings] = {
         densify_from=400,
         densify_until=2_000,
         densify_gradient=1e-3,
+        checkpoint_every=500,
     ),
 }
