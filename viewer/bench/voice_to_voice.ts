@@ -10,11 +10,11 @@ import { pauseDrawing, readRecord, recordLoudness, recordWire, type Record } fro
 import { scratchFolder } from '../support/scratch.ts';
 import { ChatServer } from '../support/server.ts';
 import { quantile } from '../support/statistics.ts';
+import { VOICE } from '../support/talk.ts';
 
 const TURNS = 20;
 const PAUSE = 9; // s for the answer
 const QUESTIONS = ['who are you', 'what is your name', 'where do you live', 'how old are you'];
-const VOICE = 0.02; // level of the microphone above which somebody speaks
 const AUDIBLE = 1e-3; // level of the avatar
 
 test(`voice to voice over ${TURNS} turns`, async () => {

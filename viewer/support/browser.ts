@@ -21,6 +21,7 @@ export interface BrowserOptions {
   width?: number;
   height?: number;
   autoplay?: boolean; // sound without a click; default true
+  calm?: boolean; // the visitor wants little motion: the head does not sway
   microphone?: string; // WAV that plays as the microphone, once
 }
 
@@ -41,7 +42,7 @@ export class Browser {
   }
 
   static async launch(options: BrowserOptions = {}): Promise<Browser> {
-    const { width = 320, height = 240, autoplay = true, microphone } = options;
+    const { width = 320, height = 240, autoplay = true, calm = false, microphone } = options;
     const profile = mkdtempSync(join(tmpdir(), 'ico3d-browser-'));
     const args = [...FLAGS];
     if (autoplay) args.push(AUTOPLAY);
@@ -55,6 +56,7 @@ export class Browser {
       args,
       viewport: { width, height },
       deviceScaleFactor: 1,
+      reducedMotion: calm ? 'reduce' : 'no-preference',
     });
     return new Browser(profile, context, context.pages()[0] ?? (await context.newPage()));
   }

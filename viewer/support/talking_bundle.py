@@ -1,36 +1,32 @@
-"""A random head with long things to say, for conversations in tests.
+"""A random head, or that of a bundle, with the persona of `persona.json`, for conversations.
 
-Run: python viewer/support/talking_bundle.py OUT.ico3d
+Run: python viewer/support/talking_bundle.py OUT.ico3d [BUNDLE]
 """
 
 import dataclasses
 import sys
 from pathlib import Path
 
-from ico3d.bundle.format import write_bundle
-from ico3d.bundle.manifest import Persona
+from ico3d.avatar.persona import load_persona
+from ico3d.bundle.format import Bundle, write_bundle
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "bundle"))
 from random_bundle import random_files, random_head, random_manifest
 
 GAUSSIANS = 300
-LONG = (
-    "The stars are very far away, and the nearest of them is more than four light years from here. "
-    "A ship as fast as any that was ever built would need many thousands of years to get there. "
-    "So a new home in the stars is a task for our children, and for the children of our children."
-)
+PERSONA = Path(__file__).with_name("persona.json")
 
 
 def main() -> None:
     """Does what the file's docstring says."""
-    head = random_head(GAUSSIANS)
-    notes = (
-        f"we must find a new home in the stars | stars | new home => {LONG}",
-        "who are you => I am Random.",
-    )
-    persona = Persona("Random", "Hello.", notes)
-    manifest = dataclasses.replace(random_manifest(head), persona=persona)
-    write_bundle(sys.argv[1], manifest, random_files(head))
+    out, *source = sys.argv[1:]
+    if source:
+        bundle = Bundle.open(source[0])
+        manifest, files = bundle.manifest, {n: bundle.read(n) for n in bundle.manifest.files}
+    else:
+        head = random_head(GAUSSIANS)
+        manifest, files = random_manifest(head), random_files(head)
+    write_bundle(out, dataclasses.replace(manifest, persona=load_persona(PERSONA)), files)
 
 
 if __name__ == "__main__":

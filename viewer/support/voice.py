@@ -15,7 +15,7 @@ import soxr
 from ico3d.common import espeak
 
 RATE = 48_000  # what Chromium's fake device runs at
-LEVEL = 0.5
+LEVEL = 0.2  # of full scale, as people before a laptop; browsers amplify it, and more would clip
 
 
 def sound(part: str) -> np.ndarray:

@@ -1,0 +1,37 @@
+import { existsSync } from 'node:fs';
+import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import type { Browser } from '../support/browser.ts';
+import { DEMO } from '../support/line.ts';
+import { readMouth, watchMouth } from '../support/mouth.ts';
+import { ChatServer } from '../support/server.ts';
+import { finished, openPage, until } from '../support/talk.ts';
+
+describe.skipIf(!existsSync(DEMO))('the packaged demo (needs src/ico3d/chat/data/demo.ico3d)', () => {
+  let server: ChatServer;
+  let browser: Browser;
+
+  beforeAll(async () => {
+    server = await ChatServer.start(DEMO);
+    browser = await openPage(server.url, { calm: true });
+  });
+
+  afterAll(async () => {
+    await browser?.close();
+    await server?.stop();
+  });
+
+  test('answers a typed question aloud, and its mouth moves', async () => {
+    const { page } = browser;
+    await page.keyboard.press('Escape'); // the greeting is known
+    await page.waitForFunction(() => window.ico3d!.conversation.player.heard() === null);
+    await page.waitForTimeout(1000);
+    await watchMouth(page);
+    await page.fill('#text', 'Who are you?');
+    await page.keyboard.press('Enter');
+    const { received, loudness } = await until(browser, finished(1), 60_000);
+    expect(received.some(({ type }) => type === 'answer')).toBe(true);
+    expect(Math.max(...loudness.map(({ level }) => level))).toBeGreaterThan(0.01);
+    const { pictures } = await readMouth(page);
+    expect(Math.max(...pictures.map(({ change }) => change))).toBeGreaterThan(10);
+  });
+});

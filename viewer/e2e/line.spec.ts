@@ -1,0 +1,93 @@
+import { join } from 'node:path';
+import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import type { Browser } from '../support/browser.ts';
+import { hasClip, makePortrait, makeStandIn } from '../support/line.ts';
+import { readMouth, watchMouth } from '../support/mouth.ts';
+import type { Loudness, Record } from '../support/recorder.ts';
+import { scratchFolder } from '../support/scratch.ts';
+import { ChatServer } from '../support/server.ts';
+import { correlation, quantile } from '../support/statistics.ts';
+import { finished, lastOnset, makeVoice, openPage, SENTENCE, SILENCE, until } from '../support/talk.ts';
+
+const folder = scratchFolder();
+const LONG_ENOUGH = 2000; // ms of speech before the interruption
+const EASED = 700; // ms until the face rests after it has been silenced
+
+describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a talk with the avatar', () => {
+  let server: ChatServer;
+  let browser: Browser;
+  let record: Record;
+  let onset: number; // of the words that interrupt
+
+  beforeAll(async () => {
+    server = await ChatServer.start(hasClip ? makePortrait(folder) : makeStandIn(folder));
+    const voice = join(folder, 'voice.wav');
+    makeVoice(voice);
+    browser = await openPage(server.url, { microphone: voice, calm: true });
+    await until(browser, finished(0), 30_000); // the greeting
+    await browser.page.waitForFunction(() => window.ico3d!.conversation.player.heard() === null);
+    await browser.page.waitForTimeout(EASED + 300);
+    await watchMouth(browser.page);
+    await browser.page.click('#microphone');
+  }, 600_000);
+
+  afterAll(async () => {
+    await browser?.close();
+    await server?.stop();
+  });
+
+  test('a spoken question is understood and answered aloud', async () => {
+    const { page } = browser;
+    const speaking = ({ loudness }: Record) => loudness.slice(-20).every(({ level }) => level > SILENCE);
+    await until(browser, speaking, 30_000);
+    const question = (await page.locator('#question').textContent())!;
+    console.log(`understood: ${question}`);
+    const understood = question.split(' ').filter((word) => SENTENCE.split(' ').includes(word));
+    expect(understood.length).toBeGreaterThan(2);
+    expect(await page.locator('#answer').textContent()).not.toBe('');
+    expect(await page.locator('#figures').textContent()).toMatch(/question to answer\d+ ms/);
+  });
+
+  test('the next question silences the answer', async () => {
+    await until(browser, ({ received }) => received.some(({ type }) => type === 'stop'), 30_000);
+    record = await until(browser, ({ received, loudness }) => {
+      const stop = received.find(({ type }) => type === 'stop')!;
+      return loudness.at(-1)!.at > stop.at + EASED + 1000;
+    }, 30_000);
+    const stop = record.received.find(({ type }) => type === 'stop')!;
+    onset = lastOnset(record, stop.at);
+    const silent = record.loudness.findLast(({ at, level }) => at < stop.at + 290 && level > SILENCE)!;
+    console.log(`silent ${Math.round(silent.at - onset)} ms after the first sound of the second question`);
+    expect(silent.at - onset).toBeLessThan(600);
+  });
+
+  test('the mouth moves with the sound, and only then', async () => {
+    const { sights, pictures } = await readMouth(browser.page);
+    const sound = record.loudness.filter(({ level }) => level > SILENCE);
+    const began = sound.find(({ at }) => at > sights[0]!.at)!.at;
+    const ended = sound.findLast(({ at }) => at < onset + 1000)!.at;
+    expect(ended - began).toBeGreaterThan(LONG_ENOUGH);
+
+    const watched = sights.filter(({ at }) => at < ended + EASED + 1000);
+    const together = correlation(watched.map(({ at }) => heard(record.loudness, at)), watched.map(({ speech }) => speech));
+    const changes = (when: (at: number) => boolean) => pictures.filter(({ at }) => when(at)).map(({ change }) => change);
+    const during = changes((at) => at > began + 200 && at < ended);
+    const rest = changes((at) => at < began || (at > ended + EASED && at < ended + EASED + 1000));
+    const moving = quantile(during, 0.5);
+    const still = quantile(rest, 0.9);
+    console.log(
+      `face and loudness correlate by ${together.toFixed(2)}; pictures of the mouth differ by ` +
+        `${moving.toFixed(1)} levels while it speaks (${during.length}), ${still.toFixed(1)} at rest (${rest.length})`,
+    );
+    expect(together).toBeGreaterThan(0.5);
+    expect(during.length).toBeGreaterThan(2);
+    expect(rest.length).toBeGreaterThan(2);
+    expect(moving).toBeGreaterThan(3 * still + 1);
+  });
+});
+
+/** How loud the avatar is within 0.2 s of a moment. */
+function heard(loudness: Loudness[], moment: number): number {
+  const near = loudness.filter(({ at }) => Math.abs(at - moment) < 200);
+  return near.reduce((sum, { level }) => sum + level, 0) / Math.max(1, near.length);
+}

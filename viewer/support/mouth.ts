@@ -1,0 +1,60 @@
+import type { Page } from 'playwright-core';
+
+/** The speech in the face's expression at one moment. */
+export interface Sight {
+  at: number; // ms, the page's performance clock
+  speech: number; // distance of the speech features from those at rest
+}
+
+/** What a drawn picture shows of the mouth. */
+export interface Picture {
+  at: number;
+  change: number; // levels of 255 from the first picture, mean of the 1 % of the lower half that differs most
+}
+
+const PICTURE_EVERY = 400; // ms: software rendering takes its share of the processor from recogniser and voice
+
+declare global {
+  interface Window {
+    mouth?: { sights: Sight[]; pictures: Picture[] };
+  }
+}
+
+/**
+ * Watches the mouth of a face that is at rest now: its expression at each tick, and a picture now
+ * and then; no others are drawn.
+ */
+export function watchMouth(page: Page): Promise<void> {
+  return page.evaluate((every) => {
+    const FEATURES = 32; // of speech; those of the eyes follow
+    const { stage } = window.ico3d!;
+    const record: NonNullable<Window['mouth']> = { sights: [], pictures: [] };
+    window.mouth = record;
+    const gl = stage.renderer.getContext();
+    const draw = stage.draw.bind(stage);
+    stage.draw = () => {};
+    const lowerHalf = () => {
+      draw();
+      const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight >> 1];
+      const rgba = new Uint8Array(4 * width * height);
+      gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, rgba); // WebGL counts rows from below
+      return rgba;
+    };
+    const [rest, restPicture] = [stage.expression.slice(0, FEATURES), lowerHalf()];
+    const change = () => {
+      const differences = lowerHalf().map((level, i) => Math.abs(level - restPicture[i]!)).sort();
+      const most = differences.subarray(-Math.ceil(differences.length / 100));
+      return most.reduce((sum, level) => sum + level, 0) / most.length;
+    };
+    setInterval(() => {
+      const at = performance.now();
+      record.sights.push({ at, speech: Math.hypot(...rest.map((value, i) => value - stage.expression[i]!)) });
+      if (at - (record.pictures.at(-1)?.at ?? 0) > every) record.pictures.push({ at, change: change() });
+    }, 33);
+  }, PICTURE_EVERY);
+}
+
+/** Everything watched so far. */
+export function readMouth(page: Page): Promise<NonNullable<Window['mouth']>> {
+  return page.evaluate(() => window.mouth!);
+}
