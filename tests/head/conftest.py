@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 import torch
@@ -87,6 +88,17 @@ class TinyCapture(Capture):
         behind = None if background is None else torch.from_numpy(background)
         view = self.cameras[camera].moved(self.world_from_head(frame))
         return render(gaussians, [view], behind)
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    """On busy cores, threads of tiny kernels wait for one another far longer than they work."""
+    threads = numba.get_num_threads(), torch.get_num_threads()
+    numba.set_num_threads(1)
+    torch.set_num_threads(1)
+    yield
+    numba.set_num_threads(threads[0])
+    torch.set_num_threads(threads[1])
 
 
 @pytest.fixture
