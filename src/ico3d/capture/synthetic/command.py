@@ -35,6 +35,8 @@ class Synthetic:
     """Width and height of the pictures in pixels."""
     text: str = ""
     """What is said, repeated as long as needed; by default varied English sentences."""
+    lively: bool = False
+    """Also show moods, which neither sound nor eyes tell: for heads driven by blendshapes."""
     seed: int = 0
     """Decides voice, order of sentences, blinks, brows, sway and views."""
     workers: int = field(default_factory=lambda: os.cpu_count() or 1)
@@ -60,6 +62,7 @@ class Synthetic:
             self.size,
             self.text,
             self.seed,
+            self.lively,
         )
         record(recording, self.out, self.workers)
         say(f"{self.frames} frames by {self.cameras} cameras lie in {self.out}")

@@ -22,6 +22,22 @@ YAW, PITCH, ROLL = 6.0, 3.5, 2.5
 SHIFT = (0.018, 0.006, 0.012)
 """Largest shift of the sway, metres."""
 
+MIMICRY = (
+    (("mouthSmileLeft", "mouthSmileRight", "cheekSquintLeft", "cheekSquintRight"), 0.7),
+    (("mouthSmileLeft", "mouthDimpleLeft"), 0.5),
+    (("mouthFrownLeft", "mouthFrownRight", "mouthShrugLower"), 0.6),
+    (("eyeSquintLeft", "eyeSquintRight", "noseSneerLeft", "noseSneerRight"), 0.7),
+    (("eyeWideLeft", "eyeWideRight"), 0.7),
+    (("cheekPuffLeft", "cheekPuffRight"), 0.5),
+    (("mouthLeft", "jawLeft"), 0.5),
+    (("mouthRight", "jawRight"), 0.5),
+    (("mouthUpperUpLeft", "noseSneerLeft", "cheekSquintLeft"), 0.6),
+    (("mouthPucker", "mouthFunnel"), 0.5),
+    (("mouthStretchLeft", "mouthStretchRight", "mouthLowerDownLeft", "mouthLowerDownRight"), 0.5),
+    (("jawForward", "mouthShrugUpper"), 0.5),
+)
+"""What a lively person's face does besides talking: shapes that move together, and how far."""
+
 
 @dataclass(frozen=True)
 class Performance:
@@ -44,7 +60,9 @@ class Performance:
     world_from_head: np.ndarray
 
 
-def perform(subject: Subject, text: str, frames: int, fps: float, seed: int) -> Performance:
+def perform(
+    subject: Subject, text: str, frames: int, fps: float, seed: int, lively: bool = False
+) -> Performance:
     """Makes up a performance.
 
     Args:
@@ -53,6 +71,7 @@ def perform(subject: Subject, text: str, frames: int, fps: float, seed: int) -> 
         frames: How many frames.
         fps: Frames per second.
         seed: Decides voice, order of sentences, blinks, brows and sway.
+        lively: Whether the face shows moods too, which neither sound nor eyes tell.
 
     Raises:
         MissingExtraError: If espeakng-loader or soxr is not installed.
@@ -68,6 +87,8 @@ def perform(subject: Subject, text: str, frames: int, fps: float, seed: int) -> 
         if name in subject.blendshape_names:
             weights[:, subject.blendshape_names.index(name)] = eyes[:, column]
     poses = _sway(times, subject, random)
+    if lively:
+        _add_mimicry(weights, subject, times, random)
     return Performance(samples, said, phonemes, weights, eyes, poses)
 
 
@@ -119,6 +140,17 @@ def _eyes(times: np.ndarray, random: np.random.Generator) -> np.ndarray:
         "eyeBlinkRight": blink * 0.98,
     }
     return np.clip(np.stack([columns[n] for n in EYE_NAMES], 1), 0, 1).astype(np.float32)
+
+
+def _add_mimicry(
+    weights: np.ndarray, subject: Subject, times: np.ndarray, random: np.random.Generator
+) -> None:
+    """Adds moods to weights (F, K): each comes and goes on its own, none is there always."""
+    for names, most in MIMICRY:
+        mood = most * np.clip(1.6 * _wander(times, 0.8, random) - 0.3, 0, 1)  # (F,)
+        for name in set(names).intersection(subject.blendshape_names):
+            column = subject.blendshape_names.index(name)
+            weights[:, column] = np.clip(weights[:, column] + mood, 0, 1)
 
 
 def _blinks(times: np.ndarray, random: np.random.Generator) -> np.ndarray:

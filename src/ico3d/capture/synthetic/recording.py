@@ -44,6 +44,7 @@ class Recording:
         size: Width and height of the pictures.
         text: What is said; empty for sentences of our own.
         seed: Decides everything that is random.
+        lively: Whether the face shows moods too, which neither sound nor eyes tell.
     """
 
     subject: str
@@ -54,6 +55,7 @@ class Recording:
     size: int
     text: str
     seed: int
+    lively: bool = False
 
 
 def record(recording: Recording, out: Path, workers: int) -> None:
@@ -71,7 +73,9 @@ def record(recording: Recording, out: Path, workers: int) -> None:
     """
     _check(recording)
     subject = load_subject(recording.subject)
-    acted = perform(subject, recording.text, recording.frames, FPS, recording.seed)
+    acted = perform(
+        subject, recording.text, recording.frames, FPS, recording.seed, recording.lively
+    )
     cameras = camera_arc(subject, recording.rig, recording.cameras, recording.size)
     views = choose_views(
         recording.frames, recording.cameras, recording.views_per_frame, recording.seed
