@@ -22,6 +22,10 @@ INDEPENDENT = 20
 FIT_FRAMES = 120
 """Frames that shape and focal length are fitted on; poses are then found for all."""
 
+ALL_FREEDOMS = (0, 1, 2, 3, 4, 5)
+"""Turns about the camera's axes, then shifts along them."""
+IN_PLANE = (2, 3, 4, 5)
+"""What a picture of a nearly flat face tells well: its turn in the picture, place and size."""
 CHUNK = 256
 """Frames whose poses are solved for at once."""
 
@@ -92,16 +96,22 @@ def fit(
     return place(track, landmarks, first)
 
 
-def place(track: Track, landmarks: np.ndarray, start: np.ndarray) -> Track:
+def place(
+    track: Track,
+    landmarks: np.ndarray,
+    start: np.ndarray,
+    freedoms: tuple[int, ...] = ALL_FREEDOMS,
+) -> Track:
     """Poses for the landmarks of any frames, shape and focal length given.
 
     Args:
         track: Shape, focal length and weights.
         landmarks: (F, K, 2) pixels.
         start: (F, 4, 4) poses to start from.
+        freedoms: Which of `ALL_FREEDOMS` to solve for; the others stay as in `start`.
     """
     parts = [
-        _placed(track, landmarks[first : first + CHUNK], start[first : first + CHUNK])
+        _placed(track, landmarks[first : first + CHUNK], start[first : first + CHUNK], freedoms)
         for first in range(0, len(landmarks), CHUNK)
     ]
     rotations = np.concatenate([part.rotations for part in parts])
@@ -109,11 +119,13 @@ def place(track: Track, landmarks: np.ndarray, start: np.ndarray) -> Track:
     return replace(track, rotations=rotations, translations=translations)
 
 
-def _placed(track: Track, landmarks: np.ndarray, start: np.ndarray) -> Track:
+def _placed(
+    track: Track, landmarks: np.ndarray, start: np.ndarray, freedoms: tuple[int, ...]
+) -> Track:
     """`place` for as many frames as fit into memory at once."""
     placed = replace(track, rotations=start[:, :3, :3], translations=start[:, :3, 3])
     for _ in range(12):
-        placed = _pose_step(placed, landmarks)
+        placed = _pose_step(placed, landmarks, freedoms)
     return placed
 
 
@@ -151,18 +163,21 @@ def _weights(track: Track, residuals: np.ndarray) -> np.ndarray:
     return 1.0 / track.sigmas**2 / (1.0 + normed / 9.0)
 
 
-def _pose_step(track: Track, landmarks: np.ndarray) -> Track:
+def _pose_step(
+    track: Track, landmarks: np.ndarray, freedoms: tuple[int, ...] = ALL_FREEDOMS
+) -> Track:
     """One Gauss-Newton step of all poses."""
     local = _local(track)  # (F, K, 3)
     residuals = landmarks - _project(track, local)  # (F, K, 2)
     by_point = _jacobian(track, local)  # (F, K, 2, 3)
     turned = local - track.translations[:, None]
     by_turn = np.cross(turned[..., None, :], by_point)  # (F, K, 2, 3): d(w x p) . J = w . (p x J)
-    jacobian = np.concatenate([by_turn, by_point], -1)  # (F, K, 2, 6)
+    jacobian = np.concatenate([by_turn, by_point], -1)[..., freedoms]  # (F, K, 2, freedoms)
     weighted = jacobian * _weights(track, residuals)[..., None, None]
     normal, pull = _normal_equations(weighted, jacobian, residuals)
-    normal += 1e-9 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(6)
-    step = np.linalg.solve(normal, pull)[..., 0]  # (F, 6)
+    normal += 1e-9 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(len(freedoms))
+    step = np.zeros((len(local), 6))
+    step[:, freedoms] = np.linalg.solve(normal, pull)[..., 0]
     length = np.linalg.norm(step[:, :3], axis=1, keepdims=True)
     turn = step[:, :3] * np.minimum(1.0, 0.3 / np.maximum(length, 1e-12))
     rotations = Rotation.from_rotvec(turn).as_matrix() @ track.rotations
