@@ -32,7 +32,8 @@ async def test_a_dropped_page_gets_what_it_missed(bundle):
         await again.heard(1)
         indices = [m.index for m in again.messages(Speech)]
         assert indices == list(range(last - 2, last - 2 + len(indices)))
-        assert again.messages(Answer)[-1].utterance == 1
+        answers = page.messages(Answer) + again.messages(Answer)  # told before or after the drop
+        assert answers[-1].utterance == 1
         await again.send(Text("who are you"))
         await again.wait(Speech, where=lambda m: m.utterance == 2)
         await again.close()
