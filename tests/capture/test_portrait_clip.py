@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ico3d.capture import photometric
 from ico3d.capture.capture import Capture
 from ico3d.capture.check import examine
 from ico3d.cli import main
@@ -25,6 +26,7 @@ def model(monkeypatch):
     if not (folder / "face_landmarker.task").is_file():
         pytest.skip("face_landmarker.task is not here")
     monkeypatch.setenv("ICO3D_MODELS", str(folder))
+    monkeypatch.setattr(photometric, "STEPS", (30, 30))  # its own test tells whether it helps
 
 
 def _faceless(path: Path, frames: int = 6) -> Path:

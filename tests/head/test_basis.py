@@ -50,9 +50,17 @@ def test_rank_one_update_equals_the_reference(kind):
         optimiser = Optimiser(kind)
         for step in range(4):
             active = weights * (torch.arange(ROWS) != step)
-            update_basis(optimiser, basis, active, gradient * (1 + step), 0.01)
+            update_basis(optimiser, basis, active, gradient * (1 + step), 0.01, weight_decay=0.3)
         found.append(basis.double())
     torch.testing.assert_close(found[0], found[1], rtol=1e-5, atol=1e-5)
+
+
+def test_weight_decay_pulls_every_row_but_the_bias():
+    basis, weights, gradient = _case(torch.float64)
+    before = basis.clone()
+    update_basis(Optimiser("sgd"), basis, weights, 0 * gradient, 0.1, weight_decay=0.5)
+    torch.testing.assert_close(basis[[0, 2, 3]], 0.95 * before[[0, 2, 3]])
+    assert torch.equal(basis[[1, 4]], before[[1, 4]])  # unused, and the bias
 
 
 def test_rank_one_update_equals_a_dense_one_and_leaves_unused_rows_alone():

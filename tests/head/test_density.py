@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from ico3d.errors import ModelError
-from ico3d.head.density import HeadDensity
+from ico3d.head.density import HeadDensity, Sampled
 from ico3d.head.model import GAUSSIAN_AXES, HeadModel, HeadShape
 from ico3d.head.settings import PRESETS
 from ico3d.splat.density import DensityStats
@@ -16,6 +16,12 @@ SETTINGS = dataclasses.replace(
     PRESETS["cpu"], densify_from=0, densify_every=1, densify_until=9, densify_gradient=0.5,
     prune_opacity=0.01, max_gaussians=10,
 )  # fmt: skip
+
+
+def _sampled(opacities: list[float], contributions: list[float]):
+    return lambda step: Sampled(
+        torch.tensor(opacities), torch.tensor(contributions, dtype=torch.float32)
+    )
 
 
 def _planned() -> tuple[HeadModel, HeadModel, Optimiser]:
@@ -33,7 +39,7 @@ def _planned() -> tuple[HeadModel, HeadModel, Optimiser]:
         optimiser.moments[f"{name}.second"] = getattr(after, name).detach().clone() + 2
     density = HeadDensity(SETTINGS, 0)
     density._stats = DensityStats(torch.tensor([0.0, 1.0, 1.0]), torch.ones(3))
-    density.adapt(after, optimiser, lambda step: torch.tensor([0.9, 0.9, 0.001]), 1)
+    density.adapt(after, optimiser, _sampled([0.9, 0.9, 0.001], [9, 9, 9]), 1)
     return before, after, optimiser
 
 
@@ -59,7 +65,17 @@ def test_a_head_that_faded_is_one_sentence():
     model, density = HeadModel(HeadShape(2, features=4), 3), HeadDensity(SETTINGS, 0)
     density._stats = DensityStats.zeros(3)
     with pytest.raises(ModelError, match="all Gaussians have faded by step 1"):
-        density.adapt(model, Optimiser(), lambda step: torch.zeros(3), 1)
+        density.adapt(model, Optimiser(), _sampled([0, 0, 0], [9, 9, 9]), 1)
+
+
+def test_what_no_picture_shows_dies():
+    model, density = HeadModel(HeadShape(2, features=4), 3), HeadDensity(SETTINGS, 0)
+    model.log_scales.data.fill_(-9)
+    density._stats = DensityStats.zeros(3)
+    model.means.data = torch.arange(3.0)[:, None].repeat(1, 3)
+    least = SETTINGS.prune_contribution * 9
+    density.adapt(model, Optimiser(), _sampled([0.9] * 3, [18, 0.9 * least, 9]), 1)
+    assert model.means[:, 0].tolist() == [0, 2]
 
 
 def test_what_was_gathered_survives_a_checkpoint():

@@ -11,6 +11,7 @@ from ico3d.errors import ModelError
 from ico3d.head.loss import HeadLoss
 from ico3d.head.perceptual import WEIGHTS, PerceptualLoss
 from ico3d.head.settings import PRESETS
+from ico3d.head.views import Picture
 from ico3d.splat.losses import ssim
 from ico3d.splat.rendering import Drawing, Rendering
 
@@ -30,9 +31,22 @@ def test_l1_ssim_and_alpha_are_weighted():
     image, target = _images()
     settings = dataclasses.replace(PAPER, steps=10, alpha_weight=0.5)
     alpha, mask = torch.full((16, 20), 0.25), torch.ones(16, 20)
-    loss = HeadLoss(settings)(_rendering(image, alpha), target, mask, 0)
+    loss = HeadLoss(settings)(_rendering(image, alpha), target, Picture(target, mask, None), 0)
     expected = 0.8 * (image - target).abs().mean() + 0.2 * (1 - ssim(image, target)) + 0.5 * 0.75
     torch.testing.assert_close(loss, expected)
+
+
+def test_a_torso_counts_by_its_weight():
+    image, target = _images()
+    image.requires_grad_()
+    torso = torch.zeros(16, 20)
+    torso[8:] = 1
+    settings = dataclasses.replace(PAPER, steps=10, ssim_weight=0.0, torso_weight=0.25)
+    rendering = _rendering(image, torch.ones(16, 20))
+    HeadLoss(settings)(rendering, target, Picture(target, None, torso), 0).backward()
+    slopes = image.grad.abs()  # of 0.8·L1 over 16·20·3 numbers
+    torch.testing.assert_close(slopes[:8], torch.full((8, 20, 3), 0.8 / 960))
+    torch.testing.assert_close(slopes[8:], torch.full((8, 20, 3), 0.25 * 0.8 / 960))
 
 
 @pytest.fixture
@@ -49,7 +63,8 @@ def test_without_weights_training_goes_on_with_one_warning(models, caplog):
     assert len(caplog.records) == 1
     assert WEIGHTS in caplog.text
     rendering = _rendering(image, torch.ones(16, 20))
-    assert loss(rendering, target, None, 20_000) == loss(rendering, target, None, 0)
+    picture = Picture(target, None, None)
+    assert loss(rendering, target, picture, 20_000) == loss(rendering, target, picture, 0)
 
 
 def _write_weights(folder) -> None:
@@ -70,7 +85,8 @@ def test_the_perceptual_term_starts_when_it_should(models):
     _write_weights(models)
     image, target = _images()
     loss, rendering = HeadLoss(PAPER), _rendering(image, torch.ones(16, 20))
-    early, late = (loss(rendering, target, None, step) for step in (9_999, 10_000))
+    picture = Picture(target, None, None)
+    early, late = (loss(rendering, target, picture, step) for step in (9_999, 10_000))
     distance = PerceptualLoss()(image, target)
     assert distance > 0
     torch.testing.assert_close(late - early, 0.1 * distance)

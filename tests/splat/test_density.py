@@ -3,8 +3,11 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ico3d.common.camera import Camera
 from ico3d.splat import density
 from ico3d.splat.density import DensitySettings, DensityStats, densify_plan
+from ico3d.splat.gaussians import Gaussians
+from ico3d.splat.render import render
 from ico3d.splat.rendering import RenderInfo
 
 RULES = DensitySettings(
@@ -43,6 +46,32 @@ def test_above_the_cap_the_faintest_die():
     rules = DensitySettings(2, 1.0, 0.01, 0.1, 0.5)
     plan = plan_of([2.0, 5.0, 3.0], [0.2, 0.001, 0.2], [0.9, 0.3, 0.8], rules)
     assert plan.keep.tolist() == [0, 2] and len(plan) == 2
+
+
+def test_the_hidden_die_and_do_not_multiply():
+    rules = DensitySettings(10, 1.0, 0.01, 0.1, 0.5, prune_contribution=0.4)
+    stats = DensityStats(torch.tensor([0.0, 2.0, 2.0]), torch.ones(3))
+    arguments = (stats, torch.full((3, 3), 0.001), torch.ones(3), rules)
+    plan = densify_plan(*arguments, torch.tensor([5.0, 0.5, 2.0]))
+    assert plan.keep.tolist() == [0, 2] and plan.clone_from.tolist() == [2]
+    assert densify_plan(*arguments).keep.tolist() == [0, 1, 2]
+
+
+def test_contributions_add_up_to_alpha_and_see_what_hides():
+    camera = Camera(32, 32, np.array([[40.0, 0, 16], [0, 40, 16], [0, 0, 1]]), np.eye(4))
+    front, behind, aside = [0.0, 0, 1], [0.0, 0, 2], [9.0, 0, 1]
+    gaussians = Gaussians(
+        torch.tensor([front, behind, aside]),
+        torch.tensor([[1.0, 0, 0, 0]]).repeat(3, 1),
+        torch.tensor([[0.2], [0.02], [0.2]]).repeat(1, 3),
+        torch.tensor([0.999, 0.9, 0.9]),
+        torch.rand(3, 3, generator=torch.Generator().manual_seed(0)),
+    )
+    given = density.contributions(gaussians, [camera, camera])
+    assert given.shape == (2, 3)
+    alpha = render(gaussians, [camera]).alpha.sum()
+    torch.testing.assert_close(given[0].sum(), alpha, rtol=1e-4, atol=0)
+    assert given[0, 0] > 100 and given[0, 1] < 0.1 and given[0, 2] == 0
 
 
 @settings(max_examples=60, deadline=None)

@@ -21,6 +21,7 @@ class Portrait:
         out: Folder to make.
         intrinsics: Focal length in pixels of the video, or "estimated".
         size: Longest short side of the pictures in pixels.
+        refine: Correct the poses by the pictures of the whole head, a minute or more.
         consent: What the person agreed to; goes into the avatar's manifest.
         licence: Licence of the recording; likewise.
     """
@@ -29,6 +30,7 @@ class Portrait:
     out: Annotated[Path, tyro.conf.Positional]
     intrinsics: float | Literal["estimated"] = "estimated"
     size: int = 512
+    refine: bool = True
     consent: str = "not stated"
     licence: str = "not stated"
 
@@ -37,7 +39,7 @@ class Portrait:
         from ico3d.capture.portrait import PortraitSettings, track_portrait
 
         focal = None if self.intrinsics == "estimated" else self.intrinsics
-        settings = PortraitSettings(self.size, focal, self.consent, self.licence)
+        settings = PortraitSettings(self.size, focal, self.refine, self.consent, self.licence)
         track_portrait(self.video, self.out, settings)
 
 

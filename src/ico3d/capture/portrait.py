@@ -4,12 +4,14 @@ import json
 import shutil
 import tempfile
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 from rich.console import Console
 from rich.progress import track as progress
+from scipy.ndimage import binary_dilation
 
 from ico3d.capture import matting, parsing, tracking
 from ico3d.capture.alignment import align, rigid_landmarks, spread_poses
@@ -40,6 +42,8 @@ from ico3d.errors import CaptureError
 FPS = 25.0
 MOVING = 0.04
 """Mean difference from the clean plate above which a camera cannot have stood still."""
+REFINED_SIZE = 256
+"""Pixels of the short side of pictures that refine poses."""
 console = Console(stderr=True)
 
 
@@ -50,12 +54,14 @@ class PortraitSettings:
     Attributes:
         size: Longest short side of the pictures in pixels; larger videos are scaled down.
         focal: Focal length in pixels of the video as it is; estimated where None.
+        refine: Whether poses are corrected by the pictures of the whole head.
         consent: What the person agreed to.
         licence: Licence of the recording.
     """
 
     size: int = 512
     focal: float | None = None
+    refine: bool = True
     consent: str = "not stated"
     licence: str = "not stated"
 
@@ -121,12 +127,16 @@ def _write(work: Path, video: Video, model: Path, settings: PortraitSettings) ->
     canonical = canonical_face(model)
     given = settings.focal and settings.focal * video.scale
     track = _track(work, readings, canonical, video, given)
-    save_transforms(work, track.focal, track.center.tolist(), readings.frames, track.poses())
     _save_blendshapes(work, readings)
     seen, moved = _save_mattes(work, readings)
     if moved > MOVING:
         notes.append("the background moves: use a steady camera, or expect a blurred background")
-    _save_points(work, readings, track, canonical)
+    points = _points(work, readings, track, canonical)
+    np.save(work / "points.npy", points)
+    poses = track.poses()
+    if settings.refine:
+        poses = _refined(work, readings, track, points)
+    save_transforms(work, track.focal, track.center.tolist(), readings.frames, poses)
     sound = read_sound(video.path)
     if sound is None:
         notes.append("the video has no sound: speech cannot drive a head trained on it")
@@ -258,16 +268,13 @@ def _save_composites(work: Path, readings: Readings, plate: np.ndarray) -> None:
         save_picture(work / "gt_imgs" / f"{number}.jpg", mixed.round().astype(np.uint8))
 
 
-def _save_points(
+def _points(
     work: Path, readings: Readings, track: tracking.Track, canonical: CanonicalFace
-) -> None:
-    """`points.npy`: the face as tracked; hair, neck and chest as the middle pose shows them."""
+) -> np.ndarray:
+    """(P, 3): the face as tracked; hair, neck and chest as the middle pose shows them."""
     middle = spread_poses(track, 1)[0]
     parts = load_uint8(work / "parsing" / f"{readings.frames[middle]}.png")
-    height, width = parts.shape[:2]
-    x, y = track.center
-    lens = np.array([[track.focal, 0, x], [0, track.focal, y], [0, 0, 1]])
-    camera = Camera(width, height, lens, OPENGL_FROM_OPENCV)
+    camera = _camera(track, parts.shape[1], parts.shape[0])
     pose = track.poses()[middle]
     hair = parsing.is_class(parts, parsing.HAIR) > 0
     torso = parsing.is_class(parts, parsing.NECK, parsing.CLOTH) > 0
@@ -276,7 +283,46 @@ def _save_points(
         silhouette_points(hair, camera, pose, (-0.03, 0.04), 4000),
         silhouette_points(torso, camera, pose, (-0.06, 0.0), 3000),
     ]
-    np.save(work / "points.npy", np.concatenate(points))
+    return np.concatenate(points)
+
+
+def _camera(track: tracking.Track, width: int, height: int) -> Camera:
+    """The camera that took the clip, for pictures scaled to this size."""
+    scale = np.array([width, height]) / (2 * track.center)
+    focal, center = track.focal * scale, track.center * scale
+    lens = np.array([[focal[0], 0, center[0]], [0, focal[1], center[1]], [0, 0, 1]])
+    return Camera(width, height, lens, OPENGL_FROM_OPENCV)
+
+
+def _refined(
+    work: Path, readings: Readings, track: tracking.Track, points: np.ndarray
+) -> np.ndarray:
+    """Poses (F, 4, 4) that the pictures agree with, hair and all."""
+    from ico3d.capture.photometric import Look, refine_poses
+
+    plate = load_uint8(work / "bc.jpg")
+    shrink = max(1, round(min(plate.shape[:2]) / REFINED_SIZE))
+    size = (plate.shape[1] // shrink, plate.shape[0] // shrink)
+
+    def small(image: np.ndarray) -> np.ndarray:
+        resized = Image.fromarray(image).resize(size, Image.Resampling.BOX)
+        return np.asarray(resized, np.float32) / 255
+
+    @lru_cache(maxsize=1024)
+    def look(index: int) -> Look:
+        number = readings.frames[index]
+        parts = load_uint8(work / "parsing" / f"{number}.png")
+        head = parsing.is_class(parts, parsing.FACE, parsing.HAIR, parsing.MOUTH) > 0
+        grown = binary_dilation(head, iterations=4)  # outlines tell most
+        image = load_uint8(work / "gt_imgs" / f"{number}.jpg")
+        return Look(small(image), small(grown.astype(np.uint8) * 255))
+
+    camera = _camera(track, *size)
+    refined = refine_poses(track.poses(), points, camera, small(plate), look)
+    console.print(
+        f"poses refined by {refined.turn:.2f}° and {1000 * refined.shift:.1f} mm on average"
+    )
+    return refined.poses
 
 
 def _save_sound(work: Path, sound: Sound) -> None:

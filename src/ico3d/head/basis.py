@@ -59,7 +59,12 @@ def _weight_gradient(basis: Tensor, gradient: Tensor) -> Tensor:
 
 
 def update_basis(
-    optimiser: Optimiser, basis: Tensor, weights: Tensor, gradient: Tensor, rate: float
+    optimiser: Optimiser,
+    basis: Tensor,
+    weights: Tensor,
+    gradient: Tensor,
+    rate: float,
+    weight_decay: float = 0.0,
 ) -> None:
     """One step on the basis with the gradient weights ⊗ gradient, in place.
 
@@ -72,11 +77,15 @@ def update_basis(
         weights: (R,) the expression with 1 appended.
         gradient: (N, w) of the blended features.
         rate: Learning rate.
+        weight_decay: Factor of each row but the bias added to its gradient (L2).
     """
     basis, weights, gradient = basis.detach(), weights.detach(), gradient.detach()
     rows = torch.nonzero(weights)[:, 0]  # (active,)
+    pulls = torch.full_like(weights, weight_decay)  # (R,)
+    pulls[-1] = 0
     if optimiser.kind == "sgd":
-        basis[rows] -= rate * weights[rows, None, None] * gradient
+        pulled = pulls[rows, None, None] * basis[rows]
+        basis[rows] -= rate * (weights[rows, None, None] * gradient + pulled)
         return
     first, second, counts = _moments(optimiser, basis)
     counts[rows.cpu()] += 1
@@ -91,10 +100,12 @@ def update_basis(
             rows.numpy(),
             np.float32(rate) * corrections[:, 0],
             corrections[:, 1].copy(),
+            pulls.numpy(),
         )
         return
     for row in rows.tolist():
-        parts = (basis[row], first[row], second[row], weights[row] * gradient)
+        pulled = weights[row] * gradient + pulls[row] * basis[row]
+        parts = (basis[row], first[row], second[row], pulled)
         adam_reference(*parts, rate, bias_corrections(int(counts[row])))
 
 

@@ -1,6 +1,7 @@
 """Density control of a head: what splat plans, carried out on model and moments."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
@@ -23,6 +24,19 @@ PRUNE_ABOVE = 0.1
 """Sizes relative to the head box, as 3DGS has them relative to the scene."""
 
 
+@dataclass(frozen=True)
+class Sampled:
+    """The greatest over some frames of what each Gaussian does there.
+
+    Attributes:
+        opacities: (N,) predicted.
+        contributions: (N,) pixels.
+    """
+
+    opacities: Tensor
+    contributions: Tensor
+
+
 class HeadDensity:
     """Clones, splits and prunes; clones and parts copy F and f_0."""
 
@@ -43,7 +57,7 @@ class HeadDensity:
         self,
         model: HeadModel,
         optimiser: Optimiser,
-        opacities: Callable[[int], Tensor],
+        sample: Callable[[int], Sampled],
         step: int,
     ) -> None:
         """Densifies and prunes if it is time.
@@ -51,7 +65,7 @@ class HeadDensity:
         Args:
             model: Changed in place.
             optimiser: Its moments follow; those of new Gaussians begin at 0.
-            opacities: Gives the greatest predicted opacity (N,) over frames sampled for a step.
+            sample: Looks at the head in some frames, chosen for a step.
             step: Number of the step just done.
 
         Raises:
@@ -67,8 +81,12 @@ class HeadDensity:
             clone_below=CLONE_BELOW * model.shape.box_size,
             prune_opacity=settings.prune_opacity,
             prune_scale=PRUNE_ABOVE * model.shape.box_size,
+            prune_contribution=settings.prune_contribution,
         )
-        plan = densify_plan(self._stats, model.log_scales.exp(), opacities(step), thresholds)
+        seen = sample(step)
+        plan = densify_plan(
+            self._stats, model.log_scales.exp(), seen.opacities, thresholds, seen.contributions
+        )
         if len(plan) == 0:
             raise ModelError(
                 f"all Gaussians have faded by step {step}: lower mlp_rate, or give "

@@ -1,16 +1,14 @@
 """The Gaussians a head starts with."""
 
-import math
-
 import numpy as np
 import torch
-from scipy.spatial import KDTree
 
 from ico3d.capture.capture import Capture
 from ico3d.errors import CaptureError
 from ico3d.head.model import HeadModel, HeadShape, Variant
 from ico3d.head.settings import HeadSettings
 from ico3d.head.views import view_of
+from ico3d.splat.initial import resampled, spacing
 
 
 def initial_head(
@@ -29,7 +27,7 @@ def initial_head(
     if surface is None or len(surface) < 4 or not np.isfinite(surface).all():
         raise CaptureError(f"{capture.path} has no finite surface points to start from.")
     seen = _seen(capture, np.asarray(surface, np.float64))  # (P', 3)
-    points = _resampled(seen, settings.initial_gaussians, rng)  # (N, 3)
+    points = resampled(seen, settings.initial_gaussians, rng)  # (N, 3)
     low, high = points.min(0), points.max(0)
     shape = HeadShape(
         expression_size=expression_size,
@@ -42,7 +40,7 @@ def initial_head(
     )
     model = HeadModel(shape, len(points))
     model.means.data = torch.from_numpy(points).float()
-    model.log_scales.data = torch.from_numpy(np.log(_spacing(points))).float()[:, None].repeat(1, 3)
+    model.log_scales.data = torch.from_numpy(np.log(spacing(points))).float()[:, None].repeat(1, 3)
     return model
 
 
@@ -59,23 +57,3 @@ def _seen(capture: Capture, points: np.ndarray) -> np.ndarray:
     if inside.sum() < 4:
         raise CaptureError(f"{capture.path}: no camera sees the surface points; check the poses.")
     return points[inside]
-
-
-def _resampled(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
-    """`count` of the points; where there are fewer, further ones between neighbours."""
-    if len(points) >= count:
-        return points[np.sort(rng.choice(len(points), count, replace=False))]
-    _, neighbours = KDTree(points).query(points, k=4)  # (P, 4), itself first
-    source = rng.integers(len(points), size=count - len(points))  # (extra,)
-    partner = np.asarray(neighbours)[source, rng.integers(1, 4, size=len(source))]  # (extra,)
-    weight = rng.random((len(source), 1))
-    between = points[source] * weight + points[partner] * (1 - weight)
-    return np.concatenate([points, between])
-
-
-def _spacing(points: np.ndarray) -> np.ndarray:
-    """Root mean square distance (N,) to the three nearest neighbours, within sane bounds."""
-    distances, _ = KDTree(points).query(points, k=4)
-    spacing = np.sqrt((distances[:, 1:] ** 2).mean(1))
-    typical = float(np.median(spacing))
-    return np.clip(spacing, max(typical / 10, math.ulp(1.0)), typical * 10)

@@ -38,7 +38,7 @@ def row_products(basis, gradient, out):
 
 
 @njit(parallel=True, fastmath=True, cache=True)
-def adam_rank_one(basis, first, second, weights, gradient, rows, steps, roots):
+def adam_rank_one(basis, first, second, weights, gradient, rows, steps, roots, pulls):
     """Adam with the gradient weights ⊗ gradient, which is never stored; in place.
 
     Args:
@@ -50,6 +50,7 @@ def adam_rank_one(basis, first, second, weights, gradient, rows, steps, roots):
         rows: Rows to update.
         steps: (R,) learning rate times the correction of the first moment.
         roots: (R,) correction of the second moment's root.
+        pulls: (R,) factor of each row added to its gradient (L2).
     """
     beta1, beta2, epsilon = np.float32(BETA1), np.float32(BETA2), np.float32(EPSILON)
     rest1, rest2 = np.float32(1.0 - BETA1), np.float32(1.0 - BETA2)
@@ -58,9 +59,9 @@ def adam_rank_one(basis, first, second, weights, gradient, rows, steps, roots):
         g = gradient[low:high]
         for r in rows:
             value, m, v = basis[r, low:high], first[r, low:high], second[r, low:high]
-            weight, step, root = weights[r], steps[r], roots[r]
+            weight, step, root, pull = weights[r], steps[r], roots[r], pulls[r]
             for i in range(g.size):
-                d = weight * g[i]
+                d = weight * g[i] + pull * value[i]
                 m[i] = beta1 * m[i] + rest1 * d
                 v[i] = beta2 * v[i] + rest2 * d * d
                 value[i] -= step * m[i] / (np.sqrt(v[i]) * root + epsilon)

@@ -7,6 +7,7 @@ from torch import Tensor
 
 from ico3d.errors import MissingModelError
 from ico3d.head.settings import HeadSettings
+from ico3d.head.views import Picture
 from ico3d.splat.losses import l1, ssim
 from ico3d.splat.rendering import Rendering
 
@@ -23,15 +24,13 @@ class HeadLoss:
         if settings.perceptual_weight and settings.steps > settings.perceptual_from:
             self._perceptual = _perceptual_term()
 
-    def __call__(
-        self, rendering: Rendering, target: Tensor, mask: Tensor | None, step: int
-    ) -> Tensor:
+    def __call__(self, rendering: Rendering, target: Tensor, picture: Picture, step: int) -> Tensor:
         """The loss of one picture.
 
         Args:
             rendering: One camera's.
             target: (H, W, 3) in [0, 1].
-            mask: (H, W) the person, or None.
+            picture: What the target was made of.
             step: Number of the optimisation step.
 
         Returns:
@@ -39,10 +38,13 @@ class HeadLoss:
         """
         settings = self._settings
         image = rendering.rgb  # (1, H, W, 3)
+        if settings.torso_weight != 1 and picture.torso is not None:
+            ignored = ((1 - settings.torso_weight) * picture.torso)[..., None]  # (H, W, 1)
+            image = image + ignored * (target - image)
         loss = settings.l1_weight * l1(image, target[None])
         loss = loss + settings.ssim_weight * (1 - ssim(image, target[None]))
-        if settings.alpha_weight and mask is not None:
-            loss = loss + settings.alpha_weight * (rendering.alpha[0] - mask).abs().mean()
+        if settings.alpha_weight and picture.mask is not None:
+            loss = loss + settings.alpha_weight * (rendering.alpha[0] - picture.mask).abs().mean()
         if self._perceptual is not None and step >= settings.perceptual_from:
             loss = loss + settings.perceptual_weight * self._perceptual(image[0], target)
         return loss

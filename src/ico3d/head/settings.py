@@ -22,6 +22,8 @@ class HeadSettings:
         ssim_weight: λ_s, of 1 − SSIM.
         perceptual_weight: λ_p, of the VGG term.
         perceptual_from: First step with the VGG term.
+        torso_weight: Weight of pixels that show the person but not the head, where the capture
+            tells them apart: a torso that moves by itself shall not teach the head.
         alpha_weight: Weight of the difference between rendered alpha and mask, where masks exist.
         position_rate: Learning rate of the means, times the size of the head box.
         position_decay: What it decays to, as a factor.
@@ -31,6 +33,10 @@ class HeadSettings:
         basis_rate: Learning rate of the latent basis F and f_0.
         logit_rate: The same for variants without an MLP, whose basis holds the logits themselves.
         basis_decay: What it decays to, as a factor.
+        basis_weight_decay: Factor of the basis' rows, the bias excepted, added to their gradient:
+            what the expression need not change, it shall not. For 100 training frames; it falls
+            with the cube of their number, as many frames are not learned by heart (measured:
+            docs/benchmarks.md).
         mlp_rate: Learning rate of the MLP.
         mlp_decay: What it decays to, as a factor.
         adaptor_rate: Learning rate of the speech adaptor.
@@ -41,6 +47,8 @@ class HeadSettings:
         densify_every: Steps between two densifications.
         densify_gradient: Screen-space gradient above which a Gaussian is cloned or split.
         prune_opacity: Gaussians whose predicted opacity stays below this are removed.
+        prune_contribution: Gaussians whose blending weights sum up to less than this in every
+            sampled picture, as a factor of the median over all Gaussians, are removed.
         checkpoint_every: Steps between checkpoints.
         cache_gib: Images kept in memory, in GiB; further ones are read again at each use.
     """
@@ -54,6 +62,7 @@ class HeadSettings:
     ssim_weight: float = 0.2
     perceptual_weight: float = 0.1
     perceptual_from: int = 10_000
+    torso_weight: float = 1.0
     alpha_weight: float = 0.0
     position_rate: float = 1.6e-4
     position_decay: float = 0.01
@@ -63,6 +72,7 @@ class HeadSettings:
     basis_rate: float = 2.5e-3
     logit_rate: float = 5e-2
     basis_decay: float = 1.0
+    basis_weight_decay: float = 0.0
     mlp_rate: float = 1.6e-4
     mlp_decay: float = 0.01
     adaptor_rate: float = 1e-3
@@ -73,6 +83,7 @@ class HeadSettings:
     densify_every: int = 100
     densify_gradient: float = 2e-4
     prune_opacity: float = 0.005
+    prune_contribution: float = 0.0
     checkpoint_every: int = 1_000
     cache_gib: float = 2.0
 
@@ -114,22 +125,26 @@ class HeadSettings:
 PRESETS: dict[str, HeadSettings] = {
     "paper": HeadSettings(),
     "cpu": HeadSettings(
-        steps=5_000,
+        steps=2_500,
         perceptual_weight=0.0,
+        torso_weight=0.5,
         alpha_weight=0.1,
-        position_rate=4e-3,
+        position_rate=1e-2,
         rotation_rate=2e-2,
         scale_rate=3e-2,
         shape_decay=0.1,
         basis_rate=1e-2,
         logit_rate=5e-2,
-        basis_decay=0.1,
-        mlp_rate=1e-2,
+        basis_decay=0.3,
+        basis_weight_decay=1e-5,
+        mlp_rate=2e-2,
+        adaptor_rate=1e-4,
         initial_gaussians=8_000,
         max_gaussians=12_000,
         densify_from=400,
-        densify_until=2_000,
-        densify_gradient=1e-3,
+        densify_until=1_800,
+        densify_gradient=3e-4,
+        prune_contribution=0.25,
         checkpoint_every=500,
     ),
 }

@@ -9,17 +9,23 @@ from torch import Tensor
 from ico3d.capture.capture import Capture
 from ico3d.errors import CaptureError
 from ico3d.head.basis import update_basis
-from ico3d.head.density import HeadDensity
+from ico3d.head.density import HeadDensity, Sampled
 from ico3d.head.expressions import ExpressionTrack
 from ico3d.head.loss import HeadLoss
 from ico3d.head.model import HeadModel
 from ico3d.head.settings import HeadSettings
 from ico3d.head.views import Picture, PictureCache, View
 from ico3d.speech.network import SpeechAdaptor
+from ico3d.splat.density import contributions
 from ico3d.splat.render import render
 from ico3d.training.optimiser import Optimiser
 
 GEOMETRY = ("means", "quats", "log_scales")
+
+FEW_FRAMES = 100
+"""Training frames that `basis_weight_decay` is meant for."""
+SAMPLES = 16
+"""Views that density control looks at."""
 
 ATTENTION_FACTOR = 5
 ATTENTION_WEIGHT_DECAY = 1e-4
@@ -51,6 +57,8 @@ class HeadTrainer:
         self._views = list(self._pictures.views(capture.split.train))
         if not self._views:
             raise CaptureError(f"{capture.path} has no picture among its training frames.")
+        few = FEW_FRAMES / len(capture.split.train)
+        self._weight_decay = settings.basis_weight_decay * few**3
         self._loss = HeadLoss(settings)
         self._optimiser = Optimiser(settings.optimiser)
         self._density = HeadDensity(settings, seed)
@@ -65,11 +73,11 @@ class HeadTrainer:
         features = self._features(expression)  # (N, w)
         gaussians = self.model.gaussians(self.model.decode(features, expression))
         rendering = render(gaussians, [view.camera], background)
-        loss = self._loss(rendering, target, picture.mask, index)
+        loss = self._loss(rendering, target, picture, index)
         loss.backward()
         self._density.observe(rendering.info, index)
         self._update(expression, features, index)
-        self._density.adapt(self.model, self._optimiser, self._sampled_opacities, index)
+        self._density.adapt(self.model, self._optimiser, self._sampled, index)
         error = float((rendering.rgb.detach()[0] - target).square().mean())
         psnr = -10 * np.log10(max(error, 1e-12))
         return {"loss": float(loss.detach()), "psnr": psnr, "gaussians": len(self.model)}
@@ -141,7 +149,14 @@ class HeadTrainer:
         rates["means"] *= self.model.shape.box_size
         weights = self.model.row_weights(expression)
         assert features.grad is not None
-        update_basis(self._optimiser, self.model.basis, weights, features.grad, rates["basis"])
+        update_basis(
+            self._optimiser,
+            self.model.basis,
+            weights,
+            features.grad,
+            rates["basis"],
+            self._weight_decay,
+        )
         for name, parameter in self.model.named_parameters():
             if parameter.grad is not None:
                 rate = rates[name if name in GEOMETRY else "mlp"]
@@ -167,12 +182,16 @@ class HeadTrainer:
             parameter.grad = None
 
     @torch.no_grad()
-    def _sampled_opacities(self, index: int) -> Tensor:
-        """(N,) largest predicted opacity over some training frames."""
+    def _sampled(self, index: int) -> Sampled:
+        """The head in some training frames."""
         rng = np.random.default_rng([self._seed, index, 2])
-        chosen = rng.choice(len(self._views), size=min(16, len(self._views)), replace=False)
-        logits = [self.model.logits(self._expression(self._views[i]))[:, 3] for i in chosen]
-        return torch.sigmoid(torch.stack(logits).amax(0))
+        chosen = rng.choice(len(self._views), size=min(SAMPLES, len(self._views)), replace=False)
+        opacities, given = [], []
+        for view in (self._views[i] for i in chosen):
+            gaussians = self.model(self._expression(view))
+            opacities.append(gaussians.opacities)
+            given.append(contributions(gaussians, [view.camera])[0])
+        return Sampled(torch.stack(opacities).amax(0), torch.stack(given).amax(0))
 
 
 def _below(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:

@@ -34,10 +34,12 @@ class Picture:
     Attributes:
         image: (H, W, 3) in [0, 1].
         mask: (H, W) in [0, 1], the person, or None.
+        torso: (H, W) in [0, 1], the person but the head; None where nobody tells them apart.
     """
 
     image: Tensor
     mask: Tensor | None
+    torso: Tensor | None
 
 
 def head_pose(capture: Capture, frame: int) -> np.ndarray:
@@ -61,6 +63,10 @@ def view_of(capture: Capture, camera: int, frame: int) -> View:
     return View(camera, frame, moved)
 
 
+Layers = tuple[np.ndarray, np.ndarray | None, np.ndarray | None]
+"""Picture, mask and torso as bytes."""
+
+
 class PictureCache:
     """Pictures of a capture, kept as bytes within a budget, else read again at each use."""
 
@@ -69,7 +75,7 @@ class PictureCache:
         self._capture = capture
         self._left = int(budget_gib * 2**30)
         self._backgrounds: dict[int, Tensor | None] = {}
-        self._kept: dict[tuple[int, int], tuple[np.ndarray, np.ndarray | None]] = {}
+        self._kept: dict[tuple[int, int], Layers] = {}
 
     def views(self, frames: Sequence[int]) -> Iterator[View]:
         """All views of these frames that were recorded, frame by frame."""
@@ -88,31 +94,45 @@ class PictureCache:
 
     def picture(self, view: View, device: torch.device) -> Picture:
         """What a recorded view shows."""
-        pair = self._read(view.camera_index, view.frame)
-        if pair is None:
+        layers = self._read(view.camera_index, view.frame)
+        if layers is None:
             raise CaptureError(
                 f"{self._capture.path}: the picture of frame {view.frame} by camera "
                 f"{view.camera_index} has vanished."
             )
-        image, mask = pair
-        return Picture(
-            _as_floats(image, device), None if mask is None else _as_floats(mask, device)
+        image, mask, torso = (
+            None if layer is None else _as_floats(layer, device) for layer in layers
         )
+        assert image is not None
+        return Picture(image, mask, torso)
 
-    def _read(self, camera: int, frame: int) -> tuple[np.ndarray, np.ndarray | None] | None:
-        """Picture and mask as bytes, from memory or from the capture."""
+    def _read(self, camera: int, frame: int) -> Layers | None:
+        """Picture, mask and torso as bytes, from memory or from the capture."""
         if (camera, frame) in self._kept:
             return self._kept[camera, frame]
         image = self._capture.image(camera, frame)
         if image is None:
             return None
         mask = self._capture.mask(camera, frame)
-        pair = (_as_bytes(image), None if mask is None else _as_bytes(mask))
-        size = sum(part.nbytes for part in pair if part is not None)
+        torso = self._torso(mask, camera, frame)
+        layers = (
+            _as_bytes(image),
+            None if mask is None else _as_bytes(mask),
+            None if torso is None else _as_bytes(torso),
+        )
+        size = sum(part.nbytes for part in layers if part is not None)
         if size <= self._left:
             self._left -= size
-            self._kept[camera, frame] = pair
-        return pair
+            self._kept[camera, frame] = layers
+        return layers
+
+    def _torso(self, mask: np.ndarray | None, camera: int, frame: int) -> np.ndarray | None:
+        """(H, W) the person without the head."""
+        head = self._capture.head_mask(camera, frame)
+        if mask is None or head is None:
+            return None
+        torso = np.clip(mask - head, 0, 1)
+        return torso if torso.any() else None
 
 
 def _as_bytes(picture: np.ndarray) -> np.ndarray:

@@ -5,13 +5,17 @@ carries any per-Gaussian tensor over, so that parameters, optimiser states and w
 hangs on its Gaussians (HeadGaS++: the basis F) follow the same plan.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import log
 
 import torch
 from torch import Tensor
 
+from ico3d.common.camera import Camera
 from ico3d.splat import quaternions
+from ico3d.splat.gaussians import Gaussians
+from ico3d.splat.render import render
 from ico3d.splat.rendering import RenderInfo
 
 SPLIT_PARTS = 2
@@ -34,6 +38,7 @@ class DensitySettings:
         prune_opacity: Those whose opacity falls below this die.
         prune_scale: Those whose largest scale exceeds this die, metres. 3DGS: 10 % of the
             scene's extent.
+        prune_contribution: Those that give pictures less than this times the median die.
     """
 
     max_gaussians: int = 50_000
@@ -41,6 +46,7 @@ class DensitySettings:
     clone_below: float = 0.002
     prune_opacity: float = 0.005
     prune_scale: float = 0.05
+    prune_contribution: float = 0.0
 
 
 @dataclass
@@ -103,14 +109,34 @@ class Plan:
         return torch.cat([self.keep, self.clone_from, self.split_from])
 
 
+def contributions(gaussians: Gaussians, cameras: Sequence[Camera]) -> Tensor:
+    """What each Gaussian gives pictures: (C, N) the sum over pixels of its blending weight.
+
+    What lies behind others, or between pixels, gives next to nothing however opaque it is.
+    """
+    gaussians = gaussians.detach()
+    one = gaussians.means.new_zeros(len(gaussians), 3).requires_grad_()
+    given = []
+    for camera in cameras:
+        colored = replace(gaussians, colors=one, sh=None)
+        with torch.enable_grad():
+            total = render(colored, [camera]).rgb[..., 0].sum()
+            given.append(torch.autograd.grad(total, one)[0][:, 0])  # (N,): d(Σ w·c)/dc
+    return torch.stack(given)
+
+
 def densify_plan(
-    stats: DensityStats, scales: Tensor, opacities: Tensor, settings: DensitySettings
+    stats: DensityStats,
+    scales: Tensor,
+    opacities: Tensor,
+    settings: DensitySettings,
+    contribution: Tensor | None = None,
 ) -> Plan:
     """Decides what multiplies and what dies (3DGS section 5).
 
-    Pruned are the faint and those that would still be too large after their split; only the others
-    multiply. Where the cap leaves no room for all of them, those of the strongest gradient go
-    first; where even those that stay are too many, the faintest die.
+    Pruned are the faint, the hidden and those that would still be too large after their split;
+    only the others multiply. Where the cap leaves no room for all of them, those of the strongest
+    gradient go first; where even those that stay are too many, the faintest die.
 
     Args:
         stats: What was gathered since the last plan.
@@ -118,6 +144,7 @@ def densify_plan(
         opacities: (N,) that decide who is faint. A model that predicts opacities gives the
             greatest over sampled frames.
         settings: Thresholds and the cap.
+        contribution: (N,) pixels, the greatest over sampled pictures; None keeps the hidden.
 
     Returns:
         The plan; the same for the same arguments.
@@ -128,9 +155,10 @@ def densify_plan(
     large = size > settings.clone_below
     final_size = torch.where(wanted & large, size / SPLIT_SHRINK, size)
     faint = opacities.detach() < settings.prune_opacity
-    alive = _under_cap(
-        ~(faint | (final_size > settings.prune_scale)), opacities.detach(), settings.max_gaussians
-    )
+    dead = faint | (final_size > settings.prune_scale)
+    if contribution is not None:
+        dead |= contribution < settings.prune_contribution * contribution.median()
+    alive = _under_cap(~dead, opacities.detach(), settings.max_gaussians)
     room = settings.max_gaussians - int(alive.sum())
     grown = _strongest(wanted & alive, gradient, room)
     return Plan(

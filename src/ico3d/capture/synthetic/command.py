@@ -36,7 +36,7 @@ class Synthetic:
     text: str = ""
     """What is said, repeated as long as needed; by default varied English sentences."""
     lively: bool = False
-    """Also show moods, which neither sound nor eyes tell: for heads driven by blendshapes."""
+    """Also show moods and glances, which sound does not tell: for heads driven by blendshapes."""
     seed: int = 0
     """Decides voice, order of sentences, blinks, brows, sway and views."""
     workers: int = field(default_factory=lambda: os.cpu_count() or 1)

@@ -23,20 +23,37 @@ SHIFT = (0.018, 0.006, 0.012)
 """Largest shift of the sway, metres."""
 
 MIMICRY = (
-    (("mouthSmileLeft", "mouthSmileRight", "cheekSquintLeft", "cheekSquintRight"), 0.7),
-    (("mouthSmileLeft", "mouthDimpleLeft"), 0.5),
-    (("mouthFrownLeft", "mouthFrownRight", "mouthShrugLower"), 0.6),
-    (("eyeSquintLeft", "eyeSquintRight", "noseSneerLeft", "noseSneerRight"), 0.7),
-    (("eyeWideLeft", "eyeWideRight"), 0.7),
-    (("cheekPuffLeft", "cheekPuffRight"), 0.5),
-    (("mouthLeft", "jawLeft"), 0.5),
-    (("mouthRight", "jawRight"), 0.5),
-    (("mouthUpperUpLeft", "noseSneerLeft", "cheekSquintLeft"), 0.6),
-    (("mouthPucker", "mouthFunnel"), 0.5),
-    (("mouthStretchLeft", "mouthStretchRight", "mouthLowerDownLeft", "mouthLowerDownRight"), 0.5),
-    (("jawForward", "mouthShrugUpper"), 0.5),
+    (("browInnerUp",), 0.8),
+    (("browOuterUpLeft",), 0.9),
+    (("browOuterUpRight",), 0.9),
+    (("browDownLeft", "browDownRight"), 0.8),
+    (("eyeSquintLeft", "cheekSquintLeft"), 0.9),
+    (("eyeSquintRight", "cheekSquintRight"), 0.9),
+    (("eyeWideLeft", "eyeWideRight"), 0.8),
+    (("noseSneerLeft",), 0.8),
+    (("noseSneerRight",), 0.8),
+    (("cheekPuffLeft",), 0.6),
+    (("cheekPuffRight",), 0.6),
+    (("mouthSmileLeft", "mouthSmileRight"), 0.4),
+    (("mouthSmileLeft", "mouthDimpleLeft"), 0.3),
+    (("mouthFrownLeft", "mouthFrownRight", "mouthShrugLower"), 0.3),
+    (("mouthPucker", "mouthFunnel"), 0.3),
+    (("mouthLeft", "jawLeft"), 0.3),
+    (("mouthRight", "jawRight"), 0.3),
 )
-"""What a lively person's face does besides talking: shapes that move together, and how far."""
+"""What a lively person's face does besides talking: shapes that move together, and how far.
+
+Brows, lids, nose and cheeks most; the mouth has to speak.
+"""
+GAZE = (
+    (("eyeLookInLeft", "eyeLookOutRight"), ("eyeLookOutLeft", "eyeLookInRight")),
+    (("eyeLookUpLeft", "eyeLookUpRight"), ("eyeLookDownLeft", "eyeLookDownRight")),
+)
+"""Both eyes to the right or left of the person, up or down."""
+LOOK = (0.8, 0.5)
+"""How far the gaze wanders sideways, and up or down."""
+SACCADE = 0.06
+"""Seconds in which the eyes jump."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +88,7 @@ def perform(
         frames: How many frames.
         fps: Frames per second.
         seed: Decides voice, order of sentences, blinks, brows and sway.
-        lively: Whether the face shows moods too, which neither sound nor eyes tell.
+        lively: Whether the face shows moods and glances too, which the sound does not tell.
 
     Raises:
         MissingExtraError: If espeakng-loader or soxr is not installed.
@@ -89,6 +106,9 @@ def perform(
     poses = _sway(times, subject, random)
     if lively:
         _add_mimicry(weights, subject, times, random)
+        for column, name in enumerate(EYE_NAMES):
+            if name in subject.blendshape_names:
+                eyes[:, column] = weights[:, subject.blendshape_names.index(name)]
     return Performance(samples, said, phonemes, weights, eyes, poses)
 
 
@@ -145,12 +165,27 @@ def _eyes(times: np.ndarray, random: np.random.Generator) -> np.ndarray:
 def _add_mimicry(
     weights: np.ndarray, subject: Subject, times: np.ndarray, random: np.random.Generator
 ) -> None:
-    """Adds moods to weights (F, K): each comes and goes on its own, none is there always."""
-    for names, most in MIMICRY:
-        mood = most * np.clip(1.6 * _wander(times, 0.8, random) - 0.3, 0, 1)  # (F,)
+    """Adds moods and glances to weights (F, K): each comes and goes on its own."""
+
+    def add(names: tuple[str, ...], values: np.ndarray) -> None:
         for name in set(names).intersection(subject.blendshape_names):
             column = subject.blendshape_names.index(name)
-            weights[:, column] = np.clip(weights[:, column] + mood, 0, 1)
+            weights[:, column] = np.clip(weights[:, column] + values, 0, 1)
+
+    for names, most in MIMICRY:
+        add(names, most * np.clip(1.6 * _wander(times, 0.8, random) - 0.3, 0, 1))
+    for (one, other), most in zip(GAZE, LOOK, strict=True):
+        turn = most * _glances(times, random)  # (F,)
+        add(one, np.clip(turn, 0, None))
+        add(other, np.clip(-turn, 0, None))
+
+
+def _glances(times: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """(F,) in [-1, 1]: a gaze that rests for 0.3 to about 3 s, then jumps."""
+    starts = np.cumsum(0.3 + random.gamma(2.0, 0.4, size=int(times[-1]) * 4 + 2))  # (J,)
+    targets = np.append(0.0, random.uniform(-1, 1, len(starts)))  # (J + 1,)
+    done = np.clip((times[:, None] - starts) / SACCADE, 0, 1)  # (F, J)
+    return targets[0] + done @ np.diff(targets)
 
 
 def _blinks(times: np.ndarray, random: np.random.Generator) -> np.ndarray:

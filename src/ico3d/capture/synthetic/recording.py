@@ -44,7 +44,7 @@ class Recording:
         size: Width and height of the pictures.
         text: What is said; empty for sentences of our own.
         seed: Decides everything that is random.
-        lively: Whether the face shows moods too, which neither sound nor eyes tell.
+        lively: Whether the face shows moods and glances too, which the sound does not tell.
     """
 
     subject: str

@@ -1,0 +1,26 @@
+"""Round Gaussians on surface points: where every training starts."""
+
+import math
+
+import numpy as np
+from scipy.spatial import KDTree
+
+
+def resampled(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+    """`count` of the points (P, 3); where there are fewer, further ones between neighbours."""
+    if len(points) >= count:
+        return points[np.sort(rng.choice(len(points), count, replace=False))]
+    _, neighbours = KDTree(points).query(points, k=4)  # (P, 4), itself first
+    source = rng.integers(len(points), size=count - len(points))  # (extra,)
+    partner = np.asarray(neighbours)[source, rng.integers(1, 4, size=len(source))]  # (extra,)
+    weight = rng.random((len(source), 1))
+    between = points[source] * weight + points[partner] * (1 - weight)
+    return np.concatenate([points, between])
+
+
+def spacing(points: np.ndarray) -> np.ndarray:
+    """Root mean square distance (N,) to the three nearest neighbours, within sane bounds."""
+    distances, _ = KDTree(points).query(points, k=4)
+    distance = np.sqrt((distances[:, 1:] ** 2).mean(1))
+    typical = float(np.median(distance))
+    return np.clip(distance, max(typical / 10, math.ulp(1.0)), typical * 10)
