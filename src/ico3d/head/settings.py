@@ -35,7 +35,7 @@ class HeadSettings:
         basis_decay: What it decays to, as a factor.
         basis_weight_decay: Factor of the basis' rows, the bias excepted, added to their gradient:
             what the expression need not change, it shall not. For 100 training frames; it falls
-            with the cube of their number, as many frames are not learned by heart (measured:
+            with the fourth power of their number: many frames are not learned by heart (measured:
             docs/benchmarks.md).
         mlp_rate: Learning rate of the MLP.
         mlp_decay: What it decays to, as a factor.
@@ -129,7 +129,7 @@ PRESETS: dict[str, HeadSettings] = {
         perceptual_weight=0.0,
         torso_weight=0.5,
         alpha_weight=0.1,
-        position_rate=1e-2,
+        position_rate=2.5e-3,
         rotation_rate=2e-2,
         scale_rate=3e-2,
         shape_decay=0.1,

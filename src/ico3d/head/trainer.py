@@ -58,7 +58,7 @@ class HeadTrainer:
         if not self._views:
             raise CaptureError(f"{capture.path} has no picture among its training frames.")
         few = FEW_FRAMES / len(capture.split.train)
-        self._weight_decay = settings.basis_weight_decay * few**3
+        self._weight_decay = settings.basis_weight_decay * few**4
         self._loss = HeadLoss(settings)
         self._optimiser = Optimiser(settings.optimiser)
         self._density = HeadDensity(settings, seed)
