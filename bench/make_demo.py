@@ -60,7 +60,9 @@ class Demo:
         print(Bundle.open(self.out).manifest.loss, f"{size / 1e6:.2f} MB")
 
     def _record(self, capture: Path) -> None:
-        size = ("--rig", "bust", "--frames", self.frames, "--size", self.size, "--cameras", 6)
+        # moods and glances are nothing that a voice could drive
+        shot = ("--rig", "bust", "--no-lively", "--cameras", 6)
+        size = ("--frames", self.frames, "--size", self.size, *shot)
         ico3d("capture synthetic", capture, "--subject", self.subject, *size, "--seed", self.seed)
 
     def _changes(self) -> list[str]:

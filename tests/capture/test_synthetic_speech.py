@@ -1,11 +1,15 @@
 """The performance: lips follow the sound without delay and close at p, b and m."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from ico3d.capture.synthetic.articulation import LEAST_CLOSED, articulate, closure
-from ico3d.capture.synthetic.performance import PAUSE, SOUND_RATE, _speak
+from ico3d.capture.synthetic.performance import PAUSE, SOUND_RATE, _glances, _speak, perform
+from ico3d.capture.synthetic.subject import load_subject
 from ico3d.common.espeak import Phoneme
+from ico3d.common.expression import EYE_NAMES
 
 NAMES = ["sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "ih", "oh", "ou"]
 JAW = {"aa": 1.0, "E": 0.6, "ih": 0.4, "oh": 0.8, "ou": 0.3}
@@ -65,3 +69,30 @@ def test_opening_follows_the_loudness_of_real_speech_without_lag():
     correlation = [np.corrcoef(jaw[20:-20], np.roll(loud, lag)[20:-20])[0, 1] for lag in lags]
     assert max(correlation) > 0.5
     assert abs(int(lags[np.argmax(correlation)])) <= 3  # 30 ms
+
+
+def test_a_gaze_rests_and_jumps():
+    times = np.arange(1000) / 25
+    gaze = _glances(times, np.random.default_rng(0))
+    assert np.abs(gaze).max() <= 1 and np.ptp(gaze) > 1
+    still = np.abs(np.diff(gaze)) < 1e-9
+    assert 0.8 < still.mean() < 0.98  # it moves in a frame or two, then rests
+
+
+NPZ = Path(__file__).parents[3] / "shared" / "subjects" / "human_face_f.npz"
+
+
+@pytest.mark.skipif(not NPZ.is_file(), reason="../shared/subjects is not here")
+def test_a_lively_person_says_the_same_with_more_of_the_face():
+    subject = load_subject(str(NPZ))
+    calm, lively = (perform(subject, "", 500, 25.0, 0, mood) for mood in (False, True))
+    np.testing.assert_array_equal(calm.samples, lively.samples)
+    np.testing.assert_array_equal(calm.world_from_head, lively.world_from_head)
+    active = [int((p.weights.std(0) > 0.02).sum()) for p in (calm, lively)]
+    assert active[0] < 30 and active[1] > 40
+    assert lively.weights.min() >= 0 and lively.weights.max() <= 1
+    for column, name in enumerate(EYE_NAMES):
+        weights = lively.weights[:, subject.blendshape_names.index(name)]
+        np.testing.assert_array_equal(lively.eyes[:, column], weights)
+    both = [subject.blendshape_names.index(n) for n in ("eyeLookInLeft", "eyeLookOutRight")]
+    np.testing.assert_array_equal(*lively.weights[:, both].T)

@@ -35,8 +35,9 @@ class Synthetic:
     """Width and height of the pictures in pixels."""
     text: str = ""
     """What is said, repeated as long as needed; by default varied English sentences."""
-    lively: bool = False
-    """Also show moods and glances, which sound does not tell: for heads driven by blendshapes."""
+    lively: bool = True
+    """Also show moods and glances; without, the face does nothing but speak, blink and raise brows,
+    which is what a head driven by speech can know."""
     seed: int = 0
     """Decides voice, order of sentences, blinks, brows, sway and views."""
     workers: int = field(default_factory=lambda: os.cpu_count() or 1)

@@ -78,7 +78,7 @@ class Performance:
 
 
 def perform(
-    subject: Subject, text: str, frames: int, fps: float, seed: int, lively: bool = False
+    subject: Subject, text: str, frames: int, fps: float, seed: int, lively: bool
 ) -> Performance:
     """Makes up a performance.
 

@@ -55,7 +55,7 @@ class Recording:
     size: int
     text: str
     seed: int
-    lively: bool = False
+    lively: bool
 
 
 def record(recording: Recording, out: Path, workers: int) -> None:
