@@ -10,7 +10,9 @@ from conftest import camera_at
 
 from ico3d.errors import MissingExtraError
 from ico3d.splat import cuda
+from ico3d.splat.cpu.forward import PIXELS
 from ico3d.splat.cpu.rasterise import Project, bin_views, camera_numbers
+from ico3d.splat.cpu.tiles import VECTOR
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
@@ -142,8 +144,12 @@ def test_broken_numbers_do_no_harm_to_memory(cameras, name, value):
     picture.rgb.sum().backward()
     tiles = bin_views(*broken_projection(ours, cameras), 44, 30)
     for view in tiles:
-        assert view.first_pair[-1] == view.first_entry[-1] == len(view.pairs)
-        assert sorted(view.pairs) == list(range(len(view.pairs)))
+        owned = [range(*ends) for ends in zip(view.first_pair, view.end_pair, strict=True)]
+        assert sorted(view.pairs) == [pair for pairs in owned for pair in pairs]
+        assert view.first_entry[-1] == len(view.pairs) <= len(view.splats)
+        spans = view.spans[view.pairs]
+        assert (spans[:, 0] < spans[:, 1]).all() and not (spans % VECTOR).any()
+        assert not len(spans) or (spans.min() >= 0 and spans.max() <= PIXELS)
 
 
 def broken_projection(gaussians, cameras):

@@ -12,46 +12,55 @@ from ico3d.splat.cpu.forward import (
     MIN_TRANSMITTANCE,
     ONE,
     PIXELS,
+    PLANE,
     ZERO,
     falloff,
     finished,
+    first_center,
     pixel_positions,
+    window,
 )
-from ico3d.splat.cpu.tiles import TILE_HEIGHT, TILE_WIDTH, Tiles, dealt, dealt_turns
+from ico3d.splat.cpu.tiles import BLOCK, TILE_WIDTH, Tiles, tiles_across
 
 GRADIENTS = 9
 """Per splat: mean (2), conic (3), opacity, colour (3)."""
 
 
 @kernel()
-def _gather(light, rest, red, green, blue, xs, ys, splat, left, top, out):
-    """Sums one splat's gradients over rows of a tile.
+def _gather(state, count, splat, left, top, out):
+    """Sums one splat's gradients over the next `count` pixels of a tile.
 
-    `light` is the transmittance so far (negative where finished), `rest` the loss's derivative
-    by everything from here to the background, weighted as it shows. With c·g = colour · pixel
-    gradient, dL/dα = T·c·g − rest behind it / (1 − α).
+    The planes of `state` (see `forward._blend`): transmittance so far (negative where finished),
+    the loss's derivative by everything from here to the background, weighted as it shows (rest),
+    the pixel gradient's red, green, blue, then x and y. With c·g = colour · pixel gradient,
+    dL/dα = T·c·g − rest behind it / (1 − α).
     """
     mx, my = splat[0] - left, splat[1] - top
     xx, xy, yy, opacity = splat[2], splat[3], splat[4], splat[5]
     r, g, b = splat[6], splat[7], splat[8]
     sum_r, sum_g, sum_b, sum_s = ZERO, ZERO, ZERO, ZERO
     sum_x, sum_y, sum_xx, sum_xy, sum_yy = ZERO, ZERO, ZERO, ZERO, ZERO
-    for p in range(light.size):
-        dx, dy = xs[p] - mx, ys[p] - my
+    for p in range(count):
+        red, green, blue = (
+            state[2 * PLANE + p],
+            state[3 * PLANE + p],
+            state[4 * PLANE + p],
+        )
+        dx, dy = state[5 * PLANE + p] - mx, state[6 * PLANE + p] - my
         raw = opacity * falloff(dx * (xx * dx + xy * dy) + yy * dy * dy)
         alpha = min(raw, MAX_ALPHA)
         alpha = alpha if alpha >= MIN_ALPHA else ZERO
-        before, clear = light[p], ONE - alpha
+        before, clear = state[p], ONE - alpha
         after = before * clear
         alpha = alpha if after > MIN_TRANSMITTANCE else ZERO
-        light[p] = after if after > MIN_TRANSMITTANCE else -abs(before)
+        state[p] = after if after > MIN_TRANSMITTANCE else -abs(before)
         weight = alpha * before
-        sum_r += weight * red[p]
-        sum_g += weight * green[p]
-        sum_b += weight * blue[p]
-        seen = weight * (r * red[p] + g * green[p] + b * blue[p])
-        behind = rest[p] - seen
-        rest[p] = behind
+        sum_r += weight * red
+        sum_g += weight * green
+        sum_b += weight * blue
+        seen = weight * (r * red + g * green + b * blue)
+        behind = state[PLANE + p] - seen
+        state[PLANE + p] = behind
         by_exponent = seen - alpha * behind / clear
         by_exponent = by_exponent if raw <= MAX_ALPHA else ZERO
         by_x, by_y = by_exponent * dx, by_exponent * dy
@@ -73,71 +82,66 @@ def _gather(light, rest, red, green, blue, xs, ys, splat, left, top, out):
 
 
 @kernel()
-def _read(state, left, top, image, light, g_image, g_light):
-    """Reads a tile's pixel gradients and what the loss owes to the whole pixel."""
-    for y in range(min(TILE_HEIGHT, image.shape[0] - top)):
-        for x in range(min(TILE_WIDTH, image.shape[1] - left)):
-            p, row, column = y * TILE_WIDTH + x, top + y, left + x
-            rest = g_light[row, column] * light[row, column]
-            for k in range(3):
-                state[2 + k, p] = g_image[row, column, k]
-                rest += g_image[row, column, k] * image[row, column, k]
-            state[1, p] = rest
+def _read(state, image, light, g_image, g_light):
+    """Reads a block's pixel gradients and what the loss owes to the whole pixel."""
+    state[:PLANE] = ONE
+    state[PLANE : 5 * PLANE] = ZERO  # nothing is owed outside of the picture
+    for y in range(light.shape[0]):
+        for x in range(light.shape[1]):
+            p = x // TILE_WIDTH * PIXELS + y * TILE_WIDTH + x % TILE_WIDTH
+            red, green, blue = g_image[y, x, 0], g_image[y, x, 1], g_image[y, x, 2]
+            own = red * image[y, x, 0] + green * image[y, x, 1] + blue * image[y, x, 2]
+            state[PLANE + p] = g_light[y, x] * light[y, x] + own
+            state[2 * PLANE + p] = red
+            state[3 * PLANE + p] = green
+            state[4 * PLANE + p] = blue
 
 
 @kernel()
-def _collect(tile, across, records, rows, splats, entries, image, light, g_image, g_light, parts):
-    """Writes the gradients of one tile's pairs."""
-    state = np.zeros((7, PIXELS), np.float32)
-    state[0] = ONE
-    pixel_positions(state[5], state[6])
-    left, top = (tile % across) * TILE_WIDTH, (tile // across) * TILE_HEIGHT
-    left_center, top_center = np.float32(left) + HALF, np.float32(top) + HALF
-    _read(state, left, top, image, light, g_image, g_light)
+def _collect(state, records, spans, splats, entries, center, parts):
+    """Writes the gradients of the pairs of one tile, whose state begins here."""
     done = False
     for k in range(entries.size):
         pair = entries[k]
         if done:
             parts[pair] = ZERO
             continue
-        low, high = rows[pair, 0] * TILE_WIDTH, rows[pair, 1] * TILE_WIDTH
-        _gather(
-            state[0, low:high],
-            state[1, low:high],
-            state[2, low:high],
-            state[3, low:high],
-            state[4, low:high],
-            state[5, low:high],
-            state[6, low:high],
-            records[splats[pair]],
-            left_center,
-            top_center,
-            parts[pair],
-        )
-        done = k % CHECK == CHECK - 1 and finished(state[0])
+        low, high = spans[pair]
+        splat = records[splats[pair]]
+        _gather(state[low:], high - low, splat, center[0], center[1], parts[pair])
+        done = k % CHECK == CHECK - 1 and finished(state)
 
 
 @kernel(parallel=True)
 def _collect_all(
-    hands, across, records, rows, splats, first_entry, pairs, image, light, g_image, g_light, parts
+    hands, across, records, spans, splats, first_entry, pairs, image, light, g_image, g_light, parts
 ):
-    count = first_entry.size - 1
-    for turn in numba.prange(dealt_turns(hands, count)):
-        tile = dealt(turn, hands, count)
-        if tile < count:
-            entries = pairs[first_entry[tile] : first_entry[tile + 1]]
-            _collect(
-                tile, across, records, rows, splats, entries, image, light, g_image, g_light, parts
+    """Writes the gradients of all pairs; each thread takes every `hands`-th block."""
+    for hand in numba.prange(hands):
+        state = np.empty(7 * PLANE, np.float32)
+        pixel_positions(state, 5)
+        for block in range(hand, first_entry.size // BLOCK, hands):
+            _read(
+                state,
+                window(image, block, across),
+                window(light, block, across),
+                window(g_image, block, across),
+                window(g_light, block, across),
             )
+            for i in range(BLOCK):
+                tile = block * BLOCK + i
+                entries = pairs[first_entry[tile] : first_entry[tile + 1]]
+                center = first_center(tile, across)
+                _collect(state[i * PIXELS :], records, spans, splats, entries, center, parts)
 
 
-@kernel()
-def _sum(first_pair, parts, gradients):
+@kernel(parallel=True)
+def _sum(first_pair, end_pair, parts, gradients):
     """Sums each splat's pairs in their order."""
-    for i in range(first_pair.size - 1):
+    for i in numba.prange(first_pair.size):
         for k in range(GRADIENTS):
             gradients[i, k] = ZERO
-        for pair in range(first_pair[i], first_pair[i + 1]):
+        for pair in range(first_pair[i], end_pair[i]):
             for k in range(GRADIENTS):
                 gradients[i, k] += parts[pair, k]
 
@@ -163,14 +167,14 @@ def draw_backward(
     Returns:
         (N, 9) float32: mean (2), conic (3), opacity, colour (3).
     """
-    parts = np.empty((len(tiles.pairs), GRADIENTS), np.float32)
+    parts = np.empty((len(tiles.splats), GRADIENTS), np.float32)
     gradients = np.empty((len(records), GRADIENTS), np.float32)
-    across = -(-tiles.width // TILE_WIDTH)
+    across = tiles_across(tiles.width)
     _collect_all(
         numba.get_num_threads(),
         across,
         records,
-        tiles.rows,
+        tiles.spans,
         tiles.splats,
         tiles.first_entry,
         tiles.pairs,
@@ -180,5 +184,5 @@ def draw_backward(
         g_light,
         parts,
     )
-    _sum(tiles.first_pair, parts, gradients)
+    _sum(tiles.first_pair, tiles.end_pair, parts, gradients)
     return gradients

@@ -7,9 +7,13 @@ import numpy as np
 
 from ico3d.splat import convention
 from ico3d.splat.cpu.compile import kernel
-from ico3d.splat.cpu.tiles import TILE_HEIGHT, TILE_WIDTH, Tiles, dealt, dealt_turns
+from ico3d.splat.cpu.tiles import BLOCK, TILE_HEIGHT, TILE_WIDTH, VECTOR, Tiles, tiles_across
 
 PIXELS = TILE_WIDTH * TILE_HEIGHT
+PLANE = BLOCK * PIXELS + 3 * VECTOR
+"""A block's state is several planes of numbers, tile after tile. Planes at a multiple of 4096
+bytes from one another would pass for the same memory in the processor's store buffer."""
+
 CHECK = 32
 """After so many splats a tile looks whether all of its pixels are finished."""
 
@@ -36,91 +40,110 @@ def falloff(exponent):
 
 
 @kernel()
-def pixel_positions(xs, ys):
-    """Writes the pixel centres of a tile, relative to its first pixel's centre."""
-    for p in range(PIXELS):
-        xs[p] = np.float32(p % TILE_WIDTH)
-        ys[p] = np.float32(p // TILE_WIDTH)
+def pixel_positions(state, plane):
+    """Writes pixel centres, relative to the first of their tile, into two planes of a state."""
+    for p in range(BLOCK * PIXELS):
+        state[plane * PLANE + p] = np.float32(p % TILE_WIDTH)
+        state[(plane + 1) * PLANE + p] = np.float32(p % PIXELS // TILE_WIDTH)
 
 
 @kernel()
-def finished(light):
-    """Whether no pixel of a tile lets light through any more."""
+def finished(state):
+    """Whether no pixel of the tile whose state begins here lets light through any more."""
     most = -ONE
-    for p in range(light.size):
-        most = max(most, light[p])
+    for p in range(PIXELS):
+        most = max(most, state[p])
     return most < ZERO
 
 
 @kernel()
-def _blend(light, red, green, blue, xs, ys, splat, left, top):
-    """Composites one splat into rows of a tile.
+def _blend(state, count, splat, left, top):
+    """Composites one splat into the next `count` pixels of a tile.
 
-    `light` is the transmittance so far, negative where the pixel is finished. There is no branch:
-    LLVM turns the conditional values into masks.
+    The planes of `state` follow at fixed distances, so that LLVM knows that they do not overlap:
+    transmittance so far (negative where the pixel is finished), red, green, blue, x, y. There is
+    no branch: LLVM turns the conditional values into masks.
     """
     mx, my = splat[0] - left, splat[1] - top
     xx, xy, yy, opacity = splat[2], splat[3], splat[4], splat[5]
     r, g, b = splat[6], splat[7], splat[8]
-    for p in range(light.size):
-        dx, dy = xs[p] - mx, ys[p] - my
+    for p in range(count):
+        dx, dy = state[4 * PLANE + p] - mx, state[5 * PLANE + p] - my
         alpha = min(opacity * falloff(dx * (xx * dx + xy * dy) + yy * dy * dy), MAX_ALPHA)
         alpha = alpha if alpha >= MIN_ALPHA else ZERO
-        before = light[p]
+        before = state[p]
         after = before * (ONE - alpha)
         weight = alpha * before if after > MIN_TRANSMITTANCE else ZERO
-        red[p] += weight * r
-        green[p] += weight * g
-        blue[p] += weight * b
-        light[p] = after if after > MIN_TRANSMITTANCE else -abs(before)
+        state[PLANE + p] += weight * r
+        state[2 * PLANE + p] += weight * g
+        state[3 * PLANE + p] += weight * b
+        state[p] = after if after > MIN_TRANSMITTANCE else -abs(before)
 
 
 @kernel()
-def _write(state, left, top, image, light):
-    """Writes a tile into the image."""
-    for y in range(min(TILE_HEIGHT, image.shape[0] - top)):
-        for x in range(min(TILE_WIDTH, image.shape[1] - left)):
-            p = y * TILE_WIDTH + x
-            light[top + y, left + x] = abs(state[0, p])
-            for k in range(3):
-                image[top + y, left + x, k] = state[1 + k, p]
+def window(image, block, across):
+    """The part of an image (H, W, ...) that a block shows."""
+    left, top = block * BLOCK % across * TILE_WIDTH, block * BLOCK // across * TILE_HEIGHT
+    return image[top : top + TILE_HEIGHT, left : left + BLOCK * TILE_WIDTH]
 
 
 @kernel()
-def _draw(tile, across, records, rows, splats, entries, image, light):
-    """Draws one tile from its entries."""
-    state = np.zeros((6, PIXELS), np.float32)
-    state[0] = ONE
-    pixel_positions(state[4], state[5])
-    left, top = (tile % across) * TILE_WIDTH, (tile // across) * TILE_HEIGHT
-    left_center, top_center = np.float32(left) + HALF, np.float32(top) + HALF
+def first_center(tile, across):
+    """Centre of a tile's first pixel."""
+    left, top = tile % across * TILE_WIDTH, tile // across * TILE_HEIGHT
+    return np.float32(left) + HALF, np.float32(top) + HALF
+
+
+@kernel()
+def _write_row(state, width, image, light):
+    """Writes one row of a tile, whose state begins here."""
+    for x in range(width):
+        light[x] = abs(state[x])
+        image[x, 0] = state[PLANE + x]
+        image[x, 1] = state[2 * PLANE + x]
+        image[x, 2] = state[3 * PLANE + x]
+
+
+@kernel()
+def _write(state, image, light):
+    """Writes a block into its part of the image."""
+    whole = light.shape[1] == BLOCK * TILE_WIDTH
+    for y in range(light.shape[0]):
+        for i in range(BLOCK):
+            row, left = state[i * PIXELS + y * TILE_WIDTH :], i * TILE_WIDTH
+            if whole:  # a width that LLVM knows
+                _write_row(row, TILE_WIDTH, image[y, left:], light[y, left:])
+            else:
+                width = min(TILE_WIDTH, light.shape[1] - left)
+                _write_row(row, width, image[y, left:], light[y, left:])
+
+
+@kernel()
+def _draw(state, records, spans, splats, entries, center):
+    """Draws one tile, whose state begins here, from its entries."""
     for k in range(entries.size):
         pair = entries[k]
-        low, high = rows[pair, 0] * TILE_WIDTH, rows[pair, 1] * TILE_WIDTH
-        _blend(
-            state[0, low:high],
-            state[1, low:high],
-            state[2, low:high],
-            state[3, low:high],
-            state[4, low:high],
-            state[5, low:high],
-            records[splats[pair]],
-            left_center,
-            top_center,
-        )
-        if k % CHECK == CHECK - 1 and finished(state[0]):
+        low, high = spans[pair]
+        _blend(state[low:], high - low, records[splats[pair]], center[0], center[1])
+        if k % CHECK == CHECK - 1 and finished(state):
             break
-    _write(state, left, top, image, light)
 
 
 @kernel(parallel=True)
-def _draw_all(hands, across, records, rows, splats, first_entry, pairs, image, light):
-    count = first_entry.size - 1
-    for turn in numba.prange(dealt_turns(hands, count)):
-        tile = dealt(turn, hands, count)
-        if tile < count:
-            entries = pairs[first_entry[tile] : first_entry[tile + 1]]
-            _draw(tile, across, records, rows, splats, entries, image, light)
+def _draw_all(hands, across, records, spans, splats, first_entry, pairs, image, light):
+    """Draws all blocks; each thread takes every `hands`-th."""
+    for hand in numba.prange(hands):
+        state = np.empty(6 * PLANE, np.float32)
+        pixel_positions(state, 4)
+        for block in range(hand, first_entry.size // BLOCK, hands):
+            state[:PLANE] = ONE
+            state[PLANE : 4 * PLANE] = ZERO
+            for i in range(BLOCK):
+                tile = block * BLOCK + i
+                entries = pairs[first_entry[tile] : first_entry[tile + 1]]
+                center = first_center(tile, across)
+                _draw(state[i * PIXELS :], records, spans, splats, entries, center)
+            _write(state, window(image, block, across), window(light, block, across))
 
 
 @kernel()
@@ -158,13 +181,13 @@ def draw(records: np.ndarray, tiles: Tiles) -> tuple[np.ndarray, np.ndarray]:
     """
     image = np.empty((tiles.height, tiles.width, 3), np.float32)
     light = np.empty((tiles.height, tiles.width), np.float32)
-    across = -(-tiles.width // TILE_WIDTH)
+    across = tiles_across(tiles.width)
     hands = numba.get_num_threads()  # not in the kernel, which could not be cached then
     _draw_all(
         hands,
         across,
         records,
-        tiles.rows,
+        tiles.spans,
         tiles.splats,
         tiles.first_entry,
         tiles.pairs,

@@ -3,19 +3,30 @@
 from dataclasses import dataclass
 from math import floor, log, sqrt
 
+import numba
 import numpy as np
 
 from ico3d.splat.convention import MIN_ALPHA
 from ico3d.splat.cpu.compile import kernel
 
-TILE_WIDTH, TILE_HEIGHT = 16, 32
-"""Pixels. A row fills one or two vector registers; tall tiles mean fewer pairs."""
+TILE_WIDTH, TILE_HEIGHT = 8, 64
+"""Pixels. Narrow tiles waste fewer pixels beside a splat, tall ones mean fewer pairs."""
+
+BLOCK = 2
+"""Neighbouring tiles in a row that are drawn one after the other: together they fill whole cache
+lines of a picture. Every row has whole blocks; the last tile may lie outside."""
+
+VECTOR = 16
+"""Pixels that are drawn together: two rows of a tile, one or two vector registers."""
 
 SLACK = 0.01
 """Pixels by which a splat's outline is widened, so that rounding cuts nothing off."""
 
 DIGIT = 11
 """Bits sorted per pass."""
+
+PARTS = 16
+"""Splats are listed in so many parts, which threads share out."""
 
 
 @dataclass
@@ -28,8 +39,10 @@ class Tiles:
     Attributes:
         width: Image width in pixels.
         height: Image height in pixels.
-        first_pair: (N + 1,) int32, where a splat's pairs begin.
-        rows: (P, 2) int32, first and end row within the tile that the splat of a pair touches.
+        first_pair: (N,) int32, where a splat's pairs begin.
+        end_pair: (N,) int32, where they end.
+        spans: (P, 2) int32, first and end pixel of the rows within the tile that the splat of a
+            pair touches, widened to whole vectors.
         splats: (P,) int32, the splat of a pair.
         first_entry: (tiles + 1,) int32, where a tile's entries of `pairs` begin.
         pairs: (P,) int32, pairs by tile, front to back.
@@ -38,27 +51,16 @@ class Tiles:
     width: int
     height: int
     first_pair: np.ndarray
-    rows: np.ndarray
+    end_pair: np.ndarray
+    spans: np.ndarray
     splats: np.ndarray
     first_entry: np.ndarray
     pairs: np.ndarray
 
 
-@kernel()
-def dealt(turn, hands, count):
-    """The item of a turn when `count` items are dealt out among `hands`; may be past the end.
-
-    A thread gets neighbouring turns. Dealt like this, it gets every `hands`-th tile instead of one
-    part of the picture, and nobody waits for the thread with the busiest part.
-    """
-    share = -(-count // hands)
-    return turn % share * hands + turn // share
-
-
-@kernel()
-def dealt_turns(hands, count):
-    """How many turns deal out `count` items."""
-    return -(-count // hands) * hands
+def tiles_across(width: int) -> int:
+    """Tiles in a row."""
+    return -(-width // (TILE_WIDTH * BLOCK)) * BLOCK
 
 
 @kernel()
@@ -105,8 +107,8 @@ def _columns(mean, conic, cut, extent, row, across):
 
 
 @kernel()
-def _rows(mean, conic, cut, extent, column, row):
-    """First and end pixel row within a tile that a splat touches."""
+def _pixels(mean, conic, cut, extent, column, row):
+    """First and end pixel within a tile of the rows that a splat touches, in whole vectors."""
     low = column * TILE_WIDTH + 0.5 - mean[0] - SLACK
     high = low + TILE_WIDTH - 1 + 2 * SLACK
     top, bottom = _reach(0.5 * conic[0], conic[1], 0.5 * conic[2], cut, low, high, extent[1])
@@ -114,7 +116,10 @@ def _rows(mean, conic, cut, extent, column, row):
         return 0, 0
     offset = mean[1] - row * TILE_HEIGHT - 0.5
     first = max(0, floor(offset + top - SLACK) + 1)
-    return first, max(first, min(TILE_HEIGHT, floor(offset + bottom + SLACK) + 1))
+    end = min(TILE_HEIGHT, floor(offset + bottom + SLACK) + 1)
+    if first >= end:
+        return 0, 0
+    return first * TILE_WIDTH // VECTOR * VECTOR, -(-end * TILE_WIDTH // VECTOR) * VECTOR
 
 
 @kernel()
@@ -127,10 +132,10 @@ def _box(mean, extent, across, down):
 
 
 @kernel()
-def _most_pairs(means, alphas, extents, across, down):
-    """How many pairs there are at most: the tiles of all boxes."""
+def _most_pairs(means, alphas, extents, across, down, first, end):
+    """How many pairs some splats have at most: the tiles of their boxes."""
     total = 0
-    for i in range(means.shape[0]):
+    for i in range(first, end):
         if alphas[i] > 0:
             left, right, top, bottom = _box(means[i], extents[i], across, down)
             total += max(0, right - left) * max(0, bottom - top)
@@ -138,22 +143,46 @@ def _most_pairs(means, alphas, extents, across, down):
 
 
 @kernel()
-def _list(means, conics, alphas, extents, across, down, first_pair, tiles, rows, splats):
-    """Lists each splat's tiles, and the rows it touches there."""
-    pair = 0
-    for i in range(means.shape[0]):
-        first_pair[i] = pair
+def _list(
+    means, conics, alphas, extents, across, down, first, end, pair, starts, ends, tiles, spans, of
+):
+    """Lists the tiles of some splats and the pixels they touch there, from pair `pair` on."""
+    for i in range(first, end):
+        starts[i] = pair
         if alphas[i] > 0:
             cut = log(alphas[i] / MIN_ALPHA)
-            leftmost, rightmost, first, end = _box(means[i], extents[i], across, down)
-            for row in range(first, end):
+            leftmost, rightmost, top, bottom = _box(means[i], extents[i], across, down)
+            for row in range(top, bottom):
                 left, right = _columns(means[i], conics[i], cut, extents[i], row, across)
                 for column in range(max(left, leftmost), min(right, rightmost)):
-                    tiles[pair], splats[pair] = row * across + column, i
-                    low, high = _rows(means[i], conics[i], cut, extents[i], column, row)
-                    rows[pair, 0], rows[pair, 1] = low, high
-                    pair += 1
-    first_pair[means.shape[0]] = pair
+                    low, high = _pixels(means[i], conics[i], cut, extents[i], column, row)
+                    if low < high:
+                        tiles[pair], of[pair] = row * across + column, i
+                        spans[pair, 0], spans[pair, 1] = low, high
+                        pair += 1
+        ends[i] = pair
+
+
+@kernel(parallel=True)
+def _rooms(parts, means, alphas, extents, across, down):
+    """Where each part of the splats begins to write its pairs (parts + 1,)."""
+    rooms, count = np.zeros(parts + 1, np.int64), means.shape[0]
+    for part in numba.prange(parts):
+        first, end = part * count // parts, (part + 1) * count // parts
+        rooms[part + 1] = _most_pairs(means, alphas, extents, across, down, first, end)
+    return rooms.cumsum()
+
+
+@kernel(parallel=True)
+def _list_all(rooms, means, conics, alphas, extents, across, down, starts, ends, tiles, spans, of):
+    """Lists all splats' tiles, each part of the splats by one thread."""
+    parts, count = rooms.size - 1, means.shape[0]
+    for part in numba.prange(parts):
+        first, end, pair = part * count // parts, (part + 1) * count // parts, rooms[part]
+        _list(
+            *(means, conics, alphas, extents, across, down),
+            *(first, end, pair, starts, ends, tiles, spans, of),
+        )
 
 
 @kernel()
@@ -183,18 +212,20 @@ def _order(depths):
 
 
 @kernel()
-def _fill(order, first_pair, tiles, first_entry, pairs):
-    """Sorts the pairs into their tiles, front to back."""
-    for pair in range(tiles.shape[0]):
-        first_entry[tiles[pair] + 1] += 1
+def _fill(order, starts, ends, tiles, first_entry):
+    """The pairs by tile, front to back; writes where a tile's begin."""
+    for i in range(starts.shape[0]):
+        for pair in range(starts[i], ends[i]):
+            first_entry[tiles[pair] + 1] += 1
     for tile in range(first_entry.shape[0] - 1):
         first_entry[tile + 1] += first_entry[tile]
-    following = first_entry.copy()
+    following, pairs = first_entry.copy(), np.empty(first_entry[-1], np.int32)
     for k in range(order.shape[0]):
         i = order[k]
-        for pair in range(first_pair[i], first_pair[i + 1]):
+        for pair in range(starts[i], ends[i]):
             pairs[following[tiles[pair]]] = pair
             following[tiles[pair]] += 1
+    return pairs
 
 
 def bin_splats(
@@ -220,12 +251,15 @@ def bin_splats(
     Returns:
         The tiles.
     """
-    across, down = -(-width // TILE_WIDTH), -(-height // TILE_HEIGHT)
-    most = _most_pairs(means2d, alphas, extents, across, down)
+    across, down = tiles_across(width), -(-height // TILE_HEIGHT)
+    rooms = _rooms(PARTS, means2d, alphas, extents, across, down)
+    most, count = rooms[-1], len(means2d)
     tiles, splats = np.empty(most, np.int32), np.empty(most, np.int32)
-    rows, first_pair = np.empty((most, 2), np.int32), np.empty(len(means2d) + 1, np.int32)
-    _list(means2d, conics, alphas, extents, across, down, first_pair, tiles, rows, splats)
-    total = first_pair[-1]
-    first_entry, pairs = np.zeros(across * down + 1, np.int32), np.empty(total, np.int32)
-    _fill(_order(depths), first_pair, tiles[:total], first_entry, pairs)
-    return Tiles(width, height, first_pair, rows[:total], splats[:total], first_entry, pairs)
+    spans = np.empty((most, 2), np.int32)
+    starts, ends = np.empty(count, np.int32), np.empty(count, np.int32)
+    _list_all(
+        rooms, means2d, conics, alphas, extents, across, down, starts, ends, tiles, spans, splats
+    )
+    first_entry = np.zeros(across * down + 1, np.int32)
+    pairs = _fill(_order(depths), starts, ends, tiles, first_entry)
+    return Tiles(width, height, starts, ends, spans, splats, first_entry, pairs)
