@@ -89,7 +89,7 @@ def damages(draw):
     def apply(data, values):
         data = bytearray(data)
         for step, where, number, foreign in values:
-            at = int(where * len(data))
+            at = max(4, int(where * len(data)))  # what tells the format, stays
             if step == "cut":
                 del data[at:]
             elif step == "flip" and data:

@@ -1,3 +1,6 @@
+import time
+import tracemalloc
+
 import numpy as np
 import pytest
 import torch
@@ -184,3 +187,16 @@ def test_text_that_is_no_number_is_refused(tmp_path):
             read_gaussians(tmp_path / "a.ply")
     (tmp_path / "a.ply").write_text(head + "1 " * 34)
     assert read_file(tmp_path / "a.ply").kind == "PLY"
+
+
+def test_large_files_are_read_fast_and_in_little_memory(tmp_path):
+    path = tmp_path / "a.ply"
+    write_gaussians(path, random_gaussians(200_000, 3))
+    start = time.process_time()
+    read_gaussians(path)
+    assert time.process_time() - start < 1
+    tracemalloc.start()
+    read_gaussians(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2.5 * path.stat().st_size

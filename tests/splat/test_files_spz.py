@@ -1,6 +1,7 @@
 import dataclasses
 import gzip
 import struct
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -222,8 +223,11 @@ def test_bombs_are_refused_before_they_go_off(tmp_path):
     data = gzip.compress(head + bytes(65_000_000))
     assert MAX_RATIO * len(data) + FREE_BYTES < 1_000_000
     (tmp_path / "a.spz").write_bytes(data)
+    tracemalloc.start()
     with pytest.raises(GaussianFileError, match="after unpacked byte 16 follows more"):
         read_gaussians(tmp_path / "a.spz")
+    assert tracemalloc.get_traced_memory()[1] < 1_000_000
+    tracemalloc.stop()
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ class Convert:
 
     Attributes:
         source: The file to read; what it is, is told by its contents.
-        target: The file to write: .ply (lossless) or .spz (about a tenth of the size).
+        target: The file to write: .ply (lossless) or .spz (about a fifth of the size).
         sh_degree: Drop the spherical harmonics above this degree.
     """
 

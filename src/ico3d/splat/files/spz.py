@@ -1,4 +1,4 @@
-"""SPZ files of Niantic: about a tenth of a PLY, with errors too small to see.
+"""SPZ files of Niantic: about a fifth of a PLY, with errors that hardly show.
 
 Axes are x right, y up, z backward (RUB) by the format's definition; they are turned on the way in
 and out, so that `RawGaussians` always have the axes of PLY files. Quantisation follows Niantic's

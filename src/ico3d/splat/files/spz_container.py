@@ -23,7 +23,7 @@ _ANTIALIASED = 1
 _PIECE = 1 << 16
 
 MAX_RATIO = 8
-"""Unpacked bytes per byte of file. Real files have 1.2 to 3; harmonics that are all 0 make 5."""
+"""Unpacked bytes per byte of file: 1.2 to 1.7 as a rule, 3.7 if all harmonics are 0."""
 
 FREE_BYTES = 1 << 18
 """Unpacked bytes that any file may have: a few equal Gaussians pack better than real ones."""
