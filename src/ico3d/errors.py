@@ -17,6 +17,10 @@ class BundleError(Ico3dError):
     """A bundle is damaged, unsafe, or of an unknown version."""
 
 
+class GaussianFileError(Ico3dError):
+    """A file of 3D Gaussians is damaged, unknown or cannot be written."""
+
+
 class SettingsError(Ico3dError):
     """Settings contradict one another or the data."""
 

@@ -1,0 +1,98 @@
+"""Reading and writing files of 3D Gaussians, recognised by what is in them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ico3d.common.files import write_atomic
+from ico3d.errors import GaussianFileError, SettingsError
+from ico3d.splat.files import compressed_ply, ply, splat, spz, standard_ply
+from ico3d.splat.files.raw import RawGaussians
+from ico3d.splat.files.spz_container import GZIP_MAGIC, MAGIC
+
+_WRITERS = {".ply": standard_ply.write, ".spz": spz.write}
+_HEAD_BYTES = 64 * 32
+
+
+@dataclass(frozen=True)
+class GaussianFile:
+    """What was in a file.
+
+    Attributes:
+        kind: The format in words.
+        gaussians: Its contents, finite.
+    """
+
+    kind: str
+    gaussians: RawGaussians
+
+
+def read_gaussians(path: Path | str) -> RawGaussians:
+    """Reads a file of 3D Gaussians: PLY (standard or compressed), SPZ or .splat.
+
+    Raises:
+        GaussianFileError: If there is none, it is damaged, or a value is not finite.
+        MissingExtraError: If it is an SPZ of version 4 and zstandard is not installed.
+    """
+    return read_file(path).gaussians
+
+
+def read_file(path: Path | str) -> GaussianFile:
+    """Like `read_gaussians`, and says which format it was."""
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            kind = _recognise(file.read(_HEAD_BYTES), path)
+            file.seek(0)
+            data = file.read()
+        named, gaussians = _read(kind, data)
+        return GaussianFile(named, gaussians.checked())
+    except OSError as error:
+        raise GaussianFileError(f"{path}: cannot be read ({error.strerror})") from None
+    except GaussianFileError as error:
+        raise GaussianFileError(f"{path}: {error}") from None
+
+
+def _recognise(head: bytes, path: Path) -> str:
+    """The kind of a file by its first bytes; a `.splat` has no mark, so its name counts too."""
+    if head[:4] in (b"ply\n", b"ply\r"):
+        return "ply"
+    if head[:2] == GZIP_MAGIC or head[:4] == MAGIC:
+        return "spz"
+    if path.suffix == ".splat" or splat.looks_like(head, path.stat().st_size):
+        return "splat"
+    raise GaussianFileError(
+        "no 3D Gaussians that ico3d can read: at byte 0 begins neither PLY nor SPZ nor .splat"
+    )
+
+
+def _read(kind: str, data: bytes) -> tuple[str, RawGaussians]:
+    """Format in words and contents of a file of a kind."""
+    if kind == "spz":
+        return "SPZ", spz.read(data)
+    if kind == "splat":
+        return ".splat", splat.read(data)
+    header = ply.parse_header(data)
+    tables = ply.read_tables(data, header)
+    if "vertex" not in tables:
+        raise GaussianFileError("the PLY has no table 'vertex' that Gaussians could be in")
+    if compressed_ply.PACKED[0] in (tables["vertex"].dtype.names or ()):
+        return "compressed PLY", compressed_ply.read(tables)
+    return "PLY", standard_ply.read(tables["vertex"])
+
+
+def write_gaussians(path: Path | str, gaussians: RawGaussians) -> None:
+    """Writes .ply (lossless) or .spz (small), by the name; never leaves half a file.
+
+    Raises:
+        SettingsError: If the name ends otherwise.
+        GaussianFileError: If a value is not finite, or the file cannot be written.
+    """
+    path = Path(path)
+    write = _WRITERS.get(path.suffix.lower())
+    if write is None:
+        raise SettingsError(f"{path}: ico3d writes Gaussians to files named .ply or .spz")
+    gaussians.checked()
+    try:
+        write_atomic(path, lambda temporary: write(gaussians, temporary))
+    except OSError as error:
+        raise GaussianFileError(f"{path}: cannot be written ({error.strerror})") from None
