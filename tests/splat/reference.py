@@ -3,12 +3,12 @@
 import numpy as np
 import torch
 
-from ico3d.splat import convention, quaternions
+from ico3d.splat import convention, harmonics, quaternions
 
 
-def project(gaussians, camera):
+def project(gaussians, camera, view=None, antialiased=True):
     """Means2d (N, 2), 2D covariances (N, 2, 2) after the blur, opacities left (N,), depths (N,)."""
-    view = torch.from_numpy(camera.world_to_camera)
+    view = torch.from_numpy(camera.world_to_camera) if view is None else view  # (4, 4)
     k = camera.intrinsics
     local = gaussians.means @ view[:3, :3].T + view[:3, 3]  # (N, 3)
     x, y, z = local.unbind(-1)
@@ -32,7 +32,9 @@ def project(gaussians, camera):
     root = root * gaussians.scales[:, None]  # (N, 2, 3)
     sharp = root @ root.mT  # (N, 2, 2)
     blurred = sharp + convention.BLUR * torch.eye(2, dtype=sharp.dtype)
-    left = gaussians.opacities * (torch.linalg.det(sharp) / torch.linalg.det(blurred)).sqrt()
+    left = gaussians.opacities
+    if antialiased:
+        left = left * (torch.linalg.det(sharp) / torch.linalg.det(blurred)).sqrt()
     left = torch.where(local[:, 2] < convention.NEAR, torch.zeros_like(left), left)
     means2d = torch.stack([k[0, 0] * x / z + k[0, 2], k[1, 1] * y / z + k[1, 2]], -1)
     return means2d, blurred, left, local[:, 2]
@@ -60,12 +62,22 @@ def composite(means2d, covariances, opacities, depths, features, width, height):
     return color, light
 
 
-def render(gaussians, cameras, background=None):
+def seen_colors(gaussians, view):
+    """Colours (N, 3) that a camera sees."""
+    if gaussians.sh is None:
+        return gaussians.colors
+    eye = -view[:3, :3].T @ view[:3, 3]  # (3,)
+    return harmonics.to_colors(gaussians.sh, gaussians.means - eye)
+
+
+def render(gaussians, cameras, background=None, world_to_camera=None, antialiased=True):
     """rgb (C, H, W, 3), alpha (C, H, W), expected depth (C, H, W) of float64 Gaussians."""
     images = []
-    for camera in cameras:
-        means2d, covariances, opacities, depths = project(gaussians, camera)
-        features = torch.cat([gaussians.colors, depths[:, None]], -1)  # (N, 4)
+    if world_to_camera is None:
+        world_to_camera = torch.from_numpy(np.stack([c.world_to_camera for c in cameras]))
+    for camera, view in zip(cameras, world_to_camera, strict=True):
+        means2d, covariances, opacities, depths = project(gaussians, camera, view, antialiased)
+        features = torch.cat([seen_colors(gaussians, view), depths[:, None]], -1)  # (N, 4)
         size = (camera.width, camera.height)
         color, light = composite(means2d, covariances, opacities, depths, features, *size)
         images.append(torch.cat([color, light[..., None]], -1))  # (H, W, 5)
@@ -89,3 +101,16 @@ def scene(count, seed=0, spread=0.35, dtype=torch.float64):
         random.random((count, 3)),
     )
     return Gaussians(*(torch.from_numpy(value).to(dtype) for value in values))
+
+
+def harmonic(gaussians, coefficients, seed=0):
+    """The same Gaussians with random harmonics, bright enough not to be cut at 0."""
+    from ico3d.splat.gaussians import Gaussians
+
+    if not coefficients:
+        return gaussians
+    random = np.random.default_rng(seed)
+    sh = 0.15 * random.normal(size=(len(gaussians), coefficients, 3))
+    sh[:, 0] += 2
+    values = {name: value for name, value in vars(gaussians).items() if name != "colors"}
+    return Gaussians(**values | {"sh": torch.from_numpy(sh).to(gaussians.means)})

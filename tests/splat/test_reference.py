@@ -2,24 +2,31 @@
 
 import math
 
+import pytest
 import torch
 from conftest import camera_at
-from reference import render, scene
+from reference import harmonic, render, scene
 
 from ico3d.splat.gaussians import Gaussians
 
 
-def test_gradients_are_finite_differences():
+@pytest.mark.parametrize("antialiased", [True, False])
+@pytest.mark.parametrize("coefficients", [0, 4, 16])
+def test_gradients_are_finite_differences(coefficients, antialiased):
+    """Of every parameter, the harmonics and the camera's pose."""
     camera = camera_at((0.1, 0.2, 1.2), width=9, height=7, focal=11.0)
-    start = scene(4, seed=3, spread=0.2)
-    values = [v.requires_grad_() for v in vars(start).values() if v is not None]
+    start = harmonic(scene(4, seed=3, spread=0.2), coefficients)
+    names = [name for name, value in vars(start).items() if value is not None]
+    values = [getattr(start, name).requires_grad_() for name in names]
+    pose = torch.from_numpy(camera.world_to_camera)[None].requires_grad_()
     weights = torch.randn(7, 9, 5, generator=torch.Generator().manual_seed(0)).double()
 
-    def loss(*parts):
-        rgb, alpha, depth = render(Gaussians(*parts), [camera])
+    def loss(pose, *parts):
+        gaussians = Gaussians(**dict(zip(names, parts, strict=True)))
+        rgb, alpha, depth = render(gaussians, [camera], None, pose, antialiased)
         return (torch.cat([rgb[0], alpha[0, ..., None], depth[0, ..., None]], -1) * weights).sum()
 
-    assert torch.autograd.gradcheck(loss, values, eps=1e-6, atol=1e-5, rtol=1e-4)
+    assert torch.autograd.gradcheck(loss, [pose, *values], eps=1e-6, atol=1e-5, rtol=1e-4)
 
 
 def test_one_gaussian_in_closed_form():

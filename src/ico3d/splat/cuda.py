@@ -28,20 +28,29 @@ def _rasterization():
 
 def _empty(colors: Tensor, cameras: Sequence[Camera]) -> Drawing:
     """A drawing of nothing, which gsplat's kernels do not make."""
-    count, width, height = len(cameras), cameras[0].width, cameras[0].height
+    count, splats = colors.shape[:2]
+    width, height = cameras[0].width, cameras[0].height
     rgb = colors.new_zeros(count, height, width, 3)
-    radii = torch.zeros(count, 0, dtype=torch.int32, device=colors.device)
-    info = RenderInfo(radii, colors.new_zeros(count, 0, 2), width, height)
+    radii = torch.zeros(count, splats, dtype=torch.int32, device=colors.device)
+    info = RenderInfo(radii, colors.new_zeros(count, splats, 2), width, height)
     return Drawing(rgb, rgb[..., 0], lambda: rgb[..., 0], info)
 
 
-def draw_gaussians(gaussians: Gaussians, colors: Tensor, cameras: Sequence[Camera]) -> Drawing:
+def draw_gaussians(
+    gaussians: Gaussians,
+    colors: Tensor,
+    cameras: Sequence[Camera],
+    poses: Tensor,
+    antialiased: bool,
+) -> Drawing:
     """Draws on black.
 
     Args:
         gaussians: Float32, on a CUDA device.
         colors: (C, N, 3).
-        cameras: C of one size.
+        cameras: C of one size; their intrinsics count.
+        poses: (C, 4, 4) float64, world to camera.
+        antialiased: Whether opacity makes up for the low-pass.
 
     Returns:
         The drawing.
@@ -49,11 +58,10 @@ def draw_gaussians(gaussians: Gaussians, colors: Tensor, cameras: Sequence[Camer
     Raises:
         MissingExtraError: If gsplat is not installed.
     """
-    if len(gaussians) == 0:
+    width, height = cameras[0].width, cameras[0].height
+    if len(gaussians) == 0 or width * height == 0:
         return _empty(colors, cameras)
     rasterization = _rasterization()
-    width, height = cameras[0].width, cameras[0].height
-    views = np.stack([camera.world_to_camera for camera in cameras])  # (C, 4, 4)
     intrinsics = np.stack([camera.intrinsics for camera in cameras])  # (C, 3, 3)
 
     def rasterise(mode: str) -> tuple[Tensor, Tensor, dict]:
@@ -63,7 +71,7 @@ def draw_gaussians(gaussians: Gaussians, colors: Tensor, cameras: Sequence[Camer
             gaussians.scales,
             gaussians.opacities,
             colors,
-            torch.from_numpy(views).to(gaussians.means),
+            poses.to(gaussians.means),
             torch.from_numpy(intrinsics).to(gaussians.means),
             width,
             height,
@@ -71,7 +79,7 @@ def draw_gaussians(gaussians: Gaussians, colors: Tensor, cameras: Sequence[Camer
             eps2d=BLUR,
             packed=False,
             render_mode=mode,
-            rasterize_mode="antialiased",
+            rasterize_mode="antialiased" if antialiased else "classic",
         )
 
     rgb, alpha, meta = rasterise("RGB")  # (C, H, W, 3), (C, H, W, 1)

@@ -52,6 +52,21 @@ class Gaussians:
         """Those that a mask, an index tensor or a slice selects."""
         return self.map(lambda tensor: tensor[index])
 
+    def drawable(self) -> Tensor:
+        """(N,) bool: all parameters are finite and the quaternion is not 0."""
+        values = [getattr(self, field.name) for field in fields(self)]
+        finite = [v.isfinite().flatten(1).all(1) for v in values if v is not None and v.dim() > 1]
+        return torch.stack([*finite, self.opacities.isfinite(), self.quats.any(1)]).all(0)
+
+    def where(self, chosen: Tensor, others: "Gaussians") -> "Gaussians":
+        """These where `chosen` (N,) says so, elsewhere those of `others`, of the same kind."""
+        values = {}
+        for field in fields(self):
+            a, b = getattr(self, field.name), getattr(others, field.name)
+            shaped = None if a is None else chosen.view(-1, *[1] * (a.dim() - 1))  # (N, 1, …)
+            values[field.name] = None if a is None else torch.where(shaped, a, b)
+        return Gaussians(**values)
+
     def transform(self, a_from_b: Tensor | np.ndarray) -> "Gaussians":
         """Moves Gaussians given in space b to space a.
 

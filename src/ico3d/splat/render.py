@@ -2,7 +2,8 @@
 
 The convention: pixel centres at +0.5. A splat's 2D covariance Σ is blurred to Σ + 0.3·I, and its
 opacity multiplied by √(det Σ / det(Σ + 0.3·I)), so that small splats keep their light (the
-anti-aliasing of Mip-Splatting; gsplat's "antialiased"). A splat ends where its alpha is under
+anti-aliasing of Mip-Splatting; gsplat's "antialiased"; scenes that other tools trained without it
+can be drawn without it). A splat ends where its alpha is under
 1/255; alpha is at most 0.999; a pixel is finished at transmittance 10⁻⁴; nothing nearer than 0.01 m
 is drawn. The projection's Jacobian is taken at most 0.3 half images outside of the picture.
 """
@@ -16,33 +17,43 @@ from torch import Tensor
 from ico3d.common.camera import Camera
 from ico3d.splat import harmonics
 from ico3d.splat.gaussians import Gaussians
-from ico3d.splat.rendering import Drawing, Rendering
+from ico3d.splat.rendering import Rendering
 
 
 def render(
-    gaussians: Gaussians, cameras: Sequence[Camera], background: Tensor | None = None
+    gaussians: Gaussians,
+    cameras: Sequence[Camera],
+    background: Tensor | None = None,
+    *,
+    world_to_camera: Tensor | None = None,
+    antialiased: bool = True,
 ) -> Rendering:
-    """Renders Gaussians, differentiably in all of their parameters.
+    """Renders Gaussians, differentiably in all of their parameters and in the cameras' poses.
 
     The backend follows the tensors' device: CPU runs numba kernels, CUDA runs gsplat. Computation
-    is float32.
+    is float32 whatever the tensors' precision.
 
     Args:
         gaussians: N ≥ 0 Gaussians in world space.
         cameras: C ≥ 1 cameras of one size.
         background: What lies behind: None for black, (3,), (H, W, 3) or (C, H, W, 3).
+        world_to_camera: (C, 4, 4) rigid, in the place of the cameras' own; may carry gradient.
+        antialiased: Whether opacity makes up for the low-pass.
 
     Returns:
         Pictures (C, H, W, 3), alpha, depth, and what density control needs. Gaussians behind a
-        camera are not drawn; without Gaussians the background is left.
+        camera, and those with a parameter that is not finite, are not drawn and get no gradient;
+        without Gaussians the background is left.
 
     Raises:
         ValueError: If cameras differ in size, there is none, or a shape does not fit.
         MissingExtraError: If the tensors are on a CUDA device and gsplat is not installed.
     """
     _check(gaussians, cameras, background)
-    gaussians = gaussians.map(Tensor.float)
-    drawing = _draw(gaussians, _view_colors(gaussians, cameras), cameras)
+    poses = _poses(cameras, world_to_camera)
+    gaussians = _sound(gaussians.map(Tensor.float))
+    colors = _view_colors(gaussians, poses)
+    drawing = _backend(gaussians).draw_gaussians(gaussians, colors, cameras, poses, antialiased)
     rgb = drawing.rgb
     if background is not None:
         behind = background.to(rgb)
@@ -50,24 +61,46 @@ def render(
     return Rendering(rgb, drawing.alpha, drawing)
 
 
-def _draw(gaussians: Gaussians, colors: Tensor, cameras: Sequence[Camera]) -> Drawing:
-    """Draws with the backend of the tensors' device."""
+def _backend(gaussians: Gaussians):
+    """The backend of the tensors' device."""
     if gaussians.means.is_cuda:
         from ico3d.splat import cuda as backend
     else:
         from ico3d.splat.cpu import backend
-    return backend.draw_gaussians(gaussians, colors, cameras)
+    return backend
 
 
-def _view_colors(gaussians: Gaussians, cameras: Sequence[Camera]) -> Tensor:
+def _poses(cameras: Sequence[Camera], world_to_camera: Tensor | None) -> Tensor:
+    """(C, 4, 4) float64, world to camera.
+
+    Raises:
+        ValueError: If there is not one per camera.
+    """
+    if world_to_camera is None:
+        return torch.from_numpy(np.stack([camera.world_to_camera for camera in cameras]))
+    if world_to_camera.shape != (len(cameras), 4, 4):
+        raise ValueError(f"world_to_camera must be {(len(cameras), 4, 4)}")
+    return world_to_camera.double()
+
+
+def _sound(gaussians: Gaussians) -> Gaussians:
+    """The same, but what is not finite made into something that nobody sees."""
+    sound = gaussians.drawable()
+    if bool(sound.all()):
+        return gaussians
+    hidden = gaussians.map(torch.zeros_like)
+    hidden.quats[:, 0], hidden.scales[:] = 1, 1
+    return gaussians.where(sound, hidden)
+
+
+def _view_colors(gaussians: Gaussians, poses: Tensor) -> Tensor:
     """(C, N, 3) colours that the cameras see."""
-    shape = (len(cameras), len(gaussians), 3)
+    shape = (len(poses), len(gaussians), 3)
     if gaussians.colors is not None:
         return gaussians.colors.expand(shape)
     assert gaussians.sh is not None
-    centers = np.stack([camera.camera_to_world[:3, 3] for camera in cameras])  # (C, 3)
-    eyes = torch.from_numpy(centers).to(gaussians.means)
-    directions = gaussians.means - eyes[:, None]  # (C, N, 3)
+    eyes = -(poses[:, :3, :3].mT @ poses[:, :3, 3:])[..., 0]  # (C, 3)
+    directions = gaussians.means - eyes.to(gaussians.means)[:, None]  # (C, N, 3)
     return harmonics.to_colors(gaussians.sh, directions).expand(shape)
 
 

@@ -10,13 +10,21 @@ from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.rendering import Drawing, RenderInfo
 
 
-def draw_gaussians(gaussians: Gaussians, colors: Tensor, cameras: Sequence[Camera]) -> Drawing:
+def draw_gaussians(
+    gaussians: Gaussians,
+    colors: Tensor,
+    cameras: Sequence[Camera],
+    poses: Tensor,
+    antialiased: bool,
+) -> Drawing:
     """Draws on black.
 
     Args:
         gaussians: Float32, on the CPU.
         colors: (C, N, 3).
-        cameras: C of one size.
+        cameras: C of one size; their intrinsics count.
+        poses: (C, 4, 4) float64, world to camera.
+        antialiased: Whether opacity makes up for the low-pass.
 
     Returns:
         The drawing.
@@ -27,9 +35,10 @@ def draw_gaussians(gaussians: Gaussians, colors: Tensor, cameras: Sequence[Camer
         gaussians.quats,
         gaussians.scales,
         gaussians.opacities,
-        camera_numbers(cameras),
+        camera_numbers(cameras, poses),
         width,
         height,
+        antialiased,
     )
     if means2d.requires_grad:
         means2d.retain_grad()

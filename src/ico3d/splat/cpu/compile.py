@@ -4,6 +4,9 @@ from collections.abc import Callable
 
 import numba
 
+PARTS = 16
+"""Work on many Gaussians is cut into so many parts, which threads share out."""
+
 
 def kernel(parallel: bool = False) -> Callable:
     """A decorator that compiles a function without error checks and with fast float arithmetic.

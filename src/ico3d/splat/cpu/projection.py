@@ -17,9 +17,12 @@ from ico3d.splat.cpu.geometry import (
     row_times_scaled,
 )
 
+FARTHEST = 1e6
+"""No splat reaches farther, pixels: tiles are counted with whole numbers."""
+
 
 @kernel()
-def _project(camera, mean, quat, scale, opacity, width, height, mean2d, conic, extent):
+def _project(camera, mean, quat, scale, opacity, width, height, antialiased, mean2d, conic, extent):
     """Projects one Gaussian; returns its depth and the opacity left after the low-pass.
 
     A Gaussian that nobody sees has opacity and extent 0.
@@ -34,11 +37,12 @@ def _project(camera, mean, quat, scale, opacity, width, height, mean2d, conic, e
     p, q = row_times_scaled(row_x, turn, scale), row_times_scaled(row_y, turn, scale)
     xx, xy, yy, sharp = dot(p, p), dot(p, q), dot(q, q), determinant(p, q)
     blurred = sharp + BLUR * (xx + yy) + BLUR * BLUR
-    left = opacity * sqrt(sharp / blurred)
+    left = opacity * sqrt(sharp / blurred) if antialiased else opacity
     if not left >= MIN_ALPHA:
         return z, 0.0
     reach = sqrt(2 * log(left / MIN_ALPHA))
     reach_x, reach_y = reach * sqrt(xx + BLUR), reach * sqrt(yy + BLUR)
+    reach_x, reach_y = min(reach_x, FARTHEST), min(reach_y, FARTHEST)
     u, v = camera[0] * x / z + camera[2], camera[1] * y / z + camera[3]
     if u + reach_x <= 0 or u - reach_x >= width or v + reach_y <= 0 or v - reach_y >= height:
         return z, 0.0
@@ -50,7 +54,19 @@ def _project(camera, mean, quat, scale, opacity, width, height, mean2d, conic, e
 
 @kernel(parallel=True)
 def _project_all(
-    cameras, means, quats, scales, opacities, width, height, means2d, conics, alphas, depths, reach
+    cameras,
+    means,
+    quats,
+    scales,
+    opacities,
+    width,
+    height,
+    antialiased,
+    means2d,
+    conics,
+    alphas,
+    depths,
+    reach,
 ):
     for i in numba.prange(means.shape[0]):
         for c in range(cameras.shape[0]):
@@ -62,6 +78,7 @@ def _project_all(
                 opacities[i],
                 width,
                 height,
+                antialiased,
                 means2d[c, i],
                 conics[c, i],
                 reach[c, i],
@@ -76,6 +93,7 @@ def project(
     opacities: np.ndarray,
     width: int,
     height: int,
+    antialiased: bool,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Projects N Gaussians into C cameras.
 
@@ -87,6 +105,7 @@ def project(
         opacities: (N,).
         width: Image width in pixels, the same for all cameras.
         height: Image height in pixels.
+        antialiased: Whether opacity makes up for the low-pass.
 
     Returns:
         means2d (C, N, 2) pixels; conics (C, N, 3), the entries xx, xy, yy of the inverse of the
@@ -108,6 +127,7 @@ def project(
         opacities,
         width,
         height,
+        antialiased,
         means2d,
         conics,
         alphas,

@@ -6,7 +6,7 @@ import numba
 import numpy as np
 
 from ico3d.splat.convention import BLUR
-from ico3d.splat.cpu.compile import kernel
+from ico3d.splat.cpu.compile import PARTS, kernel
 from ico3d.splat.cpu.geometry import (
     camera_space,
     clamped_slope,
@@ -18,12 +18,18 @@ from ico3d.splat.cpu.geometry import (
     row_times_scaled,
 )
 
+GRADIENTS = 11
+"""Per Gaussian: mean (3), quaternion (4), scale (3), opacity."""
+POSE = 12
+"""Numbers of a camera's pose."""
+
 
 @kernel()
-def _covariance_gradient(xx, xy, yy, sharp, opacity, g_conic, g_alpha):
+def _covariance_gradient(xx, xy, yy, sharp, opacity, antialiased, g_conic, g_alpha):
     """Gradient of the sharp covariance's entries xx, xy, yy, and of the opacity.
 
-    The conic K = Σ⁻¹ gives −K·G·K; the opacity left is opacity·√(det Σ / det(Σ + blur)).
+    The conic K = Σ⁻¹ gives −K·G·K; the opacity left is opacity·√(det Σ / det(Σ + blur)), or
+    without anti-aliasing all of it.
     """
     a, d = xx + BLUR, yy + BLUR
     blurred = sharp + BLUR * (xx + yy) + BLUR * BLUR
@@ -34,6 +40,8 @@ def _covariance_gradient(xx, xy, yy, sharp, opacity, g_conic, g_alpha):
     g_xx = -(k0 * m00 + k1 * m10)
     g_xy = -2 * (k0 * m01 + k1 * m11)
     g_yy = -(k1 * m01 + k2 * m11)
+    if not antialiased:
+        return g_xx, g_xy, g_yy, g_alpha
     factor = sqrt(sharp / blurred)
     g_ratio = 0.5 * g_alpha * opacity / (factor * blurred)
     ratio = sharp / blurred
@@ -44,8 +52,8 @@ def _covariance_gradient(xx, xy, yy, sharp, opacity, g_conic, g_alpha):
 
 
 @kernel()
-def _mean_gradient(camera, x, y, z, width, height, g_mean2d, g_depth, g_j, g_mean):
-    """Adds the gradient of the mean: by its pixel, its depth and the Jacobian taken at it."""
+def _local_gradient(camera, x, y, z, width, height, g_mean2d, g_depth, g_j):
+    """Gradient of the mean in camera axes: by its pixel, its depth and the Jacobian taken at it."""
     fx, fy = camera[0], camera[1]
     slope_x = clamped_slope(x / z, fx, camera[2], width)
     slope_y = clamped_slope(y / z, fy, camera[3], height)
@@ -59,8 +67,26 @@ def _mean_gradient(camera, x, y, z, width, height, g_mean2d, g_depth, g_j, g_mea
     if slope_y == y / z:
         g_y -= g_j[3] * fy / zz
         g_z += g_j[3] * fy * slope_y / zz
+    return g_x, g_y, g_z
+
+
+@kernel()
+def _pose_gradient(local, mean, j, g_x, g_y, g_camera):
+    """Adds the gradient of the camera's rotation (9, by rows) and translation (3).
+
+    Args:
+        local: Gradient of the mean in camera axes.
+        mean: (3,) in the world.
+        j: The Jacobian's entries 00, 02, 11, 12.
+        g_x: Gradient of the first row of Jacobian times rotation.
+        g_y: Of the second.
+        g_camera: (12,) to add to.
+    """
     for k in range(3):
-        g_mean[k] += camera[4 + k] * g_x + camera[7 + k] * g_y + camera[10 + k] * g_z
+        g_camera[k] += local[0] * mean[k] + j[0] * g_x[k]
+        g_camera[3 + k] += local[1] * mean[k] + j[2] * g_y[k]
+        g_camera[6 + k] += local[2] * mean[k] + j[1] * g_x[k] + j[3] * g_y[k]
+        g_camera[9 + k] += local[k]
 
 
 @kernel()
@@ -99,19 +125,21 @@ def _back(row, turn, scale):
 
 @kernel()
 def _project_backward(
-    camera, mean, quat, scale, opacity, width, height, gradient, g_mean, g_quat, g_scale
+    camera, mean, quat, scale, opacity, width, height, antialiased, gradient, out, g_camera
 ):
-    """Adds one Gaussian's gradients by one camera; returns that of its opacity.
+    """Adds one Gaussian's gradients by one camera, and those of the camera's pose.
 
-    `gradient` holds those of mean2d (2), conic (3), opacity left and depth.
+    `gradient` holds those of mean2d (2), conic (3), opacity left and depth; `out` takes those of
+    mean (3), quaternion (4), scale (3) and opacity.
     """
     x, y, z = camera_space(camera, mean)
-    j00, j02, j11, j12 = jacobian(camera, x, y, z, width, height)
-    row_x, row_y = pixel_from_world(camera, j00, j02, j11, j12)
+    j = jacobian(camera, x, y, z, width, height)
+    row_x, row_y = pixel_from_world(camera, j[0], j[1], j[2], j[3])
     turn = rotation(quat[0], quat[1], quat[2], quat[3])
     p, q = row_times_scaled(row_x, turn, scale), row_times_scaled(row_y, turn, scale)
+    xx, xy, yy, sharp = dot(p, p), dot(p, q), dot(q, q), determinant(p, q)
     g_xx, g_xy, g_yy, g_opacity = _covariance_gradient(
-        dot(p, p), dot(p, q), dot(q, q), determinant(p, q), opacity, gradient[2:5], gradient[5]
+        xx, xy, yy, sharp, opacity, antialiased, gradient[2:5], gradient[5]
     )
     g_p = (
         2 * g_xx * p[0] + g_xy * q[0],
@@ -128,42 +156,57 @@ def _project_backward(
         _unscale(1, row_x, g_p, row_y, g_q, scale),
         _unscale(2, row_x, g_p, row_y, g_q, scale),
     )
-    for k in range(3):
-        along = turn[0][k] * g_turn[0][k] + turn[1][k] * g_turn[1][k] + turn[2][k] * g_turn[2][k]
-        g_scale[k] += along / scale[k]
-    _quat_gradient(quat, g_turn, g_quat)
     g_x, g_y = _back(g_p, turn, scale), _back(g_q, turn, scale)
     right = (camera[4], camera[5], camera[6])
     down = (camera[7], camera[8], camera[9])
     forward = (camera[10], camera[11], camera[12])
     g_j = (dot(g_x, right), dot(g_x, forward), dot(g_y, down), dot(g_y, forward))
-    _mean_gradient(camera, x, y, z, width, height, gradient[0:2], gradient[6], g_j, g_mean)
-    return g_opacity
+    local = _local_gradient(camera, x, y, z, width, height, gradient[0:2], gradient[6], g_j)
+    _pose_gradient(local, mean, j, g_x, g_y, g_camera)
+    _quat_gradient(quat, g_turn, out[3:7])
+    for k in range(3):
+        out[k] += right[k] * local[0] + down[k] * local[1] + forward[k] * local[2]
+        along = turn[0][k] * g_turn[0][k] + turn[1][k] * g_turn[1][k] + turn[2][k] * g_turn[2][k]
+        out[7 + k] += along / scale[k]
+    out[10] += g_opacity
 
 
 @kernel(parallel=True)
 def _project_backward_all(
-    cameras, means, quats, scales, opacities, width, height, alphas, gradients, outs, g_opacities
+    cameras,
+    means,
+    quats,
+    scales,
+    opacities,
+    width,
+    height,
+    antialiased,
+    alphas,
+    gradients,
+    outs,
+    g_cameras,
 ):
-    for i in numba.prange(means.shape[0]):
-        total, g_opacity = np.zeros(10), 0.0
-        for c in range(cameras.shape[0]):
-            if alphas[c, i] > 0:
-                g_opacity += _project_backward(
-                    cameras[c],
-                    means[i],
-                    quats[i],
-                    scales[i],
-                    opacities[i],
-                    width,
-                    height,
-                    gradients[c, i],
-                    total[0:3],
-                    total[3:7],
-                    total[7:10],
-                )
-        outs[i] = total
-        g_opacities[i] = g_opacity
+    parts, count = g_cameras.shape[0], means.shape[0]
+    for part in numba.prange(parts):
+        total = np.zeros(GRADIENTS)
+        for i in range(part * count // parts, (part + 1) * count // parts):
+            total[:] = 0
+            for c in range(cameras.shape[0]):
+                if alphas[c, i] > 0:
+                    _project_backward(
+                        cameras[c],
+                        means[i],
+                        quats[i],
+                        scales[i],
+                        opacities[i],
+                        width,
+                        height,
+                        antialiased,
+                        gradients[c, i],
+                        total,
+                        g_cameras[part, c],
+                    )
+            outs[i] = total
 
 
 def project_backward(
@@ -174,27 +217,31 @@ def project_backward(
     opacities: np.ndarray,
     width: int,
     height: int,
+    antialiased: bool,
     alphas: np.ndarray,
     gradients: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Gradients of `project`, summed over the cameras.
 
     Args:
-        cameras: As given to `project`, as are those up to `height`.
+        cameras: As given to `project`, as are those up to `antialiased`.
         means: (N, 3).
         quats: (N, 4).
         scales: (N, 3).
         opacities: (N,).
         width: Pixels.
         height: Pixels.
+        antialiased: Whether opacity makes up for the low-pass.
         alphas: (C, N) opacities left that `project` returned; 0 takes no part.
         gradients: (C, N, 7) with respect to means2d (2), conics (3), opacity left, depth.
 
     Returns:
-        Gradients of means (N, 3), quats (N, 4), scales (N, 3), opacities (N,).
+        (N, 11) float32, gradients of mean (3), quaternion (4), scale (3), opacity; and (C, 12)
+        float64, those of the cameras' rotation (9, by rows) and translation (3).
     """
-    outs = np.empty((len(means), 10), np.float32)
-    g_opacities = np.empty(len(means), np.float32)
+    outs = np.empty((len(means), GRADIENTS), np.float32)
+    # sums of fixed parts, so that they do not depend on the number of threads
+    g_cameras = np.zeros((PARTS, len(cameras), POSE))
     _project_backward_all(
         cameras,
         means,
@@ -203,9 +250,10 @@ def project_backward(
         opacities,
         width,
         height,
+        antialiased,
         alphas,
         gradients,
         outs,
-        g_opacities,
+        g_cameras,
     )
-    return outs[:, 0:3], outs[:, 3:7], outs[:, 7:10], g_opacities
+    return outs, g_cameras.sum(0)

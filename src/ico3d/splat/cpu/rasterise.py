@@ -10,21 +10,21 @@ from torch.autograd.function import once_differentiable
 from ico3d.common.camera import Camera
 from ico3d.splat.cpu.backward import draw_backward
 from ico3d.splat.cpu.forward import draw, splat_records
-from ico3d.splat.cpu.geometry import CAMERA_SIZE
 from ico3d.splat.cpu.projection import project
 from ico3d.splat.cpu.projection_backward import project_backward
 from ico3d.splat.cpu.tiles import Tiles, bin_splats
 
 
-def camera_numbers(cameras: Sequence[Camera]) -> np.ndarray:
-    """(C, 16) float64 that the kernels read."""
-    numbers = np.empty((len(cameras), CAMERA_SIZE))
-    for row, camera in zip(numbers, cameras, strict=True):
-        k, matrix = camera.intrinsics, camera.world_to_camera
-        row[:4] = k[0, 0], k[1, 1], k[0, 2], k[1, 2]
-        row[4:13] = matrix[:3, :3].ravel()
-        row[13:] = matrix[:3, 3]
-    return numbers
+def camera_numbers(cameras: Sequence[Camera], poses: Tensor) -> Tensor:
+    """(C, 16) float64 that the kernels read.
+
+    Args:
+        cameras: C cameras, of which the intrinsics count.
+        poses: (C, 4, 4) float64, world to camera.
+    """
+    k = torch.from_numpy(np.stack([camera.intrinsics for camera in cameras]))  # (C, 3, 3)
+    lens = torch.stack([k[:, 0, 0], k[:, 1, 1], k[:, 0, 2], k[:, 1, 2]], -1)  # (C, 4)
+    return torch.cat([lens, poses[:, :3, :3].flatten(1), poses[:, :3, 3]], 1)  # (C, 16)
 
 
 def _array(tensor: Tensor) -> np.ndarray:
@@ -35,11 +35,12 @@ class Project(torch.autograd.Function):
     """Differentiable `cpu.projection.project`; the extents carry no gradient."""
 
     @staticmethod
-    def forward(ctx, means, quats, scales, opacities, cameras, width, height):
+    def forward(ctx, means, quats, scales, opacities, cameras, width, height, antialiased):
         """Returns means2d, conics, opacities left, depths, extents as `project` does."""
-        arrays = [_array(t) for t in (means, quats, scales, opacities)]
-        results = project(cameras, *arrays, width=width, height=height)
-        ctx.problem = (cameras, arrays, width, height, results[2])
+        arrays = [_array(t) for t in (cameras, means, quats, scales, opacities)]
+        image = {"width": width, "height": height, "antialiased": antialiased}
+        results = project(*arrays, **image)
+        ctx.problem = (arrays, image, results[2])
         tensors = tuple(torch.from_numpy(r) for r in results)
         ctx.mark_non_differentiable(tensors[4])
         return tensors
@@ -47,20 +48,15 @@ class Project(torch.autograd.Function):
     @staticmethod
     @once_differentiable
     def backward(ctx, g_means2d, g_conics, g_alphas, g_depths, _):
-        """Gradients of means, quats, scales, opacities."""
+        """Gradients of means, quats, scales, opacities and the cameras' poses."""
         gradients = torch.cat(
             [g_means2d, g_conics, g_alphas[..., None], g_depths[..., None]], -1
         )  # (C, N, 7)
-        cameras, arrays, width, height, alphas = ctx.problem
-        results = project_backward(
-            cameras,
-            *arrays,
-            width=width,
-            height=height,
-            alphas=alphas,
-            gradients=_array(gradients),
-        )
-        return *map(torch.from_numpy, results), None, None, None
+        arrays, image, alphas = ctx.problem
+        outs, poses = project_backward(*arrays, **image, alphas=alphas, gradients=_array(gradients))
+        means, quats, scales, opacities = torch.from_numpy(outs).split([3, 4, 3, 1], -1)
+        cameras = torch.nn.functional.pad(torch.from_numpy(poses), (4, 0))  # (C, 16)
+        return means, quats, scales, opacities[:, 0], cameras, None, None, None
 
 
 class Draw(torch.autograd.Function):

@@ -7,7 +7,7 @@ import numba
 import numpy as np
 
 from ico3d.splat.convention import MIN_ALPHA
-from ico3d.splat.cpu.compile import kernel
+from ico3d.splat.cpu.compile import PARTS, kernel
 
 TILE_WIDTH, TILE_HEIGHT = 8, 64
 """Pixels. Narrow tiles waste fewer pixels beside a splat, tall ones mean fewer pairs."""
@@ -24,9 +24,6 @@ SLACK = 0.01
 
 DIGIT = 11
 """Bits sorted per pass."""
-
-PARTS = 16
-"""Splats are listed in so many parts, which threads share out."""
 
 
 @dataclass
