@@ -172,6 +172,17 @@ def test_opacities_are_reset_and_their_moments_forgotten():
     assert people.moments["means.first"].all()
 
 
+def test_the_huge_die_after_the_first_reset_only():
+    rules = DensitySettings(prune_opacity=0.005, prune_scale=0.1)
+    people = population([0.9, 0.9], [0.05, 0.2])
+    never = DefaultStrategy(ALWAYS, rules, 0, reset_every=0)
+    strategy = DefaultStrategy(ALWAYS, rules, 0, reset_every=20)
+    for step, left in ((19, 2), (20, 2), (21, 1)):
+        never.adapt(people, step, 0.0)
+        strategy.adapt(people, step, 0.0)
+        assert len(people) == left
+
+
 def test_no_gaussian_left_is_one_sentence():
     for strategy in (mcmc(), DefaultStrategy(ALWAYS, DensitySettings(), 0, 0)):
         with pytest.raises(ModelError, match="all Gaussians have faded by step 4"):

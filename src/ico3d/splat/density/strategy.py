@@ -6,8 +6,9 @@ as well, but bound to torch.optim, to the process's random state (a resumed run 
 uninterrupted one) and, the default, without a cap; so of gsplat the relocation kernel is used.
 """
 
+import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import torch
@@ -106,7 +107,7 @@ class Strategy(ABC):
         if not self.schedule.due(step) and len(population) <= self.max_gaussians:
             return
         with torch.no_grad():
-            self._change(population, self._generator(step, 0))
+            self._change(population, step, self._generator(step, 0))
         if len(population) == 0:
             raise ModelError(
                 f"all Gaussians have faded by step {step}: lower opacity_rate, or look "
@@ -114,8 +115,8 @@ class Strategy(ABC):
             )
 
     @abstractmethod
-    def _change(self, population: Population, generator: torch.Generator) -> None:
-        """Carries out a change."""
+    def _change(self, population: Population, step: int, generator: torch.Generator) -> None:
+        """Carries out a change after a step."""
 
     def tensors(self) -> dict[str, Tensor]:
         """What has been gathered, for checkpoints."""
@@ -131,7 +132,11 @@ class Strategy(ABC):
 
 
 class DefaultStrategy(Strategy):
-    """3DGS: those with strong screen gradients clone or split, the faint and the huge die."""
+    """3DGS: those with strong screen gradients clone or split, the faint and the huge die.
+
+    As in 3DGS the huge die only after the first opacity reset: what a scene begins with may be
+    sparse, and far away everything is large.
+    """
 
     def __init__(self, schedule: Schedule, settings: DensitySettings, seed: int, reset_every: int):
         """Gathers nothing yet.
@@ -164,10 +169,13 @@ class DefaultStrategy(Strategy):
             population.replace("opacity_logits", reset_opacity_logits(logits, ceiling))
             population.forget("opacity_logits")
 
-    def _change(self, population: Population, generator: torch.Generator) -> None:
+    def _change(self, population: Population, step: int, generator: torch.Generator) -> None:
         if len(self._stats.views) != len(population):
             self._stats = DensityStats.zeros(len(population), population.scales.device)
-        plan = densify_plan(self._stats, population.scales, population.opacities, self._settings)
+        settings = self._settings
+        if not 0 < self._reset_every < step:
+            settings = replace(settings, prune_scale=math.inf)
+        plan = densify_plan(self._stats, population.scales, population.opacities, settings)
         population.carry_out(plan, generator)
         self._stats = DensityStats.zeros(len(population), population.scales.device)
 
@@ -209,7 +217,8 @@ class McmcStrategy(Strategy):
         with torch.no_grad():
             self._shake(population, rate, self._generator(step, 1))
 
-    def _change(self, population: Population, generator: torch.Generator) -> None:
+    def _change(self, population: Population, step: int, generator: torch.Generator) -> None:
+        del step
         plan = self._plan(population.opacities, generator)
         copies = 1 + torch.bincount(plan.clone_from, minlength=len(population))  # (N,)
         population.carry_out(plan, generator)
