@@ -2,16 +2,19 @@
 
 import dataclasses
 
+import numpy as np
 import pytest
 import torch
 
 from ico3d import cli
+from ico3d.capture.capture import Capture
 from ico3d.errors import ModelError, SettingsError
 from ico3d.measure.scene import evaluate_scene
 from ico3d.scene.settings import PRESETS
 from ico3d.scene.train import SceneJob, train_scene
 from ico3d.scene.trained import TrainedScene
 from ico3d.scene.trainer import SceneTrainer
+from ico3d.splat.files.formats import read_gaussians
 from ico3d.training.changes import with_changes
 
 SMALL = {
@@ -85,6 +88,24 @@ def test_a_saved_scene_is_the_same(still, tmp_path):
     assert torch.equal(again.scene.parameters["means"], loaded.scene.parameters["means"])
     with pytest.raises(SettingsError, match="another 'only'"):
         train_scene(still(2), tmp_path / "model", _job("person", steps=30))
+
+
+def test_the_verb_trains_and_exports(still, tmp_path, monkeypatch):
+    monkeypatch.setattr(Capture, "open", lambda _: still(2))
+    out = tmp_path / "model"
+    words = ["train", "static", str(tmp_path), str(out), "--only", "person", "--frames", "0"]
+    changes = ["steps=20", "initial_gaussians=80", "sh_degree=2"]
+    for name in ("scene.ply", "scene.spz"):
+        assert cli.main([*words, "--set", *changes, "--export", str(tmp_path / name)]) == 0
+    parameters = TrainedScene.load(out).scene.parameters
+    ply, spz = (read_gaussians(tmp_path / name) for name in ("scene.ply", "scene.spz"))
+    assert len(ply) == len(spz) == 80 and ply.degree == spz.degree == 2
+    np.testing.assert_allclose(spz.means, ply.means, atol=1e-3)
+    np.testing.assert_array_equal(ply.means, parameters["means"] * torch.tensor([1, -1, -1]))
+    turned = ply.half_turn()
+    np.testing.assert_array_equal(turned.rest, parameters["f_rest"])
+    np.testing.assert_array_equal(turned.quats, parameters["quats"])
+    np.testing.assert_array_equal(turned.opacities, parameters["opacity_logits"])
 
 
 def test_harmonics_are_raised_over_time(still, tmp_path):

@@ -23,6 +23,7 @@ class TrainStatic:
         preset: Settings of 3DGS, or sized for two CPU cores.
         set: Changes to the preset, as name=value (names: ico3d.scene.settings.SceneSettings).
         seed: All randomness follows from it.
+        export: A file for other tools: .ply (lossless) or .spz (small; for scenes of avatars).
     """
 
     capture: tyro.conf.Positional[Path]
@@ -33,18 +34,22 @@ class TrainStatic:
     preset: Literal["cpu", "paper"] = "cpu"
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     seed: int = 0
+    export: Path | None = None
 
     def run(self) -> None:
-        """Trains, or goes on training; writes the model folder."""
+        """Trains, or goes on training; writes the model folder and what is exported."""
         from rich.console import Console
 
         from ico3d.capture.capture import Capture
         from ico3d.scene.settings import PRESETS
         from ico3d.scene.train import SceneJob, train_scene
+        from ico3d.splat.files.formats import write_gaussians
         from ico3d.training.changes import with_changes
 
         settings = with_changes(PRESETS[self.preset, self.strategy], self.set)
         job = SceneJob(self.only, self.frames, self.strategy, self.seed, settings)
         trained = train_scene(Capture.open(self.capture), self.out, job)
+        if self.export is not None:
+            write_gaussians(self.export, trained.scene.raw())
         seconds = trained.summary["train_seconds"]
         Console().print(f"{self.out}: {len(trained.scene)} Gaussians, trained in {seconds:.0f} s.")

@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from ico3d.splat import harmonics
+from ico3d.splat.files.raw import RawGaussians
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.initial import spacing
 
@@ -51,6 +52,22 @@ class StaticScene:
     def to(self, device: torch.device) -> None:
         """Moves the parameters."""
         self.parameters = {name: value.to(device) for name, value in self.parameters.items()}
+
+    def raw(self) -> RawGaussians:
+        """The parameters as files hold them, bit by bit.
+
+        Scenes have y up, files y down: turned by half about x, they stand upright in other tools,
+        and an SPZ holds the scene's own coordinates.
+        """
+        arrays = {name: value.detach().cpu().numpy() for name, value in self.parameters.items()}
+        return RawGaussians(
+            means=arrays["means"],
+            dc=arrays["f_dc"][:, 0],  # (N, 3)
+            rest=arrays["f_rest"],
+            opacities=arrays["opacity_logits"],
+            log_scales=arrays["log_scales"],
+            quats=arrays["quats"],
+        ).half_turn()
 
     def gaussians(self, degree: int | None = None) -> Gaussians:
         """Renderable Gaussians, with harmonics up to this degree or all of them."""

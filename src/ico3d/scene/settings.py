@@ -105,6 +105,13 @@ PRESETS: dict[tuple[str, StrategyName], SceneSettings] = {
         _PAPER, densify_until=25_000, initial_opacity=0.5, initial_scale=0.1
     ),
     ("cpu", "default"): _CPU,
-    ("cpu", "mcmc"): replace(_CPU, densify_until=2_500, noise_rate=5e4),
+    ("cpu", "mcmc"): replace(
+        _CPU,
+        densify_until=2_500,
+        initial_opacity=0.5,
+        initial_scale=0.5,
+        noise_rate=5e3,
+        opacity_weight=0.002,
+    ),
 }
 """By name of the preset and of the strategy."""
