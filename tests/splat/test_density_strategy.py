@@ -166,8 +166,8 @@ def test_opacities_are_reset_and_their_moments_forgotten():
     strategy = DefaultStrategy(Schedule(50, 100, 10), rules, 0, reset_every=20)
     for step, opacity in ((10, 0.9), (20, 0.01), (100, 0.01)):
         strategy.adapt(people, step, 0.0)
-        assert float(people.opacities[0]) == pytest.approx(opacity, rel=1e-4)
-    assert float(people.opacities[1]) == pytest.approx(0.006, rel=1e-4)
+        assert people.opacities[0].item() == pytest.approx(opacity, rel=1e-4)
+    assert people.opacities[1].item() == pytest.approx(0.006, rel=1e-4)
     assert not people.moments["opacity_logits.first"].any()
     assert people.moments["means.first"].all()
 
