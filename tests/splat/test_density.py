@@ -120,24 +120,29 @@ def test_parts_scatter_as_their_source():
     assert torch.equal(again[0], new_means)
 
 
-def test_a_torch_optimiser_follows_too():
-    values = torch.nn.Parameter(torch.tensor([[1.0], [2.0], [3.0]]))
-    other = torch.nn.Parameter(torch.ones(2))
-    optimizer = torch.optim.Adam([{"params": [values], "lr": 0.1}, {"params": [other]}])
-    (values.sum() + other.sum()).backward()
-    optimizer.step()
-    moment = optimizer.state[values]["exp_avg"].clone()
+def test_a_population_carries_parameters_and_moments_along_their_axes():
+    parameters = {
+        "means": torch.arange(3.0)[:, None].repeat(1, 3).requires_grad_(),
+        "quats": torch.tensor([[1.0, 0, 0, 0]]).repeat(3, 1),
+        "log_scales": torch.full((3, 3), -2.0),
+        "basis": torch.arange(6.0).view(2, 3),
+    }
+    moments = {"basis.first": torch.ones(2, 3), "means.second": torch.ones(3, 3)}
+    moments["means.steps"] = torch.tensor(4)
+    population = density.Population(parameters, moments, {"basis": 1})
     plan = density.Plan(torch.tensor([2]), torch.tensor([2]), torch.tensor([0, 0]))
-    new = density.replace_parameters(
-        optimizer, {"v": values}, {"v": density.apply_plan(values, plan)}, plan
-    )["v"]
-    assert optimizer.param_groups[0]["params"] == [new]
-    assert torch.equal(optimizer.state[new]["exp_avg"][0], moment[2])
-    assert not optimizer.state[new]["exp_avg"][1:].any()
-    assert optimizer.state[new]["step"] == 1 and values not in optimizer.state
-    new.sum().backward()
-    optimizer.step()
-    assert (new[0] < 2.95).all()
+    population.carry_out(plan, torch.Generator().manual_seed(0))
+    assert len(population) == 4
+    assert population.parameters["means"][:2, 0].tolist() == [2, 2]
+    assert population.parameters["means"].requires_grad and population.parameters["means"].is_leaf
+    assert not population.parameters["basis"].requires_grad
+    assert population.parameters["basis"].tolist() == [[2, 2, 0, 0], [5, 5, 3, 3]]
+    assert moments["basis.first"].tolist() == [[1, 0, 0, 0]] * 2
+    assert moments["means.second"].tolist() == [[1] * 3] + [[0] * 3] * 3
+    assert moments["means.steps"] == 4
+    torch.testing.assert_close(
+        population.scales[:, 0] / np.exp(-2), torch.tensor([1, 1, 1 / 1.6, 1 / 1.6])
+    )
 
 
 def test_statistics_average_over_the_views_that_saw_a_gaussian():

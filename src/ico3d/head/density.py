@@ -13,7 +13,7 @@ from ico3d.splat.density import (
     DensitySettings,
     DensityStats,
     Plan,
-    apply_plan_to_geometry,
+    Population,
     densify_plan,
 )
 from ico3d.splat.rendering import RenderInfo
@@ -109,18 +109,9 @@ def _carry_out(
     plan: Plan, model: HeadModel, optimiser: Optimiser, generator: torch.Generator
 ) -> None:
     """Applies a plan to parameters and moments."""
-    means, scales = apply_plan_to_geometry(
-        model.means, model.quats, model.log_scales.exp(), plan, generator
-    )
-    sources = plan.sources.to(model.means.device)  # (M,)
     values = {name: getattr(model, name).detach() for name in GAUSSIAN_AXES}
+    population = Population(values, optimiser.moments, GAUSSIAN_AXES)
+    population.carry_out(plan, generator)
     model.resize(len(plan))
-    for name, axis in GAUSSIAN_AXES.items():
-        getattr(model, name).data = values[name].index_select(axis, sources)
-    model.means.data, model.log_scales.data = means, scales.log()
-    for name, axis in GAUSSIAN_AXES.items():
-        for moment in (f"{name}.first", f"{name}.second"):
-            if moment in optimiser.moments:
-                moved = optimiser.moments[moment].index_select(axis, sources)
-                moved.narrow(axis, len(plan.keep), len(plan) - len(plan.keep)).zero_()
-                optimiser.moments[moment] = moved
+    for name, value in population.parameters.items():
+        getattr(model, name).data = value

@@ -8,7 +8,7 @@ from ico3d.errors import CaptureError
 from ico3d.head.model import HeadModel, HeadShape, Variant
 from ico3d.head.settings import HeadSettings
 from ico3d.head.views import view_of
-from ico3d.splat.initial import resampled, spacing
+from ico3d.splat.initial import in_pictures, resampled, spacing
 
 
 def initial_head(
@@ -47,13 +47,12 @@ def initial_head(
 def _seen(capture: Capture, points: np.ndarray) -> np.ndarray:
     """The points (P', 3) of (P, 3) that lie within some picture: others would never be trained."""
     frames = capture.split.train[:: max(1, len(capture.split.train) // 8)]
-    inside = np.zeros(len(points), bool)
-    for frame in frames:
-        for index in range(len(capture.cameras)):
-            camera = view_of(capture, index, frame).camera
-            pixels, depths = camera.project(points)  # (P, 2), (P,)
-            fits = (pixels >= 0) & (pixels <= (camera.width, camera.height))
-            inside |= fits.all(1) & (depths > 0)
+    cameras = [
+        view_of(capture, index, frame).camera
+        for frame in frames
+        for index in range(len(capture.cameras))
+    ]
+    inside = in_pictures(points, cameras).any(0)  # (P,)
     if inside.sum() < 4:
         raise CaptureError(f"{capture.path}: no camera sees the surface points; check the poses.")
     return points[inside]

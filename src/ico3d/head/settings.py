@@ -1,10 +1,9 @@
 """Settings of head training: the paper's, and those sized for two CPU cores."""
 
-import dataclasses
 from dataclasses import dataclass
 from typing import Literal
 
-from ico3d.errors import SettingsError
+from ico3d.training.changes import with_changes
 from ico3d.training.optimiser import Rate
 
 
@@ -108,18 +107,7 @@ class HeadSettings:
         Raises:
             SettingsError: If a name is unknown or a value has the wrong type.
         """
-        values = {}
-        fields = {field.name: field for field in dataclasses.fields(self)}
-        for change in changes:
-            name, _, text = change.partition("=")
-            if name not in fields:
-                raise SettingsError(f"there is no setting '{name}': known are {', '.join(fields)}.")
-            kind = type(getattr(self, name))
-            try:
-                values[name] = kind(text)
-            except ValueError:
-                raise SettingsError(f"'{change}': {name} takes {kind.__name__} values.") from None
-        return dataclasses.replace(self, **values)
+        return with_changes(self, changes)
 
 
 PRESETS: dict[str, HeadSettings] = {

@@ -8,23 +8,9 @@ import torch
 from torch import Tensor
 
 from ico3d.capture.capture import Capture
-from ico3d.common.camera import Camera
+from ico3d.capture.pictures import LayerCache, Layers
+from ico3d.capture.pictures import View as View
 from ico3d.errors import CaptureError
-
-
-@dataclass(frozen=True)
-class View:
-    """One picture of one frame.
-
-    Attributes:
-        camera_index: Which camera took it.
-        frame: Which frame.
-        camera: That camera, in canonical head space.
-    """
-
-    camera_index: int
-    frame: int
-    camera: Camera
 
 
 @dataclass(frozen=True)
@@ -63,25 +49,20 @@ def view_of(capture: Capture, camera: int, frame: int) -> View:
     return View(camera, frame, moved)
 
 
-Layers = tuple[np.ndarray, np.ndarray | None, np.ndarray | None]
-"""Picture, mask and torso as bytes."""
-
-
 class PictureCache:
     """Pictures of a capture, kept as bytes within a budget, else read again at each use."""
 
     def __init__(self, capture: Capture, budget_gib: float):
         """Keeps up to `budget_gib` GiB."""
         self._capture = capture
-        self._left = int(budget_gib * 2**30)
         self._backgrounds: dict[int, Tensor | None] = {}
-        self._kept: dict[tuple[int, int], Layers] = {}
+        self._cache = LayerCache(self._read, budget_gib)
 
     def views(self, frames: Sequence[int]) -> Iterator[View]:
         """All views of these frames that were recorded, frame by frame."""
         for frame in frames:
             for camera in range(len(self._capture.cameras)):
-                if self._read(camera, frame) is not None:
+                if self._cache.layers(camera, frame) is not None:
                     yield view_of(self._capture, camera, frame)
 
     def background(self, view: View, device: torch.device) -> Tensor | None:
@@ -94,7 +75,7 @@ class PictureCache:
 
     def picture(self, view: View, device: torch.device) -> Picture:
         """What a recorded view shows."""
-        layers = self._read(view.camera_index, view.frame)
+        layers = self._cache.layers(view.camera_index, view.frame)
         if layers is None:
             raise CaptureError(
                 f"{self._capture.path}: the picture of frame {view.frame} by camera "
@@ -107,24 +88,12 @@ class PictureCache:
         return Picture(image, mask, torso)
 
     def _read(self, camera: int, frame: int) -> Layers | None:
-        """Picture, mask and torso as bytes, from memory or from the capture."""
-        if (camera, frame) in self._kept:
-            return self._kept[camera, frame]
+        """Picture, mask and torso."""
         image = self._capture.image(camera, frame)
         if image is None:
             return None
         mask = self._capture.mask(camera, frame)
-        torso = self._torso(mask, camera, frame)
-        layers = (
-            _as_bytes(image),
-            None if mask is None else _as_bytes(mask),
-            None if torso is None else _as_bytes(torso),
-        )
-        size = sum(part.nbytes for part in layers if part is not None)
-        if size <= self._left:
-            self._left -= size
-            self._kept[camera, frame] = layers
-        return layers
+        return image, mask, self._torso(mask, camera, frame)
 
     def _torso(self, mask: np.ndarray | None, camera: int, frame: int) -> np.ndarray | None:
         """(H, W) the person without the head."""
@@ -133,10 +102,6 @@ class PictureCache:
             return None
         torso = np.clip(mask - head, 0, 1)
         return torso if torso.any() else None
-
-
-def _as_bytes(picture: np.ndarray) -> np.ndarray:
-    return (picture * 255 + 0.5).astype(np.uint8)
 
 
 def _as_floats(picture: np.ndarray, device: torch.device) -> Tensor:

@@ -2,21 +2,25 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import tyro
+
+if TYPE_CHECKING:
+    from ico3d.capture.capture import Capture
 
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Measures a trained head against a capture, the one it was trained on or another.
+    """Measures a trained head or static scene against a capture, its own or another.
 
     Attributes:
-        model: A model folder that ico3d train head wrote.
+        model: A model folder that ico3d train head or ico3d train static wrote.
         capture: The capture with the truth; its sound or blendshapes drive the head.
         json: File for the metrics.
         images: Folder for pictures: {pred,gt,mask}/CAMERA/%06d.png.
-        frames: The capture's test frames, or all of them (for a capture that trained nothing).
+        frames: The capture's test frames (of a single moment: its test cameras), or all of them
+            (for a capture that trained nothing).
     """
 
     model: tyro.conf.Positional[Path]
@@ -33,18 +37,29 @@ class Evaluate:
 
         from ico3d.capture.capture import Capture
         from ico3d.common.files import write_atomic
-        from ico3d.head.trained import TrainedHead
-        from ico3d.measure.evaluate import evaluate_head
 
-        head = TrainedHead.load(self.model)
-        capture = Capture.open(self.capture)
-        frames = capture.split.test if self.frames == "test" else range(capture.num_frames)
-        metrics = evaluate_head(head, capture, frames, self.images)
+        metrics = self._metrics(Capture.open(self.capture))
         if self.json is not None:
             write_atomic(self.json, json.dumps(metrics, indent=1).encode())
         console = Console()
         for name, value in metrics.items():
             console.print(f"{name:16} {'not measured' if value is None else f'{value:.3f}'}")
+
+    def _metrics(self, capture: "Capture") -> dict[str, float | None]:
+        """Measures a scene, if the folder holds one, else a head."""
+        from ico3d.scene.trained import ABOUT, TrainedScene
+
+        if (self.model / ABOUT).is_file():
+            from ico3d.measure.scene import evaluate_scene
+
+            scene = TrainedScene.load(self.model)
+            return evaluate_scene(scene, capture, self.frames, self.images)
+        from ico3d.head.trained import TrainedHead
+        from ico3d.measure.evaluate import evaluate_head
+
+        head = TrainedHead.load(self.model)
+        frames = capture.split.test if self.frames == "test" else range(capture.num_frames)
+        return evaluate_head(head, capture, frames, self.images)
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,10 @@
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import torch
-from PIL import Image
 from rich.progress import track
 
 from ico3d.capture.capture import Capture
@@ -17,28 +15,11 @@ from ico3d.head.trained import TrainedHead
 from ico3d.head.views import PictureCache, View, view_of
 from ico3d.measure.lips import LandmarkReader, landmark_reader, lip_correlation, lip_gap, lip_lag_ms
 from ico3d.measure.metrics import lmd, psnr, psnr_mouth
-from ico3d.splat.losses import ssim
+from ico3d.measure.scores import Scores, add_picture, write_pictures
 from ico3d.splat.render import render
 
 FACING = np.array([0.0, 0.0, 1.0])
 """Where the face looks in canonical head space."""
-
-
-@dataclass
-class Scores:
-    """Values of one metric over pictures; None counts for nothing."""
-
-    values: dict[str, list[float]] = field(default_factory=dict)
-
-    def add(self, name: str, value: float | None) -> None:
-        """Adds the value of one picture."""
-        self.values.setdefault(name, [])
-        if value is not None:
-            self.values[name].append(value)
-
-    def means(self) -> dict[str, float | None]:
-        """Mean of each metric, None where no picture had a value."""
-        return {name: float(np.mean(v)) if v else None for name, v in self.values.items()}
 
 
 class HeadRenderer:
@@ -103,23 +84,13 @@ def _quality(
         landmarks = capture.landmarks(view.camera_index, view.frame)
         assert truth is not None
         predicted = renderer.picture(view)
-        scores.add("psnr", psnr(predicted, truth))
-        scores.add("ssim", float(ssim(torch.from_numpy(predicted), torch.from_numpy(truth))))
+        add_picture(scores, predicted, truth)
         scores.add("psnr_mask", None if mask is None else psnr(predicted, truth, mask))
         mouth = None if landmarks is None else psnr_mouth(predicted, truth, landmarks)
         scores.add("psnr_mouth", mouth)
         if images is not None:
-            parts = {"pred": predicted, "gt": truth, "mask": mask}
-            _write(images, view, {name: part for name, part in parts.items() if part is not None})
+            write_pictures(images, view, predicted, truth, mask)
     return scores
-
-
-def _write(folder: Path, view: View, parts: dict[str, np.ndarray]) -> None:
-    """Writes `FOLDER/PART/CAMERA/%06d.png`."""
-    for part, picture in parts.items():
-        path = folder / part / view.camera.name / f"{view.frame:06d}.png"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        Image.fromarray((picture * 255 + 0.5).astype(np.uint8)).save(path)
 
 
 def most_frontal_camera(capture: Capture, frames: Sequence[int]) -> int:

@@ -1,9 +1,12 @@
 """Round Gaussians on surface points: where every training starts."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.spatial import KDTree
+
+from ico3d.common.camera import Camera
 
 
 def resampled(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
@@ -24,3 +27,13 @@ def spacing(points: np.ndarray) -> np.ndarray:
     distance = np.sqrt((distances[:, 1:] ** 2).mean(1))
     typical = float(np.median(distance))
     return np.clip(distance, max(typical / 10, math.ulp(1.0)), typical * 10)
+
+
+def in_pictures(points: np.ndarray, cameras: Sequence[Camera]) -> np.ndarray:
+    """(C, P) bool: whether a camera's picture holds a point (P, 3)."""
+    inside = np.zeros((len(cameras), len(points)), bool)
+    for row, camera in zip(inside, cameras, strict=True):
+        pixels, depths = camera.project(points)  # (P, 2), (P,)
+        fits = (pixels >= 0) & (pixels < (camera.width, camera.height))
+        row[:] = fits.all(1) & (depths > 0)
+    return inside

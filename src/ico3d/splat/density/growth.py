@@ -1,9 +1,4 @@
-"""Adaptive density control of 3D Gaussian Splatting: clone, split, prune.
-
-It works on plans. `densify_plan` says which Gaussians stay, are cloned or are split; `apply_plan`
-carries any per-Gaussian tensor over, so that parameters, optimiser states and whatever a model
-hangs on its Gaussians (HeadGaS++: the basis F) follow the same plan.
-"""
+"""Adaptive density control of 3D Gaussian Splatting: which Gaussians clone, split and die."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,16 +8,13 @@ import torch
 from torch import Tensor
 
 from ico3d.common.camera import Camera
-from ico3d.splat import quaternions
+from ico3d.splat.density.plan import SPLIT_SHRINK, Plan
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 from ico3d.splat.rendering import RenderInfo
 
 SPLIT_PARTS = 2
 """A Gaussian that is too large becomes this many."""
-
-SPLIT_SHRINK = 1.6
-"""... each smaller by this factor."""
 
 
 @dataclass(frozen=True)
@@ -85,30 +77,6 @@ class DensityStats:
         return self.gradient_sum / self.views.clamp_min(1)
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What becomes of N Gaussians; the new order is: kept, clones, parts of the split.
-
-    Attributes:
-        keep: (K,) indices of those that stay as they are.
-        clone_from: (A,) indices of which there is one more.
-        split_from: (2·B,) indices of the split, each twice: they do not stay.
-    """
-
-    keep: Tensor
-    clone_from: Tensor
-    split_from: Tensor
-
-    def __len__(self) -> int:
-        """How many Gaussians there are afterwards."""
-        return len(self.keep) + len(self.clone_from) + len(self.split_from)
-
-    @property
-    def sources(self) -> Tensor:
-        """(M,) the old index of each new Gaussian."""
-        return torch.cat([self.keep, self.clone_from, self.split_from])
-
-
 def contributions(gaussians: Gaussians, cameras: Sequence[Camera]) -> Tensor:
     """What each Gaussian gives pictures: (C, N) the sum over pixels of its blending weight.
 
@@ -158,7 +126,7 @@ def densify_plan(
     dead = faint | (final_size > settings.prune_scale)
     if contribution is not None:
         dead |= contribution < settings.prune_contribution * contribution.median()
-    alive = _under_cap(~dead, opacities.detach(), settings.max_gaussians)
+    alive = under_cap(~dead, opacities.detach(), settings.max_gaussians)
     room = settings.max_gaussians - int(alive.sum())
     grown = _strongest(wanted & alive, gradient, room)
     return Plan(
@@ -175,80 +143,9 @@ def _strongest(chosen: Tensor, strength: Tensor, count: int) -> Tensor:
     return torch.zeros_like(chosen).index_fill(0, first, True)
 
 
-def _under_cap(alive: Tensor, opacities: Tensor, cap: int) -> Tensor:
-    """Those alive, without the faintest where they are more than the cap."""
+def under_cap(alive: Tensor, opacities: Tensor, cap: int) -> Tensor:
+    """Mask (N,) of those alive, without the faintest where they are more than the cap."""
     return _strongest(alive, opacities, cap) if int(alive.sum()) > cap else alive
-
-
-def apply_plan(values: Tensor, plan: Plan) -> Tensor:
-    """Carries per-Gaussian values (N, ...) over: clones and parts copy their source's.
-
-    Returns:
-        (M, ...) without gradient.
-    """
-    return values.detach()[plan.sources.to(values.device)]
-
-
-def apply_plan_to_state(state: Tensor, plan: Plan) -> Tensor:
-    """Carries an optimiser's running values (N, ...) over; clones and parts begin at 0."""
-    new = apply_plan(state, plan)
-    new[len(plan.keep) :] = 0
-    return new
-
-
-def apply_plan_to_geometry(
-    means: Tensor, quats: Tensor, scales: Tensor, plan: Plan, generator: torch.Generator
-) -> tuple[Tensor, Tensor]:
-    """Carries means and activated scales over; parts of the split are drawn from their source.
-
-    Args:
-        means: (N, 3).
-        quats: (N, 4), need not be normalised.
-        scales: (N, 3) activated, metres.
-        plan: The plan.
-        generator: On the CPU; decides where the parts lie.
-
-    Returns:
-        Means (M, 3) and scales (M, 3), without gradient.
-    """
-    new_means, new_scales = apply_plan(means, plan), apply_plan(scales, plan)
-    parts = slice(len(plan) - len(plan.split_from), len(plan))
-    noise = torch.randn(len(plan.split_from), 3, generator=generator).to(means)
-    turns = quaternions.to_matrix(apply_plan(quats, plan)[parts])  # (2·B, 3, 3)
-    offsets = turns @ (noise * new_scales[parts])[..., None]  # (2·B, 3, 1)
-    new_means[parts] += offsets[..., 0]
-    new_scales[parts] /= SPLIT_SHRINK
-    return new_means, new_scales
-
-
-def replace_parameters(
-    optimizer: torch.optim.Optimizer,
-    parameters: dict[str, Tensor],
-    values: dict[str, Tensor],
-    plan: Plan,
-) -> dict[str, Tensor]:
-    """Puts new values in the place of a torch optimiser's per-Gaussian parameters.
-
-    Args:
-        optimizer: Holds every one of `parameters`; its running values follow the plan.
-        parameters: By name, (N, ...).
-        values: The new values by the same names, (M, ...).
-        plan: The plan they were made by.
-
-    Returns:
-        The new parameters by name.
-    """
-    new = {name: torch.nn.Parameter(values[name]) for name in parameters}
-    by_identity = {id(parameters[name]): new[name] for name in parameters}
-    for group in optimizer.param_groups:
-        group["params"] = [by_identity.get(id(p), p) for p in group["params"]]
-    for name, old in parameters.items():
-        state = optimizer.state.pop(old, {})
-        optimizer.state[new[name]] = {
-            key: apply_plan_to_state(v, plan) if torch.is_tensor(v) and v.dim() else v
-            for key, v in state.items()
-        }
-    return dict(new)
 
 
 def reset_opacity_logits(logits: Tensor, ceiling: float = 0.01) -> Tensor:

@@ -1,0 +1,92 @@
+"""Measuring a static scene: the floor that every model of somebody who moves must beat."""
+
+import time
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import torch
+from rich.progress import track
+
+from ico3d.capture.capture import Capture
+from ico3d.capture.pictures import View
+from ico3d.errors import CaptureError
+from ico3d.measure.metrics import psnr
+from ico3d.measure.scores import Scores, add_picture, write_pictures
+from ico3d.scene.trained import TrainedScene
+from ico3d.scene.views import SceneViews
+from ico3d.splat.render import render
+
+
+def evaluate_scene(
+    trained: TrainedScene, capture: Capture, which: Literal["test", "all"], images: Path | None
+) -> dict[str, float | None]:
+    """Picture metrics, with the meaning they have for heads.
+
+    A person is rendered over the capture's clean plates. `psnr_background` looks at what is not the
+    person; without plates a background has nothing else to be measured by.
+
+    Args:
+        trained: The scene.
+        capture: Where truth comes from; it may be another one than the scene was trained on.
+        which: The test views of a capture (`SceneViews.test`), or all views.
+        images: Folder for pictures, or None.
+
+    Returns:
+        Metric keys to values, None where this capture does not allow the metric.
+
+    Raises:
+        CaptureError: If no picture is to be measured.
+    """
+    views = SceneViews(capture, trained.only, trained.frames, cache_gib=0)
+    chosen = views.test if which == "test" else views.train + views.test
+    if not chosen:
+        raise CaptureError(
+            f"{capture.path} has no test pictures (of fewer than 8, all train): "
+            "measure on all with --frames all."
+        )
+    scores = Scores({name: [] for name in ("psnr", "psnr_mask", "psnr_background", "ssim")})
+    renderer = SceneRenderer(trained, views)
+    for view in track(chosen, "pictures", transient=True):
+        truth, person = (None if part is None else part.numpy() for part in views.layers(view))
+        assert truth is not None
+        predicted = renderer.picture(view)
+        if renderer.shows_all(view, person):
+            add_picture(scores, predicted, truth)
+        if trained.only != "background" and person is not None:
+            measured = capture.head_mask(view.camera_index, view.frame)
+            scores.add("psnr_mask", None if measured is None else psnr(predicted, truth, measured))
+        if trained.only != "person":
+            rest = None if person is None else 1 - person
+            scores.add("psnr_background", psnr(predicted, truth, rest))
+        if images is not None:
+            write_pictures(images, view, predicted, truth, person)
+    return scores.means() | {
+        "num_gaussians": len(trained.scene),
+        "ms_per_frame": float(np.median(renderer.seconds) * 1000),
+        "train_seconds": trained.summary.get("train_seconds"),
+    }
+
+
+class SceneRenderer:
+    """Renders a scene as a capture's cameras would see it."""
+
+    def __init__(self, trained: TrainedScene, views: SceneViews):
+        """Binds the scene to the capture whose plates a person stands before."""
+        self._trained, self._views = trained, views
+        self.seconds: list[float] = []
+
+    @torch.no_grad()
+    def picture(self, view: View) -> np.ndarray:
+        """(H, W, 3), clipped to [0, 1]."""
+        behind = self._views.plate(view) if self._trained.only == "person" else None
+        begin = time.perf_counter()
+        rendering = render(self._trained.scene.gaussians(), [view.camera], behind)
+        self.seconds.append(time.perf_counter() - begin)
+        return rendering.rgb[0].clamp(0, 1).numpy()
+
+    def shows_all(self, view: View, person: np.ndarray | None) -> bool:
+        """Whether the whole picture is known: a person needs a plate, a background nobody."""
+        if self._trained.only == "person":
+            return self._views.plate(view) is not None
+        return self._trained.only == "all" or person is None

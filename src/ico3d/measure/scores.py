@@ -1,0 +1,53 @@
+"""What every evaluation does with a picture: scores it, and writes it where others can."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import torch
+from PIL import Image
+
+from ico3d.capture.pictures import View
+from ico3d.measure.metrics import psnr
+from ico3d.splat.losses import ssim
+
+
+@dataclass
+class Scores:
+    """Values of one metric over pictures; None counts for nothing."""
+
+    values: dict[str, list[float]] = field(default_factory=dict)
+
+    def add(self, name: str, value: float | None) -> None:
+        """Adds the value of one picture."""
+        self.values.setdefault(name, [])
+        if value is not None:
+            self.values[name].append(value)
+
+    def means(self) -> dict[str, float | None]:
+        """Mean of each metric, None where no picture had a value."""
+        return {name: float(np.mean(v)) if v else None for name, v in self.values.items()}
+
+
+def add_picture(scores: Scores, predicted: np.ndarray, truth: np.ndarray) -> None:
+    """Adds `psnr` and `ssim` of one whole picture.
+
+    Args:
+        scores: Where to.
+        predicted: (H, W, 3) in [0, 1].
+        truth: (H, W, 3) in [0, 1].
+    """
+    scores.add("psnr", psnr(predicted, truth))
+    scores.add("ssim", float(ssim(torch.from_numpy(predicted), torch.from_numpy(truth))))
+
+
+def write_pictures(
+    folder: Path, view: View, predicted: np.ndarray, truth: np.ndarray, mask: np.ndarray | None
+) -> None:
+    """Writes `FOLDER/{pred,gt,mask}/CAMERA/%06d.png`."""
+    for part, picture in {"pred": predicted, "gt": truth, "mask": mask}.items():
+        if picture is None:
+            continue
+        path = folder / part / view.camera.name / f"{view.frame:06d}.png"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        Image.fromarray((picture * 255 + 0.5).astype(np.uint8)).save(path)

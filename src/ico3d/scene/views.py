@@ -1,0 +1,182 @@
+"""Which pictures a static scene is trained on and measured with, and what they ask of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ico3d.capture.capture import Capture
+from ico3d.capture.pictures import LayerCache, Layers, View
+from ico3d.common.camera import Camera
+from ico3d.errors import CaptureError
+
+Only = Literal["all", "person", "background"]
+Frames = int | Literal["all"]
+Space = Literal["world", "head"]
+
+TEST_EVERY = 8
+"""Of the pictures of one moment every 8th, from the first on, is a test picture; fewer all train.
+The usual rule for static scenes (LLFF's)."""
+
+
+@dataclass(frozen=True)
+class Example:
+    """What one picture asks of a scene.
+
+    Attributes:
+        target: (H, W, 3) what the rendering should be.
+        behind: What to render over: (3,) a colour, or None for black.
+        weight: (H, W) in [0, 1], how much a pixel counts; None where all do.
+    """
+
+    target: Tensor
+    behind: Tensor | None
+    weight: Tensor | None
+
+    def to(self, device: torch.device) -> "Example":
+        """The same on another device."""
+        parts = (self.target, self.behind, self.weight)
+        return Example(*(None if part is None else part.to(device) for part in parts))  # type: ignore[arg-type]
+
+
+class SceneViews:
+    """The pictures of a capture that show a static scene.
+
+    A person whose head poses are known is trained in canonical head space, so that the head's own
+    movement does not blur it; everything else in the world. A background comes from clean plates
+    where the capture has them, else from what the masks leave.
+
+    Attributes:
+        path: Where the capture lies.
+        only: What of the pictures is wanted.
+        space: Where the scene lies.
+        train: Views to learn from.
+        test: Views to measure with: the capture's test frames, or of a single moment every 8th.
+    """
+
+    def __init__(self, capture: Capture, only: Only, frames: Frames, cache_gib: float):
+        """Finds the recorded views.
+
+        Args:
+            capture: Where pictures come from.
+            only: The whole picture, the person cut out, or everything else.
+            frames: All frames, or the number of one.
+            cache_gib: Memory for pictures.
+
+        Raises:
+            CaptureError: If there are no pictures, a mask is missing, or there is no such frame.
+        """
+        if frames != "all" and not 0 <= frames < capture.num_frames:
+            raise CaptureError(
+                f"{capture.path} has frames 0 to {capture.num_frames - 1}, not {frames}."
+            )
+        self._capture, self.path, self.only = capture, capture.path, only
+        self._plates = only == "background" and capture.background(0) is not None
+        follows = only == "person" and capture.world_from_head(0) is not None
+        self.space: Space = "head" if follows else "world"
+        self._cache = LayerCache(self._read, cache_gib)
+        self._known_plates: dict[int, Tensor | None] = {}
+        if frames == "all" and capture.split.train and capture.split.test and not self._plates:
+            self.train = self._views(capture.split.train)
+            self.test = self._views(capture.split.test)
+        else:
+            self.train, self.test = _every_eighth(self._views(self._moment(frames)))
+        if not self.train:
+            raise CaptureError(f"{capture.path} has no picture among its training frames.")
+
+    def layers(self, view: View) -> tuple[Tensor, Tensor | None]:
+        """Picture (H, W, 3) and mask (H, W) of a view, on the CPU.
+
+        Raises:
+            CaptureError: If there is no such picture.
+        """
+        found = self._cache.layers(view.camera_index, view.frame)
+        if found is None:
+            raise CaptureError(f"{self._where(view)} has vanished.")
+        image, mask = (None if layer is None else torch.from_numpy(layer) / 255 for layer in found)
+        assert image is not None
+        return image, mask
+
+    def plate(self, view: View) -> Tensor | None:
+        """(H, W, 3) what the view's camera sees without the person, where that is known."""
+        index = view.camera_index
+        if index not in self._known_plates:
+            found = self._capture.background(index)
+            self._known_plates[index] = None if found is None else torch.from_numpy(found)
+        return self._known_plates[index]
+
+    def example(self, view: View, color: np.ndarray) -> Example:
+        """What a view asks for.
+
+        Args:
+            view: One of `train` or `test`.
+            color: (3,) what a person that is cut out stands before.
+
+        Raises:
+            CaptureError: If the person is wanted and this view has no mask.
+        """
+        image, mask = self.layers(view)
+        if self.only == "person":
+            if mask is None:
+                raise CaptureError(
+                    f"{self._where(view)} has no mask: record clean plates and make masks, "
+                    "or train with --only all."
+                )
+            behind = torch.from_numpy(color).float()
+            outside, plate = 1 - mask[..., None], self.plate(view)  # (H, W, 1)
+            person = image * mask[..., None] if plate is None else image - outside * plate
+            return Example(person + outside * behind, behind, None)
+        weight = 1 - mask if self.only == "background" and mask is not None else None
+        return Example(image, None, weight)
+
+    def _views(self, frames: Sequence[int]) -> tuple[View, ...]:
+        """All recorded views of these frames, in this scene's space."""
+        cameras = range(len(self._capture.cameras))
+        return tuple(
+            View(camera, frame, self._camera(camera, frame))
+            for frame in frames
+            for camera in cameras
+            if self._cache.layers(camera, frame) is not None
+        )
+
+    def _moment(self, frames: Frames) -> Sequence[int]:
+        """The frames that count as one moment; a plate is the same in all of them."""
+        if self._plates:
+            return (0,)
+        return range(self._capture.num_frames) if frames == "all" else (frames,)
+
+    def _camera(self, camera: int, frame: int) -> Camera:
+        """A camera in this scene's space."""
+        seen = self._capture.cameras[camera]
+        if self.space == "world":
+            return seen
+        pose = self._capture.world_from_head(frame)
+        if pose is None or not np.isfinite(pose).all():
+            raise CaptureError(
+                f"{self.path}: frame {frame} has no finite head pose: "
+                "look at it with ico3d capture check."
+            )
+        return seen.moved(pose)
+
+    def _read(self, camera: int, frame: int) -> Layers | None:
+        """Picture and mask of a view; of a background its clean plate alone."""
+        if self._plates:
+            plate = self._capture.background(camera)
+            return None if plate is None else (plate, None)
+        image = self._capture.image(camera, frame)
+        return None if image is None else (image, self._capture.mask(camera, frame))
+
+    def _where(self, view: View) -> str:
+        """Names a picture in an error."""
+        return f"{self.path}: the picture of frame {view.frame} by camera {view.camera.name}"
+
+
+def _every_eighth(views: tuple[View, ...]) -> tuple[tuple[View, ...], tuple[View, ...]]:
+    """Views to train on and to test with."""
+    if len(views) < TEST_EVERY:
+        return views, ()
+    kept = tuple(view for place, view in enumerate(views) if place % TEST_EVERY)
+    return kept, views[::TEST_EVERY]

@@ -1,0 +1,50 @@
+"""Density control: where Gaussians are needed, more of them; where they are not, none.
+
+`growth` plans as 3DGS does, `strategy` has the interface to train with, `plan` carries everything
+that exists per Gaussian along, `relocation` the formula of the Markov chain.
+"""
+
+from ico3d.splat.density.growth import (
+    DensitySettings,
+    DensityStats,
+    contributions,
+    densify_plan,
+    reset_opacity_logits,
+)
+from ico3d.splat.density.plan import (
+    Plan,
+    Population,
+    apply_plan,
+    apply_plan_to_geometry,
+    apply_plan_to_state,
+)
+from ico3d.splat.density.relocation import MAX_COPIES, relocated
+from ico3d.splat.density.strategy import (
+    DefaultStrategy,
+    McmcSettings,
+    McmcStrategy,
+    Schedule,
+    Strategy,
+    StrategyName,
+)
+
+__all__ = [
+    "MAX_COPIES",
+    "DefaultStrategy",
+    "DensitySettings",
+    "DensityStats",
+    "McmcSettings",
+    "McmcStrategy",
+    "Plan",
+    "Population",
+    "Schedule",
+    "Strategy",
+    "StrategyName",
+    "apply_plan",
+    "apply_plan_to_geometry",
+    "apply_plan_to_state",
+    "contributions",
+    "densify_plan",
+    "relocated",
+    "reset_opacity_logits",
+]

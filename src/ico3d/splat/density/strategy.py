@@ -1,0 +1,257 @@
+"""How the number of Gaussians follows the training: one interface, two strategies.
+
+`DefaultStrategy` is 3DGS (clone, split, prune, opacity reset), `McmcStrategy` is Kheradmand et al.,
+"3D Gaussian Splatting as Markov Chain Monte Carlo", 2024. Both work on any device. gsplat has both
+as well, but bound to torch.optim, to the process's random state (a resumed run would not repeat the
+uninterrupted one) and, the default, without a cap; so of gsplat the relocation kernel is used.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import torch
+from torch import Tensor
+
+from ico3d.errors import ModelError
+from ico3d.splat import quaternions
+from ico3d.splat.density.growth import (
+    DensitySettings,
+    DensityStats,
+    densify_plan,
+    reset_opacity_logits,
+    under_cap,
+)
+from ico3d.splat.density.plan import Plan, Population
+from ico3d.splat.density.relocation import relocated
+from ico3d.splat.rendering import RenderInfo
+
+StrategyName = Literal["default", "mcmc"]
+
+NOISE_SHARPNESS = 100.0
+"""Noise fades as σ(100·(0.005 − o)): it shakes the almost transparent."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """When the set of Gaussians changes.
+
+    Attributes:
+        begin: First step at which it may.
+        until: It does not from this step on.
+        every: Steps between two changes.
+    """
+
+    begin: int = 500
+    until: int = 15_000
+    every: int = 100
+
+    def due(self, step: int) -> bool:
+        """Whether it changes after this step."""
+        return self.begin <= step < self.until and step % self.every == 0
+
+
+@dataclass(frozen=True)
+class McmcSettings:
+    """Numbers of the Markov chain; lengths are relative to the scene's extent.
+
+    Attributes:
+        max_gaussians: Never more than this many.
+        min_opacity: Those whose opacity is not above this are relocated.
+        growth: Factor by which the Gaussians multiply at each change, up to the cap.
+        noise_rate: λ_noise of the paper: shakes means by this times their learning rate times their
+            covariance.
+        opacity_weight: λ_o, of the mean opacity in the loss.
+        scale_weight: λ_Σ, of the mean scale in the loss.
+    """
+
+    max_gaussians: int = 1_000_000
+    min_opacity: float = 0.005
+    growth: float = 1.05
+    noise_rate: float = 5e5
+    opacity_weight: float = 0.01
+    scale_weight: float = 0.01
+
+
+class Strategy(ABC):
+    """Density control during one training.
+
+    The order within a step: render, loss + `penalty`, backward, `observe`, optimiser, `adapt`.
+    All randomness follows from the seed and the step's number.
+    """
+
+    def __init__(self, schedule: Schedule, max_gaussians: int, seed: int):
+        """Plans by a schedule and for a cap."""
+        self.schedule, self.max_gaussians, self._seed = schedule, max_gaussians, seed
+
+    def penalty(self, population: Population) -> Tensor:
+        """What the strategy adds to the loss: a scalar, 0 by default."""
+        return population.parameters["means"].new_zeros(())
+
+    def observe(self, info: RenderInfo, step: int) -> None:
+        """Gathers what the next change needs, after `backward`; nothing by default."""
+        del info, step
+
+    def adapt(self, population: Population, step: int, rate: float) -> None:
+        """Changes the set of Gaussians if it is time, and whenever it is above the cap.
+
+        Args:
+            population: Changed in place; afterwards it is not above `max_gaussians`.
+            step: Number of the step just done.
+            rate: Learning rate of the means in that step, relative to the scene's extent.
+
+        Raises:
+            ModelError: If no Gaussian is left.
+        """
+        if not self.schedule.due(step) and len(population) <= self.max_gaussians:
+            return
+        with torch.no_grad():
+            self._change(population, step, self._generator(step, 0))
+        if len(population) == 0:
+            raise ModelError(
+                f"all Gaussians have faded by step {step}: lower opacity_rate, or look "
+                "for damaged pictures with ico3d capture check."
+            )
+
+    @abstractmethod
+    def _change(self, population: Population, step: int, generator: torch.Generator) -> None:
+        """Carries out a change after a step."""
+
+    def tensors(self) -> dict[str, Tensor]:
+        """What has been gathered, for checkpoints."""
+        return {}
+
+    def restore(self, tensors: dict[str, Tensor]) -> None:
+        """Takes back what `tensors` gave."""
+        del tensors
+
+    def _generator(self, step: int, purpose: int) -> torch.Generator:
+        """Random numbers of one step."""
+        return torch.Generator().manual_seed(hash((self._seed, step, purpose)) % 2**63)
+
+
+class DefaultStrategy(Strategy):
+    """3DGS: those with strong screen gradients clone or split, the faint and the huge die.
+
+    As in 3DGS the huge die only after the first opacity reset: what a scene begins with may be
+    sparse, and far away everything is large.
+    """
+
+    def __init__(self, schedule: Schedule, settings: DensitySettings, seed: int, reset_every: int):
+        """Gathers nothing yet.
+
+        Args:
+            schedule: When to densify.
+            settings: Thresholds and the cap.
+            seed: Decides where the parts of split Gaussians lie.
+            reset_every: Steps between two opacity resets while densifying; 0 for none.
+        """
+        super().__init__(schedule, settings.max_gaussians, seed)
+        self._settings, self._reset_every = settings, reset_every
+        self._stats = DensityStats.zeros(0)
+
+    def observe(self, info: RenderInfo, step: int) -> None:
+        """Gathers screen gradients."""
+        if step >= self.schedule.until:
+            return
+        if len(self._stats.views) != info.radii.shape[1]:
+            self._stats = DensityStats.zeros(info.radii.shape[1], info.radii.device)
+        self._stats.add(info)
+
+    def adapt(self, population: Population, step: int, rate: float) -> None:
+        """Densifies and prunes if it is time, then resets opacities if it is time for that."""
+        super().adapt(population, step, rate)
+        resets = self._reset_every and 0 < step < self.schedule.until
+        if resets and step % self._reset_every == 0:
+            ceiling = 2 * self._settings.prune_opacity
+            logits = population.parameters["opacity_logits"]
+            population.replace("opacity_logits", reset_opacity_logits(logits, ceiling))
+            population.forget("opacity_logits")
+
+    def _change(self, population: Population, step: int, generator: torch.Generator) -> None:
+        if len(self._stats.views) != len(population):
+            self._stats = DensityStats.zeros(len(population), population.scales.device)
+        settings = self._settings
+        if not 0 < self._reset_every < step:
+            settings = replace(settings, prune_scale=math.inf)
+        plan = densify_plan(self._stats, population.scales, population.opacities, settings)
+        population.carry_out(plan, generator)
+        self._stats = DensityStats.zeros(len(population), population.scales.device)
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Screen gradients gathered so far."""
+        return {"gradient_sum": self._stats.gradient_sum, "views": self._stats.views}
+
+    def restore(self, tensors: dict[str, Tensor]) -> None:
+        """Takes back what `tensors` gave."""
+        self._stats = DensityStats(tensors["gradient_sum"], tensors["views"])
+
+
+class McmcStrategy(Strategy):
+    """Gaussians as samples: the dead move to the living, the set grows, all but the sure shake."""
+
+    def __init__(self, schedule: Schedule, settings: McmcSettings, seed: int, extent: float):
+        """Starts a chain.
+
+        Args:
+            schedule: When to relocate and to grow.
+            settings: Its numbers and the cap.
+            seed: Decides who is copied, and the noise.
+            extent: Size of the scene in metres: noise and penalty shall not depend on the unit.
+        """
+        super().__init__(schedule, settings.max_gaussians, seed)
+        self._settings, self._extent = settings, extent
+
+    def penalty(self, population: Population) -> Tensor:
+        """λ_o·mean(o) + λ_Σ·mean(s): what is not needed fades and shrinks."""
+        settings = self._settings
+        scales = population.scales.mean() / self._extent
+        return (
+            settings.opacity_weight * population.opacities.mean() + settings.scale_weight * scales
+        )
+
+    def adapt(self, population: Population, step: int, rate: float) -> None:
+        """Relocates and grows if it is time, then shakes the means."""
+        super().adapt(population, step, rate)
+        with torch.no_grad():
+            self._shake(population, rate, self._generator(step, 1))
+
+    def _change(self, population: Population, step: int, generator: torch.Generator) -> None:
+        del step
+        plan = self._plan(population.opacities, generator)
+        copies = 1 + torch.bincount(plan.clone_from, minlength=len(population))  # (N,)
+        population.carry_out(plan, generator)
+        copies = copies[plan.sources]  # (M,)
+        several = (copies > 1).nonzero()[:, 0]
+        opacities, scales = relocated(
+            population.opacities[several], population.scales[several], copies[several]
+        )
+        opacities = opacities.clamp_min(self._settings.min_opacity)
+        for name, value in (("opacity_logits", opacities.logit()), ("log_scales", scales.log())):
+            population.parameters[name].detach()[several] = value
+        for name in population.parameters:
+            population.forget(name, several)
+
+    def _plan(self, opacities: Tensor, generator: torch.Generator) -> Plan:
+        """Who lives, and who is copied into the place of the dead and as a newcomer."""
+        alive = under_cap(opacities > self._settings.min_opacity, opacities, self.max_gaussians)
+        keep = alive.nonzero()[:, 0]
+        wanted = min(self.max_gaussians, int(self._settings.growth * len(opacities)))
+        none = keep[:0]
+        if len(keep) == 0 or wanted <= len(keep):
+            return Plan(keep, none, none)
+        weights = opacities[keep].double().cpu()
+        drawn = torch.multinomial(weights, wanted - len(keep), True, generator=generator)
+        return Plan(keep, keep[drawn.to(keep.device)], none)
+
+    def _shake(self, population: Population, rate: float, generator: torch.Generator) -> None:
+        """Adds Σ·ξ / extent, times noise and learning rate, to the means of the faint."""
+        means, scales = population.parameters["means"].detach(), population.scales
+        threshold = self._settings.min_opacity
+        faint = torch.sigmoid(NOISE_SHARPNESS * (threshold - population.opacities))  # (N,)
+        noise = torch.randn(means.shape, generator=generator).to(means)  # (N, 3)
+        noise *= (faint * rate * self._settings.noise_rate / self._extent)[:, None]
+        turns = quaternions.to_matrix(population.parameters["quats"])  # (N, 3, 3)
+        turned = scales**2 * (turns.mT @ noise[..., None])[..., 0]  # (N, 3)
+        means += (turns @ turned[..., None])[..., 0]
