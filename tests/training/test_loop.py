@@ -8,6 +8,7 @@ import torch
 
 from ico3d.errors import ModelError, SettingsError
 from ico3d.training.checkpoint import load_tensors, save_tensors
+from ico3d.training.log import MetricsLog
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.optimiser import Optimiser
 from ico3d.training.run import RunFolder
@@ -94,3 +95,23 @@ def test_finishing_drops_the_checkpoint(tmp_path):
     run.finish({"seconds": 1.0})
     assert run.checkpoint() is None
     assert run.finished() == {"seconds": 1.0}
+
+
+def test_a_run_killed_while_it_finished_loses_its_checkpoint_later(tmp_path):
+    run = RunFolder(tmp_path, {})
+    run_loop(Walk(), run, SETTINGS)
+    checkpoint = (tmp_path / "checkpoint.safetensors").read_bytes()
+    run.finish({"seconds": 1.0})
+    (tmp_path / "checkpoint.safetensors").write_bytes(checkpoint)
+    assert RunFolder(tmp_path, {}).checkpoint() is None
+
+
+def test_metrics_of_a_torn_line_are_dropped(tmp_path):
+    log = MetricsLog(tmp_path, 0)
+    log.write(0, {"loss": 1.0})
+    log.write(5, {"loss": 0.5})
+    log.close()
+    path = tmp_path / "metrics.jsonl"
+    path.write_text(path.read_text() + '{"step": 6, "lo')
+    MetricsLog(tmp_path, 7).close()
+    assert [json.loads(line)["step"] for line in path.read_text().splitlines()] == [0, 5]
