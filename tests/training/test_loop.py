@@ -8,6 +8,7 @@ import torch
 
 from ico3d.errors import ModelError, SettingsError
 from ico3d.training.checkpoint import load_tensors, save_tensors
+from ico3d.training.finite import NotFiniteError, check_finite
 from ico3d.training.log import MetricsLog
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.optimiser import Optimiser
@@ -61,9 +62,40 @@ def test_a_killed_run_resumes_to_the_same_weights_and_metrics(tmp_path):
     assert steps == [0, 5, 10, 15, 19]
 
 
-def test_nan_names_the_parameter(tmp_path):
-    with pytest.raises(ModelError, match="'weight' is not finite after step 6"):
-        run_loop(Walk(break_at=6), RunFolder(tmp_path, {}), SETTINGS)
+def test_a_nan_gradient_is_named_before_it_is_taken_over(tmp_path):
+    walk = Walk(break_at=6)
+    with pytest.raises(
+        ModelError, match=r"the gradient of 'weight' is not finite at step 6: .* from step 4\)"
+    ):
+        run_loop(walk, RunFolder(tmp_path, {}), SETTINGS)
+    assert all(torch.isfinite(tensor).all() for tensor in walk.tensors().values())
+    whole, mended = Walk(), Walk()
+    run_loop(whole, RunFolder(tmp_path / "whole", {}), SETTINGS)
+    run_loop(mended, RunFolder(tmp_path, {}), SETTINGS)  # from the checkpoint, which is good
+    assert torch.equal(mended.weight, whole.weight)
+
+
+def test_a_nan_that_reaches_no_loss_is_found_at_the_next_entry(tmp_path):
+    class Hidden(Walk):
+        def step(self, index: int) -> dict[str, float]:
+            if index == 12:
+                self.unseen[1] = torch.inf
+            return super().step(index)
+
+        def tensors(self) -> dict[str, torch.Tensor]:
+            return super().tensors() | {"unseen": self.unseen}
+
+        unseen = torch.zeros(2)
+
+    settings = LoopSettings(steps=100, log_every=5, checkpoint_every=50)
+    with pytest.raises(ModelError, match=r"'unseen' is not finite at step 15: .* from step 0\)"):
+        run_loop(Hidden(), RunFolder(tmp_path, {}), settings)
+
+
+def test_great_but_finite_values_are_let_pass():
+    check_finite({"a": torch.tensor([3e38, 3e38]), "b": torch.tensor([-torch.inf]).nan_to_num()})
+    with pytest.raises(NotFiniteError, match="'a' is not finite"):
+        check_finite({"a": torch.tensor([torch.inf, -torch.inf])})
 
 
 def test_a_folder_keeps_to_its_settings(tmp_path):
