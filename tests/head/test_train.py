@@ -143,9 +143,13 @@ def test_a_nan_in_a_picture_stops_before_anything_is_spoiled(tiny, tmp_path, mon
 
 
 def test_settings_can_be_changed_by_name():
-    changed = PRESETS["cpu"].with_changes(("steps=7", "basis_rate=0.5", "optimiser=sgd"))
+    words = ("steps=7", "basis_rate=0.5", "optimiser=sgd", "compile=true", "mixed_precision=false")
+    changed = PRESETS["cpu"].with_changes(words)
     assert (changed.steps, changed.basis_rate, changed.optimiser) == (7, 0.5, "sgd")
+    assert (changed.compile, changed.mixed_precision) == (True, False)
     with pytest.raises(SettingsError, match="no setting 'stepz'"):
         changed.with_changes(("stepz=7",))
     with pytest.raises(SettingsError, match="steps takes int values"):
         changed.with_changes(("steps=x",))
+    with pytest.raises(SettingsError, match="compile takes true or false"):
+        changed.with_changes(("compile=yes",))

@@ -7,6 +7,8 @@ from typing import Literal
 from ico3d.errors import SettingsError
 from ico3d.training.optimiser import Rate
 
+_TRUTH = {"true": True, "false": False}
+
 
 @dataclass(frozen=True)
 class HeadSettings:
@@ -51,6 +53,8 @@ class HeadSettings:
             sampled picture, as a factor of the median over all Gaussians, are removed.
         checkpoint_every: Steps between checkpoints.
         cache_gib: Images kept in memory, in GiB; further ones are read again at each use.
+        mixed_precision: Whether the MLP computes in bfloat16; on CUDA only.
+        compile: Whether torch.compile makes the MLP's code, which takes half a minute first.
     """
 
     steps: int = 50_000
@@ -86,6 +90,8 @@ class HeadSettings:
     prune_contribution: float = 0.0
     checkpoint_every: int = 1_000
     cache_gib: float = 2.0
+    mixed_precision: bool = False
+    compile: bool = False
 
     def rates(self, has_mlp: bool) -> dict[str, Rate]:
         """The learning rates by parameter group, for a model with or without an MLP."""
@@ -116,9 +122,10 @@ class HeadSettings:
                 raise SettingsError(f"there is no setting '{name}': known are {', '.join(fields)}.")
             kind = type(getattr(self, name))
             try:
-                values[name] = kind(text)
-            except ValueError:
-                raise SettingsError(f"'{change}': {name} takes {kind.__name__} values.") from None
+                values[name] = _TRUTH[text] if kind is bool else kind(text)
+            except (ValueError, KeyError):
+                words = "true or false" if kind is bool else f"{kind.__name__} values"
+                raise SettingsError(f"'{change}': {name} takes {words}.") from None
         return dataclasses.replace(self, **values)
 
 

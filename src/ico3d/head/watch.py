@@ -97,7 +97,10 @@ class WatchedHead:
         moving = [name for name, index in self._inputs.items() if spread[index] > STILL]
         moving.sort(key=lambda name: -float(spread[self._inputs[name]]))
         columns = {name: expressions[:, self._inputs[name]] for name in moving[:MOST_SLIDERS]}
-        return [Slider(name, float(c.min()), float(c.max())) for name, c in columns.items()]
+        return [
+            Slider(name, round(float(values.min()), 3), round(float(values.max()), 3))
+            for name, values in columns.items()
+        ]
 
 
 def _named_inputs(model: HeadModel, track: ExpressionTrack) -> dict[str, int]:

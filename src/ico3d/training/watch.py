@@ -169,7 +169,7 @@ class LivePage:
         values = self._subject.values(frame)
         for slider in self._subject.sliders:
             value = min(max(values[slider.name], slider.low), slider.high)
-            self._sliders[slider.name].value = value
+            self._sliders[slider.name].value = round(value, 3)
 
     def _toggle(self) -> None:
         """Pauses or goes on."""
