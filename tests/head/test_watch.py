@@ -13,11 +13,14 @@ import pytest
 import torch
 from safetensors.torch import load_file
 
+from ico3d.common.expression import EYE_NAMES
 from ico3d.errors import MissingExtraError
-from ico3d.head.expressions import BlendshapeTrack
+from ico3d.head.expressions import BlendshapeTrack, SpeechTrack
+from ico3d.head.model import HeadModel, HeadShape
 from ico3d.head.settings import PRESETS
 from ico3d.head.train import HeadJob, train_head
 from ico3d.head.watch import WatchedHead
+from ico3d.speech.network import SpeechAdaptor
 from ico3d.training.watch import RADIUS, LivePage
 
 viser = pytest.importorskip("viser")
@@ -57,6 +60,10 @@ class Browser:
     def move(self, handle, value) -> None:
         """Moves a slider, or presses a button (value True)."""
         self._send("GuiUpdateMessage", uuid=handle._impl.uuid, updates={"value": value})
+
+    def ask_to_share(self) -> None:
+        """What the button does that the page does not show."""
+        self._send("ShareUrlRequest")
 
     def close(self) -> None:
         self._socket.close()
@@ -125,6 +132,13 @@ def test_a_moved_slider_changes_the_gaussians(page, browser, head):
     assert np.array_equal(page._pictures.image, shown)  # pictures keep to what was recorded
 
 
+def test_nobody_can_have_the_page_shared(page, browser):
+    browser.ask_to_share()
+    browser.move(page._frame, 3)
+    _step(page, lambda: page._frame_shown == 3)  # by now the other is answered, too
+    assert page.server._share_tunnel is None
+
+
 def test_a_moved_frame_changes_sliders_and_pictures(page, browser, head):
     tiny, _ = head
     browser.move(page._frame, 7)
@@ -160,6 +174,18 @@ def test_the_scene_is_upright_and_of_its_size(page, head):
     view = page.server.initial_camera
     np.testing.assert_allclose(view.position / page._scale, [0, 0, 1], atol=0.03)
     assert view.fov == pytest.approx(2 * np.arctan(24 / 60))
+
+
+def test_sliders_are_for_named_inputs_that_do_something(head):
+    tiny, _ = head
+    speech = SpeechTrack(tiny, np.zeros((40, 64), np.float32), SpeechAdaptor(64))
+    driven = HeadModel(HeadShape(speech.size), 5)
+    subject = WatchedHead(tiny, driven, speech)
+    assert {slider.name for slider in subject.sliders} == set(EYE_NAMES)
+    assert all((slider.low, slider.high) == (0, 0.2) for slider in subject.sliders)
+    static = HeadModel(HeadShape(3, "static"), 5)
+    track = BlendshapeTrack(tiny, tiny.blendshape_names)
+    assert WatchedHead(tiny, static, track).sliders == []
 
 
 def test_watching_changes_nothing_of_what_is_learnt(head, tmp_path):

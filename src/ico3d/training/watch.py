@@ -97,9 +97,11 @@ class LivePage:
         self._running.set()
         self._updated, self._frame_shown = 0.0, 0
         self.server = viser.ViserServer(HOST, port, label="ico3d", verbose=False)
+        # Anybody who reaches the page could have viser open a tunnel to it from the internet.
+        self.server.request_share_url = lambda verbose=True: None
         self.server.gui.configure_theme(show_share_button=False, control_width="large")
         self.server.on_client_connect(lambda _: self._changed.set())
-        first = subject.gaussians(0, subject.values(0)).detach()
+        first = subject.gaussians(0, subject.values(0))
         self._center, self._scale = _placed(first)
         self._stand()
         self._splats = self.server.scene.add_gaussian_splats("/gaussians", *self._arrays(first))
@@ -202,12 +204,12 @@ class LivePage:
             colors,
             gaussians.opacities[:, None],
         )
-        return tuple(tensor.float().cpu().numpy() for tensor in tensors)
+        return tuple(tensor.detach().float().cpu().numpy() for tensor in tensors)
 
 
 def _placed(gaussians: Gaussians) -> tuple[np.ndarray, float]:
     """The middle (3,) of Gaussians, and the factor that makes most of them fit in `RADIUS`."""
-    means = gaussians.means.cpu().double().numpy()
+    means = gaussians.means.detach().cpu().double().numpy()
     center = np.median(means, 0)  # (3,)
     radius = np.quantile(np.linalg.norm(means - center, axis=1), 0.9)
     return center, RADIUS / max(float(radius), 1e-6)
