@@ -37,7 +37,7 @@ class Browser:
     def __init__(self, port: int):
         from websockets.sync.client import connect
 
-        self.html = urllib.request.urlopen(f"http://127.0.0.1:{port}").read()
+        self.html = urllib.request.urlopen(f"http://127.0.0.1:{port}", timeout=20).read()
         protocol = f"viser-v{viser.__version__}"
         self._socket = connect(
             f"ws://127.0.0.1:{port}", subprotocols=[protocol], max_size=None, ping_interval=None
