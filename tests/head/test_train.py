@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 import torch
 
-from ico3d.errors import CaptureError, SettingsError
+from ico3d.errors import CaptureError, ModelError, SettingsError
 from ico3d.head.settings import PRESETS
 from ico3d.head.train import HeadJob, train_head
 from ico3d.head.trained import TrainedHead
 from ico3d.head.trainer import HeadTrainer
 from ico3d.splat.render import render
+from ico3d.training.checkpoint import load_tensors
+from ico3d.training.finite import check_finite
 
 SETTINGS = dataclasses.replace(
     PRESETS["cpu"],
@@ -123,10 +125,31 @@ def test_a_nan_pose_names_its_frame(tiny, tmp_path, monkeypatch):
         train_head(tiny, tmp_path / "model", _job())
 
 
+def test_a_nan_in_a_picture_stops_before_anything_is_spoiled(tiny, tmp_path, monkeypatch):
+    job = _job(steps=60, checkpoint_every=25)
+    staged = HeadTrainer._staged
+
+    def torn(self, view, picture, index):
+        background, target = staged(self, view, picture, index)
+        target[3, 3] = np.nan if index == 31 else target[3, 3]
+        return background, target
+
+    monkeypatch.setattr(HeadTrainer, "_staged", torn)
+    with pytest.raises(ModelError, match=r"'basis' is not finite at step 31: .* from step 25\)"):
+        train_head(tiny, tmp_path / "model", job)
+    tensors, state = load_tensors(tmp_path / "model" / "checkpoint.safetensors")
+    assert state["step"] == 25
+    check_finite(tensors)
+
+
 def test_settings_can_be_changed_by_name():
-    changed = PRESETS["cpu"].with_changes(("steps=7", "basis_rate=0.5", "optimiser=sgd"))
+    words = ("steps=7", "basis_rate=0.5", "optimiser=sgd", "compile=true", "mixed_precision=false")
+    changed = PRESETS["cpu"].with_changes(words)
     assert (changed.steps, changed.basis_rate, changed.optimiser) == (7, 0.5, "sgd")
+    assert (changed.compile, changed.mixed_precision) == (True, False)
     with pytest.raises(SettingsError, match="no setting 'stepz'"):
         changed.with_changes(("stepz=7",))
     with pytest.raises(SettingsError, match="steps takes int values"):
         changed.with_changes(("steps=x",))
+    with pytest.raises(SettingsError, match="compile takes true or false"):
+        changed.with_changes(("compile=yes",))

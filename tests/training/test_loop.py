@@ -8,6 +8,8 @@ import torch
 
 from ico3d.errors import ModelError, SettingsError
 from ico3d.training.checkpoint import load_tensors, save_tensors
+from ico3d.training.finite import NotFiniteError, check_finite
+from ico3d.training.log import MetricsLog
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.optimiser import Optimiser
 from ico3d.training.run import RunFolder
@@ -60,9 +62,40 @@ def test_a_killed_run_resumes_to_the_same_weights_and_metrics(tmp_path):
     assert steps == [0, 5, 10, 15, 19]
 
 
-def test_nan_names_the_parameter(tmp_path):
-    with pytest.raises(ModelError, match="'weight' is not finite after step 6"):
-        run_loop(Walk(break_at=6), RunFolder(tmp_path, {}), SETTINGS)
+def test_a_nan_gradient_is_named_before_it_is_taken_over(tmp_path):
+    walk = Walk(break_at=6)
+    with pytest.raises(
+        ModelError, match=r"the gradient of 'weight' is not finite at step 6: .* from step 4\)"
+    ):
+        run_loop(walk, RunFolder(tmp_path, {}), SETTINGS)
+    assert all(torch.isfinite(tensor).all() for tensor in walk.tensors().values())
+    whole, mended = Walk(), Walk()
+    run_loop(whole, RunFolder(tmp_path / "whole", {}), SETTINGS)
+    run_loop(mended, RunFolder(tmp_path, {}), SETTINGS)  # from the checkpoint, which is good
+    assert torch.equal(mended.weight, whole.weight)
+
+
+def test_a_nan_that_reaches_no_loss_is_found_at_the_next_entry(tmp_path):
+    class Hidden(Walk):
+        def step(self, index: int) -> dict[str, float]:
+            if index == 12:
+                self.unseen[1] = torch.inf
+            return super().step(index)
+
+        def tensors(self) -> dict[str, torch.Tensor]:
+            return super().tensors() | {"unseen": self.unseen}
+
+        unseen = torch.zeros(2)
+
+    settings = LoopSettings(steps=100, log_every=5, checkpoint_every=50)
+    with pytest.raises(ModelError, match=r"'unseen' is not finite at step 15: .* from step 0\)"):
+        run_loop(Hidden(), RunFolder(tmp_path, {}), settings)
+
+
+def test_great_but_finite_values_are_let_pass():
+    check_finite({"a": torch.tensor([3e38, 3e38]), "b": torch.tensor([-torch.inf]).nan_to_num()})
+    with pytest.raises(NotFiniteError, match="'a' is not finite"):
+        check_finite({"a": torch.tensor([torch.inf, -torch.inf])})
 
 
 def test_a_folder_keeps_to_its_settings(tmp_path):
@@ -94,3 +127,23 @@ def test_finishing_drops_the_checkpoint(tmp_path):
     run.finish({"seconds": 1.0})
     assert run.checkpoint() is None
     assert run.finished() == {"seconds": 1.0}
+
+
+def test_a_run_killed_while_it_finished_loses_its_checkpoint_later(tmp_path):
+    run = RunFolder(tmp_path, {})
+    run_loop(Walk(), run, SETTINGS)
+    checkpoint = (tmp_path / "checkpoint.safetensors").read_bytes()
+    run.finish({"seconds": 1.0})
+    (tmp_path / "checkpoint.safetensors").write_bytes(checkpoint)
+    assert RunFolder(tmp_path, {}).checkpoint() is None
+
+
+def test_metrics_of_a_torn_line_are_dropped(tmp_path):
+    log = MetricsLog(tmp_path, 0)
+    log.write(0, {"loss": 1.0})
+    log.write(5, {"loss": 0.5})
+    log.close()
+    path = tmp_path / "metrics.jsonl"
+    path.write_text(path.read_text() + '{"step": 6, "lo')
+    MetricsLog(tmp_path, 7).close()
+    assert [json.loads(line)["step"] for line in path.read_text().splitlines()] == [0, 5]

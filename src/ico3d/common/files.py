@@ -1,11 +1,15 @@
 """Writing files so that a crash never leaves half of one, and finding model files."""
 
 import os
+import re
 import secrets
 from collections.abc import Callable
 from pathlib import Path
 
 from ico3d.errors import MissingModelError
+
+_TEMPORARY = re.compile(r"\..+\.[0-9a-f]{16}(\.[^.]+)?")
+"""Names that `write_atomic` gives to unfinished files."""
 
 
 def write_atomic(path: Path | str, write: Callable[[Path], None] | bytes) -> None:
@@ -27,8 +31,27 @@ def write_atomic(path: Path | str, write: Callable[[Path], None] | bytes) -> Non
         with temporary.open("rb") as file:
             os.fsync(file.fileno())
         os.replace(temporary, path)
+        _sync_folder(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Removes what writers that were killed left in a folder; nobody may be writing to it now."""
+    for path in folder.iterdir():
+        if _TEMPORARY.fullmatch(path.name):
+            path.unlink()
+
+
+def _sync_folder(folder: Path) -> None:
+    """Makes renames in a folder last through a power cut."""
+    if os.name != "posix":
+        return  # elsewhere folders cannot be opened
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def model_file(name: str, purpose: str) -> Path:

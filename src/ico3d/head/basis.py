@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from ico3d.head.kernels import adam_rank_one, blend_rows, row_products
+from ico3d.training.finite import check_gradient
 from ico3d.training.optimiser import Optimiser, adam_reference, bias_corrections
 
 
@@ -78,8 +79,12 @@ def update_basis(
         gradient: (N, w) of the blended features.
         rate: Learning rate.
         weight_decay: Factor of each row but the bias added to its gradient (L2).
+
+    Raises:
+        NotFiniteError: If a gradient holds NaN or infinity; nothing is changed then.
     """
     basis, weights, gradient = basis.detach(), weights.detach(), gradient.detach()
+    check_gradient("basis", gradient)
     rows = torch.nonzero(weights)[:, 0]  # (active,)
     pulls = torch.full_like(weights, weight_decay)  # (R,)
     pulls[-1] = 0

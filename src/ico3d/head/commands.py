@@ -21,6 +21,8 @@ class TrainHead:
         set: Changes to the preset, as name=value (names: ico3d.head.settings.HeadSettings).
         encoder: Speech encoder for speech-driven heads.
         seed: All randomness follows from it.
+        watch: Shows the training in the browser while it lasts.
+        watch_port: Where, on this machine only; the next free port where it is taken.
     """
 
     capture: tyro.conf.Positional[Path]
@@ -31,6 +33,8 @@ class TrainHead:
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     encoder: str = "builtin"
     seed: int = 0
+    watch: bool = False
+    watch_port: int = 8080
 
     def run(self) -> None:
         """Trains, or goes on training; writes the model folder."""
@@ -42,6 +46,7 @@ class TrainHead:
 
         settings = PRESETS[self.preset].with_changes(self.set)
         job = HeadJob(self.inputs, self.variant, self.encoder, self.seed, settings)
-        head = train_head(Capture.open(self.capture), self.out, job)
+        port = self.watch_port if self.watch else None
+        head = train_head(Capture.open(self.capture), self.out, job, port)
         seconds = head.summary["train_seconds"]
         Console().print(f"{self.out}: {len(head.model)} Gaussians, trained in {seconds:.0f} s.")

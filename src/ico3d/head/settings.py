@@ -50,6 +50,8 @@ class HeadSettings:
             sampled picture, as a factor of the median over all Gaussians, are removed.
         checkpoint_every: Steps between checkpoints.
         cache_gib: Images kept in memory, in GiB; further ones are read again at each use.
+        mixed_precision: Whether the MLP computes in bfloat16; on CUDA only.
+        compile: Whether torch.compile makes the MLP's code, which takes half a minute first.
     """
 
     steps: int = 50_000
@@ -85,6 +87,8 @@ class HeadSettings:
     prune_contribution: float = 0.0
     checkpoint_every: int = 1_000
     cache_gib: float = 2.0
+    mixed_precision: bool = False
+    compile: bool = False
 
     def rates(self, has_mlp: bool) -> dict[str, Rate]:
         """The learning rates by parameter group, for a model with or without an MLP."""

@@ -1,5 +1,6 @@
 """From a capture to a model folder: sets up, trains, saves."""
 
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -10,14 +11,16 @@ from ico3d.capture.capture import Capture
 from ico3d.errors import CaptureError
 from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack, SpeechTrack, speech_features
 from ico3d.head.initial import initial_head
-from ico3d.head.model import Variant
+from ico3d.head.model import HeadModel, Variant
 from ico3d.head.settings import HeadSettings
 from ico3d.head.trained import Inputs, TrainedHead
 from ico3d.head.trainer import HeadTrainer
+from ico3d.head.watch import WatchedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.run import RunFolder
+from ico3d.training.watch import LivePage
 
 
 @dataclass(frozen=True)
@@ -39,13 +42,16 @@ class HeadJob:
     settings: HeadSettings
 
 
-def train_head(capture: Capture, folder: Path, job: HeadJob) -> TrainedHead:
+def train_head(
+    capture: Capture, folder: Path, job: HeadJob, watch_port: int | None = None
+) -> TrainedHead:
     """Trains a head, or goes on with an interrupted run of the same settings.
 
     Args:
         capture: Where pictures, poses and expressions come from.
         folder: Model folder; also holds metrics and checkpoints.
         job: What to train.
+        watch_port: Where a page shows the training while it lasts; None for nowhere.
 
     Returns:
         The trained head, as the folder now holds it.
@@ -54,6 +60,7 @@ def train_head(capture: Capture, folder: Path, job: HeadJob) -> TrainedHead:
         CaptureError: If the capture lacks something that is needed.
         SettingsError: If the folder holds a run with other settings.
         ModelError: If training diverges.
+        MissingExtraError: If it is to be watched and viser is not installed.
     """
     about = asdict(job)
     about |= {"capture": str(capture.path.resolve()), **about.pop("settings")}
@@ -68,7 +75,8 @@ def train_head(capture: Capture, folder: Path, job: HeadJob) -> TrainedHead:
     trainer = HeadTrainer(capture, model, track, adaptor, job.settings, job.seed)
     every = job.settings.checkpoint_every
     loop = LoopSettings(job.settings.steps, checkpoint_every=every, label="head")
-    seconds = run_loop(trainer, run, loop)
+    with _page(capture, model, track, watch_port) as page:
+        seconds = run_loop(trainer, run, loop, page)
     names = track.names if isinstance(track, BlendshapeTrack) else ()
     summary = {
         "train_seconds": seconds,
@@ -79,6 +87,13 @@ def train_head(capture: Capture, folder: Path, job: HeadJob) -> TrainedHead:
     head.save(folder)
     run.finish({"train_seconds": seconds, "num_gaussians": len(trainer.model)})
     return head
+
+
+def _page(
+    capture: Capture, model: HeadModel, track: ExpressionTrack, port: int | None
+) -> AbstractContextManager[LivePage | None]:
+    """The page that shows the training, if there is to be one."""
+    return nullcontext() if port is None else LivePage(WatchedHead(capture, model, track), port)
 
 
 def _inputs(

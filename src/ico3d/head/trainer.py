@@ -18,6 +18,7 @@ from ico3d.head.views import Picture, PictureCache, View
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.density import contributions
 from ico3d.splat.render import render
+from ico3d.training.acceleration import accelerated
 from ico3d.training.optimiser import Optimiser
 
 GEOMETRY = ("means", "quats", "log_scales")
@@ -50,6 +51,7 @@ class HeadTrainer:
 
         Raises:
             CaptureError: If there is no picture to train on.
+            SettingsError: If the model shall be compiled and there is no compiler.
         """
         self.model, self.adaptor = model, adaptor
         self._track, self._settings, self._seed = track, settings, seed
@@ -62,6 +64,9 @@ class HeadTrainer:
         self._loss = HeadLoss(settings)
         self._optimiser = Optimiser(settings.optimiser)
         self._density = HeadDensity(settings, seed)
+        self._decode = accelerated(
+            model.decode, model.means.device, settings.mixed_precision, settings.compile
+        )
         model.basis.requires_grad_(False)
 
     def step(self, index: int) -> Mapping[str, float]:
@@ -71,7 +76,7 @@ class HeadTrainer:
         background, target = self._staged(view, picture, index)
         expression = self._expression(view)  # (B,)
         features = self._features(expression)  # (N, w)
-        gaussians = self.model.gaussians(self.model.decode(features, expression))
+        gaussians = self.model.gaussians(self._decode(features, expression))
         rendering = render(gaussians, [view.camera], background)
         loss = self._loss(rendering, target, picture, index)
         loss.backward()

@@ -7,6 +7,8 @@ from ico3d.errors import SettingsError
 
 Settings = TypeVar("Settings")
 
+TRUTH = {"true": True, "false": False}
+
 
 def with_changes(settings: Settings, changes: tuple[str, ...]) -> Settings:
     """Settings with some values replaced.
@@ -26,7 +28,8 @@ def with_changes(settings: Settings, changes: tuple[str, ...]) -> Settings:
             raise SettingsError(f"there is no setting '{name}': known are {', '.join(names)}.")
         kind = type(getattr(settings, name))
         try:
-            values[name] = kind(text)
-        except ValueError:
-            raise SettingsError(f"'{change}': {name} takes {kind.__name__} values.") from None
+            values[name] = TRUTH[text] if kind is bool else kind(text)
+        except (ValueError, KeyError):
+            words = "true or false" if kind is bool else f"{kind.__name__} values"
+            raise SettingsError(f"'{change}': {name} takes {words}.") from None
     return dataclasses.replace(known, **values)

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from ico3d.common.files import write_atomic
+
 
 class MetricsLog:
     """Appends to `metrics.jsonl` and TensorBoard.
@@ -20,9 +22,9 @@ class MetricsLog:
         from torch.utils.tensorboard import SummaryWriter
 
         path = folder / "metrics.jsonl"
-        kept = _entries_before(path, first_step)
-        self._file = path.open("w")
-        self._file.writelines(kept)
+        # In one piece: a run killed right here must not lose what earlier ones wrote.
+        write_atomic(path, "".join(_entries_before(path, first_step)).encode())
+        self._file = path.open("a")
         self._board = SummaryWriter(str(folder / "tensorboard"), purge_step=first_step)
 
     def write(self, step: int, values: Mapping[str, float]) -> None:

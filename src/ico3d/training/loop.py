@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-import torch
 from torch import Tensor
 
-from ico3d.errors import ModelError
+from ico3d.training.finite import NotFiniteError, check_finite
 from ico3d.training.log import MetricsLog, progress_bar
 from ico3d.training.run import RunFolder
 
@@ -38,6 +37,14 @@ class Trainee(Protocol):
         ...
 
 
+class Watch(Protocol):
+    """Somebody who looks on."""
+
+    def after_step(self, done: int, values: Mapping[str, float | Tensor]) -> None:
+        """Told when `done` steps are done, on the training thread, with the numbers of the last."""
+        ...
+
+
 @dataclass(frozen=True)
 class LoopSettings:
     """How long and how often.
@@ -55,36 +62,27 @@ class LoopSettings:
     label: str = "training"
 
 
-def check_finite(tensors: Mapping[str, Tensor], step: int) -> None:
-    """Looks for NaN and infinity.
-
-    Raises:
-        ModelError: Naming the first tensor that holds one.
-    """
-    for name, tensor in tensors.items():
-        if tensor.is_floating_point() and not torch.isfinite(tensor).all():
-            raise ModelError(
-                f"'{name}' is not finite after step {step}: lower its learning rate, "
-                "or look for damaged frames with ico3d capture check."
-            )
-
-
-def run_loop(trainee: Trainee, run: RunFolder, settings: LoopSettings) -> float:
+def run_loop(
+    trainee: Trainee, run: RunFolder, settings: LoopSettings, watch: Watch | None = None
+) -> float:
     """Runs all steps that are left; the caller marks the run finished.
 
     Args:
         trainee: What to optimise.
         run: Where its checkpoint and metrics lie.
         settings: How long and how often.
+        watch: Told after each step; its time does not count.
 
     Returns:
         Seconds spent in steps, those before interruptions included.
 
     Raises:
-        ModelError: If the loss or a parameter is not finite any more; the parameter is named.
+        ModelError: If the loss, a gradient or a parameter is not finite any more; it is named,
+            and the latest checkpoint stays as it was.
     """
     first, seconds = _resume(trainee, run)
     log = MetricsLog(run.path, first)
+    saved = index = first
     try:
         with progress_bar() as bar:
             task = bar.add_task(settings.label, total=settings.steps, completed=first, numbers="")
@@ -94,21 +92,31 @@ def run_loop(trainee: Trainee, run: RunFolder, settings: LoopSettings) -> float:
                 seconds += time.perf_counter() - begin
                 done = index + 1
                 bar.advance(task)
-                if not math.isfinite(float(values["loss"])):
-                    check_finite(trainee.tensors(), index)
-                    raise ModelError(f"the loss is not finite at step {index}.")
+                _check_loss(values, trainee)
                 if index % settings.log_every == 0 or done == settings.steps:
+                    check_finite(trainee.tensors())
                     numbers = {name: float(value) for name, value in values.items()}
                     log.write(index, numbers)
                     bar.update(task, numbers=_readable(numbers))
+                if watch is not None:
+                    watch.after_step(done, values)
                 if done % settings.checkpoint_every == 0 and done < settings.steps:
-                    check_finite(trainee.tensors(), index)
+                    check_finite(trainee.tensors())
                     state = {"step": done, "seconds": seconds, "trainee": trainee.state()}
                     run.save_checkpoint(trainee.tensors(), state)
+                    saved = done
+    except NotFiniteError as error:
+        raise error.at(index, saved) from error
     finally:
         log.close()
-    check_finite(trainee.tensors(), settings.steps - 1)
     return seconds
+
+
+def _check_loss(values: Mapping[str, float | Tensor], trainee: Trainee) -> None:
+    """Raises NotFiniteError if the loss is not finite; names the parameter that is to blame."""
+    if not math.isfinite(float(values["loss"])):
+        check_finite(trainee.tensors())
+        raise NotFiniteError("the loss")
 
 
 def _resume(trainee: Trainee, run: RunFolder) -> tuple[int, float]:

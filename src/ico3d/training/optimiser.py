@@ -13,6 +13,8 @@ import torch
 from numba import njit, prange
 from torch import Tensor
 
+from ico3d.training.finite import check_gradient
+
 BETA1 = 0.9
 BETA2 = 0.999
 EPSILON = 1e-15
@@ -61,8 +63,12 @@ class Optimiser:
             gradient: Of the same shape.
             rate: Learning rate.
             weight_decay: Factor of the parameter added to its gradient (L2).
+
+        Raises:
+            NotFiniteError: If the gradient holds NaN or infinity; nothing is changed then.
         """
         value, gradient = value.detach(), gradient.detach()
+        check_gradient(name, gradient)
         if weight_decay:
             gradient = gradient + weight_decay * value
         if self.kind == "sgd":

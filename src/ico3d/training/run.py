@@ -6,7 +6,7 @@ from pathlib import Path
 
 from torch import Tensor
 
-from ico3d.common.files import write_atomic
+from ico3d.common.files import remove_unfinished, write_atomic
 from ico3d.errors import SettingsError
 from ico3d.training.checkpoint import load_tensors, save_tensors
 
@@ -20,7 +20,7 @@ class RunFolder:
     """
 
     def __init__(self, path: Path, settings: Mapping):
-        """Opens the folder for these settings.
+        """Opens the folder for these settings; what killed runs left half done is removed.
 
         Raises:
             SettingsError: If the folder holds a run with other settings.
@@ -28,6 +28,9 @@ class RunFolder:
         self.path = path
         self.settings = json.loads(json.dumps(settings))
         self.path.mkdir(parents=True, exist_ok=True)
+        remove_unfinished(self.path)
+        if self.finished() is not None:  # killed after that was written
+            self._checkpoint_file.unlink(missing_ok=True)
         file = path / "settings.json"
         if not file.exists():
             write_atomic(file, json.dumps(self.settings, indent=1).encode())
@@ -45,19 +48,23 @@ class RunFolder:
                 "choose another folder, or remove it to start afresh."
             )
 
+    @property
+    def _checkpoint_file(self) -> Path:
+        return self.path / "checkpoint.safetensors"
+
     def checkpoint(self) -> tuple[dict[str, Tensor], dict] | None:
         """The latest checkpoint, or None before the first."""
-        file = self.path / "checkpoint.safetensors"
+        file = self._checkpoint_file
         return load_tensors(file) if file.exists() else None
 
     def save_checkpoint(self, tensors: dict[str, Tensor], state: dict) -> None:
         """Replaces the checkpoint."""
-        save_tensors(self.path / "checkpoint.safetensors", tensors, state)
+        save_tensors(self._checkpoint_file, tensors, state)
 
     def finish(self, summary: dict) -> None:
         """Marks the run as finished and drops its checkpoint."""
         write_atomic(self.path / "finished.json", json.dumps(summary, indent=1).encode())
-        (self.path / "checkpoint.safetensors").unlink(missing_ok=True)
+        self._checkpoint_file.unlink(missing_ok=True)
 
     def finished(self) -> dict | None:
         """The summary of a finished run, None while it is not."""

@@ -1,0 +1,74 @@
+"""Training is killed, and killed again, and still gives the same head."""
+
+import json
+import multiprocessing
+import random
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from safetensors.torch import load_file
+from train_tiny import SETTINGS, train_tiny
+
+KILLS = 5
+"""Every second one comes while a checkpoint is being written."""
+
+
+@pytest.fixture(scope="module")
+def processes():
+    """Starts real processes in which everything heavy is imported already."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["train_tiny", "torch.utils.tensorboard"])
+    return context
+
+
+def _started(processes, folder: Path, begun: int):
+    """A process that trains, once it has opened the `begun`-th event file of TensorBoard."""
+    process = processes.Process(target=train_tiny, args=(folder,))
+    process.start()
+    _await(process, lambda: len(list(folder.glob("model/tensorboard/*"))) >= begun)
+    return process
+
+
+def _await(process, condition: Callable[[], bool]) -> None:
+    """Waits for what a process at work shall do."""
+    deadline = time.monotonic() + 60
+    while not condition():
+        assert process.is_alive(), f"training ended by itself: {process.exitcode}"
+        assert time.monotonic() < deadline, "training stands still"
+
+
+def test_killed_five_times_it_gives_the_same_head_bit_for_bit(processes, tmp_path):
+    whole = _started(processes, tmp_path / "whole", 1)
+    rng = random.Random(0)
+    for kill in range(KILLS):
+        process = _started(processes, tmp_path / "parts", kill + 1)
+        time.sleep(rng.uniform(0, 0.2))
+        if kill % 2:
+            _await(process, lambda: any((tmp_path / "parts/model").glob(".checkpoint.*")))
+        process.kill()
+        process.join()
+        assert process.exitcode == -9, "it was to be killed, and ended before"
+    last = _started(processes, tmp_path / "parts", KILLS + 1)
+    for process in (whole, last):
+        process.join()
+        assert process.exitcode == 0
+    models = [
+        load_file(tmp_path / name / "model" / "model.safetensors") for name in ("whole", "parts")
+    ]
+    assert models[0].keys() == models[1].keys()
+    for name, tensor in models[0].items():
+        assert tensor.equal(models[1][name]), name
+    _assert_tidy(tmp_path / "parts" / "model")
+
+
+def _assert_tidy(folder: Path) -> None:
+    """Nothing unfinished is left, and the metrics are those of one run."""
+    assert not [path.name for path in folder.iterdir() if path.name.startswith(".")]
+    assert not (folder / "checkpoint.safetensors").exists()
+    lines = (folder / "metrics.jsonl").read_text().splitlines()
+    assert [json.loads(line)["step"] for line in lines] == [
+        *range(0, SETTINGS.steps, 50),
+        SETTINGS.steps - 1,
+    ]

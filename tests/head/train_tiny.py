@@ -1,0 +1,31 @@
+"""What the process does that tests kill: trains a tiny head, as `ico3d train head` does."""
+
+import dataclasses
+from pathlib import Path
+
+import numba
+import torch
+from tiny_capture import TinyCapture
+
+from ico3d.head.settings import PRESETS
+from ico3d.head.train import HeadJob, train_head
+
+SETTINGS = dataclasses.replace(
+    PRESETS["cpu"],
+    steps=240,
+    initial_gaussians=200,
+    max_gaussians=400,
+    densify_from=20,
+    densify_every=20,
+    densify_until=130,
+    densify_gradient=1e-5,
+    checkpoint_every=3,
+)
+
+
+def train_tiny(folder: Path) -> None:
+    """Trains, or goes on training, on one thread."""
+    numba.set_num_threads(1)
+    torch.set_num_threads(1)
+    job = HeadJob("blendshapes", "full", "builtin", 0, SETTINGS)
+    train_head(TinyCapture(folder / "tiny"), folder / "model", job)
