@@ -38,9 +38,8 @@ class Project(torch.autograd.Function):
     def forward(ctx, means, quats, scales, opacities, cameras, width, height, antialiased):
         """Returns means2d, conics, opacities left, depths, extents as `project` does."""
         arrays = [_array(t) for t in (cameras, means, quats, scales, opacities)]
-        problem = (*arrays, width, height, antialiased)
-        results = project(*problem)
-        ctx.problem = (problem, results[2])
+        results = project(*arrays, width=width, height=height, antialiased=antialiased)
+        ctx.problem = (arrays, width, height, antialiased, results[2])
         tensors = tuple(torch.from_numpy(r) for r in results)
         ctx.mark_non_differentiable(tensors[4])
         return tensors
@@ -52,8 +51,15 @@ class Project(torch.autograd.Function):
         gradients = torch.cat(
             [g_means2d, g_conics, g_alphas[..., None], g_depths[..., None]], -1
         )  # (C, N, 7)
-        problem, alphas = ctx.problem
-        outs, poses = project_backward(*problem, alphas, _array(gradients))
+        arrays, width, height, antialiased, alphas = ctx.problem
+        outs, poses = project_backward(
+            *arrays,
+            width=width,
+            height=height,
+            antialiased=antialiased,
+            alphas=alphas,
+            gradients=_array(gradients),
+        )
         means, quats, scales, opacities = torch.from_numpy(outs).split([3, 4, 3, 1], -1)
         cameras = torch.nn.functional.pad(torch.from_numpy(poses), (4, 0))  # (C, 16)
         return means, quats, scales, opacities[:, 0], cameras, None, None, None
