@@ -196,4 +196,5 @@ def test_a_missing_gsplat_names_the_extra(monkeypatch, cameras):
     monkeypatch.setitem(sys.modules, "gsplat", None)
     gaussians = reference.scene(3, dtype=torch.float32)
     with pytest.raises(MissingExtraError, match=r"ico3d\[cuda\]"):
-        cuda.draw_gaussians(gaussians, gaussians.colors.expand(2, 3, 3), cameras)
+        poses = torch.eye(4).expand(2, 4, 4)
+        cuda.draw_gaussians(gaussians, gaussians.colors.expand(2, 3, 3), cameras, poses, True)
