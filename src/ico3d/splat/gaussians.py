@@ -55,8 +55,12 @@ class Gaussians:
     def drawable(self) -> Tensor:
         """(N,) bool: all parameters are finite and the quaternion is not 0."""
         values = [getattr(self, field.name) for field in fields(self)]
-        finite = [v.isfinite().flatten(1).all(1) for v in values if v is not None and v.dim() > 1]
-        return torch.stack([*finite, self.opacities.isfinite(), self.quats.any(1)]).all(0)
+        present = [value for value in values if value is not None]
+        turns = self.quats.any(1)  # (N,)
+        if torch.stack([value.sum() for value in present]).isfinite().all():  # quick to find out
+            return turns
+        finite = [v.isfinite().flatten(1).all(1) for v in present if v.dim() > 1]
+        return torch.stack([*finite, self.opacities.isfinite(), turns]).all(0)
 
     def where(self, chosen: Tensor, others: "Gaussians") -> "Gaussians":
         """These where `chosen` (N,) says so, elsewhere those of `others`, of the same kind."""

@@ -28,19 +28,25 @@ def _blur_row(padded, out):
 
 
 @kernel()
+def _near_rows(a, b, c, d, e, out):
+    for i in range(out.size):
+        out[i] = W0 * c[i] + W1 * (b[i] + d[i]) + W2 * (a[i] + e[i])
+
+
+@kernel()
+def _far_rows(a, b, c, d, e, f, out):
+    for i in range(out.size):
+        out[i] += W3 * (c[i] + d[i]) + W4 * (b[i] + e[i]) + W5 * (a[i] + f[i])
+
+
+@kernel()
 def _blur_column(rows, out):
     """Blurs along y: the weighted sum of 11 rows.
 
-    Few arrays at a time: LLVM gives up where it must check many for overlap.
+    Half of them at a time: LLVM gives up where it must check many arrays for overlap.
     """
-    middle = rows[5]
-    for i in range(out.size):
-        out[i] = W0 * middle[i]
-    weights = (W1, W2, W3, W4, W5)
-    for k in range(SSIM_RADIUS):
-        above, below, weight = rows[4 - k], rows[6 + k], weights[k]
-        for i in range(out.size):
-            out[i] += weight * (above[i] + below[i])
+    _near_rows(rows[3], rows[4], rows[5], rows[6], rows[7], out)
+    _far_rows(rows[0], rows[1], rows[2], rows[8], rows[9], rows[10], out)
 
 
 @kernel()
