@@ -35,6 +35,8 @@ bench: install ## long quality and speed runs; figures go to docs/benchmarks.md
 	$(PY) bench/head.py $(RESULTS)/capture $(RESULTS)/head
 	$(PY) bench/bake.py $(RESULTS)/head/blendshapes-full-0 $(RESULTS)/capture --json $(RESULTS)/bake.json
 	$(if $(OPPONENT),ico3d bench raster --against $(OPPONENT) --json $(RESULTS)/raster.json)
+	$(PY) bench/step.py $(RESULTS)/capture --json $(RESULTS)/step.json
+	$(PY) bench/gpu.py --json $(RESULTS)/gpu.json --capture $(RESULTS)/capture
 	$(PY) bench/files.py src/ico3d/chat/data/demo.ico3d --json $(RESULTS)/files.json
 	ico3d bench talk src/ico3d/chat/data/demo.ico3d --json $(RESULTS)/talk.json
 	cd viewer && npm run --silent bench
