@@ -62,6 +62,10 @@ class Evaluate:
         return evaluate_head(head, capture, frames, self.images)
 
 
+SCENES = ((5_000, 256), (20_000, 256), (50_000, 512), (100_000, 1024), (200_000, 1024))
+"""Gaussians and picture sizes that `ico3d bench raster` goes through."""
+
+
 @dataclass(frozen=True)
 class BenchRaster:
     """Times the CPU rasteriser against another program on the same projected Gaussians.
@@ -69,15 +73,15 @@ class BenchRaster:
     Attributes:
         against: The opponent's Python script; it is run, so name only one that you trust.
         json: File for the figures.
-        n: Gaussians.
-        size: Image width and height in pixels, a multiple of 16.
+        n: Gaussians of one scene, in the place of five from 5,000 to 200,000.
+        size: That scene's image width and height in pixels, a multiple of 16.
         runs: Turns; medians are reported.
         threads: Threads of either program.
     """
 
     against: Path
     json: Path | None = None
-    n: int = 20_000
+    n: int | None = None
     size: int = 256
     runs: int = 40
     threads: int = 2
@@ -91,18 +95,31 @@ class BenchRaster:
         os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = str(self.threads)
 
         from rich.console import Console
+        from rich.progress import track
         from rich.table import Table
 
         from ico3d.common.files import write_atomic
         from ico3d.measure.raster import compare
 
-        figures = compare(self.against, self.n, self.size, self.runs)
-        figures |= {"gaussians": self.n, "size": self.size, "threads": self.threads}
+        scenes = SCENES if self.n is None else ((self.n, self.size),)
+        turns = track(scenes, "drawing", transient=True)
+        results = [compare(self.against, n, size, self.runs) for n, size in turns]
         if self.json is not None:
+            figures = {f"ratio_{result.name}": result.ratio for result in results}
+            figures |= {"threads": self.threads, "scenes": [r.figures() for r in results]}
             write_atomic(self.json, json.dumps(figures, indent=1).encode())
-        table = Table("figure", "value")
-        for name, value in figures.items():
-            table.add_row(name, f"{value:.3g}")
+        table = Table(
+            *("scene", "tile pairs", "ours ms", "theirs ms", "forward", "backward", "ratio"),
+            *("ns per pair", "picture", "gradients"),
+        )
+        for r in results:
+            theirs = r.theirs_forward_ms + r.theirs_backward_ms
+            ratios = [f"{value:.2f}" for value in (r.forward_ratio, r.backward_ratio, r.ratio)]
+            table.add_row(
+                *(r.name, f"{r.pairs:,}", f"{r.ours_total_ms:.1f}", f"{theirs:.1f}", *ratios),
+                *(f"{1e6 * r.ours_total_ms / r.pairs:.0f}", f"{r.image_difference:.0e}"),
+                f"{r.gradient_difference:.0e}",
+            )
         Console().print(table)
 
 

@@ -5,7 +5,7 @@ import importlib.util
 import subprocess
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -142,7 +142,70 @@ def _timed(step: Callable[[], None]) -> float:
     return 1e3 * (time.perf_counter() - start)
 
 
-def compare(path: Path, count: int, size: int, runs: int) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Comparison:
+    """Both rasterisers on one scene.
+
+    Attributes:
+        gaussians: How many.
+        size: Image width and height in pixels.
+        pairs: Splats times tiles that ours draws: what its cost should be proportional to.
+        ours_binning_ms: Medians, as are those below.
+        ours_forward_ms: Drawing alone.
+        ours_backward_ms: Gradients.
+        theirs_forward_ms: Binning and drawing.
+        theirs_backward_ms: Gradients.
+        image_difference: Largest difference of the pictures.
+        gradient_difference: Of the gradients, relative to the largest of each parameter.
+    """
+
+    gaussians: int
+    size: int
+    pairs: int
+    ours_binning_ms: float
+    ours_forward_ms: float
+    ours_backward_ms: float
+    theirs_forward_ms: float
+    theirs_backward_ms: float
+    image_difference: float
+    gradient_difference: float
+
+    @property
+    def name(self) -> str:
+        """Such as 20k_256."""
+        return f"{self.gaussians / 1000:g}k_{self.size}"
+
+    @property
+    def forward_ratio(self) -> float:
+        """Binning and drawing, ours / theirs."""
+        return (self.ours_binning_ms + self.ours_forward_ms) / self.theirs_forward_ms
+
+    @property
+    def backward_ratio(self) -> float:
+        """Gradients, ours / theirs."""
+        return self.ours_backward_ms / self.theirs_backward_ms
+
+    @property
+    def ours_total_ms(self) -> float:
+        """Binning, drawing and gradients."""
+        return self.ours_binning_ms + self.ours_forward_ms + self.ours_backward_ms
+
+    @property
+    def ratio(self) -> float:
+        """All of it, ours / theirs."""
+        return self.ours_total_ms / (self.theirs_forward_ms + self.theirs_backward_ms)
+
+    def figures(self) -> dict[str, Any]:
+        """Everything as JSON holds it."""
+        ratios = {
+            "forward_ratio": self.forward_ratio,
+            "backward_ratio": self.backward_ratio,
+            "ratio": self.ratio,
+        }
+        return asdict(self) | {"ours_total_ms": self.ours_total_ms} | ratios
+
+
+def compare(path: Path, count: int, size: int, runs: int) -> Comparison:
     """Times both, turn by turn, so that what disturbs the machine disturbs both.
 
     Args:
@@ -152,8 +215,7 @@ def compare(path: Path, count: int, size: int, runs: int) -> dict[str, Any]:
         runs: Turns.
 
     Returns:
-        Median milliseconds per phase, their totals and ratio (ours / theirs), and the largest
-        differences of the pictures and, relative to the largest value, of the gradients.
+        Median times and differences.
 
     Raises:
         SettingsError: If the opponent cannot be used or built, or the size does not fit it.
@@ -168,36 +230,15 @@ def compare(path: Path, count: int, size: int, runs: int) -> dict[str, Any]:
     except (OSError, subprocess.CalledProcessError) as error:
         raise SettingsError(f"{path} could not be built: {error}") from error
     ours = Ours(scene)
-    steps = {
-        "ours_binning_ms": ours.bin,
-        "ours_forward_ms": ours.forward,
-        "theirs_binning_forward_ms": theirs.forward,
-        "ours_backward_ms": ours.backward,
-        "theirs_backward_ms": theirs.backward,
-    }
-    times: dict[str, list[float]] = {name: [] for name in steps}
-    for _ in range(runs):
-        for name, step in steps.items():
-            times[name].append(_timed(step))
-    return _summary(times, ours, theirs, f"ratio_{count / 1000:g}k_{size}")
-
-
-def _summary(
-    times: dict[str, list[float]], ours: Ours, theirs: Theirs, ratio_key: str
-) -> dict[str, Any]:
-    """The medians and what follows from them."""
-    medians = {name: float(np.median(values)) for name, values in times.items()}
-    totals = {
-        who: sum(value for name, value in medians.items() if name.startswith(who))
-        for who in ("ours", "theirs")
-    }
+    steps = (ours.bin, ours.forward, ours.backward, theirs.forward, theirs.backward)
+    times = np.array([[_timed(step) for step in steps] for _ in range(runs)])  # (runs, 5)
     largest = np.abs(theirs.gradients).max(0)
     difference = np.abs(ours.gradients - theirs.gradients).max(0) / largest
-    return {
-        **medians,
-        "ours_total_ms": totals["ours"],
-        "theirs_total_ms": totals["theirs"],
-        ratio_key: totals["ours"] / totals["theirs"],
-        "image_difference": float(np.abs(ours.image - theirs.image).max()),
-        "gradient_difference": float(difference.max()),
-    }
+    return Comparison(
+        count,
+        size,
+        len(ours.tiles.pairs),
+        *map(float, np.median(times, 0)),
+        image_difference=float(np.abs(ours.image - theirs.image).max()),
+        gradient_difference=float(difference.max()),
+    )
