@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from tiny_capture import TinyCapture
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture(autouse=True, scope="module")
 def one_thread():
     """On busy cores, threads of tiny kernels wait for one another far longer than they work."""
     threads = numba.get_num_threads(), torch.get_num_threads()
