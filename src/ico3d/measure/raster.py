@@ -191,9 +191,14 @@ class Comparison:
         return self.ours_binning_ms + self.ours_forward_ms + self.ours_backward_ms
 
     @property
+    def theirs_total_ms(self) -> float:
+        """The same of theirs."""
+        return self.theirs_forward_ms + self.theirs_backward_ms
+
+    @property
     def ratio(self) -> float:
         """All of it, ours / theirs."""
-        return self.ours_total_ms / (self.theirs_forward_ms + self.theirs_backward_ms)
+        return self.ours_total_ms / self.theirs_total_ms
 
     def figures(self) -> dict[str, Any]:
         """Everything as JSON holds it."""
