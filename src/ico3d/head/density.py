@@ -45,13 +45,13 @@ class HeadDensity:
         self._settings, self._seed = settings, seed
         self._stats = DensityStats.zeros(0)
 
-    def observe(self, info: RenderInfo, step: int, pictures: int) -> None:
-        """Gathers screen gradients after `backward` of a loss that averages over `pictures`."""
+    def observe(self, info: RenderInfo, step: int) -> None:
+        """Gathers screen gradients after `backward`."""
         if step >= self._settings.densify_until:
             return
         if len(self._stats.views) != info.radii.shape[1]:
             self._stats = DensityStats.zeros(info.radii.shape[1], info.radii.device)
-        self._stats.add(info, pictures)
+        self._stats.add(info)
 
     def adapt(
         self,

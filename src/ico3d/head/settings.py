@@ -48,7 +48,6 @@ class HeadSettings:
         prune_opacity: Gaussians whose predicted opacity stays below this are removed.
         prune_contribution: Gaussians whose blending weights sum up to less than this in every
             sampled picture, as a factor of the median over all Gaussians, are removed.
-        views_per_step: Pictures of one frame that a step learns from, where so many cameras saw it.
         checkpoint_every: Steps between checkpoints.
         cache_gib: Images kept in memory, in GiB; further ones are read again at each use.
         mixed_precision: Whether the MLP computes in bfloat16; on CUDA only.
@@ -86,7 +85,6 @@ class HeadSettings:
     densify_gradient: float = 2e-4
     prune_opacity: float = 0.005
     prune_contribution: float = 0.0
-    views_per_step: int = 1
     checkpoint_every: int = 1_000
     cache_gib: float = 2.0
     mixed_precision: bool = False

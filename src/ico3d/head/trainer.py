@@ -1,7 +1,6 @@
-"""Optimising a head: one frame per step (paper, head model and implementation details)."""
+"""Optimising a head: one picture per step (paper, head model and implementation details)."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 import torch
@@ -18,9 +17,7 @@ from ico3d.head.settings import HeadSettings
 from ico3d.head.views import Picture, PictureCache, View
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.density import contributions
-from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
-from ico3d.splat.rendering import RenderInfo
 from ico3d.training.acceleration import accelerated
 from ico3d.training.optimiser import Optimiser
 
@@ -62,8 +59,6 @@ class HeadTrainer:
         self._views = list(self._pictures.views(capture.split.train))
         if not self._views:
             raise CaptureError(f"{capture.path} has no picture among its training frames.")
-        self._steps_per_epoch = len(_by_frame(self._views, settings.views_per_step))
-        self._epoch, self._groups = -1, []
         few = FEW_FRAMES / len(capture.split.train)
         self._weight_decay = settings.basis_weight_decay * few**4
         self._loss = HeadLoss(settings)
@@ -75,20 +70,22 @@ class HeadTrainer:
         model.basis.requires_grad_(False)
 
     def step(self, index: int) -> Mapping[str, float]:
-        """Renders one frame as some cameras saw it and learns from the differences."""
-        views = self._frame_views(index)
-        expression = self._expression(views[0])  # (B,)
+        """Renders one picture and learns from the difference."""
+        view = self._view(index)
+        picture = self._pictures.picture(view, self.model.means.device)
+        background, target = self._staged(view, picture, index)
+        expression = self._expression(view)  # (B,)
         features = self._features(expression)  # (N, w)
         gaussians = self.model.gaussians(self._decode(features, expression))
-        seen = [self._compare(view, gaussians, index) for view in views]
-        loss = torch.stack([one.loss for one in seen]).mean()
+        rendering = render(gaussians, [view.camera], background)
+        loss = self._loss(rendering, target, picture, index)
         loss.backward()
-        for one in seen:
-            self._density.observe(one.info, index, len(seen))
+        self._density.observe(rendering.info, index)
         self._update(expression, features, index)
         self._density.adapt(self.model, self._optimiser, self._sampled, index)
-        psnr = -10 * np.log10(max(np.mean([one.error for one in seen]), 1e-12))
-        return {"loss": float(loss.detach()), "psnr": float(psnr), "gaussians": len(self.model)}
+        error = float((rendering.rgb.detach()[0] - target).square().mean())
+        psnr = -10 * np.log10(max(error, 1e-12))
+        return {"loss": float(loss.detach()), "psnr": psnr, "gaussians": len(self.model)}
 
     def tensors(self) -> dict[str, Tensor]:
         """Parameters, moments, and what density control has gathered."""
@@ -113,22 +110,13 @@ class HeadTrainer:
         self._optimiser.moments = _below("moments.", tensors)
         self._density.restore(_below("density.", tensors))
 
-    def _frame_views(self, index: int) -> list[View]:
-        """Views of one frame; every view once per epoch, in an order of its own."""
-        epoch, place = divmod(index, self._steps_per_epoch)
-        if epoch != self._epoch:
+    def _view(self, index: int) -> View:
+        """Every view once per epoch, in an order of its own."""
+        epoch, place = divmod(index, len(self._views))
+        if place == 0 or not hasattr(self, "_order"):
             rng = np.random.default_rng([self._seed, epoch])
-            shuffled = [self._views[i] for i in rng.permutation(len(self._views))]
-            self._epoch, self._groups = epoch, _by_frame(shuffled, self._settings.views_per_step)
-        return self._groups[place]
-
-    def _compare(self, view: View, gaussians: Gaussians, index: int) -> "_Seen":
-        """The Gaussians as a view shows them, against its picture."""
-        picture = self._pictures.picture(view, self.model.means.device)
-        background, target = self._staged(view, picture, index)
-        rendering = render(gaussians, [view.camera], background)
-        error = float((rendering.rgb.detach()[0] - target).square().mean())
-        return _Seen(self._loss(rendering, target, picture, index), rendering.info, error)
+            self._order = rng.permutation(len(self._views))
+        return self._views[self._order[place]]
 
     def _staged(self, view: View, picture: Picture, index: int) -> tuple[Tensor, Tensor]:
         """What to render over, and the picture over the same.
@@ -209,28 +197,6 @@ class HeadTrainer:
             opacities.append(gaussians.opacities)
             given.append(contributions(gaussians, [view.camera])[0])
         return Sampled(torch.stack(opacities).amax(0), torch.stack(given).amax(0))
-
-
-@dataclass(frozen=True)
-class _Seen:
-    """One view of a step: its loss (a scalar), what density control needs, its squared error."""
-
-    loss: Tensor
-    info: RenderInfo
-    error: float
-
-
-def _by_frame(views: Sequence[View], most: int) -> list[list[View]]:
-    """Groups of up to `most` views of one frame, in the order of their first views."""
-    groups: list[list[View]] = []
-    open_groups: dict[int, list[View]] = {}
-    for view in views:
-        group = open_groups.get(view.frame)
-        if group is None or len(group) == most:
-            open_groups[view.frame] = group = []
-            groups.append(group)
-        group.append(view)
-    return groups
 
 
 def _below(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:

@@ -58,21 +58,17 @@ class DensityStats:
         """Statistics of `count` Gaussians, nothing gathered."""
         return DensityStats(torch.zeros(count, device=device), torch.zeros(count, device=device))
 
-    def add(self, info: RenderInfo, pictures: int | None = None) -> None:
+    def add(self, info: RenderInfo) -> None:
         """Gathers from a render after `backward`.
 
-        With a loss that averages over several pictures the gradients are so many times too small;
-        they are scaled back, so that the threshold means the same for any number of pictures.
-
-        Args:
-            info: Of a render of C cameras.
-            pictures: How many pictures the loss averages over; C by default.
+        With a loss that averages over C cameras the gradients are C times too small; they are
+        scaled back, so that the threshold means the same for any number of cameras.
 
         Raises:
             RuntimeError: If `backward` has not run.
         """
         visible = info.visible  # (C, N)
-        norms = info.screen_gradients() * (pictures or len(visible))  # (C, N)
+        norms = info.screen_gradients() * len(visible)  # (C, N)
         self.gradient_sum += (norms * visible).sum(0)
         self.views += visible.sum(0)
 
