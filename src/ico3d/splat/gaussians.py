@@ -67,8 +67,9 @@ class Gaussians:
         values = {}
         for field in fields(self):
             a, b = getattr(self, field.name), getattr(others, field.name)
-            shaped = None if a is None else chosen.view(-1, *[1] * (a.dim() - 1))  # (N, 1, …)
-            values[field.name] = None if a is None else torch.where(shaped, a, b)
+            if a is not None:
+                shaped = chosen.view(-1, *[1] * (a.dim() - 1))  # (N, 1, …)
+                values[field.name] = torch.where(shaped, a, b)
         return Gaussians(**values)
 
     def transform(self, a_from_b: Tensor | np.ndarray) -> "Gaussians":
