@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import reference
 import torch
-from conftest import camera_at
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reference import camera_at
 
 from ico3d.common.camera import Camera
 from ico3d.splat import quaternions

@@ -4,8 +4,7 @@ import math
 
 import pytest
 import torch
-from conftest import camera_at
-from reference import harmonic, render, scene
+from reference import camera_at, harmonic, render, scene
 
 from ico3d.splat.gaussians import Gaussians
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import reference
 import torch
-from conftest import camera_at
+from reference import camera_at
 
 from ico3d.errors import MissingExtraError
 from ico3d.splat import cuda
@@ -91,6 +91,27 @@ def test_screen_gradients_are_those_of_normalised_coordinates(cameras, device):
         assert difference(picture.info.screen_gradients()[c], norms) < 1e-4
         unseen = ~picture.info.visible[c].cpu()
         assert norms[unseen].abs().max() == 0 if unseen.any() else True
+
+
+@pytest.mark.parametrize("device", DEVICES)
+def test_absolute_gradients_are_sums_over_pixels_without_signs(device):
+    camera = camera_at((0.1, 0.2, 1.2), width=9, height=7, focal=11.0)
+    start = reference.scene(6, 3, 0.2)
+    exact, ours = leaves(start, torch.float64), leaves(start, torch.float32, device)
+    picture = render(ours, [camera], absgrad=True)
+    weights = weights_for(picture.rgb, 0)
+    (picture.rgb * weights).sum().backward()
+    means2d, *rest = reference.project(exact, camera)
+    means2d.retain_grad()
+    rgb, _ = reference.composite(means2d, *rest, exact.colors, camera.width, camera.height)
+    pixels = (rgb * weights[0].double().cpu()).sum(-1).flatten()  # (H·W,)
+    wanted = sum(
+        torch.autograd.grad(pixel, means2d, retain_graph=True)[0].abs() for pixel in pixels
+    )
+    half = torch.tensor([camera.width / 2, camera.height / 2])
+    assert difference(picture.info.screen_gradients()[0], (wanted * half).norm(dim=-1)) < 1e-4
+    signed = render(leaves(start, torch.float32, device), [camera]).rgb
+    assert torch.equal(signed, picture.rgb)
 
 
 @pytest.mark.parametrize("device", DEVICES)
@@ -197,4 +218,6 @@ def test_a_missing_gsplat_names_the_extra(monkeypatch, cameras):
     gaussians = reference.scene(3, dtype=torch.float32)
     with pytest.raises(MissingExtraError, match=r"ico3d\[cuda\]"):
         poses = torch.eye(4).expand(2, 4, 4)
-        cuda.draw_gaussians(gaussians, gaussians.colors.expand(2, 3, 3), cameras, poses, True)
+        cuda.draw_gaussians(
+            gaussians, gaussians.colors.expand(2, 3, 3), cameras, poses, True, False
+        )

@@ -45,6 +45,8 @@ class HeadSettings:
         densify_until: Last step of densification and pruning.
         densify_every: Steps between two densifications.
         densify_gradient: Screen-space gradient above which a Gaussian is cloned or split.
+        absgrad: Whether that gradient is summed over pixels without signs; four times the
+            threshold is usual then.
         prune_opacity: Gaussians whose predicted opacity stays below this are removed.
         prune_contribution: Gaussians whose blending weights sum up to less than this in every
             sampled picture, as a factor of the median over all Gaussians, are removed.
@@ -83,6 +85,7 @@ class HeadSettings:
     densify_until: int = 15_000
     densify_every: int = 100
     densify_gradient: float = 2e-4
+    absgrad: bool = False
     prune_opacity: float = 0.005
     prune_contribution: float = 0.0
     checkpoint_every: int = 1_000

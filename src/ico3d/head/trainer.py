@@ -77,7 +77,7 @@ class HeadTrainer:
         expression = self._expression(view)  # (B,)
         features = self._features(expression)  # (N, w)
         gaussians = self.model.gaussians(self._decode(features, expression))
-        rendering = render(gaussians, [view.camera], background)
+        rendering = render(gaussians, [view.camera], background, absgrad=self._settings.absgrad)
         loss = self._loss(rendering, target, picture, index)
         loss.backward()
         self._density.observe(rendering.info, index)

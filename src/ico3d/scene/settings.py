@@ -33,6 +33,7 @@ class SceneSettings:
         densify_until: It does not from this step on.
         densify_every: Steps between two changes.
         densify_gradient: Strategy default: screen gradient above which a Gaussian clones or splits.
+        absgrad: Strategy default: whether those gradients are summed over pixels without signs.
         reset_every: Strategy default: steps between two opacity resets; 0 for none.
         min_opacity: Below this a Gaussian dies (default) or moves to a living one (mcmc).
         noise_rate: Strategy mcmc: noise on the means, times their learning rate and covariance.
@@ -61,6 +62,7 @@ class SceneSettings:
     densify_until: int = 15_000
     densify_every: int = 100
     densify_gradient: float = 2e-4
+    absgrad: bool = False
     reset_every: int = 3_000
     min_opacity: float = 0.005
     noise_rate: float = 5e5

@@ -66,7 +66,12 @@ class SceneTrainer:
         view = self._view(index)
         example = self._example(view, index)
         degree = index // self._settings.sh_every
-        rendering = render(self.scene.gaussians(degree), [view.camera], example.behind)
+        rendering = render(
+            self.scene.gaussians(degree),
+            [view.camera],
+            example.behind,
+            absgrad=self._settings.absgrad,
+        )
         loss = self._loss(rendering, example)
         (loss + self._strategy.penalty(self._population)).backward()
         self._strategy.observe(rendering.info, index)

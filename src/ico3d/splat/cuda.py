@@ -42,6 +42,7 @@ def draw_gaussians(
     cameras: Sequence[Camera],
     poses: Tensor,
     antialiased: bool,
+    absgrad: bool,
 ) -> Drawing:
     """Draws on black.
 
@@ -51,6 +52,7 @@ def draw_gaussians(
         cameras: C of one size; their intrinsics count.
         poses: (C, 4, 4) float64, world to camera.
         antialiased: Whether opacity makes up for the low-pass.
+        absgrad: Whether screen gradients are summed without signs.
 
     Returns:
         The drawing.
@@ -80,6 +82,7 @@ def draw_gaussians(
             packed=False,
             render_mode=mode,
             rasterize_mode="antialiased" if antialiased else "classic",
+            absgrad=absgrad,
         )
 
     rgb, alpha, meta = rasterise("RGB")  # (C, H, W, 3), (C, H, W, 1)
@@ -87,5 +90,6 @@ def draw_gaussians(
         meta["means2d"].retain_grad()
     radii = meta["radii"]  # (C, N, 2) or, in older versions, (C, N)
     radii = (radii.amax(-1) if radii.dim() == 3 else radii).int()  # (C, N)
-    info = RenderInfo(radii, meta["means2d"], width, height)
+    absolute = (lambda: meta["means2d"].absgrad) if absgrad else None
+    info = RenderInfo(radii, meta["means2d"], width, height, absolute)
     return Drawing(rgb, alpha[..., 0], lambda: rasterise("D")[0][..., 0], info)

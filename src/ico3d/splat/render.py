@@ -27,6 +27,7 @@ def render(
     *,
     world_to_camera: Tensor | None = None,
     antialiased: bool = True,
+    absgrad: bool = False,
 ) -> Rendering:
     """Renders Gaussians, differentiably in all of their parameters and in the cameras' poses.
 
@@ -39,6 +40,7 @@ def render(
         background: What lies behind: None for black, (3,), (H, W, 3) or (C, H, W, 3).
         world_to_camera: (C, 4, 4) rigid, in the place of the cameras' own; may carry gradient.
         antialiased: Whether opacity makes up for the low-pass.
+        absgrad: Whether `info.screen_gradients()` sums over pixels without signs.
 
     Returns:
         Pictures (C, H, W, 3), alpha, depth, and what density control needs. Gaussians behind a
@@ -53,7 +55,8 @@ def render(
     poses = _poses(cameras, world_to_camera)
     gaussians = _sound(gaussians.map(Tensor.float))
     colors = _view_colors(gaussians, poses)
-    drawing = _backend(gaussians).draw_gaussians(gaussians, colors, cameras, poses, antialiased)
+    backend = _backend(gaussians)
+    drawing = backend.draw_gaussians(gaussians, colors, cameras, poses, antialiased, absgrad)
     rgb = drawing.rgb
     if background is not None:
         behind = background.to(rgb)

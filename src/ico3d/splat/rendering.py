@@ -17,12 +17,15 @@ class RenderInfo:
         means2d: (C, N, 2) pixels; holds its gradient after `backward`.
         width: Image width in pixels.
         height: Image height in pixels.
+        absolute: Gives (C, N, 2) after `backward`: the gradient of means2d summed over pixels
+            without signs, where that was asked for.
     """
 
     radii: Tensor
     means2d: Tensor
     width: int
     height: int
+    absolute: Callable[[], Tensor] | None = None
 
     @property
     def visible(self) -> Tensor:
@@ -33,6 +36,8 @@ class RenderInfo:
         """(C, N) length of the loss's gradient by the splat's centre.
 
         Normalised as 3DGS does it: by device coordinates, in which the image is 2 wide and high.
+        With absolute gradients, what pulls a splat to all sides at once does not cancel out
+        (AbsGS).
 
         Raises:
             RuntimeError: If `backward` has not run, or the means need no gradient.
@@ -40,7 +45,8 @@ class RenderInfo:
         if self.means2d.grad is None:
             raise RuntimeError("screen gradients exist only after backward of a render")
         half = torch.tensor([self.width / 2, self.height / 2]).to(self.means2d)  # (2,)
-        return (self.means2d.grad * half).norm(dim=-1)  # (C, N)
+        gradient = self.means2d.grad if self.absolute is None else self.absolute()  # (C, N, 2)
+        return (gradient * half).norm(dim=-1)  # (C, N)
 
 
 @dataclass

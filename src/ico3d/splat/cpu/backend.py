@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import torch
 from torch import Tensor
 
 from ico3d.common.camera import Camera
@@ -16,6 +17,7 @@ def draw_gaussians(
     cameras: Sequence[Camera],
     poses: Tensor,
     antialiased: bool,
+    absgrad: bool,
 ) -> Drawing:
     """Draws on black.
 
@@ -25,6 +27,7 @@ def draw_gaussians(
         cameras: C of one size; their intrinsics count.
         poses: (C, 4, 4) float64, world to camera.
         antialiased: Whether opacity makes up for the low-pass.
+        absgrad: Whether screen gradients are summed without signs.
 
     Returns:
         The drawing.
@@ -43,11 +46,13 @@ def draw_gaussians(
     if means2d.requires_grad:
         means2d.retain_grad()
     tiles = bin_views(means2d, conics, alphas, depths, extents, width, height)
-    images, light = Draw.apply(means2d, conics, alphas, colors, tiles)
+    absolute = torch.zeros_like(means2d) if absgrad else None  # (C, N, 2)
+    images, light = Draw.apply(means2d, conics, alphas, colors, tiles, absolute)
 
     def draw_depth() -> Tensor:
         spread = depths[..., None].expand(*depths.shape, 3)  # (C, N, 3)
-        return Draw.apply(means2d, conics, alphas, spread, tiles)[0][..., 0]  # (C, H, W)
+        return Draw.apply(means2d, conics, alphas, spread, tiles, None)[0][..., 0]  # (C, H, W)
 
-    info = RenderInfo(extents.amax(-1).ceil().int(), means2d, width, height)  # radii (C, N)
+    radii = extents.amax(-1).ceil().int()  # (C, N)
+    info = RenderInfo(radii, means2d, width, height, None if absolute is None else lambda: absolute)
     return Drawing(images, 1 - light, draw_depth, info)

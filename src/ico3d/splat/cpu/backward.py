@@ -24,10 +24,12 @@ from ico3d.splat.cpu.tiles import BLOCK, TILE_WIDTH, Tiles, tiles_across
 
 GRADIENTS = 9
 """Per splat: mean (2), conic (3), opacity, colour (3)."""
+ABSOLUTE = 2
+"""And where asked for: the mean's (2) once more, summed over pixels without their signs."""
 
 
 @kernel()
-def _gather(state, count, splat, left, top, out):
+def _gather(state, count, splat, left, top, absolute, out):
     """Sums one splat's gradients over the next `count` pixels of a tile.
 
     The planes of `state` (see `forward._blend`): transmittance so far (negative where finished),
@@ -40,6 +42,7 @@ def _gather(state, count, splat, left, top, out):
     r, g, b = splat[6], splat[7], splat[8]
     sum_r, sum_g, sum_b, sum_s = ZERO, ZERO, ZERO, ZERO
     sum_x, sum_y, sum_xx, sum_xy, sum_yy = ZERO, ZERO, ZERO, ZERO, ZERO
+    absolute_x, absolute_y = ZERO, ZERO
     for p in range(count):
         red, green, blue = (
             state[2 * PLANE + p],
@@ -70,6 +73,9 @@ def _gather(state, count, splat, left, top, out):
         sum_xx += by_x * dx
         sum_xy += by_x * dy
         sum_yy += by_y * dy
+        if absolute:  # the same for all pixels: LLVM makes two loops of it
+            absolute_x += abs((xx + xx) * by_x + xy * by_y)
+            absolute_y += abs(xy * by_x + (yy + yy) * by_y)
     out[0] = (xx + xx) * sum_x + xy * sum_y
     out[1] = xy * sum_x + (yy + yy) * sum_y
     out[2] = -HALF * sum_xx
@@ -79,6 +85,9 @@ def _gather(state, count, splat, left, top, out):
     out[6] = sum_r
     out[7] = sum_g
     out[8] = sum_b
+    if absolute:
+        out[9] = absolute_x
+        out[10] = absolute_y
 
 
 @kernel()
@@ -108,7 +117,8 @@ def _collect(state, records, spans, splats, entries, center, parts):
             continue
         low, high = spans[pair]
         splat = records[splats[pair]]
-        _gather(state[low:], high - low, splat, center[0], center[1], parts[pair])
+        absolute = parts.shape[1] > GRADIENTS
+        _gather(state[low:], high - low, splat, center[0], center[1], absolute, parts[pair])
         done = k % CHECK == CHECK - 1 and finished(state)
 
 
@@ -139,10 +149,10 @@ def _collect_all(
 def _sum(first_pair, end_pair, parts, gradients):
     """Sums each splat's pairs in their order."""
     for i in numba.prange(first_pair.size):
-        for k in range(GRADIENTS):
+        for k in range(parts.shape[1]):
             gradients[i, k] = ZERO
         for pair in range(first_pair[i], end_pair[i]):
-            for k in range(GRADIENTS):
+            for k in range(parts.shape[1]):
                 gradients[i, k] += parts[pair, k]
 
 
@@ -153,6 +163,7 @@ def draw_backward(
     light: np.ndarray,
     g_image: np.ndarray,
     g_light: np.ndarray,
+    absolute: bool = False,
 ) -> np.ndarray:
     """Gradients of `draw`.
 
@@ -163,12 +174,14 @@ def draw_backward(
         light: (H, W) that `draw` returned.
         g_image: (H, W, 3) gradient with respect to the image.
         g_light: (H, W) gradient with respect to the transmittance.
+        absolute: Whether to sum the mean's gradient without signs, too.
 
     Returns:
-        (N, 9) float32: mean (2), conic (3), opacity, colour (3).
+        (N, 9) float32: mean (2), conic (3), opacity, colour (3); with `absolute` (N, 11).
     """
-    parts = np.empty((len(tiles.splats), GRADIENTS), np.float32)
-    gradients = np.empty((len(records), GRADIENTS), np.float32)
+    columns = GRADIENTS + (ABSOLUTE if absolute else 0)
+    parts = np.empty((len(tiles.splats), columns), np.float32)
+    gradients = np.empty((len(records), columns), np.float32)
     across = tiles_across(tiles.width)
     _collect_all(
         numba.get_num_threads(),

@@ -69,7 +69,9 @@ class Draw(torch.autograd.Function):
     """Differentiable compositing of C cameras' splats."""
 
     @staticmethod
-    def forward(ctx, means2d, conics, alphas, colors, tiles: Sequence[Tiles]):
+    def forward(
+        ctx, means2d, conics, alphas, colors, tiles: Sequence[Tiles], absolute: Tensor | None
+    ):
         """Draws.
 
         Args:
@@ -79,6 +81,7 @@ class Draw(torch.autograd.Function):
             alphas: (C, N) opacities after the low-pass.
             colors: (C, N, 3).
             tiles: One per camera.
+            absolute: (C, N, 2) that takes the means' gradients summed without signs, or None.
 
         Returns:
             Images (C, H, W, 3) on black and transmittances (C, H, W).
@@ -86,7 +89,7 @@ class Draw(torch.autograd.Function):
         splats = zip(*(map(_array, (means2d, conics, alphas, colors))), strict=True)
         records = [splat_records(*parts) for parts in splats]
         drawn = [draw(r, t) for r, t in zip(records, tiles, strict=True)]
-        ctx.problem = (records, tiles, drawn)
+        ctx.problem, ctx.absolute = (records, tiles, drawn), absolute
         images, lights = zip(*drawn, strict=True)
         return torch.from_numpy(np.stack(images)), torch.from_numpy(np.stack(lights))
 
@@ -94,17 +97,20 @@ class Draw(torch.autograd.Function):
     @once_differentiable
     def backward(ctx, g_images, g_lights):
         """Gradients of means2d, conics, alphas, colors."""
+        wanted = ctx.absolute is not None
         views = zip(*ctx.problem, _array(g_images), _array(g_lights), strict=True)
         gradients = torch.from_numpy(
             np.stack(
                 [
-                    draw_backward(records, tiles, image, light, g_image, g_light)
+                    draw_backward(records, tiles, image, light, g_image, g_light, wanted)
                     for records, tiles, (image, light), g_image, g_light in views
                 ]
             )
-        )  # (C, N, 9)
-        means2d, conics, alphas, colors = gradients.split([2, 3, 1, 3], -1)
-        return means2d, conics, alphas[..., 0], colors, None
+        )  # (C, N, 9 or 11)
+        means2d, conics, alphas, colors = gradients[..., :9].split([2, 3, 1, 3], -1)
+        if wanted:
+            ctx.absolute += gradients[..., 9:]
+        return means2d, conics, alphas[..., 0], colors, None, None
 
 
 def bin_views(
