@@ -12,7 +12,7 @@ from ico3d.capture.capture import Capture
 from ico3d.capture.synthetic import recording
 from ico3d.capture.synthetic.points import surface_points
 from ico3d.capture.synthetic.recording import Recording, choose_views, record
-from ico3d.capture.synthetic.subject import load_subject
+from ico3d.capture.synthetic.subjects import load_subject
 from ico3d.errors import CaptureError, SettingsError
 
 _SPEC = importlib.util.spec_from_file_location(

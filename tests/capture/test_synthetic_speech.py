@@ -7,7 +7,7 @@ import pytest
 
 from ico3d.capture.synthetic.articulation import LEAST_CLOSED, articulate, closure
 from ico3d.capture.synthetic.performance import PAUSE, SOUND_RATE, _glances, _speak, perform
-from ico3d.capture.synthetic.subject import load_subject
+from ico3d.capture.synthetic.subjects import load_subject
 from ico3d.common.espeak import Phoneme
 from ico3d.common.expression import EYE_NAMES
 

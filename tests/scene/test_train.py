@@ -97,6 +97,7 @@ def test_the_verb_trains_and_exports(still, tmp_path, monkeypatch):
     changes = ["steps=20", "initial_gaussians=80", "sh_degree=2"]
     for name in ("scene.ply", "scene.spz"):
         assert cli.main([*words, "--set", *changes, "--export", str(tmp_path / name)]) == 0
+    assert cli.main([*words, "--set", *changes, "--export", "scene.obj"]) == 1
     parameters = TrainedScene.load(out).scene.parameters
     ply, spz = (read_gaussians(tmp_path / name) for name in ("scene.ply", "scene.spz"))
     assert len(ply) == len(spz) == 80 and ply.degree == spz.degree == 2

@@ -43,9 +43,11 @@ class TrainStatic:
         from ico3d.capture.capture import Capture
         from ico3d.scene.settings import PRESETS
         from ico3d.scene.train import SceneJob, train_scene
-        from ico3d.splat.files.formats import write_gaussians
+        from ico3d.splat.files.formats import check_writable, write_gaussians
         from ico3d.training.changes import with_changes
 
+        if self.export is not None:
+            check_writable(self.export)
         settings = with_changes(PRESETS[self.preset, self.strategy], self.set)
         job = SceneJob(self.only, self.frames, self.strategy, self.seed, settings)
         trained = train_scene(Capture.open(self.capture), self.out, job)

@@ -20,7 +20,8 @@ from ico3d.capture.synthetic.performance import SOUND_RATE, Performance, perform
 from ico3d.capture.synthetic.points import surface_points
 from ico3d.capture.synthetic.reader import FORMAT, VERSION
 from ico3d.capture.synthetic.studio import RIGS, Studio, backdrop, camera_arc
-from ico3d.capture.synthetic.subject import Subject, load_subject
+from ico3d.capture.synthetic.subject import Subject
+from ico3d.capture.synthetic.subjects import load_subject
 from ico3d.common.camera import Camera
 from ico3d.common.files import write_atomic
 from ico3d.errors import SettingsError

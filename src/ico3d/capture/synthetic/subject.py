@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from enum import IntEnum
-from pathlib import Path
 
 import numpy as np
 
@@ -126,22 +125,3 @@ class Subject:
     def weights(self, values: dict[str, float]) -> np.ndarray:
         """(K,) float32 weights from names; names this person lacks are left out."""
         return np.array([values.get(name, 0.0) for name in self.blendshape_names], np.float32)
-
-
-def load_subject(subject: str) -> Subject:
-    """Loads a person.
-
-    Args:
-        subject: `anny`, or the path of an `.npz` file in the layout of `subject_npz`.
-
-    Raises:
-        CaptureError: If there is no such file or it is not in that layout.
-        MissingExtraError: If `anny` is asked for and not installed.
-    """
-    if subject == "anny":
-        from ico3d.capture.synthetic.subject_anny import load_anny
-
-        return load_anny()
-    from ico3d.capture.synthetic.subject_npz import load_npz
-
-    return load_npz(Path(subject))

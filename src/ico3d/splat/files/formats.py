@@ -80,6 +80,16 @@ def _read(kind: str, data: bytes) -> tuple[str, RawGaussians]:
     return "PLY", standard_ply.read(tables["vertex"])
 
 
+def check_writable(path: Path) -> None:
+    """Says before long work whether a file of this name can be written after it.
+
+    Raises:
+        SettingsError: If the name does not end in .ply or .spz.
+    """
+    if path.suffix.lower() not in _WRITERS:
+        raise SettingsError(f"{path}: ico3d writes Gaussians to files named .ply or .spz.")
+
+
 def write_gaussians(path: Path | str, gaussians: RawGaussians) -> None:
     """Writes .ply (lossless) or .spz (small), by the name; never leaves half a file.
 
@@ -88,9 +98,8 @@ def write_gaussians(path: Path | str, gaussians: RawGaussians) -> None:
         GaussianFileError: If a value is not finite, or the file cannot be written.
     """
     path = Path(path)
-    write = _WRITERS.get(path.suffix.lower())
-    if write is None:
-        raise SettingsError(f"{path}: ico3d writes Gaussians to files named .ply or .spz")
+    check_writable(path)
+    write = _WRITERS[path.suffix.lower()]
     gaussians.checked()
     try:
         write_atomic(path, lambda temporary: write(gaussians, temporary))

@@ -1,0 +1,22 @@
+"""Whom the studio can record."""
+
+from pathlib import Path
+
+from ico3d.capture.synthetic.subject import Subject
+from ico3d.capture.synthetic.subject_anny import load_anny
+from ico3d.capture.synthetic.subject_npz import load_npz
+
+
+def load_subject(subject: str) -> Subject:
+    """Loads a person.
+
+    Args:
+        subject: `anny`, or the path of an `.npz` file in the layout of `subject_npz`.
+
+    Raises:
+        CaptureError: If there is no such file or it is not in that layout.
+        MissingExtraError: If `anny` is asked for and not installed.
+    """
+    if subject == "anny":
+        return load_anny()
+    return load_npz(Path(subject))
