@@ -97,6 +97,8 @@ _CPU = SceneSettings(
     max_gaussians=12_000,
     densify_from=300,
     densify_until=2_000,
+    densify_gradient=8e-4,
+    absgrad=True,
     reset_every=0,
     checkpoint_every=500,
 )
