@@ -27,10 +27,17 @@ class Sound:
 
 @dataclass(frozen=True)
 class Split:
-    """Which frames train and which test (design section 2); indices ascend."""
+    """Which pictures train and which test (design section 2); indices ascend.
+
+    Attributes:
+        train: Frames to learn from.
+        test: Frames to measure with; bodies have none of their own and test with cameras.
+        test_cameras: Cameras that only measure.
+    """
 
     train: tuple[int, ...]
     test: tuple[int, ...]
+    test_cameras: tuple[int, ...] = ()
 
 
 class Capture(ABC):
@@ -84,8 +91,8 @@ class Capture(ABC):
         """(68, 2) Multi-PIE landmarks in pixels of this camera, also for views without image."""
         return None
 
-    def points(self) -> np.ndarray | None:
-        """(P, 3) initial surface points in canonical head space (bodies: the world, frame 0)."""
+    def points(self, frame: int = 0) -> np.ndarray | None:
+        """(P, 3) surface points of a frame: of bodies in the world, else in head space."""
         return None
 
     @property
@@ -118,3 +125,19 @@ def last_eleventh(num_frames: int) -> Split:
     """The test split of heads: the last 1/11 of the frames."""
     first_test = num_frames * 10 // 11
     return Split(tuple(range(first_test)), tuple(range(first_test, num_frames)))
+
+
+TEST_CAMERA_EVERY = 5
+
+
+def all_frames(num_frames: int, cameras: Sequence[Camera]) -> Split:
+    """The split of bodies: all frames train; every fifth camera by azimuth tests.
+
+    Azimuth is measured about the upward axis y through the middle of the cameras; the first test
+    camera is the third of the ring, so that three cameras suffice for one.
+    """
+    centers = np.stack([camera.camera_to_world[:3, 3] for camera in cameras])  # (C, 3)
+    across = centers - centers.mean(0)
+    ring = np.argsort(np.arctan2(across[:, 0], across[:, 2]), kind="stable")
+    tested = sorted(int(index) for index in ring[TEST_CAMERA_EVERY // 2 :: TEST_CAMERA_EVERY])
+    return Split(tuple(range(num_frames)), (), tuple(tested) if len(cameras) > 2 else ())

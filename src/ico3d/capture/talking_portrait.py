@@ -116,7 +116,7 @@ class TalkingPortrait(Capture):
             raise CaptureError(f"{path}: expected 68 finite landmarks; delete or redo the file.")
         return points
 
-    def points(self) -> np.ndarray | None:
+    def points(self, frame: int = 0) -> np.ndarray | None:
         """The tracked face with a guess of the body around it, or a guess of both."""
         path = self.path / "points.npy"
         if not path.is_file():

@@ -67,6 +67,19 @@ class Camera:
         scale = np.diag([width / self.width, height / self.height, 1.0])
         return Camera(width, height, scale @ self.intrinsics, self.world_to_camera, self.name)
 
+    def cropped(self, left: int, top: int, width: int, height: int) -> "Camera":
+        """The camera that takes a part of the picture only.
+
+        Args:
+            left: Columns cut off, or added where negative.
+            top: Rows cut off, or added.
+            width: Columns of the part.
+            height: Rows of the part.
+        """
+        intrinsics = self.intrinsics.copy()
+        intrinsics[:2, 2] -= (left, top)
+        return Camera(width, height, intrinsics, self.world_to_camera, self.name)
+
     def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Projects world points.
 

@@ -105,7 +105,7 @@ class SyntheticCapture(Capture):
         """(68, 3) landmarks in canonical head space, metres."""
         return self._frames["landmarks"][self._index(frame)]
 
-    def points(self) -> np.ndarray | None:
+    def points(self, frame: int = 0) -> np.ndarray | None:
         """(P, 3) points on the neutral surface, canonical head space."""
         return self._frames["points"]
 
