@@ -24,6 +24,11 @@ class Window:
     def __len__(self) -> int:
         return self.last - self.first + 1
 
+    @property
+    def center(self) -> int:
+        """The frame in the middle, to which the canonical Gaussians belong."""
+        return (self.first + self.last) // 2
+
     def tau(self, frame: float) -> float:
         """Time within the window: 0 at its first frame, 1 at its last."""
         return (frame - self.first) / max(self.last - self.first, 1)

@@ -1,0 +1,150 @@
+"""The space-time encoder: features of a place and a time from six planes (paper, eq. of φ(f_v)).
+
+Of the HexPlane family, as the paper: a plane per pair of axes, sampled bilinearly and multiplied,
+at one or more resolutions of space.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn.functional import grid_sample
+
+from ico3d.errors import SettingsError
+
+SPACE_PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+"""The planes of space, and the axes of their columns and rows."""
+TIME_PLANES = ("xt", "yt", "zt")
+"""The planes of time in the order of the axes of their columns; rows are times."""
+SPACE_RANGE = (0.1, 0.5)
+"""Where the planes of space begin; those of time begin at 1, so that nothing moves."""
+
+
+@dataclass(frozen=True)
+class EncoderShape:
+    """What decides the sizes of the planes.
+
+    Attributes:
+        space: Places along x, y and z at each scale.
+        time: Times, at every scale; as many as frames lets each frame have its own.
+        channels: Features per scale.
+    """
+
+    space: tuple[int, ...] = (32,)
+    time: int = 16
+    channels: int = 16
+
+    def __post_init__(self):
+        """Raises SettingsError where planes would be empty."""
+        if not self.space or min(self.space) < 2 or self.time < 1 or self.channels < 1:
+            raise SettingsError(
+                f"An encoder of {self.space} places, {self.time} times and {self.channels} "
+                "channels does not exist: give at least 2 places per scale, 1 time and 1 channel."
+            )
+
+    @property
+    def outputs(self) -> int:
+        """The number of features of a place."""
+        return len(self.space) * self.channels
+
+
+def initial_planes(shape: EncoderShape, generator: torch.Generator) -> dict[str, Tensor]:
+    """Planes to begin with, by name: the axes of columns and rows, then the scale ("xt0").
+
+    Args:
+        shape: Sizes.
+        generator: Of the planes of space, which are random.
+
+    Returns:
+        Per scale of S places: xy, xz, yz (S, S, channels) and xt, yt, zt (time, S, channels).
+    """
+    planes = {}
+    for scale, places in enumerate(shape.space):
+        for name in SPACE_PLANES:
+            plane = torch.empty(places, places, shape.channels)
+            planes[f"{name}{scale}"] = plane.uniform_(*SPACE_RANGE, generator=generator)
+        for name in TIME_PLANES:
+            planes[f"{name}{scale}"] = torch.ones(shape.time, places, shape.channels)
+    return planes
+
+
+def encode(
+    planes: dict[str, Tensor], shape: EncoderShape, positions: Tensor, time: float
+) -> Tensor:
+    """Features of places at one time.
+
+    Samples are bilinear between the nodes of a plane, the first and last of which lie at −1 and 1
+    in space and at 0 and 1 in time. What lies outside has the features of the border.
+
+    Args:
+        planes: As `initial_planes` makes them.
+        shape: Their sizes.
+        positions: (N, 3), −1 … 1 inside the box.
+        time: 0 … 1 within the window.
+
+    Returns:
+        (N, outputs), differentiable in planes and positions.
+    """
+    scales = [_at_scale(planes, scale, positions, time) for scale in range(len(shape.space))]
+    return torch.cat(scales, 1)
+
+
+def _at_scale(planes: dict[str, Tensor], scale: int, positions: Tensor, time: float) -> Tensor:
+    """(N, channels) features at one scale."""
+    product = torch.ones_like(positions[:, :1])
+    for name, axes in SPACE_PLANES.items():
+        product = product * _sample(planes[f"{name}{scale}"], positions[:, axes])
+    for axis, name in enumerate(TIME_PLANES):
+        line = _line(planes[f"{name}{scale}"], time)
+        places = torch.stack([positions[:, axis], torch.zeros_like(positions[:, axis])], 1)
+        product = product * _sample(line[None], places)
+    return product
+
+
+def _sample(plane: Tensor, places: Tensor) -> Tensor:
+    """(N, C) samples of a plane (H, W, C) at columns and rows (N, 2) within −1 … 1."""
+    sampled = grid_sample(
+        plane.permute(2, 0, 1)[None],  # (1, C, H, W)
+        places[None, None],  # (1, 1, N, 2)
+        padding_mode="border",
+        align_corners=True,
+    )  # (1, C, 1, N)
+    return sampled[0, :, 0].T
+
+
+def _line(plane: Tensor, time: float) -> Tensor:
+    """(W, C): a plane of time (T, W, C) at one time."""
+    row, part = _row(plane.shape[0], time)
+    return plane[row] if part == 0 else torch.lerp(plane[row], plane[row + 1], part)
+
+
+def _row(times: int, time: float) -> tuple[int, float]:
+    """The node at or before a time, and how far the time is from it to the next."""
+    place = min(max(time, 0.0), 1.0) * (times - 1)
+    return int(place), place - int(place)
+
+
+def space_smoothness(planes: dict[str, Tensor]) -> Tensor:
+    """Mean square of the second differences along both axes, over the planes of space."""
+    chosen = [plane for name, plane in planes.items() if name[:2] in SPACE_PLANES]
+    return _mean_square([plane.diff(2, axis) for plane in chosen for axis in (0, 1)])
+
+
+def time_smoothness(planes: dict[str, Tensor]) -> Tensor:
+    """Mean square of the second differences along time, over the planes of time."""
+    return _mean_square([plane.diff(2, 0) for plane in _of_time(planes)])
+
+
+def time_change(planes: dict[str, Tensor]) -> Tensor:
+    """Mean of |1 − P| over the planes of time: 0 where the features do not depend on time."""
+    return torch.cat([(1 - plane).abs().flatten() for plane in _of_time(planes)]).mean()
+
+
+def _of_time(planes: dict[str, Tensor]) -> list[Tensor]:
+    return [plane for name, plane in planes.items() if name[:2] in TIME_PLANES]
+
+
+def _mean_square(differences: list[Tensor]) -> Tensor:
+    """The mean over all; 0 where there are none, as with two times."""
+    values = torch.cat([difference.flatten() for difference in differences])
+    return values.square().sum() / max(len(values), 1)
