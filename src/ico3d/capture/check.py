@@ -65,7 +65,9 @@ def sampled_views(capture: Capture, count: int) -> list[tuple[int, int]]:
 def _split(capture: Capture) -> Finding:
     """Frame numbers of training and test."""
     train, test = capture.split.train, capture.split.test
+    cameras = len(capture.split.test_cameras)
     text = f"{len(train)} frames train, {len(test)} test, of {capture.num_frames}"
+    text += f"; {cameras} of {len(capture.cameras)} cameras test" if cameras else ""
     both, every = set(train) & set(test), [*train, *test]
     if both:
         return Finding("split", "error", f"frame {min(both)} is in training and in test")
@@ -73,7 +75,7 @@ def _split(capture: Capture) -> Finding:
         return Finding("split", "error", f"{text}: numbers lie outside the recording")
     left_out = capture.num_frames - len(every)
     note = f"; {left_out} frames are in neither" if left_out else ""
-    return Finding("split", "warn" if left_out or not test else "ok", text + note)
+    return Finding("split", "warn" if left_out or not (test or cameras) else "ok", text + note)
 
 
 def _pictures(capture: Capture) -> Finding:
