@@ -161,6 +161,7 @@ CPU = BodySettings(
     densify_from=200,
     densify_gradient=0.0,
     densify_growth=0.12,
+    absgrad=True,
     finetune_steps=400,
     finetune_rate=0.3,
     checkpoint_every=500,
