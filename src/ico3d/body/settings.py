@@ -19,7 +19,7 @@ class BodySettings:
     """How a body is trained; defaults are the paper's and, where it is silent, 3DGS's.
 
     Attributes:
-        motion_threshold: Motion after which a new window begins, px² (`ico3d.body.flow`).
+        motion_threshold: Motion that a window may add up to, cm² (`ico3d.body.flow.ClipFlow`).
         shortest_window: Frames that a window has at least.
         longest_window: Frames that it has at most.
         initial: Where Gaussians begin: the best that the capture allows, or the visual hull.
@@ -70,9 +70,9 @@ class BodySettings:
         cache_gib: Pictures kept in memory, in GiB; further ones are read again at each use.
     """
 
-    motion_threshold: float = 20.0
+    motion_threshold: float = 100.0
     shortest_window: int = 6
-    longest_window: int = 20
+    longest_window: int = 16
     initial: Literal["best", "hull"] = "best"
     initial_gaussians: int = 50_000
     initial_opacity: float = 0.1
