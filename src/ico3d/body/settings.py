@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from ico3d.body.initial import Source
 from ico3d.training.optimiser import Rate
 
 Method = Literal["swings++", "swings", "4dgs", "spacetime", "freetime", "static"]
@@ -73,7 +74,7 @@ class BodySettings:
     motion_threshold: float = 100.0
     shortest_window: int = 6
     longest_window: int = 16
-    initial: Literal["best", "hull"] = "best"
+    initial: Source = "best"
     initial_gaussians: int = 50_000
     initial_opacity: float = 0.1
     initial_scale: float = 1.0
@@ -147,15 +148,15 @@ CPU = BodySettings(
     steps_per_frame=250,
     warmup_steps=300,
     grid_space=32,
-    grid_scales=1,
+    grid_scales=2,
     position_rate=5e-4,
     position_decay=0.03,
     rotation_rate=1e-3,
     scale_rate=5e-3,
     opacity_rate=3e-2,
     color_rate=1e-2,
-    mlp_rate=7e-4,
-    grid_rate=5e-2,
+    mlp_rate=2e-3,
+    grid_rate=2e-2,
     blend_rate=1e-3,
     densify_from=200,
     densify_gradient=0.0,
