@@ -147,26 +147,26 @@ class _Product(torch.autograd.Function):
     def forward(ctx, time: float, positions: Tensor, *planes: Tensor) -> Tensor:
         row, part = _row(len(planes[-1]), time)
         lines = [_line(plane, row, part) for plane in planes[3:]]
-        sampled = [_laned(tensor) for tensor in (*planes[:3], *lines)]
+        sampled = [_grouped(tensor) for tensor in (*planes[:3], *lines)]
         positions = positions.contiguous()
-        features = positions.new_empty(len(positions), sampled[0].shape[-1])  # (N, lanes)
+        features = positions.new_empty(len(positions), *sampled[0].shape[2:])
         kernels.forward(numba.get_num_threads(), *_arrays(*sampled, positions, features))
         ctx.save_for_backward(positions, *sampled)
         ctx.row, ctx.part, ctx.sizes = row, part, [plane.shape for plane in planes]
-        return features[:, : planes[0].shape[-1]]
+        return _channels(features, planes[0].shape[-1])
 
     @staticmethod
     def backward(ctx, *gradients: Tensor):
         positions, *sampled = ctx.saved_tensors
-        hands, (places, _, lanes) = numba.get_num_threads(), sampled[0].shape
+        hands = numba.get_num_threads()
         g_positions = torch.zeros_like(positions)
-        g_planes = positions.new_zeros(hands, 3, places, places, lanes)
-        g_lines = positions.new_zeros(hands, 3, places, lanes)
-        taken = (*sampled, positions, _laned(gradients[0]))
+        g_planes = positions.new_zeros(hands, 3, *sampled[0].shape)
+        g_lines = positions.new_zeros(hands, 3, *sampled[-1].shape)
+        taken = (*sampled, positions, _grouped(gradients[0]))
         kernels.backward(*_arrays(*taken, g_planes, g_lines, g_positions))
         channels = gradients[0].shape[1]
-        by_planes = g_planes.sum(0)[..., :channels]  # (3, S, S, C)
-        by_lines = g_lines.sum(0)[..., :channels]  # (3, S, C)
+        by_planes = _channels(g_planes.sum(0), channels)  # (3, S, S, C)
+        by_lines = _channels(g_lines.sum(0), channels)  # (3, S, C)
         by_times = [
             _on_rows(line, size, ctx.row, ctx.part)
             for line, size in zip(by_lines, ctx.sizes[3:], strict=True)
@@ -183,10 +183,16 @@ def _on_rows(line: Tensor, size: torch.Size, row: int, part: float) -> Tensor:
     return gradient
 
 
-def _laned(tensor: Tensor) -> Tensor:
-    """With zeros as further channels up to what the kernels take, and contiguous."""
+def _grouped(tensor: Tensor) -> Tensor:
+    """(…, C) to (…, groups, LANES), as the kernels take channels; zeros fill the last group."""
     missing = -tensor.shape[-1] % kernels.LANES
-    return (pad(tensor, (0, missing)) if missing else tensor).contiguous()
+    padded = pad(tensor, (0, missing)) if missing else tensor
+    return padded.unflatten(-1, (-1, kernels.LANES)).contiguous()
+
+
+def _channels(grouped: Tensor, channels: int) -> Tensor:
+    """(…, C) of what `_grouped` gives."""
+    return grouped.flatten(-2)[..., :channels]
 
 
 def _arrays(*tensors: Tensor) -> list[np.ndarray]:
