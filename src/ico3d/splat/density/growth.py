@@ -25,6 +25,7 @@ class DensitySettings:
         max_gaussians: Never more than this many; the strongest gradients win.
         gradient_threshold: Mean screen gradient (normalised device units) above which a Gaussian
             multiplies.
+        growth: Part of the Gaussians that multiplies at once at most, those of strongest gradient.
         clone_below: Gaussians whose largest scale is up to this are cloned, larger ones split,
             metres. 3DGS: 1 % of the scene's extent.
         prune_opacity: Those whose opacity falls below this die.
@@ -35,6 +36,7 @@ class DensitySettings:
 
     max_gaussians: int = 50_000
     gradient_threshold: float = 2e-4
+    growth: float = 1.0
     clone_below: float = 0.002
     prune_opacity: float = 0.005
     prune_scale: float = 0.05
@@ -127,7 +129,7 @@ def densify_plan(
     if contribution is not None:
         dead |= contribution < settings.prune_contribution * contribution.median()
     alive = under_cap(~dead, opacities.detach(), settings.max_gaussians)
-    room = settings.max_gaussians - int(alive.sum())
+    room = min(settings.max_gaussians - int(alive.sum()), int(settings.growth * len(size)))
     grown = _strongest(wanted & alive, gradient, room)
     return Plan(
         (alive & ~(grown & large)).nonzero()[:, 0],
