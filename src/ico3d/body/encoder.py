@@ -50,6 +50,13 @@ class EncoderShape:
         """The number of features of a place."""
         return len(self.space) * self.channels
 
+    def planes(self, scale: int) -> dict[str, tuple[int, int, int]]:
+        """Names and sizes (rows, columns, channels) of the planes of one scale."""
+        places = self.space[scale]
+        space = {f"{name}{scale}": (places, places, self.channels) for name in SPACE_PLANES}
+        times = {f"{name}{scale}": (self.time, places, self.channels) for name in TIME_PLANES}
+        return space | times
+
 
 def initial_planes(shape: EncoderShape, generator: torch.Generator) -> dict[str, Tensor]:
     """Planes to begin with, by name: the axes of columns and rows, then the scale ("xt0").
@@ -62,12 +69,11 @@ def initial_planes(shape: EncoderShape, generator: torch.Generator) -> dict[str,
         Per scale of S places: xy, xz, yz (S, S, channels) and xt, yt, zt (time, S, channels).
     """
     planes = {}
-    for scale, places in enumerate(shape.space):
-        for name in SPACE_PLANES:
-            plane = torch.empty(places, places, shape.channels)
-            planes[f"{name}{scale}"] = plane.uniform_(*SPACE_RANGE, generator=generator)
-        for name in TIME_PLANES:
-            planes[f"{name}{scale}"] = torch.ones(shape.time, places, shape.channels)
+    for scale in range(len(shape.space)):
+        for name, size in shape.planes(scale).items():
+            planes[name] = torch.ones(size)
+            if name[:2] in SPACE_PLANES:
+                planes[name].uniform_(*SPACE_RANGE, generator=generator)
     return planes
 
 
@@ -87,16 +93,22 @@ def encode(
 
     Returns:
         (N, outputs), differentiable in planes and positions.
+
+    Raises:
+        ValueError: If the planes or positions are of other sizes.
     """
+    if positions.shape[1:] != (3,):
+        raise ValueError(f"positions must be (N, 3), not {tuple(positions.shape)}")
     scales = []
     for scale in range(len(shape.space)):
-        space = [planes[f"{name}{scale}"] for name in SPACE_PLANES]
-        times = [planes[f"{name}{scale}"] for name in TIME_PLANES]
-        if all(_has_kernel(tensor) for tensor in (positions, *space, *times)):
-            scales.append(_Product.apply(time, positions, *space, *times))
+        chosen = [planes[name] for name in shape.planes(scale)]
+        if [plane.shape for plane in chosen] != list(shape.planes(scale).values()):
+            raise ValueError(f"the planes of scale {scale} must be {shape.planes(scale)}")
+        if all(_has_kernel(tensor) for tensor in (positions, *chosen)):
+            scales.append(_Product.apply(time, positions, *chosen))
         else:
-            lines = [_line(plane, *_row(len(plane), time)) for plane in times]
-            scales.append(_product(positions, space, lines))
+            lines = [_line(plane, *_row(shape.time, time)) for plane in chosen[3:]]
+            scales.append(_product(positions, chosen[:3], lines))
     return torch.cat(scales, 1)
 
 
