@@ -18,7 +18,7 @@ SAMPLES_PER_FRAME = 2
 """All frames, and what lies midway."""
 _MOST_FADING = 0.02
 """How much an opacity may change within a window, which has but one; more would be seen."""
-GAUSSIANS_PER_CLUSTER = 200
+GAUSSIANS_PER_CLUSTER = 140
 """At least, on average: each cluster's curves take their room, too."""
 
 

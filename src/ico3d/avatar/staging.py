@@ -21,7 +21,8 @@ _ARM = 0.1
 _SMOOTHING = 1.5
 """Standard deviation, in frames, of the smoothing of head poses (trackers jitter)."""
 _MARGIN = 1.2
-_BODY_FOV = 30.0
+_BODY_FOV, _BODY_MARGIN = 30.0, 1.3
+"""The margin leaves room for the player's bar below the feet."""
 _THUMBNAIL = 384
 NEUTRAL = (0.84, 0.86, 0.88)
 """Background where the capture has none: a light grey."""
@@ -91,7 +92,7 @@ def standing_view(
         toward: (3,) from the body to the visitor, of length 1.
     """
     middle = (low + high) / 2
-    reach = np.linalg.norm(high - low) / 2 * _MARGIN
+    reach = np.linalg.norm(high - low) / 2 * _BODY_MARGIN
     eye = middle + toward * reach / np.tan(np.deg2rad(_BODY_FOV) / 2)
     return CameraInfo(triple(eye), triple(middle), triple(up), _BODY_FOV)
 
