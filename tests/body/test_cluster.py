@@ -2,14 +2,17 @@
 
 import os
 import signal
+import sys
+from pathlib import Path
 
 import pytest
 from test_jobs import wait_for
-from window_tasks import CHECKPOINT_EVERY, tasks
+from window_tasks import CHECKPOINT_EVERY, step_gone_on_from, tasks
 
 from ico3d.body.cluster import RayCluster, share
 from ico3d.body.jobs import train_windows
-from ico3d.errors import SettingsError
+from ico3d.errors import MissingExtraError, SettingsError
+from ico3d.training.log import METRICS
 from ico3d.training.run import CHECKPOINT
 
 
@@ -40,6 +43,13 @@ def test_nobody_can_work():
         share([node(alive=False, CPU=4.0), node(GPU=1.0)], 3)
 
 
+def test_ray_is_not_there(monkeypatch):
+    """One sentence that says what to install."""
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(MissingExtraError, match=r"ico3d\[cluster\]"):
+        RayCluster("auto")
+
+
 @pytest.fixture(scope="module")
 def address():
     """Of a cluster of two nodes with a core each, which only this machine reaches."""
@@ -47,14 +57,24 @@ def address():
     patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
     patch.setenv("RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "0")  # Ray's way to say: loopback only
     ray_cluster = pytest.importorskip("ray.cluster_utils", reason="ray is not installed")
-    small = {"num_cpus": 1, "object_store_memory": 80 * 2**20}
-    cluster = ray_cluster.Cluster(
-        initialize_head=True, head_node_args={**small, "include_dashboard": False}
-    )
+    small = {"num_cpus": 1, "object_store_memory": 80 * 2**20, "include_log_monitor": False}
+    cluster = ray_cluster.Cluster()
+    cluster.add_node(**small, include_dashboard=False, no_monitor=True)
     cluster.add_node(**small)
     yield cluster.address
     cluster.shutdown()
     patch.undo()
+
+
+def worker_of(task) -> int:
+    """The process that writes a window's metrics."""
+    for link in Path("/proc").glob("[0-9]*/fd/*"):
+        try:
+            if link.readlink() == task.folder / METRICS:
+                return int(link.parts[2])
+        except OSError:
+            continue  # somebody else's, or closed in the meantime
+    raise AssertionError("nobody trains this window")
 
 
 class Disturbed(RayCluster):
@@ -78,3 +98,12 @@ def test_the_same_files(address, recorded, sequence, tmp_path, capsys):
     crew.victim = made[1]
     train_windows(made, crew)
     assert [task.file.read_bytes() for task in made] == sequence
+    step = step_gone_on_from(capsys.readouterr().out, made[1], "was lost (WorkerCrashedError)")
+    assert CHECKPOINT_EVERY <= step < made[1].steps
+
+
+def test_nobody_answers():
+    """One sentence, at once."""
+    pytest.importorskip("ray", reason="ray is not installed")
+    with pytest.raises(SettingsError, match=r"no Ray cluster answers at 127\.0\.0\.1:9"):
+        RayCluster("127.0.0.1:9")

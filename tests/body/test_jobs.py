@@ -11,7 +11,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from window_tasks import CHECKPOINT_EVERY, tasks
+from window_tasks import CHECKPOINT_EVERY, step_gone_on_from, tasks
 
 from ico3d.body.commands import TrainBody
 from ico3d.body.jobs import RETRIES, Lost, train_windows
@@ -65,10 +65,8 @@ def test_a_killed_worker_is_replaced_and_the_files_are_those_of_a_sequence(
     assert [task.file.read_bytes() for task in made] == sequence
     assert len(seconds) == 3 and min(seconds) > 0
     said = capsys.readouterr().out
-    _, _, rest = said.partition("window 1 (frames 3 to 6): its worker was killed by SIGKILL; ")
-    step = int(rest.removeprefix("another goes on from step ").partition(".")[0])
-    assert step >= CHECKPOINT_EVERY and step % CHECKPOINT_EVERY == 0
-    assert step < made[1].steps
+    step = step_gone_on_from(said, made[1], "was killed by SIGKILL")
+    assert CHECKPOINT_EVERY <= step < made[1].steps
     assert "window 2 (frames 6 to 8): loss" in said, "the end of each window is told"
 
 
@@ -112,7 +110,7 @@ def test_ctrl_c_and_errors_end_all_workers_and_spare_checkpoints(recorded, tmp_p
 def test_an_error_of_the_program_is_shown_and_not_tried_again(tmp_path, capfd):
     """A window of no capture."""
     task = tasks(None, tmp_path)[1]
-    with pytest.raises(ModelError, match="window 1 .* the error that is printed above"):
+    with pytest.raises(ModelError, match=r"window 1 .* the error that is printed above"):
         train_windows([task], Processes(1))
     assert capfd.readouterr().err.count("AttributeError: 'NoneType' object") == 1
 
@@ -165,7 +163,9 @@ class Hopeless:
 def test_workers_are_not_replaced_for_ever(recorded, tmp_path):
     """A sentence that says which window, how often and after which step."""
     crew = Hopeless()
-    with pytest.raises(ModelError, match=rf"window 0 .* was lost, {RETRIES + 1} times after step 0"):
+    with pytest.raises(
+        ModelError, match=rf"window 0 .* was lost, {RETRIES + 1} times after step 0"
+    ):
         train_windows(tasks(recorded, tmp_path), crew)
     assert crew.started[0] == RETRIES + 1 and crew.stopped
 

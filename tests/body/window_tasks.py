@@ -28,9 +28,18 @@ def tasks(capture: Path, folder: Path, method="swings++", **changes) -> list[Win
     }
     job = BodyJob(method, 0, replace(settings_for("cpu", method), **(small | changes)))
     return [
-        WindowTask(capture, folder / f"{index:04d}", window, index, job)
+        WindowTask(capture, folder / f"{index:04d}", folder / "flow", window, index, job)
         for index, window in enumerate(WINDOWS)
     ]
+
+
+def step_gone_on_from(said: str, task: WindowTask, reason: str) -> int:
+    """The step in what was said when a window lost its worker."""
+    _, found, rest = said.partition(
+        f"{task.label}: its worker {reason}; another goes on from step "
+    )
+    assert found, said
+    return int(rest.partition(".")[0])
 
 
 def files_of_a_sequence(capture: Path, folder: Path) -> list[bytes]:

@@ -5,6 +5,7 @@ ico3d is installed on each. Workers answer through Ray; how far they are is read
 """
 
 import logging
+import socket
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -13,9 +14,12 @@ from ico3d.body.jobs import Lost, work
 from ico3d.body.train import WindowTask
 from ico3d.errors import Ico3dError, MissingExtraError, SettingsError
 
+ANSWER = 10.0
+"""Seconds within which a cluster must answer."""
+
 
 class RayCluster:
-    """A `Crew` of Ray workers, Ray keeps the queue."""
+    """A `Crew` of Ray workers; Ray keeps the queue."""
 
     capacity = None
 
@@ -35,8 +39,9 @@ class RayCluster:
             raise MissingExtraError("ray", "cluster", "training on a Ray cluster") from None
         self._ray: Any = ray
         try:
+            _reach(address)
             ray.init(address=address, log_to_driver=False, logging_level=logging.WARNING)
-        except (ConnectionError, ValueError, RuntimeError) as error:
+        except (OSError, ValueError, RuntimeError) as error:
             raise SettingsError(
                 f"no Ray cluster answers at {address}: start one with ray start --head."
             ) from error
@@ -53,10 +58,10 @@ class RayCluster:
 
     def start(self, task: WindowTask) -> None:
         """Gives Ray a window to train."""
-        found = replace(task, capture=task.capture.resolve(), folder=task.folder.resolve())
+        places = {name: getattr(task, name).resolve() for name in ("capture", "folder", "flow")}
         # Not Ray's own retries: those would be neither counted by checkpoint nor seen.
         remote = self._ray.remote(max_retries=0, **self._needs)(work)
-        self._running[remote.remote(found, self._needs["num_cpus"])] = task
+        self._running[remote.remote(replace(task, **places), self._needs["num_cpus"])] = task
 
     def ended(self, timeout: float) -> Sequence[tuple[WindowTask, float | Lost]]:
         """Waits until Ray has a result, or has lost a worker or its machine."""
@@ -84,6 +89,17 @@ class RayCluster:
         for reference in self._running:
             self._ray.cancel(reference, force=True)
         self._ray.shutdown()
+
+
+def _reach(address: str) -> None:
+    """Connects to an address and hangs up: where nobody answers, Ray would wait for minutes.
+
+    Raises:
+        OSError: If nobody answers.
+    """
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if port.isdigit():  # others are words like "auto"
+        socket.create_connection((host, int(port)), ANSWER).close()
 
 
 def share(nodes: Sequence[Mapping], windows: int) -> dict[str, int]:

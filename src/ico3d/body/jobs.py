@@ -129,6 +129,6 @@ def work(task: WindowTask, threads: int) -> float | Ico3dError:
     torch.set_num_threads(threads)
     numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore (set at run time)
     try:
-        return train_window(task, bar=False)
+        return train_window(task)
     except Ico3dError as error:
         return error

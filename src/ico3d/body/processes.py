@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -126,6 +127,7 @@ def _gpus() -> list[str]:
 def _main(sender: Connection, task: WindowTask, threads: int, gpu: str | None) -> None:
     """What a process does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all: the parent decides
+    sys.stdout = open(os.devnull, "w")  # noqa: SIM115 (to the end); the parent draws for all
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if gpu is not None:
         os.environ[GPUS] = gpu  # read at the first use of CUDA, which is later

@@ -80,13 +80,12 @@ Runner = Callable[[Sequence[WindowTask]], Sequence[float]]
 """Trains windows; gives the seconds spent in steps by window."""
 
 
-def train_window(task: WindowTask, capture: Capture | None = None, bar: bool = True) -> float:
+def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     """Trains a window, or goes on with an interrupted run of the same settings.
 
     Args:
         task: Which.
         capture: The opened capture, where the caller has it open already.
-        bar: Whether to draw a progress bar.
 
     Returns:
         Seconds spent in steps.
@@ -117,7 +116,6 @@ def train_window(task: WindowTask, capture: Capture | None = None, bar: bool = T
         task.steps,
         checkpoint_every=job.settings.checkpoint_every,
         label=task.label,
-        bar=bar,
     )
     seconds = run_loop(trainer, run, loop)
     save_window(task.file, trainer.model)

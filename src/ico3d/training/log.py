@@ -69,13 +69,12 @@ def readable(numbers: Mapping[str, float]) -> str:
     return "  ".join(f"{name} {value:.4g}" for name, value in numbers.items())
 
 
-def progress_bar(drawn: bool = True) -> Progress:
-    """A bar with steps, time left and a field `numbers` for what matters; silent if not drawn."""
+def progress_bar() -> Progress:
+    """A bar with steps, time left and a field `numbers` for what matters."""
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
         TextColumn("{task.fields[numbers]}"),
-        disable=not drawn,
     )

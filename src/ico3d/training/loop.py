@@ -55,14 +55,12 @@ class LoopSettings:
         log_every: Steps between entries in metrics.jsonl.
         checkpoint_every: Steps between checkpoints.
         label: What the progress bar says.
-        bar: Whether to draw one; where several run at once, who started them draws for all.
     """
 
     steps: int
     log_every: int = 50
     checkpoint_every: int = 1000
     label: str = "training"
-    bar: bool = True
 
 
 def run_loop(
@@ -87,7 +85,7 @@ def run_loop(
     log = MetricsLog(run.path, first)
     saved = index = first
     try:
-        with progress_bar(settings.bar) as bar:
+        with progress_bar() as bar:
             task = bar.add_task(settings.label, total=settings.steps, completed=first, numbers="")
             for index in range(first, settings.steps):
                 begin = time.perf_counter()
