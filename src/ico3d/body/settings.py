@@ -158,6 +158,7 @@ CPU = BodySettings(
     mlp_rate=2e-3,
     grid_rate=2e-2,
     blend_rate=1e-3,
+    motion_rate=5e-3,
     densify_from=200,
     densify_gradient=0.0,
     densify_growth=0.12,
