@@ -5,11 +5,13 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import torch
+from rich.console import Console
 
 from ico3d.body.finetune import FineTuner
-from ico3d.body.flow import dynamic_weights
+from ico3d.body.flow import clip_flow, dynamic_weights
 from ico3d.body.model import WindowModel
-from ico3d.body.plan import Plan, PlanSettings, make_plan
+from ico3d.body.plan import Plan, PlanSettings, make_plan, print_plan, save_plan
+from ico3d.body.plan_picture import draw_plan
 from ico3d.body.settings import ONE_WINDOW, BodySettings, Method
 from ico3d.body.start import begin_window
 from ico3d.body.trained import TrainedBody, load_window, save_window
@@ -20,6 +22,8 @@ from ico3d.capture.capture import Capture
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.run import RunFolder
 
+FINETUNING = ("finetune_steps", "consistency", "finetune_rate")
+"""Settings that windows do not depend on: fine-tuning can be done anew without training anew."""
 WINDOW_FILE = "window.safetensors"
 
 
@@ -45,6 +49,7 @@ class WindowTask:
     Attributes:
         capture: Path of the capture.
         folder: Where the window's run lies.
+        flow: Folder of the optical flow, shared by all windows.
         window: Which frames.
         index: Its number.
         job: What to train.
@@ -52,6 +57,7 @@ class WindowTask:
 
     capture: Path
     folder: Path
+    flow: Path
     window: Window
     index: int
     job: BodyJob
@@ -85,7 +91,7 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     capture = capture or Capture.open(task.capture)
 
     def dynamic(points):
-        return dynamic_weights(points, capture, window)
+        return dynamic_weights(points, capture, window, clip_flow(capture, task.flow))
 
     begin = begin_window(capture, window, job.method, job.settings, dynamic, job.seed)
     begin.model.to(_device())
@@ -121,13 +127,14 @@ def finetune_window(
         Seconds spent in steps.
     """
     job, window = task.job, task.window
-    run = RunFolder(task.folder, _about(task.capture, window, job))
+    about = _about(task.capture, window, job)
+    run = RunFolder(task.folder, about | asdict(job.settings))
     finished = run.finished()
     if finished is not None:
         return finished["train_seconds"]
     model = load_window(trained / WINDOW_FILE)
-    about = RunFolder(trained, _about(task.capture, window, job)).finished()
-    assert about is not None
+    before = RunFolder(trained, about).finished()
+    assert before is not None
     model.to(_device())
     previous.to(_device())
     held_out = capture.split.test_cameras
@@ -135,7 +142,7 @@ def finetune_window(
     pictures = BodyViews(capture, job.settings.cache_gib)
     seed = job.seed + 1_000 * task.index + 500
     tuner = FineTuner(
-        model, previous, window, pictures, cameras, job.settings, about["extent"], seed
+        model, previous, window, pictures, cameras, job.settings, before["extent"], seed
     )
     loop = LoopSettings(
         job.settings.finetune_steps,
@@ -171,7 +178,9 @@ def train_body(capture: Capture, folder: Path, job: BodyJob) -> TrainedBody:
         return TrainedBody.load(folder)
     windows = plan_windows(capture, job, folder).windows
     tasks = [
-        WindowTask(capture.path, folder / "windows" / f"{index:04d}", window, index, job)
+        WindowTask(
+            capture.path, folder / "windows" / f"{index:04d}", folder / "flow", window, index, job
+        )
         for index, window in enumerate(windows)
     ]
     seconds = sum(train_window(task, capture) for task in tasks)
@@ -187,14 +196,17 @@ def train_body(capture: Capture, folder: Path, job: BodyJob) -> TrainedBody:
 
 
 def plan_windows(capture: Capture, job: BodyJob, folder: Path) -> Plan:
-    """The windows of a clip; methods of one window take all of it."""
+    """The windows of a clip, shown and drawn; methods of one window take all of it."""
     settings = job.settings
     bounds = PlanSettings(
         settings.motion_threshold, settings.shortest_window, settings.longest_window
     )
     plan = make_plan(capture, bounds, folder)
     if job.method in ONE_WINDOW:
-        return replace(plan, windows=(Window(0, capture.num_frames - 1),))
+        plan = replace(plan, windows=(Window(0, capture.num_frames - 1),))
+    print_plan(plan, Console())
+    save_plan(plan, folder / "plan.json")
+    draw_plan(plan, capture, folder / "plan.png")
     return plan
 
 
@@ -215,9 +227,11 @@ def _save(
 
 
 def _about(capture: Path, window: Window, job: BodyJob) -> dict:
-    """What a window's run is known by."""
+    """What a window's run is known by: what fine-tuning does comes later."""
     about = {"capture": str(capture.resolve()), "method": job.method, "seed": job.seed}
-    return about | asdict(window) | asdict(job.settings)
+    settings = asdict(job.settings)
+    kept = {name: value for name, value in settings.items() if name not in FINETUNING}
+    return about | asdict(window) | kept
 
 
 def _device() -> torch.device:
