@@ -16,6 +16,8 @@ from ico3d.training.checkpoint import load_tensors, save_tensors
 
 ABOUT = "body.json"
 """The file by which a folder is known to hold a body."""
+ROUNDING = 1e-6
+"""Frames by which a time may miss its frame: 31 / 15 s is, in floats, after frame 31."""
 
 
 def save_window(file: Path, model: WindowModel) -> None:
@@ -67,7 +69,7 @@ class TrainedBody:
 
     def window_at(self, seconds: float) -> int:
         """The window that shows a time; at a shared frame the earlier one."""
-        frame = seconds * self.fps
+        frame = seconds * self.fps - ROUNDING
         inside = (i for i, window in enumerate(self.windows) if frame <= window.last)
         return next(inside, len(self.windows) - 1)
 

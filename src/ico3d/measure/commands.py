@@ -12,15 +12,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Measures a trained head or static scene against a capture, its own or another.
+    """Measures a trained head, body or static scene against a capture, its own or another.
 
     Attributes:
-        model: A model folder that ico3d train head or ico3d train static wrote.
+        model: A model folder that ico3d train head, train body or train static wrote.
         capture: The capture with the truth; its sound or blendshapes drive the head.
         json: File for the metrics.
         images: Folder for pictures: {pred,gt,mask}/CAMERA/%06d.png.
         frames: The capture's test frames (of a single moment: its test cameras), or all of them
-            (for a capture that trained nothing).
+            (for a capture that trained nothing); of bodies: all frames by the test cameras, or by
+            all cameras.
     """
 
     model: tyro.conf.Positional[Path]
@@ -43,23 +44,36 @@ class Evaluate:
             write_atomic(self.json, json.dumps(metrics, indent=1).encode())
         console = Console()
         for name, value in metrics.items():
+            if isinstance(value, list):
+                continue  # parts of the whole: for the file
             console.print(f"{name:16} {'not measured' if value is None else f'{value:.3f}'}")
 
-    def _metrics(self, capture: "Capture") -> dict[str, float | None]:
-        """Measures a scene, if the folder holds one, else a head."""
-        from ico3d.scene.trained import ABOUT, TrainedScene
+    def _metrics(self, capture: "Capture") -> dict:
+        """Measures what the folder holds: a scene, a body, else a head."""
+        from ico3d.body.trained import ABOUT as BODY
+        from ico3d.scene.trained import ABOUT as SCENE
 
-        if (self.model / ABOUT).is_file():
+        if (self.model / SCENE).is_file():
             from ico3d.measure.scene import evaluate_scene
+            from ico3d.scene.trained import TrainedScene
 
             scene = TrainedScene.load(self.model)
             return evaluate_scene(scene, capture, self.frames, self.images)
+        if (self.model / BODY).is_file():
+            return self._body(capture)
         from ico3d.head.trained import TrainedHead
         from ico3d.measure.evaluate import evaluate_head
 
         head = TrainedHead.load(self.model)
         frames = capture.split.test if self.frames == "test" else range(capture.num_frames)
         return evaluate_head(head, capture, frames, self.images)
+
+    def _body(self, capture: "Capture") -> dict:
+        from ico3d.body.trained import TrainedBody
+        from ico3d.measure.body import evaluate_body
+
+        cameras = range(len(capture.cameras)) if self.frames == "all" else None
+        return evaluate_body(TrainedBody.load(self.model), capture, cameras, images=self.images)
 
 
 SCENES = ((5_000, 256), (20_000, 256), (50_000, 512), (100_000, 1024), (200_000, 1024))
