@@ -11,6 +11,7 @@ from true_body import true_body
 from ico3d.body.windows import Window
 from ico3d.errors import CaptureError
 from ico3d.measure.body import Truth, evaluate_body, picture_scores
+from ico3d.measure.flicker import border_flicker, masked_difference, novel_cameras
 from ico3d.measure.metrics import moving_pixels, psnr_moving
 
 
@@ -145,3 +146,36 @@ def test_psnr_on_moving_pixels_counts_no_others():
     assert psnr_moving(predicted, truth, weight) == pytest.approx(20, abs=1e-4)
     weight[8:10] = 0
     assert psnr_moving(predicted, truth, weight) is None  # 42 pixels
+
+
+def test_windows_that_agree_do_not_flicker(truth_scores):
+    assert truth_scores["flicker"] == 0
+    assert truth_scores["per_border"] == [{"frame": 4, "flicker": 0.0}]
+
+
+def test_flicker_is_the_constant_difference_of_two_windows(capture):
+    cameras = novel_cameras(capture.cameras)
+    (found,) = border_flicker(true_body(capture, (0.02, 0.1)), cameras)
+    assert len(cameras) == 20
+    assert found == pytest.approx(0.08, abs=1e-4)
+    assert novel_cameras(capture.cameras)[7].world_to_camera == pytest.approx(
+        cameras[7].world_to_camera
+    )
+
+
+def test_difference_on_the_person_in_closed_form():
+    first, second = np.zeros((4, 5, 3)), np.zeros((4, 5, 3))
+    alphas = np.zeros((2, 4, 5))
+    second[1, 1:3] = (0.1, 0.2, 0.3)
+    alphas[0, 1, 0:2] = 0.5
+    alphas[1, 1, 1:3] = 1.0
+    assert masked_difference(first, second, *alphas) == pytest.approx(1.2 / (3 * 2.5))
+    assert masked_difference(first, first, alphas[0] * 0, alphas[0] * 0) == 0
+
+
+def test_one_window_has_no_border(capture):
+    body = true_body(capture)
+    body.windows, body.models = body.windows[:1], body.models[:1]
+    scores = evaluate_body(body, capture, cameras=(0,))
+    assert scores["flicker"] is None and scores["per_border"] == []
+    assert len(scores["per_frame"]) == 5

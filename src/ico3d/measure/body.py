@@ -13,13 +13,15 @@ from rich.progress import track
 from ico3d.body.trained import ROUNDING, TrainedBody
 from ico3d.body.windows import Window
 from ico3d.capture.capture import Capture
-from ico3d.capture.pictures import View
+from ico3d.capture.pictures import View, train_cameras
 from ico3d.errors import CaptureError
+from ico3d.measure.flicker import border_flicker, novel_cameras
+from ico3d.measure.lpips import lpips
 from ico3d.measure.metrics import moving_pixels, psnr, psnr_moving
 from ico3d.measure.scores import Scores, add_picture, write_pictures
 from ico3d.splat.render import render
 
-QUALITY = ("psnr", "psnr_mask", "psnr_moving", "ssim")
+QUALITY = ("psnr", "psnr_mask", "psnr_moving", "ssim", "lpips")
 """Metrics of a picture; of several pictures, their mean over those that allow them."""
 
 
@@ -97,7 +99,7 @@ def evaluate_body(
     spans: Sequence[Window] | None = None,
     images: Path | None = None,
 ) -> dict:
-    """All metrics of design section 2 that a body has, each the mean over pictures.
+    """All metrics of design section 2 that a body has, those of pictures as means over them.
 
     The body is rendered over the capture's clean plates; where it has none, over black, and
     compared with the person cut out by the mask. `psnr_moving` is PSNR on the person's moving
@@ -115,7 +117,8 @@ def evaluate_body(
 
     Returns:
         Metric keys to values, None where this capture does not allow the metric; `per_window`,
-        `per_camera` and `per_frame`: lists of the same for parts of the pictures.
+        `per_camera` and `per_frame`: lists of the same for parts of the pictures. `flicker` is
+        the mean of `per_border` (`border_flicker`), None where there is one window.
 
     Raises:
         CaptureError: If there is no picture to measure with.
@@ -127,10 +130,18 @@ def evaluate_body(
     if not found:
         raise CaptureError(f"{capture.path} has no picture in the frames to measure.")
     result: dict = _means(found.values())
+    borders = border_flicker(
+        body, novel_cameras([capture.cameras[i] for i in train_cameras(capture)])
+    )
+    result["flicker"] = float(np.mean(borders)) if borders else None
     result["num_gaussians"] = sum(map(len, body.models))
     result["ms_per_frame"] = float(np.median(renderer.seconds) * 1000)
     result["train_seconds"] = body.summary.get("train_seconds")
     result["per_window"] = _per_window(found, spans or body.windows)
+    result["per_border"] = [
+        {"frame": window.last, "flicker": value}
+        for window, value in zip(body.windows, borders, strict=False)
+    ]
     result["per_camera"] = [
         {"camera": capture.cameras[camera].name}
         | _means(values for (other, _), values in found.items() if other == camera)
@@ -194,6 +205,7 @@ def picture_scores(predicted: np.ndarray, truth: Truth) -> PictureScores:
     scores = Scores({name: [] for name in QUALITY})
     if truth.whole:
         add_picture(scores, predicted, truth.picture)
+        scores.add("lpips", lpips(predicted, truth.picture))
     if truth.mask is not None and truth.mask.any():
         box = _box(truth.mask)
         seen, true, mask = predicted[box], truth.picture[box], truth.mask[box]
