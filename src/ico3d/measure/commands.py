@@ -22,6 +22,8 @@ class Evaluate:
         frames: The capture's test frames (of a single moment: its test cameras), or all of them
             (for a capture that trained nothing); of bodies: all frames by the test cameras, or by
             all cameras.
+        plots: Of bodies: folder for PSNR over frames and by camera, as pictures.
+        untuned: Of bodies: measure the windows as they were before temporal fine-tuning.
     """
 
     model: tyro.conf.Positional[Path]
@@ -29,6 +31,8 @@ class Evaluate:
     json: Path | None = None
     images: Path | None = None
     frames: Literal["test", "all"] = "test"
+    plots: Path | None = None
+    untuned: bool = False
 
     def run(self) -> None:
         """Prints the metrics, writes what was asked for."""
@@ -46,7 +50,7 @@ class Evaluate:
         for name, value in metrics.items():
             if isinstance(value, list):
                 continue  # parts of the whole: for the file
-            console.print(f"{name:16} {'not measured' if value is None else f'{value:.3f}'}")
+            console.print(f"{name:16} {'not measured' if value is None else f'{value:.5g}'}")
 
     def _metrics(self, capture: "Capture") -> dict:
         """Measures what the folder holds: a scene, a body, else a head."""
@@ -69,11 +73,16 @@ class Evaluate:
         return evaluate_head(head, capture, frames, self.images)
 
     def _body(self, capture: "Capture") -> dict:
-        from ico3d.body.trained import TrainedBody
+        from ico3d.body.trained import ABOUT, UNTUNED, TrainedBody
         from ico3d.measure.body import evaluate_body
+        from ico3d.measure.body_plots import plot_body
 
+        body = TrainedBody.load(self.model, UNTUNED if self.untuned else ABOUT)
         cameras = range(len(capture.cameras)) if self.frames == "all" else None
-        return evaluate_body(TrainedBody.load(self.model), capture, cameras, images=self.images)
+        metrics = evaluate_body(body, capture, cameras, images=self.images)
+        if self.plots is not None:
+            plot_body(metrics, self.plots)
+        return metrics
 
 
 SCENES = ((5_000, 256), (20_000, 256), (50_000, 512), (100_000, 1024), (200_000, 1024))
