@@ -49,7 +49,10 @@ def difference(capture, models):
     """Mean L1 at the shared frame between both windows, held-out cameras."""
     with torch.no_grad():
         pairs = [
-            [render(model.at(tau), [capture.cameras[i]]).rgb for model, tau in zip(models, (1.0, 0.0))]
+            [
+                render(model.at(tau), [capture.cameras[i]]).rgb
+                for model, tau in zip(models, (1.0, 0.0), strict=True)
+            ]
             for i in capture.split.test_cameras
         ]
     return float(np.mean([(a - b).abs().mean() for a, b in pairs]))

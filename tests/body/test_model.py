@@ -77,7 +77,9 @@ def test_the_encoder_sees_the_box():
     np.testing.assert_allclose(motion.middle, points.mean(0))
     assert motion.encoder == EncoderShape((32,), 7, 16) and motion.mlp.inputs == 16
     shared = motion.initial(torch.Generator().manual_seed(0))
-    shared = {n: v + 0.1 * torch.randn_like(v) if n.startswith(GRID) else v for n, v in shared.items()}
+    shared = {
+        n: v + 0.1 * torch.randn_like(v) if n.startswith(GRID) else v for n, v in shared.items()
+    }
     corner = torch.tensor(np.array(motion.middle) + motion.half).float()[None]
     deltas = [
         motion.deltas({**shared, "means": corner + off, "alpha": torch.ones(1, 2)}, 0.4)
@@ -127,7 +129,7 @@ def test_the_time_of_a_spacetime_gaussian_learns_from_its_opacity_alone():
 
 def test_a_window_without_its_tensors_is_refused():
     """Named are those that it has and those that it should have."""
-    with pytest.raises(ValueError, match="expected .*'alpha'"):
+    with pytest.raises(ValueError, match=r"expected .*'alpha'"):
         WindowModel(ENCODED, canonical(), {})
     with pytest.raises(ValueError, match="length"):
         WindowModel(Still(), {**canonical(), "means": torch.zeros(4, 3)}, {})

@@ -57,18 +57,30 @@ def masked_error(capture, model, frame):
     return np.mean(errors) / 3
 
 
+def ends_error(capture, model):
+    """The sum of errors at both ends of the window."""
+    return masked_error(capture, model, 4) + masked_error(capture, model, 8)
+
+
 @pytest.mark.parametrize("method", ["swings++", "swings", "4dgs", "spacetime", "freetime"])
-def test_every_method_learns_the_motion(capture, method):
-    """At the window's ends each is nearer to the truth than Gaussians that stand still."""
-    trainers = trainer_of(capture, method), trainer_of(capture, "static")
+def test_every_method_learns(capture, method):
+    """At the window's ends the error falls to less than half."""
+    trainer = trainer_of(capture, method)
+    before = ends_error(capture, trainer.model)
+    for index in range(250):
+        trainer.step(index)
+    assert len(trainer.model) <= 400
+    assert ends_error(capture, trainer.model) < 0.5 * before
+
+
+def test_what_moves_is_learned(capture):
+    """SWinGS++ is nearer to the truth than Gaussians that stand still."""
+    trainers = trainer_of(capture), trainer_of(capture, "static")
     for trainer in trainers:
         for index in range(250):
             trainer.step(index)
-        assert len(trainer.model) <= 400
-    moving, still = (
-        sum(masked_error(capture, t.model, frame) for frame in (4, 8)) for t in trainers
-    )
-    assert moving < 0.9 * still
+    moving, still = (ends_error(capture, trainer.model) for trainer in trainers)
+    assert moving < 0.7 * still
 
 
 def test_the_warm_up_moves_nothing(capture):
@@ -133,7 +145,7 @@ def test_cameras_that_see_other_colors_are_corrected(capture):
     picture, plate = capture.image, capture.background
     capture.image = lambda c, f: picture(c, f) * (0.8 if c == 1 else 1.0)
     capture.background = lambda c: plate(c) * (0.8 if c == 1 else 1.0)
-    trainer = trainer_of(capture, color_correction=True, motion_rate=5e-3)
+    trainer = trainer_of(capture, color_correction=True, motion_rate=2e-2)
     for index in range(250):
         trainer.step(index)
     factors = trainer.tensors()["affine"].detach()[:, :, :3].diagonal(dim1=1, dim2=2).mean(1)
@@ -143,9 +155,18 @@ def test_cameras_that_see_other_colors_are_corrected(capture):
 def test_epochs_show_every_view_once(capture):
     """In another order each time."""
     learner = Learner(
-        trainer_of(capture).model, WINDOW, BodyViews(capture, 0.1), settings_for("cpu", "swings++"), 1.0, 0
+        trainer_of(capture).model,
+        WINDOW,
+        BodyViews(capture, 0.1),
+        settings_for("cpu", "swings++"),
+        1.0,
+        0,
     )
     count = len(learner.views)
     seen = [learner.view(learner.views, index) for index in range(2 * count)]
-    assert {id(v) for v in seen[:count]} == {id(v) for v in seen[count:]} == {id(v) for v in learner.views}
+    assert (
+        {id(v) for v in seen[:count]}
+        == {id(v) for v in seen[count:]}
+        == {id(v) for v in learner.views}
+    )
     assert seen[:count] != seen[count:]

@@ -1,6 +1,5 @@
 """The pictures that a body is trained on."""
 
-
 import numpy as np
 import pytest
 import torch

@@ -6,7 +6,9 @@ from ico3d.body.deformation import Deformation
 from ico3d.body.encoder import EncoderShape
 from ico3d.body.tunable import MlpShape
 
-ENCODED = Deformation((0.0, 1.0, 0.0), (1.0, 1.0, 0.5), MlpShape(8, 6, 2), EncoderShape((4,), 3, 8), 0)
+ENCODED = Deformation(
+    (0.0, 1.0, 0.0), (1.0, 1.0, 0.5), MlpShape(8, 6, 2), EncoderShape((4,), 3, 8), 0
+)
 POSITIONAL = Deformation((0.0, 1.0, 0.0), (1.0, 1.0, 0.5), MlpShape(52, 6, 4, sets=3), None, 6)
 
 

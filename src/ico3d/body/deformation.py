@@ -1,4 +1,4 @@
-"""The learned deformation of SWinGS++, of SWinGS, and of 4DGS (paper, dynamic 3D body Gaussians)."""
+"""The learned deformation of SWinGS++, SWinGS and 4DGS (paper, dynamic 3D body Gaussians)."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -79,13 +79,9 @@ class Deformation:
     def deltas(self, values: Mapping[str, Tensor], tau: float) -> Tensor:
         """(N, 10): Δμ in metres, Δr, Δs (paper eq. of φ_dyn)."""
         means = values["means"]
-        if self.mlp.sets > 1:
-            alpha = values["alpha"]
-        else:
-            alpha = means.new_ones(len(means), 1)
-        return tunable_mlp(
-            _below(MLP, values), self.mlp, self._features(values, tau), alpha
-        )  # (N, 10)
+        alpha = values["alpha"] if self.mlp.sets > 1 else means.new_ones(len(means), 1)
+        features = self._features(values, tau)  # (N, inputs)
+        return tunable_mlp(_below(MLP, values), self.mlp, features, alpha)
 
     def _features(self, values: Mapping[str, Tensor], tau: float) -> Tensor:
         """(N, mlp.inputs) what the MLP sees."""

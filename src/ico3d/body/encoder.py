@@ -6,10 +6,13 @@ at one or more resolutions of space.
 
 from dataclasses import dataclass
 
+import numba
+import numpy as np
 import torch
 from torch import Tensor
-from torch.nn.functional import grid_sample
+from torch.nn.functional import grid_sample, pad
 
+from ico3d.body import encoder_kernels as kernels
 from ico3d.errors import SettingsError
 
 SPACE_PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
@@ -85,19 +88,30 @@ def encode(
     Returns:
         (N, outputs), differentiable in planes and positions.
     """
-    scales = [_at_scale(planes, scale, positions, time) for scale in range(len(shape.space))]
+    scales = []
+    for scale in range(len(shape.space)):
+        space = [planes[f"{name}{scale}"] for name in SPACE_PLANES]
+        times = [planes[f"{name}{scale}"] for name in TIME_PLANES]
+        if all(_has_kernel(tensor) for tensor in (positions, *space, *times)):
+            scales.append(_Product.apply(time, positions, *space, *times))
+        else:
+            lines = [_line(plane, *_row(len(plane), time)) for plane in times]
+            scales.append(_product(positions, space, lines))
     return torch.cat(scales, 1)
 
 
-def _at_scale(planes: dict[str, Tensor], scale: int, positions: Tensor, time: float) -> Tensor:
-    """(N, channels) features at one scale."""
+def _has_kernel(tensor: Tensor) -> bool:
+    return tensor.device.type == "cpu" and tensor.dtype == torch.float32
+
+
+def _product(positions: Tensor, planes: list[Tensor], lines: list[Tensor]) -> Tensor:
+    """(N, C) product of the samples of planes (S, S, C) and lines (S, C)."""
     product = torch.ones_like(positions[:, :1])
-    for name, axes in SPACE_PLANES.items():
-        product = product * _sample(planes[f"{name}{scale}"], positions[:, axes])
-    for axis, name in enumerate(TIME_PLANES):
-        line = _line(planes[f"{name}{scale}"], time)
-        places = torch.stack([positions[:, axis], torch.zeros_like(positions[:, axis])], 1)
-        product = product * _sample(line[None], places)
+    for plane, axes in zip(planes, SPACE_PLANES.values(), strict=True):
+        product = product * _sample(plane, positions[:, axes])
+    for axis, line in enumerate(lines):
+        place = positions[:, axis]
+        product = product * _sample(line[None], torch.stack([place, torch.zeros_like(place)], 1))
     return product
 
 
@@ -112,9 +126,8 @@ def _sample(plane: Tensor, places: Tensor) -> Tensor:
     return sampled[0, :, 0].T
 
 
-def _line(plane: Tensor, time: float) -> Tensor:
-    """(W, C): a plane of time (T, W, C) at one time."""
-    row, part = _row(plane.shape[0], time)
+def _line(plane: Tensor, row: int, part: float) -> Tensor:
+    """(S, C): a plane of time (T, S, C) between a row and the next."""
     return plane[row] if part == 0 else torch.lerp(plane[row], plane[row + 1], part)
 
 
@@ -122,6 +135,62 @@ def _row(times: int, time: float) -> tuple[int, float]:
     """The node at or before a time, and how far the time is from it to the next."""
     place = min(max(time, 0.0), 1.0) * (times - 1)
     return int(place), place - int(place)
+
+
+class _Product(torch.autograd.Function):
+    """`_product` of planes and the lines of one time, by kernels.
+
+    Threads share the points: the same for one number of threads, and to rounding for another.
+    """
+
+    @staticmethod
+    def forward(ctx, time: float, positions: Tensor, *planes: Tensor) -> Tensor:
+        row, part = _row(len(planes[-1]), time)
+        lines = [_line(plane, row, part) for plane in planes[3:]]
+        sampled = [_laned(tensor) for tensor in (*planes[:3], *lines)]
+        positions = positions.contiguous()
+        features = positions.new_empty(len(positions), sampled[0].shape[-1])  # (N, lanes)
+        kernels.forward(numba.get_num_threads(), *_arrays(*sampled, positions, features))
+        ctx.save_for_backward(positions, *sampled)
+        ctx.row, ctx.part, ctx.sizes = row, part, [plane.shape for plane in planes]
+        return features[:, : planes[0].shape[-1]]
+
+    @staticmethod
+    def backward(ctx, *gradients: Tensor):
+        positions, *sampled = ctx.saved_tensors
+        hands, (places, _, lanes) = numba.get_num_threads(), sampled[0].shape
+        g_positions = torch.zeros_like(positions)
+        g_planes = positions.new_zeros(hands, 3, places, places, lanes)
+        g_lines = positions.new_zeros(hands, 3, places, lanes)
+        taken = (*sampled, positions, _laned(gradients[0]))
+        kernels.backward(*_arrays(*taken, g_planes, g_lines, g_positions))
+        channels = gradients[0].shape[1]
+        by_planes = g_planes.sum(0)[..., :channels]  # (3, S, S, C)
+        by_lines = g_lines.sum(0)[..., :channels]  # (3, S, C)
+        by_times = [
+            _on_rows(line, size, ctx.row, ctx.part)
+            for line, size in zip(by_lines, ctx.sizes[3:], strict=True)
+        ]
+        return None, g_positions, *by_planes, *by_times
+
+
+def _on_rows(line: Tensor, size: torch.Size, row: int, part: float) -> Tensor:
+    """Gradient of a plane of time (T, S, C) from that of its `_line`."""
+    gradient = line.new_zeros(size)
+    gradient[row] = line * (1 - part)
+    if part > 0:
+        gradient[row + 1] = line * part
+    return gradient
+
+
+def _laned(tensor: Tensor) -> Tensor:
+    """With zeros as further channels up to what the kernels take, and contiguous."""
+    missing = -tensor.shape[-1] % kernels.LANES
+    return (pad(tensor, (0, missing)) if missing else tensor).contiguous()
+
+
+def _arrays(*tensors: Tensor) -> list[np.ndarray]:
+    return [tensor.detach().numpy() for tensor in tensors]
 
 
 def space_smoothness(planes: dict[str, Tensor]) -> Tensor:

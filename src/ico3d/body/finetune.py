@@ -1,4 +1,4 @@
-"""Temporal fine-tuning: a window learns to agree with the one before (paper, temporal consistency)."""
+"""Temporal fine-tuning: a window learns to agree with the one before (paper, same section)."""
 
 from collections.abc import Mapping, Sequence
 

@@ -2,6 +2,7 @@
 
 import logging
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -21,6 +22,8 @@ HIDING = 3.0
 """How many times their spacing points must lie behind others to be hidden by them: no hole
 between points is as wide, however they fell."""
 
+Source = Literal["best", "hull"]
+
 logger = logging.getLogger(__name__)
 
 
@@ -37,7 +40,13 @@ class Start:
     source: str
 
 
-def initial_points(capture: Capture, frame: int, count: int, rng: np.random.Generator) -> Start:
+def initial_points(
+    capture: Capture,
+    frame: int,
+    count: int,
+    rng: np.random.Generator,
+    source: Source = "best",
+) -> Start:
     """Points on the person's surface at one frame, best source first.
 
     These are the capture's own points (a body model's vertices), the visual hull of the masks of
@@ -48,11 +57,13 @@ def initial_points(capture: Capture, frame: int, count: int, rng: np.random.Gene
         frame: Frame number.
         count: Points wanted.
         rng: Chooses among them.
+        source: The best there is, or the hull even where the capture has points of its own.
 
     Raises:
         CaptureError: If the cameras do not even look at one place from different sides.
     """
-    start = _surface(capture, frame) or _hull(capture, frame) or _anywhere(capture, count, rng)
+    known = _surface(capture, frame) if source == "best" else None
+    start = known or _hull(capture, frame) or _anywhere(capture, count, rng)
     logger.info("%s, frame %d: Gaussians begin on %s.", capture.path, frame, start.source)
     return Start(resampled(start.points, count, rng), start.source)
 

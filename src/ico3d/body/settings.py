@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from ico3d.body.initial import Source
 from ico3d.training.optimiser import Rate
 
 Method = Literal["swings++", "swings", "4dgs", "spacetime", "freetime", "static"]
@@ -73,7 +74,7 @@ class BodySettings:
     motion_threshold: float = 20.0
     shortest_window: int = 6
     longest_window: int = 20
-    initial: Literal["best", "hull"] = "best"
+    initial: Source = "best"
     initial_gaussians: int = 50_000
     initial_opacity: float = 0.1
     initial_scale: float = 1.0

@@ -90,7 +90,7 @@ def _clouds(
     rng: np.random.Generator,
 ) -> tuple[list[np.ndarray], str]:
     """Points (each, 3) of every frame, and where they come from."""
-    starts = [initial_points(capture, frame, each, rng) for frame in frames]
+    starts = [initial_points(capture, frame, each, rng, settings.initial) for frame in frames]
     return [resampled(start.points, each, rng) for start in starts], starts[0].source
 
 
@@ -126,7 +126,7 @@ def _motion(
     if method in ("spacetime", "freetime"):
         formula = SPACETIME if method == "spacetime" else FREETIME
         return formula, _formula_tensors(formula, settings, clouds)
-    sampled = [initial_points(capture, f, 500, rng) for f in _some(window)]
+    sampled = [initial_points(capture, f, 500, rng, settings.initial) for f in _some(window)]
     motion = deformation(method, settings, window, np.concatenate([s.points for s in sampled]))
     if motion.mlp.sets == 1:
         return motion, {}
