@@ -26,7 +26,7 @@ SUBJECTS = Path(__file__).parents[3] / "shared" / "subjects"
 
 def _settings(subject: Path, **changes) -> Recording:
     values = dict(rig="head", cameras=3, frames=11, views_per_frame=1, size=40, text="", seed=3)
-    values["lively"] = False
+    values |= dict(lively=False, fps=25.0, light="studio", motion="talk")
     return Recording(str(subject), **(values | changes))
 
 

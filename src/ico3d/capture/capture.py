@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ico3d.capture.finding import Finding
 from ico3d.common.camera import Camera
 from ico3d.common.expression import EYE_NAMES as EYE_NAMES
 from ico3d.errors import CaptureError
@@ -95,6 +96,10 @@ class Capture(ABC):
         """(P, 3) surface points of a frame: of bodies in the world, else in head space."""
         return None
 
+    def inspect(self) -> list[Finding]:
+        """What is missing or damaged in the files of this format, found without decoding them."""
+        return []
+
     @property
     def provenance(self) -> dict:
         """Who was recorded, how, and under which licence: goes into the bundle's manifest."""
@@ -117,7 +122,8 @@ class Capture(ABC):
                 return reader(path)
         raise CaptureError(
             f"{path} is in no format known here: expected a talking-portrait folder "
-            "(transforms_train.json) or a synthetic capture (capture.json)."
+            "(transforms_train.json), a synthetic capture (capture.json) or a DNA-Rendering "
+            "recording (.smc and _annots.smc)."
         )
 
 

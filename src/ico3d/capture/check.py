@@ -46,7 +46,10 @@ def examine(capture: Capture) -> list[Finding]:
             findings.append(check(capture))
         except CaptureError as error:
             findings.append(Finding(what, "error", str(error)))
-    return findings
+    try:
+        return [*findings, *capture.inspect()]
+    except CaptureError as error:
+        return [*findings, Finding("files", "error", str(error))]
 
 
 def sampled_views(capture: Capture, count: int) -> list[tuple[int, int]]:
@@ -65,7 +68,11 @@ def sampled_views(capture: Capture, count: int) -> list[tuple[int, int]]:
 def _split(capture: Capture) -> Finding:
     """Frame numbers of training and test."""
     train, test = capture.split.train, capture.split.test
+    cameras = capture.split.test_cameras
     text = f"{len(train)} frames train, {len(test)} test, of {capture.num_frames}"
+    if cameras:
+        names = ", ".join(capture.cameras[camera].name for camera in cameras)
+        text = f"{len(train)} of {capture.num_frames} frames; these cameras test: {names}"
     both, every = set(train) & set(test), [*train, *test]
     if both:
         return Finding("split", "error", f"frame {min(both)} is in training and in test")
@@ -73,7 +80,7 @@ def _split(capture: Capture) -> Finding:
         return Finding("split", "error", f"{text}: numbers lie outside the recording")
     left_out = capture.num_frames - len(every)
     note = f"; {left_out} frames are in neither" if left_out else ""
-    return Finding("split", "warn" if left_out or not test else "ok", text + note)
+    return Finding("split", "ok" if (test or cameras) and not left_out else "warn", text + note)
 
 
 def _pictures(capture: Capture) -> Finding:
@@ -95,9 +102,10 @@ def _pictures(capture: Capture) -> Finding:
             return Finding(
                 "pictures", "error", f"camera {lens.name}, frame {frame} is blank or NaN"
             )
-    lens = capture.cameras[0]
+    sizes = sorted({f"{lens.width}x{lens.height}" for lens in capture.cameras})
     count = f"{len(capture.cameras)} camera{'s' if len(capture.cameras) > 1 else ''}"
-    return Finding("pictures", "ok", f"{count}, {lens.width}x{lens.height}, {capture.fps:g} fps")
+    size = " and ".join(sizes) if len(sizes) < 4 else f"{len(sizes)} sizes"
+    return Finding("pictures", "ok", f"{count}, {size}, {capture.fps:g} fps")
 
 
 def _masks(capture: Capture) -> Finding:
@@ -105,17 +113,22 @@ def _masks(capture: Capture) -> Finding:
     shares, heads = [], []
     for camera, frame in sampled_views(capture, LOOKED_AT):
         mask, head = capture.mask(camera, frame), capture.head_mask(camera, frame)
-        if mask is None or head is None:
-            return Finding("masks", "warn", f"camera {camera}, frame {frame} has no mask")
         lens = capture.cameras[camera]
+        where = f"camera {lens.name}, frame {frame}"
+        if mask is None or head is None:
+            return Finding("masks", "warn", f"{where} has no mask")
         if mask.shape != (lens.height, lens.width) or head.shape != mask.shape:
-            return Finding("masks", "error", f"camera {camera}, frame {frame}: shape {mask.shape}")
+            return Finding("masks", "error", f"{where}: shape {mask.shape}")
         if not mask.any() or not head.any():
-            return Finding("masks", "error", f"camera {camera}, frame {frame}: the mask is empty")
+            return Finding("masks", "error", f"{where}: the mask is empty")
         shares.append(mask.mean())
         heads.append(head.mean())
-    text = f"person {np.mean(shares):.0%} of the picture, head {np.mean(heads):.0%}"
-    odd = np.mean(shares) > 0.95 or np.ptp(shares) > 0.5 * np.mean(shares)
+    text = f"person {np.mean(shares):.0%} of the picture"
+    if capture.world_from_head(0) is not None:
+        text += f", head {np.mean(heads):.0%}"
+    # One camera sees a person of one size; several may stand near and far.
+    unsteady = len(capture.cameras) == 1 and np.ptp(shares) > 0.5 * np.mean(shares)
+    odd = np.mean(shares) > 0.95 or unsteady
     return Finding("masks", "warn" if odd else "ok", text + (", changes a lot" if odd else ""))
 
 

@@ -51,7 +51,8 @@ class Check:
 
     Attributes:
         path: The capture.
-        out: The contact sheet, a PNG; `check.png` inside the capture by default.
+        out: The contact sheet, a PNG; `check.png` inside the capture by default, or beside it
+            where it is a file.
     """
 
     path: Annotated[Path, tyro.conf.Positional]
@@ -66,4 +67,8 @@ class Check:
         from ico3d.capture.capture import Capture
         from ico3d.capture.check import report
 
-        report(Capture.open(self.path), self.out or self.path / "check.png")
+        inside = self.path / "check.png"
+        report(
+            Capture.open(self.path),
+            self.out or (inside if self.path.is_dir() else self.path.with_suffix(".png")),
+        )

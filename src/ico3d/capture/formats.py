@@ -20,6 +20,20 @@ def _synthetic(path: Path) -> Capture:
     return SyntheticCapture(path)
 
 
+def _dna(path: Path) -> Capture:
+    """Opens a DNA-Rendering recording."""
+    from ico3d.capture.dna.reader import DnaRendering
+
+    return DnaRendering(path)
+
+
+def _is_dna(path: Path) -> bool:
+    """Recognises SMC files."""
+    from ico3d.capture.dna.files import is_recording
+
+    return is_recording(path)
+
+
 def _holds(name: str) -> Callable[[Path], bool]:
     """Recognises a folder by a file in it."""
     return lambda path: (path / name).is_file()
@@ -28,5 +42,6 @@ def _holds(name: str) -> Callable[[Path], bool]:
 FORMATS: list[tuple[Callable[[Path], bool], Callable[[Path], Capture]]] = [
     (_holds("transforms_train.json"), _portrait),
     (_holds("capture.json"), _synthetic),
+    (_is_dna, _dna),
 ]
 """Pairs of (recognises a path, opens it)."""

@@ -15,6 +15,8 @@ LIFTED = np.radians((-6.0, 26.0))
 """Rotation of the shoulder girdle with the hand down, and with it above the head."""
 UPPER_TWIST = 0.5
 """Part of the upper arm's twist that its first bone takes; the second one takes the rest."""
+GATHERED = 0.7
+"""Part of the spread of the fingers at rest that is taken back."""
 THUMB_CURL = 0.35
 """How far the thumb bends, next to the fingers."""
 
@@ -120,26 +122,38 @@ def _turn_hand(
     """Turns the palm, half in the forearm and half in the wrist, and curls the fingers."""
     s, sign = SIDES[side], (1.0, -1.0)[side]
     half = about(limb.rest.lower, sign * 0.5 * acting.palms[side])
-    curl = _curl_axis(skeleton, s)
+    curl, normal = _hand_axes(skeleton, s)
     rotations[:, skeleton.index(f"lowerarm02.{s}")] = half
     rotations[:, limb.end] = half @ about(curl, acting.flexed[side])
+    bent = about(curl, acting.curled[side])
+    for finger in FINGERS:
+        first, *rest = (skeleton.index(f"{finger}-{phalanx}.{s}") for phalanx in (1, 2, 3))
+        rotations[:, first] = about(normal, _gathered(skeleton, finger, s, normal)) @ bent
+        rotations[:, rest] = bent[:, None]
     for phalanx in (1, 2, 3):
-        for finger in FINGERS:
-            joint = skeleton.index(f"{finger}-{phalanx}.{s}")
-            rotations[:, joint] = about(curl, acting.curled[side])
         thumb = skeleton.index(f"finger1-{phalanx}.{s}")
         rotations[:, thumb] = about(curl, THUMB_CURL * acting.curled[side])
 
 
-def _curl_axis(skeleton: Skeleton, s: str) -> np.ndarray:
-    """(3,) about which fingers bend towards the palm."""
-    index, little, tip = (
-        skeleton.at[skeleton.index(f"finger{n}.{s}")] for n in ("2-1", "5-1", "2-3")
-    )
+def _along(skeleton: Skeleton, finger: str, s: str) -> np.ndarray:
+    """(3,) direction of a finger at rest."""
+    first, last = (skeleton.at[skeleton.index(f"{finger}-{n}.{s}")] for n in (1, 3))
+    return unit(last - first)
+
+
+def _hand_axes(skeleton: Skeleton, s: str) -> tuple[np.ndarray, np.ndarray]:
+    """(3,) about which fingers bend towards the palm, and (3,) what stands on the palm."""
+    index, little = (skeleton.at[skeleton.index(f"{f}-1.{s}")] for f in ("finger2", "finger5"))
+    along = _along(skeleton, "finger3", s)
     across = unit(little - index)
-    along = unit(tip - index)
-    axis = unit(across - (across @ along) * along)
-    return axis if s == "R" else -axis
+    axis = unit(across - (across @ along) * along) * (1.0 if s == "R" else -1.0)
+    return axis, np.cross(axis, along)
+
+
+def _gathered(skeleton: Skeleton, finger: str, s: str, normal: np.ndarray) -> float:
+    """Radians about the palm's normal that bring a spread finger nearer to the middle one."""
+    own, middle = _along(skeleton, finger, s), _along(skeleton, "finger3", s)
+    return GATHERED * float(np.arctan2(np.cross(own, middle) @ normal, own @ middle))
 
 
 def _place_leg(

@@ -7,6 +7,11 @@ from numba import njit
 from ico3d.capture.synthetic.materials import Spot
 from ico3d.capture.synthetic.textures import grain, noise, smoothstep
 
+TROUSER_CHECK = 0.052
+"""Metres from one line of the checks to the next."""
+CHECKS = 10
+"""Lines around a leg."""
+
 
 @njit(cache=True, nogil=True)
 def _patch(x, y, z, size, least, pixel):
@@ -49,9 +54,14 @@ def printed(colors, x, y, z, pixel):
 @njit(cache=True, nogil=True)
 def trousers(colors, x, y, z, pixel):
     """A checked cloth with worn patches."""
-    upright = _band((x + 0.6 * z) / 0.047, 0.22, pixel / 0.047)
-    level = _band(y / 0.055, 0.22, pixel / 0.055)
-    fine = _band((x - 0.6 * z) / 0.047 + 0.3, 0.10, pixel / 0.047)
+    hip, ankle = colors.legs[0], colors.legs[1]
+    down = (hip[1] - y) / (hip[1] - ankle[1])
+    out = abs(x) - hip[0] - down * (ankle[0] - hip[0])
+    around = CHECKS * math.atan2(z - hip[2], out) / 6.2832
+    across = pixel / TROUSER_CHECK
+    upright = _band(around, 0.22, across)
+    level = _band(y / TROUSER_CHECK, 0.22, across)
+    fine = _band(around + 0.5, 0.10, across)
     worn = 0.35 * (2.0 * noise(x / 0.07, y / 0.07, z / 0.07) - 1.0)
     weave = 0.14 * grain(x, y * 2.0, z, 0.009, pixel) + 0.12 * grain(x, y, z, 0.003, pixel)
     shade = 1.0 + 0.5 * worn + weave
@@ -69,7 +79,9 @@ def shoe(colors, x, y, z, pixel):
     floor = colors.floor
     shade = 1.0 + 0.14 * grain(x, y, z, 0.012, pixel) + 0.10 * grain(x, y, z, 0.005, pixel)
     sole = 1.0 - smoothstep(0.022 - 0.4 * pixel, 0.022 + 0.4 * pixel, y - floor)
-    lace = _band(z / 0.022, 0.35, pixel / 0.022) * smoothstep(0.06, 0.07, y - floor)
+    beside = abs(abs(x) - colors.legs[1, 0])
+    laced = smoothstep(0.06, 0.07, y - floor) * (1.0 - smoothstep(0.022, 0.03, beside))
+    lace = _band(z / 0.022, 0.35, pixel / 0.022) * laced
     r, g, b = colors.shoe[0], colors.shoe[1], colors.shoe[2]
     light = min(1.0, sole + 0.8 * lace)
     r, g, b = r + (0.55 - r) * light, g + (0.53 - g) * light, b + (0.48 - b) * light

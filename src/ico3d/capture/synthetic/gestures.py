@@ -11,11 +11,15 @@ from ico3d.capture.synthetic.skeleton import Skeleton
 MOTIONS = ("showcase", "talk", "walk")
 STANCE = 0.13
 """Metres between an ankle and the middle."""
+SOFT_KNEES = 0.006
+"""Metres that the pelvis sinks from the rest pose, so that no sway overstretches a leg."""
 TOES_OUT = np.radians(9.0)
 FAST = 0.4
 """Seconds in which a hand goes above the head."""
-GESTURE = (0.42, 0.75)
-"""Seconds that a hand takes from one place to the next."""
+GESTURE = (0.3, 0.6)
+"""Seconds that a hand takes from one place to the next, at least."""
+PACE = 0.8
+"""Metres per second that a gesturing wrist moves at most, on average over a movement."""
 STEPS = 1.7
 """Steps per second."""
 STEP_HEIGHT = 0.13
@@ -45,8 +49,8 @@ class Hand:
         return np.array([*self.wrist, *self.elbow, *angles])
 
 
-DOWN = Hand((0.085, -0.478, 0.075), (0.35, 0.0, -1.0), curled=18.0)
-CHEST = Hand((-0.07, -0.17, 0.25), (0.8, -0.7, -0.1), flexed=10.0, curled=16.0)
+DOWN = Hand((0.058, -0.502, 0.03), (0.3, 0.0, -1.0), palm=-28.0, curled=20.0)
+CHEST = Hand((-0.07, -0.17, 0.25), (0.8, -0.7, -0.1), palm=-25.0, flexed=12.0, curled=16.0)
 PLACES = (
     CHEST,
     Hand((0.06, -0.22, 0.36), (0.5, -0.9, -0.3), palm=-35.0, curled=6.0),
@@ -59,7 +63,7 @@ RAISED = (
     Hand((0.05, 0.42, 0.13), (0.9, -0.1, 0.35), palm=10.0, curled=5.0),
     Hand((0.12, 0.40, 0.16), (0.9, -0.1, 0.35), palm=-10.0, curled=8.0),
 )
-READY = Hand((0.05, -0.16, 0.34), (0.6, -0.8, -0.3), palm=-15.0, curled=12.0)
+READY = Hand((0.06, -0.25, 0.31), (0.6, -0.8, -0.3), palm=-25.0, curled=12.0)
 """Where a hand is before and after it goes above the head."""
 
 
@@ -136,9 +140,10 @@ def _gesture(track: Track, until: float, random: np.random.Generator) -> None:
     places = [PLACES[i] for i in random.permutation(len(PLACES))]
     while until - track.now > GESTURE[0]:
         left = until - track.now
-        seconds = min(float(random.uniform(*GESTURE)), left)
+        least = float(np.linalg.norm(places[0].row()[:3] - track.rows[-1][:3])) / PACE
+        seconds = max(float(random.uniform(*GESTURE)), least)
         if left - seconds < GESTURE[0]:
-            seconds = left if left < GESTURE[1] else left / 2
+            seconds = left
         track.go(places[0], seconds, random.uniform(-0.02, 0.02, 3))
         places = places[1:] + places[:1]
 
@@ -216,7 +221,12 @@ def _whole_body(
     turns = [wander(times, f, random) for f in (0.3, 0.3, 0.25, 0.5, 0.6, 0.5)]
     zero = np.zeros_like(times)
     shift = np.stack(
-        [0.022 * weight - 0.035 * step, 0.003 * breath - 0.012 * np.abs(step), 0.01 * turns[0]], 1
+        [
+            0.022 * weight - 0.035 * step,
+            0.002 * breath - 0.012 * np.abs(step) - SOFT_KNEES,
+            0.01 * turns[0],
+        ],
+        1,
     )
     pelvis = np.stack(
         [zero, 0.05 * turns[1] - 0.06 * step, 0.025 * weight - 0.03 * step], 1

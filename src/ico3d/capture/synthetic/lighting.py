@@ -23,12 +23,14 @@ class Lamps:
         colors: (3, 3) of these.
         sky: (3,) light from above.
         ground: (3,) light from below.
+        cloth: (3,) what the grey cloth behind the person sends back.
     """
 
     directions: np.ndarray
     colors: np.ndarray
     sky: np.ndarray
     ground: np.ndarray
+    cloth: np.ndarray
 
 
 STUDIOS = {
@@ -37,12 +39,14 @@ STUDIOS = {
         np.array([[1.25, 1.17, 1.06], [0.26, 0.28, 0.33], [0.60, 0.62, 0.66]]),
         np.array([0.34, 0.36, 0.395]),
         np.array([0.17, 0.155, 0.14]),
+        np.array([0.92, 0.97, 1.06]),
     ),
     "warm": Lamps(
         np.array([[0.75, 0.45, 0.65], [-0.80, 0.25, 0.55], [-0.60, 0.65, -0.80]]),
         np.array([[1.42, 1.02, 0.62], [0.30, 0.24, 0.19], [0.72, 0.52, 0.34]]),
         np.array([0.40, 0.335, 0.26]),
         np.array([0.20, 0.145, 0.095]),
+        np.array([1.15, 0.93, 0.70]),
     ),
 }
 """`studio`: neutral, key light from the person's right. `warm`: like bulbs, from their left."""

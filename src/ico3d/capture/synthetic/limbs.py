@@ -71,11 +71,11 @@ class Limb:
     @staticmethod
     def of(skeleton: Skeleton, upper: str, lower: str, end: str) -> "Limb":
         """The limb between three joints."""
-        joints = [skeleton.index(name) for name in (upper, lower, end)]
-        a, b, c = skeleton.at[joints]
+        first, second, last = (skeleton.index(name) for name in (upper, lower, end))
+        a, b, c = skeleton.at[[first, second, last]]
         lengths = (float(np.linalg.norm(b - a)), float(np.linalg.norm(c - b)))
         one, two = unit(b - a), unit(c - b)
-        return Limb(*joints, lengths, Bend(one, two, unit(np.cross(one, two))))
+        return Limb(first, second, last, lengths, Bend(one, two, unit(np.cross(one, two))))
 
     def rotations(self, bend: Bend) -> tuple[np.ndarray, np.ndarray]:
         """(F, 3, 3) of the upper and of the lower bone, from rest, in canonical axes."""

@@ -35,7 +35,7 @@ class Colors(NamedTuple):
     """`Look` as arrays for the shader.
 
     `bold`: whether the shirt has a print that shows from far away. `floor`: height of the ground in
-    canonical head space at rest.
+    canonical head space at rest. `legs`: (2, 3) left hip and ankle at rest.
     """
 
     skin: np.ndarray
@@ -51,6 +51,7 @@ class Colors(NamedTuple):
     shoe: np.ndarray
     bold: bool
     floor: float
+    legs: np.ndarray
 
 
 @njit(cache=True, nogil=True)

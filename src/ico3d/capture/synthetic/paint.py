@@ -16,12 +16,12 @@ DIRECTIONS = 64
 HEAD_MAP = (448, 0.24)
 """Texels along the side of a depth map, and half of it in metres: the head and the neck; what lies
 outside is lit."""
-BODY_MAP = (1024, 1.1)
+BODY_MAP = (640, 1.1)
 """Of a whole person."""
 NECK = -0.2
 """Height below which the occlusion of a whole person comes from the map of the body, metres."""
-BIAS = 0.0015
-"""Metres that a surface may lie behind the depth map and still count as lit."""
+BIAS = 1.4
+"""Texels that a surface may lie behind the depth map and still count as lit."""
 SCALP_REACH = 0.006
 """Metres over which the roots of hair shade the skin."""
 WIDE = 0.06
@@ -157,7 +157,7 @@ def _sky_visibility(subject: Subject, vertices: np.ndarray, size: int, reach: fl
         nearest, triangle, barycentric = empty_buffers(size, size)
         rasterise(screen, solid, nearest, triangle, barycentric)
         cosine = np.maximum(normals @ direction, 0)  # (V,)
-        seen += cosine * _lit(screen, nearest)
+        seen += cosine * _lit(screen, nearest, BIAS * 2 * reach / size)
         total += cosine
     return (WIDE + (1 - WIDE) * seen / total).astype(np.float32)
 
@@ -201,7 +201,7 @@ def light_screen(
 
 
 @njit(cache=True, nogil=True)
-def _lit(screen, nearest):
+def _lit(screen, nearest, bias):
     """(V,) 1 where a vertex lies at the front of the depth map, 0 where something hides it."""
     size = nearest.shape[0]
     lit = np.ones(screen.shape[0])
@@ -209,6 +209,6 @@ def _lit(screen, nearest):
         x, y = int(screen[i, 0]), int(screen[i, 1])
         if x < 0 or y < 0 or x >= size or y >= size:
             continue
-        if nearest[y, x] > screen[i, 2] + BIAS:
+        if nearest[y, x] > screen[i, 2] + bias:
             lit[i] = 0.0
     return lit

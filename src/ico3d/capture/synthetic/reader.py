@@ -113,7 +113,7 @@ class SyntheticCapture(Capture):
         return self._frames["landmarks"][self._index(frame)]
 
     def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) surface points: of a body in this frame and the world, of a neutral head its own."""
+        """(P, 3) surface points: of a body in this frame, of a head neutral in its own space."""
         points = self._frames["points"]
         return points[self._index(frame)] if self.shows_body else points
 

@@ -100,13 +100,13 @@ def record(recording: Recording, out: Path, workers: int) -> None:
         recording.frames, recording.cameras, recording.views_per_frame, recording.seed
     )
     _begin(recording, out)
-    backdrops = [backdrop(camera) for camera in cameras]
+    lamps = STUDIOS[recording.light]
+    backdrops = [backdrop(camera, lamps) for camera in cameras]
     for camera, image in zip(cameras, backdrops, strict=True):
         _write_png(out / "backgrounds" / f"{camera.name}.png", image)
     _write_sound(out / "audio.wav", acted.samples)
     _write_frames(out / "frames.safetensors", subject, acted, views, recording.seed)
-    studio = Studio(subject, STUDIOS[recording.light])
-    _draw(studio, acted, cameras, backdrops, views, out, workers)
+    _draw(Studio(subject, lamps), acted, cameras, backdrops, views, out, workers)
     # Last: a folder with capture.json is complete.
     _write_json(out / "capture.json", recording, subject, acted, cameras)
     (out / UNFINISHED).unlink()

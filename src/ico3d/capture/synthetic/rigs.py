@@ -28,12 +28,12 @@ class Framing:
 ARCS = {"head": Framing(0.31, -0.02), "bust": Framing(0.46, -0.045)}
 """Head: three quarters of the picture are head. Bust: half, with the shoulders."""
 
-BODY = Framing(2.36, 1.08)
+BODY = Framing(2.36, 1.05)
 """A person from the floor to above raised hands; the aim is a height above the floor."""
 BODY_DISTANCE = 2.8
 ASPECT = 0.62
 """Width of a picture of a body by its height."""
-RINGS = (-9.0, 4.0, 17.0)
+RINGS = (-7.0, 5.0, 17.0)
 """Elevations of the rings of cameras, degrees."""
 RIGS = (*ARCS, "body")
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class Skeleton:
         return np.einsum("vab,vb->va", mixed[..., :3], vertices) + mixed[..., 3]
 
 
-def about(axis: np.ndarray, angles: np.ndarray) -> np.ndarray:
+def about(axis: np.ndarray, angles: ArrayLike) -> np.ndarray:
     """Rotations about axes (Rodrigues' formula).
 
     Args:

@@ -17,26 +17,26 @@ from ico3d.common.camera import Camera
 SUPERSAMPLING = 3
 
 
-def backdrop(camera: Camera) -> np.ndarray:
+def backdrop(camera: Camera, lamps: Lamps) -> np.ndarray:
     """(H, W, 3) float32: a mottled grey cloth far behind the person, as the camera sees it."""
     columns, rows = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     pixels = np.stack([columns, rows, np.ones_like(rows)], axis=-1)  # (H, W, 3)
     rays = pixels @ np.linalg.inv(camera.intrinsics).T @ camera.world_to_camera[:3, :3]
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    return _cloth_backdrop(rays.astype(np.float32))
+    return _cloth_backdrop(rays.astype(np.float32), lamps.cloth)
 
 
 @njit(cache=True, nogil=True)
-def _cloth_backdrop(rays):
+def _cloth_backdrop(rays, tint):
     out = np.empty(rays.shape, np.float32)
     for i in range(rays.shape[0]):
         for j in range(rays.shape[1]):
             x, y, z = rays[i, j, 0], rays[i, j, 1], rays[i, j, 2]
             mottle = noise(3 * x, 3 * y, 3 * z) + 0.5 * noise(9 * x + 5, 9 * y, 9 * z)
             value = 0.16 + 0.10 * mottle + 0.22 * (y + 0.1)
-            out[i, j, 0] = display(0.92 * value)
-            out[i, j, 1] = display(0.97 * value)
-            out[i, j, 2] = display(1.06 * value)
+            out[i, j, 0] = display(tint[0] * value)
+            out[i, j, 1] = display(tint[1] * value)
+            out[i, j, 2] = display(tint[2] * value)
     return out
 
 
@@ -83,6 +83,7 @@ class Studio:
             shoe=np.array(look.shoe, np.float32),
             bold=subject.skeleton is not None,
             floor=-float(subject.head_in_world[1]),
+            legs=_left_leg(subject),
         )
         self._eyes = np.array(
             [[*eye.centre, *eye.axis, eye.iris_radius] for eye in subject.eyes], np.float32
@@ -142,6 +143,14 @@ class Studio:
             self._paint.occlusion_at(gap),
             self._eyes,
         )
+
+
+def _left_leg(subject: Subject) -> np.ndarray:
+    """(2, 3) float32 hip and ankle at rest; zeros for a bust."""
+    bones = subject.skeleton
+    if bones is None:
+        return np.zeros((2, 3), np.float32)
+    return bones.at[[bones.index("upperleg01.L"), bones.index("foot.L")]].astype(np.float32)
 
 
 @njit(cache=True, nogil=True)

@@ -1,0 +1,133 @@
+"""Cameras of a DNA-Rendering recording: where they stand, their lenses and their colours."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ico3d.capture.decoding import size_of
+from ico3d.capture.dna.smc import SmcFile
+from ico3d.capture.lens import Lens
+from ico3d.errors import CaptureError
+
+GROUPS = ("Camera_5mp", "Camera_12mp")
+
+
+@dataclass(frozen=True)
+class Device:
+    """One camera as the files describe it.
+
+    Attributes:
+        number: Its number in the files, 0 to 59.
+        group: The group of the main file that holds its pictures.
+        lens: Size, intrinsics and distortion of its recorded pictures.
+        camera_to_world: (4, 4) in the world of the files.
+        colours: (256, 3) uint8 for RGB: what each recorded value is corrected to.
+    """
+
+    number: int
+    group: str
+    lens: Lens
+    camera_to_world: np.ndarray
+    colours: np.ndarray
+
+    @property
+    def pictures(self) -> str:
+        """The group of its pictures in the main file."""
+        return f"{self.group}/{self.number}/color"
+
+    @property
+    def name(self) -> str:
+        """Two digits."""
+        return f"{self.number:02d}"
+
+
+def read_devices(main: SmcFile, annotations: SmcFile) -> tuple[list[Device], list[str]]:
+    """All cameras that have pictures and a calibration, by number.
+
+    Returns:
+        The cameras, and the names of those that have pictures but no calibration.
+
+    Raises:
+        CaptureError: If there are none, or one is damaged.
+    """
+    devices, lost = [], []
+    for group in GROUPS:
+        size = None
+        for number in sorted(int(key) for key in main.keys(group) if key.isdecimal()):
+            if not annotations.keys(f"Camera_Parameter/{number:02d}"):
+                lost.append(f"{number:02d}")
+                continue
+            size = size or _picture_size(main, f"{group}/{number}/color")
+            if size is not None:
+                devices.append(_device(annotations, group, number, size))
+    if not devices:
+        raise CaptureError(
+            f"{main.path} has no camera with pictures and a calibration: "
+            "is it the main file of a DNA-Rendering recording?"
+        )
+    return devices, lost
+
+
+def _picture_size(main: SmcFile, pictures: str) -> tuple[int, int] | None:
+    """Width and height of a camera's first picture, the same in its group."""
+    for frame in main.keys(pictures)[:1]:
+        where = f"{pictures}/{frame}"
+        return size_of(main.encoded(where) or b"", f"{main.path}: {where}")
+    return None
+
+
+def _device(annotations: SmcFile, group: str, number: int, size: tuple[int, int]) -> Device:
+    """One camera."""
+    inside = f"Camera_Parameter/{number:02d}"
+
+    def read(name: str, shape: tuple[int, ...]) -> np.ndarray:
+        values = annotations.numbers(f"{inside}/{name}", shape)
+        if values is None:
+            raise CaptureError(f"{annotations.path}: camera {number:02d} has no {name}.")
+        return values
+
+    intrinsics = read("K", (3, 3))
+    intrinsics[:2, 2] += 0.5  # calibrated with OpenCV, which counts from pixel centres
+    lens = Lens(f"{number:02d}", *size, intrinsics, tuple(read("D", (5,)).tolist()))
+    polynomial = annotations.numbers(f"{inside}/Color_Calibration", (3, 3))
+    return Device(
+        number, group, lens, rigid(read("RT", (4, 4)), f"camera {number:02d}"), colours(polynomial)
+    )
+
+
+def rigid(matrix: np.ndarray, what: str) -> np.ndarray:
+    """A (4, 4) pose, its rotation made exact.
+
+    Args:
+        matrix: As the file has it.
+        what: Whose pose it is, for the error.
+
+    Raises:
+        CaptureError: If it is no rotation and translation.
+    """
+    turn = matrix[:3, :3].clip(-2, 2)
+    wrong = np.abs(turn @ turn.T - np.eye(3)).max() > 1e-3 or np.linalg.det(turn) < 0
+    if wrong or not np.allclose(matrix[3], [0, 0, 0, 1]):
+        raise CaptureError(f"{what}: its pose is no rotation and translation.")
+    left, _, right = np.linalg.svd(turn)
+    pose = matrix.copy()
+    pose[:3, :3] = left @ right
+    return pose
+
+
+def colours(polynomial: np.ndarray | None) -> np.ndarray:
+    """The colour correction as a table.
+
+    Args:
+        polynomial: (3, 3) rows (a, b, c) for blue, green and red: x' = a x² + b x + c on 0 to 255;
+            None leaves colours as they are.
+
+    Returns:
+        (256, 3) uint8, columns red, green and blue.
+    """
+    value = np.arange(256.0)
+    if polynomial is None:
+        return np.repeat(value[:, None], 3, 1).astype(np.uint8)
+    a, b, c = polynomial[::-1].T[:, None]  # (1, 3) each, now red first
+    corrected = a * value[:, None] ** 2 + b * value[:, None] + c  # (256, 3)
+    return np.clip(np.rint(corrected), 0, 255).astype(np.uint8)

@@ -1,0 +1,79 @@
+"""Which files make a DNA-Rendering recording."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ico3d.errors import CaptureError
+
+ANNOTATIONS, KINECT = "_annots", "_kinect"
+
+
+@dataclass(frozen=True)
+class Files:
+    """The files of one recording.
+
+    Attributes:
+        main: Pictures.
+        annotations: Calibration, and in parts 1 and 2 masks, keypoints and SMPL-X.
+        kinect: Depth; None where it was not fetched.
+    """
+
+    main: Path
+    annotations: Path
+    kinect: Path | None
+
+
+def is_recording(path: Path) -> bool:
+    """Whether a path is, or a folder holds, a main SMC file."""
+    return path.suffix == ".smc" if path.is_file() else bool(_mains(path))
+
+
+def find_files(path: Path) -> Files:
+    """Finds what belongs together.
+
+    Annotations and depth lie beside the main file, or where the data set has them: in folders
+    named like that of the main file with "annotations" and "kinect" for "main".
+
+    Args:
+        path: The main file, or a folder that holds one recording.
+
+    Raises:
+        CaptureError: If there are several recordings, or there are no annotations.
+    """
+    main = _only_main(path)
+    annotations = _companion(main, "annotations", ANNOTATIONS)
+    if annotations is None:
+        raise CaptureError(
+            f"{main} lacks its annotations with the calibration: put {main.stem}{ANNOTATIONS}.smc "
+            "beside it."
+        )
+    return Files(main, annotations, _companion(main, "kinect", KINECT))
+
+
+def _mains(folder: Path) -> list[Path]:
+    """Main files in a folder."""
+    if not folder.is_dir():
+        return []
+    found = sorted(p for p in folder.iterdir() if p.suffix == ".smc" and p.is_file())
+    return [p for p in found if not p.stem.endswith((ANNOTATIONS, KINECT))]
+
+
+def _only_main(path: Path) -> Path:
+    """The main file that is meant."""
+    if path.is_file():
+        if path.stem.endswith((ANNOTATIONS, KINECT)):
+            raise CaptureError(f"{path} has no pictures: name the main file instead.")
+        return path
+    mains = _mains(path)
+    if len(mains) != 1:
+        names = ", ".join(p.name for p in mains[:3]) + (", …" if mains[3:] else "")
+        raise CaptureError(f"{path} holds {len(mains)} recordings ({names}): name one of them.")
+    return mains[0]
+
+
+def _companion(main: Path, kind: str, suffix: str) -> Path | None:
+    """A file that belongs to the main file."""
+    name = f"{main.stem}{suffix}.smc"
+    folder = main.absolute().parent
+    places = [folder, folder.with_name(folder.name.replace("main", kind))]
+    return next((place / name for place in places if (place / name).is_file()), None)

@@ -1,0 +1,70 @@
+"""The depth cameras of a DNA-Rendering recording."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ico3d.capture.decoding import decoded
+from ico3d.capture.dna.annotations import person
+from ico3d.capture.dna.calibration import rigid
+from ico3d.capture.dna.smc import SmcFile
+from ico3d.capture.upright import turned
+from ico3d.errors import CaptureError
+
+
+@dataclass(frozen=True)
+class KinectCalibration:
+    """One depth camera; its pictures are not straightened.
+
+    Attributes:
+        intrinsics: (3, 3) as the file has it: pixel centres at whole numbers.
+        distortion: (D,) OpenCV's coefficients.
+        camera_to_world: (4, 4) in the capture's world.
+    """
+
+    intrinsics: np.ndarray
+    distortion: np.ndarray
+    camera_to_world: np.ndarray
+
+
+class Kinect:
+    """Depth, masks and calibration from `…_kinect.smc`."""
+
+    def __init__(self, file: SmcFile, upright: np.ndarray):
+        """Lists the cameras.
+
+        Args:
+            file: The Kinect file.
+            upright: (3, 3) rotation from the world of the files to the capture's.
+
+        Raises:
+            CaptureError: If the file is damaged.
+        """
+        self._file, self._upright = file, upright
+        found = [int(key) for key in file.keys("Kinect") if key.isdecimal()]
+        self.cameras: tuple[int, ...] = tuple(sorted(found))
+
+    def calibration(self, camera: int) -> KinectCalibration:
+        """Lens and place of a camera.
+
+        Raises:
+            CaptureError: If there is none, or it is damaged.
+        """
+        inside = f"Calibration/Kinect/{camera:02d}"
+        lens = self._file.numbers(f"{inside}/K", (3, 3))
+        bent = self._file.numbers(f"{inside}/D", (None,))
+        pose = self._file.numbers(f"{inside}/RT", (4, 4))
+        if lens is None or bent is None or pose is None:
+            raise CaptureError(f"{self._file.path}: Kinect {camera:02d} has no calibration.")
+        place = rigid(pose, f"{self._file.path}: Kinect {camera:02d}")
+        return KinectCalibration(lens, bent, turned(self._upright, place))
+
+    def depth(self, camera: int, frame: int) -> np.ndarray | None:
+        """(H, W) uint16 as the Kinect measured it, or None where there is none."""
+        return self._file.pixels(f"Kinect/{camera}/depth/{frame}")
+
+    def mask(self, camera: int, frame: int) -> np.ndarray | None:
+        """(H, W) float32, 1 on the person, or None where there is none."""
+        inside = f"Kinect/{camera}/mask/{frame}"
+        held = self._file.encoded(inside)
+        return None if held is None else person(decoded(held, f"{self._file.path}: {inside}"))

@@ -1,0 +1,161 @@
+"""One SMC file: HDF5, read piece by piece and never kept."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from ico3d.capture.extras import hdf5
+from ico3d.errors import CaptureError
+
+PURPOSE = "reading SMC files"
+LARGEST = 256 * 2**20
+"""Bytes that one piece may have; a damaged header can promise any number."""
+DAMAGED = (OSError, KeyError, ValueError, TypeError, RuntimeError, OverflowError, MemoryError)
+"""What h5py raises for files with damage."""
+
+
+class SmcFile:
+    """An SMC file, opened when it is first read and anew in each process.
+
+    HDF5 handles belong to the process that opened them; a copy that was pickled, or inherited by a
+    forked process, opens its own.
+    """
+
+    def __init__(self, path: Path):
+        """Names the file.
+
+        Args:
+            path: Where it lies.
+        """
+        self.path = path
+        self._opened: tuple[int, Any] | None = None
+
+    def __getstate__(self) -> dict:
+        return {"path": self.path, "_opened": None}
+
+    def keys(self, inside: str) -> list[str]:
+        """Names in a group; none where there is no such group."""
+        with self._guard(inside):
+            group = self._find(inside)
+            # Names that are no UTF-8 come as bytes; ours are all digits.
+            return [k for k in group if isinstance(k, str)] if _is(group, "Group") else []
+
+    def attribute(self, inside: str, name: str) -> Any:
+        """An attribute of a group, or None."""
+        with self._guard(inside):
+            node = self._find(inside)
+            return None if node is None else node.attrs.get(name)
+
+    def encoded(self, inside: str) -> bytes | None:
+        """What an encoded picture's dataset holds, or None where there is none."""
+        values = self._read(inside)
+        if values is None:
+            return None
+        if values.dtype != np.uint8 or values.ndim != 1:
+            raise self._damaged(inside)
+        return values.tobytes()
+
+    def head(self, inside: str, count: int) -> bytes:
+        """The first bytes of an encoded picture; fewer where it has fewer, none where it is none.
+
+        Args:
+            inside: The dataset.
+            count: How many to read.
+        """
+        with self._guard(inside):
+            node = self._find(inside)
+            plain = _is(node, "Dataset") and node.dtype == np.uint8 and node.ndim == 1
+            return node[:count].tobytes() if plain else b""
+
+    def numbers(self, inside: str, shape: tuple[int | None, ...]) -> np.ndarray | None:
+        """Finite float64 numbers, or None where there is no such dataset.
+
+        Args:
+            inside: The dataset.
+            shape: What it must have; None stands for any length.
+
+        Raises:
+            CaptureError: If they have another shape or are not finite.
+        """
+        values = self._read(inside)
+        if values is None:
+            return None
+        if len(shape) != values.ndim or any(
+            wanted not in (None, got) for wanted, got in zip(shape, values.shape, strict=True)
+        ):
+            wanted = " x ".join("any" if n is None else str(n) for n in shape) or "a single number"
+            raise CaptureError(
+                f"{self.path}: {inside} has shape {values.shape}, expected {wanted}."
+            )
+        if values.dtype.kind not in "fiub" or not np.isfinite(values).all():
+            raise CaptureError(f"{self.path}: {inside} holds values that are no finite numbers.")
+        return values.astype(np.float64)
+
+    def pixels(self, inside: str) -> np.ndarray | None:
+        """(H, W) whole numbers of a picture that is not encoded, or None where there is none."""
+        values = self._read(inside)
+        if values is not None and (values.ndim != 2 or values.dtype.kind != "u"):
+            raise self._damaged(inside)
+        return values
+
+    def _read(self, inside: str) -> np.ndarray | None:
+        """A whole dataset."""
+        with self._guard(inside):
+            node = self._find(inside)
+            if node is None or _is(node, "Group"):
+                return None
+            if not _is(node, "Dataset"):
+                raise self._damaged(inside)
+            if node.external or node.is_virtual or node.dtype.hasobject or node.nbytes > LARGEST:
+                raise self._damaged(inside)
+            return np.asarray(node[()])
+
+    def _find(self, inside: str) -> Any:
+        """A group or dataset by its path ("" is the file), or None.
+
+        Links must not lead into other files.
+        """
+        node = self._file()
+        for part in filter(None, inside.split("/")):
+            link = node.get(part, getlink=True) if _is(node, "Group") else None
+            if link is None:
+                return None
+            if not isinstance(link, (hdf5(PURPOSE).HardLink, hdf5(PURPOSE).SoftLink)):
+                raise self._damaged(inside)
+            node = node[part]
+        return node
+
+    def _file(self) -> Any:
+        """The open file of this process."""
+        if self._opened is None or self._opened[0] != os.getpid():
+            h5py = hdf5(PURPOSE)
+            try:
+                # No lock: data sets often lie where locks cannot be had, and nobody writes.
+                self._opened = os.getpid(), h5py.File(self.path, "r", locking=False)
+            except FileNotFoundError as error:
+                raise CaptureError(f"{self.path} is missing.") from error
+            except DAMAGED as error:
+                raise CaptureError(
+                    f"{self.path} is no SMC file or damaged, perhaps cut off: fetch it again."
+                ) from error
+        return self._opened[1]
+
+    @contextmanager
+    def _guard(self, inside: str) -> Iterator[None]:
+        """Turns what h5py says of damage into one sentence."""
+        try:
+            yield
+        except DAMAGED as error:
+            raise self._damaged(inside) from error
+
+    def _damaged(self, inside: str) -> CaptureError:
+        return CaptureError(f"{self.path}: {inside} is damaged: fetch the file again.")
+
+
+def _is(node: Any, kind: Literal["Group", "Dataset"]) -> bool:
+    """Whether a node has names below it, or numbers in it."""
+    return isinstance(node, getattr(hdf5(PURPOSE), kind))

@@ -1,0 +1,134 @@
+"""Lenses that bend straight lines, and how pictures are straightened."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ico3d.capture.extras import opencv
+from ico3d.errors import CaptureError
+
+PURPOSE = "straightening the pictures of a lens with distortion"
+COEFFICIENTS = (0, 4, 5, 8, 12, 14)
+"""How many distortion coefficients OpenCV's models have."""
+MOST_CHANGE = 3.0
+"""Straightening changes a focal length by no more than this factor, or the lens is nonsense."""
+
+
+@dataclass(frozen=True)
+class Lens:
+    """A camera without its place: what a calibration says about lens and sensor.
+
+    Attributes:
+        name: Name of the camera, for errors.
+        width: Pixels.
+        height: Pixels.
+        intrinsics: (3, 3) fx, fy, cx, cy in pixels, pixel centres at +0.5.
+        distortion: OpenCV's k1, k2, p1, p2, k3, …; empty or zero where lines stay straight.
+    """
+
+    name: str
+    width: int
+    height: int
+    intrinsics: np.ndarray
+    distortion: tuple[float, ...] = ()
+
+    def __post_init__(self):
+        """Checks the numbers.
+
+        Raises:
+            CaptureError: If no lens can have them.
+        """
+        matrix = np.asarray(self.intrinsics, np.float64)
+        values = np.array(self.distortion, np.float64)
+        if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
+            raise CaptureError(f"camera {self.name}: the intrinsics are no finite 3x3 matrix.")
+        if matrix[0, 0] <= 0 or matrix[1, 1] <= 0:
+            raise CaptureError(f"camera {self.name}: the focal lengths must be above 0.")
+        if self.width < 1 or self.height < 1:
+            raise CaptureError(
+                f"camera {self.name}: pictures of {self.width}x{self.height} pixels."
+            )
+        if len(values) not in COEFFICIENTS or not np.isfinite(values).all():
+            raise CaptureError(
+                f"camera {self.name}: the distortion must be 4, 5, 8, 12 or 14 finite numbers."
+            )
+        plain = np.diag([matrix[0, 0], matrix[1, 1], 1.0])
+        plain[:2, 2] = matrix[:2, 2]
+        object.__setattr__(self, "intrinsics", plain)
+
+    @property
+    def bends(self) -> bool:
+        """Whether there is any distortion."""
+        return any(self.distortion)
+
+    @cached_property
+    def straight_intrinsics(self) -> np.ndarray:
+        """(3, 3) of the pinhole camera that took the straightened pictures.
+
+        OpenCV's optimal matrix for pictures that hold recorded pixels only: with the matrix of the
+        calibration, a large k3 would bring rings of repeated picture into the corners.
+
+        Raises:
+            CaptureError: If the distortion cannot be undone.
+            MissingExtraError: If OpenCV is needed and not installed.
+        """
+        if not self.bends:
+            return self.intrinsics
+        size = (self.width, self.height)
+        matrix, _ = opencv(PURPOSE).getOptimalNewCameraMatrix(
+            _opencv_matrix(self.intrinsics), self._coefficients, size, 0, size
+        )
+        change = np.diag(matrix)[:2] / np.diag(self.intrinsics)[:2]
+        sane = np.isfinite(matrix).all() and (change > 1 / MOST_CHANGE).all()
+        if not sane or (change > MOST_CHANGE).any():
+            raise CaptureError(
+                f"camera {self.name}: its distortion cannot be undone; calibrate it again."
+            )
+        return _our_matrix(matrix)
+
+    def straightened(self, picture: np.ndarray) -> np.ndarray:
+        """A picture (H, W, ...) uint8 or float32 as the pinhole camera would have taken it."""
+        if not self.bends:
+            return picture
+        return opencv(PURPOSE).undistort(
+            picture,
+            _opencv_matrix(self.intrinsics),
+            self._coefficients,
+            None,
+            _opencv_matrix(self.straight_intrinsics),
+        )
+
+    def straightened_points(self, pixels: np.ndarray) -> np.ndarray:
+        """Where (P, 2) pixels of the recorded picture lie in the straightened one."""
+        if not self.bends or not len(pixels):
+            return np.asarray(pixels, np.float64)
+        moved = opencv(PURPOSE).undistortPoints(
+            np.asarray(pixels, np.float64)[:, None] - 0.5,
+            _opencv_matrix(self.intrinsics),
+            self._coefficients,
+            P=_opencv_matrix(self.straight_intrinsics),
+        )  # (P, 1, 2)
+        return moved[:, 0] + 0.5
+
+    def resized(self, width: int, height: int) -> "Lens":
+        """The same lens on a sensor with another number of pixels."""
+        scale = np.diag([width / self.width, height / self.height, 1.0])
+        return Lens(self.name, width, height, scale @ self.intrinsics, self.distortion)
+
+    @property
+    def _coefficients(self) -> np.ndarray:
+        return np.array(self.distortion, np.float64)
+
+
+def _opencv_matrix(intrinsics: np.ndarray) -> np.ndarray:
+    """OpenCV counts from the middle of the first pixel, we from its corner."""
+    matrix = intrinsics.copy()
+    matrix[:2, 2] -= 0.5
+    return matrix
+
+
+def _our_matrix(intrinsics: np.ndarray) -> np.ndarray:
+    matrix = intrinsics.copy()
+    matrix[:2, 2] += 0.5
+    return matrix

@@ -1,0 +1,42 @@
+"""Turning worlds so that +y is up, which calibrations leave open."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+
+def up_of_cameras(cameras_to_world: Sequence[np.ndarray]) -> np.ndarray:
+    """(3,) mean upward direction of (4, 4) OpenCV cameras, which people hold upright."""
+    ups = -np.stack([matrix[:3, 1] for matrix in cameras_to_world])  # (C, 3)
+    mean = ups.mean(0)
+    length = float(np.linalg.norm(mean))
+    return mean / length if length > 1e-6 else np.array([0.0, 1.0, 0.0])
+
+
+def nearest_axis(direction: np.ndarray) -> np.ndarray:
+    """(3,) the signed coordinate axis nearest to a direction."""
+    axis = np.zeros(3)
+    largest = int(np.abs(direction).argmax())
+    axis[largest] = 1.0 if direction[largest] >= 0 else -1.0
+    return axis
+
+
+def turn_upright(up: np.ndarray) -> np.ndarray:
+    """The smallest rotation (3, 3) that takes a unit direction to +y.
+
+    Directions along coordinate axes give matrices of exact zeros and ones.
+    """
+    x, y, z = (float(value) for value in up)
+    if y < -1 + 1e-9:
+        return np.diag([1.0, -1.0, -1.0])
+    # Rodrigues about up x +y, whose sine is its length and whose cosine is y.
+    axis = np.array([[0.0, -x, 0.0], [x, 0.0, z], [0.0, -z, 0.0]])
+    return np.eye(3) + axis + axis @ axis / (1 + y)
+
+
+def turned(rotation: np.ndarray, camera_to_world: np.ndarray) -> np.ndarray:
+    """A (4, 4) pose in the world that a (3, 3) rotation makes of the old one."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation @ camera_to_world[:3, :3]
+    matrix[:3, 3] = rotation @ camera_to_world[:3, 3]
+    return matrix
