@@ -31,6 +31,7 @@ VERBS: dict[str, Verb] = {
     "render": Verb("ico3d.avatar.film.command", "Render", "film a body along a path of cameras"),
     "convert": Verb("ico3d.splat.commands", "Convert", "convert files of 3D Gaussians"),
     "serve": Verb("ico3d.chat.commands", "Serve", "serve a bundle and talk with it"),
+    "bench body": Verb("ico3d.measure.commands", "BenchBody", "compare methods for bodies"),
     "bench raster": Verb("ico3d.measure.commands", "BenchRaster", "time the rasteriser"),
     "bench talk": Verb("ico3d.measure.commands", "BenchTalk", "time question to answer"),
 }
