@@ -25,6 +25,7 @@ VERBS: dict[str, Verb] = {
     "capture check": Verb("ico3d.capture.commands", "Check", "check it, draw a contact sheet"),
     "train head": Verb("ico3d.head.commands", "TrainHead", "train HeadGaS++ on a capture"),
     "train static": Verb("ico3d.scene.commands", "TrainStatic", "train a scene that stands still"),
+    "train body": Verb("ico3d.body.commands", "TrainBody", "train SWinGS++ on a body in motion"),
     "train speech": Verb("ico3d.speech.commands", "TrainSpeech", "train the speech encoder"),
     "evaluate": Verb("ico3d.measure.commands", "Evaluate", "measure a model on held-out frames"),
     "bake": Verb("ico3d.avatar.commands", "Bake", "make the bundle that browsers play"),

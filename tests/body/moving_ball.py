@@ -13,6 +13,7 @@ AXES = np.array([0.22, 0.6, 0.2])
 BALL = 0.16
 """Radius of what moves."""
 PLATE = 0.2
+_TAKEN: dict = {}
 
 
 class MovingBall(Capture):
@@ -39,6 +40,7 @@ class MovingBall(Capture):
             )
             for number, turn in enumerate(turns)
         )
+        self._lenses = self.cameras  # tests may change what the capture says
         self.split = all_frames(self.num_frames, self.cameras)
         self.asked: list[tuple[int, int]] = []
 
@@ -63,18 +65,29 @@ class MovingBall(Capture):
         return self._trace(camera, frame)[1]
 
     def _trace(self, camera, frame):
-        view = self.cameras[camera]
-        columns, rows = np.meshgrid(np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5)
-        pixels = np.stack([columns, rows, np.ones_like(rows)], -1)  # (H, W, 3)
-        pose = view.camera_to_world
-        rays = pixels @ np.linalg.inv(view.intrinsics).T @ pose[:3, :3].T
-        near_trunk, on_trunk = _hit(pose[:3, 3], rays, np.zeros(3), AXES)
-        near_ball, on_ball = _hit(pose[:3, 3], rays, self.center(frame), np.full(3, BALL))
-        color = np.where(
-            (near_trunk < near_ball)[..., None], _trunk_color(on_trunk), _ball_color(on_ball)
-        )
-        mask = np.isfinite(np.minimum(near_trunk, near_ball))
-        return np.where(mask[..., None], color, PLATE).astype(np.float32), mask.astype(np.float32)
+        return _picture(self._lenses[camera], tuple(self.center(frame)))
+
+
+def _picture(view, center):
+    """Picture and mask that a camera takes; many tests take the same ones."""
+    key = (view.world_to_camera.tobytes(), center)
+    if key not in _TAKEN:
+        _TAKEN[key] = _taken(view, center)
+    return tuple(layer.copy() for layer in _TAKEN[key])
+
+
+def _taken(view, center):
+    columns, rows = np.meshgrid(np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5)
+    pixels = np.stack([columns, rows, np.ones_like(rows)], -1)  # (H, W, 3)
+    pose = view.camera_to_world
+    rays = pixels @ np.linalg.inv(view.intrinsics).T @ pose[:3, :3].T
+    near_trunk, on_trunk = _hit(pose[:3, 3], rays, np.zeros(3), AXES)
+    near_ball, on_ball = _hit(pose[:3, 3], rays, np.array(center), np.full(3, BALL))
+    color = np.where(
+        (near_trunk < near_ball)[..., None], _trunk_color(on_trunk), _ball_color(on_ball)
+    )
+    mask = np.isfinite(np.minimum(near_trunk, near_ball))
+    return np.where(mask[..., None], color, PLATE).astype(np.float32), mask.astype(np.float32)
 
 
 def _hit(eye, rays, center, axes):

@@ -75,7 +75,7 @@ def test_the_encoder_sees_the_box():
     edge = np.array(motion.half) * 2
     np.testing.assert_allclose(edge, np.ptp(points, axis=0) * (1 + 2 * PADDING))
     np.testing.assert_allclose(motion.middle, points.mean(0))
-    assert motion.encoder == EncoderShape((32,), 7, 16) and motion.mlp.inputs == 16
+    assert motion.encoder == EncoderShape((32, 64), 7, 16) and motion.mlp.inputs == 32
     shared = motion.initial(torch.Generator().manual_seed(0))
     shared = {
         n: v + 0.1 * torch.randn_like(v) if n.startswith(GRID) else v for n, v in shared.items()

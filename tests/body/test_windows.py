@@ -1,6 +1,6 @@
 """Windows follow the motion, within their bounds."""
 
-from itertools import pairwise
+from itertools import pairwise, takewhile
 
 import numpy as np
 import pytest
@@ -36,6 +36,18 @@ def test_it_cuts_before_the_step_that_is_too_much():
     assert cut(motion, 10, 2, 20) == (Window(0, 3), Window(3, 5), Window(5, 6))
     assert cut(motion, 11, 2, 20) == (Window(0, 3), Window(3, 6))
     assert cut(motion, 12, 2, 20) == (Window(0, 4), Window(4, 6))
+
+
+def test_a_window_ends_before_the_burst_that_does_not_fit():
+    burst = [0, 0, 0, 0, 0, 2, 4, 4, 4, 0, 0, 0, 0]
+    # the sum passes 9 amid the burst; what is less than 9 / 2 / 9 = 0.5 is calm
+    assert cut(burst, 9, 2, 10) == (Window(0, 5), Window(5, 7), Window(7, 13))
+    # the longest length ends amid the burst, too; all of it fits into the next window
+    assert cut(burst, 15, 2, 8) == (Window(0, 5), Window(5, 12), Window(12, 13))
+    # a burst that has just ended is no reason to go back
+    assert cut(burst, 15, 2, 10) == (Window(0, 9), Window(9, 13))
+    # never below the shortest length
+    assert cut(burst, 9, 7, 10) == (Window(0, 7), Window(7, 13))
 
 
 def test_a_sum_that_equals_the_threshold_is_not_above_it():
@@ -100,5 +112,8 @@ def test_no_window_moves_more_than_the_threshold_where_any_length_is_allowed(mot
     for number, window in enumerate(windows):
         moved = sum(motion[window.first : window.last])
         assert len(window) == 2 or moved <= threshold * (1 + 1e-9)
-        if number + 1 < len(windows):
-            assert moved + motion[window.last] > threshold * (1 - 1e-9)
+        if number + 1 < len(windows) and moved + motion[window.last] <= threshold * (1 - 1e-9):
+            # only to leave a burst to the next window: what follows at once does not fit
+            calm = threshold / 2 / len(motion)
+            burst = list(takewhile(calm.__lt__, motion[window.last :]))
+            assert motion[window.last - 1] <= calm and moved + sum(burst) > threshold * (1 - 1e-9)

@@ -20,7 +20,7 @@ class BodySettings:
     """How a body is trained; defaults are the paper's and, where it is silent, 3DGS's.
 
     Attributes:
-        motion_threshold: Motion after which a new window begins, px² (`ico3d.body.flow`).
+        motion_threshold: Motion that a window may add up to, cm² (`ico3d.body.flow.ClipFlow`).
         shortest_window: Frames that a window has at least.
         longest_window: Frames that it has at most.
         initial: Where Gaussians begin: the best that the capture allows, or the visual hull.
@@ -71,9 +71,9 @@ class BodySettings:
         cache_gib: Pictures kept in memory, in GiB; further ones are read again at each use.
     """
 
-    motion_threshold: float = 20.0
+    motion_threshold: float = 100.0
     shortest_window: int = 6
-    longest_window: int = 20
+    longest_window: int = 16
     initial: Source = "best"
     initial_gaussians: int = 50_000
     initial_opacity: float = 0.1
@@ -149,7 +149,7 @@ CPU = BodySettings(
     warmup_steps=300,
     grid_space=32,
     grid_scales=2,
-    position_rate=5e-4,
+    position_rate=1e-3,
     position_decay=0.03,
     rotation_rate=1e-3,
     scale_rate=5e-3,
@@ -161,6 +161,7 @@ CPU = BodySettings(
     densify_from=200,
     densify_gradient=0.0,
     densify_growth=0.12,
+    absgrad=True,
     finetune_steps=400,
     finetune_rate=0.3,
     checkpoint_every=500,

@@ -5,11 +5,13 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import torch
+from rich.console import Console
 
 from ico3d.body.finetune import FineTuner
-from ico3d.body.flow import dynamic_weights
+from ico3d.body.flow import clip_flow, dynamic_weights
 from ico3d.body.model import WindowModel
-from ico3d.body.plan import Plan, PlanSettings, make_plan
+from ico3d.body.plan import Plan, PlanSettings, make_plan, print_plan, save_plan
+from ico3d.body.plan_picture import draw_plan
 from ico3d.body.settings import ONE_WINDOW, BodySettings, Method
 from ico3d.body.start import begin_window
 from ico3d.body.trained import ABOUT, UNTUNED, TrainedBody, load_window, save_window
@@ -45,6 +47,7 @@ class WindowTask:
     Attributes:
         capture: Path of the capture.
         folder: Where the window's run lies.
+        flow: Folder of the optical flow, shared by all windows.
         window: Which frames.
         index: Its number.
         job: What to train.
@@ -52,6 +55,7 @@ class WindowTask:
 
     capture: Path
     folder: Path
+    flow: Path
     window: Window
     index: int
     job: BodyJob
@@ -85,7 +89,7 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     capture = capture or Capture.open(task.capture)
 
     def dynamic(points):
-        return dynamic_weights(points, capture, window)
+        return dynamic_weights(points, capture, window, clip_flow(capture, task.flow))
 
     begin = begin_window(capture, window, job.method, job.settings, dynamic, job.seed)
     begin.model.to(_device())
@@ -171,7 +175,9 @@ def train_body(capture: Capture, folder: Path, job: BodyJob) -> TrainedBody:
         return TrainedBody.load(folder)
     windows = plan_windows(capture, job, folder).windows
     tasks = [
-        WindowTask(capture.path, folder / "windows" / f"{index:04d}", window, index, job)
+        WindowTask(
+            capture.path, folder / "windows" / f"{index:04d}", folder / "flow", window, index, job
+        )
         for index, window in enumerate(windows)
     ]
     seconds = sum(train_window(task, capture) for task in tasks)
@@ -188,14 +194,17 @@ def train_body(capture: Capture, folder: Path, job: BodyJob) -> TrainedBody:
 
 
 def plan_windows(capture: Capture, job: BodyJob, folder: Path) -> Plan:
-    """The windows of a clip; methods of one window take all of it."""
+    """The windows of a clip, shown and drawn; methods of one window take all of it."""
     settings = job.settings
     bounds = PlanSettings(
         settings.motion_threshold, settings.shortest_window, settings.longest_window
     )
     plan = make_plan(capture, bounds, folder)
     if job.method in ONE_WINDOW:
-        return replace(plan, windows=(Window(0, capture.num_frames - 1),))
+        plan = replace(plan, windows=(Window(0, capture.num_frames - 1),))
+    print_plan(plan, Console())
+    save_plan(plan, folder / "plan.json")
+    draw_plan(plan, capture, folder / "plan.png")
     return plan
 
 

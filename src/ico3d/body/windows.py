@@ -40,11 +40,14 @@ def cut(
     """Cuts a clip into windows that share one frame with their neighbours.
 
     Greedy: a window takes step after step and ends before the one that would take its summed
-    motion above the threshold, so that a fast jump begins the next window. Where what is left
-    then could not be divided within the bounds, the window ends earlier, else later, by as few
-    frames as make it possible. If the whole clip cannot be divided within the bounds, windows
-    may be longer than `longest`, by as little as possible; a clip shorter than `shortest` is one
-    window.
+    motion above the threshold, so that a fast jump begins the next window. One that would end
+    amid a burst of motion ends before the burst. Where what is left then could not be divided
+    within the bounds, the window ends earlier, else later, by as few frames as make it possible.
+    If the whole clip cannot be divided within the bounds, windows may be longer than `longest`,
+    by as little as possible; a clip shorter than `shortest` is one window.
+
+    Steps belong to a burst if a window of the longest length would pass half of the threshold
+    with such steps alone.
 
     Args:
         motion: (F − 1,) how much moves from frame i to frame i + 1; not negative.
@@ -69,11 +72,13 @@ def cut(
         raise ValueError("motion must be finite and not negative.")
     fewest, most = _bounds(len(motion), shortest - 1, longest - 1)
     total = np.concatenate([[0.0], np.cumsum(motion)])  # (F,) motion before each frame
+    bursting = motion > threshold / 2 / (longest - 1)  # (F − 1,)
     windows, first = [], 0
     while not windows or first < len(motion):
         moved = total[first + 1 : first + 1 + most] - total[first]
         calm = int(np.searchsorted(moved, threshold, side="right"))
-        steps = _possible(max(calm, fewest), len(motion) - first, fewest, most)
+        wanted = _before_burst(bursting[first:], max(calm, fewest), fewest)
+        steps = _possible(wanted, len(motion) - first, fewest, most)
         windows.append(Window(first, first + steps))
         first += steps
     return tuple(windows)
@@ -89,6 +94,14 @@ def _bounds(steps: int, fewest: int, most: int) -> tuple[int, int]:
 def _divisible(steps: int, fewest: int, most: int) -> bool:
     """Whether so many steps are a sum of windows of `fewest` to `most` steps."""
     return steps == 0 or steps <= (steps // fewest) * most
+
+
+def _before_burst(bursting: np.ndarray, steps: int, fewest: int) -> int:
+    """Steps of a window such that it ends with a calm one, where it would end amid a burst."""
+    if not bursting[steps - 1 : steps + 1].all() or steps >= len(bursting):
+        return steps
+    calm = np.flatnonzero(~bursting[fewest - 1 : steps])
+    return fewest + int(calm[-1]) if len(calm) else steps
 
 
 def _possible(wanted: int, left: int, fewest: int, most: int) -> int:
