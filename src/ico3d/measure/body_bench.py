@@ -7,6 +7,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
+from shutil import copytree
 
 import numpy as np
 
@@ -88,6 +89,8 @@ class Trial:
         """
         capture = open_clip(self.terms.capture, self.terms.frames)
         job = BodyJob(self.method, self.seed, self.terms.settings(self.method))
+        # Optical flow is the same for all, and was measured to cut the windows.
+        copytree(self.terms.folder / "flow", self.folder / "flow", dirs_exist_ok=True)
         body = train_body(capture, self.folder, job)
         if not (self.folder / UNTUNED).is_file():
             return {"seed": self.seed} | self._scores(body, capture)
