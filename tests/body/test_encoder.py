@@ -185,6 +185,14 @@ def test_planes_without_nodes_are_refused(wrong):
         EncoderShape(**wrong)
 
 
+def test_other_sizes_are_refused():
+    planes, positions = _case(SHAPE, 4, torch.float32)
+    with pytest.raises(ValueError, match="scale 1"):
+        encode({**planes, "zt1": planes["zt1"][:, :-1]}, SHAPE, positions, TIME)
+    with pytest.raises(ValueError, match="positions"):
+        encode(planes, SHAPE, positions[:, :2], TIME)
+
+
 def test_regularisers():
     shape = EncoderShape(space=(3,), time=4, channels=1)
     planes = initial_planes(shape, torch.Generator().manual_seed(1))

@@ -108,4 +108,5 @@ def test_cameras_are_cropped_to_the_person(capture, models):
     left, top = (whole.intrinsics[:2, 2] - part.intrinsics[:2, 2]).astype(int)
     pictures = [render(person, [camera]).rgb[0] for camera in (whole, part)]
     cut = pictures[0][top : top + part.height, left : left + part.width]
-    torch.testing.assert_close(pictures[1], cut, atol=1e-4, rtol=0)
+    difference = (pictures[1] - cut).abs()  # splats beyond the edge are linearised at it
+    assert difference.max() < 5e-3 and difference.mean() < 1e-5

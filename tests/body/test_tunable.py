@@ -151,6 +151,15 @@ def test_a_layer_without_values_is_refused():
         MlpShape(inputs=16, sets=0)
 
 
+def test_other_sizes_are_refused():
+    weights, x, alpha = _case(SHAPE, 4, torch.float32)
+    with pytest.raises(ValueError, match="weights"):
+        tunable_mlp({**weights, "bias1": weights["bias0"][:, :-1]}, SHAPE, x, alpha)
+    for wrong in ((x[:, 1:], alpha), (x[1:], alpha), (x, alpha[:, :1])):
+        with pytest.raises(ValueError, match="alpha"):
+            tunable_mlp(weights, SHAPE, *wrong)
+
+
 def test_positional_encoding():
     x = torch.tensor([[0.25, -1.0]], dtype=torch.float64)
     angles = [math.pi / 4, -math.pi, math.pi / 2, -2 * math.pi]

@@ -50,6 +50,13 @@ class EncoderShape:
         """The number of features of a place."""
         return len(self.space) * self.channels
 
+    def planes(self, scale: int) -> dict[str, tuple[int, int, int]]:
+        """Names and sizes (rows, columns, channels) of the planes of one scale."""
+        places = self.space[scale]
+        space = {f"{name}{scale}": (places, places, self.channels) for name in SPACE_PLANES}
+        times = {f"{name}{scale}": (self.time, places, self.channels) for name in TIME_PLANES}
+        return space | times
+
 
 def initial_planes(shape: EncoderShape, generator: torch.Generator) -> dict[str, Tensor]:
     """Planes to begin with, by name: the axes of columns and rows, then the scale ("xt0").
@@ -62,12 +69,11 @@ def initial_planes(shape: EncoderShape, generator: torch.Generator) -> dict[str,
         Per scale of S places: xy, xz, yz (S, S, channels) and xt, yt, zt (time, S, channels).
     """
     planes = {}
-    for scale, places in enumerate(shape.space):
-        for name in SPACE_PLANES:
-            plane = torch.empty(places, places, shape.channels)
-            planes[f"{name}{scale}"] = plane.uniform_(*SPACE_RANGE, generator=generator)
-        for name in TIME_PLANES:
-            planes[f"{name}{scale}"] = torch.ones(shape.time, places, shape.channels)
+    for scale in range(len(shape.space)):
+        for name, size in shape.planes(scale).items():
+            planes[name] = torch.ones(size)
+            if name[:2] in SPACE_PLANES:
+                planes[name].uniform_(*SPACE_RANGE, generator=generator)
     return planes
 
 
@@ -87,16 +93,22 @@ def encode(
 
     Returns:
         (N, outputs), differentiable in planes and positions.
+
+    Raises:
+        ValueError: If the planes or positions are of other sizes.
     """
+    if positions.shape[1:] != (3,):
+        raise ValueError(f"positions must be (N, 3), not {tuple(positions.shape)}")
     scales = []
     for scale in range(len(shape.space)):
-        space = [planes[f"{name}{scale}"] for name in SPACE_PLANES]
-        times = [planes[f"{name}{scale}"] for name in TIME_PLANES]
-        if all(_has_kernel(tensor) for tensor in (positions, *space, *times)):
-            scales.append(_Product.apply(time, positions, *space, *times))
+        chosen = [planes[name] for name in shape.planes(scale)]
+        if [plane.shape for plane in chosen] != list(shape.planes(scale).values()):
+            raise ValueError(f"the planes of scale {scale} must be {shape.planes(scale)}")
+        if all(_has_kernel(tensor) for tensor in (positions, *chosen)):
+            scales.append(_Product.apply(time, positions, *chosen))
         else:
-            lines = [_line(plane, *_row(len(plane), time)) for plane in times]
-            scales.append(_product(positions, space, lines))
+            lines = [_line(plane, *_row(shape.time, time)) for plane in chosen[3:]]
+            scales.append(_product(positions, chosen[:3], lines))
     return torch.cat(scales, 1)
 
 
@@ -147,26 +159,26 @@ class _Product(torch.autograd.Function):
     def forward(ctx, time: float, positions: Tensor, *planes: Tensor) -> Tensor:
         row, part = _row(len(planes[-1]), time)
         lines = [_line(plane, row, part) for plane in planes[3:]]
-        sampled = [_laned(tensor) for tensor in (*planes[:3], *lines)]
+        sampled = [_grouped(tensor) for tensor in (*planes[:3], *lines)]
         positions = positions.contiguous()
-        features = positions.new_empty(len(positions), sampled[0].shape[-1])  # (N, lanes)
+        features = positions.new_empty(len(positions), *sampled[0].shape[2:])
         kernels.forward(numba.get_num_threads(), *_arrays(*sampled, positions, features))
         ctx.save_for_backward(positions, *sampled)
         ctx.row, ctx.part, ctx.sizes = row, part, [plane.shape for plane in planes]
-        return features[:, : planes[0].shape[-1]]
+        return _channels(features, planes[0].shape[-1])
 
     @staticmethod
     def backward(ctx, *gradients: Tensor):
         positions, *sampled = ctx.saved_tensors
-        hands, (places, _, lanes) = numba.get_num_threads(), sampled[0].shape
+        hands = numba.get_num_threads()
         g_positions = torch.zeros_like(positions)
-        g_planes = positions.new_zeros(hands, 3, places, places, lanes)
-        g_lines = positions.new_zeros(hands, 3, places, lanes)
-        taken = (*sampled, positions, _laned(gradients[0]))
+        g_planes = positions.new_zeros(hands, 3, *sampled[0].shape)
+        g_lines = positions.new_zeros(hands, 3, *sampled[-1].shape)
+        taken = (*sampled, positions, _grouped(gradients[0]))
         kernels.backward(*_arrays(*taken, g_planes, g_lines, g_positions))
         channels = gradients[0].shape[1]
-        by_planes = g_planes.sum(0)[..., :channels]  # (3, S, S, C)
-        by_lines = g_lines.sum(0)[..., :channels]  # (3, S, C)
+        by_planes = _channels(g_planes.sum(0), channels)  # (3, S, S, C)
+        by_lines = _channels(g_lines.sum(0), channels)  # (3, S, C)
         by_times = [
             _on_rows(line, size, ctx.row, ctx.part)
             for line, size in zip(by_lines, ctx.sizes[3:], strict=True)
@@ -183,10 +195,16 @@ def _on_rows(line: Tensor, size: torch.Size, row: int, part: float) -> Tensor:
     return gradient
 
 
-def _laned(tensor: Tensor) -> Tensor:
-    """With zeros as further channels up to what the kernels take, and contiguous."""
+def _grouped(tensor: Tensor) -> Tensor:
+    """(…, C) to (…, groups, LANES), as the kernels take channels; zeros fill the last group."""
     missing = -tensor.shape[-1] % kernels.LANES
-    return (pad(tensor, (0, missing)) if missing else tensor).contiguous()
+    padded = pad(tensor, (0, missing)) if missing else tensor
+    return padded.unflatten(-1, (-1, kernels.LANES)).contiguous()
+
+
+def _channels(grouped: Tensor, channels: int) -> Tensor:
+    """(…, C) of what `_grouped` gives."""
+    return grouped.flatten(-2)[..., :channels]
 
 
 def _arrays(*tensors: Tensor) -> list[np.ndarray]:

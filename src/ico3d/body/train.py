@@ -22,6 +22,8 @@ from ico3d.capture.capture import Capture
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.run import RunFolder
 
+FINETUNING = ("finetune_steps", "consistency", "finetune_rate")
+"""Settings that windows do not depend on: fine-tuning can be done anew without training anew."""
 WINDOW_FILE = "window.safetensors"
 
 
@@ -125,13 +127,14 @@ def finetune_window(
         Seconds spent in steps.
     """
     job, window = task.job, task.window
-    run = RunFolder(task.folder, _about(task.capture, window, job))
+    about = _about(task.capture, window, job)
+    run = RunFolder(task.folder, about | asdict(job.settings))
     finished = run.finished()
     if finished is not None:
         return finished["train_seconds"]
     model = load_window(trained / WINDOW_FILE)
-    about = RunFolder(trained, _about(task.capture, window, job)).finished()
-    assert about is not None
+    before = RunFolder(trained, about).finished()
+    assert before is not None
     model.to(_device())
     previous.to(_device())
     held_out = capture.split.test_cameras
@@ -139,7 +142,7 @@ def finetune_window(
     pictures = BodyViews(capture, job.settings.cache_gib)
     seed = job.seed + 1_000 * task.index + 500
     tuner = FineTuner(
-        model, previous, window, pictures, cameras, job.settings, about["extent"], seed
+        model, previous, window, pictures, cameras, job.settings, before["extent"], seed
     )
     loop = LoopSettings(
         job.settings.finetune_steps,
@@ -230,9 +233,11 @@ def _save(
 
 
 def _about(capture: Path, window: Window, job: BodyJob) -> dict:
-    """What a window's run is known by."""
+    """What a window's run is known by: what fine-tuning does comes later."""
     about = {"capture": str(capture.resolve()), "method": job.method, "seed": job.seed}
-    return about | asdict(window) | asdict(job.settings)
+    settings = asdict(job.settings)
+    kept = {name: value for name, value in settings.items() if name not in FINETUNING}
+    return about | asdict(window) | kept
 
 
 def _device() -> torch.device:

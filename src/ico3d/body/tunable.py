@@ -50,6 +50,15 @@ class MlpShape:
         sizes = [self.inputs, *[self.width] * self.depth, self.outputs]
         return list(pairwise(sizes))
 
+    @property
+    def weights(self) -> dict[str, tuple[int, ...]]:
+        """Names and sizes of the tensors, layer by layer."""
+        sizes = {}
+        for layer, (inputs, outputs) in enumerate(self.layers):
+            sizes[f"weight{layer}"] = (self.sets, inputs, outputs)
+            sizes[f"bias{layer}"] = (self.sets, outputs)
+        return sizes
+
 
 def initial_weights(shape: MlpShape, generator: torch.Generator) -> dict[str, Tensor]:
     """Random weights: those of a linear layer in torch, each set its own.
@@ -61,12 +70,11 @@ def initial_weights(shape: MlpShape, generator: torch.Generator) -> dict[str, Te
     Returns:
         Per layer k of I inputs and O outputs: "weight{k}" (sets, I, O) and "bias{k}" (sets, O).
     """
-    weights = {}
-    for layer, (inputs, outputs) in enumerate(shape.layers):
+    weights = {name: torch.empty(size) for name, size in shape.weights.items()}
+    for layer, (inputs, _) in enumerate(shape.layers):
         bound = (OUTPUT_GAIN if layer == shape.depth else 1.0) / math.sqrt(inputs)
-        for name, size in (("weight", (inputs, outputs)), ("bias", (outputs,))):
-            values = torch.empty(shape.sets, *size)
-            weights[f"{name}{layer}"] = values.uniform_(-bound, bound, generator=generator)
+        for name in (f"weight{layer}", f"bias{layer}"):
+            weights[name].uniform_(-bound, bound, generator=generator)
     return weights
 
 
@@ -81,8 +89,15 @@ def tunable_mlp(weights: dict[str, Tensor], shape: MlpShape, x: Tensor, alpha: T
 
     Returns:
         (N, outputs), differentiable in weights, x and alpha.
+
+    Raises:
+        ValueError: If weights, x or alpha are of other sizes.
     """
-    tensors = [weights[f"{name}{k}"] for k in range(shape.depth + 1) for name in ("weight", "bias")]
+    tensors = [weights[name] for name in shape.weights]
+    if [tensor.shape for tensor in tensors] != list(shape.weights.values()):
+        raise ValueError(f"the weights must be {shape.weights}")
+    if x.shape != (len(alpha), shape.inputs) or alpha.shape != (len(x), shape.sets):
+        raise ValueError(f"x and alpha must be (N, {shape.inputs}) and (N, {shape.sets})")
     if all(_has_kernel(tensor) for tensor in (x, alpha, *tensors)):
         return _Mlp.apply(shape, x, alpha, *tensors)  # type: ignore[no-any-return]
     for layer in range(shape.depth + 1):
@@ -110,8 +125,9 @@ class _Mlp(torch.autograd.Function):
         x, alpha = x.contiguous(), alpha.contiguous()
         matrices = _padded_matrices(tensors)
         layers = _layer_table(shape)
-        hidden = torch.empty(-(-len(x) // BLOCK), shape.depth, padded(shape.width) * BLOCK)
-        out = torch.empty(len(x), shape.outputs)
+        blocks = -(-len(x) // BLOCK)
+        hidden = x.new_empty(blocks, shape.depth, padded(shape.width) * BLOCK)
+        out = x.new_empty(len(x), shape.outputs)
         flat = torch.cat([matrix.flatten() for matrix in matrices])
         kernels.forward(*_arrays(x, alpha, flat, layers, hidden, out))
         ctx.save_for_backward(x, alpha, hidden)
@@ -123,7 +139,7 @@ class _Mlp(torch.autograd.Function):
         x, alpha, hidden = ctx.saved_tensors
         flat = torch.cat([matrix.T.flatten() for matrix in ctx.matrices])
         g_x, g_alpha = torch.empty_like(x), torch.empty_like(alpha)
-        g_weights = torch.zeros(PARTS, len(flat))
+        g_weights = x.new_zeros(PARTS, len(flat))
         taken = (x, alpha, flat, ctx.layers, hidden, gradients[0].contiguous())
         kernels.backward(*_arrays(*taken, g_x, g_alpha, g_weights))
         return None, g_x, g_alpha, *_taken_apart(ctx.shape, ctx.matrices, g_weights.sum(0))

@@ -5,10 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ico3d.capture.synthetic.acting import Acting
+from ico3d.capture.synthetic.limbs import Limb
 from ico3d.capture.synthetic.performance import wander
 from ico3d.capture.synthetic.skeleton import Skeleton
 
 MOTIONS = ("showcase", "talk", "walk")
+ARM = 0.517
+"""Metres from shoulder to wrist of the person for whom lengths are written here; they are scaled
+for others."""
 STANCE = 0.13
 """Metres between an ankle and the middle."""
 SOFT_KNEES = 0.006
@@ -119,8 +123,14 @@ def act(skeleton: Skeleton, motion: str, times: np.ndarray, seed: int) -> Acting
     hands[:, :, :3] += 0.006 * np.stack(
         [np.stack([wander(times, 0.6, random) for _ in range(3)], 1) for _ in range(2)]
     )
+    hands[:, :, :3] *= _size(skeleton)
     stride = _stride(times, end if motion == "walk" else 0.0)
     return _whole_body(skeleton, times, hands, stride, random)
+
+
+def _size(skeleton: Skeleton) -> float:
+    """How long this person's arms are, next to `ARM`."""
+    return sum(Limb.of(skeleton, "upperarm01.L", "lowerarm01.L", "wrist.L").lengths) / ARM
 
 
 def _showcase(end: float, random: np.random.Generator) -> tuple[Track, Track]:
@@ -264,7 +274,7 @@ def _ankles(skeleton: Skeleton, stride: np.ndarray) -> np.ndarray:
     """(2, F, 3): on the floor, or lifted."""
     rest = skeleton.at[[skeleton.index("foot.L"), skeleton.index("foot.R")]]  # (2, 3)
     ankles = np.tile(rest[:, None], (1, stride.shape[1], 1))
-    ankles[:, :, 0] = np.array([[STANCE], [-STANCE]])
+    ankles[:, :, 0] = _size(skeleton) * np.array([[STANCE], [-STANCE]])
     ankles[:, :, 1] += STEP_HEIGHT * stride
     ankles[:, :, 2] -= 0.05 * stride
     return ankles
