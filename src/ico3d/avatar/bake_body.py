@@ -18,8 +18,8 @@ LEAST_UNIT = 2.0**-14
 """Relative to the Gaussian that moves farthest; float16 holds smaller ones coarsely."""
 SAMPLES_PER_FRAME = 2
 """All frames, and what lies midway."""
-_LEAST_SCALE = 1e-6
-"""Metres; smaller Gaussians are invisible, and logarithms of 0 are none."""
+_LEAST_SCALE = 2e-4
+"""Metres; nobody sees whether a Gaussian is smaller, and components would be spent on it."""
 
 
 class Span(Protocol):
@@ -86,9 +86,10 @@ class WindowBaker:
 
     def baked(self, ranks: tuple[int, int, int]) -> BakedWindow:
         """The window with so many components of positions, rotations and log-scales."""
-        position = _components(self._motion.means, ranks[0])
-        rotation = _components(self._motion.quats, ranks[1])
-        scale = _components(self._motion.log_scales, ranks[2])
+        shown = self._rgba[:, 3] / np.float32(255)  # (N,) whose errors are seen
+        position = _components(self._motion.means, shown, ranks[0])
+        rotation = _components(self._motion.quats, shown, ranks[1])
+        scale = _components(self._motion.log_scales, shown, ranks[2])
         return BakedWindow(
             means=position.mean,
             quats=np.rint(rotation.mean * QUAT_UNIT).astype(np.int16),
@@ -138,15 +139,16 @@ class _Components:
     scores: np.ndarray
 
 
-def _components(samples: np.ndarray, rank: int) -> _Components:
+def _components(samples: np.ndarray, weights: np.ndarray, rank: int) -> _Components:
     """Principal components over time of (S, N, D), 8-bit.
 
     Every Gaussian has a unit of its own: few move far. Components are as long as the motion along
-    them, so that the first, which matter most, use the range of the integers.
+    them, so that the first, which matter most, use the range of the integers. Weights (N,) say
+    how much a Gaussian's errors matter.
     """
     steps, count, size = samples.shape
     flat = samples.reshape(steps, count * size)
-    factors = factorise(flat, np.ones(count * size, np.float32), rank)
+    factors = factorise(flat, weights.repeat(size), rank)
     lengths = np.linalg.norm(factors.scores, axis=0)  # (K,)
     lengths = np.where(lengths > 0, lengths, 1).astype(np.float32)
     basis = (factors.basis * lengths[:, None]).reshape(rank, count, size)
