@@ -42,7 +42,7 @@ def tuner_of(capture, models, consistency):
     settings = replace(settings_for("cpu", "swings++"), **SMALL)
     settings = replace(settings, finetune_steps=60, finetune_rate=3.0, consistency=consistency)
     cameras = [c for i, c in enumerate(capture.cameras) if i not in capture.split.test_cameras]
-    pictures = BodyViews(capture, 0.1)
+    pictures = BodyViews(capture, AFTER.frames, 0.1)
     return FineTuner(models[1], models[0], AFTER, pictures, cameras, settings, 0.7, 0)
 
 

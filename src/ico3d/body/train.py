@@ -109,7 +109,7 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
 
     begin = begin_window(capture, window, job.method, job.settings, dynamic, job.seed)
     begin.model.to(_device())
-    pictures = BodyViews(capture, job.settings.cache_gib)
+    pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
     seed = job.seed + 1_000 * task.index
     trainer = BodyTrainer(
         begin.model, window, pictures, job.method, job.settings, begin.extent, seed
@@ -153,7 +153,7 @@ def finetune_window(
     previous.to(_device())
     held_out = capture.split.test_cameras
     cameras = [camera for i, camera in enumerate(capture.cameras) if i not in held_out]
-    pictures = BodyViews(capture, job.settings.cache_gib)
+    pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
     seed = job.seed + 1_000 * task.index + 500
     tuner = FineTuner(
         model, previous, window, pictures, cameras, job.settings, before["extent"], seed

@@ -100,7 +100,9 @@ class BakedWindow:
         turned = units[:, 1:2] * _blend(c[p : p + r], self.rotation_basis)  # (N, 4)
         quats = self.quats / np.float32(QUAT_UNIT) + turned
         quats /= np.maximum(np.linalg.norm(quats, axis=1, keepdims=True), np.float32(1e-6))
-        scales = self.scales.astype(np.float32) + units[:, 2:] * _blend(c[p + r :], self.scale_basis)
+        scales = self.scales.astype(np.float32) + units[:, 2:] * _blend(
+            c[p + r :], self.scale_basis
+        )
         return means, quats, np.exp(scales)
 
 
