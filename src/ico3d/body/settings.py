@@ -163,8 +163,7 @@ CPU = BodySettings(
     densify_gradient=0.0,
     densify_growth=0.12,
     absgrad=True,
-    finetune_steps=400,
-    finetune_rate=0.3,
+    finetune_steps=2_500,
     checkpoint_every=500,
 )
 

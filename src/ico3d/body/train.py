@@ -1,6 +1,6 @@
 """From a capture to a model folder: plans windows, trains them, fine-tunes, saves."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -67,6 +67,20 @@ class WindowTask:
         """The trained window."""
         return self.folder / WINDOW_FILE
 
+    @property
+    def steps(self) -> int:
+        """Optimisation steps."""
+        return self.job.settings.steps_of(len(self.window))
+
+    @property
+    def label(self) -> str:
+        """What people read."""
+        return f"window {self.index} (frames {self.window.first} to {self.window.last})"
+
+
+Runner = Callable[[Sequence[WindowTask]], Sequence[float]]
+"""Trains windows; gives the seconds spent in steps by window."""
+
 
 def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     """Trains a window, or goes on with an interrupted run of the same settings.
@@ -101,9 +115,9 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
         begin.model, window, pictures, job.method, job.settings, begin.extent, seed
     )
     loop = LoopSettings(
-        job.settings.steps_of(len(window)),
+        task.steps,
         checkpoint_every=job.settings.checkpoint_every,
-        label=f"window {task.index} (frames {window.first} to {window.last})",
+        label=task.label,
     )
     seconds = run_loop(trainer, run, loop)
     save_window(task.file, trainer.model)
@@ -155,13 +169,16 @@ def finetune_window(
     return seconds
 
 
-def train_body(capture: Capture, folder: Path, job: BodyJob) -> TrainedBody:
+def train_body(
+    capture: Capture, folder: Path, job: BodyJob, runner: Runner | None = None
+) -> TrainedBody:
     """Trains a body, or goes on with an interrupted run of the same settings.
 
     Args:
         capture: Calibrated, synchronised cameras with masks.
         folder: Model folder; also holds the plan, and the run of every window.
         job: What to train.
+        runner: Trains the windows; one after another in this process by default.
 
     Returns:
         The trained body, as the folder now holds it.
@@ -183,7 +200,7 @@ def train_body(capture: Capture, folder: Path, job: BodyJob) -> TrainedBody:
         )
         for index, window in enumerate(windows)
     ]
-    seconds = sum(train_window(task, capture) for task in tasks)
+    seconds = sum(runner(tasks) if runner else (train_window(task, capture) for task in tasks))
     body = _save(capture, folder, job, tasks, seconds)
     if job.settings.finetune_steps and len(tasks) > 1:
         _save(capture, folder, job, tasks, seconds, UNTUNED)
