@@ -18,27 +18,33 @@ from ico3d.bundle.manifest import (
     window_file,
 )
 
-SPANS, SIZES, RANKS = ((0, 4), (4, 6)), (20, 23), (5, 3, 2)
+SPANS, SIZES, RANKS, CLUSTERS = ((0, 4), (4, 6)), (20, 23), (5, 3, 2), 3
 
 
-def random_window(count: int, ranks: tuple[int, int, int], samples: int, seed=0) -> BakedWindow:
+def random_window(
+    count: int,
+    ranks: tuple[int, int, int],
+    samples: int,
+    clusters: int = CLUSTERS,
+    seed: int = 0,
+) -> BakedWindow:
     rng = np.random.default_rng(seed)
     quats = rng.normal(size=(count, 4))
     quats *= 32767 / np.linalg.norm(quats, axis=1, keepdims=True)
 
     def basis(rank: int, size: int) -> np.ndarray:
-        return rng.integers(-127, 128, (rank, count, size)).astype(np.int8)
+        return rng.integers(-32767, 32768, (rank, count, size)).astype(np.int16)
 
     return BakedWindow(
         means=rng.normal(0, 0.5, (count, 3)).astype(np.float32),
         quats=quats.astype(np.int16),
-        scales=rng.uniform(-5, -3, (count, 3)).astype(np.float16),
+        scales=rng.uniform(0.2, 0.3, (count, 3)).astype(np.float16),
         rgba=rng.integers(0, 256, (count, 4)).astype(np.uint8),
-        units=rng.uniform(0.1, 1, (count, 3)).astype(np.float16),
+        clusters=rng.permutation(np.arange(count) % clusters).astype(np.uint8),
         position_basis=basis(ranks[0], 3),
         rotation_basis=basis(ranks[1], 4),
         scale_basis=basis(ranks[2], 3),
-        coefficients=rng.normal(0, 1e-3, (samples, sum(ranks))).astype(np.float32),
+        coefficients=rng.normal(0, 3e-6, (samples, clusters, sum(ranks))).astype(np.float32),
     )
 
 
@@ -51,7 +57,7 @@ def random_windows() -> list[BakedWindow]:
 
 def body_manifest(windows: list[BakedWindow]) -> Manifest:
     infos = [
-        WindowInfo(*span, window.num_gaussians, window.ranks, window_file(i))
+        WindowInfo(*span, window.num_gaussians, CLUSTERS, window.ranks, window_file(i))
         for i, (span, window) in enumerate(zip(SPANS, windows, strict=True))
     ]
     return Manifest(

@@ -5,10 +5,10 @@ import { makeBody } from '../support/body.ts';
 import { psnr, takePixels, worst } from '../support/pictures.ts';
 import { ChatServer } from '../support/server.ts';
 
-const WIDTH = 180;
-const HEIGHT = 240;
+const WIDTH = 120;
+const HEIGHT = 160;
 const TIMES = [0, 0.3, 1, 1.45, 2, 2.7, 3]; // borders among them
-const reference = makeBody({ gaussians: 1200, times: TIMES, pictures: `${WIDTH}x${HEIGHT}` });
+const reference = makeBody({ gaussians: 600, times: TIMES, pictures: `${WIDTH}x${HEIGHT}` });
 const pixels = 3 * WIDTH * HEIGHT;
 
 /** What a drawn picture showed of the body. */
@@ -136,7 +136,7 @@ describe('a body alone, served by ico3d serve', () => {
       return { sights: window.sights!, likeness: window.pictures!.map((picture) => window.psnr!(picture, before)) };
     }, border);
     const windows = sights.map((sight) => sight.window).filter((window, i, all) => window !== all[i - 1]);
-    expect(windows.slice(-3)).toEqual([border - 1, border, border - 1]);
+    expect(windows.slice(-2)).toEqual([border, border - 1]);
     console.log(`${likeness.length} pictures around ${border} s: ${Math.min(...likeness).toFixed(1)} dB at least`);
     expect(Math.min(...likeness)).toBeGreaterThan(40);
   });
@@ -164,6 +164,7 @@ describe('a body alone, served by ico3d serve', () => {
   });
 
   test('the player is worked with the mouse and with the keyboard', async () => {
+    await page.setViewportSize({ width: 360, height: 120 });
     await page.evaluate(() => window.ico3d!.stage.start());
     const time = () => page.evaluate(() => window.ico3d!.body!.playback.time);
     const playing = () => page.evaluate(() => window.ico3d!.body!.playback.playing);
@@ -185,7 +186,7 @@ describe('a body alone, served by ico3d serve', () => {
     for (let i = 0; i < 45; i++) await page.keyboard.press('ArrowLeft'); // half around, to the back
     const z = await page.evaluate(() => window.ico3d!.stage.orbit.camera.position.z);
     expect(z).toBeLessThan(-1);
-    await page.keyboard.press('Home');
+    await page.setViewportSize({ width: WIDTH, height: HEIGHT });
   });
 
   test('a late window: the picture stays until it is there', async () => {

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.avatar import body_bundle
-from ico3d.avatar.bake_body import WindowBaker
+from ico3d.avatar.bake_body import Shape, WindowBaker
 from ico3d.avatar.body_bundle import WindowResult
 from ico3d.avatar.render_bundle import body_gaussians, render_body, visitor_camera
 from ico3d.bundle.format import Bundle
@@ -24,7 +24,7 @@ from ico3d.bundle.manifest import Loss, Persona, window_file
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "avatar"))
 from moving_body import FPS, MovingPerson
 
-BORDERS, RANKS = (0, 15, 30, 45), (7, 5, 2)
+BORDERS, SHAPE = (0, 15, 30, 45), Shape(8, (7, 5, 2))
 PROVENANCE = {"kind": "computed", "sources": ["a seed"], "consent": "none", "licence": "CC0-1.0"}
 
 
@@ -37,7 +37,7 @@ def write_body(path: Path, count: int) -> None:
     person.opacities[np.concatenate([person.orders[0][len(o) :] for o in person.orders])] = 0.02
     results = []
     for i, span in enumerate(person.windows):
-        window = WindowBaker(person, i).baked(RANKS)
+        window = WindowBaker(person, i).baked(SHAPE)
         seconds = (span.last - span.first) / FPS
         data = window.to_bytes(window_file(i))
         results.append(WindowResult(window, data, seconds, Loss(None, None, None)))
@@ -52,7 +52,7 @@ def reference_of(bundle: Bundle, seconds: float) -> dict:
     index = next(i for i, window in enumerate(body.windows) if frame <= window.last + 1e-9)
     window = body.windows[index]
     tau = (frame - window.first) / (window.last - window.first)
-    coefficients = bundle.window(index).coefficients_at(tau).tolist()
+    coefficients = bundle.window(index).coefficients_at(tau).ravel().tolist()
     return {"time": seconds, "window": index, "tau": tau, "coefficients": coefficients}
 
 

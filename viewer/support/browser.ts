@@ -63,7 +63,7 @@ export class Browser {
 
   /** Opens the page and waits until the avatar is on stage. */
   async open(url: string): Promise<Page> {
-    await this.page.goto(url);
+    await this.page.goto(url, { timeout: 60_000 });
     await this.page.waitForFunction(() => window.ico3d !== undefined, undefined, { timeout: 60_000 });
     return this.page;
   }

@@ -8,18 +8,18 @@ import numpy as np
 import torch
 
 from ico3d.avatar.bake_head import LEAST_ALPHA
-from ico3d.avatar.lowrank import factorise
+from ico3d.avatar.motion_clusters import Channel, components, group
 from ico3d.bundle.body import QUAT_UNIT, BakedWindow
 from ico3d.errors import BundleError
 from ico3d.splat.gaussians import Gaussians
 
-INT8 = 127
-LEAST_UNIT = 2.0**-14
-"""Relative to the Gaussian that moves farthest; float16 holds smaller ones coarsely."""
+_INT16 = 32767
 SAMPLES_PER_FRAME = 2
 """All frames, and what lies midway."""
-_LEAST_SCALE = 2e-4
-"""Metres; nobody sees whether a Gaussian is smaller, and components would be spent on it."""
+_MOST_FADING = 0.02
+"""How much an opacity may change within a window, which has but one; more would be seen."""
+GAUSSIANS_PER_CLUSTER = 200
+"""At least, on average: each cluster's curves take their room, too."""
 
 
 class Span(Protocol):
@@ -58,12 +58,26 @@ class MovingBody(Protocol):
 
 
 @dataclass(frozen=True)
+class Shape:
+    """How closely a window is kept.
+
+    Attributes:
+        clusters: Groups of Gaussians with components of their own; at most one per
+            `GAUSSIANS_PER_CLUSTER`.
+        ranks: Components of positions, rotations and scales.
+    """
+
+    clusters: int
+    ranks: tuple[int, int, int]
+
+
+@dataclass(frozen=True)
 class _Motion:
-    """What moves in a window: (S, N, 3), (S, N, 4), (S, N, 3)."""
+    """What moves in a window: (S, N, 3) metres, (S, N, 4) quaternions, (S, N, 3) metres."""
 
     means: np.ndarray
     quats: np.ndarray
-    log_scales: np.ndarray
+    scales: np.ndarray
 
 
 class WindowBaker:
@@ -73,7 +87,8 @@ class WindowBaker:
         """Samples window `index`.
 
         Raises:
-            BundleError: If nothing of it is ever opaque enough to be drawn.
+            BundleError: If nothing of it is ever opaque enough to be drawn, or if Gaussians come
+                and go.
         """
         span = body.windows[index]
         first = body.window_gaussians(index, 0.0).detach()
@@ -82,36 +97,61 @@ class WindowBaker:
             raise BundleError(f"window {index} has no Gaussian that is ever seen: train it again.")
         self._rgba = _display_colours(first[kept])
         count = SAMPLES_PER_FRAME * (span.last - span.first) + 1
-        self._motion = _sample(body, index, kept, count)
+        self._motion = _sample(body, index, first, kept, count)
 
-    def baked(self, ranks: tuple[int, int, int]) -> BakedWindow:
-        """The window with so many components of positions, rotations and log-scales."""
-        shown = self._rgba[:, 3] / np.float32(255)  # (N,) whose errors are seen
-        position = _components(self._motion.means, shown, ranks[0])
-        rotation = _components(self._motion.quats, shown, ranks[1])
-        scale = _components(self._motion.log_scales, shown, ranks[2])
+    def baked(self, shape: Shape) -> BakedWindow:
+        """The window in this shape."""
+        channels = self._channels(shape.ranks)
+        count = max(1, min(shape.clusters, len(self._rgba) // GAUSSIANS_PER_CLUSTER))
+        labels = group(channels, count)
+        position, rotation, scale = (_components(c, labels, count) for c in channels)
         return BakedWindow(
             means=position.mean,
             quats=np.rint(rotation.mean * QUAT_UNIT).astype(np.int16),
             scales=scale.mean.astype(np.float16),
             rgba=self._rgba,
-            units=np.stack([position.units, rotation.units, scale.units], 1),
+            clusters=labels,
             position_basis=position.basis,
             rotation_basis=rotation.basis,
             scale_basis=scale.basis,
-            coefficients=np.hstack([position.scores, rotation.scores, scale.scores]),
+            coefficients=np.concatenate([position.curves, rotation.curves, scale.curves], 2),
         )
 
+    def _channels(self, ranks: tuple[int, int, int]) -> list[Channel]:
+        """What moves, weighted by how far an error moves a Gaussian's rim, times its opacity.
 
-def _sample(body: MovingBody, index: int, kept: torch.Tensor, count: int) -> _Motion:
+        A turn by the angle θ is a change of the quaternion by θ/2, and moves the rim by θ times
+        how far the Gaussian is from a sphere.
+        """
+        motion, opacity = self._motion, self._rgba[:, 3] / np.float32(255)
+        squares = np.square(motion.scales)  # (S, N, 3)
+        eccentricity = np.sqrt((squares.max(axis=2) - squares.min(axis=2)).mean(axis=0))  # (N,)
+        weights = (opacity, 2 * eccentricity * opacity, opacity)
+        values = (motion.means, motion.quats, motion.scales)
+        return [Channel(*part) for part in zip(values, weights, ranks, strict=True)]
+
+
+def _sample(
+    body: MovingBody, index: int, first: Gaussians, kept: torch.Tensor, count: int
+) -> _Motion:
     samples = []
     with torch.no_grad():
         for tau in np.linspace(0, 1, count):
-            now = body.window_gaussians(index, float(tau))[kept]
-            values = (now.means, now.quats, now.scales.clamp_min(_LEAST_SCALE).log())
+            now = body.window_gaussians(index, float(tau))
+            _check_constant(first.opacities, now.opacities, index)
+            now = now[kept]
+            values = (now.means, now.quats, now.scales)
             samples.append([value.float().cpu().numpy() for value in values])
-    means, quats, log_scales = (np.stack(part) for part in zip(*samples, strict=True))
-    return _Motion(means, aligned(quats), log_scales)
+    means, quats, scales = (np.stack(part) for part in zip(*samples, strict=True))
+    return _Motion(means, aligned(quats), scales)
+
+
+def _check_constant(first: torch.Tensor, now: torch.Tensor, index: int) -> None:
+    if (first - now).abs().max() > _MOST_FADING:
+        raise BundleError(
+            f"window {index} has Gaussians that come and go, which bundles cannot hold: "
+            "bake a body of another method, such as swings++."
+        )
 
 
 def aligned(quats: np.ndarray) -> np.ndarray:
@@ -124,41 +164,26 @@ def aligned(quats: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Components:
-    """Y ≈ mean + units · Σ_k scores_k · basis_k.
-
-    Attributes:
-        mean: (N, D) float32.
-        units: (N,) float16, at most 1.
-        basis: (K, N, D) int8.
-        scores: (S, K) float32.
-    """
+    """mean + Σ_k curves_sck · basis_kn: (N, D) float32, (K, N, D) int16, (S, C, K) float32."""
 
     mean: np.ndarray
-    units: np.ndarray
     basis: np.ndarray
-    scores: np.ndarray
+    curves: np.ndarray
 
 
-def _components(samples: np.ndarray, weights: np.ndarray, rank: int) -> _Components:
-    """Principal components over time of (S, N, D), 8-bit.
-
-    Every Gaussian has a unit of its own: few move far. Components are as long as the motion along
-    them, so that the first, which matter most, use the range of the integers. Weights (N,) say
-    how much a Gaussian's errors matter.
-    """
-    steps, count, size = samples.shape
-    flat = samples.reshape(steps, count * size)
-    factors = factorise(flat, weights.repeat(size), rank)
-    lengths = np.linalg.norm(factors.scores, axis=0)  # (K,)
-    lengths = np.where(lengths > 0, lengths, 1).astype(np.float32)
-    basis = (factors.basis * lengths[:, None]).reshape(rank, count, size)
-    reach = np.abs(basis).max(axis=(0, 2))  # (N,)
-    farthest = max(float(reach.max()), np.finfo(np.float32).tiny)
-    units = np.maximum(reach / farthest, LEAST_UNIT).astype(np.float16)
-    step = farthest / INT8 * units.astype(np.float32)  # (N,) what 1 stands for
-    whole = np.clip(np.rint(basis / step[:, None]), -INT8, INT8).astype(np.int8)
-    mean, scores = factors.mean.reshape(count, size), factors.scores / lengths
-    return _Components(mean, units, whole, scores * np.float32(farthest / INT8))
+def _components(channel: Channel, labels: np.ndarray, count: int) -> _Components:
+    """Each cluster's principal components, 16-bit; the curves take on their units."""
+    spans = components(channel, labels, count)  # (C, S, K)
+    mean = channel.values.mean(axis=0)
+    basis = np.zeros((channel.rank, *mean.shape), np.int16)
+    for cluster, span in enumerate(spans):
+        chosen = labels == cluster
+        parts = np.tensordot(span.T, channel.values[:, chosen] - mean[chosen], 1)  # (K, n, D)
+        units = np.abs(parts).max(axis=(1, 2), initial=0) / _INT16  # (K,)
+        units[units == 0] = 1
+        basis[:, chosen] = np.rint(parts / units[:, None, None])
+        span *= units
+    return _Components(mean, basis, spans.transpose(1, 0, 2).astype(np.float32))
 
 
 def _display_colours(gaussians: Gaussians) -> np.ndarray:

@@ -93,7 +93,7 @@ class Bake:
         from ico3d.capture.capture import Capture
 
         if self.rank is not None:
-            self._refuse("--rank is for heads: a body's ranks are chosen window by window.")
+            self._refuse("--rank is for heads: what a body keeps is chosen window by window.")
         persona, notices = self._body_persona(), self._notices()
         body = TrainedBody.load(self.model)
         capture = Capture.open(self.files[0]) if len(self.files) > 1 else None

@@ -61,13 +61,15 @@ class WindowInfo:
         first: Number of its first frame, which is the last one of the window before.
         last: Number of its last frame.
         num_gaussians: N.
-        ranks: P, R, L: the numbers of basis vectors of positions, rotations and log-scales.
+        num_clusters: C, groups of Gaussians that move in ways of their own.
+        ranks: P, R, L: the numbers of basis vectors of positions, rotations and scales.
         file: `body/0000.safetensors` and so on.
     """
 
     first: int
     last: int
     num_gaussians: int
+    num_clusters: int
     ranks: tuple[int, int, int]
     file: str
 
@@ -276,6 +278,8 @@ def _check_window(body: BodyInfo, index: int, window: WindowInfo) -> None:
     _require(window.file == window_file(index), f"{where}.file", f"be {window_file(index)}")
     count, top = window.num_gaussians, limits.MAX_GAUSSIANS
     _require(1 <= count <= top, f"{where}.num_gaussians", f"lie between 1 and {top}")
+    count, top = window.num_clusters, limits.MAX_CLUSTERS
+    _require(1 <= count <= top, f"{where}.num_clusters", f"lie between 1 and {top}")
     top = limits.MAX_BODY_RANK
     inside = all(1 <= rank <= top for rank in window.ranks)
     _require(inside, f"{where}.ranks", f"lie between 1 and {top}")

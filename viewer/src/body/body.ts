@@ -64,17 +64,16 @@ export class Body implements Actor {
    * @throws whatever kept the first window from being fetched
    */
   async ready(): Promise<void> {
-    while (!this.shown || this.shown.waiting) {
+    while (this.shown?.time !== this.playback.time) {
       if (!this.shown && this.failure) throw this.failure;
       await new Promise((resolve) => setTimeout(resolve, POLL));
     }
   }
 
-  /** Goes to a time and stays there; resolves when it is on stage. */
+  /** Goes to a time and stays there; resolves when it is on stage, which must have been started. */
   async show(seconds: number): Promise<void> {
     this.playback.playing = false;
     this.playback.seek(seconds);
-    this.tick(0);
     await this.ready();
   }
 

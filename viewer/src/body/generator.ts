@@ -1,7 +1,9 @@
 import { dyno, SplatGenerator, SplatTransformer } from '@sparkjsdev/spark';
 import * as THREE from 'three';
 import { coefficientPlaces, type Capacity, type PackedWindow } from './packed.ts';
-import { BASIS_STEP, coefficientsAt } from './window.ts';
+import { coefficientsAt } from './window.ts';
+
+const LEAST_SCALE = '1e-6'; // metres
 
 /**
  * One slot as a Spark generator: a shader that moves the Gaussians of the window it holds.
@@ -29,7 +31,7 @@ export class WindowGenerator extends SplatGenerator {
     });
     this.capacity = capacity;
     this.uniforms = uniforms;
-    this.found = new Float32Array(uniforms.bodyCoefficients.value.length);
+    this.found = new Float32Array(this.coefficients.length);
   }
 
   /** Takes a window in. */
@@ -37,7 +39,7 @@ export class WindowGenerator extends SplatGenerator {
     this.content = content;
     this.places = coefficientPlaces(content.window, this.capacity);
     this.uniforms.bodyCount.value = content.window.num_gaussians;
-    this.uniforms.bodyCoefficients.value.fill(0);
+    this.coefficients.fill(0);
     replace(this.uniforms.bodyRest.value, content.rest);
     replace(this.uniforms.bodyColours.value, content.colours);
     replace(this.uniforms.bodyBasis.value, content.basis);
@@ -51,17 +53,23 @@ export class WindowGenerator extends SplatGenerator {
    */
   pose(tau: number, visible: boolean): boolean {
     if (!this.content) return false;
-    const { bodyCoefficients: { value }, bodyGate } = this.uniforms;
+    const { coefficients, uniforms: { bodyCoefficients, bodyGate } } = this;
     coefficientsAt(this.content.curve, tau, this.found);
     const gate = visible ? 1 : 0;
     let changed = gate !== bodyGate.value;
     bodyGate.value = gate;
     this.places.forEach((place, k) => {
-      if (value[place] !== this.found[k]) changed = true;
-      value[place] = this.found[k]!;
+      if (coefficients[place] !== this.found[k]) changed = true;
+      coefficients[place] = this.found[k]!;
     });
-    if (changed) this.updateVersion();
-    return changed;
+    if (!changed) return false;
+    bodyCoefficients.value.needsUpdate = true;
+    this.updateVersion();
+    return true;
+  }
+
+  private get coefficients(): Float32Array {
+    return this.uniforms.bodyCoefficients.value.image.data as Float32Array;
   }
 }
 
@@ -70,12 +78,12 @@ interface Uniforms {
   bodyRest: { value: THREE.DataArrayTexture };
   bodyColours: { value: THREE.DataArrayTexture };
   bodyBasis: { value: THREE.DataArrayTexture };
-  bodyCoefficients: { value: Float32Array };
+  bodyCoefficients: { value: THREE.DataTexture }; // a row for each cluster
   bodyCount: { value: number };
   bodyGate: { value: number };
 }
 
-function makeUniforms({ width, rows, ranks }: Capacity): Uniforms {
+function makeUniforms({ width, rows, clusters, ranks }: Capacity): Uniforms {
   const size = ranks[0] + ranks[1] + ranks[2];
   const texels = (layers: number) => 4 * width * rows * layers;
   const array = (data: Float32Array | Uint8Array | Int16Array, layers: number) =>
@@ -89,12 +97,13 @@ function makeUniforms({ width, rows, ranks }: Capacity): Uniforms {
   basis.format = THREE.RGBAIntegerFormat;
   basis.type = THREE.ShortType;
   basis.internalFormat = 'RGBA16I';
-  for (const texture of [rest, colours, basis]) texture.needsUpdate = true;
+  const curves = new THREE.DataTexture(new Float32Array(clusters * size), size, clusters, THREE.RedFormat, THREE.FloatType);
+  for (const texture of [rest, colours, basis, curves]) texture.needsUpdate = true;
   return {
     bodyRest: { value: rest },
     bodyColours: { value: colours },
     bodyBasis: { value: basis },
-    bodyCoefficients: { value: new Float32Array(size) },
+    bodyCoefficients: { value: curves },
     bodyCount: { value: 0 },
     bodyGate: { value: 0 },
   };
@@ -114,7 +123,7 @@ function makeGenerator(capacity: Capacity, uniforms: Uniforms, transformer: Spla
       outTypes: { gsplat: dyno.Gsplat },
       inputs: { index },
       generate: ({ inputs, outputs }) => ({
-        globals: [dyno.defineGsplat, declarations(capacity)],
+        globals: [dyno.defineGsplat, declarations()],
         statements: statements(capacity, inputs.index!, outputs.gsplat!),
         uniforms,
       }),
@@ -123,20 +132,21 @@ function makeGenerator(capacity: Capacity, uniforms: Uniforms, transformer: Spla
   });
 }
 
-function declarations({ ranks }: Capacity): string {
+function declarations(): string {
   return dyno.unindent(`
     uniform sampler2DArray bodyRest;
     uniform sampler2DArray bodyColours;
     uniform isampler2DArray bodyBasis;
-    uniform float bodyCoefficients[${ranks[0] + ranks[1] + ranks[2]}];
+    uniform sampler2D bodyCoefficients;
     uniform int bodyCount;
     uniform float bodyGate;
-    vec4 bodyBlend(ivec2 texel, int begin, int end) {
+    vec4 bodyBlend(ivec2 texel, int cluster, int begin, int end) {
       vec4 sum = vec4(0.0);
       for (int k = begin; k < end; k++) {
-        sum += bodyCoefficients[k] * vec4(texelFetch(bodyBasis, ivec3(texel, 1 + k), 0));
+        float coefficient = texelFetch(bodyCoefficients, ivec2(k, cluster), 0).x;
+        sum += coefficient * vec4(texelFetch(bodyBasis, ivec3(texel, 1 + k), 0));
       }
-      return sum / ${BASIS_STEP}.0;
+      return sum;
     }
   `);
 }
@@ -145,14 +155,16 @@ function declarations({ ranks }: Capacity): string {
 function statements({ width, ranks: [p, r, l] }: Capacity, index: string, gsplat: string): string[] {
   return dyno.unindentLines(`
     ivec2 texel = ivec2(${index} % ${width}, ${index} / ${width});
+    vec4 rest = texelFetch(bodyRest, ivec3(texel, 0), 0);
+    int cluster = int(rest.w);
     vec4 rotation = vec4(texelFetch(bodyBasis, ivec3(texel, 0), 0)) / 32767.0;
-    rotation += bodyBlend(texel, ${p}, ${p + r});
-    vec4 growth = bodyBlend(texel, ${p + r}, ${p + r + l});
+    rotation += bodyBlend(texel, cluster, ${p}, ${p + r});
+    vec4 growth = bodyBlend(texel, cluster, ${p + r}, ${p + r + l});
     ${gsplat}.flags = ${index} < bodyCount ? GSPLAT_FLAG_ACTIVE : 0u;
     ${gsplat}.index = ${index};
-    ${gsplat}.center = texelFetch(bodyRest, ivec3(texel, 0), 0).xyz + bodyBlend(texel, 0, ${p}).xyz;
+    ${gsplat}.center = rest.xyz + bodyBlend(texel, cluster, 0, ${p}).xyz;
     ${gsplat}.quaternion = rotation.yzwx * inversesqrt(max(dot(rotation, rotation), 1e-12));
-    ${gsplat}.scales = exp(texelFetch(bodyRest, ivec3(texel, 1), 0).xyz + growth.xyz);
+    ${gsplat}.scales = max(texelFetch(bodyRest, ivec3(texel, 1), 0).xyz + growth.xyz, ${LEAST_SCALE});
     ${gsplat}.rgba = texelFetch(bodyColours, ivec3(texel, 0), 0) * vec4(1.0, 1.0, 1.0, bodyGate);
   `);
 }

@@ -8,16 +8,17 @@ export interface Capacity {
   count: number; // Gaussians
   width: number; // texels
   rows: number;
-  ranks: [number, number, number]; // of positions, rotations, log-scales
+  clusters: number;
+  ranks: [number, number, number]; // of positions, rotations, scales
 }
 
 /** A window as its textures hold it. */
 export interface PackedWindow {
   window: BakedWindow['info'];
   curve: Curve;
-  rest: Float32Array; // 2 layers of texels: centre, log-scales
+  rest: Float32Array; // 2 layers of texels: centre and cluster, scales
   colours: Uint8Array; // texels
-  basis: Int16Array; // 1 + P + R + L layers of texels: quaternion, positions, rotations, log-scales
+  basis: Int16Array; // 1 + P + R + L layers of texels: quaternion, positions, rotations, scales
 }
 
 /** What the largest window needs. */
@@ -25,7 +26,8 @@ export function capacityOf({ windows }: BodyInfo): Capacity {
   const most = (value: (window: BodyInfo['windows'][number]) => number) => Math.max(...windows.map(value));
   const count = most((window) => window.num_gaussians);
   const ranks = [0, 1, 2].map((part) => most((window) => window.ranks[part]!));
-  return { count, width: WIDTH, rows: Math.ceil(count / WIDTH), ranks: ranks as Capacity['ranks'] };
+  const clusters = most((window) => window.num_clusters);
+  return { count, width: WIDTH, rows: Math.ceil(count / WIDTH), clusters, ranks: ranks as Capacity['ranks'] };
 }
 
 /** Lays a window out for textures; what a smaller one leaves free is 0. */
@@ -35,6 +37,7 @@ export function pack(window: BakedWindow, capacity: Capacity): PackedWindow {
   const rest = new Float32Array(2 * layer);
   spread(window.means, 3, rest, 0);
   spread(window.scales, 3, rest, layer);
+  window.clusters.forEach((cluster, i) => (rest[4 * i + 3] = cluster));
   const colours = new Uint8Array(layer);
   colours.set(window.rgba);
   const basis = new Int16Array((1 + ranks[0] + ranks[1] + ranks[2]) * layer);
@@ -65,8 +68,10 @@ function spread<T extends Float32Array | Int16Array>(values: T, size: number, te
   }
 }
 
-/** Where each of a window's coefficients goes among those of the capacity's ranks. */
+/** Where each of a window's (C, P + R + L) coefficients goes among those of the capacity. */
 export function coefficientPlaces(window: BakedWindow['info'], { ranks }: Capacity): number[] {
   const begins = [0, ranks[0], ranks[0] + ranks[1]];
-  return window.ranks.flatMap((rank, part) => Array.from({ length: rank }, (_, k) => begins[part]! + k));
+  const row = window.ranks.flatMap((rank, part) => Array.from({ length: rank }, (_, k) => begins[part]! + k));
+  const width = ranks[0] + ranks[1] + ranks[2];
+  return Array.from({ length: window.num_clusters }, (_, c) => row.map((k) => c * width + k)).flat();
 }

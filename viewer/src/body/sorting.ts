@@ -27,6 +27,7 @@ export class SortWatch {
   /** A picture is about to be drawn; `now` in ms, performance clock. */
   drawing(now: number): void {
     this.drawnAt ??= now;
+    this.settled(); // looks at each sort, or one that has ended would be taken for the next one
   }
 
   /** Whether the last change has been sorted. */

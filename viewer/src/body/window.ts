@@ -1,54 +1,47 @@
 import type { BodyInfo, WindowInfo } from '../bundle/manifest.ts';
 import { takeTensor, type Tensor } from '../bundle/safetensors.ts';
+import { PageError } from '../errors.ts';
 
-/** A baked window of the body (`docs/bundle.md`): N Gaussians that move in P + R + L ways. */
+/** A baked window of the body (`docs/bundle.md`): N Gaussians; each cluster moves in P + R + L ways. */
 export interface BakedWindow {
   info: WindowInfo;
   means: Float32Array; // (N,3) metres
   quats: Int16Array; // (N,4) wxyz · 32767
-  scales: Float32Array; // (N,3) log of metres
+  scales: Float32Array; // (N,3) metres
   rgba: Uint8Array; // (N,4)
-  positionBasis: Int16Array; // (P,N,3) in BASIS_STEPs, as the next two
+  clusters: Uint8Array; // (N,)
+  positionBasis: Int16Array; // (P,N,3)
   rotationBasis: Int16Array; // (R,N,4)
   scaleBasis: Int16Array; // (L,N,3)
   curve: Curve;
 }
 
-/** What 1 in the file's bases is, times the Gaussian's unit (at most 1), in a 16-bit texture. */
-export const BASIS_STEP = 258;
-
 /** Coefficients over the window's time. */
 export interface Curve {
   samples: number; // S
-  size: number; // P + R + L
-  rows: Float32Array; // (S + 2, P + R + L): one more row before the first and after the last
+  size: number; // C·(P + R + L)
+  rows: Float32Array; // (S + 2, C, P + R + L): one more row before the first and after the last
 }
 
 /** Takes a window's tensors out of its file, checked against the manifest's counts. */
 export function readBakedWindow(tensors: Map<string, Tensor>, body: BodyInfo, info: WindowInfo): BakedWindow {
-  const { num_gaussians: n, ranks: [p, r, l], first, last, file } = info;
+  const { num_gaussians: n, num_clusters: c, ranks: [p, r, l], first, last, file } = info;
   const samples = body.samples_per_frame * (last - first) + 1;
   const take = <T>(name: string, dtype: Tensor['dtype'], shape: number[]): T =>
     takeTensor(tensors, name, dtype, shape, file).data as T;
-  const means = take<Float32Array>('means', 'F32', [n, 3]);
-  const units = take<Float32Array>('units', 'F16', [n, 3]);
-  const basis = (name: string, rank: number, size: number, part: number): Int16Array => {
-    const steps = take<Int8Array>(name, 'I8', [rank, n, size]);
-    return Int16Array.from(steps, (value, i) => {
-      const gaussian = Math.floor(i / size) % n;
-      return Math.round(BASIS_STEP * value * Math.min(units[3 * gaussian + part]!, 1));
-    });
-  };
+  const clusters = take<Uint8Array>('clusters', 'U8', [n]);
+  if (clusters.some((cluster) => cluster >= c)) throw new PageError(`${file}: clusters names one that is not there.`);
   return {
     info,
-    means,
+    clusters,
+    means: take('means', 'F32', [n, 3]),
     quats: take('quats', 'I16', [n, 4]),
     scales: take('scales', 'F16', [n, 3]),
     rgba: take('rgba', 'U8', [n, 4]),
-    positionBasis: basis('position_basis', p, 3, 0),
-    rotationBasis: basis('rotation_basis', r, 4, 1),
-    scaleBasis: basis('scale_basis', l, 3, 2),
-    curve: continued(take('coefficients', 'F32', [samples, p + r + l]), samples, p + r + l),
+    positionBasis: take('position_basis', 'I16', [p, n, 3]),
+    rotationBasis: take('rotation_basis', 'I16', [r, n, 4]),
+    scaleBasis: take('scale_basis', 'I16', [l, n, 3]),
+    curve: continued(take('coefficients', 'F32', [samples, c, p + r + l]), samples, c * (p + r + l)),
   };
 }
 
@@ -69,7 +62,7 @@ function continued(given: Float32Array, samples: number, size: number): Curve {
  * The coefficients at a time of the window: Catmull–Rom between the sampled times.
  *
  * @param tau 0 at the window's first frame, 1 at its last
- * @param out (P + R + L,) receives them
+ * @param out (C, P + R + L) receives them
  */
 export function coefficientsAt({ samples, size, rows }: Curve, tau: number, out: Float32Array): void {
   const place = Math.min(Math.max(tau, 0), 1) * (samples - 1);

@@ -27,7 +27,8 @@ export interface WindowInfo {
   first: number;
   last: number;
   num_gaussians: number;
-  ranks: [number, number, number]; // of positions, rotations, log-scales
+  num_clusters: number; // groups of Gaussians that move in ways of their own
+  ranks: [number, number, number]; // of positions, rotations, scales
   file: string;
 }
 
@@ -54,6 +55,7 @@ const VERSION = 2;
 const HEADS_ONLY = 1; // the version before bodies
 const MOST_LAYERS = 48; // basis vectors of a window; WebGL2 promises 256 layers of a texture
 const MOST_GAUSSIANS = 1_000_000;
+const MOST_CLUSTERS = 256;
 
 /**
  * Checks a parsed manifest as far as the page relies on it.
@@ -88,13 +90,18 @@ function checkBody(body: BodyInfo): void {
   for (const key of ['fps', 'samples_per_frame'] as const) if (!isPositive(body[key])) bad(`body.${key}`);
   if (!Array.isArray(body.windows) || body.windows.length === 0) bad('body.windows');
   body.windows.forEach((window, i) => {
-    const { first, last, num_gaussians: count, ranks } = window;
+    const { first, last, ranks } = window;
     const begins = i ? body.windows[i - 1]!.last : 0;
     if (first !== begins || !Number.isInteger(last) || last <= first) bad(`body.windows[${i}]`);
-    if (!Number.isInteger(count) || !isPositive(count) || count > MOST_GAUSSIANS) bad(`body.windows[${i}].num_gaussians`);
-    const counted = isNumbers(ranks, 3) && ranks.every((rank) => Number.isInteger(rank) && rank > 0);
+    if (!isCount(window.num_gaussians, MOST_GAUSSIANS)) bad(`body.windows[${i}].num_gaussians`);
+    if (!isCount(window.num_clusters, MOST_CLUSTERS)) bad(`body.windows[${i}].num_clusters`);
+    const counted = isNumbers(ranks, 3) && ranks.every((rank) => isCount(rank, MOST_LAYERS));
     if (!counted || ranks[0] + ranks[1] + ranks[2] > MOST_LAYERS) bad(`body.windows[${i}].ranks`);
   });
+}
+
+function isCount(value: unknown, most: number): boolean {
+  return Number.isInteger(value) && (value as number) > 0 && (value as number) <= most;
 }
 
 function isPositive(value: unknown): boolean {
