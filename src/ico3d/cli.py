@@ -29,8 +29,10 @@ VERBS: dict[str, Verb] = {
     "train speech": Verb("ico3d.speech.commands", "TrainSpeech", "train the speech encoder"),
     "evaluate": Verb("ico3d.measure.commands", "Evaluate", "measure a model on held-out frames"),
     "bake": Verb("ico3d.avatar.commands", "Bake", "make the bundle that browsers play"),
+    "render": Verb("ico3d.avatar.film.command", "Render", "film a body along a path of cameras"),
     "convert": Verb("ico3d.splat.commands", "Convert", "convert files of 3D Gaussians"),
     "serve": Verb("ico3d.chat.commands", "Serve", "serve a bundle and talk with it"),
+    "bench body": Verb("ico3d.measure.commands", "BenchBody", "compare methods for bodies"),
     "bench raster": Verb("ico3d.measure.commands", "BenchRaster", "time the rasteriser"),
     "bench talk": Verb("ico3d.measure.commands", "BenchTalk", "time question to answer"),
 }

@@ -98,9 +98,9 @@ def test_the_baked_window_is_the_exact_one_also_between_sampled_times(person, in
     window = WindowBaker(person, index).baked((16, 16, 6))
     for tau in (0.0, 0.21, 0.5, 0.83, 1.0):
         exact, baked = person.window_gaussians(index, tau), window_gaussians(window, tau)
-        assert (exact.means - baked.means).norm(dim=1).max() < 4e-4  # m
+        assert (exact.means - baked.means).norm(dim=1).max() < 6e-3  # m, of 1 m of motion
         unit = torch.nn.functional.normalize(exact.quats)
-        assert (unit * baked.quats).sum(1).abs().min() > 1 - 1e-5
+        assert (unit * baked.quats).sum(1).abs().min() > 1 - 1e-4
         assert (exact.scales / baked.scales).log().abs().max() < 0.01
         assert (exact.colors - baked.colors).abs().max() <= 0.5 / 255 + 1e-6
         assert (exact.opacities - baked.opacities).abs().max() <= 0.5 / 255 + 1e-6

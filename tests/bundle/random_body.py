@@ -27,17 +27,18 @@ def random_window(count: int, ranks: tuple[int, int, int], samples: int, seed=0)
     quats *= 32767 / np.linalg.norm(quats, axis=1, keepdims=True)
 
     def basis(rank: int, size: int) -> np.ndarray:
-        return rng.integers(-32767, 32768, (rank, count, size)).astype(np.int16)
+        return rng.integers(-127, 128, (rank, count, size)).astype(np.int8)
 
     return BakedWindow(
         means=rng.normal(0, 0.5, (count, 3)).astype(np.float32),
         quats=quats.astype(np.int16),
         scales=rng.uniform(-5, -3, (count, 3)).astype(np.float16),
         rgba=rng.integers(0, 256, (count, 4)).astype(np.uint8),
+        units=rng.uniform(0.1, 1, (count, 3)).astype(np.float16),
         position_basis=basis(ranks[0], 3),
         rotation_basis=basis(ranks[1], 4),
         scale_basis=basis(ranks[2], 3),
-        coefficients=rng.normal(0, 3e-6, (samples, sum(ranks))).astype(np.float32),
+        coefficients=rng.normal(0, 1e-3, (samples, sum(ranks))).astype(np.float32),
     )
 
 

@@ -13,11 +13,13 @@ from ico3d.bundle.body import QUAT_UNIT, BakedWindow
 from ico3d.errors import BundleError
 from ico3d.splat.gaussians import Gaussians
 
-_INT16 = 32767
+INT8 = 127
+LEAST_UNIT = 2.0**-14
+"""Relative to the Gaussian that moves farthest; float16 holds smaller ones coarsely."""
 SAMPLES_PER_FRAME = 2
 """All frames, and what lies midway."""
-_LEAST_SCALE = 1e-6
-"""Metres; smaller Gaussians are invisible, and logarithms of 0 are none."""
+_LEAST_SCALE = 2e-4
+"""Metres; nobody sees whether a Gaussian is smaller, and components would be spent on it."""
 
 
 class Span(Protocol):
@@ -84,14 +86,16 @@ class WindowBaker:
 
     def baked(self, ranks: tuple[int, int, int]) -> BakedWindow:
         """The window with so many components of positions, rotations and log-scales."""
-        position = _components(self._motion.means, ranks[0])
-        rotation = _components(self._motion.quats, ranks[1])
-        scale = _components(self._motion.log_scales, ranks[2])
+        shown = self._rgba[:, 3] / np.float32(255)  # (N,) whose errors are seen
+        position = _components(self._motion.means, shown, ranks[0])
+        rotation = _components(self._motion.quats, shown, ranks[1])
+        scale = _components(self._motion.log_scales, shown, ranks[2])
         return BakedWindow(
             means=position.mean,
             quats=np.rint(rotation.mean * QUAT_UNIT).astype(np.int16),
             scales=scale.mean.astype(np.float16),
             rgba=self._rgba,
+            units=np.stack([position.units, rotation.units, scale.units], 1),
             position_basis=position.basis,
             rotation_basis=rotation.basis,
             scale_basis=scale.basis,
@@ -120,26 +124,41 @@ def aligned(quats: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Components:
-    """Y ≈ mean + Σ_k scores_k · basis_k: (N, D) float32, (K, N, D) int16, (S, K) float32."""
+    """Y ≈ mean + units · Σ_k scores_k · basis_k.
+
+    Attributes:
+        mean: (N, D) float32.
+        units: (N,) float16, at most 1.
+        basis: (K, N, D) int8.
+        scores: (S, K) float32.
+    """
 
     mean: np.ndarray
+    units: np.ndarray
     basis: np.ndarray
     scores: np.ndarray
 
 
-def _components(samples: np.ndarray, rank: int) -> _Components:
-    """Principal components over time of (S, N, D), 16-bit; the scores take on their scales."""
+def _components(samples: np.ndarray, weights: np.ndarray, rank: int) -> _Components:
+    """Principal components over time of (S, N, D), 8-bit.
+
+    Every Gaussian has a unit of its own: few move far. Components are as long as the motion along
+    them, so that the first, which matter most, use the range of the integers. Weights (N,) say
+    how much a Gaussian's errors matter.
+    """
     steps, count, size = samples.shape
     flat = samples.reshape(steps, count * size)
-    factors = factorise(flat, np.ones(count * size, np.float32), rank)
-    units = np.abs(factors.basis).max(axis=1) / _INT16  # (K,)
-    units = np.where(units > 0, units, 1).astype(np.float32)
-    basis = np.rint(factors.basis / units[:, None]).astype(np.int16)
-    return _Components(
-        factors.mean.reshape(count, size),
-        basis.reshape(rank, count, size),
-        factors.scores * units,
-    )
+    factors = factorise(flat, weights.repeat(size), rank)
+    lengths = np.linalg.norm(factors.scores, axis=0)  # (K,)
+    lengths = np.where(lengths > 0, lengths, 1).astype(np.float32)
+    basis = (factors.basis * lengths[:, None]).reshape(rank, count, size)
+    reach = np.abs(basis).max(axis=(0, 2))  # (N,)
+    farthest = max(float(reach.max()), np.finfo(np.float32).tiny)
+    units = np.maximum(reach / farthest, LEAST_UNIT).astype(np.float16)
+    step = farthest / INT8 * units.astype(np.float32)  # (N,) what 1 stands for
+    whole = np.clip(np.rint(basis / step[:, None]), -INT8, INT8).astype(np.int8)
+    mean, scores = factors.mean.reshape(count, size), factors.scores / lengths
+    return _Components(mean, units, whole, scores * np.float32(farthest / INT8))
 
 
 def _display_colours(gaussians: Gaussians) -> np.ndarray:

@@ -30,7 +30,7 @@ from ico3d.bundle.manifest import (
 from ico3d.capture.capture import Capture
 from ico3d.errors import BundleError
 
-RANKS = ((5, 3, 2), (6, 3, 2), (7, 3, 2))
+RANKS = ((6, 2, 4), (10, 3, 5), (15, 3, 5))
 """Of positions, rotations, log-scales: tried in this order for each window."""
 MAX_DROP = 0.1
 """dB that a baked window may lose on the person, against ground truth."""

@@ -14,7 +14,7 @@ from ico3d.body.plan import Plan, PlanSettings, make_plan, print_plan, save_plan
 from ico3d.body.plan_picture import draw_plan
 from ico3d.body.settings import ONE_WINDOW, BodySettings, Method
 from ico3d.body.start import begin_window
-from ico3d.body.trained import TrainedBody, load_window, save_window
+from ico3d.body.trained import ABOUT, UNTUNED, TrainedBody, load_window, save_window
 from ico3d.body.trainer import BodyTrainer
 from ico3d.body.views import BodyViews
 from ico3d.body.windows import Window
@@ -109,7 +109,7 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
 
     begin = begin_window(capture, window, job.method, job.settings, dynamic, job.seed)
     begin.model.to(_device())
-    pictures = BodyViews(capture, job.settings.cache_gib)
+    pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
     seed = job.seed + 1_000 * task.index
     trainer = BodyTrainer(
         begin.model, window, pictures, job.method, job.settings, begin.extent, seed
@@ -153,7 +153,7 @@ def finetune_window(
     previous.to(_device())
     held_out = capture.split.test_cameras
     cameras = [camera for i, camera in enumerate(capture.cameras) if i not in held_out]
-    pictures = BodyViews(capture, job.settings.cache_gib)
+    pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
     seed = job.seed + 1_000 * task.index + 500
     tuner = FineTuner(
         model, previous, window, pictures, cameras, job.settings, before["extent"], seed
@@ -203,6 +203,7 @@ def train_body(
     seconds = sum(runner(tasks) if runner else (train_window(task, capture) for task in tasks))
     body = _save(capture, folder, job, tasks, seconds)
     if job.settings.finetune_steps and len(tasks) > 1:
+        _save(capture, folder, job, tasks, seconds, UNTUNED)
         tuned = [replace(t, folder=folder / "finetuned" / f"{t.index:04d}") for t in tasks[1:]]
         for before, task, after in zip(tasks, tasks[1:], tuned, strict=False):
             source = before if before.index == 0 else tuned[before.index - 1]
@@ -228,7 +229,12 @@ def plan_windows(capture: Capture, job: BodyJob, folder: Path) -> Plan:
 
 
 def _save(
-    capture: Capture, folder: Path, job: BodyJob, tasks: Sequence[WindowTask], seconds: float
+    capture: Capture,
+    folder: Path,
+    job: BodyJob,
+    tasks: Sequence[WindowTask],
+    seconds: float,
+    about: str = ABOUT,
 ) -> TrainedBody:
     """Names the windows' files in the model folder."""
     summary = {
@@ -239,7 +245,7 @@ def _save(
     models = [load_window(task.file) for task in tasks]
     windows = tuple(task.window for task in tasks)
     body = TrainedBody(models, windows, capture.fps, job.method, summary)
-    body.save(folder, [str(task.file.relative_to(folder)) for task in tasks])
+    body.save(folder, [str(task.file.relative_to(folder)) for task in tasks], about)
     return body
 
 

@@ -24,17 +24,19 @@ class BakedWindow:
         quats: (N, 4) int16 wxyz in units of 1/32767, of any length up to 1.
         scales: (N, 3) float16, logarithms of metres.
         rgba: (N, 4) uint8 display colour and opacity.
-        position_basis: (P, N, 3) int16.
-        rotation_basis: (R, N, 4) int16.
-        scale_basis: (L, N, 3) int16.
+        units: (N, 3) float16 in [0, 1], what 1 stands for in a Gaussian's three bases.
+        position_basis: (P, N, 3) int8.
+        rotation_basis: (R, N, 4) int8.
+        scale_basis: (L, N, 3) int8.
         coefficients: (S, P + R + L) float32: metres, quaternion values and logarithms per unit of
-            the bases, at S times evenly spread over the window.
+            basis · unit, at S times evenly spread over the window.
     """
 
     means: np.ndarray
     quats: np.ndarray
     scales: np.ndarray
     rgba: np.ndarray
+    units: np.ndarray
     position_basis: np.ndarray
     rotation_basis: np.ndarray
     scale_basis: np.ndarray
@@ -93,10 +95,14 @@ class BakedWindow:
         """
         p, r, _ = self.ranks
         c = self.coefficients_at(tau)
-        means = self.means + _blend(c[:p], self.position_basis)
-        quats = self.quats / np.float32(QUAT_UNIT) + _blend(c[p : p + r], self.rotation_basis)
+        units = self.units.astype(np.float32)
+        means = self.means + units[:, :1] * _blend(c[:p], self.position_basis)
+        turned = units[:, 1:2] * _blend(c[p : p + r], self.rotation_basis)  # (N, 4)
+        quats = self.quats / np.float32(QUAT_UNIT) + turned
         quats /= np.maximum(np.linalg.norm(quats, axis=1, keepdims=True), np.float32(1e-6))
-        scales = self.scales.astype(np.float32) + _blend(c[p + r :], self.scale_basis)
+        scales = self.scales.astype(np.float32) + units[:, 2:] * _blend(
+            c[p + r :], self.scale_basis
+        )
         return means, quats, np.exp(scales)
 
 
@@ -132,9 +138,10 @@ def _window_spec(n: int, ranks: tuple[int, int, int], samples: int) -> Spec:
         "quats": ("I16", (n, 4)),
         "scales": ("F16", (n, 3)),
         "rgba": ("U8", (n, 4)),
-        "position_basis": ("I16", (p, n, 3)),
-        "rotation_basis": ("I16", (r, n, 4)),
-        "scale_basis": ("I16", (s, n, 3)),
+        "units": ("F16", (n, 3)),
+        "position_basis": ("I8", (p, n, 3)),
+        "rotation_basis": ("I8", (r, n, 4)),
+        "scale_basis": ("I8", (s, n, 3)),
         "coefficients": ("F32", (samples, p + r + s)),
     }
 
@@ -144,14 +151,19 @@ def _check_reach(window: BakedWindow, name: str) -> None:
     p, r, _ = window.ranks
     rows = _continued(window.coefficients.astype(np.float64))
     most = 1.25 * np.abs(rows).max(axis=0)  # Catmull–Rom overshoots by a quarter at most
-    if np.abs(window.means).max() + most[:p] @ _largest(window.position_basis) > _MAX_LENGTH:
+    units = window.units.astype(np.float64).T  # (3, N)
+    if units.min() < 0 or units.max() > 1:
+        raise BundleError(f"{name}: its units lie outside of 0 to 1.")
+    places = np.abs(window.means).max(1) + _most(most[:p], window.position_basis, units[0])
+    if places.max() > _MAX_LENGTH:
         raise BundleError(f"{name}: it reaches farther than {_MAX_LENGTH:g} m.")
-    if most[p : p + r] @ _largest(window.rotation_basis) > _MAX_LENGTH:
+    if _most(most[p : p + r], window.rotation_basis, units[1]).max() > _MAX_LENGTH:
         raise BundleError(f"{name}: its rotations are out of range.")
-    if window.scales.max() + most[p + r :] @ _largest(window.scale_basis) > _MAX_LOG_SCALE:
+    sizes = window.scales.max(1) + _most(most[p + r :], window.scale_basis, units[2])
+    if sizes.max() > _MAX_LOG_SCALE:
         raise BundleError(f"{name}: its Gaussians grow beyond exp({_MAX_LOG_SCALE:g}) m.")
 
 
-def _largest(basis: np.ndarray) -> np.ndarray:
-    """(K,) the largest absolute value of each basis vector."""
-    return np.abs(basis.astype(np.float64)).max(axis=(1, 2), initial=0)
+def _most(coefficients: np.ndarray, basis: np.ndarray, units: np.ndarray) -> np.ndarray:
+    """(N,) what the basis (K, N, D) adds to a Gaussian at most, units (N,) included."""
+    return units * (coefficients @ np.abs(basis.astype(np.float64)).max(axis=2))

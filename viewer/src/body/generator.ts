@@ -1,7 +1,7 @@
 import { dyno, SplatGenerator, SplatTransformer } from '@sparkjsdev/spark';
 import * as THREE from 'three';
 import { coefficientPlaces, type Capacity, type PackedWindow } from './packed.ts';
-import { coefficientsAt } from './window.ts';
+import { BASIS_STEP, coefficientsAt } from './window.ts';
 
 /**
  * One slot as a Spark generator: a shader that moves the Gaussians of the window it holds.
@@ -136,7 +136,7 @@ function declarations({ ranks }: Capacity): string {
       for (int k = begin; k < end; k++) {
         sum += bodyCoefficients[k] * vec4(texelFetch(bodyBasis, ivec3(texel, 1 + k), 0));
       }
-      return sum;
+      return sum / ${BASIS_STEP}.0;
     }
   `);
 }

@@ -8,11 +8,14 @@ export interface BakedWindow {
   quats: Int16Array; // (N,4) wxyz · 32767
   scales: Float32Array; // (N,3) log of metres
   rgba: Uint8Array; // (N,4)
-  positionBasis: Int16Array; // (P,N,3)
+  positionBasis: Int16Array; // (P,N,3) in BASIS_STEPs, as the next two
   rotationBasis: Int16Array; // (R,N,4)
   scaleBasis: Int16Array; // (L,N,3)
   curve: Curve;
 }
+
+/** What 1 in the file's bases is, times the Gaussian's unit (at most 1), in a 16-bit texture. */
+export const BASIS_STEP = 258;
 
 /** Coefficients over the window's time. */
 export interface Curve {
@@ -27,15 +30,24 @@ export function readBakedWindow(tensors: Map<string, Tensor>, body: BodyInfo, in
   const samples = body.samples_per_frame * (last - first) + 1;
   const take = <T>(name: string, dtype: Tensor['dtype'], shape: number[]): T =>
     takeTensor(tensors, name, dtype, shape, file).data as T;
+  const means = take<Float32Array>('means', 'F32', [n, 3]);
+  const units = take<Float32Array>('units', 'F16', [n, 3]);
+  const basis = (name: string, rank: number, size: number, part: number): Int16Array => {
+    const steps = take<Int8Array>(name, 'I8', [rank, n, size]);
+    return Int16Array.from(steps, (value, i) => {
+      const gaussian = Math.floor(i / size) % n;
+      return Math.round(BASIS_STEP * value * Math.min(units[3 * gaussian + part]!, 1));
+    });
+  };
   return {
     info,
-    means: take('means', 'F32', [n, 3]),
+    means,
     quats: take('quats', 'I16', [n, 4]),
     scales: take('scales', 'F16', [n, 3]),
     rgba: take('rgba', 'U8', [n, 4]),
-    positionBasis: take('position_basis', 'I16', [p, n, 3]),
-    rotationBasis: take('rotation_basis', 'I16', [r, n, 4]),
-    scaleBasis: take('scale_basis', 'I16', [l, n, 3]),
+    positionBasis: basis('position_basis', p, 3, 0),
+    rotationBasis: basis('rotation_basis', r, 4, 1),
+    scaleBasis: basis('scale_basis', l, 3, 2),
     curve: continued(take('coefficients', 'F32', [samples, p + r + l]), samples, p + r + l),
   };
 }
