@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -58,11 +59,13 @@ def address():
     patch.setenv("RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "0")  # Ray's way to say: loopback only
     ray_cluster = pytest.importorskip("ray.cluster_utils", reason="ray is not installed")
     small = {"num_cpus": 1, "object_store_memory": 80 * 2**20, "include_log_monitor": False}
-    cluster = ray_cluster.Cluster()
-    cluster.add_node(**small, include_dashboard=False, no_monitor=True)
-    cluster.add_node(**small)
-    yield cluster.address
-    cluster.shutdown()
+    with tempfile.TemporaryDirectory(prefix="ray", ignore_cleanup_errors=True) as folder:
+        patch.setenv("RAY_TMPDIR", folder)  # not pytest's: names of sockets must be short
+        cluster = ray_cluster.Cluster()
+        cluster.add_node(**small, include_dashboard=False, no_monitor=True)
+        cluster.add_node(**small)
+        yield cluster.address
+        cluster.shutdown()
     patch.undo()
 
 

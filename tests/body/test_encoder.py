@@ -152,19 +152,17 @@ def test_no_points(dtype):
     assert not found["xy0"].any()
 
 
-def test_one_number_of_threads_gives_the_same_and_another_nearly():
+def test_any_number_of_threads_gives_the_same():
     many = numba.get_num_threads()
     runs = []
     try:
-        for threads in (many, many, 1):
+        for threads in (many, 1):
             numba.set_num_threads(threads)
             runs.append(_with_gradients(encode, SHAPE, 3000, torch.float32))
     finally:
         numba.set_num_threads(many)
     for name, value in runs[0].items():
         assert torch.equal(value, runs[1][name]), name
-        close = 1e-5 * value.abs().max().item()
-        torch.testing.assert_close(value, runs[2][name], rtol=0, atol=close, msg=name)
 
 
 def test_arguments_need_not_be_contiguous_nor_ask_for_gradients():

@@ -8,7 +8,7 @@ from ico3d.body.train import BodyJob, WindowTask, train_window
 from ico3d.body.windows import Window
 
 WINDOWS = (Window(0, 3), Window(3, 6), Window(6, 8))
-STEPS_PER_FRAME = 25
+STEPS_PER_FRAME = 15
 CHECKPOINT_EVERY = 10
 
 

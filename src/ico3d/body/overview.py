@@ -19,7 +19,7 @@ class Overview:
         self._done = {task.index: _standing(task)[0] for task in tasks}
         steps = sum(task.steps for task in tasks)
         self._all = self._bars.add_task(
-            f"{len(tasks)} windows", total=steps, completed=sum(self._done.values()), numbers=""
+            "all windows", total=steps, completed=sum(self._done.values()), numbers=""
         )
         self._rows = {
             task.index: self._bars.add_task(

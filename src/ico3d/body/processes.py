@@ -20,7 +20,7 @@ GPUS = "CUDA_VISIBLE_DEVICES"
 
 
 @dataclass(frozen=True)
-class _Worker:
+class Worker:
     """A process that trains one window.
 
     Attributes:
@@ -81,7 +81,7 @@ class Processes:
         self.capacity = jobs
         self._threads = 1
         self._context = multiprocessing.get_context("spawn")  # threads and CUDA survive no fork
-        self._workers: list[_Worker] = []
+        self._workers: list[Worker] = []
 
     def expect(self, windows: int) -> None:
         """Shares out the cores among those that work at once."""
@@ -98,7 +98,7 @@ class Processes:
         )
         process.start()
         sender.close()  # the worker's end closes when it ends, whatever ends it
-        self._workers.append(_Worker(task, place, process, results))
+        self._workers.append(Worker(task, place, process, results))
 
     def ended(self, timeout: float) -> Sequence[tuple[WindowTask, float | Lost]]:
         """Waits until a process has a result, or has none to give any more."""
