@@ -75,8 +75,8 @@ def _with_gradients(function, shape, count, dtype, time=TIME):
 @pytest.mark.parametrize("shape", [SHAPE, ODD, EncoderShape((4,), time=1, channels=32)])
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_values_and_gradients_equal_the_reference(shape, dtype):
-    found = _with_gradients(encode, shape, 90, dtype)
-    expected = _with_gradients(_reference, shape, 90, torch.float64)
+    found = _with_gradients(encode, shape, 40, dtype)
+    expected = _with_gradients(_reference, shape, 40, torch.float64)
     tolerance = 1e-5 if dtype == torch.float32 else 1e-12
     for name, value in found.items():
         assert value.dtype == dtype
@@ -152,19 +152,17 @@ def test_no_points(dtype):
     assert not found["xy0"].any()
 
 
-def test_one_number_of_threads_gives_the_same_and_another_nearly():
+def test_any_number_of_threads_gives_the_same():
     many = numba.get_num_threads()
     runs = []
     try:
-        for threads in (many, many, 1):
+        for threads in (many, 1):
             numba.set_num_threads(threads)
             runs.append(_with_gradients(encode, SHAPE, 3000, torch.float32))
     finally:
         numba.set_num_threads(many)
     for name, value in runs[0].items():
         assert torch.equal(value, runs[1][name]), name
-        close = 1e-5 * value.abs().max().item()
-        torch.testing.assert_close(value, runs[2][name], rtol=0, atol=close, msg=name)
 
 
 def test_arguments_need_not_be_contiguous_nor_ask_for_gradients():

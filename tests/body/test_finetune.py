@@ -42,7 +42,7 @@ def tuner_of(capture, models, consistency):
     settings = replace(settings_for("cpu", "swings++"), **SMALL)
     settings = replace(settings, finetune_steps=60, finetune_rate=3.0, consistency=consistency)
     cameras = [c for i, c in enumerate(capture.cameras) if i not in capture.split.test_cameras]
-    pictures = BodyViews(capture, 0.1)
+    pictures = BodyViews(capture, AFTER.frames, 0.1)
     return FineTuner(models[1], models[0], AFTER, pictures, cameras, settings, 0.7, 0)
 
 
@@ -108,4 +108,5 @@ def test_cameras_are_cropped_to_the_person(capture, models):
     left, top = (whole.intrinsics[:2, 2] - part.intrinsics[:2, 2]).astype(int)
     pictures = [render(person, [camera]).rgb[0] for camera in (whole, part)]
     cut = pictures[0][top : top + part.height, left : left + part.width]
-    torch.testing.assert_close(pictures[1], cut, atol=1e-4, rtol=0)
+    difference = (pictures[1] - cut).abs()  # splats beyond the edge are linearised at it
+    assert difference.max() < 5e-3 and difference.mean() < 1e-5

@@ -41,7 +41,7 @@ def trainer_of(capture, method="swings++", seed=0, window=WINDOW, **changes):
     begin = begin_window(
         capture, window, method, settings, lambda p: (p[:, 0] > 0.2).astype(float), seed
     )
-    pictures = BodyViews(capture, 0.1)
+    pictures = BodyViews(capture, window.frames, 0.1)
     return BodyTrainer(begin.model, window, pictures, method, settings, begin.extent, seed)
 
 
@@ -158,7 +158,7 @@ def test_epochs_show_every_view_once(capture):
     learner = Learner(
         trainer_of(capture).model,
         WINDOW,
-        BodyViews(capture, 0.1),
+        BodyViews(capture, WINDOW.frames, 0.1),
         settings_for("cpu", "swings++"),
         1.0,
         0,

@@ -76,6 +76,16 @@ def test_cropped_pictures_give_the_same_hull():
     assert away.min() > RADIUS - 0.012 and away.max() < RADIUS + 0.08
 
 
+@pytest.mark.parametrize("count", [3, 4, 6])
+def test_nothing_appears_where_only_opposite_cameras_look(count):
+    turns = np.arange(count) * 2 * np.pi / count
+    narrow = [_camera(turn).cropped(45, 0, 110, 180) for turn in turns]
+    seen = [Silhouette.of(camera, _ball(camera)) for camera in narrow]
+    away = _from_center(visual_hull(seen, EDGE))
+    # three cameras leave a prism about the ball
+    assert away.min() > RADIUS - 0.012 and away.max() < 2.2 * RADIUS
+
+
 def test_large_masks_are_made_smaller_with_their_cameras():
     camera = _camera(0.3)
     large = camera.resized(2000, 1800)

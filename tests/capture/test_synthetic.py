@@ -129,7 +129,7 @@ def test_views_are_shared_out_evenly():
 
 def test_points_lie_on_the_surface(person):
     subject = load_subject(str(person))
-    points = surface_points(subject, 500, seed=0)
+    points = surface_points(subject, 500, seed=0).on(subject.vertices)
     face = points[points[:, 1] > -0.11]
     face = face[np.abs(face[:, 0]) < 0.02]
     assert len(face) > 10

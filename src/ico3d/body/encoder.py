@@ -21,6 +21,8 @@ TIME_PLANES = ("xt", "yt", "zt")
 """The planes of time in the order of the axes of their columns; rows are times."""
 SPACE_RANGE = (0.1, 0.5)
 """Where the planes of space begin; those of time begin at 1, so that nothing moves."""
+SUMS = 4
+"""Parts of the points whose gradients are summed apart, by as many threads at most."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +154,8 @@ def _row(times: int, time: float) -> tuple[int, float]:
 class _Product(torch.autograd.Function):
     """`_product` of planes and the lines of one time, by kernels.
 
-    Threads share the points: the same for one number of threads, and to rounding for another.
+    Threads share the points in parts that do not depend on how many threads there are, so that the
+    sums do not, either.
     """
 
     @staticmethod
@@ -170,10 +173,9 @@ class _Product(torch.autograd.Function):
     @staticmethod
     def backward(ctx, *gradients: Tensor):
         positions, *sampled = ctx.saved_tensors
-        hands = numba.get_num_threads()
         g_positions = torch.zeros_like(positions)
-        g_planes = positions.new_zeros(hands, 3, *sampled[0].shape)
-        g_lines = positions.new_zeros(hands, 3, *sampled[-1].shape)
+        g_planes = positions.new_zeros(SUMS, 3, *sampled[0].shape)
+        g_lines = positions.new_zeros(SUMS, 3, *sampled[-1].shape)
         taken = (*sampled, positions, _grouped(gradients[0]))
         kernels.backward(*_arrays(*taken, g_planes, g_lines, g_positions))
         channels = gradients[0].shape[1]

@@ -46,7 +46,7 @@ class FineTuner:
             model: Changed in place.
             previous: The window before; not changed.
             window: The frames of `model`.
-            pictures: Where pictures come from.
+            pictures: Those of the window.
             cameras: The training cameras, between which novel ones lie.
             settings: Rates and weights.
             extent: Size of the person in metres.

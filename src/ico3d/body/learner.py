@@ -40,21 +40,18 @@ class Learner:
         extent: float,
         seed: int,
     ):
-        """Reads the pictures' masks, and the pictures as far as they fit into memory.
+        """Has learnt nothing yet.
 
         Args:
             model: Changed in place.
             window: Which frames.
-            pictures: Where pictures come from.
+            pictures: Those of the window.
             settings: Rates and weights.
             extent: Size of the person in metres; the means' rate refers to it.
             seed: All randomness follows from it and from the step's number.
-
-        Raises:
-            CaptureError: If there are no pictures or masks.
         """
         self.model, self.optimiser = model, Optimiser()
-        self.views = pictures.views(range(window.first, window.last + 1))
+        self.views = pictures.views
         self._pictures, self._window, self._settings = pictures, window, settings
         self._rates, self._extent, self._seed = settings.rates(), extent, seed
         cameras = 1 + max(view.camera_index for view in self.views)

@@ -19,11 +19,15 @@ class Motion(Protocol):
     trained, saved and frozen by name.
     """
 
-    per_gaussian: tuple[str, ...]
-    """Names of the tensors (N, …) that it hangs on the Gaussians."""
+    @property
+    def per_gaussian(self) -> tuple[str, ...]:
+        """Names of the tensors (N, …) that it hangs on the Gaussians."""
+        ...
 
-    shared: tuple[str, ...]
-    """Names of the tensors that all Gaussians share."""
+    @property
+    def shared(self) -> tuple[str, ...]:
+        """Names of the tensors that all Gaussians share."""
+        ...
 
     def at(self, values: Mapping[str, Tensor], tau: float) -> Gaussians:
         """Activated Gaussians.

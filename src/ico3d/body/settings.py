@@ -145,8 +145,8 @@ CPU = BodySettings(
     initial_gaussians=4_000,
     max_gaussians=7_000,
     initial_opacity=0.3,
-    steps_per_frame=250,
-    warmup_steps=300,
+    steps_per_frame=150,
+    warmup_steps=200,
     grid_space=32,
     grid_scales=2,
     position_rate=1e-3,
@@ -163,8 +163,7 @@ CPU = BodySettings(
     densify_gradient=0.0,
     densify_growth=0.12,
     absgrad=True,
-    finetune_steps=400,
-    finetune_rate=0.3,
+    finetune_steps=2_500,
     checkpoint_every=500,
 )
 

@@ -1,6 +1,6 @@
 """From a capture to a model folder: plans windows, trains them, fine-tunes, saves."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from ico3d.body.plan import Plan, PlanSettings, make_plan, print_plan, save_plan
 from ico3d.body.plan_picture import draw_plan
 from ico3d.body.settings import ONE_WINDOW, BodySettings, Method
 from ico3d.body.start import begin_window
-from ico3d.body.trained import TrainedBody, load_window, save_window
+from ico3d.body.trained import ABOUT, UNTUNED, TrainedBody, load_window, save_window
 from ico3d.body.trainer import BodyTrainer
 from ico3d.body.views import BodyViews
 from ico3d.body.windows import Window
@@ -67,6 +67,20 @@ class WindowTask:
         """The trained window."""
         return self.folder / WINDOW_FILE
 
+    @property
+    def steps(self) -> int:
+        """Optimisation steps."""
+        return self.job.settings.steps_of(len(self.window))
+
+    @property
+    def label(self) -> str:
+        """What people read."""
+        return f"window {self.index} (frames {self.window.first} to {self.window.last})"
+
+
+Runner = Callable[[Sequence[WindowTask]], Sequence[float]]
+"""Trains windows; gives the seconds spent in steps by window."""
+
 
 def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     """Trains a window, or goes on with an interrupted run of the same settings.
@@ -95,15 +109,15 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
 
     begin = begin_window(capture, window, job.method, job.settings, dynamic, job.seed)
     begin.model.to(_device())
-    pictures = BodyViews(capture, job.settings.cache_gib)
+    pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
     seed = job.seed + 1_000 * task.index
     trainer = BodyTrainer(
         begin.model, window, pictures, job.method, job.settings, begin.extent, seed
     )
     loop = LoopSettings(
-        job.settings.steps_of(len(window)),
+        task.steps,
         checkpoint_every=job.settings.checkpoint_every,
-        label=f"window {task.index} (frames {window.first} to {window.last})",
+        label=task.label,
     )
     seconds = run_loop(trainer, run, loop)
     save_window(task.file, trainer.model)
@@ -139,7 +153,7 @@ def finetune_window(
     previous.to(_device())
     held_out = capture.split.test_cameras
     cameras = [camera for i, camera in enumerate(capture.cameras) if i not in held_out]
-    pictures = BodyViews(capture, job.settings.cache_gib)
+    pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
     seed = job.seed + 1_000 * task.index + 500
     tuner = FineTuner(
         model, previous, window, pictures, cameras, job.settings, before["extent"], seed
@@ -155,13 +169,16 @@ def finetune_window(
     return seconds
 
 
-def train_body(capture: Capture, folder: Path, job: BodyJob) -> TrainedBody:
+def train_body(
+    capture: Capture, folder: Path, job: BodyJob, runner: Runner | None = None
+) -> TrainedBody:
     """Trains a body, or goes on with an interrupted run of the same settings.
 
     Args:
         capture: Calibrated, synchronised cameras with masks.
         folder: Model folder; also holds the plan, and the run of every window.
         job: What to train.
+        runner: Trains the windows; one after another in this process by default.
 
     Returns:
         The trained body, as the folder now holds it.
@@ -183,9 +200,10 @@ def train_body(capture: Capture, folder: Path, job: BodyJob) -> TrainedBody:
         )
         for index, window in enumerate(windows)
     ]
-    seconds = sum(train_window(task, capture) for task in tasks)
+    seconds = sum(runner(tasks) if runner else (train_window(task, capture) for task in tasks))
     body = _save(capture, folder, job, tasks, seconds)
     if job.settings.finetune_steps and len(tasks) > 1:
+        _save(capture, folder, job, tasks, seconds, UNTUNED)
         tuned = [replace(t, folder=folder / "finetuned" / f"{t.index:04d}") for t in tasks[1:]]
         for before, task, after in zip(tasks, tasks[1:], tuned, strict=False):
             source = before if before.index == 0 else tuned[before.index - 1]
@@ -211,7 +229,12 @@ def plan_windows(capture: Capture, job: BodyJob, folder: Path) -> Plan:
 
 
 def _save(
-    capture: Capture, folder: Path, job: BodyJob, tasks: Sequence[WindowTask], seconds: float
+    capture: Capture,
+    folder: Path,
+    job: BodyJob,
+    tasks: Sequence[WindowTask],
+    seconds: float,
+    about: str = ABOUT,
 ) -> TrainedBody:
     """Names the windows' files in the model folder."""
     summary = {
@@ -222,7 +245,7 @@ def _save(
     models = [load_window(task.file) for task in tasks]
     windows = tuple(task.window for task in tasks)
     body = TrainedBody(models, windows, capture.fps, job.method, summary)
-    body.save(folder, [str(task.file.relative_to(folder)) for task in tasks])
+    body.save(folder, [str(task.file.relative_to(folder)) for task in tasks], about)
     return body
 
 

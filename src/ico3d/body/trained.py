@@ -16,6 +16,10 @@ from ico3d.training.checkpoint import load_tensors, save_tensors
 
 ABOUT = "body.json"
 """The file by which a folder is known to hold a body."""
+UNTUNED = "untuned.json"
+"""The same for the windows as they were before temporal fine-tuning, where there was one."""
+ROUNDING = 1e-6
+"""Frames by which a time may miss its frame: 31 / 15 s is, in floats, after frame 31."""
 
 
 def save_window(file: Path, model: WindowModel) -> None:
@@ -67,7 +71,7 @@ class TrainedBody:
 
     def window_at(self, seconds: float) -> int:
         """The window that shows a time; at a shared frame the earlier one."""
-        frame = seconds * self.fps
+        frame = seconds * self.fps - ROUNDING
         inside = (i for i, window in enumerate(self.windows) if frame <= window.last)
         return next(inside, len(self.windows) - 1)
 
@@ -81,9 +85,9 @@ class TrainedBody:
         tau = self.windows[index].tau(seconds * self.fps)
         return self.window_gaussians(index, min(max(tau, 0.0), 1.0))
 
-    def save(self, folder: Path, files: Sequence[str]) -> None:
-        """Writes `body.json`, which names the windows' files in the folder."""
-        about = {
+    def save(self, folder: Path, files: Sequence[str], about: str = ABOUT) -> None:
+        """Writes `body.json` or its like, which names the windows' files in the folder."""
+        content = {
             "fps": self.fps,
             "method": self.method,
             "windows": [
@@ -92,27 +96,32 @@ class TrainedBody:
             ],
             "summary": self.summary,
         }
-        write_atomic(folder / ABOUT, json.dumps(about, indent=1).encode())
+        write_atomic(folder / about, json.dumps(content, indent=1).encode())
 
     @classmethod
-    def load(cls, folder: Path | str) -> "TrainedBody":
+    def load(cls, folder: Path | str, about: str = ABOUT) -> "TrainedBody":
         """Reads a body onto the CPU.
+
+        Args:
+            folder: The model folder.
+            about: `ABOUT` or `UNTUNED`.
 
         Raises:
             ModelError: If the folder holds none, or a damaged one.
         """
         folder = Path(folder)
         try:
-            about = json.loads((folder / ABOUT).read_text())
-            entries = about["windows"]
+            content = json.loads((folder / about).read_text())
+            entries = content["windows"]
             windows = tuple(Window(int(e["first"]), int(e["last"])) for e in entries)
             files = [folder / str(entry["file"]) for entry in entries]
-            fps, method, summary = float(about["fps"]), about["method"], about["summary"]
+            fps, method = float(content["fps"]), content["method"]
+            summary = content["summary"]
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ModelError(
                 f"{folder} holds no body ({error}): train one with ico3d train body."
             ) from error
         for file in files:
             if not file.resolve().is_relative_to(folder.resolve()):
-                raise ModelError(f"{folder / ABOUT} names a file outside of its folder: {file}.")
+                raise ModelError(f"{folder / about} names a file outside of its folder: {file}.")
         return cls([load_window(file) for file in files], windows, fps, method, summary)

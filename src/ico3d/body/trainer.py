@@ -29,11 +29,7 @@ class BodyTrainer:
         extent: float,
         seed: int,
     ):
-        """Gets ready for the first step; arguments as for `Learner`.
-
-        Raises:
-            CaptureError: If there are no pictures or masks.
-        """
+        """Gets ready for the first step; arguments as for `Learner`."""
         for tensor in (*model.gaussians.values(), *model.shared.values()):
             tensor.requires_grad_()
         self._learner = Learner(model, window, pictures, settings, extent, seed)

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from ico3d.capture.capture import Capture
-from ico3d.capture.pictures import LayerCache, Layers, View
+from ico3d.capture.pictures import LayerCache, Layers, View, train_cameras
 from ico3d.errors import CaptureError
 
 MARGIN = 8
@@ -31,38 +31,43 @@ class Example:
 
 
 class BodyViews:
-    """Pictures of some frames by a capture's training cameras, cropped to the person."""
+    """Pictures of some frames by a capture's training cameras, cropped to the person.
 
-    def __init__(self, capture: Capture, cache_gib: float):
-        """Reads nothing yet.
+    All pictures of a camera have one crop, which holds the person in every frame: a Gaussian that
+    stays where a hand was in another frame must be seen to be wrong.
+
+    Attributes:
+        views: The recorded views in which the person is seen, frame by frame.
+    """
+
+    def __init__(self, capture: Capture, frames: Iterable[int], cache_gib: float):
+        """Reads masks, and pictures as far as they fit into memory.
 
         Args:
             capture: Where pictures and masks come from.
+            frames: Which frames.
             cache_gib: Memory for pictures.
-        """
-        self._capture = capture
-        self._boxes: dict[tuple[int, int], tuple[int, int, int, int] | None] = {}
-        self._plates: dict[int, np.ndarray | None] = {}
-        self._cache = LayerCache(self._read, cache_gib)
-
-    def views(self, frames: Iterable[int]) -> list[View]:
-        """The recorded views of these frames by training cameras in which the person is seen.
 
         Raises:
-            CaptureError: If there is none, or a view has no mask.
+            CaptureError: If there is no picture of the person, or a view has no mask.
         """
-        held_out = self._capture.split.test_cameras
-        chosen = [i for i in range(len(self._capture.cameras)) if i not in held_out]
-        found = []
-        for frame in frames:
-            for camera in chosen:
-                if self._cache.layers(camera, frame) is not None:
-                    box = self._boxes[camera, frame]
-                    assert box is not None
-                    found.append(View(camera, frame, self._capture.cameras[camera].cropped(*box)))
-        if not found:
-            raise CaptureError(f"{self._capture.path} has no picture of the person to train on.")
-        return found
+        self._capture = capture
+        self._plates: dict[int, np.ndarray | None] = {}
+        self._cache = LayerCache(self._read, cache_gib)
+        frames = list(frames)
+        self._boxes = {
+            camera: box
+            for camera in train_cameras(capture)
+            if (box := self._common_box(camera, frames)) is not None
+        }
+        self.views = [
+            View(camera, frame, capture.cameras[camera].cropped(*box.place))
+            for frame in frames
+            for camera, box in self._boxes.items()
+            if self._cache.layers(camera, frame) is not None
+        ]
+        if not self.views:
+            raise CaptureError(f"{capture.path} has no picture of the person to train on.")
 
     def example(self, view: View, color: np.ndarray, device: torch.device) -> Example:
         """What a view asks for, before a colour (3,)."""
@@ -72,24 +77,35 @@ class BodyViews:
         behind = torch.from_numpy(color).to(device).float()
         return Example(person + (1 - mask[..., None]) * behind, mask, behind)
 
+    def _common_box(self, camera: int, frames: Iterable[int]) -> "_Box | None":
+        """What holds the person in all frames of a camera; None where nobody is seen."""
+        seen = self._capture.cameras[camera]
+        inside = np.zeros((seen.height, seen.width), bool)
+        for frame in frames:
+            mask = self._mask(camera, frame)
+            if mask is not None:
+                inside |= mask > 0
+        return _Box.around(inside) if inside.any() else None
+
+    def _mask(self, camera: int, frame: int) -> np.ndarray | None:
+        """(H, W); None where there is no picture either."""
+        mask = self._capture.mask(camera, frame)
+        if mask is None and self._capture.image(camera, frame) is not None:
+            name = self._capture.cameras[camera].name
+            raise CaptureError(
+                f"{self._capture.path}: frame {frame} of camera {name} has no mask: a body is "
+                "trained on the person alone; record clean plates and make masks of them."
+            )
+        return mask
+
     def _read(self, camera: int, frame: int) -> Layers | None:
         """The person on black (h, w, 3) and the mask (h, w), cropped; None where nobody is seen."""
         image = self._capture.image(camera, frame)
         if image is None:
             return None
-        mask = self._capture.mask(camera, frame)
-        if mask is None:
-            name = self._capture.cameras[camera].name
-            raise CaptureError(
-                f"{self._capture.path}: frame {frame} of camera {name} has no mask: a body is "
-                "trained on the person alone; make masks with ico3d capture track."
-            )
-        box = _box(mask)
-        self._boxes[camera, frame] = box
-        if box is None:
+        mask, cut = self._mask(camera, frame), self._boxes[camera].cut
+        if mask is None or not mask.any():
             return None
-        left, top, width, height = box
-        cut = np.s_[top : top + height, left : left + width]
         outside = 1 - mask[cut][..., None]
         plate = self._plate(camera)
         person = image[cut] * (1 - outside) if plate is None else image[cut] - outside * plate[cut]
@@ -102,12 +118,27 @@ class BodyViews:
         return self._plates[camera]
 
 
-def _box(mask: np.ndarray) -> tuple[int, int, int, int] | None:
-    """Left, top, width, height of what is inside a mask, with a margin; None where nothing is."""
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
-    if len(rows) == 0:
-        return None
-    top, left = max(rows[0] - MARGIN, 0), max(columns[0] - MARGIN, 0)
-    bottom = min(rows[-1] + 1 + MARGIN, mask.shape[0])
-    right = min(columns[-1] + 1 + MARGIN, mask.shape[1])
-    return int(left), int(top), int(right - left), int(bottom - top)
+@dataclass(frozen=True)
+class _Box:
+    """A part of a picture.
+
+    Attributes:
+        place: Left, top, width, height in pixels.
+    """
+
+    place: tuple[int, int, int, int]
+
+    @staticmethod
+    def around(inside: np.ndarray) -> "_Box":
+        """What holds the pixels (H, W) that are marked, with a margin."""
+        rows, columns = np.flatnonzero(inside.any(1)), np.flatnonzero(inside.any(0))
+        top, left = max(rows[0] - MARGIN, 0), max(columns[0] - MARGIN, 0)
+        bottom = min(rows[-1] + 1 + MARGIN, inside.shape[0])
+        right = min(columns[-1] + 1 + MARGIN, inside.shape[1])
+        return _Box((int(left), int(top), int(right - left), int(bottom - top)))
+
+    @property
+    def cut(self) -> tuple[slice, slice]:
+        """Rows and columns."""
+        left, top, width, height = self.place
+        return slice(top, top + height), slice(left, left + width)

@@ -25,6 +25,11 @@ class Window:
         return self.last - self.first + 1
 
     @property
+    def frames(self) -> range:
+        """All of its frames."""
+        return range(self.first, self.last + 1)
+
+    @property
     def center(self) -> int:
         """The frame in the middle, to which the canonical Gaussians belong."""
         return (self.first + self.last) // 2

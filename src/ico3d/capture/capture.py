@@ -122,8 +122,9 @@ class Capture(ABC):
                 return reader(path)
         raise CaptureError(
             f"{path} is in no format known here: expected a talking-portrait folder "
-            "(transforms_train.json), a synthetic capture (capture.json) or a DNA-Rendering "
-            "recording (.smc and _annots.smc)."
+            "(transforms_train.json), a synthetic capture (capture.json), a multiview folder "
+            "(cameras.json) or a DNA-Rendering recording (.smc and _annots.smc); "
+            "other recordings come in with ico3d capture import."
         )
 
 

@@ -6,6 +6,9 @@ from typing import Annotated, Literal
 
 import tyro
 
+from ico3d.capture.multiview.commands import Import as Import
+from ico3d.capture.multiview.commands import Masks as Masks
+from ico3d.capture.multiview.commands import Resize as Resize
 from ico3d.capture.synthetic.command import Synthetic as Synthetic
 
 

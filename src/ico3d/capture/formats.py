@@ -20,6 +20,13 @@ def _synthetic(path: Path) -> Capture:
     return SyntheticCapture(path)
 
 
+def _multiview(path: Path) -> Capture:
+    """Opens a multiview folder."""
+    from ico3d.capture.multiview.reader import MultiviewCapture
+
+    return MultiviewCapture(path)
+
+
 def _dna(path: Path) -> Capture:
     """Opens a DNA-Rendering recording."""
     from ico3d.capture.dna.reader import DnaRendering
@@ -42,6 +49,7 @@ def _holds(name: str) -> Callable[[Path], bool]:
 FORMATS: list[tuple[Callable[[Path], bool], Callable[[Path], Capture]]] = [
     (_holds("transforms_train.json"), _portrait),
     (_holds("capture.json"), _synthetic),
+    (_holds("cameras.json"), _multiview),
     (_is_dna, _dna),
 ]
 """Pairs of (recognises a path, opens it)."""

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 from numba import njit
 from PIL import Image
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, label
 
 from ico3d.common.camera import Camera
 
@@ -18,10 +18,12 @@ MARGIN = 1.1
 """Of the carved box, beyond what the cameras' pictures are as wide as."""
 MOST_PARALLEL = 1e4
 """Condition above which viewing directions count as parallel: under a degree apart."""
-WORTH_IGNORING = 0.03
+WORTH_IGNORING = 0.01
 """A mask is bad if without it the hull fills so much more of the other masks."""
 CAMERAS_PER_BAD = 16
 """One mask in so many may be bad; of four cameras or more, at least one."""
+HELD, SURELY_HELD = 0.5, 0.7
+"""Parts of the pictures that must hold a voxel, and one of those that it is connected to."""
 BISECTIONS = 4
 """Halvings of a voxel's edge when its surface is sought."""
 
@@ -65,9 +67,10 @@ def visual_hull(silhouettes: Sequence[Silhouette], edge: float) -> Hull | None:
     """Carves the box that the cameras look at by what they see.
 
     A voxel belongs to the hull if no mask excludes it and half of the pictures, two at least,
-    hold it. Where it is outside of a picture, that picture says nothing. A hull of good masks
-    fills them all, seen from their cameras; a few masks without which it fills the others
-    clearly better are bad and ignored.
+    hold it. Where it is outside of a picture, that picture says nothing; so that nothing appears
+    in the corners that two opposite cameras see alone, parts of the hull of which no voxel is in
+    most pictures are dropped. A hull of good masks fills them all, seen from their cameras; a few
+    masks without which it fills the others clearly better are bad and ignored.
 
     Args:
         silhouettes: What cameras around the person saw at one moment.
@@ -84,7 +87,10 @@ def visual_hull(silhouettes: Sequence[Silhouette], edge: float) -> Hull | None:
     origin = center - (cells - 1) / 2 * edge
     ignored = _bad(silhouettes, origin, edge, cells)
     stack = _Stack.of([s for index, s in enumerate(silhouettes) if index not in ignored])
-    occupied = _carve(origin, edge, cells, 0, *stack.arrays) == 0  # (cells, cells, cells)
+    occupied = _connected(
+        _carve(origin, edge, cells, 0, *stack.arrays) == 0,
+        _carve(origin, edge, cells, 0, *stack.arrays[:3], stack.surely) == 0,
+    )  # (cells, cells, cells)
     return Hull(_surface(occupied, origin, edge, stack), ignored)
 
 
@@ -129,12 +135,14 @@ class _Stack:
         masks: (C, H, W) bool, the largest size.
         sizes: (C, 2) height and width of each.
         held: Pictures that must hold a point of the hull.
+        surely: Pictures that must hold one of those that it is connected to.
     """
 
     projections: np.ndarray
     masks: np.ndarray
     sizes: np.ndarray
     held: int
+    surely: int
 
     @classmethod
     def of(cls, silhouettes: Sequence[Silhouette]) -> "_Stack":
@@ -145,7 +153,8 @@ class _Stack:
         for into, silhouette in zip(masks, silhouettes, strict=True):
             height, width = silhouette.mask.shape
             into[:height, :width] = silhouette.mask
-        return cls(np.stack(projections), masks, sizes, max(2, math.ceil(len(silhouettes) / 2)))
+        held = (max(2, math.ceil(part * len(silhouettes))) for part in (HELD, SURELY_HELD))
+        return cls(np.stack(projections), masks, sizes, *held)
 
     @property
     def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
@@ -208,6 +217,12 @@ class _Filling:
         filled[row, column] = True
         near = binary_dilation(filled, np.ones((3, 3)))[1:-1, 1:-1]
         return float((near & self._mask).sum() / max(self._mask.sum(), 1))
+
+
+def _connected(occupied: np.ndarray, sure: np.ndarray) -> np.ndarray:
+    """The parts of occupied voxels (n, n, n) bool that hold a sure one."""
+    parts, _ = label(occupied)  # type: ignore (its stub knows two kinds of answers)
+    return occupied & np.isin(parts, np.unique(parts[sure]))
 
 
 def _surface(occupied: np.ndarray, origin: np.ndarray, edge: float, stack: _Stack) -> np.ndarray:

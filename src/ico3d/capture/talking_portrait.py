@@ -13,12 +13,12 @@ from ico3d.capture.capture import EYE_NAMES, Capture, Sound, Split
 from ico3d.capture.expressions import AU_COLUMNS, eyes_of_action_units, eyes_of_blendshapes
 from ico3d.capture.parsing import BACKGROUND, FACE, HAIR, MOUTH, is_class
 from ico3d.capture.portrait_files import DETAILS, OPENGL_FROM_OPENCV, load_landmarks
+from ico3d.capture.sound import read_sound_file
 from ico3d.capture.surface import unknown_person
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
 
 FPS = 25.0
-SOUND_RATE = 16_000
 Result = TypeVar("Result")
 
 
@@ -82,17 +82,7 @@ class TalkingPortrait(Capture):
 
     def audio(self) -> Sound | None:
         """`aud.wav`, at 16 kHz."""
-        import soundfile
-        import soxr
-
-        path = self.path / "aud.wav"
-        if not path.is_file():
-            return None
-        samples, rate = _reading(path, lambda: soundfile.read(path, dtype="float32"))
-        mono = samples.mean(1) if samples.ndim == 2 else samples
-        if rate != SOUND_RATE:
-            mono = soxr.resample(mono, rate, SOUND_RATE, quality="VHQ")
-        return Sound(np.asarray(mono, np.float32), SOUND_RATE)
+        return read_sound_file(self.path / "aud.wav")
 
     def world_from_head(self, frame: int) -> np.ndarray | None:
         """The pose of a frame with a face."""

@@ -19,6 +19,8 @@ BETA1 = 0.9
 BETA2 = 0.999
 EPSILON = 1e-15
 """As in 3D Gaussian splatting: gradients of positions are far below Adam's usual 1e-8."""
+BLOCK = 4096
+"""Numbers that a thread updates at a time."""
 
 
 @dataclass(frozen=True)
@@ -118,14 +120,19 @@ def adam_reference(
 
 @njit(parallel=True, fastmath=True, cache=True)
 def adam_kernel(value, first, second, gradient, rate, first_correction, second_correction):
-    """One Adam step over flat float32 arrays, in place."""
+    """One Adam step over flat float32 arrays, in place.
+
+    Threads share blocks, which end where they end whatever the number of threads: the numbers at
+    the end of a loop are computed one by one, and rounded otherwise than eight at a time.
+    """
     beta1, beta2, epsilon = np.float32(BETA1), np.float32(BETA2), np.float32(EPSILON)
     rest1, rest2 = np.float32(1.0 - BETA1), np.float32(1.0 - BETA2)
     step = rate * first_correction
-    for i in prange(value.size):
-        g = gradient[i]
-        m = beta1 * first[i] + rest1 * g
-        v = beta2 * second[i] + rest2 * g * g
-        first[i] = m
-        second[i] = v
-        value[i] -= step * m / (np.sqrt(v) * second_correction + epsilon)
+    for block in prange((value.size + BLOCK - 1) // BLOCK):
+        for i in range(block * BLOCK, min((block + 1) * BLOCK, value.size)):
+            g = gradient[i]
+            m = beta1 * first[i] + rest1 * g
+            v = beta2 * second[i] + rest2 * g * g
+            first[i] = m
+            second[i] = v
+            value[i] -= step * m / (np.sqrt(v) * second_correction + epsilon)

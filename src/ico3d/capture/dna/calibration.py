@@ -7,6 +7,7 @@ import numpy as np
 from ico3d.capture.decoding import size_of
 from ico3d.capture.dna.smc import SmcFile
 from ico3d.capture.lens import Lens
+from ico3d.capture.poses import rigid
 from ico3d.errors import CaptureError
 
 GROUPS = ("Camera_5mp", "Camera_12mp")
@@ -93,26 +94,6 @@ def _device(annotations: SmcFile, group: str, number: int, size: tuple[int, int]
     return Device(
         number, group, lens, rigid(read("RT", (4, 4)), f"camera {number:02d}"), colours(polynomial)
     )
-
-
-def rigid(matrix: np.ndarray, what: str) -> np.ndarray:
-    """A (4, 4) pose, its rotation made exact.
-
-    Args:
-        matrix: As the file has it.
-        what: Whose pose it is, for the error.
-
-    Raises:
-        CaptureError: If it is no rotation and translation.
-    """
-    turn = matrix[:3, :3].clip(-2, 2)
-    wrong = np.abs(turn @ turn.T - np.eye(3)).max() > 1e-3 or np.linalg.det(turn) < 0
-    if wrong or not np.allclose(matrix[3], [0, 0, 0, 1]):
-        raise CaptureError(f"{what}: its pose is no rotation and translation.")
-    left, _, right = np.linalg.svd(turn)
-    pose = matrix.copy()
-    pose[:3, :3] = left @ right
-    return pose
 
 
 def colours(polynomial: np.ndarray | None) -> np.ndarray:

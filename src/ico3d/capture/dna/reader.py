@@ -16,7 +16,7 @@ from ico3d.capture.dna.kinect import Kinect
 from ico3d.capture.dna.smc import SmcFile
 from ico3d.capture.extras import opencv
 from ico3d.capture.finding import Finding
-from ico3d.capture.upright import nearest_axis, turn_upright, turned, up_of_cameras
+from ico3d.capture.poses import nearest_axis, turn_upright, turned, up_of_cameras
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
 

@@ -25,22 +25,22 @@ class DensitySettings:
         max_gaussians: Never more than this many; the strongest gradients win.
         gradient_threshold: Mean screen gradient (normalised device units) above which a Gaussian
             multiplies.
-        growth: Part of the Gaussians that multiplies at once at most, those of strongest gradient.
         clone_below: Gaussians whose largest scale is up to this are cloned, larger ones split,
             metres. 3DGS: 1 % of the scene's extent.
         prune_opacity: Those whose opacity falls below this die.
         prune_scale: Those whose largest scale exceeds this die, metres. 3DGS: 10 % of the
             scene's extent.
         prune_contribution: Those that give pictures less than this times the median die.
+        growth: Part of the Gaussians that multiplies at once at most, those of strongest gradient.
     """
 
     max_gaussians: int = 50_000
     gradient_threshold: float = 2e-4
-    growth: float = 1.0
     clone_below: float = 0.002
     prune_opacity: float = 0.005
     prune_scale: float = 0.05
     prune_contribution: float = 0.0
+    growth: float = 1.0
 
 
 @dataclass

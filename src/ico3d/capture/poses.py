@@ -1,8 +1,10 @@
-"""Turning worlds so that +y is up, which calibrations leave open."""
+"""Poses of cameras: made exact, and worlds turned so that +y is up."""
 
 from collections.abc import Sequence
 
 import numpy as np
+
+from ico3d.errors import CaptureError
 
 
 def up_of_cameras(cameras_to_world: Sequence[np.ndarray]) -> np.ndarray:
@@ -40,3 +42,26 @@ def turned(rotation: np.ndarray, camera_to_world: np.ndarray) -> np.ndarray:
     matrix[:3, :3] = rotation @ camera_to_world[:3, :3]
     matrix[:3, 3] = rotation @ camera_to_world[:3, 3]
     return matrix
+
+
+def rigid(matrix: np.ndarray, what: str) -> np.ndarray:
+    """A (4, 4) pose, its rotation made exact.
+
+    Args:
+        matrix: As the file has it.
+        what: Whose pose it is, for the error.
+
+    Returns:
+        (4, 4) with the nearest rotation.
+
+    Raises:
+        CaptureError: If it is no rotation and translation.
+    """
+    turn = matrix[:3, :3].clip(-2, 2)
+    wrong = np.abs(turn @ turn.T - np.eye(3)).max() > 1e-3 or np.linalg.det(turn) < 0
+    if wrong or not np.allclose(matrix[3], [0, 0, 0, 1]):
+        raise CaptureError(f"{what}: its pose is no rotation and translation.")
+    left, _, right = np.linalg.svd(turn)
+    pose = matrix.copy()
+    pose[:3, :3] = left @ right
+    return pose

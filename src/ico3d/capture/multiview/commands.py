@@ -1,0 +1,123 @@
+"""The commands that make and complete multiview folders."""
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+MOST_WORKERS = 8
+"""Each needs room for some large pictures."""
+
+
+def _workers() -> int:
+    return min(os.cpu_count() or 1, MOST_WORKERS)
+
+
+@dataclass(frozen=True)
+class Import:
+    """Take over a recording that COLMAP, nerfstudio or instant-ngp calibrated.
+
+    Pictures are copied as they are into a multiview folder; lenses with distortion are straightened
+    when it is read. The world is turned so that +y is up. Pictures without times become cameras of
+    one moment.
+
+    Attributes:
+        source: A COLMAP sparse model (binary or text) or a folder around one, or transforms.json.
+        out: Folder to make.
+        images: Folder of the pictures of a COLMAP model; `images` nearby by default.
+        fps: Frames per second of recordings whose frames have a time.
+        scale: Metres per unit of the source; COLMAP's worlds have any size.
+        consent: What the person agreed to; goes into the avatar's manifest.
+        licence: Licence of the recording; likewise.
+    """
+
+    source: Annotated[Path, tyro.conf.Positional]
+    out: Annotated[Path, tyro.conf.Positional]
+    images: Path | None = None
+    fps: float = 25.0
+    scale: float = 1.0
+    consent: str = "not stated"
+    licence: str = "not stated"
+
+    def run(self) -> None:
+        """Runs it.
+
+        Raises:
+            CaptureError: If the source is damaged or not known, or `out` exists.
+        """
+        from ico3d.capture.multiview.importing import ImportSettings, import_recording
+
+        settings = ImportSettings(self.images, self.fps, self.scale, self.consent, self.licence)
+        about = import_recording(self.source, self.out, settings)
+        _say(about, self.out)
+
+
+@dataclass(frozen=True)
+class Masks:
+    """Cut the person out of every picture of a multiview folder by its clean plates.
+
+    Writes `masks/CAMERA/FRAME.png`; masks that are there stay, so that one can be mended by hand
+    and an interrupted run goes on.
+
+    Attributes:
+        folder: A multiview folder with `backgrounds/CAMERA.png`.
+        workers: Threads.
+    """
+
+    folder: Annotated[Path, tyro.conf.Positional]
+    workers: int = field(default_factory=_workers)
+
+    def run(self) -> None:
+        """Runs it.
+
+        Raises:
+            CaptureError: If there is no clean plate, or a picture is damaged.
+        """
+        from rich import print as say
+
+        from ico3d.capture.multiview.masking import make_masks
+
+        written = make_masks(self.folder, self.workers)
+        say(f"{written} masks written; look at them: ico3d capture check {self.folder}")
+
+
+@dataclass(frozen=True)
+class Resize:
+    """Write any capture again with smaller pictures, as a multiview folder.
+
+    Recordings of 5 or 12 megapixels are decoded, corrected and straightened once instead of at each
+    look. Keeps pictures, masks, clean plates, sound and surface points.
+
+    Attributes:
+        source: A capture of any format.
+        out: Folder to make.
+        height: Pixels that pictures have at most.
+        workers: Threads.
+    """
+
+    source: Annotated[Path, tyro.conf.Positional]
+    out: Annotated[Path, tyro.conf.Positional]
+    height: int = 512
+    workers: int = field(default_factory=_workers)
+
+    def run(self) -> None:
+        """Runs it.
+
+        Raises:
+            CaptureError: If the source cannot be read, or `out` exists.
+        """
+        from ico3d.capture.multiview.resizing import resize_capture
+
+        _say(resize_capture(self.source, self.out, self.height, self.workers), self.out)
+
+
+def _say(about, out: Path) -> None:
+    """What was written, and what to do with it."""
+    from rich import print as say
+
+    say(
+        f"{len(about.places)} cameras, {about.num_frames} frames lie in {out}; "
+        f"look at them: ico3d capture check {out}"
+    )

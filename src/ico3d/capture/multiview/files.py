@@ -1,0 +1,106 @@
+"""The pictures of a multiview folder, as recorded: before lenses are straightened."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ico3d.capture.decoding import decoded, size_of
+from ico3d.capture.lens import Lens
+from ico3d.capture.multiview.clip import Clip, OpenClips
+from ico3d.errors import CaptureError
+
+PICTURES = (".png", ".jpg", ".jpeg")
+VIDEOS = (".mp4", ".mkv", ".mov", ".webm", ".avi")
+
+
+class RecordedFiles:
+    """Pictures, masks and clean plates of all cameras of a folder."""
+
+    def __init__(self, folder: Path, lenses: list[Lens]):
+        """Finds out which cameras have pictures and which have videos.
+
+        Raises:
+            CaptureError: If a camera has neither.
+        """
+        self.folder, self._lenses = folder, lenses
+        self._clips = [self._find_clip(lens.name) for lens in lenses]
+        self._open = OpenClips()
+
+    def clip(self, camera: int) -> Clip | None:
+        """The video of a camera, or None where it has pictures."""
+        return self._clips[camera]
+
+    def picture(self, camera: int, frame: int) -> np.ndarray | None:
+        """uint8 RGB or RGBA (H, W, C), or None where there is none."""
+        clip = self._clips[camera]
+        if clip is None:
+            return self._decoded("images", camera, frame)
+        picture = self._open.picture(clip, frame)
+        if picture is not None:
+            self._check_size(picture, camera, f"{clip.path}: frame {frame}")
+        return picture
+
+    def mask(self, camera: int, frame: int) -> np.ndarray | None:
+        """uint8 (H, W), the largest channel of the mask picture, or None where there is none."""
+        picture = self._decoded("masks", camera, frame)
+        return None if picture is None else picture[..., :3].max(-1)
+
+    def plate(self, camera: int) -> np.ndarray | None:
+        """The clean plate, uint8 RGB (H, W, 3), or None where there is none."""
+        name = self._lenses[camera].name
+        file = _existing(self.folder / "backgrounds", name)
+        if file is None:
+            return None
+        what = f"{file} (the background of camera {name})"
+        picture = decoded(file, what)[..., :3]
+        self._check_size(picture, camera, what)
+        return picture
+
+    def file(self, kind: str, camera: int, frame: int) -> Path | None:
+        """The file of a picture ("images") or a mask ("masks"), or None where there is none."""
+        return _existing(self.folder / kind / self._lenses[camera].name, f"{frame:06d}")
+
+    def is_damaged(self, kind: str, camera: int, frame: int) -> bool:
+        """Whether a file that is there cannot be a picture of its camera, by its first bytes."""
+        file, lens = self.file(kind, camera, frame), self._lenses[camera]
+        try:
+            return file is not None and size_of(file, "") != (lens.width, lens.height)
+        except CaptureError:
+            return True
+
+    def _find_clip(self, name: str) -> Clip | None:
+        """The video of a camera unless it has pictures."""
+        if (self.folder / "images" / name).is_dir():
+            return None
+        videos = (self.folder / "videos" / f"{name}{suffix}" for suffix in VIDEOS)
+        video = next((path for path in videos if path.is_file()), None)
+        if video is None:
+            raise CaptureError(
+                f"{self.folder}: camera {name} has neither videos/{name}.mp4 nor images/{name}."
+            )
+        return Clip(video)
+
+    def _decoded(self, kind: str, camera: int, frame: int) -> np.ndarray | None:
+        """A picture file."""
+        file = self.file(kind, camera, frame)
+        if file is None:
+            return None
+        what = f"{file} (camera {self._lenses[camera].name}, frame {frame})"
+        picture = decoded(file, what)
+        self._check_size(picture, camera, what)
+        return picture
+
+    def _check_size(self, picture: np.ndarray, camera: int, what: str) -> None:
+        """A picture must be of its camera's size."""
+        height, width = picture.shape[:2]
+        lens = self._lenses[camera]
+        if (width, height) != (lens.width, lens.height):
+            raise CaptureError(
+                f"{what} has {width}x{height} pixels, its camera {lens.width}x{lens.height}."
+            )
+
+
+def _existing(folder: Path, stem: str) -> Path | None:
+    """The picture file of a name."""
+    paths = (folder / f"{stem}{suffix}" for suffix in PICTURES)
+    return next((path for path in paths if path.is_file()), None)

@@ -1,0 +1,207 @@
+"""Makes a multiview folder of a recording that another tool has calibrated."""
+
+import re
+import shutil
+from collections import Counter
+from dataclasses import dataclass, replace
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+
+from ico3d.capture.multiview.colmap import is_model, read_colmap
+from ico3d.capture.multiview.description import Description, Place
+from ico3d.capture.multiview.foreign import Foreign, Shot
+from ico3d.capture.multiview.reader import MultiviewCapture
+from ico3d.capture.multiview.transforms import read_transforms
+from ico3d.capture.multiview.writing import new_folder, shown
+from ico3d.capture.poses import nearest_axis, turn_upright, turned, up_of_cameras
+from ico3d.errors import CaptureError, SettingsError
+
+NEARLY = np.cos(np.radians(20))
+"""An axis of the source is taken to be meant as up if the cameras' mean is within 20° of it."""
+UNEVEN = 0.1
+"""Part of a frame by which times may be off."""
+MOST_GAPS = 10
+"""Frames per frame that has a picture."""
+
+
+@dataclass(frozen=True)
+class ImportSettings:
+    """How a recording is taken over.
+
+    Attributes:
+        images: Folder of the pictures of a COLMAP model; looked for where None.
+        fps: Frames per second of recordings with times.
+        scale: Metres per unit of the source.
+        consent: What the person agreed to.
+        licence: Licence of the recording.
+    """
+
+    images: Path | None = None
+    fps: float = 25.0
+    scale: float = 1.0
+    consent: str = "not stated"
+    licence: str = "not stated"
+
+    def __post_init__(self):
+        """Checks the numbers.
+
+        Raises:
+            SettingsError: If frame rate or scale are not above 0.
+        """
+        if not (isfinite(self.fps) and self.fps > 0 and isfinite(self.scale) and self.scale > 0):
+            raise SettingsError(
+                f"fps and scale must be above 0, not {self.fps:g} and {self.scale:g}."
+            )
+
+
+def import_recording(source: Path, out: Path, settings: ImportSettings) -> Description:
+    """Copies a recording into a multiview folder; `out` appears only when it is complete.
+
+    Args:
+        source: A COLMAP model or a folder around one, or a transforms.json or its folder.
+        out: Folder to make.
+        settings: How.
+
+    Returns:
+        What was written.
+
+    Raises:
+        CaptureError: If `out` exists, or the source is not known, or something in it is damaged.
+    """
+    foreign = _read(source, settings.images)
+    cameras, frames = _grouped(foreign)
+    turn = _upright(foreign)
+    places = tuple(
+        Place(replace(shots[0].lens, name=name), _world_to_camera(shots[0], turn, settings.scale))
+        for name, shots in zip(_names(cameras), cameras, strict=True)
+    )
+    count = max(max(row) for row in frames) + 1
+    sources = (f"{foreign.tool}: {source.resolve().name}",)
+    about = Description(settings.fps, count, places, sources, settings.consent, settings.licence)
+    with new_folder(out) as work:
+        _copy(work, places, cameras, frames)
+        if foreign.points is not None:
+            (work / "points").mkdir()
+            points = settings.scale * foreign.points @ turn.T
+            np.save(work / "points" / "000000.npy", points.astype(np.float32))
+        about.write(work)
+        MultiviewCapture(work)  # what cannot be opened, such as a wild lens, is not written
+    return about
+
+
+def _read(source: Path, images: Path | None) -> Foreign:
+    """Finds out what the source is."""
+    if not source.exists():
+        raise CaptureError(f"there is nothing at {source}.")
+    transforms = source / "transforms.json" if source.is_dir() else source
+    if transforms.suffix == ".json" and transforms.is_file():
+        return read_transforms(transforms)
+    below = (".", "sparse/0", "sparse", "colmap/sparse/0", "distorted/sparse/0")
+    model = next((source / name for name in below if is_model(source / name)), None)
+    if model is None:
+        raise CaptureError(
+            f"{source} holds neither transforms.json nor a COLMAP model (cameras.bin and "
+            "images.bin, or .txt)."
+        )
+    return read_colmap(model, images or _images_near(source, model))
+
+
+def _images_near(source: Path, model: Path) -> Path:
+    """The folder of pictures that belongs to a COLMAP model."""
+    above = model.resolve().parents
+    places = [folder / "images" for folder in (source, *above[:3])]
+    found = next((folder for folder in places if folder.is_dir()), None)
+    if found is None:
+        raise CaptureError(
+            f"{source} has no folder 'images': name that of the pictures (--images)."
+        )
+    return found
+
+
+def _grouped(foreign: Foreign) -> tuple[list[list[Shot]], list[list[int]]]:
+    """Pictures by camera, and the frame of each; shots of one moment are cameras of their own."""
+    numbers = _frame_numbers(foreign)
+    if numbers is None:
+        return [[shot] for shot in foreign.shots], [[0] for _ in foreign.shots]
+    cameras: dict[tuple, dict[int, Shot]] = {}
+    for shot, frame in zip(foreign.shots, numbers, strict=True):
+        lens = shot.lens
+        key = (lens.width, lens.height, lens.intrinsics.tobytes(), lens.distortion)
+        taken = cameras.setdefault((*key, shot.camera_to_world.round(9).tobytes()), {})
+        if frame in taken:
+            raise CaptureError(
+                f"{shot.file} and {taken[frame].file} are of one camera and one time."
+            )
+        taken[frame] = shot
+    return [list(c.values()) for c in cameras.values()], [list(c) for c in cameras.values()]
+
+
+def _frame_numbers(foreign: Foreign) -> list[int] | None:
+    """The frame of each picture from its time, or None where there are no times."""
+    times = np.array([np.nan if shot.time is None else shot.time for shot in foreign.shots])
+    if np.isnan(times).any():
+        return None
+    moments = np.unique(times.round(9))
+    if len(moments) == 1:
+        return [0] * len(times)
+    steps = (times - moments[0]) / np.diff(moments).min()
+    numbers = np.rint(steps)
+    if np.abs(steps - numbers).max() > UNEVEN or numbers.max() > MOST_GAPS * len(moments):
+        raise CaptureError(
+            f"{foreign.tool}: the times of the frames are not evenly spaced: "
+            "resample the recording to a constant rate."
+        )
+    return [int(n) for n in numbers]
+
+
+def _upright(foreign: Foreign) -> np.ndarray:
+    """(3, 3) rotation of the source's world that makes +y up."""
+    up = up_of_cameras([shot.camera_to_world for shot in foreign.shots])
+    axis = nearest_axis(up)
+    return turn_upright(axis if foreign.axes_mean_up and axis @ up > NEARLY else up)
+
+
+def _world_to_camera(shot: Shot, turn: np.ndarray, scale: float) -> np.ndarray:
+    """(4, 4) in the upright world in metres."""
+    pose = turned(turn, shot.camera_to_world)
+    pose[:3, 3] *= scale
+    return np.linalg.inv(pose)
+
+
+def _names(cameras: list[list[Shot]]) -> list[str]:
+    """A name for each camera: of its folder if that is its own, else of its first picture."""
+    folders = [{shot.file.parent for shot in shots} for shots in cameras]
+    users = Counter(folder for used in folders for folder in used)
+    names: list[str] = []
+    for shots, used in zip(cameras, folders, strict=True):
+        (folder, *more) = used
+        own = len(shots) > 1 and not more and users[folder] == 1
+        plain = re.sub(r"[^A-Za-z0-9_.-]", "_", folder.name if own else shots[0].file.stem)
+        plain = f"camera{plain}" if plain[:1] in (".", "-", "") else plain
+        names.append(_free(plain[:80], names))
+    return names
+
+
+def _free(name: str, taken: list[str]) -> str:
+    """The name, with a number behind it if it is taken; case does not tell names apart."""
+    known = {one.lower() for one in taken}
+    tries = [name, *(f"{name}_{number}" for number in range(2, len(taken) + 3))]
+    return next(one for one in tries if one.lower() not in known)
+
+
+def _copy(
+    work: Path, places: tuple[Place, ...], cameras: list[list[Shot]], frames: list[list[int]]
+) -> None:
+    """Copies pictures and masks as they are."""
+    with shown("copying", sum(map(len, cameras))) as advance:
+        for place, shots, numbers in zip(places, cameras, frames, strict=True):
+            for shot, frame in zip(shots, numbers, strict=True):
+                for kind, file in (("images", shot.file), ("masks", shot.mask)):
+                    if file is not None:
+                        suffix = file.suffix.lower()
+                        target = work / kind / place.lens.name / f"{frame:06d}{suffix}"
+                        target.parent.mkdir(parents=True, exist_ok=True)
+                        shutil.copyfile(file, target)
+                advance()

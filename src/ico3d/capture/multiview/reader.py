@@ -1,0 +1,143 @@
+"""Reads a multiview folder: `docs/captures-multiview.md`."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ico3d.capture.capture import Capture, Sound, all_frames
+from ico3d.capture.decoding import unit
+from ico3d.capture.finding import Finding, missing_and_damaged
+from ico3d.capture.lens import Lens
+from ico3d.capture.multiview.description import read_description
+from ico3d.capture.multiview.files import RecordedFiles
+from ico3d.capture.sound import read_sound_file
+from ico3d.common.camera import Camera
+from ico3d.errors import CaptureError
+
+
+class MultiviewCapture(Capture):
+    """A recording by several cameras that stand still and run in step.
+
+    Pictures, masks and plates come straightened where the lens bends lines. A picture with
+    transparency is its own mask, before black.
+    """
+
+    kind = "multiview"
+
+    def __init__(self, path: Path):
+        """Opens a folder; pictures are read when asked for.
+
+        Raises:
+            CaptureError: If `cameras.json` is damaged or a camera has no pictures.
+        """
+        self.path = path
+        self._about = read_description(path)
+        self.fps, self.num_frames = self._about.fps, self._about.num_frames
+        self.lenses: list[Lens] = [place.lens for place in self._about.places]
+        self.files = RecordedFiles(path, self.lenses)
+        self.cameras = tuple(
+            Camera(
+                place.lens.width,
+                place.lens.height,
+                place.lens.straight_intrinsics,
+                place.world_to_camera,
+                place.lens.name,
+            )
+            for place in self._about.places
+        )
+        self.split = all_frames(self.num_frames, self.cameras)
+
+    def image(self, camera: int, frame: int) -> np.ndarray | None:
+        """The straightened picture, or None where there is none."""
+        picture = self.files.picture(camera, self._index(frame))
+        if picture is None:
+            return None
+        straight = unit(self.lenses[camera].straightened(picture))
+        return straight[..., :3] * straight[..., 3:] if picture.shape[-1] == 4 else straight
+
+    def mask(self, camera: int, frame: int) -> np.ndarray | None:
+        """The straightened mask, else the picture's opacity, else None."""
+        mask = self.files.mask(camera, self._index(frame))
+        if mask is None and self.files.clip(camera) is None:
+            picture = self.files.picture(camera, frame)
+            mask = None if picture is None or picture.shape[-1] < 4 else picture[..., 3]
+        return None if mask is None else unit(self.lenses[camera].straightened(mask))
+
+    def background(self, camera: int) -> np.ndarray | None:
+        """The straightened clean plate, or None where there is none."""
+        plate = self.files.plate(camera)
+        return None if plate is None else unit(self.lenses[camera].straightened(plate))
+
+    def audio(self) -> Sound | None:
+        """`audio.wav`, or None."""
+        return read_sound_file(self.path / "audio.wav")
+
+    def points(self, frame: int = 0) -> np.ndarray | None:
+        """(P, 3) of `points/FRAME.npy`, or None where the frame has none."""
+        file = self.path / "points" / f"{self._index(frame):06d}.npy"
+        if not file.is_file():
+            return None
+        try:
+            points = np.load(file, allow_pickle=False)
+        except (OSError, ValueError, EOFError) as error:
+            raise CaptureError(f"{file} is damaged: it is no array of numbers.") from error
+        if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind != "f":
+            raise CaptureError(f"{file} must hold (P, 3) floating-point numbers.")
+        if not np.isfinite(points).all():
+            raise CaptureError(f"{file} holds NaN or infinity.")
+        return points
+
+    @property
+    def provenance(self) -> dict:
+        """What `cameras.json` says about it."""
+        return {
+            "kind": self.kind,
+            "sources": list(self._about.sources),
+            "consent": self._about.consent,
+            "licence": self._about.licence,
+        }
+
+    def inspect(self) -> list[Finding]:
+        """Pictures and masks that are missing or damaged, and videos that are too short."""
+        findings = [self._inspect_pictures()]
+        if (self.path / "masks").is_dir():
+            findings.append(self._inspect_masks())
+        elif (self.path / "backgrounds").is_dir():
+            text = f"none yet: ico3d capture masks {self.path} makes them from the clean plates"
+            findings.append(Finding("mask files", "warn", text))
+        return findings
+
+    def _inspect_pictures(self) -> Finding:
+        """Whether every camera has every frame."""
+        missing, damaged = [], []
+        for camera, lens in enumerate(self.lenses):
+            clip = self.files.clip(camera)
+            if clip is not None:
+                missing += [(lens.name, f) for f in range(clip.count, self.num_frames)]
+                continue
+            for frame in range(self.num_frames):
+                if self.files.file("images", camera, frame) is None:
+                    missing.append((lens.name, frame))
+                elif self.files.is_damaged("images", camera, frame):
+                    damaged.append((lens.name, frame))
+        return missing_and_damaged("views", len(self.lenses) * self.num_frames, missing, damaged)
+
+    def _inspect_masks(self) -> Finding:
+        """Whether every picture has a mask."""
+        missing, damaged, total = [], [], 0
+        for camera, lens in enumerate(self.lenses):
+            clip = self.files.clip(camera)
+            for frame in range(self.num_frames if clip is None else clip.count):
+                if clip is None and self.files.file("images", camera, frame) is None:
+                    continue
+                total += 1
+                if self.files.file("masks", camera, frame) is None:
+                    missing.append((lens.name, frame))
+                elif self.files.is_damaged("masks", camera, frame):
+                    damaged.append((lens.name, frame))
+        return missing_and_damaged("mask files", total, missing, damaged)
+
+    def _index(self, frame: int) -> int:
+        if not 0 <= frame < self.num_frames:
+            raise CaptureError(f"{self.path} has frames 0 to {self.num_frames - 1}, not {frame}.")
+        return frame

@@ -1,0 +1,95 @@
+"""Writes any capture again with smaller pictures, as a multiview folder."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ico3d.capture.capture import Capture
+from ico3d.capture.lens import Lens
+from ico3d.capture.multiview.description import Description, Place
+from ico3d.capture.multiview.parallel import View, each_camera
+from ico3d.capture.multiview.writing import new_folder
+from ico3d.capture.portrait_files import save_picture
+from ico3d.capture.resized import ResizedCapture
+from ico3d.common.camera import Camera
+
+
+def resize_capture(source: Path, out: Path, height: int, workers: int) -> Description:
+    """Writes pictures, masks, clean plates, sound and surface points; `out` appears at the end.
+
+    Args:
+        source: A capture of any format.
+        out: Folder to make.
+        height: Pixels that pictures have at most.
+        workers: Threads.
+
+    Returns:
+        What was written.
+
+    Raises:
+        CaptureError: If `out` exists, or the capture cannot be read.
+    """
+    capture = ResizedCapture(Capture.open(source), height)
+    known = capture.provenance
+    about = Description(
+        capture.fps,
+        capture.num_frames,
+        tuple(_place(camera) for camera in capture.cameras),
+        tuple(known["sources"]),
+        known["consent"],
+        known["licence"],
+    )
+    cameras = range(len(capture.cameras))
+    with new_folder(out) as work:
+
+        def start(camera: int) -> View:
+            opened = ResizedCapture(Capture.open(source), height)
+            return lambda frame: _write_view(opened, work, camera, frame)
+
+        each_camera(start, cameras, capture.num_frames, workers, "pictures")
+        _write_rest(capture, work)
+        about.write(work)
+    return about
+
+
+def _place(camera: Camera) -> Place:
+    """A camera without distortion."""
+    lens = Lens(camera.name, camera.width, camera.height, camera.intrinsics)
+    return Place(lens, camera.world_to_camera)
+
+
+def _write_view(capture: ResizedCapture, work: Path, camera: int, frame: int) -> int:
+    """One picture and its mask."""
+    image = capture.image(camera, frame)
+    if image is None:
+        return 0
+    name = capture.cameras[camera].name
+    save_picture(work / "images" / name / f"{frame:06d}.jpg", _bytes(image))
+    mask = capture.mask(camera, frame)
+    if mask is not None:
+        save_picture(work / "masks" / name / f"{frame:06d}.png", _bytes(mask))
+    return 1
+
+
+def _write_rest(capture: ResizedCapture, work: Path) -> None:
+    """What is not a view."""
+    import soundfile
+
+    for index, camera in enumerate(capture.cameras):
+        (work / "images" / camera.name).mkdir(parents=True, exist_ok=True)
+        plate = capture.background(index)
+        if plate is not None:
+            save_picture(work / "backgrounds" / f"{camera.name}.png", _bytes(plate))
+    sound = capture.audio()
+    if sound is not None:
+        soundfile.write(work / "audio.wav", sound.samples, sound.rate)
+    for frame in range(capture.num_frames):
+        points = capture.points(frame)
+        # Points of heads lie in head space, for which a multiview folder has no place.
+        if points is not None and capture.world_from_head(frame) is None:
+            (work / "points").mkdir(exist_ok=True)
+            np.save(work / "points" / f"{frame:06d}.npy", points.astype(np.float32))
+
+
+def _bytes(picture: np.ndarray) -> np.ndarray:
+    return (picture * 255 + 0.5).astype(np.uint8)

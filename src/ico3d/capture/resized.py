@@ -1,0 +1,104 @@
+"""Any capture with smaller pictures."""
+
+import numpy as np
+
+from ico3d.capture.capture import Capture, Sound
+from ico3d.capture.extras import opencv
+from ico3d.capture.finding import Finding
+from ico3d.common.camera import Camera
+from ico3d.errors import SettingsError
+
+
+class ResizedCapture(Capture):
+    """A capture whose pictures are scaled down as they are read; everything else is its own.
+
+    Attributes:
+        whole: The capture itself, for what only its format has.
+    """
+
+    def __init__(self, capture: Capture, height: int):
+        """Wraps an open capture.
+
+        Args:
+            capture: Of any format; its cameras may differ in size.
+            height: Pixels that pictures have at most; smaller ones stay as they are.
+
+        Raises:
+            SettingsError: If the height is below 1.
+        """
+        if height < 1:
+            raise SettingsError(f"pictures cannot have a height of {height} pixels.")
+        self.whole = capture
+        self.kind, self.path = capture.kind, capture.path
+        self.fps, self.num_frames = capture.fps, capture.num_frames
+        self.split, self.blendshape_names = capture.split, capture.blendshape_names
+        self.cameras = tuple(_resized(camera, height) for camera in capture.cameras)
+
+    def image(self, camera: int, frame: int) -> np.ndarray | None:
+        """The picture, each pixel the mean of what it covers."""
+        return self._shrunk(self.whole.image(camera, frame), camera)
+
+    def mask(self, camera: int, frame: int) -> np.ndarray | None:
+        """The person: between 0 and 1 along the edge."""
+        return self._shrunk(self.whole.mask(camera, frame), camera)
+
+    def head_mask(self, camera: int, frame: int) -> np.ndarray | None:
+        """The part that is measured, likewise."""
+        return self._shrunk(self.whole.head_mask(camera, frame), camera)
+
+    def background(self, camera: int) -> np.ndarray | None:
+        """What the camera sees without the person."""
+        return self._shrunk(self.whole.background(camera), camera)
+
+    def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
+        """(68, 2) in pixels of the smaller picture."""
+        marks = self.whole.landmarks(camera, frame)
+        small, large = self.cameras[camera], self.whole.cameras[camera]
+        scale = (small.width / large.width, small.height / large.height)
+        return None if marks is None else marks * scale
+
+    def audio(self) -> Sound | None:
+        """The sound of the capture."""
+        return self.whole.audio()
+
+    def world_from_head(self, frame: int) -> np.ndarray | None:
+        """(4, 4) of the capture."""
+        return self.whole.world_from_head(frame)
+
+    def eyes(self, frame: int) -> np.ndarray | None:
+        """(7,) of the capture."""
+        return self.whole.eyes(frame)
+
+    def blendshapes(self, frame: int) -> np.ndarray | None:
+        """Weights of the capture."""
+        return self.whole.blendshapes(frame)
+
+    def points(self, frame: int = 0) -> np.ndarray | None:
+        """(P, 3) of the capture."""
+        return self.whole.points(frame)
+
+    def inspect(self) -> list[Finding]:
+        """What is wrong with the files of the capture."""
+        return self.whole.inspect()
+
+    @property
+    def provenance(self) -> dict:
+        """Of the capture."""
+        return self.whole.provenance
+
+    def _shrunk(self, picture: np.ndarray | None, camera: int) -> np.ndarray | None:
+        """A picture (H, W, ...) in the size of its camera."""
+        lens = self.cameras[camera]
+        if picture is None or picture.shape[:2] == (lens.height, lens.width):
+            return picture
+        cv2 = opencv("scaling pictures")
+        # Means of values in [0, 1] may leave it by a rounding error.
+        small = cv2.resize(picture, (lens.width, lens.height), interpolation=cv2.INTER_AREA)
+        return np.clip(small, 0.0, 1.0)
+
+
+def _resized(camera: Camera, height: int) -> Camera:
+    """A camera with at most this many rows."""
+    if camera.height <= height:
+        return camera
+    return camera.resized(max(1, round(camera.width * height / camera.height)), height)

@@ -1,0 +1,134 @@
+"""Masks from clean plates, against the truth of a drawn scene."""
+
+import logging
+
+import cv2
+import numpy as np
+import pytest
+
+from ico3d.capture.capture import Capture
+from ico3d.capture.multiview.matte import matte
+from ico3d.cli import main
+from ico3d.errors import CaptureError
+
+SIZE = (240, 360)
+"""Width, height."""
+
+
+def plate_and_person(seed: int):
+    """A textured wall, a person who akimbo leaves a hole at the arm, and the truth (H, W)."""
+    random = np.random.default_rng(seed)
+    shape = (SIZE[1], SIZE[0])
+    wall = 150 + cv2.GaussianBlur(random.normal(0, 60, (*shape, 3)), (0, 0), 3)
+    truth = np.zeros(shape, np.float32)
+    cv2.ellipse(truth, (120, 70), (26, 34), 0, 0, 360, 1.0, -1, cv2.LINE_AA)
+    cv2.ellipse(truth, (120, 200), (46, 110), 0, 0, 360, 1.0, -1, cv2.LINE_AA)
+    cv2.polylines(truth, [np.array([(85, 130), (45, 190), (90, 240)])], False, 1.0, 14, cv2.LINE_AA)
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    cloth = np.where((x // 9 + y // 9) % 2, 60.0, 190.0)[..., None] * (1.0, 0.7, 0.5)
+    skin = np.where(y[..., None] < 108, (200.0, 150, 130), cloth)
+    return wall, skin, truth
+
+
+def photographed(wall, person, truth, gain=1.0, noise=2.0, shadow=0.0, seed=9):
+    """uint8 RGB, with the shadow a lamp from the left throws on the wall."""
+    random = np.random.default_rng(seed)
+    shade = 1 - shadow * cv2.GaussianBlur(np.roll(truth, 30, 1), (0, 0), 14)
+    lit = wall * shade[..., None]
+    mixed = truth[..., None] * person + (1 - truth[..., None]) * lit
+    return np.clip(gain * mixed + random.normal(0, noise, lit.shape), 0, 255).astype(np.uint8)
+
+
+def overlap(found, truth) -> float:
+    """Intersection over union."""
+    a, b = found > 127, truth > 0.5
+    return (a & b).sum() / (a | b).sum()
+
+
+@pytest.mark.parametrize(
+    ("gain", "noise", "shadow"),
+    ((1.0, 1.0, 0.0), (1.12, 2.0, 0.0), (0.9, 4.0, 0.0), (1.05, 2.0, 0.22)),
+)
+def test_noise_exposure_and_shadows_change_little(gain, noise, shadow):
+    for seed in range(3):
+        wall, person, truth = plate_and_person(seed)
+        picture = photographed(wall, person, truth, gain, noise, shadow)
+        plate = photographed(wall, person, 0 * truth, seed=1)
+        found = matte(picture, plate)
+        assert overlap(found, truth) > 0.97
+        assert np.abs(found / 255 - truth).mean() < 0.012
+        assert found[190, 62] < 30  # one sees the wall between arm and body
+
+
+@pytest.mark.parametrize("blur", (0.5, 1.0, 1.5))
+def test_opacity_along_an_edge_is_right_where_colours_are_even(blur):
+    """A hard edge would be off by 0.15 to 0.27."""
+    wall, _, truth = plate_and_person(0)
+    person, truth = np.full_like(wall, (200.0, 150, 130)), cv2.GaussianBlur(truth, (0, 0), blur)
+    found = matte(photographed(wall, person, truth, noise=1), photographed(wall, person, 0 * truth))
+    edge = (truth > 0.1) & (truth < 0.9)
+    edge[105:] = False  # the head
+    assert np.abs(found[edge] / 255 - truth[edge]).mean() < 0.035
+
+
+def test_nobody_gives_an_empty_mask():
+    wall, person, truth = plate_and_person(0)
+    nobody = photographed(wall, person, 0 * truth, gain=1.08, noise=3)
+    assert not matte(nobody, photographed(wall, person, 0 * truth, seed=1)).any()
+
+
+def recording(folders, folder, cameras=2, frames=3):
+    rig = folders.ring(cameras, SIZE)
+    for index, camera in enumerate(rig):
+        wall, person, truth = plate_and_person(index)
+        folders.save(
+            folder / f"backgrounds/{camera.name}.png",
+            photographed(wall, person, 0 * truth, seed=index),
+        )
+        for frame in range(frames):
+            moved = np.roll(truth, 9 * frame, 1)
+            picture = photographed(wall, np.roll(person, 9 * frame, 1), moved, seed=frame)
+            folders.save(folder / f"images/{camera.name}/{frame:06d}.png", picture)
+    return folders.write_cameras(folder, [folders.entry(camera) for camera in rig], frames)
+
+
+def test_the_command_writes_what_is_missing(folders, tmp_path, capsys):
+    folder = recording(folders, tmp_path)
+    mended = np.full((SIZE[1], SIZE[0]), 77, np.uint8)
+    folders.save(folder / "masks/cam01/000001.png", mended)
+    assert main(["capture", "masks", str(folder), "--workers", "2"]) == 0
+    assert "5 masks written" in capsys.readouterr().out
+    capture = Capture.open(folder)
+    for index in range(2):
+        truth = plate_and_person(index)[2]
+        for frame in range(3):
+            if (index, frame) != (1, 1):
+                found = capture.mask(index, frame) * 255
+                assert overlap(found, np.roll(truth, 9 * frame, 1)) > 0.97
+    np.testing.assert_array_equal(np.rint(capture.mask(1, 1) * 255), mended)
+    assert main(["capture", "masks", str(folder)]) == 0
+    assert "0 masks written" in capsys.readouterr().out
+    assert main(["capture", "check", str(folder)]) == 0
+
+
+def test_cameras_without_a_plate_are_said(folders, tmp_path, caplog, capsys):
+    folder = recording(folders, tmp_path, frames=1)
+    (folder / "backgrounds/cam00.png").unlink()
+    with caplog.at_level(logging.WARNING):
+        assert main(["capture", "masks", str(folder)]) == 0
+    assert "camera cam00 has no clean plate" in caplog.text
+    (folder / "backgrounds/cam01.png").unlink()
+    assert main(["capture", "masks", str(folder)]) == 1
+    assert "no clean plates" in capsys.readouterr().err
+
+
+def test_a_damaged_picture_ends_it_with_its_name(folders, tmp_path, capsys):
+    folder = recording(folders, tmp_path)
+    (folder / "images/cam01/000002.png").write_bytes(b"\x89PNG")
+    assert main(["capture", "masks", str(folder), "--workers", "1"]) == 1
+    assert "camera cam01, frame 2" in capsys.readouterr().err
+
+
+def test_plates_of_another_size_are_refused():
+    with pytest.raises(CaptureError, match="background"):
+        matte(np.zeros((8, 8, 3), np.uint8), np.zeros((9, 8, 3), np.uint8))

@@ -1,0 +1,208 @@
+"""Multiview folders: what lies in them comes back, and what does not is named."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+import soundfile
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from ico3d.capture.capture import Capture
+from ico3d.capture.check import examine
+from ico3d.cli import main
+from ico3d.errors import CaptureError
+
+BENT = [-0.2, 0.06, 0.002, -0.001, 0.01]
+
+
+def fails(call, *words):
+    with pytest.raises(CaptureError) as error:
+        call()
+    message = str(error.value)
+    assert all(word in message for word in words), message
+    assert "\n" not in message and message.endswith(".")
+
+
+def test_pictures_come_back_as_they_were_saved(folder, folders):
+    capture = Capture.open(folder)
+    assert (capture.kind, capture.fps, capture.num_frames) == ("multiview", 30.0, 3)
+    assert capture.split.train == (0, 1, 2) and len(capture.split.test_cameras) == 1
+    for index, camera in enumerate(folders.ring(5)):
+        np.testing.assert_array_equal(capture.cameras[index].intrinsics, camera.intrinsics)
+        np.testing.assert_allclose(
+            capture.cameras[index].world_to_camera, camera.world_to_camera, atol=1e-12
+        )
+        for frame in range(3):
+            image = capture.image(index, frame)
+            assert image.dtype == np.float32
+            np.testing.assert_array_equal(np.rint(image * 255), folders.picture(index, frame))
+    assert capture.mask(0, 0) is None and capture.background(0) is None
+    assert capture.audio() is None and capture.points() is None
+    assert capture.provenance["consent"] == "not stated"
+
+
+def test_masks_plates_points_and_sound(folder, folders):
+    coverage = np.arange(32 * 40, dtype=np.uint8).reshape(32, 40)
+    folders.save(folder / "masks/cam01/000002.png", coverage)
+    folders.save(folder / "backgrounds/cam01.jpg", np.full((32, 40, 3), 90, np.uint8))
+    (folder / "points").mkdir()
+    points = np.random.default_rng(0).normal(size=(7, 3)).astype(np.float32)
+    np.save(folder / "points/000001.npy", points)
+    soundfile.write(folder / "audio.wav", np.zeros((48_000, 2)), 48_000)
+    capture = Capture.open(folder)
+    np.testing.assert_array_equal(np.rint(capture.mask(1, 2) * 255), coverage)
+    assert capture.background(1) == pytest.approx(90 / 255, abs=1e-6)
+    np.testing.assert_array_equal(capture.points(1), points)
+    assert capture.points(0) is None and len(capture.audio().samples) == 16_000
+
+
+def test_transparency_is_a_mask_before_black(folder, folders):
+    solid = folders.picture(9, 9)
+    alpha = np.arange(32 * 40, dtype=np.uint8).reshape(32, 40)
+    folders.save(folder / "images/cam00/000000.png", np.dstack([solid, alpha]))
+    capture = Capture.open(folder)
+    expected = solid * (alpha[..., None] / 255.0) / 255
+    np.testing.assert_allclose(capture.image(0, 0), expected, atol=1e-6)
+    np.testing.assert_array_equal(np.rint(capture.mask(0, 0) * 255), alpha)
+
+
+def test_a_point_of_the_world_is_found_where_the_straightened_camera_sees_it(folders, tmp_path):
+    """Pictures, masks and plates of a lens that bends lines are straightened alike."""
+    size, point = (320, 240), np.array([0.5, 1.35, 0.2])
+    rig = folders.ring(3, size)
+    entries = []
+    for camera in rig:
+        matrix = camera.intrinsics * [[6], [6], [1]] - [
+            [0, 0, 5 * size[0] / 2],
+            [0, 0, 600],
+            [0] * 3,
+        ]
+        entries.append(folders.entry(camera, intrinsics=matrix.tolist(), distortion=BENT))
+        opencv = matrix - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
+        turn, _ = cv2.Rodrigues(camera.world_to_camera[:3, :3])
+        move = camera.world_to_camera[:3, 3]
+        where, _ = cv2.projectPoints(point[None], turn, move, opencv, np.array(BENT))
+        y, x = np.mgrid[: size[1], : size[0]]
+        dot = 255 * np.exp(-((x - where[0, 0, 0]) ** 2 + (y - where[0, 0, 1]) ** 2) / 16)
+        for kind in (f"images/{camera.name}/000000", f"masks/{camera.name}/000000"):
+            folders.save(tmp_path / f"{kind}.png", np.repeat(dot[..., None], 3, 2).astype(np.uint8))
+        folders.save(tmp_path / f"backgrounds/{camera.name}.png", dot.astype(np.uint8))
+    capture = Capture.open(folders.write_cameras(tmp_path, entries, 1))
+    y, x = np.mgrid[: size[1], : size[0]] + 0.5
+    for index, camera in enumerate(capture.cameras):
+        pixel, _ = camera.project(point)
+        assert abs(pixel - np.array(size) / 2).max() > 40  # far from where lenses do nothing
+        image, plate = capture.image(index, 0).mean(-1), capture.background(index).mean(-1)
+        for weight in (image, plate, capture.mask(index, 0)):
+            middle = np.array([(weight * x).sum(), (weight * y).sum()]) / weight.sum()
+            assert np.abs(middle - pixel).max() < 0.1
+
+
+def test_a_sound_folder_is_checked_without_errors(folder, capsys):
+    assert main(["capture", "check", str(folder)]) == 0
+    assert "all 15 are there" in capsys.readouterr().out
+    with Image.open(folder / "check.png") as sheet:
+        assert sheet.width == 6 * 256
+
+
+def test_missing_and_damaged_views_are_named(folder):
+    (folder / "images/cam03/000001.png").unlink()
+    (folder / "images/cam02/000002.png").write_bytes(b"\x89PNG nothing")
+    capture = Capture.open(folder)
+    assert capture.image(3, 1) is None
+    fails(lambda: capture.image(2, 2), "camera cam02, frame 2", "damaged")
+    (finding,) = (f for f in examine(capture) if f.what == "views")
+    assert finding.level == "error"
+    assert finding.text == "damaged: camera cam02, frame 2; missing: camera cam03, frame 1"
+
+
+def test_cut_pictures_are_damaged_not_half_grey(folder):
+    file = folder / "images/cam00/000000.png"
+    file.write_bytes(file.read_bytes()[:-1500])
+    fails(lambda: Capture.open(folder).image(0, 0), "camera cam00, frame 0", "damaged")
+
+
+def test_pictures_of_another_size_are_refused(folder, folders):
+    folders.save(folder / "images/cam00/000000.png", folders.picture(0, 0, (20, 20)))
+    fails(lambda: Capture.open(folder).image(0, 0), "20x20", "40x32")
+
+
+def test_sixteen_bits_are_refused(folder):
+    deep = Image.fromarray(np.full((32, 40), 40_000, np.uint16))
+    deep.save(folder / "images/cam00/000000.png")
+    fails(lambda: Capture.open(folder).image(0, 0), "8 bits")
+
+
+def test_a_camera_without_pictures_is_named(folder, folders):
+    rig = folders.ring(6)
+    folders.write_cameras(folder, [folders.entry(camera) for camera in rig], 3)
+    fails(lambda: Capture.open(folder), "cam05", "videos/cam05.mp4")
+
+
+def test_frames_outside_the_recording(folder):
+    fails(lambda: Capture.open(folder).image(0, 3), "frames 0 to 2")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    (
+        ({"format": "other"}, "format"),
+        ({"version": 2}, "version"),
+        ({"fps": 0}, "fps"),
+        ({"fps": float("nan")}, "fps"),
+        ({"num_frames": 10**400}, "num_frames"),
+        ({"num_frames": "3"}, "num_frames"),
+        ({"cameras": []}, "no cameras"),
+    ),
+)
+def test_what_cannot_be_is_refused(folder, change, words):
+    file = folder / "cameras.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), **change}))
+    fails(lambda: Capture.open(folder), "cameras.json", words)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    (
+        ({"name": "../../etc"}, "name"),
+        ({"name": ".hidden"}, "name"),
+        ({"name": "CAM01"}, "called cam01"),
+        ({"width": 0}, "width"),
+        ({"intrinsics": [[1, 2], [3, 4]]}, "3x3"),
+        ({"intrinsics": [[0, 0, 1], [0, 1, 1], [0, 0, 1]]}, "focal"),
+        ({"world_to_camera": (2 * np.eye(4)).tolist()}, "rotation"),
+        ({"distortion": [1, 2, 3]}, "distortion"),
+        ({"distortion": "k1"}, "distortion"),
+        ({"distortion": [1e9, 0, 0, 0, 0]}, "distortion"),
+    ),
+)
+def test_cameras_that_cannot_be_are_refused(folder, change, words):
+    file = folder / "cameras.json"
+    about = json.loads(file.read_text())
+    about["cameras"][0].update(change)
+    file.write_text(json.dumps(about))
+    fails(lambda: Capture.open(folder), words)
+
+
+def test_pickled_points_are_refused(folder):
+    (folder / "points").mkdir()
+    np.save(folder / "points/000000.npy", np.array([{"a": 1}], object), allow_pickle=True)
+    fails(lambda: Capture.open(folder).points(), "000000.npy", "damaged")
+
+
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+def test_descriptions_cut_or_changed_anywhere_are_one_sentence(folders, tmp_path_factory, data):
+    folder = folders.write_folder(tmp_path_factory.mktemp("cut"), 1, 1)
+    file = folder / "cameras.json"
+    text = file.read_text()
+    place = data.draw(st.integers(0, len(text) - 1))
+    kept = data.draw(st.sampled_from((text[place + 1 :], "")))
+    file.write_text(text[:place] + data.draw(st.sampled_from(("", "9", "]", "e9", "null"))) + kept)
+    try:
+        Capture.open(folder).image(0, 0)
+    except CaptureError as error:
+        assert "\n" not in str(error)

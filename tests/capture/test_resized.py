@@ -1,0 +1,97 @@
+"""Captures with smaller pictures."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ico3d.capture.capture import Capture
+from ico3d.capture.resized import ResizedCapture
+from ico3d.cli import main
+from ico3d.errors import SettingsError
+
+
+@pytest.fixture(scope="module")
+def folders():
+    """The writer of multiview folders."""
+    path = Path(__file__).parent / "multiview" / "folders.py"
+    spec = importlib.util.spec_from_file_location("folders", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def two_sizes(folders, tmp_path):
+    """Three cameras: two of 80 x 64 pixels, one of 30 x 20."""
+    folder, rig = tmp_path / "whole", [*folders.ring(2, (80, 64)), folders.ring(3, (30, 20))[2]]
+    for index, camera in enumerate(rig):
+        size = (camera.width, camera.height)
+        folders.save(folder / f"images/{camera.name}/000000.png", folders.picture(index, 0, size))
+        mask = np.zeros((size[1], size[0]), np.uint8)
+        mask[size[1] // 4 :, size[0] // 4 : -size[0] // 4] = 255
+        folders.save(folder / f"masks/{camera.name}/000000.png", mask)
+        folders.save(folder / f"backgrounds/{camera.name}.png", folders.picture(index, 1, size))
+    (folder / "points").mkdir()
+    np.save(folder / "points/000000.npy", np.ones((4, 3), np.float32))
+    return folders.write_cameras(folder, [folders.entry(camera) for camera in rig], 1)
+
+
+def test_pixels_are_means_of_what_they_cover(two_sizes, folders):
+    whole = Capture.open(two_sizes)
+    small = ResizedCapture(whole, 32)
+    assert [(c.width, c.height) for c in small.cameras] == [(40, 32), (40, 32), (30, 20)]
+    expected = folders.picture(0, 0, (80, 64)).reshape(32, 2, 40, 2, 3).mean((1, 3)) / 255
+    np.testing.assert_allclose(small.image(0, 0), expected, atol=1e-6)
+    assert small.mask(0, 0).sum() * 4 == pytest.approx(whole.mask(0, 0).sum())
+    assert small.background(1).shape == (32, 40, 3)
+    np.testing.assert_array_equal(small.image(2, 0), whole.image(2, 0))
+    assert small.kind == "multiview" and small.split == whole.split and small.whole is whole
+
+
+def test_cameras_see_points_where_the_pictures_show_them(two_sizes):
+    whole = Capture.open(two_sizes)
+    small = ResizedCapture(whole, 32)
+    points = np.random.default_rng(0).normal((0, 1, 0), 0.5, (9, 3))
+    for before, after in zip(whole.cameras[:2], small.cameras[:2], strict=True):
+        np.testing.assert_allclose(after.project(points)[0], before.project(points)[0] / 2)
+
+
+def test_everything_else_is_that_of_the_capture(folder):
+    """A portrait: poses, expressions, landmarks, sound."""
+    whole = Capture.open(folder)
+    small = ResizedCapture(whole, 16)
+    np.testing.assert_array_equal(small.landmarks(0, 3), whole.landmarks(0, 3) / 4)
+    np.testing.assert_array_equal(small.eyes(3), whole.eyes(3))
+    np.testing.assert_array_equal(small.world_from_head(3), whole.world_from_head(3))
+    np.testing.assert_array_equal(small.points(), whole.points())
+    np.testing.assert_array_equal(small.audio().samples, whole.audio().samples)
+    assert small.head_mask(0, 3).shape == (16, 16)
+    assert small.provenance == whole.provenance and small.blendshapes(3) is None
+
+
+def test_no_height_is_refused(two_sizes):
+    with pytest.raises(SettingsError):
+        ResizedCapture(Capture.open(two_sizes), 0)
+
+
+def test_the_command_writes_a_smaller_capture(two_sizes, tmp_path, capsys):
+    out = tmp_path / "small"
+    assert main(["capture", "resize", str(two_sizes), str(out), "--height", "32"]) == 0
+    small, expected = Capture.open(out), ResizedCapture(Capture.open(two_sizes), 32)
+    assert small.split == expected.split and small.provenance == expected.provenance
+    for index, camera in enumerate(expected.cameras):
+        np.testing.assert_allclose(small.cameras[index].intrinsics, camera.intrinsics)
+        np.testing.assert_allclose(
+            small.cameras[index].world_to_camera, camera.world_to_camera, atol=1e-12
+        )
+        # JPEG of noise, the worst there is
+        assert np.abs(small.image(index, 0) - expected.image(index, 0)).mean() < 0.02
+        np.testing.assert_allclose(small.mask(index, 0), expected.mask(index, 0), atol=0.5 / 255)
+        np.testing.assert_allclose(
+            small.background(index), expected.background(index), atol=0.51 / 255
+        )
+    np.testing.assert_array_equal(small.points(0), expected.points(0))
+    assert main(["capture", "resize", str(two_sizes), str(out)]) == 1
+    assert "exists already" in capsys.readouterr().err
