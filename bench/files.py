@@ -44,10 +44,11 @@ class Bench:
     def run(self) -> None:
         """Prints, and writes, one row per format and set."""
         bundle = Bundle.open(self.bundle)
-        expression = np.zeros(bundle.head.expression_size, np.float32)
-        head = RawGaussians.from_gaussians(baked_gaussians(bundle.head, expression))
+        baked, poses = bundle.require_head()
+        expression = np.zeros(baked.expression_size, np.float32)
+        head = RawGaussians.from_gaussians(baked_gaussians(baked, expression))
         camera = visitor_camera(bundle.manifest.camera, self.size, self.size)
-        camera = camera.moved(bundle.world_from_head[0])
+        camera = camera.moved(poses[0])
         rows = []
         for suffix in (".ply", ".spz"):
             back, row = round_trip(head, suffix)

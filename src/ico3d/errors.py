@@ -4,6 +4,15 @@
 class Ico3dError(Exception):
     """Base of every error the command line prints as one sentence, without a traceback."""
 
+    def __reduce__(self):
+        """Travels between processes as its sentence, whatever its constructor takes."""
+        return _again, (type(self), self.args), self.__dict__
+
+
+def _again(kind: type[Ico3dError], words: tuple) -> Ico3dError:
+    """An error that has travelled."""
+    return kind.__new__(kind, *words)
+
 
 class CaptureError(Ico3dError):
     """A recording is missing, damaged or inconsistent."""

@@ -113,6 +113,7 @@ def random_manifest(head: BakedHead) -> Manifest:
             num_poses=NUM_POSES,
             idle_expression=(0.0,) * EXPRESSION_SIZE,
         ),
+        body=None,
         speech=SpeechInfo(encoder="random", sha256="0" * 64, fps=25.0, input="mel"),
         camera=CameraInfo((0.0, 0.0, 0.8), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 24.0),
         background=(0.85, 0.87, 0.9),

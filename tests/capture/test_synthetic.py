@@ -26,7 +26,7 @@ SUBJECTS = Path(__file__).parents[3] / "shared" / "subjects"
 
 def _settings(subject: Path, **changes) -> Recording:
     values = dict(rig="head", cameras=3, frames=11, views_per_frame=1, size=40, text="", seed=3)
-    values["lively"] = False
+    values |= dict(lively=False, fps=25.0, light="studio", motion="talk")
     return Recording(str(subject), **(values | changes))
 
 
@@ -129,7 +129,7 @@ def test_views_are_shared_out_evenly():
 
 def test_points_lie_on_the_surface(person):
     subject = load_subject(str(person))
-    points = surface_points(subject, 500, seed=0)
+    points = surface_points(subject, 500, seed=0).on(subject.vertices)
     face = points[points[:, 1] > -0.11]
     face = face[np.abs(face[:, 0]) < 0.02]
     assert len(face) > 10

@@ -22,8 +22,8 @@ from ico3d.common.espeak import synthesize  # noqa: E402
 RANDOM_BUNDLE = Path(__file__).parents[1] / "bundle" / "random_bundle.py"
 
 
-def random_bundle_module():
-    spec = importlib.util.spec_from_file_location("random_bundle", RANDOM_BUNDLE)
+def random_bundle_module(name="random_bundle"):
+    spec = importlib.util.spec_from_file_location(name, RANDOM_BUNDLE.with_stem(name))
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
@@ -43,6 +43,15 @@ def bundle(bundle_path):
 
 
 @pytest.fixture(scope="session")
+def body(tmp_path_factory):
+    """A bundle of a body alone."""
+    random_bundle_module()
+    path = tmp_path_factory.mktemp("bundle") / "body.ico3d"
+    random_bundle_module("random_body").write_random_body(path)
+    return Bundle.open(path)
+
+
+@pytest.fixture(scope="session")
 def question():
     """ "Who are you?" as (S,) int16 at 16 kHz, without the silence around it."""
     speech = synthesize("What is your name?", voice="en-us", rate=150)
@@ -55,8 +64,10 @@ def question():
 async def serving(bundle, settings=None, resume_seconds=30.0):
     """Yields the URL and the sessions of a running server."""
     listener = server.bind("127.0.0.1", 0)
-    avatar = server.open_avatar(bundle, settings or ChatSettings())
-    sessions = Sessions(avatar, resume_seconds)
+    avatar, sessions = None, None
+    if bundle.manifest.head:
+        avatar = server.open_avatar(bundle, settings or ChatSettings())
+        sessions = Sessions(avatar, resume_seconds)
     running = server.make_server(server.make_app(bundle, avatar, "127.0.0.1", sessions))
     task = asyncio.create_task(running.serve(sockets=[listener]))
     while not running.started:

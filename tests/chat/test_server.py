@@ -14,12 +14,15 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from ico3d.chat.codec import decode_server, encode
+from ico3d.chat.face import open_face
 from ico3d.chat.guard import is_own
 from ico3d.chat.limits import FORGIVEN, Limits
 from ico3d.chat.protocol import Audio, Error, Hello, Speech, Text, Welcome
 from ico3d.cli import main
-from ico3d.errors import ProtocolError, SettingsError
+from ico3d.errors import BundleError, ProtocolError, SettingsError
 from ico3d.measure.page import open_page
+
+from .conftest import serving
 
 
 @pytest.mark.parametrize(
@@ -71,6 +74,23 @@ async def test_http_serves_the_bundle_and_nothing_else(served, bundle):
         assert (await client.get("/health", headers={"Host": "evil.example"})).status_code == 403
         foreign = await client.get("/health", headers={"Origin": "http://evil.example"})
         assert foreign.status_code == 403
+
+
+async def test_a_body_alone_is_served_without_a_conversation(body):
+    async with serving(body) as (url, _), httpx.AsyncClient(base_url=url) as client:
+        for name in ("body/0000.safetensors", "body/0001.safetensors", "manifest.json"):
+            assert (await client.get(f"/bundle/{name}")).content == body.read(name)
+        for name in (
+            "body/0002.safetensors",
+            "body",
+            "body/../manifest.json/x",
+            "head.safetensors",
+        ):
+            assert (await client.get(f"/bundle/{name}")).status_code == 404
+        with pytest.raises(InvalidStatus):
+            await connect(address(url))
+    with pytest.raises(BundleError, match="no head to talk with"):
+        open_face(body)
 
 
 @pytest.mark.parametrize("header", [{"Origin": "http://evil.example"}, {"Host": "evil.example"}])

@@ -159,3 +159,10 @@ def test_opacity_reset_only_lowers():
     logits = torch.tensor([-9.0, 0.0, 9.0])
     reset = density.reset_opacity_logits(logits, 0.01).sigmoid()
     assert torch.allclose(reset, torch.tensor([torch.sigmoid(logits[0]), 0.01, 0.01]))
+
+
+def test_growth_is_limited():
+    """Of four that want to, half may: those of strongest gradient."""
+    rules = DensitySettings(100, 1.0, 0.01, 0.1, 0.5, growth=0.5)
+    plan = plan_of([2.0, 5.0, 3.0, 4.0], [0.001] * 4, [0.9] * 4, rules)
+    assert plan.clone_from.tolist() == [1, 3]

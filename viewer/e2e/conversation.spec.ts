@@ -29,12 +29,12 @@ describe('a typed question', () => {
     expect(await page.locator('#stand-ins').textContent()).toMatch(/^Offline stand-ins in use: recognition/);
 
     await page.evaluate(() => {
-      const { stage, conversation } = window.ico3d!;
+      const { head, conversation } = window.ico3d!;
       const faces: { at: number; speaking: boolean; expression: number[] }[] = [];
       Object.assign(window, { faces });
       setInterval(() => {
-        const speaking = (conversation.player.heard()?.seconds ?? -1) > 0.2;
-        faces.push({ at: performance.now(), speaking, expression: [...stage.expression] });
+        const speaking = (conversation!.player.heard()?.seconds ?? -1) > 0.2;
+        faces.push({ at: performance.now(), speaking, expression: [...head!.expression] });
       }, 33);
     });
     await page.fill('#text', 'Who are you?');

@@ -23,7 +23,7 @@ describe.skipIf(!existsSync(DEMO))('the packaged demo (needs src/ico3d/chat/data
   test('answers a typed question aloud, and its mouth moves', async () => {
     const { page } = browser;
     await page.keyboard.press('Escape'); // the greeting is known
-    await page.waitForFunction(() => window.ico3d!.conversation.player.heard() === null);
+    await page.waitForFunction(() => window.ico3d!.conversation!.player.heard() === null);
     await page.waitForTimeout(1000);
     await watchMouth(page);
     await page.fill('#text', 'Who are you?');

@@ -25,7 +25,7 @@ describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a tal
     makeVoice(voice);
     browser = await openPage(server.url, { microphone: voice, calm: true });
     await until(browser, finished(0), 30_000); // the greeting
-    await browser.page.waitForFunction(() => window.ico3d!.conversation.player.heard() === null);
+    await browser.page.waitForFunction(() => window.ico3d!.conversation!.player.heard() === null);
     await browser.page.waitForTimeout(EASED + 300);
     await watchMouth(browser.page);
     await browser.page.click('#microphone');

@@ -40,7 +40,7 @@ interface Sight {
 function watch(): Promise<void> {
   return browser.page.evaluate(() => {
     const { stage, conversation } = window.ico3d!;
-    const { context } = conversation.player;
+    const { context } = conversation!.player;
     const gl = stage.renderer.getContext();
     const draw = stage.draw.bind(stage);
     const sights: Sight[] = [];
@@ -91,7 +91,7 @@ test('stop is silence within 30 ms, and what comes later of that utterance is dr
   await feed(page, 1, 4);
   await page.waitForTimeout(1200);
   const stopped = await page.evaluate(() => {
-    const { player } = window.ico3d!.conversation;
+    const { player } = window.ico3d!.conversation!;
     player.stop(1);
     return player.context.currentTime;
   });
@@ -104,7 +104,7 @@ test('stop is silence within 30 ms, and what comes later of that utterance is dr
   }, stopped);
   expect(before).toBe(true);
   expect(after / RATE).toBeLessThan(0.03);
-  expect(await page.evaluate(() => window.ico3d!.conversation.player.current)).toBeNull();
+  expect(await page.evaluate(() => window.ico3d!.conversation!.player.current)).toBeNull();
 });
 
 function ms(seconds: number): string {

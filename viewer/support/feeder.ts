@@ -10,7 +10,7 @@ export const AHEAD = 1.5;
 export function feed(page: Page, utterance: number, seconds: number): Promise<void> {
   return page.evaluate(
     ([id, duration, ahead]) => {
-      const { player } = window.ico3d!.conversation;
+      const { player } = window.ico3d!.conversation!;
       const began = performance.now();
       window.pieces = [];
       let sample = 0;

@@ -27,7 +27,7 @@ declare global {
 export function watchMouth(page: Page): Promise<void> {
   return page.evaluate((every) => {
     const FEATURES = 32; // of speech; those of the eyes follow
-    const { stage } = window.ico3d!;
+    const { stage, head } = window.ico3d!;
     const record: NonNullable<Window['mouth']> = { sights: [], pictures: [] };
     window.mouth = record;
     const gl = stage.renderer.getContext();
@@ -40,7 +40,7 @@ export function watchMouth(page: Page): Promise<void> {
       gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, rgba); // WebGL counts rows from below
       return rgba;
     };
-    const [rest, restPicture] = [stage.expression.slice(0, FEATURES), lowerHalf()];
+    const [rest, restPicture] = [head!.expression.slice(0, FEATURES), lowerHalf()];
     const change = () => {
       const differences = lowerHalf().map((level, i) => Math.abs(level - restPicture[i]!)).sort();
       const most = differences.subarray(-Math.ceil(differences.length / 100));
@@ -48,7 +48,7 @@ export function watchMouth(page: Page): Promise<void> {
     };
     setInterval(() => {
       const at = performance.now();
-      record.sights.push({ at, speech: Math.hypot(...rest.map((value, i) => value - stage.expression[i]!)) });
+      record.sights.push({ at, speech: Math.hypot(...rest.map((value, i) => value - head!.expression[i]!)) });
       if (at - (record.pictures.at(-1)?.at ?? 0) > every) record.pictures.push({ at, change: change() });
     }, 33);
   }, PICTURE_EVERY);

@@ -47,7 +47,7 @@ def phase_manifest() -> Manifest:
     camera = CameraInfo((0.0, 0.0, 0.8), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 24.0)
     provenance = Provenance("clock", ("computed",), "none needed", "CC0-1.0")
     persona, loss = Persona("Clock", "", ()), Loss(None, None, None)
-    return Manifest("clock", head, None, camera, (0.0, 0.0, 0.0), persona, loss, provenance)
+    return Manifest("clock", head, None, None, camera, (0.0, 0.0, 0.0), persona, loss, provenance)
 
 
 def main() -> None:

@@ -9,23 +9,33 @@ export interface Still {
 
 /** Shows one expression with the head in its first pose and reads everything back. */
 export async function takeStill(page: Page, expression: number[]): Promise<Still> {
-  const still = await page.evaluate(async (row) => {
-    const { stage, attributes } = window.ico3d!;
-    await stage.still(row);
+  const { attributes, coefficients } = await page.evaluate(async (row) => {
+    const { stage, head, splats } = window.ico3d!;
+    head!.show(row);
+    await stage.still();
+    const { rgba } = splats(head!.generator);
+    return { attributes: [...rgba], coefficients: [...head!.generator.shown] };
+  }, expression);
+  return { pixels: await takePixels(page), attributes: Float32Array.from(attributes), coefficients };
+}
+
+/** Draws what is on stage and reads it back: (H, W, 3), top row first. */
+export async function takePixels(page: Page): Promise<Uint8Array> {
+  const { width, height, rgba } = await page.evaluate(() => {
+    const { stage } = window.ico3d!;
     const { width, height } = stage.renderer.domElement;
     const rgba = new Uint8Array(4 * width * height);
     const gl = stage.renderer.getContext();
     stage.draw();
     gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, rgba);
-    return { width, height, rgba: [...rgba], attributes: [...attributes()], coefficients: [...stage.head.shown] };
-  }, expression);
-  const { width, height, rgba, attributes, coefficients } = still;
+    return { width, height, rgba: [...rgba] };
+  });
   const pixels = new Uint8Array(3 * width * height);
   for (let i = 0; i < width * height; i++) {
     const source = (height - 1 - Math.floor(i / width)) * width + (i % width); // WebGL counts rows from below
     pixels.set(rgba.slice(4 * source, 4 * source + 3), 3 * i);
   }
-  return { pixels, attributes: Float32Array.from(attributes), coefficients };
+  return pixels;
 }
 
 /** Peak signal-to-noise ratio of two 8-bit pictures, dB. */

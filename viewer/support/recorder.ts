@@ -69,7 +69,7 @@ export async function recordWire(context: BrowserContext): Promise<void> {
 /** Watches how loud the avatar is, every 10 ms. */
 export function recordLoudness(page: Page): Promise<void> {
   return page.evaluate(() => {
-    const { context, output } = window.ico3d!.conversation.player;
+    const { context, output } = window.ico3d!.conversation!.player;
     const analyser = new AnalyserNode(context, { fftSize: 256 });
     output.connect(analyser);
     const wave = new Float32Array(256);

@@ -44,7 +44,7 @@ const SETTLE = 700; // ms: with its first worklet, an AudioContext moves to anot
 /** Records the player's output on its own audio clock from now on. */
 export async function tap(page: Page): Promise<void> {
   await page.evaluate(async (worklet) => {
-    const { context, output } = window.ico3d!.conversation.player;
+    const { context, output } = window.ico3d!.conversation!.player;
     const url = URL.createObjectURL(new Blob([worklet], { type: 'text/javascript' }));
     await context.audioWorklet.addModule(url);
     const tapped: Tapped = { first: -1, samples: [], starts: [] };

@@ -1,27 +1,23 @@
 """From a trained head and its capture to a bundle."""
 
-import io
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
-from PIL import Image
 
 from ico3d.avatar import comparison, staging
 from ico3d.avatar.bake_head import MAX_RANK, BakeSettings, HeadBaker, megabytes_per_10k
 from ico3d.avatar.importance import logit_importance
-from ico3d.avatar.render_bundle import baked_gaussians, visitor_camera
+from ico3d.avatar.render_bundle import baked_gaussians
 from ico3d.bundle.format import HEAD, LICENSES, POSES, SPEECH, THUMBNAIL, write_bundle
 from ico3d.bundle.head import BakedHead, poses_to_bytes
 from ico3d.bundle.manifest import (
-    CameraInfo,
     HeadInfo,
     Loss,
     Manifest,
     Persona,
-    Provenance,
     SpeechInfo,
 )
 from ico3d.capture.capture import Capture
@@ -33,7 +29,6 @@ from ico3d.head.views import view_of
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.export import export_speech
 from ico3d.speech.network import SpeechAdaptor
-from ico3d.splat.render import render
 
 RANKS = (16, 20, 24, 28, MAX_RANK)
 """Tried in this order. Not fewer: means over views would not notice that rare blinks are lost."""
@@ -42,7 +37,6 @@ MAX_MEGABYTES = 1.7
 _PROBES = 32
 MEASURED_VIEWS = 40
 _SILENCE_SECONDS = 2
-_THUMBNAIL = 384
 
 Report = Callable[[str], None]
 
@@ -150,7 +144,7 @@ def write(
     files = {
         HEAD: result.head.to_bytes(),
         POSES: poses_to_bytes(poses),
-        THUMBNAIL: _thumbnail(result.head, idle, camera, background, middle),
+        THUMBNAIL: staging.thumbnail(seen.transform(middle), camera, background),
     }
     speech = None
     if head.adaptor is not None:
@@ -160,12 +154,13 @@ def write(
     manifest = Manifest(
         name=name,
         head=_head_info(result.head, head, idle, capture.fps, len(poses)),
+        body=None,
         speech=speech,
         camera=camera,
         background=background,
         persona=persona,
         loss=result.loss,
-        provenance=_provenance(capture),
+        provenance=staging.provenance(capture.provenance, str(capture.path)),
     )
     return write_bundle(out, manifest, files)
 
@@ -238,32 +233,3 @@ def _head_info(
         num_poses=num_poses,
         idle_expression=tuple(round(float(value), 6) for value in idle),
     )
-
-
-def _provenance(capture: Capture) -> Provenance:
-    about = capture.provenance
-    try:
-        return Provenance(
-            kind=str(about["kind"]),
-            sources=tuple(str(source) for source in about["sources"]),
-            consent=str(about["consent"]),
-            licence=str(about["licence"]),
-        )
-    except (KeyError, TypeError) as error:
-        raise BundleError(f"{capture.path}: its provenance lacks {error}.") from error
-
-
-def _thumbnail(
-    head: BakedHead,
-    idle: np.ndarray,
-    info: CameraInfo,
-    background: tuple[float, float, float],
-    pose: np.ndarray,
-) -> bytes:
-    """The idle face as a visitor sees it, PNG."""
-    camera = visitor_camera(info, _THUMBNAIL, _THUMBNAIL).moved(pose)
-    with torch.no_grad():
-        picture = render(baked_gaussians(head, idle), [camera], torch.tensor(background)).rgb[0]
-    buffer = io.BytesIO()
-    Image.fromarray((picture.clamp(0, 1) * 255 + 0.5).byte().numpy()).save(buffer, "PNG")
-    return buffer.getvalue()

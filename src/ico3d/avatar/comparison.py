@@ -102,9 +102,16 @@ def baked_picture(head: BakedHead, view: Reference) -> np.ndarray:
     return _picture(baked_gaussians(head, view.expression), view.camera, view.background)
 
 
-def psnr(a: np.ndarray, b: np.ndarray) -> float:
-    """Peak signal-to-noise ratio in dB of two pictures in [0, 1], at most 100."""
-    error = np.square(a.astype(np.float64) - b.astype(np.float64)).mean()
+def psnr(a: np.ndarray, b: np.ndarray, mask: np.ndarray | None = None) -> float:
+    """Peak signal-to-noise ratio in dB of two pictures in [0, 1], at most 100.
+
+    Args:
+        a: (H, W, 3).
+        b: (H, W, 3).
+        mask: (H, W) weights of the pixels, not all 0.
+    """
+    squares = np.square(a.astype(np.float64) - b.astype(np.float64)).mean(axis=2)  # (H, W)
+    error = np.average(squares, weights=mask)
     return float(-10 * np.log10(max(error, 1e-10)))
 
 

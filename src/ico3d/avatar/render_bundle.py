@@ -1,15 +1,17 @@
-"""Rendering a baked head in Python: the picture that the page must show."""
+"""Rendering baked avatars in Python: the picture that the page must show."""
 
 from collections.abc import Sequence
 
 import numpy as np
 import torch
 
+from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.evaluate import attributes
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.head import BakedHead
 from ico3d.bundle.manifest import CameraInfo
 from ico3d.common.camera import Camera, look_at
+from ico3d.errors import BundleError
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
@@ -26,6 +28,47 @@ def baked_gaussians(head: BakedHead, expression: np.ndarray) -> Gaussians:
     )
 
 
+def window_gaussians(window: BakedWindow, tau: float) -> Gaussians:
+    """The Gaussians (N) of a window of the body at τ in [0, 1], in the world."""
+    means, quats, scales = window.at(tau)
+    rgba = torch.from_numpy(window.rgba / np.float32(255))
+    return Gaussians(
+        means=torch.from_numpy(means),
+        quats=torch.from_numpy(quats),
+        scales=torch.from_numpy(scales),
+        opacities=rgba[:, 3],
+        colors=rgba[:, :3],
+    )
+
+
+def body_gaussians(bundle: Bundle, seconds: float) -> Gaussians:
+    """The body at a time; before its first and after its last frame it stands still.
+
+    Raises:
+        BundleError: If the bundle has no body.
+    """
+    body = bundle.manifest.body
+    if body is None:
+        raise BundleError("this bundle has no body.")
+    frame = min(max(seconds * body.fps, 0.0), body.windows[-1].last)
+    index = next(i for i, window in enumerate(body.windows) if frame <= window.last)
+    window = body.windows[index]
+    tau = (frame - window.first) / (window.last - window.first)
+    return window_gaussians(bundle.window(index), tau)
+
+
+def render_body(bundle: Bundle, seconds: float, camera: Camera) -> np.ndarray:
+    """Renders a bundle's body as a viewer does: (H, W, 3) float32 display RGB.
+
+    Raises:
+        BundleError: If the bundle has no body.
+    """
+    behind = torch.tensor(bundle.manifest.background)
+    with torch.no_grad():
+        picture = render(body_gaussians(bundle, seconds), [camera], behind).rgb[0]
+    return picture.numpy()  # (H, W, 3)
+
+
 def render_bundle(
     bundle: Bundle,
     expression: Sequence[float] | np.ndarray,
@@ -33,7 +76,7 @@ def render_bundle(
     background: np.ndarray | None = None,
     world_from_head: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Renders a bundle as a viewer does.
+    """Renders a bundle's head as a viewer does.
 
     Args:
         bundle: The avatar.
@@ -44,10 +87,14 @@ def render_bundle(
 
     Returns:
         (H, W, 3) float32 display RGB.
+
+    Raises:
+        BundleError: If the bundle has no head.
     """
-    pose = bundle.world_from_head[0] if world_from_head is None else world_from_head
+    head, poses = bundle.require_head()
+    pose = poses[0] if world_from_head is None else world_from_head
     behind = np.array(bundle.manifest.background) if background is None else background
-    gaussians = baked_gaussians(bundle.head, np.asarray(expression, np.float32))
+    gaussians = baked_gaussians(head, np.asarray(expression, np.float32))
     with torch.no_grad():
         picture = render(gaussians, [camera.moved(pose)], torch.tensor(behind).float()).rgb[0]
     return picture.numpy()  # (H, W, 3)

@@ -1,10 +1,18 @@
-"""How a baked head is presented: its motion, the visitor's camera, the background."""
+"""How a baked avatar is presented: motion, the visitor's camera, background, thumbnail."""
+
+import io
 
 import numpy as np
+import torch
+from PIL import Image
 
-from ico3d.bundle.manifest import CameraInfo
+from ico3d.avatar.render_bundle import visitor_camera
+from ico3d.bundle.manifest import CameraInfo, Provenance
 from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera
+from ico3d.errors import BundleError
+from ico3d.splat.gaussians import Gaussians
+from ico3d.splat.render import render
 
 LONGEST = 10.0
 """Seconds of head motion in a bundle."""
@@ -13,6 +21,8 @@ _ARM = 0.1
 _SMOOTHING = 1.5
 """Standard deviation, in frames, of the smoothing of head poses (trackers jitter)."""
 _MARGIN = 1.2
+_BODY_FOV = 30.0
+_THUMBNAIL = 384
 NEUTRAL = (0.84, 0.86, 0.88)
 """Background where the capture has none: a light grey."""
 
@@ -60,16 +70,63 @@ def visitor_view(camera: Camera, points: np.ndarray) -> CameraInfo:
     rotation, eye = camera.world_to_camera[:3, :3], camera.camera_to_world[:3, 3]
     target = eye + rotation.T @ ray * np.median(depths[inside])
     fov = 2 * np.degrees(np.arctan(half / camera.intrinsics[1, 1]))
-    return CameraInfo(_triple(eye), _triple(target), _triple(-rotation[1]), round(float(fov), 3))
+    return CameraInfo(triple(eye), triple(target), triple(-rotation[1]), round(float(fov), 3))
 
 
 def background_colour(capture: Capture, camera: int) -> tuple[float, float, float]:
     """The mean colour of the clean background, or a light grey."""
     picture = capture.background(camera)
-    return NEUTRAL if picture is None else _triple(picture.reshape(-1, 3).mean(axis=0))
+    return NEUTRAL if picture is None else triple(picture.reshape(-1, 3).mean(axis=0))
 
 
-def _triple(values: np.ndarray) -> tuple[float, float, float]:
+def standing_view(
+    low: np.ndarray, high: np.ndarray, up: np.ndarray, toward: np.ndarray
+) -> CameraInfo:
+    """Where the visitor of a body starts: level with its middle, far enough to see all of it.
+
+    Args:
+        low: (3,) least coordinates of the body.
+        high: (3,) greatest coordinates.
+        up: (3,) upward, of length 1.
+        toward: (3,) from the body to the visitor, of length 1.
+    """
+    middle = (low + high) / 2
+    reach = np.linalg.norm(high - low) / 2 * _MARGIN
+    eye = middle + toward * reach / np.tan(np.deg2rad(_BODY_FOV) / 2)
+    return CameraInfo(triple(eye), triple(middle), triple(up), _BODY_FOV)
+
+
+def provenance(about: dict, where: str) -> Provenance:
+    """Who was recorded, as a manifest says it.
+
+    Raises:
+        BundleError: If a part is missing.
+    """
+    try:
+        return Provenance(
+            kind=str(about["kind"]),
+            sources=tuple(str(source) for source in about["sources"]),
+            consent=str(about["consent"]),
+            licence=str(about["licence"]),
+        )
+    except (KeyError, TypeError) as error:
+        raise BundleError(f"{where}: its provenance lacks {error}.") from error
+
+
+def thumbnail(
+    gaussians: Gaussians, info: CameraInfo, background: tuple[float, float, float]
+) -> bytes:
+    """What a visitor sees first, as a PNG."""
+    camera = visitor_camera(info, _THUMBNAIL, _THUMBNAIL)
+    with torch.no_grad():
+        picture = render(gaussians, [camera], torch.tensor(background)).rgb[0]  # (H, W, 3)
+    buffer = io.BytesIO()
+    Image.fromarray((picture.clamp(0, 1) * 255 + 0.5).byte().numpy()).save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def triple(values: np.ndarray) -> tuple[float, float, float]:
+    """Three rounded numbers for a manifest."""
     x, y, z = (round(float(value), 5) for value in values)
     return x, y, z
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ico3d.bundle import limits
 from ico3d.bundle.archive import Archive, open_archive, write_zip
+from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.head import HEAD, POSES, BakedHead, poses_from_bytes
 from ico3d.bundle.manifest import MANIFEST, FileEntry, Manifest, check_manifest
 from ico3d.bundle.onnx_check import check_onnx
@@ -25,14 +26,14 @@ class Bundle:
 
     Attributes:
         manifest: What the bundle says of itself.
-        head: The baked head.
+        head: The baked head, None where there is only a body.
         world_from_head: (F, 4, 4) float32 head poses at `manifest.head.fps`, to be played back
-            and forth.
+            and forth; None without a head.
     """
 
     manifest: Manifest
-    head: BakedHead
-    world_from_head: np.ndarray
+    head: BakedHead | None
+    world_from_head: np.ndarray | None
 
     def __init__(self, archive: Archive):
         """Reads and checks every file; use `Bundle.open`.
@@ -80,22 +81,41 @@ class Bundle:
             raise BundleError(f"{name}: its content does not match the manifest's hash.")
         return data
 
+    def require_head(self) -> tuple[BakedHead, np.ndarray]:
+        """The head and its poses.
+
+        Raises:
+            BundleError: If there is only a body.
+        """
+        if self.head is None or self.world_from_head is None:
+            raise BundleError(f"the bundle of '{self.manifest.name}' has a body only, no head.")
+        return self.head, self.world_from_head
+
+    def window(self, index: int) -> BakedWindow:
+        """A window of the body.
+
+        Raises:
+            BundleError: If there is none, or its file has changed since it was opened.
+        """
+        body = self.manifest.body
+        if body is None or not 0 <= index < len(body.windows):
+            raise BundleError(f"the bundle has no window {index} of a body.")
+        info = body.windows[index]
+        return BakedWindow.from_bytes(self.read(info.file), body, info)
+
     def _check_contents(self) -> None:
         info = self.manifest.head
-        speech = self.manifest.speech
-        source = speech.input if speech else ""
-        checks = {
-            HEAD: lambda data: BakedHead.from_bytes(data, info),
-            POSES: lambda data: poses_from_bytes(data, info.num_poses),
-            THUMBNAIL: _check_thumbnail,
-            LICENSES: _check_text,
-            SPEECH: lambda data: check_onnx(data, SPEECH, source, "expression"),
-        }
-        results = {}
-        for name in self.manifest.files:
-            data = self.read(name)
-            results[name] = checks[name](data) if name in checks else None
-        self.head, self.world_from_head = results[HEAD], results[POSES]
+        self.head = self.world_from_head = None
+        if info is not None:
+            self.head = BakedHead.from_bytes(self.read(HEAD), info)
+            self.world_from_head = poses_from_bytes(self.read(POSES), info.num_poses)
+        for index in range(len(self.manifest.body.windows) if self.manifest.body else 0):
+            self.window(index)  # not kept: together they may be large
+        _check_thumbnail(self.read(THUMBNAIL))
+        if self.manifest.speech is not None:
+            check_onnx(self.read(SPEECH), SPEECH, self.manifest.speech.input, "expression")
+        if LICENSES in self.manifest.files:
+            _check_text(self.read(LICENSES))
 
 
 def write_bundle(path: Path | str, manifest: Manifest, files: Mapping[str, bytes]) -> Manifest:
@@ -139,7 +159,9 @@ def _check_listing(manifest: Manifest, archive: Archive) -> None:
 
 
 def _check_required(manifest: Manifest) -> None:
-    required = {HEAD, POSES, THUMBNAIL} | ({SPEECH} if manifest.speech else set())
+    required = {THUMBNAIL} | ({SPEECH} if manifest.speech else set())
+    required |= {HEAD, POSES} if manifest.head else set()
+    required |= {window.file for window in manifest.body.windows} if manifest.body else set()
     for name in sorted(required - set(manifest.files)):
         raise BundleError(f"{name}: is missing.")
     for name in manifest.files:

@@ -9,7 +9,9 @@ from ico3d.bundle.decode import decode, encode, parse_json
 from ico3d.errors import BundleError
 
 FORMAT = "ico3d-bundle"
-VERSION = 1
+VERSION = 2
+HEADS_ONLY = 1
+"""The version before bodies; its manifests lack `body` and are read as if it were null."""
 MANIFEST = "manifest.json"
 
 
@@ -49,6 +51,53 @@ class HeadInfo:
     fps: float
     num_poses: int
     idle_expression: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class WindowInfo:
+    """A span of the body's time with Gaussians of its own.
+
+    Attributes:
+        first: Number of its first frame, which is the last one of the window before.
+        last: Number of its last frame.
+        num_gaussians: N.
+        ranks: P, R, L: the numbers of basis vectors of positions, rotations and log-scales.
+        file: `body/0000.safetensors` and so on.
+    """
+
+    first: int
+    last: int
+    num_gaussians: int
+    ranks: tuple[int, int, int]
+    file: str
+
+
+@dataclass(frozen=True)
+class BodyInfo:
+    """The counts that the windows' tensors must agree with.
+
+    Attributes:
+        fps: Frames per second; frame i is at i / fps seconds.
+        samples_per_frame: Sampled times per frame: S = samples_per_frame · (last − first) + 1.
+        low: Least coordinates that its Gaussians' centres reach, metres.
+        high: Greatest coordinates.
+        windows: In the order of time, without gaps.
+    """
+
+    fps: float
+    samples_per_frame: int
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+    windows: tuple[WindowInfo, ...]
+
+    def num_samples(self, window: WindowInfo) -> int:
+        """S of a window."""
+        return self.samples_per_frame * (window.last - window.first) + 1
+
+
+def window_file(index: int) -> str:
+    """Name of the file of window `index`."""
+    return f"body/{index:04}.safetensors"
 
 
 @dataclass(frozen=True)
@@ -95,12 +144,14 @@ class Persona:
 
 @dataclass(frozen=True)
 class Loss:
-    """What baking costs on held-out frames, dB of whole-image PSNR; null where not measured.
+    """What baking costs on held-out pictures, dB of PSNR; null where not measured.
+
+    Of whole pictures for heads, on the person for bodies.
 
     Attributes:
         psnr_exact: The exact model against ground truth.
-        psnr_baked: The baked head against ground truth.
-        psnr_baked_vs_exact: The baked head against the exact model's render.
+        psnr_baked: The baked one against ground truth.
+        psnr_baked_vs_exact: The baked one against the exact model's render.
     """
 
     psnr_exact: float | None
@@ -120,10 +171,11 @@ class Provenance:
 
 @dataclass(frozen=True)
 class Manifest:
-    """`manifest.json`. `files` is filled in when the bundle is written."""
+    """`manifest.json` of a head, a body, or both; `files` is filled in when it is written."""
 
     name: str
-    head: HeadInfo
+    head: HeadInfo | None
+    body: BodyInfo | None
     speech: SpeechInfo | None
     camera: CameraInfo
     background: tuple[float, float, float]
@@ -149,6 +201,8 @@ class Manifest:
             raise BundleError(f"{MANIFEST}: is larger than {limits.MAX_MANIFEST_BYTES} bytes.")
         value = parse_json(data, MANIFEST)
         _check_version(value)
+        if value["version"] == HEADS_ONLY and "body" not in value:
+            value = {**value, "version": VERSION, "body": None}
         manifest = decode(Manifest, value, MANIFEST)
         check_manifest(manifest)
         return manifest
@@ -158,8 +212,10 @@ def _check_version(value: Any) -> None:
     """The format comes first: a newer version has other fields."""
     if not isinstance(value, dict) or value.get("format") != FORMAT:
         raise BundleError(f"{MANIFEST}: this is no ico3d bundle (format is not '{FORMAT}').")
-    if value.get("version") != VERSION:
-        raise BundleError(f"{MANIFEST}: this program reads bundles of version {VERSION} only.")
+    if value.get("version") not in (HEADS_ONLY, VERSION):
+        raise BundleError(
+            f"{MANIFEST}: this program reads bundles of versions {HEADS_ONLY} and {VERSION} only."
+        )
 
 
 def check_manifest(manifest: Manifest) -> None:
@@ -168,7 +224,12 @@ def check_manifest(manifest: Manifest) -> None:
     Raises:
         BundleError: Naming the first field that is wrong.
     """
-    _check_head(manifest.head)
+    parts = manifest.head is not None or manifest.body is not None
+    _require(parts, "head", "be there where no body is")
+    if manifest.head is not None:
+        _check_head(manifest.head)
+    if manifest.body is not None:
+        _check_body(manifest.body)
     _check_speech(manifest)
     _check_camera(manifest.camera)
     _require(all(0 <= c <= 1 for c in manifest.background), "background", "lie between 0 and 1")
@@ -198,14 +259,41 @@ def _check_head(head: HeadInfo) -> None:
     _require(inside, "head.eye_offset", f"leave room for 7 of the {size} values")
 
 
+def _check_body(body: BodyInfo) -> None:
+    _require(0 < body.fps <= 1000, "body.fps", "lie between 0 and 1000")
+    top = limits.MAX_SAMPLES_PER_FRAME
+    inside = 1 <= body.samples_per_frame <= top
+    _require(inside, "body.samples_per_frame", f"lie between 1 and {top}")
+    ordered = all(a <= b for a, b in zip(body.low, body.high, strict=True))
+    _require(ordered, "body.low", "be at most body.high")
+    _require(len(body.windows) > 0, "body.windows", "hold one at least")
+    for index, window in enumerate(body.windows):
+        _check_window(body, index, window)
+
+
+def _check_window(body: BodyInfo, index: int, window: WindowInfo) -> None:
+    where = f"body.windows[{index}]"
+    _require(window.file == window_file(index), f"{where}.file", f"be {window_file(index)}")
+    count, top = window.num_gaussians, limits.MAX_GAUSSIANS
+    _require(1 <= count <= top, f"{where}.num_gaussians", f"lie between 1 and {top}")
+    top = limits.MAX_BODY_RANK
+    inside = all(1 <= rank <= top for rank in window.ranks)
+    _require(inside, f"{where}.ranks", f"lie between 1 and {top}")
+    length, top = window.last - window.first, limits.MAX_WINDOW_FRAMES
+    _require(1 <= length <= top, f"{where}.last", f"be 1 to {top} frames after its first")
+    _require(body.num_samples(window) >= 3, f"{where}.last", "leave three sampled times")
+    begins = body.windows[index - 1].last if index else 0
+    _require(window.first == begins, f"{where}.first", f"be {begins}")
+
+
 def _check_speech(manifest: Manifest) -> None:
-    speech = manifest.speech
-    driven = manifest.head.inputs == "speech"
+    speech, head = manifest.speech, manifest.head
+    driven = head is not None and head.inputs == "speech"
     _require(driven == (speech is not None), "speech", "be there just for heads driven by speech")
     if speech is not None:
         _require(speech.input in ("mel", "features"), "speech.input", "be mel or features")
         _require(0 < speech.fps <= 1000, "speech.fps", "lie between 0 and 1000")
-        _require(manifest.head.eye_offset == 32, "head.eye_offset", "be 32 for speech")
+        _require(head is None or head.eye_offset == 32, "head.eye_offset", "be 32 for speech")
 
 
 def _check_camera(camera: CameraInfo) -> None:

@@ -10,7 +10,13 @@ from safetensors.numpy import save
 from ico3d.bundle.decode import parse_json
 from ico3d.errors import BundleError
 
-_DTYPES = {"F32": np.dtype("<f4"), "F16": np.dtype("<f2"), "I8": np.dtype("i1")}
+_DTYPES = {
+    "F32": np.dtype("<f4"),
+    "F16": np.dtype("<f2"),
+    "I16": np.dtype("<i2"),
+    "I8": np.dtype("i1"),
+    "U8": np.dtype("u1"),
+}
 _MAX_HEADER_BYTES = 1 << 16
 
 Spec = Mapping[str, tuple[str, tuple[int, ...]]]

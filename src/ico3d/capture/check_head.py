@@ -11,6 +11,10 @@ STEADY = (27, 28, 29, 30, 36, 39, 42, 45)
 """Landmarks that hardly move with the expression: nose bridge and eye corners."""
 
 
+USUAL_FPS = 25.0
+"""At fewer frames per second, heads move further between them."""
+
+
 def _all_poses(capture: Capture) -> Iterator[tuple[int, np.ndarray]]:
     """Frames that have a head pose."""
     for frame in range(capture.num_frames):
@@ -53,7 +57,8 @@ def motion(capture: Capture) -> Finding:
         f"{1e3 * np.median(moves):.2f} mm; largest {np.degrees(max(turns)):.1f}°, "
         f"{1e3 * max(moves):.1f} mm"
     )
-    wild = np.median(turns) > np.radians(2) or max(moves) > 0.1
+    slower = max(1.0, (USUAL_FPS / capture.fps) ** 2)
+    wild = np.median(turns) > np.radians(2) * slower or max(moves) > 0.1 * slower
     return Finding("motion", "warn" if wild else "ok", text)
 
 

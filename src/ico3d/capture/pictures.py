@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera
 
 
@@ -21,6 +22,11 @@ class View:
     camera_index: int
     frame: int
     camera: Camera
+
+
+def train_cameras(capture: Capture) -> tuple[int, ...]:
+    """Numbers of the cameras that may be learnt from."""
+    return tuple(i for i in range(len(capture.cameras)) if i not in capture.split.test_cameras)
 
 
 Layers = tuple[np.ndarray | None, ...]

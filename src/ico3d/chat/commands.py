@@ -15,7 +15,7 @@ DEMO = Path(__file__).parent / "data" / "demo.ico3d"
 
 @dataclass(frozen=True)
 class Serve:
-    """Serves a bundle: opens a page where anyone can talk with it.
+    """Serves a bundle: a page where anyone can talk with it, or watch it if it is a body alone.
 
     Attributes:
         bundle: The avatar: NAME.ico3d or its folder.
@@ -47,11 +47,11 @@ class Serve:
         settings = read_settings(self.settings)
         listener = server.bind(self.host, self.port)
         bundle = Bundle.open(self.bundle)
-        avatar = server.open_avatar(bundle, settings)
+        avatar = server.open_avatar(bundle, settings) if bundle.manifest.head else None
         app = server.make_app(bundle, avatar, self.host)
         url = server.address(listener)
         print(f"{bundle.manifest.persona.name} is at {url} (Ctrl+C ends)")
-        for line in described(avatar.services.described()):
+        for line in described(avatar.services.described()) if avatar else []:
             print(line)
         if not (server.STATIC / "index.html").is_file():
             print("The page is not built: run `make viewer`.", file=sys.stderr)

@@ -8,6 +8,7 @@ import numpy as np
 from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.bundle.manifest import HeadInfo
 from ico3d.chat.protocol import EXPRESSION_FPS, SPEECH_RATE
+from ico3d.errors import BundleError
 from ico3d.speech.eyes import EyeBehaviour
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions
 
@@ -85,10 +86,14 @@ def open_face(bundle: Bundle) -> tuple[HeadInfo, SpeechModel | None]:
     """What a server needs of a bundle to move its face; the model serves all sessions.
 
     Raises:
+        BundleError: If the bundle has no head.
         ModelError: If the bundle's speech model cannot be used.
     """
+    info = bundle.manifest.head
+    if info is None:
+        raise BundleError(f"the bundle of '{bundle.manifest.name}' has no head to talk with.")
     model = SpeechModel(bundle.read(SPEECH)) if bundle.manifest.speech else None
-    return bundle.manifest.head, model
+    return info, model
 
 
 @dataclass(frozen=True)

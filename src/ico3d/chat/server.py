@@ -32,6 +32,7 @@ def open_avatar(bundle: Bundle, settings: ChatSettings) -> Avatar:
     """What the sessions share.
 
     Raises:
+        BundleError: If the bundle has no head.
         SettingsError: If a service is unknown.
         ModelError: If the bundle's speech model cannot be used.
     """
@@ -39,24 +40,25 @@ def open_avatar(bundle: Bundle, settings: ChatSettings) -> Avatar:
     return Avatar(head, speech, bundle.manifest.persona, choose(settings), settings)
 
 
-def make_app(bundle: Bundle, avatar: Avatar, host: str, sessions: Sessions | None = None) -> Guard:
+def make_app(
+    bundle: Bundle, avatar: Avatar | None, host: str, sessions: Sessions | None = None
+) -> Guard:
     """The application.
 
     Args:
         bundle: What the page loads.
-        avatar: What the sessions share.
+        avatar: What the sessions share; None for a body alone, which does not talk.
         host: The address that the server is bound to.
         sessions: Where sessions live; a new place by default.
     """
-    sessions = Sessions(avatar) if sessions is None else sessions
-    notices = [] if avatar.speech else [STILL]
-    described = avatar.services.described()
-    welcome = Welcome(protocol.VERSION, "-", False, described, notices)
+    if avatar is not None and sessions is None:
+        sessions = Sessions(avatar)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         yield
-        await sessions.close_all()
+        if sessions is not None:
+            await sessions.close_all()
 
     app = FastAPI(lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
 
@@ -64,17 +66,26 @@ def make_app(bundle: Bundle, avatar: Avatar, host: str, sessions: Sessions | Non
     async def health() -> JSONResponse:
         return JSONResponse({"ok": True})
 
-    @app.get("/bundle/{name}")
+    @app.get("/bundle/{name:path}")
     async def bundle_file(name: str, request: Request) -> Response:
         return await asyncio.to_thread(serve_file, bundle, name, request)
+
+    if avatar is not None and sessions is not None:
+        add_conversation(app, avatar, sessions)
+    add_page(app)
+    return Guard(app, host)
+
+
+def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
+    """The WebSocket."""
+    notices = [] if avatar.speech else [STILL]
+    described = avatar.services.described()
+    welcome = Welcome(protocol.VERSION, "-", False, described, notices)
 
     @app.websocket("/ws")
     async def conversation(socket: WebSocket) -> None:
         await socket.accept()
         await Connection(socket, sessions, welcome).run()
-
-    add_page(app)
-    return Guard(app, host)
 
 
 def serve_file(bundle: Bundle, name: str, request: Request) -> Response:

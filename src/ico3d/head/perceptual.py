@@ -1,5 +1,7 @@
 """The perceptual loss: distance of VGG-16 features (Johnson et al., cited by the paper)."""
 
+from collections.abc import Sequence
+
 import torch
 from safetensors.torch import load_file
 from torch import Tensor, nn
@@ -32,7 +34,7 @@ class PerceptualLoss(nn.Module):
         """
         super().__init__()
         path = model_file(WEIGHTS, "the perceptual loss")
-        self.features = _convolutions()
+        self.features = vgg_layers(CHANNELS)
         tensors = load_file(path)
         try:
             self.load_state_dict({name: tensors[name] for name in self.state_dict()})
@@ -53,10 +55,11 @@ class PerceptualLoss(nn.Module):
         return total
 
 
-def _convolutions() -> nn.Sequential:
+def vgg_layers(channels_of: Sequence[int]) -> nn.Sequential:
+    """Convolutions with ReLU, numbered as in torchvision; 0 channels stand for a max pooling."""
     layers: list[nn.Module] = []
     width = 3
-    for channels in CHANNELS:
+    for channels in channels_of:
         if channels == 0:
             layers.append(nn.MaxPool2d(2))
             continue

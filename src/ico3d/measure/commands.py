@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -12,15 +12,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Measures a trained head or static scene against a capture, its own or another.
+    """Measures a trained head, body or static scene against a capture, its own or another.
 
     Attributes:
-        model: A model folder that ico3d train head or ico3d train static wrote.
+        model: A model folder that ico3d train head, train body or train static wrote.
         capture: The capture with the truth; its sound or blendshapes drive the head.
         json: File for the metrics.
         images: Folder for pictures: {pred,gt,mask}/CAMERA/%06d.png.
         frames: The capture's test frames (of a single moment: its test cameras), or all of them
-            (for a capture that trained nothing).
+            (for a capture that trained nothing); of bodies: all frames by the test cameras, or by
+            all cameras.
+        plots: Of bodies: folder for PSNR over frames and by camera, as pictures.
+        untuned: Of bodies: measure the windows as they were before temporal fine-tuning.
     """
 
     model: tyro.conf.Positional[Path]
@@ -28,6 +31,8 @@ class Evaluate:
     json: Path | None = None
     images: Path | None = None
     frames: Literal["test", "all"] = "test"
+    plots: Path | None = None
+    untuned: bool = False
 
     def run(self) -> None:
         """Prints the metrics, writes what was asked for."""
@@ -43,23 +48,41 @@ class Evaluate:
             write_atomic(self.json, json.dumps(metrics, indent=1).encode())
         console = Console()
         for name, value in metrics.items():
-            console.print(f"{name:16} {'not measured' if value is None else f'{value:.3f}'}")
+            if isinstance(value, list):
+                continue  # parts of the whole: for the file
+            console.print(f"{name:16} {'not measured' if value is None else f'{value:.5g}'}")
 
-    def _metrics(self, capture: "Capture") -> dict[str, float | None]:
-        """Measures a scene, if the folder holds one, else a head."""
-        from ico3d.scene.trained import ABOUT, TrainedScene
+    def _metrics(self, capture: "Capture") -> dict:
+        """Measures what the folder holds: a scene, a body, else a head."""
+        from ico3d.body.trained import ABOUT as BODY
+        from ico3d.scene.trained import ABOUT as SCENE
 
-        if (self.model / ABOUT).is_file():
+        if (self.model / SCENE).is_file():
             from ico3d.measure.scene import evaluate_scene
+            from ico3d.scene.trained import TrainedScene
 
             scene = TrainedScene.load(self.model)
             return evaluate_scene(scene, capture, self.frames, self.images)
+        if (self.model / BODY).is_file():
+            return self._body(capture)
         from ico3d.head.trained import TrainedHead
         from ico3d.measure.evaluate import evaluate_head
 
         head = TrainedHead.load(self.model)
         frames = capture.split.test if self.frames == "test" else range(capture.num_frames)
         return evaluate_head(head, capture, frames, self.images)
+
+    def _body(self, capture: "Capture") -> dict:
+        from ico3d.body.trained import ABOUT, UNTUNED, TrainedBody
+        from ico3d.measure.body import evaluate_body
+        from ico3d.measure.body_plots import plot_body
+
+        body = TrainedBody.load(self.model, UNTUNED if self.untuned else ABOUT)
+        cameras = range(len(capture.cameras)) if self.frames == "all" else None
+        metrics = evaluate_body(body, capture, cameras, images=self.images)
+        if self.plots is not None:
+            plot_body(metrics, self.plots)
+        return metrics
 
 
 SCENES = ((5_000, 256), (20_000, 256), (50_000, 512), (100_000, 1024), (200_000, 1024))
@@ -168,3 +191,89 @@ class BenchTalk:
         for name, values in figures.items():
             table.add_row(name, f"{values['p50']:.0f}", f"{values['p95']:.0f}")
         Console().print(table)
+
+
+Method = Literal["swings++", "swings", "4dgs", "spacetime", "freetime", "static"]
+
+
+@dataclass(frozen=True)
+class BenchBody:
+    """Trains SWinGS++ and what it is compared with on one recording, and measures all of them.
+
+    As many Gaussians and steps for each: a method that takes the clip as one window has those of
+    all windows. All begin on the visual hull. The same command goes on where it was interrupted.
+
+    Attributes:
+        capture: A recording of a whole person; by default one is made of --subject.
+        subject: The person of the standard recording, an .npz file.
+        folder: Where the recording and the trainings lie.
+        seeds: How often each method is trained.
+        methods: Which.
+        frames: Only so many of the first frames; all by default.
+        finetune: Fine-tune SWinGS++ in the end, and measure before and after; the table shows it
+            as it was before.
+        set: Changes to the cpu preset of all methods, as name=value.
+        jobs: Trainings at a time; they share the cores.
+        json: File for the figures.
+    """
+
+    capture: tyro.conf.Positional[Path | None] = None
+    subject: Path | None = None
+    folder: Path = Path("bench-body")
+    seeds: int = 1
+    methods: tuple[Method, ...] = ("swings++", "swings", "4dgs", "spacetime", "freetime", "static")
+    frames: int | None = None
+    finetune: bool = False
+    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
+    jobs: int = 1
+    json: Path | None = None
+
+    def run(self) -> None:
+        """Prints the table and margins, writes the figures.
+
+        Raises:
+            SettingsError: If there is neither a recording nor a person to record.
+        """
+        import json
+
+        from rich.console import Console
+
+        from ico3d.common.files import write_atomic
+        from ico3d.measure import body_bench, body_tables
+
+        console = Console()
+        terms = body_bench.terms_for(
+            self._recording(), self.frames, self.folder, self.set, self.finetune
+        )
+        trials = [
+            body_bench.Trial(method, seed, terms)
+            for seed in range(self.seeds)
+            for method in self.methods
+        ]
+        results = body_bench.run_trials(
+            trials, self.jobs, lambda *found: console.print(body_tables.line(*found))
+        )
+        figures = body_bench.summary(results)
+        figures["windows"] = [[window.first, window.last] for window in terms.windows]
+        figures["jobs"] = self.jobs
+        if self.json is not None:
+            write_atomic(self.json, json.dumps(figures, indent=1).encode())
+        for table in body_tables.tables(figures):
+            console.print(table)
+
+    def _recording(self) -> Path:
+        """The capture to train on."""
+        import os
+
+        from ico3d.errors import SettingsError
+        from ico3d.measure.body_bench import record_standard
+
+        if self.seeds < 1 or self.jobs < 1 or (self.frames or 2) < 2:
+            raise SettingsError("--seeds and --jobs must be at least 1, and --frames at least 2.")
+        if self.capture is not None:
+            return self.capture
+        if self.subject is None:
+            raise SettingsError(
+                "ico3d bench body needs a capture, or a person to record: --subject FILE.npz."
+            )
+        return record_standard(self.subject, self.folder / "capture", os.cpu_count() or 1)

@@ -1,9 +1,19 @@
 """Picture metrics, with the one meaning they have everywhere (design, section 2)."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 MOUTH = slice(48, 68)
 """The mouth among the 68 landmarks."""
+
+MOTION = 25 / 255
+"""Change of a colour channel from frame to frame above which a pixel moves."""
+SPREAD = 3
+"""Pixels around a moving one that count as moving too."""
+FEWEST_MOVING = 50
+"""Moving pixels of the person below which a picture tells nothing about motion: a lone pixel
+spreads over 49."""
 
 
 def psnr(predicted: np.ndarray, truth: np.ndarray, mask: np.ndarray | None = None) -> float | None:
@@ -26,6 +36,39 @@ def psnr(predicted: np.ndarray, truth: np.ndarray, mask: np.ndarray | None = Non
             return None
         error = (squares * mask[..., None]).sum() / (3 * weight)
     return float(-10 * np.log10(max(error, 1e-12)))
+
+
+def moving_pixels(picture: np.ndarray, neighbours: Sequence[np.ndarray]) -> np.ndarray:
+    """Where something moves: what differs from the frame before or after, and what is near it.
+
+    Args:
+        picture: (H, W, 3) in [0, 1], as recorded.
+        neighbours: The frames before and after by the same camera, as far as there are any.
+
+    Returns:
+        (H, W) bool: some channel differs from some neighbour by more than `MOTION` within `SPREAD`
+        pixels along rows and columns.
+    """
+    from scipy.ndimage import maximum_filter
+
+    moved = np.zeros(picture.shape[:2], bool)
+    for other in neighbours:
+        moved |= (np.abs(picture - other) > MOTION).any(-1)
+    return maximum_filter(moved, size=2 * SPREAD + 1, mode="constant")
+
+
+def psnr_moving(predicted: np.ndarray, truth: np.ndarray, weight: np.ndarray) -> float | None:
+    """PSNR on moving pixels of the person.
+
+    Args:
+        predicted: (H, W, 3) in [0, 1].
+        truth: (H, W, 3) in [0, 1].
+        weight: (H, W) the mask where pixels move (`moving_pixels`), else 0.
+
+    Returns:
+        dB, or None where `weight` adds up to fewer than `FEWEST_MOVING` pixels.
+    """
+    return None if weight.sum() < FEWEST_MOVING else psnr(predicted, truth, weight)
 
 
 def mouth_box(landmarks: np.ndarray, height: int, width: int) -> tuple[slice, slice] | None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ico3d.capture.capture import Capture
+from ico3d.capture.hull import Silhouette, focus, looked_at, visual_hull
 from ico3d.capture.pictures import View
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
@@ -16,12 +17,10 @@ from ico3d.splat.initial import in_pictures, resampled
 
 SAMPLED_VIEWS = 24
 """Views that are looked at: more tell nothing new."""
-CANDIDATES = 60_000
-"""Points that are carved by the masks."""
+HULL_VOXELS = 50
+"""Voxels of the visual hull, across half of what the pictures hold."""
 DEPTHS = 0.5, 6.0
 """How far away a background may be, in distances of the cameras from what they look at."""
-MOST_PARALLEL = 1e4
-"""Condition above which viewing directions count as parallel: under a degree apart."""
 CAMERA_MARGIN = 1.1
 """3DGS's factor from the spread of the cameras to the extent of the scene."""
 
@@ -54,7 +53,7 @@ def initial_scene(
     count = min(settings.initial_gaussians, settings.max_gaussians)
     surface = None if views.only == "background" else _surface(capture, views, some)
     if views.only == "person":
-        surface = _hull(views, some, rng) if surface is None else surface
+        surface = _hull(views, some) if surface is None else surface
         points = resampled(surface, count, rng)  # (N, 3)
         extent = float(np.ptp(points, axis=0).max() / 2)
     else:
@@ -87,62 +86,32 @@ def _surface(capture: Capture, views: SceneViews, some: Sequence[View]) -> np.nd
     return seen if len(seen) >= 4 else None
 
 
-def _hull(views: SceneViews, some: Sequence[View], rng: np.random.Generator) -> np.ndarray:
-    """(P, 3) points that lie within the mask of every picture that holds them."""
-    center, radius = _common_ball([view.camera for view in some], views)
-    points = center + radius * rng.uniform(-1, 1, (CANDIDATES, 3))  # (CANDIDATES, 3)
-    inside = in_pictures(points, [view.camera for view in some])  # (C, CANDIDATES)
-    kept = inside.sum(0) >= min(2, len(some))
-    for view, held in zip(some, inside, strict=True):
-        mask = views.layers(view)[1]
-        if mask is not None:
-            kept[held] &= _pixels(mask.numpy(), points[held], view.camera) > 0.5
-    if kept.sum() < 4:
-        raise CaptureError(
-            f"{views.path}: the masks of its cameras agree on no place where the person is: "
-            "check cameras and masks with ico3d capture check."
-        )
-    return points[kept]
-
-
-def _common_ball(cameras: Sequence[Camera], views: SceneViews) -> tuple[np.ndarray, float]:
-    """Middle (3,) and radius of what the cameras look at.
+def _hull(views: SceneViews, some: Sequence[View]) -> np.ndarray:
+    """(P, 3) points on the surface of what all masks agree on.
 
     Raises:
-        CaptureError: If they do not look at one place from different sides.
+        CaptureError: If the person cannot be placed.
     """
-    middle = _focus(cameras)
-    if middle is None:
+    box = looked_at([view.camera for view in some])
+    if box is None:
         raise CaptureError(
             f"{views.path} has neither surface points nor cameras that look at one place from "
             "different sides: a person cannot be placed in depth."
         )
-    widths = [
-        np.linalg.norm(middle - camera.camera_to_world[:3, 3])
-        * max(camera.width / camera.intrinsics[0, 0], camera.height / camera.intrinsics[1, 1])
-        for camera in cameras
-    ]
-    return middle, float(np.median(widths)) / 2
-
-
-def _focus(cameras: Sequence[Camera]) -> np.ndarray | None:
-    """(3,) the place nearest to all optical axes; None where they are all but parallel."""
-    centers, axes = _rays(cameras)
-    across = np.eye(3) - axes[:, :, None] * axes[:, None]  # (C, 3, 3)
-    if np.linalg.cond(across.sum(0)) > MOST_PARALLEL:
-        return None
-    return np.linalg.solve(across.sum(0), (across @ centers[:, :, None]).sum(0))[:, 0]
-
-
-def _rays(cameras: Sequence[Camera]) -> tuple[np.ndarray, np.ndarray]:
-    """Centres (C, 3) and viewing directions (C, 3)."""
-    poses = np.stack([camera.camera_to_world for camera in cameras])  # (C, 4, 4)
-    return poses[:, :3, 3], poses[:, :3, 2]
+    masks = [(view.camera, views.layers(view)[1]) for view in some]
+    seen = [Silhouette.of(camera, mask.numpy()) for camera, mask in masks if mask is not None]
+    hull = visual_hull(seen, box[1] / HULL_VOXELS)
+    if hull is None or len(hull.surface) < 4:
+        raise CaptureError(
+            f"{views.path}: the masks of its cameras agree on no place where the person is: "
+            "check cameras and masks with ico3d capture check."
+        )
+    return hull.surface
 
 
 def _camera_spread(views: Sequence[View]) -> float:
     """Greatest distance of a camera from the middle of them all, metres."""
-    centers, _ = _rays([view.camera for view in views])
+    centers = np.stack([view.camera.camera_to_world[:3, 3] for view in views])  # (C, 3)
     return float(np.linalg.norm(centers - centers.mean(0), axis=1).max())
 
 
@@ -158,7 +127,7 @@ def _reach(capture: Capture, some: Sequence[View]) -> float:
             f"{capture.path}: all pictures were taken from one place: depth cannot be seen."
         )
     cameras = [view.camera for view in some]
-    middle = _focus(cameras)
+    middle = focus(cameras)
     if middle is None:
         return 2 * spread
     depth = float(np.median([camera.project(middle)[1] for camera in cameras]))

@@ -1,6 +1,8 @@
 """Checkpoints: one safetensors file with tensors and a JSON state, written atomically."""
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from safetensors import SafetensorError, safe_open
@@ -23,12 +25,24 @@ def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict]:
     Raises:
         ModelError: If the file is missing, damaged, or was written by something else.
     """
+    with _opened(path) as file:
+        state = json.loads((file.metadata() or {})["state"])
+        return {name: file.get_tensor(name) for name in file.keys()}, state  # noqa: SIM118
+
+
+def load_state(path: Path) -> dict:
+    """Only the state, without reading the tensors; arguments and errors as for `load_tensors`."""
+    with _opened(path) as file:
+        return json.loads((file.metadata() or {})["state"])
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[safe_open]:
     if not path.is_file():
         raise ModelError(f"there is no model file at {path}.")
     try:
         with safe_open(path, framework="pt") as file:
-            state = json.loads((file.metadata() or {})["state"])
-            return {name: file.get_tensor(name) for name in file.keys()}, state  # noqa: SIM118
+            yield file
     except (SafetensorError, KeyError, ValueError, OSError) as error:
         raise ModelError(
             f"{path} is damaged or no file of ico3d ({error}): train again."

@@ -2,12 +2,17 @@
 
 import json
 import logging
+import os
 from collections.abc import Mapping
 from pathlib import Path
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ico3d.common.files import write_atomic
+
+METRICS = "metrics.jsonl"
+TAIL = 4096
+"""Bytes at the end of a metrics file that surely hold a whole entry."""
 
 
 class MetricsLog:
@@ -21,7 +26,7 @@ class MetricsLog:
         logging.getLogger("tensorboard").setLevel(logging.ERROR)
         from torch.utils.tensorboard import SummaryWriter
 
-        path = folder / "metrics.jsonl"
+        path = folder / METRICS
         # In one piece: a run killed right here must not lose what earlier ones wrote.
         write_atomic(path, "".join(_entries_before(path, first_step)).encode())
         self._file = path.open("a")
@@ -46,6 +51,22 @@ def _entries_before(path: Path, step: int) -> list[str]:
         return []
     lines = path.read_text().splitlines(keepends=True)
     return [line for line in lines if line.endswith("\n") and json.loads(line)["step"] < step]
+
+
+def latest_entry(folder: Path) -> dict | None:
+    """The last entry in a run's metrics.jsonl, which somebody may be writing to; None without."""
+    try:
+        with (folder / METRICS).open("rb") as file:
+            file.seek(max(file.seek(0, os.SEEK_END) - TAIL, 0))
+            whole = file.read().rpartition(b"\n")[0]
+    except FileNotFoundError:
+        return None
+    return json.loads(whole.rpartition(b"\n")[2]) if whole else None
+
+
+def readable(numbers: Mapping[str, float]) -> str:
+    """The numbers in the order the trainee gave them."""
+    return "  ".join(f"{name} {value:.4g}" for name, value in numbers.items())
 
 
 def progress_bar() -> Progress:

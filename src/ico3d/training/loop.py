@@ -4,13 +4,14 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 from torch import Tensor
 
 from ico3d.training.finite import NotFiniteError, check_finite
-from ico3d.training.log import MetricsLog, progress_bar
-from ico3d.training.run import RunFolder
+from ico3d.training.log import MetricsLog, progress_bar, readable
+from ico3d.training.run import RunFolder, checkpoint_state
 
 
 class Trainee(Protocol):
@@ -97,7 +98,7 @@ def run_loop(
                     check_finite(trainee.tensors())
                     numbers = {name: float(value) for name, value in values.items()}
                     log.write(index, numbers)
-                    bar.update(task, numbers=_readable(numbers))
+                    bar.update(task, numbers=readable(numbers))
                 if watch is not None:
                     watch.after_step(done, values)
                 if done % settings.checkpoint_every == 0 and done < settings.steps:
@@ -129,6 +130,7 @@ def _resume(trainee: Trainee, run: RunFolder) -> tuple[int, float]:
     return state["step"], state["seconds"]
 
 
-def _readable(numbers: Mapping[str, float]) -> str:
-    """The numbers in the order the trainee gave them."""
-    return "  ".join(f"{name} {value:.4g}" for name, value in numbers.items())
+def saved_steps(folder: Path) -> int:
+    """Steps that a run has behind it at its latest checkpoint; somebody may be running it."""
+    state = checkpoint_state(folder)
+    return 0 if state is None else state["step"]

@@ -7,8 +7,10 @@ from pathlib import Path
 from torch import Tensor
 
 from ico3d.common.files import remove_unfinished, write_atomic
-from ico3d.errors import SettingsError
-from ico3d.training.checkpoint import load_tensors, save_tensors
+from ico3d.errors import ModelError, SettingsError
+from ico3d.training.checkpoint import load_state, load_tensors, save_tensors
+
+CHECKPOINT = "checkpoint.safetensors"
 
 
 class RunFolder:
@@ -50,7 +52,7 @@ class RunFolder:
 
     @property
     def _checkpoint_file(self) -> Path:
-        return self.path / "checkpoint.safetensors"
+        return self.path / CHECKPOINT
 
     def checkpoint(self) -> tuple[dict[str, Tensor], dict] | None:
         """The latest checkpoint, or None before the first."""
@@ -70,3 +72,14 @@ class RunFolder:
         """The summary of a finished run, None while it is not."""
         file = self.path / "finished.json"
         return json.loads(file.read_text()) if file.exists() else None
+
+
+def checkpoint_state(folder: Path) -> dict | None:
+    """The state in a run's latest checkpoint, None before the first.
+
+    Leaves the folder as it is, which opening the run would not: somebody may be writing to it.
+    """
+    try:
+        return load_state(folder / CHECKPOINT)
+    except ModelError:
+        return None

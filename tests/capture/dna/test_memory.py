@@ -33,7 +33,9 @@ LOOK = textwrap.dedent(
             capture.keypoints_2d(camera, frame), capture.smplx(frame)
         sizes.append(resident())
     opened = len(__import__("os").listdir("/proc/self/fd"))
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    # Not ru_maxrss: that remembers the process this one was started from.
+    with open("/proc/self/status") as file:
+        peak = 1024 * next(int(line.split()[1]) for line in file if line.startswith("VmHWM"))
     print(json.dumps({"sizes": sizes, "peak": peak, "open": opened}))
     """
 )

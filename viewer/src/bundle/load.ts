@@ -1,12 +1,12 @@
 import { PageError } from '../errors.ts';
 import { readBakedHead, type BakedHead } from '../head/baked.ts';
-import { checkManifest, type Manifest } from './manifest.ts';
+import { checkManifest, type HeadInfo, type Manifest } from './manifest.ts';
 import { parseSafetensors, takeTensor } from './safetensors.ts';
 
-/** A bundle's content, checked and ready for the GPU. */
-export interface Bundle {
-  manifest: Manifest;
-  head: BakedHead;
+/** A head's files, checked and ready for the GPU. */
+export interface HeadFiles {
+  info: HeadInfo;
+  baked: BakedHead;
   poses: Float32Array; // (F,4,4) row-major world_from_head
 }
 
@@ -22,11 +22,15 @@ export async function loadManifest(): Promise<Manifest> {
 }
 
 /**
- * Fetches and checks what the page draws.
+ * Fetches and checks a head.
  *
  * @param onProgress called with the loaded fraction, 0 to 1
  */
-export async function loadBundle(manifest: Manifest, onProgress: (fraction: number) => void): Promise<Bundle> {
+export async function loadHead(
+  manifest: Manifest,
+  info: HeadInfo,
+  onProgress: (fraction: number) => void,
+): Promise<HeadFiles> {
   const names = ['head.safetensors', 'head_poses.safetensors'];
   const total = names.reduce((sum, name) => sum + (manifest.files[name]?.size ?? 0), 0);
   let loaded = 0;
@@ -38,12 +42,11 @@ export async function loadBundle(manifest: Manifest, onProgress: (fraction: numb
       }),
     ),
   );
-  const shape = [manifest.head.num_poses, 4, 4];
   const poseTensors = parseSafetensors(poses!, names[1]!);
   return {
-    manifest,
-    head: readBakedHead(parseSafetensors(head!, names[0]!), manifest.head, names[0]!),
-    poses: takeTensor(poseTensors, 'world_from_head', 'F32', shape, names[1]!).data as Float32Array,
+    info,
+    baked: readBakedHead(parseSafetensors(head!, names[0]!), info, names[0]!),
+    poses: takeTensor(poseTensors, 'world_from_head', 'F32', [info.num_poses, 4, 4], names[1]!).data as Float32Array,
   };
 }
 
@@ -58,7 +61,16 @@ async function get(name: string): Promise<Response> {
   return response;
 }
 
-async function loadFile(manifest: Manifest, name: string, onBytes: (n: number) => void): Promise<ArrayBuffer> {
+/**
+ * Fetches one file of the bundle; its size and hash must be those of the manifest.
+ *
+ * @param onBytes called with the number of bytes that came
+ */
+export async function loadFile(
+  manifest: Manifest,
+  name: string,
+  onBytes: (n: number) => void = () => {},
+): Promise<ArrayBuffer> {
   const entry = manifest.files[name];
   if (!entry) throw new PageError(`manifest.json does not list ${name}.`);
   const reader = (await get(name)).body!.getReader();

@@ -8,29 +8,52 @@ export interface StartCamera {
   fov_y: number; // degrees
 }
 
+/** The counts of a head. */
+export interface HeadInfo {
+  num_gaussians: number;
+  rank: number;
+  hidden: number;
+  inputs: 'speech' | 'blendshapes';
+  expression_size: number;
+  eye_offset: number | null;
+  expression_names: string[];
+  fps: number;
+  num_poses: number;
+  idle_expression: number[];
+}
+
+/** A span of the body's frames, both ends inside, with Gaussians of its own. */
+export interface WindowInfo {
+  first: number;
+  last: number;
+  num_gaussians: number;
+  ranks: [number, number, number]; // of positions, rotations, log-scales
+  file: string;
+}
+
+/** The body's times and counts; windows without gaps, in the order of time. */
+export interface BodyInfo {
+  fps: number;
+  samples_per_frame: number;
+  windows: WindowInfo[];
+}
+
 /** What the page reads of `manifest.json`; `docs/bundle.md` describes it whole. */
 export interface Manifest {
   name: string;
   files: Record<string, { sha256: string; size: number }>;
-  head: {
-    num_gaussians: number;
-    rank: number;
-    hidden: number;
-    inputs: 'speech' | 'blendshapes';
-    expression_size: number;
-    eye_offset: number | null;
-    expression_names: string[];
-    fps: number;
-    num_poses: number;
-    idle_expression: number[];
-  };
+  head: HeadInfo | null;
+  body: BodyInfo | null;
   camera: StartCamera;
   background: [number, number, number];
   persona: { name: string; greeting: string };
 }
 
 const FORMAT = 'ico3d-bundle';
-const VERSION = 1;
+const VERSION = 2;
+const HEADS_ONLY = 1; // the version before bodies
+const MOST_LAYERS = 48; // basis vectors of a window; WebGL2 promises 256 layers of a texture
+const MOST_GAUSSIANS = 1_000_000;
 
 /**
  * Checks a parsed manifest as far as the page relies on it.
@@ -40,18 +63,42 @@ const VERSION = 1;
 export function checkManifest(value: unknown): Manifest {
   const manifest = value as Manifest & { format?: string; version?: number };
   if (manifest?.format !== FORMAT) throw new PageError('manifest.json is not that of an avatar bundle.');
-  if (manifest.version !== VERSION) {
-    throw new PageError(`This avatar has format version ${manifest.version}; the page reads ${VERSION}.`);
+  if (manifest.version !== VERSION && manifest.version !== HEADS_ONLY) {
+    throw new PageError(`This avatar has format version ${manifest.version}; the page reads up to ${VERSION}.`);
   }
   const { head, camera, background } = manifest;
-  for (const key of ['num_gaussians', 'rank', 'hidden', 'expression_size', 'num_poses', 'fps'] as const) {
-    if (!(Number.isFinite(head?.[key]) && head[key] > 0)) bad(`head.${key}`);
-  }
-  if (!isNumbers(head.idle_expression, head.expression_size)) bad('head.idle_expression');
+  const body = manifest.body ?? null;
+  if (!head && !body) bad('head');
+  if (head) checkHead(head);
+  if (body) checkBody(body);
   for (const key of ['eye', 'target', 'up'] as const) if (!isNumbers(camera?.[key], 3)) bad(`camera.${key}`);
   if (!(camera.fov_y > 0 && camera.fov_y < 180)) bad('camera.fov_y');
   if (!isNumbers(background, 3)) bad('background');
-  return manifest;
+  return { ...manifest, body };
+}
+
+function checkHead(head: HeadInfo): void {
+  for (const key of ['num_gaussians', 'rank', 'hidden', 'expression_size', 'num_poses', 'fps'] as const) {
+    if (!isPositive(head[key])) bad(`head.${key}`);
+  }
+  if (!isNumbers(head.idle_expression, head.expression_size)) bad('head.idle_expression');
+}
+
+function checkBody(body: BodyInfo): void {
+  for (const key of ['fps', 'samples_per_frame'] as const) if (!isPositive(body[key])) bad(`body.${key}`);
+  if (!Array.isArray(body.windows) || body.windows.length === 0) bad('body.windows');
+  body.windows.forEach((window, i) => {
+    const { first, last, num_gaussians: count, ranks } = window;
+    const begins = i ? body.windows[i - 1]!.last : 0;
+    if (first !== begins || !Number.isInteger(last) || last <= first) bad(`body.windows[${i}]`);
+    if (!Number.isInteger(count) || !isPositive(count) || count > MOST_GAUSSIANS) bad(`body.windows[${i}].num_gaussians`);
+    const counted = isNumbers(ranks, 3) && ranks.every((rank) => Number.isInteger(rank) && rank > 0);
+    if (!counted || ranks[0] + ranks[1] + ranks[2] > MOST_LAYERS) bad(`body.windows[${i}].ranks`);
+  });
+}
+
+function isPositive(value: unknown): boolean {
+  return Number.isFinite(value) && (value as number) > 0;
 }
 
 function isNumbers(value: unknown, length: number): boolean {
@@ -63,7 +110,7 @@ function bad(field: string): never {
 }
 
 /** Indices of the two eyelid values in the expression, or none. */
-export function blinkIndices(head: Manifest['head']): number[] {
+export function blinkIndices(head: HeadInfo): number[] {
   if (head.eye_offset !== null) return [head.eye_offset + 5, head.eye_offset + 6]; // behind five brow values
   return ['eyeBlinkLeft', 'eyeBlinkRight'].map((n) => head.expression_names.indexOf(n)).filter((i) => i >= 0);
 }

@@ -3,9 +3,9 @@ import { floatFromHalf } from '../protocol.ts';
 
 /** One array of a safetensors file. */
 export interface Tensor {
-  dtype: 'F32' | 'F16' | 'I8';
+  dtype: 'F32' | 'F16' | 'I16' | 'I8' | 'U8';
   shape: number[];
-  data: Float32Array | Int8Array; // half floats are widened on reading
+  data: Float32Array | Int16Array | Int8Array | Uint8Array; // half floats are widened on reading
 }
 
 interface Entry {
@@ -14,7 +14,7 @@ interface Entry {
   data_offsets: [number, number];
 }
 
-const BYTES: Record<string, number> = { F32: 4, F16: 2, I8: 1 };
+const BYTES: Record<string, number> = { F32: 4, F16: 2, I16: 2, I8: 1, U8: 1 };
 const HEADER_LIMIT = 1 << 20;
 
 /**
@@ -55,6 +55,8 @@ function readTensor(buffer: ArrayBuffer, base: number, entry: Entry, where: stri
   }
   const bytes = buffer.slice(base + begin, base + end); // a copy is aligned whatever the header's length
   if (dtype === 'I8') return { dtype, shape, data: new Int8Array(bytes) };
+  if (dtype === 'U8') return { dtype, shape, data: new Uint8Array(bytes) };
+  if (dtype === 'I16') return { dtype, shape, data: new Int16Array(bytes) };
   if (dtype === 'F16') return { dtype, shape, data: Float32Array.from(new Uint16Array(bytes), floatFromHalf) };
   return { dtype: 'F32', shape, data: new Float32Array(bytes) };
 }
@@ -78,7 +80,7 @@ export function takeTensor(
       `${file}: ${name} is ${tensor.dtype} (${tensor.shape}) and should be ${dtype} (${shape}).`,
     );
   }
-  if (dtype !== 'I8' && !tensor.data.every(Number.isFinite)) {
+  if (dtype.startsWith('F') && !tensor.data.every(Number.isFinite)) {
     throw new PageError(`${file}: ${name} holds numbers that are not finite.`);
   }
   return tensor;

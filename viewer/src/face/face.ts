@@ -1,4 +1,4 @@
-import type { Director } from '../stage/stage.ts';
+import type { Director } from '../head/head.ts';
 import { smooth, type IdleFace } from './idle.ts';
 import { mix, type ExpressionTrack } from './track.ts';
 

@@ -1,4 +1,4 @@
-import type { Manifest } from '../bundle/manifest.ts';
+import type { HeadInfo } from '../bundle/manifest.ts';
 import { takeTensor, type Tensor } from '../bundle/safetensors.ts';
 
 /** A baked head (`docs/bundle.md`): N Gaussians, K basis vectors, a small network from B values. */
@@ -26,7 +26,7 @@ export interface Network {
 }
 
 /** Takes a head's tensors out of its file, checked against the manifest's counts. */
-export function readBakedHead(tensors: Map<string, Tensor>, head: Manifest['head'], file: string): BakedHead {
+export function readBakedHead(tensors: Map<string, Tensor>, head: HeadInfo, file: string): BakedHead {
   const { num_gaussians: n, rank: k, hidden: h, expression_size: b } = head;
   const take = <T>(name: string, dtype: Tensor['dtype'], shape: number[]): T =>
     takeTensor(tensors, name, dtype, shape, file).data as T;

@@ -2,23 +2,35 @@ import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import type { StartCamera } from '../bundle/manifest.ts';
 
-const SIDEWAYS = THREE.MathUtils.degToRad(75); // how far the visitor may walk around
+/** What a visitor may do. */
+export interface Freedom {
+  sideways: number; // rad to walk around, to either side
+  nearest: number; // of the start distance
+  narrowest: number; // width / height under which the view widens instead of cutting off the sides
+}
+
+/** Heads are recorded from the front. */
+export const IN_FRONT: Freedom = { sideways: THREE.MathUtils.degToRad(75), nearest: 0.5, narrowest: 0.8 };
+
+/** Bodies are recorded from all around. */
+export const AROUND: Freedom = { sideways: Infinity, nearest: 0.2, narrowest: 0.45 };
+
 const UPWARDS = THREE.MathUtils.degToRad(30);
-const NEAREST = 0.5; // of the start distance
-const FARTHEST = 1.8;
+const FARTHEST = 1.8; // of the start distance
 const KEY_STEP = THREE.MathUtils.degToRad(4);
 const KEY_ZOOM = 1.08;
-const NARROWEST = 0.8; // width / height under which the view widens instead of cutting the ears off
 
-/** The camera that a visitor moves around the head: mouse, touch, arrow keys, + and −. */
+/** The camera that a visitor moves around the avatar: mouse, touch, arrow keys, + and −. */
 export class Orbit {
   readonly camera: THREE.PerspectiveCamera;
   private readonly controls: OrbitControls;
   private readonly start: StartCamera;
+  private readonly freedom: Freedom;
   private changed = true;
 
-  constructor(canvas: HTMLCanvasElement, start: StartCamera, onChange: () => void) {
+  constructor(canvas: HTMLCanvasElement, start: StartCamera, freedom: Freedom, onChange: () => void) {
     this.start = start;
+    this.freedom = freedom;
     this.camera = new THREE.PerspectiveCamera(start.fov_y, 1, 0.01, 100);
     this.camera.up.set(...start.up);
     this.camera.position.set(...start.eye);
@@ -44,7 +56,8 @@ export class Orbit {
   }
 
   resize(aspect: number): void {
-    const half = Math.tan(THREE.MathUtils.degToRad(this.start.fov_y) / 2) * Math.max(1, NARROWEST / aspect);
+    const widened = Math.max(1, this.freedom.narrowest / aspect);
+    const half = Math.tan(THREE.MathUtils.degToRad(this.start.fov_y) / 2) * widened;
     this.camera.fov = THREE.MathUtils.radToDeg(2 * Math.atan(half));
     this.camera.aspect = aspect;
     this.camera.updateProjectionMatrix();
@@ -58,13 +71,13 @@ export class Orbit {
   }
 
   private limit(): void {
-    const { controls } = this;
+    const { controls, freedom } = this;
     controls.update();
     const distance = controls.getDistance();
-    controls.minDistance = NEAREST * distance;
+    controls.minDistance = freedom.nearest * distance;
     controls.maxDistance = FARTHEST * distance;
-    controls.minAzimuthAngle = controls.getAzimuthalAngle() - SIDEWAYS;
-    controls.maxAzimuthAngle = controls.getAzimuthalAngle() + SIDEWAYS;
+    controls.minAzimuthAngle = controls.getAzimuthalAngle() - freedom.sideways;
+    controls.maxAzimuthAngle = controls.getAzimuthalAngle() + freedom.sideways;
     controls.minPolarAngle = controls.getPolarAngle() - UPWARDS;
     controls.maxPolarAngle = controls.getPolarAngle() + UPWARDS;
   }

@@ -1,32 +1,39 @@
+import type { SplatGenerator } from '@sparkjsdev/spark';
 import { floatFromHalf } from '../protocol.ts';
 import type { Stage } from './stage.ts';
 
 const WORDS = 4; // uint32 per texel
 const WIDTH = 2048; // Spark's texture width
 
-/**
- * Reads back what the GPU made of the head: r, g, b, opacity of each Gaussian, (N,4).
- * For tests: it stalls the GPU.
- */
-export function readAttributes(stage: Stage): Float32Array {
-  const { spark, renderer, head } = stage;
+/** What the GPU made of N Gaussians. */
+export interface Splats {
+  centres: Float32Array; // (N,3)
+  rgba: Float32Array; // (N,4)
+}
+
+/** Reads back what is drawn of a generator. For tests: it stalls the GPU. */
+export function readSplats({ spark, renderer }: Stage, generator: SplatGenerator): Splats {
   const target = spark.display.target!;
-  const rows = Math.ceil(head.numSplats / WIDTH);
+  const { base, count } = spark.display.mapping.find(({ node }) => node === generator)!;
+  const rows = Math.ceil(count / WIDTH);
   const texels = [0, 1].map((texture) => {
     const out = new Uint32Array(WORDS * WIDTH * rows);
-    renderer.readRenderTargetPixels(target, 0, 0, WIDTH, rows, out, undefined, texture);
+    renderer.readRenderTargetPixels(target, 0, base / WIDTH, WIDTH, rows, out, undefined, texture);
     return out;
   });
-  return unpack(texels[0]!, texels[1]!, head.numSplats);
+  return unpack(texels[0]!, texels[1]!, count);
 }
 
 /** Spark's extended splats: (x, y, z, half2(alpha, –)), (half2(r, g), half2(b, –), –, –). */
-function unpack(first: Uint32Array, second: Uint32Array, count: number): Float32Array {
+function unpack(first: Uint32Array, second: Uint32Array, count: number): Splats {
   const low = (word: number) => floatFromHalf(word & 0xffff);
-  const out = new Float32Array(4 * count);
+  const floats = new Float32Array(first.buffer);
+  const [centres, rgba] = [new Float32Array(3 * count), new Float32Array(4 * count)];
   for (let i = 0; i < count; i++) {
-    const rg = second[WORDS * i]!;
-    out.set([low(rg), floatFromHalf(rg >>> 16), low(second[WORDS * i + 1]!), low(first[WORDS * i + 3]!)], 4 * i);
+    const at = WORDS * i;
+    centres.set(floats.subarray(at, at + 3), 3 * i);
+    const rg = second[at]!;
+    rgba.set([low(rg), floatFromHalf(rg >>> 16), low(second[at + 1]!), low(first[at + 3]!)], 4 * i);
   }
-  return out;
+  return { centres, rgba };
 }

@@ -1,68 +1,60 @@
 import { SparkRenderer } from '@sparkjsdev/spark';
 import * as THREE from 'three';
-import type { Bundle } from '../bundle/load.ts';
-import { HeadGenerator } from '../head/generator.ts';
-import { PoseLoop } from '../head/poses.ts';
-import { Orbit } from './orbit.ts';
+import type { Manifest } from '../bundle/manifest.ts';
+import { AROUND, IN_FRONT, Orbit } from './orbit.ts';
 
-export const TICK = 1 / 30; // s between changes of the face
+export const TICK = 1 / 30; // s between changes
 const LEAST_ALPHA = 1 / 255; // a splat ends where its alpha falls under this
-const LONGEST_STEP = 0.25; // s the head may move at once, e.g. after the page was hidden
+const LONGEST_STEP = 0.25; // s that may pass at once, e.g. after the page was hidden
 
-/** What the stage shows, decided anew each tick. */
-export interface Director {
-  /** Writes the expression (B,) to show now; returns false if it is as before. */
-  expression(out: Float32Array): boolean;
+/** What moves on stage: a head, a body. */
+export interface Actor {
+  readonly objects: THREE.Object3D[]; // always the same ones
+  /** Goes on by `step` seconds; returns false if it looks as before. */
+  tick(step: number): boolean;
+  /** A picture is about to be drawn; `now` in ms, performance clock. */
+  drawing?(now: number): void;
 }
 
-/** Canvas, camera and head: draws what changed and nothing else. */
+/** Canvas, camera and actors: draws what changed and nothing else. */
 export class Stage {
   readonly renderer: THREE.WebGLRenderer;
   readonly scene = new THREE.Scene();
   readonly spark: SparkRenderer;
-  readonly head: HeadGenerator;
   readonly orbit: Orbit;
-  readonly expression: Float32Array;
   frames = 0; // drawn so far
-  moving: boolean; // the head follows the captured motion
-  bodyTime = 0; // s along the captured motion
-  private readonly poses: PoseLoop;
   private readonly canvas: HTMLCanvasElement;
-  private director: Director | null = null;
-  private lastTick = 0;
+  private readonly actors: Actor[] = [];
+  private lastTick = 0; // s, on the grid of ticks
+  private lastTime = 0; // s, when it really was
   private dirty = true;
 
-  constructor(canvas: HTMLCanvasElement, bundle: Bundle, moving: boolean) {
-    const { manifest, head, poses } = bundle;
+  constructor(canvas: HTMLCanvasElement, manifest: Manifest) {
     this.canvas = canvas;
-    this.moving = moving;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: false, powerPreference: 'high-performance' });
     // Both sRGB: colours of the bundle are display values and are blended as they are.
     this.renderer.setClearColor(new THREE.Color().setRGB(...manifest.background, THREE.SRGBColorSpace));
     this.spark = makeSpark(this.renderer, () => (this.dirty = true));
-    this.head = new HeadGenerator(head);
-    this.scene.add(this.spark, this.head);
-    this.poses = new PoseLoop(poses, manifest.head.fps);
-    this.poses.apply(0, this.head);
-    this.orbit = new Orbit(canvas, manifest.camera, () => (this.dirty = true));
-    this.expression = Float32Array.from(manifest.head.idle_expression);
-    this.head.express(this.expression);
+    this.scene.add(this.spark);
+    this.orbit = new Orbit(canvas, manifest.camera, manifest.body ? AROUND : IN_FRONT, () => (this.dirty = true));
     new ResizeObserver(() => this.fit()).observe(canvas);
     this.fit();
   }
 
-  /** Starts drawing what `director` decides. */
-  start(director: Director): void {
-    this.director = director;
+  /** Adds an actor; before the start only, or Spark would hold its picture until it has sorted anew. */
+  add(actor: Actor): void {
+    this.actors.push(actor);
+    this.scene.add(...actor.objects);
+  }
+
+  /** Starts drawing what the actors do. */
+  start(): void {
     this.renderer.setAnimationLoop((now) => this.frame(now / 1000));
   }
 
-  /** Stops the loop and shows one still: for measurements and thumbnails. */
-  async still(expression: ArrayLike<number>, poseSeconds = 0): Promise<void> {
+  /** Stops the loop and draws one still, well sorted: for measurements and thumbnails. */
+  async still(): Promise<void> {
     this.renderer.setAnimationLoop(null);
-    this.poses.apply(poseSeconds, this.head);
-    this.expression.set(expression);
-    this.head.express(this.expression);
     this.orbit.update();
     await this.sorted(); // a sort of the picture before may still run
     await this.spark.update({ scene: this.scene, camera: this.orbit.camera });
@@ -72,6 +64,7 @@ export class Stage {
 
   /** Draws now; what the canvas holds may be read until the current task ends. */
   draw(): void {
+    for (const actor of this.actors) actor.drawing?.(performance.now());
     this.renderer.render(this.scene, this.orbit.camera);
     this.frames++;
   }
@@ -89,18 +82,11 @@ export class Stage {
   }
 
   private tick(now: number): void {
-    const step = Math.min(now - this.lastTick, LONGEST_STEP);
+    const step = Math.min(now - this.lastTime, LONGEST_STEP);
+    this.lastTime = now;
     // Ticks stay on their grid, or a 144-Hz screen would turn 30 Hz into 28.8.
     this.lastTick = now - this.lastTick > 2 * TICK ? now : this.lastTick + TICK;
-    if (this.moving) {
-      this.bodyTime += step;
-      this.poses.apply(this.bodyTime, this.head);
-      this.dirty = true;
-    }
-    if (this.director?.expression(this.expression)) {
-      this.head.express(this.expression);
-      this.dirty = true;
-    }
+    for (const actor of this.actors) if (actor.tick(step)) this.dirty = true;
   }
 
   private fit(): void {
@@ -125,7 +111,7 @@ function makeSpark(renderer: THREE.WebGLRenderer, onDirty: () => void): SparkRen
     maxStdDev: Math.sqrt(2 * Math.log(255)), // where an opaque splat's alpha reaches 1/255
     maxPixelRadius: 4096,
     sortRadial: false, // by depth, as in training
-    minSortIntervalMs: 50, // the head sways slowly, and each sort costs a picture drawn twice
+    minSortIntervalMs: 50, // people move little in that time, and each sort costs a picture drawn twice
     enableLod: false,
   });
 }

@@ -16,8 +16,10 @@ export class Controls {
     byId('panel-button').append(icon('chart'));
   }
 
-  /** Lets the visitor act on a conversation. */
+  /** Shows itself and lets the visitor act on a conversation. */
   bind(conversation: Conversation): void {
+    this.form.hidden = false;
+    this.input.focus();
     this.form.onsubmit = (event) => {
       event.preventDefault();
       const text = this.input.value.trim();

@@ -1,5 +1,5 @@
 import type { Services } from '../protocol.ts';
-import type { ConversationView } from '../talk/conversation.ts';
+import type { Conversation, ConversationView } from '../talk/conversation.ts';
 import { Captions } from './captions.ts';
 import { Controls } from './controls.ts';
 import { byId } from './elements.ts';
@@ -16,8 +16,15 @@ const STATES = {
   speaking: 'Speaking',
 } as const;
 
+/** What is around the picture. */
+export interface Page {
+  view: ConversationView;
+  /** Shows the controls of a conversation and starts it. */
+  talk(conversation: Conversation): void;
+}
+
 /** Everything on the page around the picture. */
-export function makePage(overlay: Overlay, frames: () => number): { view: ConversationView; controls: Controls } {
+export function makePage(overlay: Overlay, frames: () => number): Page {
   const captions = new Captions();
   const controls = new Controls();
   const panel = new Panel(frames);
@@ -36,7 +43,12 @@ export function makePage(overlay: Overlay, frames: () => number): { view: Conver
     metrics: (name, values) => panel.metrics(name, values),
     failed: (error) => overlay.fail(error.message),
   };
-  return { view, controls };
+  const talk = (conversation: Conversation) => {
+    byId('state-line').hidden = false;
+    controls.bind(conversation);
+    conversation.start();
+  };
+  return { view, talk };
 }
 
 /** Says plainly which services are the small offline ones. */
@@ -49,7 +61,8 @@ function showStandIns(services: Services): void {
   note.textContent = `Offline stand-ins in use: ${names.join(', ')}`;
 }
 
-function showNotice(sentence: string): void {
+/** Shows a sentence for some seconds. */
+export function showNotice(sentence: string): void {
   const item = document.createElement('p');
   item.textContent = sentence;
   byId('notices').append(item);

@@ -32,7 +32,11 @@ class Spot(NamedTuple):
 
 
 class Colors(NamedTuple):
-    """`Look` as arrays for the shader."""
+    """`Look` as arrays for the shader.
+
+    `bold`: whether the shirt has a print that shows from far away. `floor`: height of the ground in
+    canonical head space at rest. `legs`: (2, 3) left hip and ankle at rest.
+    """
 
     skin: np.ndarray
     lips: np.ndarray
@@ -42,6 +46,12 @@ class Colors(NamedTuple):
     stripes: bool
     freckles: float
     stubble: float
+    accent: np.ndarray
+    trousers: np.ndarray
+    shoe: np.ndarray
+    bold: bool
+    floor: float
+    legs: np.ndarray
 
 
 @njit(cache=True, nogil=True)

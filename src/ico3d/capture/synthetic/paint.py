@@ -13,11 +13,15 @@ from ico3d.capture.synthetic.subject import CARDS, Subject
 OPENINGS = (0.0, 0.12, 0.25, 0.45)
 """Weights of `jawOpen` at which occlusion is computed; frames blend between them."""
 DIRECTIONS = 64
-MAP_SIZE = 448
-REACH = 0.24
-"""Half the side of a depth map, metres: the head and the neck; what lies outside is lit."""
-BIAS = 0.0015
-"""Metres that a surface may lie behind the depth map and still count as lit."""
+HEAD_MAP = (448, 0.24)
+"""Texels along the side of a depth map, and half of it in metres: the head and the neck; what lies
+outside is lit."""
+BODY_MAP = (640, 1.1)
+"""Of a whole person."""
+NECK = -0.2
+"""Height below which the occlusion of a whole person comes from the map of the body, metres."""
+BIAS = 1.4
+"""Texels that a surface may lie behind the depth map and still count as lit."""
 SCALP_REACH = 0.006
 """Metres over which the roots of hair shade the skin."""
 WIDE = 0.06
@@ -59,7 +63,12 @@ def paint(subject: Subject) -> Paint:
             shape[f"mouthUpperUp{side}"] = 0.3 * opening
         vertices = subject.posed(subject.weights(shape))
         gaps.append(lip_gap(subject.landmarks(vertices)))
-        occlusion.append(_sky_visibility(subject, vertices))
+        occlusion.append(_sky_visibility(subject, vertices, *HEAD_MAP))
+    if subject.skeleton is not None:
+        below = subject.vertices[:, 1] < NECK
+        middle = 0.5 * (subject.vertices.max(axis=0) + subject.vertices.min(axis=0))
+        seen = _sky_visibility(subject, subject.vertices - middle, *BODY_MAP)
+        occlusion = [np.where(below, seen, old) for old in occlusion]
     return Paint(
         _channels(subject), strand_frames(subject), np.array(gaps, np.float32), np.stack(occlusion)
     )
@@ -131,17 +140,24 @@ def _scalp(subject: Subject) -> np.ndarray:
     return np.exp(-0.5 * (distance / SCALP_REACH) ** 2)
 
 
-def _sky_visibility(subject: Subject, vertices: np.ndarray) -> np.ndarray:
-    """(V,) float32 cosine-weighted part of the sky that each vertex sees."""
+def _sky_visibility(subject: Subject, vertices: np.ndarray, size: int, reach: float) -> np.ndarray:
+    """(V,) float32 cosine-weighted part of the sky that each vertex sees.
+
+    Args:
+        subject: The person.
+        vertices: (V, 3) metres from the middle of the depth maps.
+        size: Texels along the side of a depth map.
+        reach: Half its side in metres.
+    """
     solid = subject.faces[~np.isin(subject.materials, CARDS)]
     normals = vertex_normals(vertices, subject.faces)
     seen, total = np.zeros(len(vertices)), np.full(len(vertices), 1e-6)
     for direction in _sphere(DIRECTIONS):
-        screen = light_screen(vertices, direction, MAP_SIZE, REACH)
-        nearest, triangle, barycentric = empty_buffers(MAP_SIZE, MAP_SIZE)
+        screen = light_screen(vertices, direction, size, reach)
+        nearest, triangle, barycentric = empty_buffers(size, size)
         rasterise(screen, solid, nearest, triangle, barycentric)
         cosine = np.maximum(normals @ direction, 0)  # (V,)
-        seen += cosine * _lit(screen, nearest)
+        seen += cosine * _lit(screen, nearest, BIAS * 2 * reach / size)
         total += cosine
     return (WIDE + (1 - WIDE) * seen / total).astype(np.float32)
 
@@ -170,10 +186,10 @@ def light_screen(
     """The person as parallel light sees them, for `rasterise`.
 
     Args:
-        vertices: (V, 3) canonical head space.
+        vertices: (V, 3) metres from the middle of the depth map.
         direction: (3,) towards the light.
         size: Side of the depth map in texels.
-        reach: Half the side of the depth map in metres; its middle is the canonical origin.
+        reach: Half the side of the depth map in metres.
 
     Returns:
         (V, 3) float32: x, y in texels, and metres towards the light plus 2.
@@ -185,7 +201,7 @@ def light_screen(
 
 
 @njit(cache=True, nogil=True)
-def _lit(screen, nearest):
+def _lit(screen, nearest, bias):
     """(V,) 1 where a vertex lies at the front of the depth map, 0 where something hides it."""
     size = nearest.shape[0]
     lit = np.ones(screen.shape[0])
@@ -193,6 +209,6 @@ def _lit(screen, nearest):
         x, y = int(screen[i, 0]), int(screen[i, 1])
         if x < 0 or y < 0 or x >= size or y >= size:
             continue
-        if nearest[y, x] > screen[i, 2] + BIAS:
+        if nearest[y, x] > screen[i, 2] + bias:
             lit[i] = 0.0
     return lit

@@ -67,6 +67,8 @@ class Performance:
         weights: (F, K) float32 blendshape weights.
         eyes: (F, 7) float32 in the order of `EYE_NAMES`.
         world_from_head: (F, 4, 4) float64.
+        joints: (F, J, 4, 4) float64, of a whole person: takes what is bound to each joint from
+            canonical head space at rest to the world; None for a bust.
     """
 
     samples: np.ndarray
@@ -75,6 +77,16 @@ class Performance:
     weights: np.ndarray
     eyes: np.ndarray
     world_from_head: np.ndarray
+    joints: np.ndarray | None = None
+
+    def vertices(self, subject: Subject, frame: int) -> np.ndarray:
+        """(V, 3) float32 the mesh of a frame, in canonical head space."""
+        shape = subject.posed(self.weights[frame])
+        if self.joints is None or subject.skeleton is None:
+            return shape
+        # Into head space before blending: float32 stays exact at the face.
+        inverse = np.linalg.inv(self.world_from_head[frame])
+        return subject.skeleton.skinned(shape, inverse @ self.joints[frame])
 
 
 def perform(
@@ -146,9 +158,9 @@ def _script(text: str, random: np.random.Generator) -> Iterator[str]:
 
 def _eyes(times: np.ndarray, random: np.random.Generator) -> np.ndarray:
     """(F, 7) brows that wander with the talk and lids that blink."""
-    lift = np.clip(_wander(times, 0.5, random), 0, None) ** 1.3
-    frown = np.clip(-_wander(times, 0.35, random) - 0.2, 0, None)
-    tilt = 0.12 * _wander(times, 0.3, random)
+    lift = np.clip(wander(times, 0.5, random), 0, None) ** 1.3
+    frown = np.clip(-wander(times, 0.35, random) - 0.2, 0, None)
+    tilt = 0.12 * wander(times, 0.3, random)
     blink = _blinks(times, random)
     columns = {
         "browDownLeft": 0.55 * frown * (1 + tilt),
@@ -173,7 +185,7 @@ def _add_mimicry(
             weights[:, column] = np.clip(weights[:, column] + values, 0, 1)
 
     for names, most in MIMICRY:
-        add(names, most * np.clip(1.6 * _wander(times, 0.8, random) - 0.3, 0, 1))
+        add(names, most * np.clip(1.6 * wander(times, 0.8, random) - 0.3, 0, 1))
     for (one, other), most in zip(GAZE, LOOK, strict=True):
         turn = most * _glances(times, random)  # (F,)
         add(one, np.clip(turn, 0, None))
@@ -202,7 +214,7 @@ def _blinks(times: np.ndarray, random: np.random.Generator) -> np.ndarray:
     return lids
 
 
-def _wander(times: np.ndarray, fastest: float, random: np.random.Generator) -> np.ndarray:
+def wander(times: np.ndarray, fastest: float, random: np.random.Generator) -> np.ndarray:
     """(F,) a smooth random curve in [-1, 1] without frequencies above `fastest` Hz."""
     frequencies = random.uniform(0.15, 1.0, 5) * fastest
     phases = random.uniform(0, 2 * np.pi, 5)
@@ -213,9 +225,9 @@ def _wander(times: np.ndarray, fastest: float, random: np.random.Generator) -> n
 def _sway(times: np.ndarray, subject: Subject, random: np.random.Generator) -> np.ndarray:
     """(F, 4, 4) head poses: the whole bust turns about the base of the neck."""
     yaw, pitch, roll = (
-        np.radians(limit) * _wander(times, 0.3, random) for limit in (YAW, PITCH, ROLL)
+        np.radians(limit) * wander(times, 0.3, random) for limit in (YAW, PITCH, ROLL)
     )
-    shift = np.stack([limit * _wander(times, 0.25, random) for limit in SHIFT], 1)  # (F, 3)
+    shift = np.stack([limit * wander(times, 0.25, random) for limit in SHIFT], 1)  # (F, 3)
     rotation = _about(1, yaw) @ _about(0, pitch) @ _about(2, roll)  # (F, 3, 3)
     poses = np.tile(np.eye(4), (len(times), 1, 1))
     poses[:, :3, :3] = rotation

@@ -9,11 +9,13 @@ from PIL import Image, UnidentifiedImageError
 from safetensors import SafetensorError
 from safetensors.numpy import load
 
-from ico3d.capture.capture import Capture, Sound, last_eleventh
+from ico3d.capture.capture import Capture, Sound, all_frames, last_eleventh
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
 
-FORMAT, VERSION = "ico3d-synthetic", 1
+FORMAT, VERSION = "ico3d-synthetic", 2
+READABLE = (1, 2)
+"""Version 1 knew heads only, and did not say so."""
 NEEDED = ("format", "version", "fps", "num_frames", "blendshape_names", "cameras", "sources")
 
 
@@ -40,7 +42,12 @@ class SyntheticCapture(Capture):
         self.num_frames = int(about["num_frames"])
         self.blendshape_names = tuple(about["blendshape_names"])
         self.cameras = tuple(_camera(c, path) for c in about["cameras"])
-        self.split = last_eleventh(self.num_frames)
+        self.shows_body = about.get("shows", "head") == "body"
+        self.split = (
+            all_frames(self.num_frames, self.cameras)
+            if self.shows_body
+            else last_eleventh(self.num_frames)
+        )
         self._frames = self._read_frames()
 
     @property
@@ -106,8 +113,9 @@ class SyntheticCapture(Capture):
         return self._frames["landmarks"][self._index(frame)]
 
     def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) points on the neutral surface, canonical head space."""
-        return self._frames["points"]
+        """(P, 3) surface points: of a body in this frame, of a head neutral in its own space."""
+        points = self._frames["points"]
+        return points[self._index(frame)] if self.shows_body else points
 
     def _index(self, frame: int) -> int:
         if not 0 <= frame < self.num_frames:
@@ -134,7 +142,7 @@ class SyntheticCapture(Capture):
             "blendshapes": (frames, shapes),
             "landmarks": (frames, 68, 3),
             "views": (frames, len(self.cameras)),
-            "points": (None, 3),
+            "points": (frames, None, 3) if self.shows_body else (None, 3),
         }
         for name, shape in expected.items():
             _check_array(file, name, arrays.get(name), shape)
@@ -163,8 +171,9 @@ def _read_json(file: Path) -> dict:
         raise CaptureError(f"{file} is missing or damaged: record again.") from error
     if not isinstance(about, dict) or about.get("format") != FORMAT:
         raise CaptureError(f"{file} does not describe a synthetic capture ('{FORMAT}').")
-    if about.get("version") != VERSION:
-        raise CaptureError(f"{file} has version {about.get('version')}; this reads {VERSION}.")
+    if about.get("version") not in READABLE:
+        known = " and ".join(map(str, READABLE))
+        raise CaptureError(f"{file} has version {about.get('version')}; this reads {known}.")
     missing = [name for name in NEEDED if name not in about]
     if missing:
         raise CaptureError(f"{file} lacks {', '.join(missing)}: record again.")

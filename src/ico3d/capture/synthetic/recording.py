@@ -16,18 +16,23 @@ from PIL import Image
 from rich.progress import Progress, TextColumn
 from safetensors.numpy import save
 
+from ico3d.capture.synthetic.embody import embodied
+from ico3d.capture.synthetic.gestures import MOTIONS
+from ico3d.capture.synthetic.lighting import STUDIOS
 from ico3d.capture.synthetic.performance import SOUND_RATE, Performance, perform
 from ico3d.capture.synthetic.points import surface_points
 from ico3d.capture.synthetic.reader import FORMAT, VERSION
-from ico3d.capture.synthetic.studio import RIGS, Studio, backdrop, camera_arc
+from ico3d.capture.synthetic.rigs import RIGS, cameras_of
+from ico3d.capture.synthetic.studio import Studio, backdrop
 from ico3d.capture.synthetic.subject import Subject
 from ico3d.capture.synthetic.subjects import load_subject
 from ico3d.common.camera import Camera
 from ico3d.common.files import write_atomic
 from ico3d.errors import SettingsError
 
-FPS = 25.0
 POINTS = 6000
+BODY_POINTS = 4000
+"""In each frame."""
 UNFINISHED = "unfinished.json"
 """Settings of a recording that has not come to its end."""
 
@@ -38,25 +43,36 @@ class Recording:
 
     Attributes:
         subject: `anny` or an `.npz` file.
-        rig: Name of the camera rig: `head` or `bust`.
+        rig: Name of the camera rig: `head`, `bust` or `body`.
         cameras: How many cameras.
-        frames: How many frames at 25 per second.
+        frames: How many frames.
+        fps: Frames per second.
         views_per_frame: How many cameras take a picture of each frame.
-        size: Width and height of the pictures.
+        size: Height of the pictures; those of heads are as wide.
         text: What is said; empty for sentences of our own.
         seed: Decides everything that is random.
         lively: Whether the face shows moods and glances too, which the sound does not tell.
+        light: One of `STUDIOS`.
+        motion: What a whole person does, one of `MOTIONS`.
     """
 
     subject: str
     rig: str
     cameras: int
     frames: int
+    fps: float
     views_per_frame: int
     size: int
     text: str
     seed: int
     lively: bool
+    light: str
+    motion: str
+
+    @property
+    def whole(self) -> bool:
+        """Whether the whole person is recorded."""
+        return self.rig == "body"
 
 
 def record(recording: Recording, out: Path, workers: int) -> None:
@@ -73,30 +89,35 @@ def record(recording: Recording, out: Path, workers: int) -> None:
         MissingExtraError: If an optional package is missing.
     """
     _check(recording)
-    subject = load_subject(recording.subject)
+    subject = load_subject(recording.subject, recording.whole)
     acted = perform(
-        subject, recording.text, recording.frames, FPS, recording.seed, recording.lively
+        subject, recording.text, recording.frames, recording.fps, recording.seed, recording.lively
     )
-    cameras = camera_arc(subject, recording.rig, recording.cameras, recording.size)
+    if recording.whole:
+        acted = embodied(subject, acted, recording.motion, recording.fps, recording.seed)
+    cameras = cameras_of(subject, recording.rig, recording.cameras, recording.size)
     views = choose_views(
         recording.frames, recording.cameras, recording.views_per_frame, recording.seed
     )
     _begin(recording, out)
-    backdrops = [backdrop(camera) for camera in cameras]
+    lamps = STUDIOS[recording.light]
+    backdrops = [backdrop(camera, lamps) for camera in cameras]
     for camera, image in zip(cameras, backdrops, strict=True):
         _write_png(out / "backgrounds" / f"{camera.name}.png", image)
     _write_sound(out / "audio.wav", acted.samples)
     _write_frames(out / "frames.safetensors", subject, acted, views, recording.seed)
-    _draw(subject, acted, cameras, backdrops, views, out, workers)
+    _draw(Studio(subject, lamps), acted, cameras, backdrops, views, out, workers)
     # Last: a folder with capture.json is complete.
     _write_json(out / "capture.json", recording, subject, acted, cameras)
     (out / UNFINISHED).unlink()
 
 
 def _check(recording: Recording) -> None:
-    if recording.rig not in RIGS:
-        raise SettingsError(f"there is no rig '{recording.rig}': use {' or '.join(RIGS)}.")
-    for name in ("cameras", "frames", "views_per_frame", "size"):
+    for name, known in (("rig", RIGS), ("light", tuple(STUDIOS)), ("motion", MOTIONS)):
+        value = getattr(recording, name)
+        if value not in known:
+            raise SettingsError(f"there is no {name} '{value}': use {' or '.join(known)}.")
+    for name in ("cameras", "frames", "fps", "views_per_frame", "size"):
         if getattr(recording, name) < 1:
             raise SettingsError(f"{name} must be at least 1, not {getattr(recording, name)}.")
     if recording.views_per_frame > recording.cameras:
@@ -134,7 +155,7 @@ def choose_views(frames: int, cameras: int, per_frame: int, seed: int) -> np.nda
 
 
 def _draw(
-    subject: Subject,
+    studio: Studio,
     acted: Performance,
     cameras: tuple[Camera, ...],
     backdrops: list[np.ndarray],
@@ -142,19 +163,27 @@ def _draw(
     out: Path,
     workers: int,
 ) -> None:
-    studio = Studio(subject)
+    missing = {
+        frame: [
+            int(c)
+            for c in np.flatnonzero(row)
+            if not (out / "masks" / cameras[c].name / _png_name(frame)).exists()
+        ]
+        for frame, row in enumerate(views)
+    }
 
-    def draw(job: tuple[int, int]) -> None:
-        frame, index = job
-        camera = cameras[index]
-        rgb, alpha = studio.picture(camera, acted.weights[frame], acted.world_from_head[frame])
-        image = rgb + (1 - alpha[..., None]) * backdrops[index]
-        _write_png(out / "images" / camera.name / _png_name(frame), image)
-        # The mask comes last: where it is, the picture is whole.
-        _write_png(out / "masks" / camera.name / _png_name(frame), alpha)
+    def draw(frame: int) -> None:
+        vertices = acted.vertices(studio.subject, frame)
+        figure = studio.figure(vertices, acted.world_from_head[frame])
+        for index in missing[frame]:
+            camera = cameras[index]
+            rgb, alpha = studio.picture(camera, figure)
+            image = rgb + (1 - alpha[..., None]) * backdrops[index]
+            _write_png(out / "images" / camera.name / _png_name(frame), image)
+            # The mask comes last: where it is, the picture is whole.
+            _write_png(out / "masks" / camera.name / _png_name(frame), alpha)
 
-    jobs = [(int(f), int(c)) for f, c in np.argwhere(views)]
-    jobs = [j for j in jobs if not (out / "masks" / cameras[j[1]].name / _png_name(j[0])).exists()]
+    jobs = [frame for frame, left in missing.items() if left]
     with ThreadPoolExecutor(workers) as pool:
         try:
             for _ in _progress(pool.map(draw, jobs), len(jobs)):
@@ -169,7 +198,7 @@ def _png_name(frame: int) -> str:
 
 
 def _progress(steps: Iterator, total: int) -> Iterator:
-    columns = (*Progress.get_default_columns(), TextColumn("{task.completed}/{task.total} images"))
+    columns = (*Progress.get_default_columns(), TextColumn("{task.completed}/{task.total} frames"))
     with Progress(*columns) as progress:
         yield from progress.track(steps, total=total, description="recording")
 
@@ -196,14 +225,20 @@ def _write_sound(path: Path, samples: np.ndarray) -> None:
 def _write_frames(
     path: Path, subject: Subject, acted: Performance, views: np.ndarray, seed: int
 ) -> None:
-    landmarks = [subject.landmarks(subject.posed(w)) for w in acted.weights]
+    meshes = (acted.vertices(subject, frame) for frame in range(len(views)))
+    landmarks, points = [], []
+    places = surface_points(subject, POINTS if acted.joints is None else BODY_POINTS, seed)
+    for mesh, pose in zip(meshes, acted.world_from_head, strict=True):
+        landmarks.append(subject.landmarks(mesh))
+        if acted.joints is not None:
+            points.append(places.on(mesh @ pose[:3, :3].T + pose[:3, 3]))
     arrays = {
         "world_from_head": acted.world_from_head,
         "eyes": acted.eyes,
         "blendshapes": acted.weights,
         "landmarks": np.stack(landmarks).astype(np.float32),
         "views": views,
-        "points": surface_points(subject, POINTS, seed),
+        "points": np.stack(points) if points else places.on(subject.vertices),
     }
     write_atomic(path, save({k: np.ascontiguousarray(v) for k, v in arrays.items()}))
 
@@ -219,7 +254,8 @@ def _write_json(
     content = {
         "format": FORMAT,
         "version": VERSION,
-        "fps": FPS,
+        "shows": "body" if recording.whole else "head",
+        "fps": recording.fps,
         "num_frames": recording.frames,
         "settings": settings,
         "blendshape_names": subject.blendshape_names,

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from ico3d.capture.synthetic import garments
 from ico3d.capture.synthetic import materials as paints
 from ico3d.capture.synthetic.lighting import gloss, key_visibility, wrapped
 from ico3d.capture.synthetic.materials import Spot
@@ -15,6 +16,7 @@ from ico3d.capture.synthetic.textures import noise, smoothstep, strands
 SKIN, MOUTH, EYE = int(Material.SKIN), int(Material.MOUTH), int(Material.EYE)
 TEETH, GUMS, TONGUE = int(Material.TEETH), int(Material.GUMS), int(Material.TONGUE)
 HAIR, CLOTH, BROW = int(Material.HAIR), int(Material.CLOTH), int(Material.BROW)
+TROUSERS, SHOE, SOCK = int(Material.TROUSERS), int(Material.SHOE), int(Material.SOCK)
 
 
 MOUTH_DEPTH = 0.026
@@ -198,7 +200,15 @@ def _spot(scene, colors, f, a, b, c, rest, pixel):
     """What the surface is made of at one spot."""
     material = scene.materials[f]
     x, y, z = rest
+    if material == TROUSERS:
+        return garments.trousers(colors, x, y, z, pixel)
+    if material == SHOE:
+        return garments.shoe(colors, x, y, z, pixel)
+    if material == SOCK:
+        return garments.sock(x, y, z, pixel)
     if material == CLOTH:
+        if colors.bold:
+            return garments.printed(colors, x, y, z, pixel)
         u, v = _uv(scene.corner_uv, f, a, b, c)
         return paints.cloth(colors, u, v, x, y, z, pixel)
     if material == TEETH:
@@ -252,7 +262,7 @@ def _shade_one(scene, colors, lights, f, a, b, c, camera, pixel):
             n[1] + tilt * (2.0 * noise(q[0] + 31.0, q[1], q[2]) - 1.0),
             n[2] + tilt * (2.0 * noise(q[0], q[1] + 57.0, q[2]) - 1.0),
         )
-    if material in (SKIN, CLOTH):
+    if material in (SKIN, CLOTH, TROUSERS, SHOE, SOCK):
         return _lit(spot, lights, n, v, p, occlusion)
     inward = math.exp(-_painted(scene, f, a, b, c)[5] / MOUTH_DEPTH)
     r, g, bl = _lit(spot, lights, n, v, p, (0.35 + 0.65 * occlusion) * inward)

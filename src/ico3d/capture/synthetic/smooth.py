@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ico3d.capture.synthetic.raster import vertex_normals
+from ico3d.capture.synthetic.skeleton import Skeleton
 from ico3d.capture.synthetic.subject import Subject
 
 BULGE = 0.75
@@ -40,6 +41,7 @@ def smoothed(subject: Subject, chosen: np.ndarray) -> Subject:
         lip_mask=np.concatenate([subject.lip_mask, subject.lip_mask[edges].mean(axis=1)]),
         delta_vertices=delta_vertices,
         deltas=deltas,
+        skeleton=_split_skeleton(subject, edges),
     )
 
 
@@ -70,6 +72,15 @@ def _split_deltas(subject: Subject, edges: np.ndarray) -> tuple[np.ndarray, np.n
         np.concatenate([subject.delta_vertices, index]).astype(np.int32),
         np.concatenate([subject.deltas, middles], axis=1).astype(np.float32),
     )
+
+
+def _split_skeleton(subject: Subject, edges: np.ndarray) -> Skeleton | None:
+    """The skeleton on which middles hang as their ends do."""
+    if subject.skeleton is None:
+        return None
+    weights = subject.skeleton.weights
+    middles = weights[edges].mean(axis=1)  # (E, J)
+    return replace(subject.skeleton, weights=np.concatenate([weights, middles]))
 
 
 def _edge_middles(subject: Subject, edges: np.ndarray) -> np.ndarray:

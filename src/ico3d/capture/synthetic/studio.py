@@ -1,108 +1,67 @@
-"""The studio: cameras, backdrop, and one picture of a person."""
+"""The studio: backdrop, and pictures of a person."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 
-from ico3d.capture.synthetic.lighting import lights_on
+from ico3d.capture.synthetic.lighting import BUST, WHOLE, Lamps, Lights, lights_on
 from ico3d.capture.synthetic.materials import Colors
 from ico3d.capture.synthetic.paint import lip_gap, paint
 from ico3d.capture.synthetic.raster import empty_buffers, rasterise, to_screen, vertex_normals
 from ico3d.capture.synthetic.shader import Scene, display, shade, shade_cards
 from ico3d.capture.synthetic.subject import CARDS, Subject
 from ico3d.capture.synthetic.textures import noise
-from ico3d.common.camera import Camera, look_at
+from ico3d.common.camera import Camera
 
 SUPERSAMPLING = 3
-DISTANCE = 1.35
-"""Metres from the cameras to the head."""
-WIDEST_AZIMUTH = 60.0
 
 
-@dataclass(frozen=True)
-class Framing:
-    """What the pictures of a rig show.
-
-    Attributes:
-        height: Metres from their top to their bottom, at the head.
-        aim: What they look at: metres from the canonical origin at rest, upwards.
-    """
-
-    height: float
-    aim: float
-
-
-RIGS = {"head": Framing(0.31, -0.02), "bust": Framing(0.46, -0.045)}
-"""Head: three quarters of the picture are head. Bust: half, with the shoulders."""
-
-
-def camera_arc(subject: Subject, rig: str, count: int, size: int) -> tuple[Camera, ...]:
-    """Cameras on a frontal arc around the head; the first looks straight at the face.
-
-    Args:
-        subject: Its rest pose places the rig.
-        rig: One of `RIGS`.
-        count: How many.
-        size: Width and height of the pictures.
-    """
-    framing = RIGS[rig]
-    target = subject.head_in_world + np.array([0.0, framing.aim, 0.0])
-    focal = size * DISTANCE / framing.height
-    intrinsics = np.array([[focal, 0, size / 2], [0, focal, size / 2], [0, 0, 1]])
-    cameras = []
-    for index in range(count):
-        azimuth, elevation = np.radians(_direction(index, count))
-        towards = np.array(
-            [
-                np.sin(azimuth) * np.cos(elevation),
-                np.sin(elevation),
-                np.cos(azimuth) * np.cos(elevation),
-            ]
-        )
-        pose = look_at(target + DISTANCE * towards, target)
-        cameras.append(Camera(size, size, intrinsics, pose, str(index)))
-    return tuple(cameras)
-
-
-def _direction(index: int, count: int) -> tuple[float, float]:
-    """Azimuth and elevation in degrees: the front, then wider and wider, side by side."""
-    if index == 0:
-        return 0.0, 0.0
-    ring, rings = (index + 1) // 2, count // 2
-    side = 1.0 if index % 2 else -1.0
-    return side * WIDEST_AZIMUTH * ring / rings, (9.0, -7.0, 16.0)[index % 3]
-
-
-def backdrop(camera: Camera) -> np.ndarray:
+def backdrop(camera: Camera, lamps: Lamps) -> np.ndarray:
     """(H, W, 3) float32: a mottled grey cloth far behind the person, as the camera sees it."""
     columns, rows = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     pixels = np.stack([columns, rows, np.ones_like(rows)], axis=-1)  # (H, W, 3)
     rays = pixels @ np.linalg.inv(camera.intrinsics).T @ camera.world_to_camera[:3, :3]
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    return _cloth_backdrop(rays.astype(np.float32))
+    return _cloth_backdrop(rays.astype(np.float32), lamps.cloth)
 
 
 @njit(cache=True, nogil=True)
-def _cloth_backdrop(rays):
+def _cloth_backdrop(rays, tint):
     out = np.empty(rays.shape, np.float32)
     for i in range(rays.shape[0]):
         for j in range(rays.shape[1]):
             x, y, z = rays[i, j, 0], rays[i, j, 1], rays[i, j, 2]
             mottle = noise(3 * x, 3 * y, 3 * z) + 0.5 * noise(9 * x + 5, 9 * y, 9 * z)
             value = 0.16 + 0.10 * mottle + 0.22 * (y + 0.1)
-            out[i, j, 0] = display(0.92 * value)
-            out[i, j, 1] = display(0.97 * value)
-            out[i, j, 2] = display(1.06 * value)
+            out[i, j, 0] = display(tint[0] * value)
+            out[i, j, 1] = display(tint[1] * value)
+            out[i, j, 2] = display(tint[2] * value)
     return out
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A person in one frame, as every camera sees them.
+
+    Attributes:
+        scene: In canonical head space.
+        lights: As that space sees them.
+        world_from_head: (4, 4).
+    """
+
+    scene: Scene
+    lights: Lights
+    world_from_head: np.ndarray
 
 
 class Studio:
     """Takes pictures of one person."""
 
-    def __init__(self, subject: Subject):
+    def __init__(self, subject: Subject, lamps: Lamps):
         """Paints the person, which takes about a second."""
         self.subject = subject
+        self._lamps = lamps
         cards = np.isin(subject.materials, CARDS)
         self._solid = np.ascontiguousarray(subject.faces[~cards])
         self._cards = np.ascontiguousarray(subject.faces[cards])
@@ -119,31 +78,38 @@ class Studio:
             stripes=look.stripes,
             freckles=look.freckles,
             stubble=look.stubble,
+            accent=np.array(look.accent, np.float32),
+            trousers=np.array(look.trousers, np.float32),
+            shoe=np.array(look.shoe, np.float32),
+            bold=subject.skeleton is not None,
+            floor=-float(subject.head_in_world[1]),
+            legs=_left_leg(subject),
         )
         self._eyes = np.array(
             [[*eye.centre, *eye.axis, eye.iris_radius] for eye in subject.eyes], np.float32
         )
 
-    def picture(
-        self, camera: Camera, weights: np.ndarray, world_from_head: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """One picture.
+    def figure(self, vertices: np.ndarray, world_from_head: np.ndarray) -> Figure:
+        """A person in one frame.
 
         Args:
-            camera: In the world.
-            weights: (K,) blendshape weights.
-            world_from_head: (4, 4) pose of the head; the whole bust moves with it.
+            vertices: (V, 3) float32 posed, canonical head space.
+            world_from_head: (4, 4) pose of the head; the whole mesh is brought there.
+        """
+        covered = BUST if self.subject.skeleton is None else WHOLE
+        lights = lights_on(vertices, self._solid, world_from_head, self._lamps, covered)
+        return Figure(self._scene(vertices), lights, world_from_head)
+
+    def picture(self, camera: Camera, figure: Figure) -> tuple[np.ndarray, np.ndarray]:
+        """One picture.
 
         Returns:
             rgb (H, W, 3) float32 display values premultiplied by alpha, and alpha (H, W) float32,
             the part of each pixel that the person covers.
         """
-        subject = self.subject
-        vertices = subject.posed(weights)
-        local = camera.moved(world_from_head)
-        scene = self._scene(vertices)
-        lights = lights_on(vertices, self._solid, world_from_head)
-        screen = to_screen(vertices, local, SUPERSAMPLING)
+        scene, lights = figure.scene, figure.lights
+        local = camera.moved(figure.world_from_head)
+        screen = to_screen(scene.vertices, local, SUPERSAMPLING)
         size = (camera.height * SUPERSAMPLING, camera.width * SUPERSAMPLING)
         centre = local.camera_to_world[:3, 3].astype(np.float32)
         pixel = np.float32(np.linalg.norm(centre) / camera.intrinsics[0, 0])
@@ -177,6 +143,14 @@ class Studio:
             self._paint.occlusion_at(gap),
             self._eyes,
         )
+
+
+def _left_leg(subject: Subject) -> np.ndarray:
+    """(2, 3) float32 hip and ankle at rest; zeros for a bust."""
+    bones = subject.skeleton
+    if bones is None:
+        return np.zeros((2, 3), np.float32)
+    return bones.at[[bones.index("upperleg01.L"), bones.index("foot.L")]].astype(np.float32)
 
 
 @njit(cache=True, nogil=True)

@@ -5,6 +5,8 @@ from enum import IntEnum
 
 import numpy as np
 
+from ico3d.capture.synthetic.skeleton import Skeleton
+
 
 class Material(IntEnum):
     """What a face of the mesh is made of; the number is the one the shader switches on."""
@@ -19,10 +21,14 @@ class Material(IntEnum):
     CLOTH = 7
     BROW = 8
     LASH = 9
+    TROUSERS = 10
+    SHOE = 11
+    SOCK = 12
 
 
 CARDS = (Material.BROW, Material.LASH)
 """Materials that are drawn with an alpha over what lies behind them."""
+GARMENTS = (Material.CLOTH, Material.TROUSERS, Material.SHOE, Material.SOCK)
 
 
 @dataclass(frozen=True)
@@ -53,6 +59,9 @@ class Look:
         stripes: Whether the pattern is stripes; flowers otherwise.
         freckles: How many, 0 to 1.
         stubble: How much shaved beard shows, 0 to 1.
+        accent: (3,) albedo of the third colour of a whole person's shirt.
+        trousers: (2, 3) albedo of the trousers and of their checks.
+        shoe: (3,) albedo of the leather.
     """
 
     skin: tuple[float, float, float]
@@ -63,6 +72,12 @@ class Look:
     stripes: bool
     freckles: float
     stubble: float
+    accent: tuple[float, float, float] = (0.45, 0.09, 0.04)
+    trousers: tuple[tuple[float, float, float], tuple[float, float, float]] = (
+        (0.10, 0.12, 0.17),
+        (0.30, 0.29, 0.27),
+    )
+    shoe: tuple[float, float, float] = (0.13, 0.06, 0.03)
 
 
 @dataclass(frozen=True)
@@ -90,6 +105,7 @@ class Subject:
         look: Colours.
         sources: What the geometry was made from, with licences.
         licence: Licence of pictures of this person.
+        skeleton: Of a whole person, who stands in the mesh's rest pose; None for a bust.
     """
 
     name: str
@@ -110,6 +126,7 @@ class Subject:
     look: Look
     sources: tuple[str, ...]
     licence: str
+    skeleton: Skeleton | None = None
 
     def posed(self, weights: np.ndarray) -> np.ndarray:
         """Vertices (V, 3) float32 for blendshape weights (K,)."""

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ico3d.capture.synthetic.skeleton import Skeleton
 from ico3d.capture.synthetic.smooth import smoothed
-from ico3d.capture.synthetic.subject import Eye, Look, Material, Subject
+from ico3d.capture.synthetic.subject import GARMENTS, Eye, Look, Material, Subject
 from ico3d.errors import CaptureError
 
 MATERIAL_OF_PART = {
@@ -28,6 +29,12 @@ MATERIAL_OF_PART = {
     "hair": Material.HAIR,
     "shirt": Material.CLOTH,
 }
+MATERIAL_BELOW = {
+    "trousers": Material.TROUSERS,
+    "shoes": Material.SHOE,
+    "socks": Material.SOCK,
+}
+"""What only a whole person wears."""
 BUST_DEPTH = 0.55
 """How far below the eyes the person is kept, metres; no camera of the head rig sees lower."""
 
@@ -68,8 +75,12 @@ TANNED = Look(
 )
 
 
-def load_npz(path: Path) -> Subject:
+def load_npz(path: Path, whole: bool = False) -> Subject:
     """Reads a person from a file.
+
+    Args:
+        path: The file.
+        whole: The whole person with a skeleton, in the rest pose; otherwise a bust.
 
     Raises:
         CaptureError: If the file is missing, is no npz, or lacks an array.
@@ -79,24 +90,27 @@ def load_npz(path: Path) -> Subject:
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
-        subject = _subject(path.stem, arrays)
-        return smoothed(subject, subject.materials == Material.HAIR)
+        subject = _subject(path.stem, arrays, whole)
+        coarse = (Material.HAIR, *GARMENTS) if whole else (Material.HAIR,)
+        return smoothed(subject, np.isin(subject.materials, coarse))
     except KeyError as error:
         raise CaptureError(f"the subject file {path} lacks the array {error}.") from error
     except (ValueError, OSError, IndexError) as error:
         raise CaptureError(f"the subject file {path} cannot be read: {error}.") from error
 
 
-def _subject(name: str, arrays: dict[str, np.ndarray]) -> Subject:
+def _subject(name: str, arrays: dict[str, np.ndarray], whole: bool) -> Subject:
     joints = {str(n): i for i, n in enumerate(arrays["joint_names"])}
     joint_at, tail_at = arrays["joint_pos"].astype(float), arrays["joint_tail"].astype(float)
     eye_left = joint_at[joints["eye.L"]]
     origin = np.array([0.0, eye_left[1], joint_at[joints["head"], 2]])
-    kept = _kept_faces(arrays, origin[1] - BUST_DEPTH)
+    known = MATERIAL_OF_PART | MATERIAL_BELOW if whole else MATERIAL_OF_PART
+    kept = _kept_faces(arrays, known, 0.0 if whole else origin[1] - BUST_DEPTH)
     used, faces = np.unique(arrays["faces"][kept], return_inverse=True)
-    vertices = _relaxed(arrays, joints)[used] - origin
+    shape = arrays["verts"].astype(float) if whole else _relaxed(arrays, joints)
+    vertices = shape[used] - origin
     parts = [str(p) for p in arrays["part_names"]]
-    materials = np.array([MATERIAL_OF_PART.get(p, 255) for p in parts], np.uint8)
+    materials = np.array([known.get(p, 255) for p in parts], np.uint8)
     names, moved, deltas = _blendshapes(arrays, used)
     male = name.endswith("_m")
     return Subject(
@@ -124,14 +138,17 @@ def _subject(name: str, arrays: dict[str, np.ndarray]) -> Subject:
             "MakeHuman community assets, CC0 1.0",
         ),
         licence="MIT (keep ICT-FaceKit-LICENSE.txt) and CC0 1.0",
+        skeleton=_skeleton(arrays, used, origin) if whole else None,
     )
 
 
-def _kept_faces(arrays: dict[str, np.ndarray], lowest: float) -> np.ndarray:
-    """Indices of the faces that are drawn: shown by default, of a known part, on the bust."""
-    known = np.array([str(p) in MATERIAL_OF_PART for p in arrays["part_names"]])
+def _kept_faces(
+    arrays: dict[str, np.ndarray], known: dict[str, Material], lowest: float
+) -> np.ndarray:
+    """Indices of the faces that are drawn: shown by default, of a known part, high enough."""
+    known_part = np.array([str(p) in known for p in arrays["part_names"]])
     height = arrays["verts"][:, 1][arrays["faces"]].max(axis=1)  # (F,)
-    shown = ~arrays["face_hidden"] & known[arrays["face_part"]]
+    shown = ~arrays["face_hidden"] & known_part[arrays["face_part"]]
     return np.flatnonzero(shown & (height > lowest))
 
 
@@ -139,8 +156,11 @@ def _texture_coordinates(arrays: dict[str, np.ndarray], kept: np.ndarray) -> np.
     """(F, 3, 2) float32 texture coordinates, rewritten where `Subject.corner_uv` says more."""
     uv = arrays["uv"][arrays["faces_uv"][kept]].astype(np.float32)
     parts = np.array([str(p) for p in arrays["part_names"]])[arrays["face_part"][kept]]
-    cloth, lashes = parts == "shirt", parts == "lashes"
-    if cloth.any():
+    lashes = parts == "lashes"
+    for garment in ("shirt", *MATERIAL_BELOW):
+        cloth = parts == garment
+        if not cloth.any():
+            continue
         corners = arrays["verts"][arrays["faces"][kept]][cloth]  # (F, 3, 3)
         length = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
         in_atlas = np.linalg.norm(uv[cloth, 1] - uv[cloth, 0], axis=1)
@@ -151,6 +171,26 @@ def _texture_coordinates(arrays: dict[str, np.ndarray], kept: np.ndarray) -> np.
     uv[lashes, :, 0] += np.where(index < 3, 2.0, 0.0) - np.floor(uv[lashes, :, 0])
     uv[lashes, :, 1] = 1 - np.clip((card - index) * LASH_CARDS[1] / LASH_CARDS[2], 0, 1)
     return uv
+
+
+def _skeleton(arrays: dict[str, np.ndarray], used: np.ndarray, origin: np.ndarray) -> Skeleton:
+    """The joints, and how the `used` vertices hang on them; shoes are as stiff as their soles."""
+    names = tuple(str(n) for n in arrays["joint_names"])
+    weights = np.zeros((len(arrays["verts"]), len(names)), np.float32)
+    rows = np.arange(len(weights))[:, None]
+    np.add.at(weights, (rows, arrays["w_idx"]), arrays["w_val"].astype(np.float32))
+    parts = [str(p) for p in arrays["part_names"]]
+    shoes = np.unique(arrays["faces"][arrays["face_part"] == parts.index("shoes")])
+    left = arrays["verts"][shoes, 0] > 0
+    weights[shoes] = 0
+    weights[shoes[left], names.index("foot.L")] = 1
+    weights[shoes[~left], names.index("foot.R")] = 1
+    return Skeleton(
+        names,
+        arrays["joint_parents"].astype(int),
+        arrays["joint_pos"].astype(float) - origin,
+        weights[used] / weights[used].sum(axis=1, keepdims=True),
+    )
 
 
 def _positions_in(used: np.ndarray, indices: np.ndarray) -> np.ndarray:

@@ -31,6 +31,7 @@ class DensitySettings:
         prune_scale: Those whose largest scale exceeds this die, metres. 3DGS: 10 % of the
             scene's extent.
         prune_contribution: Those that give pictures less than this times the median die.
+        growth: Part of the Gaussians that multiplies at once at most, those of strongest gradient.
     """
 
     max_gaussians: int = 50_000
@@ -39,6 +40,7 @@ class DensitySettings:
     prune_opacity: float = 0.005
     prune_scale: float = 0.05
     prune_contribution: float = 0.0
+    growth: float = 1.0
 
 
 @dataclass
@@ -127,7 +129,7 @@ def densify_plan(
     if contribution is not None:
         dead |= contribution < settings.prune_contribution * contribution.median()
     alive = under_cap(~dead, opacities.detach(), settings.max_gaussians)
-    room = settings.max_gaussians - int(alive.sum())
+    room = min(settings.max_gaussians - int(alive.sum()), int(settings.growth * len(size)))
     grown = _strongest(wanted & alive, gradient, room)
     return Plan(
         (alive & ~(grown & large)).nonzero()[:, 0],

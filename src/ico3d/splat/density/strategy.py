@@ -241,9 +241,13 @@ class McmcStrategy(Strategy):
         none = keep[:0]
         if len(keep) == 0 or wanted <= len(keep):
             return Plan(keep, none, none)
-        weights = opacities[keep].double().cpu()
+        weights = self._weights(opacities)[keep].double().cpu()
         drawn = torch.multinomial(weights, wanted - len(keep), True, generator=generator)
         return Plan(keep, keep[drawn.to(keep.device)], none)
+
+    def _weights(self, opacities: Tensor) -> Tensor:
+        """(N,) how likely each is copied: by opacity (N,)."""
+        return opacities
 
     def _shake(self, population: Population, rate: float, generator: torch.Generator) -> None:
         """Adds Σ·ξ / extent, times noise and learning rate, to the means of the faint."""

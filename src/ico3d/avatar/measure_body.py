@@ -1,0 +1,136 @@
+"""What baking costs a body: exact and baked windows beside each other and the recording."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from ico3d.avatar.bake_body import SAMPLES_PER_FRAME, MovingBody, Span
+from ico3d.avatar.comparison import psnr
+from ico3d.avatar.render_bundle import window_gaussians
+from ico3d.avatar.staging import NEUTRAL
+from ico3d.bundle.body import BakedWindow
+from ico3d.bundle.manifest import Loss
+from ico3d.capture.capture import Capture
+from ico3d.common.camera import Camera, look_at
+from ico3d.splat.render import render
+
+VIEWS = 24
+"""Pictures per window that baking is measured with."""
+_PROBE_SIZE, _PROBE_FOV = 256, 40.0
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera at a time of a window; picture and mask where they were recorded.
+
+    Attributes:
+        camera: In the world.
+        tau: In [0, 1].
+        background: (3,) or (H, W, 3).
+        truth: (H, W, 3), or None.
+        mask: (H, W) the person, or None.
+    """
+
+    camera: Camera
+    tau: float
+    background: torch.Tensor
+    truth: np.ndarray | None = None
+    mask: np.ndarray | None = None
+
+
+def recorded_views(capture: Capture, span: Span, count: int = VIEWS) -> Iterator[View]:
+    """Pictures of the test cameras, or of all where none tests, spread over a window.
+
+    One at a time: large recordings do not fit into memory. Where the capture lacks a clean
+    background, the person is cut out over a neutral colour.
+    """
+    cameras = capture.split.test_cameras or tuple(range(len(capture.cameras)))
+    pairs = [(c, f) for f in range(span.first, span.last + 1) for c in cameras]
+    for number in np.unique(np.linspace(0, len(pairs) - 1, count).astype(int)):
+        view = _recorded_view(capture, *pairs[number], span=span)
+        if view is not None:
+            yield view
+
+
+def _recorded_view(capture: Capture, camera: int, frame: int, span: Span) -> View | None:
+    """None where there is no picture, or nobody in it."""
+    truth, mask = capture.image(camera, frame), capture.mask(camera, frame)
+    if truth is None or (mask is not None and not mask.any()):
+        return None
+    behind = capture.background(camera)
+    if behind is None:
+        behind = np.array(NEUTRAL, np.float32)
+        if mask is not None:
+            truth = truth * mask[..., None] + behind * (1 - mask[..., None])
+    tau = (frame - span.first) / (span.last - span.first)
+    return View(capture.cameras[camera], tau, torch.from_numpy(behind), truth, mask)
+
+
+def probe_views(cameras: Sequence[Camera], span: Span, count: int = VIEWS) -> list[View]:
+    """Times between the sampled ones, seen from these cameras in turn."""
+    intervals = SAMPLES_PER_FRAME * (span.last - span.first)
+    chosen = np.unique(np.linspace(0, intervals - 1, count).astype(int))
+    return [
+        View(cameras[i % len(cameras)], (interval + 0.5) / intervals, torch.tensor(NEUTRAL))
+        for i, interval in enumerate(chosen)
+    ]
+
+
+def ring_of_cameras(low: np.ndarray, high: np.ndarray, count: int = 4) -> list[Camera]:
+    """Cameras around a box, about the axis y."""
+    middle = (low + high) / 2
+    distance = 0.6 * np.linalg.norm(high - low) / np.tan(np.deg2rad(_PROBE_FOV) / 2)
+    focal = 0.5 * _PROBE_SIZE / np.tan(np.deg2rad(_PROBE_FOV) / 2)
+    half = _PROBE_SIZE / 2
+    intrinsics = np.array([[focal, 0, half], [0, focal, half], [0, 0, 1]])
+    angles = 2 * np.pi * np.arange(count) / count
+    eyes = [middle + distance * np.array([np.sin(a), 0.0, np.cos(a)]) for a in angles]
+    return [Camera(_PROBE_SIZE, _PROBE_SIZE, intrinsics, look_at(e, middle)) for e in eyes]
+
+
+def measure_window(
+    body: MovingBody,
+    index: int,
+    baked: BakedWindow,
+    recorded: Iterable[View],
+    probes: Iterable[View],
+) -> Loss:
+    """Mean PSNR on the person: against the recording, and against the exact model."""
+    exact_psnr, baked_psnr, likeness = [], [], []
+    for view in recorded:
+        assert view.truth is not None
+        exact, ours = _exact_picture(body, index, view)[0], _picture(baked, view)
+        exact_psnr.append(psnr(exact, view.truth, view.mask))
+        baked_psnr.append(psnr(ours, view.truth, view.mask))
+    for view in probes:
+        exact, alpha = _exact_picture(body, index, view)
+        if alpha.any():
+            likeness.append(psnr(_picture(baked, view), exact, alpha))
+    return Loss(_mean(exact_psnr), _mean(baked_psnr), _mean(likeness))
+
+
+def comparison_line(body: MovingBody, index: int, baked: BakedWindow, view: View) -> np.ndarray:
+    """[recorded |] exact | baked of one view, side by side: (H, W·3 or W·2, 3) float32."""
+    pictures = [_exact_picture(body, index, view)[0], _picture(baked, view)]
+    return np.hstack(pictures if view.truth is None else [view.truth, *pictures])
+
+
+def _exact_picture(body: MovingBody, index: int, view: View) -> tuple[np.ndarray, np.ndarray]:
+    """(H, W, 3) and alpha (H, W) of the exact body."""
+    with torch.no_grad():
+        gaussians = body.window_gaussians(index, view.tau).to("cpu")
+        drawn = render(gaussians, [view.camera], view.background)
+    return drawn.rgb[0].numpy(), drawn.alpha[0].numpy()
+
+
+def _picture(baked: BakedWindow, view: View) -> np.ndarray:
+    """(H, W, 3) of the baked body."""
+    with torch.no_grad():
+        gaussians = window_gaussians(baked, view.tau)
+        return render(gaussians, [view.camera], view.background).rgb[0].numpy()
+
+
+def _mean(values: list[float]) -> float | None:
+    return round(float(np.mean(values)), 4) if values else None

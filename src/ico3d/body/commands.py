@@ -1,0 +1,88 @@
+"""The verb `ico3d train body`."""
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from ico3d.errors import SettingsError
+
+if TYPE_CHECKING:
+    from ico3d.body.train import Runner
+
+
+@dataclass(frozen=True)
+class TrainBody:
+    """Trains SWinGS++ on a capture of a whole person in motion.
+
+    The same command goes on where it was interrupted.
+
+    Attributes:
+        capture: A capture by calibrated, synchronised cameras, with masks.
+        out: The model folder to write.
+        method: SWinGS++, or what it is compared with: a positional encoding in the place of its
+            encoder, one window without tuning, Gaussians that come and go by formulas, Gaussians
+            that do not move within a window.
+        preset: Settings of the paper, or sized for two CPU cores.
+        set: Changes to the preset, as name=value (names: ico3d.body.settings.BodySettings).
+        seed: All randomness follows from it.
+        jobs: Windows that train at once, each in a process of its own; with CUDA, as many as there
+            are GPUs, at most.
+        ray: Address of a Ray cluster that trains the windows, host:port or auto; the capture and
+            the model folder must lie under the same path on all its machines.
+        plan: Only measures motion and shows the windows.
+    """
+
+    capture: tyro.conf.Positional[Path]
+    out: tyro.conf.Positional[Path]
+    method: Literal["swings++", "swings", "4dgs", "spacetime", "freetime", "static"] = "swings++"
+    preset: Literal["cpu", "paper"] = "cpu"
+    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
+    seed: int = 0
+    jobs: int = 1
+    ray: str | None = None
+    plan: bool = False
+
+    def run(self) -> None:
+        """Trains, or goes on training; writes the model folder."""
+        from rich.console import Console
+
+        from ico3d.body.settings import settings_for
+        from ico3d.body.train import BodyJob, plan_windows, train_body
+        from ico3d.capture.capture import Capture
+        from ico3d.training.changes import with_changes
+
+        runner = None if self.plan else self._runner()
+        settings = with_changes(settings_for(self.preset, self.method), self.set)
+        job = BodyJob(self.method, self.seed, settings)
+        capture = Capture.open(self.capture)
+        if self.plan:
+            plan_windows(capture, job, self.out)
+            return
+        body = train_body(capture, self.out, job, runner)
+        seconds, count = body.summary["train_seconds"], sum(map(len, body.models))
+        Console().print(
+            f"{self.out}: {len(body.windows)} windows, {count} Gaussians, "
+            f"trained in {seconds:.0f} s."
+        )
+
+    def _runner(self) -> "Runner | None":
+        """Who trains the windows.
+
+        Raises:
+            SettingsError: If it cannot be.
+        """
+        from ico3d.body.cluster import RayCluster
+        from ico3d.body.jobs import train_windows
+        from ico3d.body.processes import Processes
+
+        if self.jobs < 1 or (self.jobs > 1 and self.ray):
+            raise SettingsError(
+                f"--jobs {self.jobs} is impossible here: it counts processes of this machine, one "
+                "or more, and a Ray cluster decides by itself how many windows train at once."
+            )
+        if self.ray:
+            return partial(train_windows, crew=RayCluster(self.ray))
+        return partial(train_windows, crew=Processes(self.jobs)) if self.jobs > 1 else None

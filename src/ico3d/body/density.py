@@ -1,0 +1,80 @@
+"""Density control of bodies: 3DGS's for most methods, relocation for FreeTime."""
+
+from torch import Tensor
+
+from ico3d.body.settings import BodySettings, Method
+from ico3d.splat.density import (
+    DefaultStrategy,
+    DensitySettings,
+    DensityStats,
+    McmcSettings,
+    McmcStrategy,
+    Schedule,
+    Strategy,
+)
+from ico3d.splat.rendering import RenderInfo
+
+CLONE_BELOW = 0.01
+PRUNE_ABOVE = 0.1
+"""Sizes relative to the extent, as in 3DGS."""
+FADING = 1e-3
+"""FreeTime's weight of the mean opacity: what is not needed fades."""
+
+
+class RelocationStrategy(McmcStrategy):
+    """FreeTime: the faint move to where gradients and opacities are high; nothing shakes."""
+
+    def __init__(self, schedule: Schedule, settings: McmcSettings, seed: int, extent: float):
+        """Gathers nothing yet; arguments as for the Markov chain."""
+        super().__init__(schedule, settings, seed, extent)
+        self._stats = DensityStats.zeros(0)
+
+    def observe(self, info: RenderInfo, step: int) -> None:
+        """Gathers screen gradients."""
+        del step
+        if len(self._stats.views) != info.radii.shape[1]:
+            self._stats = DensityStats.zeros(info.radii.shape[1], info.radii.device)
+        self._stats.add(info)
+
+    def _weights(self, opacities: Tensor) -> Tensor:
+        """Half gradient, half opacity, each relative to its mean; the gathered is used up."""
+        gradient = self._stats.mean_gradient()
+        self._stats = DensityStats.zeros(0)
+        if len(gradient) != len(opacities):
+            return opacities
+        return gradient / gradient.mean().clamp_min(1e-12) + opacities / opacities.mean()
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Screen gradients gathered so far."""
+        return {"gradient_sum": self._stats.gradient_sum, "views": self._stats.views}
+
+    def restore(self, tensors: dict[str, Tensor]) -> None:
+        """Takes back what `tensors` gave."""
+        self._stats = DensityStats(tensors["gradient_sum"], tensors["views"])
+
+
+def density_control(
+    method: Method, settings: BodySettings, steps: int, seed: int, extent: float
+) -> Strategy:
+    """The strategy of a method, for a window of this extent in metres."""
+    until = round(settings.densify_until * steps)
+    schedule = Schedule(settings.densify_from, until, settings.densify_every)
+    if method == "freetime":
+        chain = McmcSettings(
+            max_gaussians=settings.max_gaussians,
+            min_opacity=settings.min_opacity,
+            growth=1 + settings.densify_growth,
+            noise_rate=0.0,
+            opacity_weight=FADING,
+            scale_weight=0.0,
+        )
+        return RelocationStrategy(schedule, chain, seed, extent)
+    thresholds = DensitySettings(
+        max_gaussians=settings.max_gaussians,
+        gradient_threshold=settings.densify_gradient,
+        growth=settings.densify_growth,
+        clone_below=CLONE_BELOW * extent,
+        prune_opacity=settings.min_opacity,
+        prune_scale=PRUNE_ABOVE * extent,
+    )
+    return DefaultStrategy(schedule, thresholds, seed, reset_every=0)

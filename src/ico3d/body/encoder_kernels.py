@@ -1,0 +1,206 @@
+"""Numba kernels of the space-time encoder at one scale and one time, forward and backward.
+
+The planes of time are lines by then, so that three planes and three lines are sampled, multiplied,
+and their gradients scattered. Channels are innermost, in groups of `LANES`: loops of a fixed
+length, which LLVM unrolls.
+"""
+
+import numba
+import numpy as np
+
+from ico3d.splat.cpu.compile import kernel
+
+LANES = 16
+"""Channels of a group."""
+ZERO, HALF, ONE = np.float32(0), np.float32(0.5), np.float32(1)
+
+
+@kernel(inline=True)
+def _place(position, places):
+    """The node before a position of −1 … 1, how far it is to the next, and the latter's slope.
+
+    Outside, and on the border, nothing depends on the position: the slope is 0 (as in torch).
+    """
+    scale = HALF * np.float32(places - 1)
+    place = (position + ONE) * scale
+    slope = scale if ZERO < place < np.float32(places - 1) else ZERO
+    place = min(max(place, ZERO), np.float32(places - 1))
+    node = min(max(int(place), 0), places - 2)  # also where the position is not a number
+    return node, place - np.float32(node), slope
+
+
+@kernel(inline=True)
+def _corners(plane, row, column, group):
+    """A group of channels at four nodes: (row, column), the next column, both a row below."""
+    return (
+        plane[row, column, group],
+        plane[row, column + 1, group],
+        plane[row + 1, column, group],
+        plane[row + 1, column + 1, group],
+    )
+
+
+@kernel(inline=True)
+def _sample(corners, x, y, out):
+    """Writes the bilinear sample."""
+    a, b, c, d = corners
+    wa, wb, wc, wd = (ONE - y) * (ONE - x), (ONE - y) * x, y * (ONE - x), y * x
+    for k in range(LANES):
+        out[k] = wa * a[k] + wb * b[k] + wc * c[k] + wd * d[k]
+
+
+@kernel(inline=True)
+def _sample_line(line, node, part, group, out):
+    """Writes the linear sample."""
+    a, b = line[node, group], line[node + 1, group]
+    for k in range(LANES):
+        out[k] = (ONE - part) * a[k] + part * b[k]
+
+
+@kernel(inline=True)
+def _sample_all(planes, lines, x, y, z, group, samples):
+    """Writes the samples of xy, xz, yz, xt, yt, zt, one after the other."""
+    _sample(_corners(planes[0], y[0], x[0], group), x[1], y[1], samples)
+    _sample(_corners(planes[1], z[0], x[0], group), x[1], z[1], samples[LANES:])
+    _sample(_corners(planes[2], z[0], y[0], group), y[1], z[1], samples[2 * LANES :])
+    _sample_line(lines[0], x[0], x[1], group, samples[3 * LANES :])
+    _sample_line(lines[1], y[0], y[1], group, samples[4 * LANES :])
+    _sample_line(lines[2], z[0], z[1], group, samples[5 * LANES :])
+
+
+@kernel(inline=True)
+def _product(s, out):
+    for k in range(LANES):
+        first = s[k] * s[LANES + k] * s[2 * LANES + k]
+        out[k] = first * s[3 * LANES + k] * s[4 * LANES + k] * s[5 * LANES + k]
+
+
+@kernel(inline=True)
+def _product_backward(s, gradient):
+    """Writes the gradients of the six samples after the samples."""
+    for k in range(LANES):
+        a, b, c = s[k], s[LANES + k], s[2 * LANES + k]
+        d, e, f = s[3 * LANES + k], s[4 * LANES + k], s[5 * LANES + k]
+        g = gradient[k]
+        cd, ef, ab = c * d, e * f, a * b
+        first, second, third = g * cd * ef, g * ab * ef, g * ab * cd
+        s[6 * LANES + k] = first * b
+        s[7 * LANES + k] = first * a
+        s[8 * LANES + k] = second * d
+        s[9 * LANES + k] = second * c
+        s[10 * LANES + k] = third * f
+        s[11 * LANES + k] = third * e
+
+
+@kernel(inline=True)
+def _add(out, weight, gradient):
+    for k in range(LANES):
+        out[k] += weight * gradient[k]
+
+
+@kernel(inline=True)
+def _scatter(corners, sums, x, y, gradient):
+    """Adds to the gradients of four nodes; returns the gradient by x and y."""
+    a, b, c, d = corners
+    ga, gb, gc, gd = ZERO, ZERO, ZERO, ZERO
+    for k in range(LANES):
+        g = gradient[k]
+        ga += g * a[k]
+        gb += g * b[k]
+        gc += g * c[k]
+        gd += g * d[k]
+    _add(sums[0], (ONE - y) * (ONE - x), gradient)
+    _add(sums[1], (ONE - y) * x, gradient)
+    _add(sums[2], y * (ONE - x), gradient)
+    _add(sums[3], y * x, gradient)
+    return (ONE - y) * (gb - ga) + y * (gd - gc), (ONE - x) * (gc - ga) + x * (gd - gb)
+
+
+@kernel(inline=True)
+def _scatter_line(line, sums, node, part, group, gradient):
+    """Adds to the gradients of two nodes; returns the gradient by the position."""
+    a, b = line[node, group], line[node + 1, group]
+    total = ZERO
+    for k in range(LANES):
+        total += gradient[k] * (b[k] - a[k])
+    _add(sums[node, group], ONE - part, gradient)
+    _add(sums[node + 1, group], part, gradient)
+    return total
+
+
+@kernel(parallel=True)
+def forward(hands, xy, xz, yz, xt, yt, zt, positions, out):
+    """Writes the features of all points.
+
+    Args:
+        hands: Threads to share the points.
+        xy: (S, S, groups, LANES), as are xz and yz: rows are the second axis.
+        xz: See xy.
+        yz: See xy.
+        xt: (S, groups, LANES) at the time asked for, as are yt and zt.
+        yt: See xt.
+        zt: See xt.
+        positions: (N, 3).
+        out: (N, groups, LANES), written.
+    """
+    places, count = xy.shape[0], len(positions)
+    planes, lines = (xy, xz, yz), (xt, yt, zt)
+    for hand in numba.prange(hands):
+        samples = np.empty(6 * LANES, np.float32)
+        for i in range(hand * count // hands, (hand + 1) * count // hands):
+            x = _place(positions[i, 0], places)
+            y = _place(positions[i, 1], places)
+            z = _place(positions[i, 2], places)
+            for group in range(xy.shape[2]):
+                _sample_all(planes, lines, x, y, z, group, samples)
+                _product(samples, out[i, group])
+
+
+@kernel(parallel=True)
+def backward(xy, xz, yz, xt, yt, zt, positions, gradient, g_planes, g_lines, g_positions):
+    """Gradients of `forward`.
+
+    Args:
+        xy: As given to `forward`, as are those up to `positions`.
+        xz: See xy.
+        yz: See xy.
+        xt: See xy.
+        yt: See xy.
+        zt: See xy.
+        positions: (N, 3).
+        gradient: (N, groups, LANES) with respect to the features.
+        g_planes: (hands, 3, S, S, groups, LANES) zeros; the sum over hands is the gradient.
+        g_lines: (hands, 3, S, groups, LANES) zeros; likewise.
+        g_positions: (N, 3), added to.
+    """
+    places, count, hands = xy.shape[0], len(positions), len(g_planes)
+    planes, lines = (xy, xz, yz), (xt, yt, zt)
+    for hand in numba.prange(hands):
+        s = np.empty(12 * LANES, np.float32)
+        sums, line_sums = g_planes[hand], g_lines[hand]
+        for i in range(hand * count // hands, (hand + 1) * count // hands):
+            x = _place(positions[i, 0], places)
+            y = _place(positions[i, 1], places)
+            z = _place(positions[i, 2], places)
+            gx, gy, gz = ZERO, ZERO, ZERO
+            for group in range(xy.shape[2]):
+                _sample_all(planes, lines, x, y, z, group, s)
+                _product_backward(s, gradient[i, group])
+                own = _corners(xy, y[0], x[0], group)
+                into = _corners(sums[0], y[0], x[0], group)
+                by_x, by_y = _scatter(own, into, x[1], y[1], s[6 * LANES :])
+                gx, gy = gx + by_x, gy + by_y
+                own = _corners(xz, z[0], x[0], group)
+                into = _corners(sums[1], z[0], x[0], group)
+                by_x, by_z = _scatter(own, into, x[1], z[1], s[7 * LANES :])
+                gx, gz = gx + by_x, gz + by_z
+                own = _corners(yz, z[0], y[0], group)
+                into = _corners(sums[2], z[0], y[0], group)
+                by_y, by_z = _scatter(own, into, y[1], z[1], s[8 * LANES :])
+                gy, gz = gy + by_y, gz + by_z
+                gx += _scatter_line(xt, line_sums[0], x[0], x[1], group, s[9 * LANES :])
+                gy += _scatter_line(yt, line_sums[1], y[0], y[1], group, s[10 * LANES :])
+                gz += _scatter_line(zt, line_sums[2], z[0], z[1], group, s[11 * LANES :])
+            g_positions[i, 0] += gx * x[2]
+            g_positions[i, 1] += gy * y[2]
+            g_positions[i, 2] += gz * z[2]

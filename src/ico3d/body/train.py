@@ -1,0 +1,261 @@
+"""From a capture to a model folder: plans windows, trains them, fine-tunes, saves."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import torch
+from rich.console import Console
+
+from ico3d.body.finetune import FineTuner
+from ico3d.body.flow import clip_flow, dynamic_weights
+from ico3d.body.model import WindowModel
+from ico3d.body.plan import Plan, PlanSettings, make_plan, print_plan, save_plan
+from ico3d.body.plan_picture import draw_plan
+from ico3d.body.settings import ONE_WINDOW, BodySettings, Method
+from ico3d.body.start import begin_window
+from ico3d.body.trained import ABOUT, UNTUNED, TrainedBody, load_window, save_window
+from ico3d.body.trainer import BodyTrainer
+from ico3d.body.views import BodyViews
+from ico3d.body.windows import Window
+from ico3d.capture.capture import Capture
+from ico3d.training.loop import LoopSettings, run_loop
+from ico3d.training.run import RunFolder
+
+FINETUNING = ("finetune_steps", "consistency", "finetune_rate")
+"""Settings that windows do not depend on: fine-tuning can be done anew without training anew."""
+WINDOW_FILE = "window.safetensors"
+
+
+@dataclass(frozen=True)
+class BodyJob:
+    """What to train.
+
+    Attributes:
+        method: SWinGS++ or what it is compared with.
+        seed: All randomness follows from it.
+        settings: How to train.
+    """
+
+    method: Method
+    seed: int
+    settings: BodySettings
+
+
+@dataclass(frozen=True)
+class WindowTask:
+    """One window's training, which depends on no other.
+
+    Attributes:
+        capture: Path of the capture.
+        folder: Where the window's run lies.
+        flow: Folder of the optical flow, shared by all windows.
+        window: Which frames.
+        index: Its number.
+        job: What to train.
+    """
+
+    capture: Path
+    folder: Path
+    flow: Path
+    window: Window
+    index: int
+    job: BodyJob
+
+    @property
+    def file(self) -> Path:
+        """The trained window."""
+        return self.folder / WINDOW_FILE
+
+    @property
+    def steps(self) -> int:
+        """Optimisation steps."""
+        return self.job.settings.steps_of(len(self.window))
+
+    @property
+    def label(self) -> str:
+        """What people read."""
+        return f"window {self.index} (frames {self.window.first} to {self.window.last})"
+
+
+Runner = Callable[[Sequence[WindowTask]], Sequence[float]]
+"""Trains windows; gives the seconds spent in steps by window."""
+
+
+def train_window(task: WindowTask, capture: Capture | None = None) -> float:
+    """Trains a window, or goes on with an interrupted run of the same settings.
+
+    Args:
+        task: Which.
+        capture: The opened capture, where the caller has it open already.
+
+    Returns:
+        Seconds spent in steps.
+
+    Raises:
+        CaptureError: If the capture lacks something that is needed.
+        SettingsError: If the folder holds a run with other settings.
+        ModelError: If training diverges.
+    """
+    job, window = task.job, task.window
+    run = RunFolder(task.folder, _about(task.capture, window, job))
+    finished = run.finished()
+    if finished is not None:
+        return finished["train_seconds"]
+    capture = capture or Capture.open(task.capture)
+
+    def dynamic(points):
+        return dynamic_weights(points, capture, window, clip_flow(capture, task.flow))
+
+    begin = begin_window(capture, window, job.method, job.settings, dynamic, job.seed)
+    begin.model.to(_device())
+    pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
+    seed = job.seed + 1_000 * task.index
+    trainer = BodyTrainer(
+        begin.model, window, pictures, job.method, job.settings, begin.extent, seed
+    )
+    loop = LoopSettings(
+        task.steps,
+        checkpoint_every=job.settings.checkpoint_every,
+        label=task.label,
+    )
+    seconds = run_loop(trainer, run, loop)
+    save_window(task.file, trainer.model)
+    summary = {"train_seconds": seconds, "num_gaussians": len(trainer.model)}
+    run.finish({**summary, "extent": begin.extent, "source": begin.source})
+    return seconds
+
+
+def finetune_window(
+    task: WindowTask, capture: Capture, trained: Path, previous: WindowModel
+) -> float:
+    """Fine-tunes a window to agree with the one before, or goes on with that.
+
+    Args:
+        task: Which; its folder is where the fine-tuning's run lies.
+        capture: The opened capture.
+        trained: Folder of the window's training.
+        previous: The window before, fine-tuned itself.
+
+    Returns:
+        Seconds spent in steps.
+    """
+    job, window = task.job, task.window
+    about = _about(task.capture, window, job)
+    run = RunFolder(task.folder, about | asdict(job.settings))
+    finished = run.finished()
+    if finished is not None:
+        return finished["train_seconds"]
+    model = load_window(trained / WINDOW_FILE)
+    before = RunFolder(trained, about).finished()
+    assert before is not None
+    model.to(_device())
+    previous.to(_device())
+    held_out = capture.split.test_cameras
+    cameras = [camera for i, camera in enumerate(capture.cameras) if i not in held_out]
+    pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
+    seed = job.seed + 1_000 * task.index + 500
+    tuner = FineTuner(
+        model, previous, window, pictures, cameras, job.settings, before["extent"], seed
+    )
+    loop = LoopSettings(
+        job.settings.finetune_steps,
+        checkpoint_every=job.settings.checkpoint_every,
+        label=f"fine-tuning window {task.index}",
+    )
+    seconds = run_loop(tuner, run, loop)
+    save_window(task.file, tuner.model)
+    run.finish({"train_seconds": seconds, "num_gaussians": len(tuner.model)})
+    return seconds
+
+
+def train_body(
+    capture: Capture, folder: Path, job: BodyJob, runner: Runner | None = None
+) -> TrainedBody:
+    """Trains a body, or goes on with an interrupted run of the same settings.
+
+    Args:
+        capture: Calibrated, synchronised cameras with masks.
+        folder: Model folder; also holds the plan, and the run of every window.
+        job: What to train.
+        runner: Trains the windows; one after another in this process by default.
+
+    Returns:
+        The trained body, as the folder now holds it.
+
+    Raises:
+        CaptureError: If the capture lacks something that is needed.
+        SettingsError: If the folder holds a run with other settings.
+        ModelError: If training diverges.
+    """
+    about = asdict(job)
+    about |= {"capture": str(capture.path.resolve()), **about.pop("settings")}
+    run = RunFolder(folder, about)
+    if run.finished() is not None:
+        return TrainedBody.load(folder)
+    windows = plan_windows(capture, job, folder).windows
+    tasks = [
+        WindowTask(
+            capture.path, folder / "windows" / f"{index:04d}", folder / "flow", window, index, job
+        )
+        for index, window in enumerate(windows)
+    ]
+    seconds = sum(runner(tasks) if runner else (train_window(task, capture) for task in tasks))
+    body = _save(capture, folder, job, tasks, seconds)
+    if job.settings.finetune_steps and len(tasks) > 1:
+        _save(capture, folder, job, tasks, seconds, UNTUNED)
+        tuned = [replace(t, folder=folder / "finetuned" / f"{t.index:04d}") for t in tasks[1:]]
+        for before, task, after in zip(tasks, tasks[1:], tuned, strict=False):
+            source = before if before.index == 0 else tuned[before.index - 1]
+            seconds += finetune_window(after, capture, task.folder, load_window(source.file))
+        body = _save(capture, folder, job, [tasks[0], *tuned], seconds)
+    run.finish({"train_seconds": seconds, "num_gaussians": sum(map(len, body.models))})
+    return body
+
+
+def plan_windows(capture: Capture, job: BodyJob, folder: Path) -> Plan:
+    """The windows of a clip, shown and drawn; methods of one window take all of it."""
+    settings = job.settings
+    bounds = PlanSettings(
+        settings.motion_threshold, settings.shortest_window, settings.longest_window
+    )
+    plan = make_plan(capture, bounds, folder)
+    if job.method in ONE_WINDOW:
+        plan = replace(plan, windows=(Window(0, capture.num_frames - 1),))
+    print_plan(plan, Console())
+    save_plan(plan, folder / "plan.json")
+    draw_plan(plan, capture, folder / "plan.png")
+    return plan
+
+
+def _save(
+    capture: Capture,
+    folder: Path,
+    job: BodyJob,
+    tasks: Sequence[WindowTask],
+    seconds: float,
+    about: str = ABOUT,
+) -> TrainedBody:
+    """Names the windows' files in the model folder."""
+    summary = {
+        "train_seconds": seconds,
+        "capture": capture.provenance,
+        "settings": asdict(job.settings),
+    }
+    models = [load_window(task.file) for task in tasks]
+    windows = tuple(task.window for task in tasks)
+    body = TrainedBody(models, windows, capture.fps, job.method, summary)
+    body.save(folder, [str(task.file.relative_to(folder)) for task in tasks], about)
+    return body
+
+
+def _about(capture: Path, window: Window, job: BodyJob) -> dict:
+    """What a window's run is known by: what fine-tuning does comes later."""
+    about = {"capture": str(capture.resolve()), "method": job.method, "seed": job.seed}
+    settings = asdict(job.settings)
+    kept = {name: value for name, value in settings.items() if name not in FINETUNING}
+    return about | asdict(window) | kept
+
+
+def _device() -> torch.device:
+    return torch.device("cuda" if torch.cuda.is_available() else "cpu")

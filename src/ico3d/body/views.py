@@ -1,0 +1,144 @@
+"""The pictures that a body is trained on: the person cut out, and little around them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ico3d.capture.capture import Capture
+from ico3d.capture.pictures import LayerCache, Layers, View, train_cameras
+from ico3d.errors import CaptureError
+
+MARGIN = 8
+"""Pixels around the person that are kept: what lies outside of the mask must learn to be empty."""
+
+
+@dataclass(frozen=True)
+class Example:
+    """What one picture asks of a body.
+
+    Attributes:
+        target: (H, W, 3) the person before `color`.
+        mask: (H, W) in [0, 1].
+        color: (3,) what they stand before.
+    """
+
+    target: Tensor
+    mask: Tensor
+    color: Tensor
+
+
+class BodyViews:
+    """Pictures of some frames by a capture's training cameras, cropped to the person.
+
+    All pictures of a camera have one crop, which holds the person in every frame: a Gaussian that
+    stays where a hand was in another frame must be seen to be wrong.
+
+    Attributes:
+        views: The recorded views in which the person is seen, frame by frame.
+    """
+
+    def __init__(self, capture: Capture, frames: Iterable[int], cache_gib: float):
+        """Reads masks, and pictures as far as they fit into memory.
+
+        Args:
+            capture: Where pictures and masks come from.
+            frames: Which frames.
+            cache_gib: Memory for pictures.
+
+        Raises:
+            CaptureError: If there is no picture of the person, or a view has no mask.
+        """
+        self._capture = capture
+        self._plates: dict[int, np.ndarray | None] = {}
+        self._cache = LayerCache(self._read, cache_gib)
+        frames = list(frames)
+        self._boxes = {
+            camera: box
+            for camera in train_cameras(capture)
+            if (box := self._common_box(camera, frames)) is not None
+        }
+        self.views = [
+            View(camera, frame, capture.cameras[camera].cropped(*box.place))
+            for frame in frames
+            for camera, box in self._boxes.items()
+            if self._cache.layers(camera, frame) is not None
+        ]
+        if not self.views:
+            raise CaptureError(f"{capture.path} has no picture of the person to train on.")
+
+    def example(self, view: View, color: np.ndarray, device: torch.device) -> Example:
+        """What a view asks for, before a colour (3,)."""
+        layers = self._cache.layers(view.camera_index, view.frame)
+        assert layers is not None and layers[0] is not None and layers[1] is not None
+        person, mask = (torch.from_numpy(part).to(device).float() / 255 for part in layers)  # type: ignore[arg-type]
+        behind = torch.from_numpy(color).to(device).float()
+        return Example(person + (1 - mask[..., None]) * behind, mask, behind)
+
+    def _common_box(self, camera: int, frames: Iterable[int]) -> "_Box | None":
+        """What holds the person in all frames of a camera; None where nobody is seen."""
+        seen = self._capture.cameras[camera]
+        inside = np.zeros((seen.height, seen.width), bool)
+        for frame in frames:
+            mask = self._mask(camera, frame)
+            if mask is not None:
+                inside |= mask > 0
+        return _Box.around(inside) if inside.any() else None
+
+    def _mask(self, camera: int, frame: int) -> np.ndarray | None:
+        """(H, W); None where there is no picture either."""
+        mask = self._capture.mask(camera, frame)
+        if mask is None and self._capture.image(camera, frame) is not None:
+            name = self._capture.cameras[camera].name
+            raise CaptureError(
+                f"{self._capture.path}: frame {frame} of camera {name} has no mask: a body is "
+                "trained on the person alone; record clean plates and make masks of them."
+            )
+        return mask
+
+    def _read(self, camera: int, frame: int) -> Layers | None:
+        """The person on black (h, w, 3) and the mask (h, w), cropped; None where nobody is seen."""
+        image = self._capture.image(camera, frame)
+        if image is None:
+            return None
+        mask, cut = self._mask(camera, frame), self._boxes[camera].cut
+        if mask is None or not mask.any():
+            return None
+        outside = 1 - mask[cut][..., None]
+        plate = self._plate(camera)
+        person = image[cut] * (1 - outside) if plate is None else image[cut] - outside * plate[cut]
+        return person.clip(0, 1), mask[cut]
+
+    def _plate(self, camera: int) -> np.ndarray | None:
+        """(H, W, 3) what a camera sees without the person, where that is known."""
+        if camera not in self._plates:
+            self._plates[camera] = self._capture.background(camera)
+        return self._plates[camera]
+
+
+@dataclass(frozen=True)
+class _Box:
+    """A part of a picture.
+
+    Attributes:
+        place: Left, top, width, height in pixels.
+    """
+
+    place: tuple[int, int, int, int]
+
+    @staticmethod
+    def around(inside: np.ndarray) -> "_Box":
+        """What holds the pixels (H, W) that are marked, with a margin."""
+        rows, columns = np.flatnonzero(inside.any(1)), np.flatnonzero(inside.any(0))
+        top, left = max(rows[0] - MARGIN, 0), max(columns[0] - MARGIN, 0)
+        bottom = min(rows[-1] + 1 + MARGIN, inside.shape[0])
+        right = min(columns[-1] + 1 + MARGIN, inside.shape[1])
+        return _Box((int(left), int(top), int(right - left), int(bottom - top)))
+
+    @property
+    def cut(self) -> tuple[slice, slice]:
+        """Rows and columns."""
+        left, top, width, height = self.place
+        return slice(top, top + height), slice(left, left + width)

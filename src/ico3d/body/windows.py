@@ -1,0 +1,117 @@
+"""Sliding windows: a clip is cut where much has moved (SWinGS, section on adaptive windows)."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ico3d.errors import SettingsError
+
+
+@dataclass(frozen=True)
+class Window:
+    """A span of frames with its own Gaussians.
+
+    Attributes:
+        first: First frame, inside.
+        last: Last frame, inside; the next window begins with it.
+    """
+
+    first: int
+    last: int
+
+    def __len__(self) -> int:
+        return self.last - self.first + 1
+
+    @property
+    def frames(self) -> range:
+        """All of its frames."""
+        return range(self.first, self.last + 1)
+
+    @property
+    def center(self) -> int:
+        """The frame in the middle, to which the canonical Gaussians belong."""
+        return (self.first + self.last) // 2
+
+    def tau(self, frame: float) -> float:
+        """Time within the window: 0 at its first frame, 1 at its last."""
+        return (frame - self.first) / max(self.last - self.first, 1)
+
+
+def cut(
+    motion: Sequence[float] | np.ndarray, threshold: float, shortest: int, longest: int
+) -> tuple[Window, ...]:
+    """Cuts a clip into windows that share one frame with their neighbours.
+
+    Greedy: a window takes step after step and ends before the one that would take its summed
+    motion above the threshold, so that a fast jump begins the next window. One that would end
+    amid a burst of motion ends before the burst. Where what is left then could not be divided
+    within the bounds, the window ends earlier, else later, by as few frames as make it possible.
+    If the whole clip cannot be divided within the bounds, windows may be longer than `longest`,
+    by as little as possible; a clip shorter than `shortest` is one window.
+
+    Steps belong to a burst if a window of the longest length would pass half of the threshold
+    with such steps alone.
+
+    Args:
+        motion: (F − 1,) how much moves from frame i to frame i + 1; not negative.
+        threshold: Motion that a window may add up to, unless it is of the shortest length.
+        shortest: Frames a window has at least, 2 or more.
+        longest: Frames a window has at most.
+
+    Returns:
+        Windows from frame 0 to frame F − 1.
+
+    Raises:
+        SettingsError: If the bounds or the threshold contradict one another.
+        ValueError: If motion is negative or not finite.
+    """
+    motion = np.asarray(motion, np.float64)
+    if not 2 <= shortest <= longest or not threshold > 0:
+        raise SettingsError(
+            f"windows of {shortest} to {longest} frames and {threshold} motion are impossible: "
+            "the shortest has 2 frames or more, the longest no fewer, and the threshold is above 0."
+        )
+    if not (np.isfinite(motion) & (motion >= 0)).all():
+        raise ValueError("motion must be finite and not negative.")
+    fewest, most = _bounds(len(motion), shortest - 1, longest - 1)
+    total = np.concatenate([[0.0], np.cumsum(motion)])  # (F,) motion before each frame
+    bursting = motion > threshold / 2 / (longest - 1)  # (F − 1,)
+    windows, first = [], 0
+    while not windows or first < len(motion):
+        moved = total[first + 1 : first + 1 + most] - total[first]
+        calm = int(np.searchsorted(moved, threshold, side="right"))
+        wanted = _before_burst(bursting[first:], max(calm, fewest), fewest)
+        steps = _possible(wanted, len(motion) - first, fewest, most)
+        windows.append(Window(first, first + steps))
+        first += steps
+    return tuple(windows)
+
+
+def _bounds(steps: int, fewest: int, most: int) -> tuple[int, int]:
+    """Steps of the shortest and of the longest window, such that `steps` can be divided."""
+    if steps < fewest:
+        return steps, steps
+    return fewest, max(most, math.ceil(steps / (steps // fewest)))
+
+
+def _divisible(steps: int, fewest: int, most: int) -> bool:
+    """Whether so many steps are a sum of windows of `fewest` to `most` steps."""
+    return steps == 0 or steps <= (steps // fewest) * most
+
+
+def _before_burst(bursting: np.ndarray, steps: int, fewest: int) -> int:
+    """Steps of a window such that it ends with a calm one, where it would end amid a burst."""
+    if not bursting[steps - 1 : steps + 1].all() or steps >= len(bursting):
+        return steps
+    calm = np.flatnonzero(~bursting[fewest - 1 : steps])
+    return fewest + int(calm[-1]) if len(calm) else steps
+
+
+def _possible(wanted: int, left: int, fewest: int, most: int) -> int:
+    """Steps nearest to the wanted that leave something divisible; fewer rather than more."""
+    shorter = range(min(wanted, left), fewest - 1, -1)
+    longer = range(wanted + 1, min(most, left) + 1)
+    fitting = (s for s in (*shorter, *longer) if _divisible(left - s, fewest, most))
+    return next(fitting, left)

@@ -1,0 +1,240 @@
+"""Measuring a trained body: pictures by the cameras that trained nothing, at all moments."""
+
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import torch
+from rich.progress import track
+
+from ico3d.body.trained import ROUNDING, TrainedBody
+from ico3d.body.windows import Window
+from ico3d.capture.capture import Capture
+from ico3d.capture.pictures import View, train_cameras
+from ico3d.errors import CaptureError
+from ico3d.measure.flicker import border_flicker, novel_cameras
+from ico3d.measure.lpips import lpips
+from ico3d.measure.metrics import moving_pixels, psnr, psnr_moving
+from ico3d.measure.scores import Scores, add_picture, write_pictures
+from ico3d.splat.render import render
+
+QUALITY = ("psnr", "psnr_mask", "psnr_moving", "ssim", "lpips")
+"""Metrics of a picture; of several pictures, their mean over those that allow them."""
+
+
+class BodyRenderer:
+    """Renders a trained body at the frames of a capture."""
+
+    def __init__(self, body: TrainedBody, capture: Capture):
+        """Binds the body to the capture's clock and clean plates."""
+        self._body, self._capture = body, capture
+        self._plate = lru_cache(1)(self._read_plate)
+        self.seconds: list[float] = []
+
+    @torch.no_grad()
+    def picture(self, camera: int, frame: int) -> np.ndarray:
+        """(H, W, 3) the body over the clean plate, else over black; clipped to [0, 1]."""
+        behind = self._plate(camera)
+        seen = self._capture.cameras[camera]
+        begin = time.perf_counter()
+        gaussians = self._body.gaussians(frame / self._capture.fps)
+        rgb = render(gaussians, [seen], behind).rgb[0].clamp(0, 1).cpu()
+        self.seconds.append(time.perf_counter() - begin)
+        return rgb.numpy()
+
+    def _read_plate(self, camera: int) -> torch.Tensor | None:
+        found = self._capture.background(camera)
+        return None if found is None else torch.from_numpy(found)
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What was recorded, as far as a body can know it.
+
+    Attributes:
+        picture: (H, W, 3) in [0, 1]; where no clean plate is known the person cut out by the
+            mask, before black.
+        mask: (H, W) the person, or None where nobody made a mask.
+        moving: (H, W) bool, `moving_pixels`.
+        whole: Whether all of the picture can be expected of a body: there is a plate or a mask.
+    """
+
+    picture: np.ndarray
+    mask: np.ndarray | None
+    moving: np.ndarray
+    whole: bool
+
+
+class BodyTruth:
+    """The recorded pictures of a capture; remembers a few, since each is looked at three times."""
+
+    def __init__(self, capture: Capture):
+        """Reads nothing yet."""
+        self._capture = capture
+        self._image = lru_cache(3)(capture.image)
+        self._has_plate = lru_cache(1)(lambda camera: capture.background(camera) is not None)
+
+    def at(self, camera: int, frame: int) -> Truth | None:
+        """The truth of one view, or None where it was not recorded."""
+        picture = self._image(camera, frame)
+        if picture is None:
+            return None
+        around = [f for f in (frame - 1, frame + 1) if 0 <= f < self._capture.num_frames]
+        neighbours = [other for f in around if (other := self._image(camera, f)) is not None]
+        moving = moving_pixels(picture, neighbours)
+        mask, plate = self._capture.mask(camera, frame), self._has_plate(camera)
+        if not plate and mask is not None:
+            picture = picture * mask[..., None]
+        return Truth(picture, mask, moving, plate or mask is not None)
+
+
+def evaluate_body(
+    body: TrainedBody,
+    capture: Capture,
+    cameras: Sequence[int] | None = None,
+    frames: Sequence[int] | None = None,
+    spans: Sequence[Window] | None = None,
+    images: Path | None = None,
+) -> dict:
+    """All metrics of design section 2 that a body has, those of pictures as means over them.
+
+    The body is rendered over the capture's clean plates; where it has none, over black, and
+    compared with the person cut out by the mask. `psnr_moving` is PSNR on the person's moving
+    pixels: those that differ by more than 25/255 from the frame before or after, and what lies
+    within 3 pixels of them.
+
+    Args:
+        body: The trained body.
+        capture: Where truth comes from.
+        cameras: Those to measure with; by default the capture's test cameras.
+        frames: Those to measure; by default all that the body shows.
+        spans: Frames to report on one by one; by default the body's windows. A frame in two of
+            them counts for the earlier, which shows it.
+        images: Folder for pictures, or None.
+
+    Returns:
+        Metric keys to values, None where this capture does not allow the metric; `per_window`,
+        `per_camera` and `per_frame`: lists of the same for parts of the pictures. `flicker` is
+        the mean of `per_border` (`border_flicker`), None where there is one window.
+
+    Raises:
+        CaptureError: If there is no picture to measure with.
+    """
+    cameras = _test_cameras(capture) if cameras is None else cameras
+    frames = _shown(body, capture) if frames is None else frames
+    renderer = BodyRenderer(body, capture)
+    found = _measured(renderer, capture, cameras, frames, images)
+    if not found:
+        raise CaptureError(f"{capture.path} has no picture in the frames to measure.")
+    result: dict = _means(found.values())
+    borders = border_flicker(
+        body, novel_cameras([capture.cameras[i] for i in train_cameras(capture)])
+    )
+    result["flicker"] = float(np.mean(borders)) if borders else None
+    result["num_gaussians"] = sum(map(len, body.models))
+    result["ms_per_frame"] = float(np.median(renderer.seconds) * 1000)
+    result["train_seconds"] = body.summary.get("train_seconds")
+    result["per_window"] = _per_window(found, spans or body.windows)
+    result["per_border"] = [
+        {"frame": window.last, "flicker": value}
+        for window, value in zip(body.windows, borders, strict=False)
+    ]
+    result["per_camera"] = [
+        {"camera": capture.cameras[camera].name}
+        | _means(values for (other, _), values in found.items() if other == camera)
+        for camera in cameras
+    ]
+    result["per_frame"] = [
+        {"frame": frame} | _means(values for (_, other), values in found.items() if other == frame)
+        for frame in frames
+    ]
+    return result
+
+
+PictureScores = dict[str, float | None]
+"""Metric keys to the values of one picture."""
+
+
+def _test_cameras(capture: Capture) -> tuple[int, ...]:
+    if not capture.split.test_cameras:
+        raise CaptureError(
+            f"{capture.path} has no test cameras (of fewer than 3, all train): "
+            "measure with all by --frames all."
+        )
+    return capture.split.test_cameras
+
+
+def _shown(body: TrainedBody, capture: Capture) -> range:
+    """The frames of a capture that a body shows."""
+    return range(min(capture.num_frames, int(body.seconds * capture.fps + ROUNDING) + 1))
+
+
+def _measured(
+    renderer: BodyRenderer,
+    capture: Capture,
+    cameras: Sequence[int],
+    frames: Sequence[int],
+    images: Path | None,
+) -> dict[tuple[int, int], PictureScores]:
+    """Scores by camera and frame."""
+    truths = BodyTruth(capture)
+    chosen = [(camera, frame) for camera in cameras for frame in frames]
+    found = {}
+    for camera, frame in track(chosen, "pictures", transient=True):
+        truth = truths.at(camera, frame)
+        if truth is None:
+            continue
+        predicted = renderer.picture(camera, frame)
+        found[camera, frame] = picture_scores(predicted, truth)
+        if images is not None:
+            view = View(camera, frame, capture.cameras[camera])
+            write_pictures(images, view, predicted, truth.picture, truth.mask)
+    return found
+
+
+def picture_scores(predicted: np.ndarray, truth: Truth) -> PictureScores:
+    """What one picture is worth.
+
+    Args:
+        predicted: (H, W, 3) in [0, 1].
+        truth: What it should be.
+    """
+    scores = Scores({name: [] for name in QUALITY})
+    if truth.whole:
+        add_picture(scores, predicted, truth.picture)
+        scores.add("lpips", lpips(predicted, truth.picture))
+    if truth.mask is not None and truth.mask.any():
+        box = _box(truth.mask)
+        seen, true, mask = predicted[box], truth.picture[box], truth.mask[box]
+        scores.add("psnr_mask", psnr(seen, true, mask))
+        scores.add("psnr_moving", psnr_moving(seen, true, mask * truth.moving[box]))
+    return scores.means()
+
+
+def _box(mask: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns of what is inside of a mask: metrics on the mask need no more."""
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+
+
+def _per_window(found: dict[tuple[int, int], PictureScores], spans: Sequence[Window]) -> list[dict]:
+    """Means over the frames of each span; a shared frame belongs to the earlier one."""
+    result, begin = [], -1
+    for span in spans:
+        inside = range(max(span.first, begin), span.last + 1)
+        means = _means(values for (_, frame), values in found.items() if frame in inside)
+        result.append({"first": span.first, "last": span.last} | means)
+        begin = span.last + 1
+    return result
+
+
+def _means(pictures: Iterable[PictureScores]) -> PictureScores:
+    """Mean of each metric over the pictures that have it."""
+    scores = Scores({name: [] for name in QUALITY})
+    for values in pictures:
+        for name, value in values.items():
+            scores.add(name, value)
+    return scores.means()

@@ -1,0 +1,68 @@
+"""How much a body jumps where one window hands over to the next."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from rich.progress import track
+
+from ico3d.body.novel_views import novel_camera
+from ico3d.body.trained import TrainedBody
+from ico3d.common.camera import Camera
+from ico3d.splat.gaussians import Gaussians
+from ico3d.splat.render import render
+
+NOVEL_CAMERAS = 20
+
+
+def novel_cameras(recorded: Sequence[Camera], count: int = NOVEL_CAMERAS) -> list[Camera]:
+    """The same cameras between the recorded ones at every call."""
+    return [novel_camera(recorded, np.random.default_rng([count, k])) for k in range(count)]
+
+
+@torch.no_grad()
+def border_flicker(body: TrainedBody, cameras: Sequence[Camera]) -> list[float]:
+    """How different the two windows of each border show the frame that they share.
+
+    Args:
+        body: The trained body.
+        cameras: Who looks on (`novel_cameras`).
+
+    Returns:
+        One value per border, the mean over cameras of `masked_difference`.
+    """
+    borders = range(len(body.windows) - 1)
+    return [
+        float(np.mean([_difference(before, after, camera) for camera in cameras]))
+        for before, after in (
+            (body.window_gaussians(index, 1.0), body.window_gaussians(index + 1, 0.0))
+            for index in track(borders, "window borders", transient=True)
+        )
+    ]
+
+
+def masked_difference(
+    first: np.ndarray, second: np.ndarray, first_alpha: np.ndarray, second_alpha: np.ndarray
+) -> float:
+    """L1 per pixel of the person: Σ |a − b| / (3·Σ m), where m is the larger alpha.
+
+    What lies outside of both silhouettes does not differ, and needs no mask. Two that differ by
+    a constant colour alone have that as their difference.
+
+    Args:
+        first: (H, W, 3), before black.
+        second: Likewise.
+        first_alpha: (H, W).
+        second_alpha: (H, W).
+    """
+    area = np.maximum(first_alpha, second_alpha).sum(dtype=np.float64)
+    error = np.abs(first - second).sum(dtype=np.float64)
+    return float(error / (3 * area)) if area > 0 else 0.0
+
+
+def _difference(before: Gaussians, after: Gaussians, camera: Camera) -> float:
+    """`masked_difference` of two sets of Gaussians seen by one camera."""
+    pictures = [render(gaussians, [camera]) for gaussians in (before, after)]
+    colors = [picture.rgb[0].clamp(0, 1).cpu().numpy() for picture in pictures]
+    alphas = [picture.alpha[0].cpu().numpy() for picture in pictures]
+    return masked_difference(*colors, *alphas)

@@ -1,0 +1,85 @@
+"""LPIPS with VGG-16 (Zhang et al. 2018), where its weights are at hand."""
+
+import logging
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import torch
+from safetensors.torch import load_file
+from torch import Tensor, nn
+
+from ico3d.common.files import model_file
+from ico3d.errors import MissingModelError, ModelError
+from ico3d.head.perceptual import DEVIATION, MEAN, WEIGHTS, vgg_layers
+
+LINEAR = "lpips_vgg.safetensors"
+"""The learnt weights of channels, (1, C, 1, 1) each, under the names of version 0.1 of the authors'
+package: `lin0.model.1.weight` … `lin4.model.1.weight`."""
+
+CHANNELS = (64, 64, 0, 128, 128, 0, 256, 256, 256, 0, 512, 512, 512, 0, 512, 512, 512)
+"""All convolutions of VGG-16; 0 is a max pooling."""
+
+TAPS = (3, 8, 15, 22, 29)
+"""Layers that are compared: relu1_2, relu2_2, relu3_3, relu4_3, relu5_3."""
+
+log = logging.getLogger(__name__)
+
+
+class Lpips(nn.Module):
+    """Distance of two pictures in the features of VGG-16, each channel weighted as learnt."""
+
+    def __init__(self):
+        """Loads the weights.
+
+        Raises:
+            MissingModelError: If a file is not installed.
+            ModelError: If a file holds something else.
+        """
+        super().__init__()
+        paths = [model_file(name, "LPIPS") for name in (WEIGHTS, LINEAR)]
+        self.features = vgg_layers(CHANNELS)
+        tensors, linear = map(load_file, paths)
+        try:
+            names = self.features.state_dict(prefix="features.")
+            self.load_state_dict({name: tensors[name] for name in names})
+            weights = [linear[f"lin{k}.model.1.weight"].flatten() for k in range(len(TAPS))]
+        except (KeyError, RuntimeError) as error:
+            raise ModelError(
+                f"{paths[0]} and {paths[1]} do not hold the weights of LPIPS: {error}."
+            ) from error
+        self._weights = weights  # (C,) each
+        self.requires_grad_(False)
+
+    @torch.no_grad()
+    def forward(self, image: Tensor, target: Tensor) -> float:
+        """The distance of two pictures (H, W, 3) in [0, 1]; 0 for equal ones."""
+        pair = torch.stack([image, target])  # (2, H, W, 3)
+        values = (pair - pair.new_tensor(MEAN)) / pair.new_tensor(DEVIATION)
+        values = values.permute(0, 3, 1, 2)  # (2, 3, H, W)
+        total = 0.0
+        for index, layer in enumerate(self.features):
+            values = layer(values)
+            if index in TAPS:
+                unit = values / (values.norm(dim=1, keepdim=True) + 1e-10)  # (2, C, h, w)
+                squares = (unit[0] - unit[1]).square().mean((1, 2))  # (C,)
+                total += float(self._weights[TAPS.index(index)] @ squares)
+        return total
+
+
+@cache
+def _installed() -> Callable[[Tensor, Tensor], float] | None:
+    """LPIPS, or None after one warning."""
+    try:
+        return Lpips()
+    except MissingModelError as error:
+        log.warning("measuring goes on without LPIPS: %s", error)
+        return None
+
+
+def lpips(predicted: np.ndarray, truth: np.ndarray) -> float | None:
+    """LPIPS of two pictures (H, W, 3) in [0, 1], or None where its weights are not installed."""
+    measure = _installed()
+    if measure is None:
+        return None
+    return measure(torch.from_numpy(predicted).float(), torch.from_numpy(truth).float())

@@ -1,0 +1,32 @@
+"""What the tests of bodies share."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from moving_ball import MovingBall
+from recorded_capture import record
+from window_tasks import files_of_a_sequence
+
+
+@pytest.fixture
+def moving_ball(tmp_path):
+    """Makes captures: moving_ball(heights, cameras)."""
+    return lambda heights, cameras=8: MovingBall(tmp_path / "ball", heights, cameras)
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory):
+    """The moving capture on disk."""
+    folder = tmp_path_factory.mktemp("recorded")
+    record(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def sequence(recorded, tmp_path_factory):
+    """Contents of the windows' files if they train one after another."""
+    return files_of_a_sequence(recorded, tmp_path_factory.mktemp("sequence"))

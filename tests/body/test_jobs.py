@@ -1,0 +1,199 @@
+"""Windows trained by processes beside one another."""
+
+import multiprocessing
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from window_tasks import CHECKPOINT_EVERY, step_gone_on_from, tasks
+
+from ico3d.body.commands import TrainBody
+from ico3d.body.jobs import RETRIES, Lost, train_windows
+from ico3d.body.processes import Processes
+from ico3d.errors import CaptureError, MissingExtraError, ModelError, SettingsError
+from ico3d.training.finite import NotFiniteError
+from ico3d.training.loop import saved_steps
+from ico3d.training.run import CHECKPOINT
+
+
+class Disturbed(Processes):
+    """Processes to one of which something happens as soon as it has a checkpoint."""
+
+    def __init__(self, jobs, victim, disturb):
+        super().__init__(jobs)
+        self._victim, self._disturb = victim, disturb
+
+    def start(self, task):
+        super().start(task)
+        if task == self._victim:
+            names = {child.name: child.pid for child in multiprocessing.active_children()}
+            self._pid = names[task.label]
+
+    def ended(self, timeout):
+        if self._victim is not None and wait_for(self._victim.folder / CHECKPOINT):
+            self._victim = None
+            self._disturb(self._pid)
+        return super().ended(timeout)
+
+
+def wait_for(file: Path) -> bool:
+    """Waits until a file is there."""
+    for _ in range(60_000):
+        if file.exists():
+            return True
+        time.sleep(0.002)
+    raise TimeoutError(file)
+
+
+def killed(pid):
+    """The worst that can happen."""
+    os.kill(pid, signal.SIGKILL)
+
+
+def test_a_killed_worker_is_replaced_and_the_files_are_those_of_a_sequence(
+    recorded, sequence, tmp_path, capsys
+):
+    """Two at once, three windows; the second loses its worker in the middle of training."""
+    made = tasks(recorded, tmp_path)
+    seconds = train_windows(made, Disturbed(2, made[1], killed))
+    assert [task.file.read_bytes() for task in made] == sequence
+    assert len(seconds) == 3 and min(seconds) > 0
+    said = capsys.readouterr().out
+    step = step_gone_on_from(said, made[1], "was killed by SIGKILL")
+    assert CHECKPOINT_EVERY <= step < made[1].steps
+    assert "window 2 (frames 6 to 8): loss" in said, "the end of each window is told"
+
+
+def interrupted(pid):
+    """Ctrl-C, which reaches the worker as well as the one who started it."""
+    os.kill(pid, signal.SIGINT)
+    time.sleep(0.2)
+    assert alive(pid), "the worker leaves that to its parent"
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def command_line(pid: str) -> str:
+    """What a process was started with."""
+    return Path(f"/proc/{pid}/cmdline").read_text()
+
+
+def test_ctrl_c_and_errors_end_all_workers_and_spare_checkpoints(recorded, tmp_path):
+    """First the one, then, while the same window goes on, an error that a user can mend."""
+    first, second, _ = tasks(recorded, tmp_path, "static", steps_per_frame=300)
+    with pytest.raises(KeyboardInterrupt):
+        train_windows([first], Disturbed(1, first, interrupted))
+    assert not multiprocessing.active_children()
+    saved = saved_steps(first.folder)
+    assert CHECKPOINT_EVERY <= saved < first.steps
+    second.folder.mkdir()
+    (second.folder / "settings.json").write_text("{}")
+    with pytest.raises(SettingsError, match="holds a run with another '"):
+        train_windows([first, second], Processes(2))
+    assert not multiprocessing.active_children()
+    assert saved_steps(first.folder) >= saved
+
+
+def test_an_error_of_the_program_is_shown_and_not_tried_again(tmp_path, capfd):
+    """A window of no capture."""
+    task = tasks(None, tmp_path)[1]
+    with pytest.raises(ModelError, match=r"window 1 .* the error that is printed above"):
+        train_windows([task], Processes(1))
+    assert capfd.readouterr().err.count("AttributeError: 'NoneType' object") == 1
+
+
+def test_workers_end_with_the_one_who_started_them(recorded, tmp_path):
+    """Even if that is killed: nobody would stop them, and who comes next writes the same files."""
+    command = (
+        "import sys; from pathlib import Path; from window_tasks import tasks;"
+        "from ico3d.body.jobs import train_windows; from ico3d.body.processes import Processes;"
+        "made = tasks(*map(Path, sys.argv[1:]), 'static', steps_per_frame=10_000);"
+        "train_windows(made[:1], Processes(1))"
+    )
+    paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    environment = {**os.environ, "PYTHONPATH": paths}
+    words = [sys.executable, "-c", command, str(recorded), str(tmp_path)]
+    with subprocess.Popen(words, env=environment, stdout=subprocess.DEVNULL) as parent:
+        wait_for(tasks(recorded, tmp_path)[0].folder / CHECKPOINT)
+        children = Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text().split()
+        worker = next(int(child) for child in children if "spawn_main" in command_line(child))
+        assert alive(worker)
+        parent.kill()
+    deadline = time.monotonic() + 60
+    while alive(worker):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+class Hopeless:
+    """A `Crew` whose workers are always lost."""
+
+    capacity = 2
+
+    def __init__(self):
+        self.started, self.working, self.stopped = Counter(), [], False
+
+    def expect(self, windows):
+        pass
+
+    def start(self, task):
+        self.started[task.index] += 1
+        self.working.append(task)
+
+    def ended(self, timeout):
+        return [(self.working.pop(0), Lost("was lost"))]
+
+    def stop(self):
+        self.stopped = True
+
+
+def test_workers_are_not_replaced_for_ever(recorded, tmp_path):
+    """A sentence that says which window, how often and after which step."""
+    crew = Hopeless()
+    with pytest.raises(
+        ModelError, match=rf"window 0 .* was lost, {RETRIES + 1} times after step 0"
+    ):
+        train_windows(tasks(recorded, tmp_path), crew)
+    assert crew.started[0] == RETRIES + 1 and crew.stopped
+
+
+def test_a_gpu_for_each(monkeypatch):
+    """By the names that the environment gives them; never two windows on one."""
+    monkeypatch.setattr("torch.cuda.device_count", lambda: 2)
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "3,GPU-5")
+    assert Processes(2)._gpus == ["3", "GPU-5"]
+    monkeypatch.delenv("CUDA_VISIBLE_DEVICES")
+    assert Processes(2)._gpus == ["0", "1"]
+    with pytest.raises(SettingsError, match="give --jobs 2 or fewer"):
+        Processes(3)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [CaptureError("No."), MissingExtraError("ray", "cluster", "x"), NotFiniteError("'means'")],
+)
+def test_errors_travel(error):
+    """Class, sentence and attributes, whatever the constructor takes."""
+    again = pickle.loads(pickle.dumps(error))
+    assert (type(again), str(again), vars(again)) == (type(error), str(error), vars(error))
+
+
+@pytest.mark.parametrize("wrong", [{"jobs": 0}, {"jobs": 2, "ray": "auto"}])
+def test_impossible_jobs_are_refused_before_anything_is_done(wrong, tmp_path):
+    """No process, or processes and a cluster."""
+    with pytest.raises(SettingsError, match=f"--jobs {wrong['jobs']} is impossible"):
+        TrainBody(tmp_path / "none", tmp_path / "out", **wrong).run()
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,90 @@
+"""From a capture to a model folder."""
+
+import json
+from dataclasses import replace
+
+import pytest
+import torch
+from moving_capture import FRAMES, MovingCapture
+
+from ico3d.body.settings import settings_for
+from ico3d.body.train import BodyJob, train_body
+from ico3d.body.trained import TrainedBody
+from ico3d.body.windows import Window
+from ico3d.errors import SettingsError
+
+TINY = {
+    "longest_window": 6,
+    "shortest_window": 3,
+    "initial_gaussians": 60,
+    "max_gaussians": 90,
+    "steps_per_frame": 4,
+    "warmup_steps": 4,
+    "densify_from": 5,
+    "densify_every": 5,
+    "grid_space": 4,
+    "width": 8,
+    "finetune_steps": 6,
+}
+
+
+def job(method="swings++", seed=0, **changes):
+    """A training of a few seconds."""
+    return BodyJob(method, seed, replace(settings_for("cpu", method), **(TINY | changes)))
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    """A capture, the folder of its body, and the body."""
+    folder = tmp_path_factory.mktemp("body")
+    capture = MovingCapture(folder / "capture")
+    return capture, folder / "model", train_body(capture, folder / "model", job())
+
+
+def test_windows_cover_the_clip(trained):
+    """They share one frame; the plan on disk and its picture are those that were trained."""
+    _, folder, body = trained
+    assert body.windows[0].first == 0 and body.windows[-1].last == FRAMES - 1
+    assert all(a.last == b.first for a, b in zip(body.windows, body.windows[1:], strict=False))
+    plan = json.loads((folder / "plan.json").read_text())
+    assert [Window(**window) for window in plan["windows"]] == list(body.windows)
+    assert (folder / "plan.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_folder_holds_the_body(trained):
+    """The fine-tuned windows, bit by bit, and how they were made."""
+    _, folder, body = trained
+    loaded = TrainedBody.load(folder)
+    for a, b in zip(body.models, loaded.models, strict=True):
+        assert torch.equal(a.at(0.4).means, b.at(0.4).means)
+    files = [entry["file"] for entry in json.loads((folder / "body.json").read_text())["windows"]]
+    assert files[0].startswith("windows/") and files[1].startswith("finetuned/")
+    assert loaded.summary["settings"]["max_gaussians"] == 90
+    assert loaded.summary["capture"]["kind"] == "moving"
+
+
+def test_a_finished_run_is_loaded(trained):
+    """The same command does nothing; other settings are refused."""
+    capture, folder, body = trained
+    again = train_body(capture, folder, job())
+    assert torch.equal(again.models[1].at(0.5).means, body.models[1].at(0.5).means)
+    with pytest.raises(SettingsError, match="max_gaussians"):
+        train_body(capture, folder, job(max_gaussians=80))
+
+
+def test_the_same_seed_gives_the_same_body(trained, tmp_path):
+    """And another seed another one."""
+    capture, _, body = trained
+    same = train_body(capture, tmp_path / "same", job(finetune_steps=0))
+    other = train_body(capture, tmp_path / "other", job(finetune_steps=0, seed=1))
+    first = [some.models[0].at(1.0).means for some in (body, same, other)]
+    assert torch.equal(first[0], first[1])
+    assert first[0].shape != first[2].shape or not torch.equal(first[0], first[2])
+
+
+@pytest.mark.parametrize("method", ["4dgs", "spacetime", "freetime"])
+def test_some_methods_take_the_clip_as_one_window(trained, tmp_path, method):
+    """So there is nothing to fine-tune."""
+    body = train_body(trained[0], tmp_path / method, job(method))
+    assert body.windows == (Window(0, FRAMES - 1),)
+    assert not (tmp_path / method / "finetuned").exists()

@@ -1,0 +1,70 @@
+"""Bodies on disk."""
+
+import json
+
+import pytest
+import torch
+from window_parts import ENCODED, canonical
+
+from ico3d.body.formulas import Still
+from ico3d.body.model import WindowModel
+from ico3d.body.trained import ABOUT, TrainedBody, load_window, save_window
+from ico3d.body.windows import Window
+from ico3d.errors import ModelError
+
+
+@pytest.fixture
+def body(tmp_path):
+    """Two windows: one that is deformed, one that is still; saved."""
+    alpha = torch.rand(5, 2, generator=torch.Generator().manual_seed(3))
+    shared = ENCODED.initial(torch.Generator().manual_seed(4))
+    models = [
+        WindowModel(ENCODED, {**canonical(), "alpha": alpha}, shared),
+        WindowModel(Still(), canonical(3), {}),
+    ]
+    made = TrainedBody(models, (Window(0, 4), Window(4, 6)), 15.0, "swings++", {"who": "nobody"})
+    for number, model in enumerate(models):
+        save_window(tmp_path / f"{number}.safetensors", model)
+    made.save(tmp_path, ["0.safetensors", "1.safetensors"])
+    return made
+
+
+def test_round_trip(body, tmp_path):
+    """The same windows, bit by bit."""
+    loaded = TrainedBody.load(tmp_path)
+    assert (loaded.windows, loaded.fps, loaded.method) == (body.windows, 15.0, "swings++")
+    for frame in (0, 1.3, 4, 5, 6):
+        a, b = (some.gaussians(frame / 15) for some in (body, loaded))
+        assert torch.equal(a.means, b.means) and torch.equal(a.colors, b.colors)
+
+
+def test_times_find_their_window(body):
+    """A shared frame belongs to the earlier window; times beyond the clip are its ends."""
+    assert [body.window_at(frame / 15) for frame in (0, 3.9, 4, 4.1, 6, 99)] == [0, 0, 0, 1, 1, 1]
+    assert body.seconds == 6 / 15
+    torch.testing.assert_close(body.gaussians(99.0).means, body.window_gaussians(1, 1.0).means)
+    torch.testing.assert_close(body.gaussians(-1.0).means, body.window_gaussians(0, 0.0).means)
+
+
+def test_no_body_and_damaged_ones(body, tmp_path):
+    """One sentence that names the file."""
+    with pytest.raises(ModelError, match="no body"):
+        TrainedBody.load(tmp_path / "elsewhere")
+    whole = (tmp_path / "1.safetensors").read_bytes()
+    (tmp_path / "1.safetensors").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(ModelError, match=r"1\.safetensors"):
+        TrainedBody.load(tmp_path)
+    about = json.loads((tmp_path / ABOUT).read_text())
+    about["windows"][0]["file"] = "../../elsewhere.safetensors"
+    (tmp_path / ABOUT).write_text(json.dumps(about))
+    with pytest.raises(ModelError, match="outside of its folder"):
+        TrainedBody.load(tmp_path)
+
+
+def test_a_window_of_something_else_is_refused(tmp_path):
+    """A file of the right kind with other tensors."""
+    model = WindowModel(Still(), canonical(), {})
+    model.gaussians["superfluous"] = torch.zeros(5)
+    save_window(tmp_path / "w.safetensors", model)
+    with pytest.raises(ModelError, match="superfluous"):
+        load_window(tmp_path / "w.safetensors")

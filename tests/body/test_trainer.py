@@ -1,0 +1,173 @@
+"""Training a window."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from moving_capture import MovingCapture
+
+from ico3d.body.learner import Learner
+from ico3d.body.settings import settings_for
+from ico3d.body.start import begin_window
+from ico3d.body.trainer import BodyTrainer
+from ico3d.body.views import BodyViews
+from ico3d.body.windows import Window
+from ico3d.splat.losses import ssim
+from ico3d.splat.render import render
+
+WINDOW = Window(4, 8)
+SMALL = {
+    "initial_gaussians": 250,
+    "max_gaussians": 400,
+    "steps_per_frame": 50,
+    "warmup_steps": 20,
+    "densify_from": 30,
+    "densify_every": 30,
+    "grid_space": 8,
+    "width": 32,
+}
+
+
+@pytest.fixture
+def capture(tmp_path):
+    """The swinging arm."""
+    return MovingCapture(tmp_path)
+
+
+def trainer_of(capture, method="swings++", seed=0, window=WINDOW, **changes):
+    """A trainer of the window in which the arm rises."""
+    settings = replace(settings_for("cpu", method), **(SMALL | changes))
+    begin = begin_window(
+        capture, window, method, settings, lambda p: (p[:, 0] > 0.2).astype(float), seed
+    )
+    pictures = BodyViews(capture, window.frames, 0.1)
+    return BodyTrainer(begin.model, window, pictures, method, settings, begin.extent, seed)
+
+
+def masked_error(capture, model, frame):
+    """Mean squared error on the person, over the held-out cameras."""
+    errors = []
+    for index in capture.split.test_cameras:
+        plate = torch.from_numpy(capture.background(index))
+        with torch.no_grad():
+            seen = render(model.at(WINDOW.tau(frame)), [capture.cameras[index]], plate).rgb[0]
+        mask = capture.mask(index, frame)[..., None]
+        errors.append(((seen.numpy() - capture.image(index, frame)) ** 2 * mask).sum() / mask.sum())
+    return np.mean(errors) / 3
+
+
+def ends_error(capture, model):
+    """The sum of errors at both ends of the window."""
+    return masked_error(capture, model, 4) + masked_error(capture, model, 8)
+
+
+@pytest.mark.parametrize("method", ["swings++", "swings", "4dgs", "spacetime", "freetime"])
+def test_every_method_learns(capture, method):
+    """The error at the window's ends falls, with fewer Gaussians than allowed."""
+    trainer = trainer_of(capture, method)
+    before = ends_error(capture, trainer.model)
+    for index in range(250):
+        trainer.step(index)
+    assert len(trainer.model) <= 400
+    assert ends_error(capture, trainer.model) < 0.9 * before
+
+
+def test_what_moves_is_learned(capture):
+    """SWinGS++ is nearer to the truth than Gaussians that stand still."""
+    trainers = trainer_of(capture), trainer_of(capture, "static")
+    for trainer in trainers:
+        for index in range(250):
+            trainer.step(index)
+    moving, still = (ends_error(capture, trainer.model) for trainer in trainers)
+    assert moving < 0.7 * still
+
+
+def test_the_warm_up_moves_nothing(capture):
+    """Only canonical Gaussians learn, and only from the centre frame."""
+    trainer = trainer_of(capture)
+    before = {name: value.clone() for name, value in trainer.model.shared.items()}
+    alpha, means = (trainer.model.gaussians[n].clone() for n in ("alpha", "means"))
+    for index in range(20):
+        trainer.step(index)
+    assert all(torch.equal(before[n], value) for n, value in trainer.model.shared.items())
+    assert torch.equal(alpha, trainer.model.gaussians["alpha"])
+    assert not torch.equal(means, trainer.model.gaussians["means"])
+    trainer.step(20)
+    assert not torch.equal(before["mlp.weight2"], trainer.model.shared["mlp.weight2"])
+
+
+def test_alpha_follows_density_control(capture):
+    """Blending weights begin as the flow's mask and are cloned along with their Gaussians."""
+    trainer = trainer_of(capture)
+    alpha = trainer.model.gaussians["alpha"].detach()
+    moving = trainer.model.gaussians["means"][:, 0] > 0.2
+    torch.testing.assert_close(alpha, torch.stack([~moving, moving], 1).float())
+    for index in range(100):
+        trainer.step(index)
+    assert len(trainer.model) > 250 and len(trainer.model.gaussians["alpha"]) == len(trainer.model)
+
+
+def test_the_loss_is_the_papers(capture):
+    """λ_1·L1 + λ_s·(1 − SSIM) + λ_m·|M_r − M_gt|."""
+    trainer = trainer_of(capture)
+    learner = trainer._learner
+    view = learner.views[3]
+    example = learner.example(view, 0)
+    rendering = learner.draw(trainer.model.canonical(), view, example)
+    image, target = rendering.rgb, example.target[None]
+    expected = (
+        0.8 * (image - target).abs().mean()
+        + 0.2 * (1 - ssim(image, target))
+        + 0.1 * (rendering.alpha[0] - example.mask).abs().mean()
+    )
+    torch.testing.assert_close(learner.loss(rendering, example), expected)
+
+
+@pytest.mark.parametrize("method", ["swings++", "freetime"])
+def test_resuming_repeats_the_uninterrupted_run(capture, method):
+    """Bit by bit, density control included."""
+    whole = trainer_of(capture, method)
+    for index in range(40):
+        whole.step(index)
+    kept = {name: value.detach().clone() for name, value in whole.tensors().items()}
+    resumed = trainer_of(capture, method)
+    resumed.restore(kept, {})
+    for index in range(40, 65):
+        whole.step(index)
+        resumed.step(index)
+    for name, value in whole.tensors().items():
+        assert torch.equal(value, resumed.tensors()[name]), name
+
+
+def test_cameras_that_see_other_colors_are_corrected(capture):
+    """A camera whose pictures are darker by a fifth learns that factor, not the Gaussians."""
+    picture, plate = capture.image, capture.background
+    capture.image = lambda c, f: picture(c, f) * (0.8 if c == 1 else 1.0)
+    capture.background = lambda c: plate(c) * (0.8 if c == 1 else 1.0)
+    trainer = trainer_of(capture, color_correction=True, motion_rate=2e-2)
+    for index in range(250):
+        trainer.step(index)
+    affine = trainer.tensors()["affine"].detach()
+    grey = (affine @ torch.tensor([0.5, 0.5, 0.5, 1.0])).mean(1)  # (C,)
+    assert grey[1] / grey[[0, 2]].mean() == pytest.approx(0.8, abs=0.06)
+
+
+def test_epochs_show_every_view_once(capture):
+    """In another order each time."""
+    learner = Learner(
+        trainer_of(capture).model,
+        WINDOW,
+        BodyViews(capture, WINDOW.frames, 0.1),
+        settings_for("cpu", "swings++"),
+        1.0,
+        0,
+    )
+    count = len(learner.views)
+    seen = [learner.view(learner.views, index) for index in range(2 * count)]
+    assert (
+        {id(v) for v in seen[:count]}
+        == {id(v) for v in seen[count:]}
+        == {id(v) for v in learner.views}
+    )
+    assert seen[:count] != seen[count:]

@@ -1,0 +1,62 @@
+"""The pictures that a body is trained on."""
+
+import numpy as np
+import pytest
+import torch
+from moving_capture import MovingCapture
+
+from ico3d.body.views import MARGIN, BodyViews
+from ico3d.errors import CaptureError
+
+CPU = torch.device("cpu")
+
+
+@pytest.fixture
+def capture(tmp_path):
+    """The swinging arm."""
+    return MovingCapture(tmp_path)
+
+
+def test_training_cameras_only(capture):
+    """Every frame by every camera that is not held out."""
+    views = BodyViews(capture, range(2, 5), 0.1).views
+    assert {view.frame for view in views} == {2, 3, 4}
+    assert {view.camera_index for view in views} == set(range(7)) - set(capture.split.test_cameras)
+
+
+@pytest.mark.parametrize("cache_gib", [0.0, 0.1])
+def test_the_person_stands_before_a_color(capture, cache_gib):
+    """What the plate shows is taken out exactly, as far as bytes go."""
+    pictures = BodyViews(capture, [0, 8], cache_gib)
+    color = np.array([0.9, 0.1, 0.4])
+    for view in [view for view in pictures.views if view.frame == 8][:3]:
+        example = pictures.example(view, color, CPU)
+        mask, image = (part(view.camera_index, 8) for part in (capture.mask, capture.image))
+        ever = mask + capture.mask(view.camera_index, 0)
+        rows, columns = np.flatnonzero(ever.any(1)), np.flatnonzero(ever.any(0))
+        top, left = max(rows[0] - MARGIN, 0), max(columns[0] - MARGIN, 0)
+        cut = np.s_[top : top + view.camera.height, left : left + view.camera.width]
+        plate = capture.background(view.camera_index)
+        expected = image + (1 - mask[..., None]) * (color - plate)
+        np.testing.assert_allclose(example.target, expected[cut], atol=2.1 / 255)
+        np.testing.assert_allclose(example.mask, mask[cut], atol=0.51 / 255)
+        whole = capture.cameras[view.camera_index]
+        moved = whole.intrinsics[:2, 2] - view.camera.intrinsics[:2, 2]
+        np.testing.assert_array_equal(moved, (left, top))
+
+
+def test_a_capture_without_masks_is_refused(capture):
+    """Named are frame and camera."""
+    capture.mask = lambda camera, frame: None
+    with pytest.raises(CaptureError, match="frame 0 of camera c0 has no mask"):
+        BodyViews(capture, [0], 0.1)
+
+
+def test_views_without_anybody_are_left_out(capture):
+    """Where the person is outside of the picture, nothing is learned."""
+    seen = capture.mask
+    capture.mask = lambda c, f: seen(c, f) * (c != 2)
+    assert 2 not in {view.camera_index for view in BodyViews(capture, [0], 0.1).views}
+    capture.mask = lambda c, f: 0 * seen(c, f)
+    with pytest.raises(CaptureError, match="no picture of the person"):
+        BodyViews(capture, [0], 0.1)

@@ -1,0 +1,50 @@
+"""Windows to train by whoever shall be tested, and what they must become."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from ico3d.body.settings import settings_for
+from ico3d.body.train import BodyJob, WindowTask, train_window
+from ico3d.body.windows import Window
+
+WINDOWS = (Window(0, 3), Window(3, 6), Window(6, 8))
+STEPS_PER_FRAME = 25
+CHECKPOINT_EVERY = 10
+
+
+def tasks(capture: Path, folder: Path, method="swings++", **changes) -> list[WindowTask]:
+    """Three tiny windows."""
+    small = {
+        "initial_gaussians": 200,
+        "max_gaussians": 400,
+        "steps_per_frame": STEPS_PER_FRAME,
+        "warmup_steps": 10,
+        "densify_from": 20,
+        "densify_every": 20,
+        "grid_space": 8,
+        "width": 32,
+        "cache_gib": 0.1,
+        "checkpoint_every": CHECKPOINT_EVERY,
+    }
+    job = BodyJob(method, 0, replace(settings_for("cpu", method), **(small | changes)))
+    return [
+        WindowTask(capture, folder / f"{index:04d}", folder / "flow", window, index, job)
+        for index, window in enumerate(WINDOWS)
+    ]
+
+
+def step_gone_on_from(said: str, task: WindowTask, reason: str) -> int:
+    """The step in what was said when a window lost its worker."""
+    _, found, rest = said.partition(
+        f"{task.label}: its worker {reason}; another goes on from step "
+    )
+    assert found, said
+    return int(rest.partition(".")[0])
+
+
+def files_of_a_sequence(capture: Path, folder: Path) -> list[bytes]:
+    """What the windows are if one after another trains in one process."""
+    made = tasks(capture, folder)
+    for task in made:
+        train_window(task)
+    return [task.file.read_bytes() for task in made]

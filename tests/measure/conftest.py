@@ -1,0 +1,7 @@
+"""What tests of measuring share with the tests of bodies."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "body"))
+sys.path.insert(0, str(Path(__file__).parent))

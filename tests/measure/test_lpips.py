@@ -1,0 +1,85 @@
+"""LPIPS with made-up weights against its definition, written out."""
+
+import logging
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import save_file
+
+from ico3d.errors import ModelError
+from ico3d.measure import lpips as room
+
+STAGES = ((64, 64), (128, 128), (256, 256, 256), (512, 512, 512), (512, 512, 512))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Random weights, under torchvision's and the authors' names."""
+    generator = torch.Generator().manual_seed(0)
+    vgg, linear, number, width = {}, {}, 0, 3
+    for stage, widths in enumerate(STAGES):
+        for channels in widths:
+            size = (channels, width, 3, 3)
+            vgg[f"features.{number}.weight"] = torch.randn(size, generator=generator) / width**0.5
+            vgg[f"features.{number}.bias"] = 0.1 * torch.randn(channels, generator=generator)
+            number, width = number + 2, channels
+        number += 1  # the pooling
+        name = f"lin{stage}.model.1.weight"
+        linear[name] = torch.rand(1, width, 1, 1, generator=generator)
+    path = tmp_path_factory.mktemp("models")
+    save_file(vgg, path / "vgg16.safetensors")
+    save_file(linear, path / "lpips_vgg.safetensors")
+    return path, vgg, linear
+
+
+@pytest.fixture(autouse=True)
+def look_again():
+    room._installed.cache_clear()
+    yield
+    room._installed.cache_clear()
+
+
+def _by_definition(a, b, vgg, linear) -> float:
+    mean, deviation = (-0.030, -0.088, -0.188), (0.458, 0.448, 0.450)
+    values = torch.stack([torch.from_numpy(a), torch.from_numpy(b)]).float() * 2 - 1
+    values = ((values - torch.tensor(mean)) / torch.tensor(deviation)).movedim(-1, 1)
+    number, total = 0, 0.0
+    for stage, widths in enumerate(STAGES):
+        for _ in widths:
+            weight, bias = (vgg[f"features.{number}.{kind}"] for kind in ("weight", "bias"))
+            values = torch.nn.functional.conv2d(values, weight, bias, padding=1).relu()
+            number += 2
+        unit = values / values.square().sum(1, keepdim=True).sqrt()
+        difference = (unit[:1] - unit[1:]).square()
+        weights = linear[f"lin{stage}.model.1.weight"]
+        total += float(torch.nn.functional.conv2d(difference, weights).mean())
+        values, number = torch.nn.functional.max_pool2d(values, 2), number + 1
+    return total
+
+
+def test_it_is_what_it_is_defined_as(folder, monkeypatch):
+    path, vgg, linear = folder
+    monkeypatch.setenv("ICO3D_MODELS", str(path))
+    rng = np.random.default_rng(1)
+    a, b = rng.random((2, 32, 40, 3)).astype(np.float32)
+    assert room.lpips(a, b) == pytest.approx(_by_definition(a, b, vgg, linear), rel=1e-4)
+    assert room.lpips(a, a) == 0
+
+
+def test_a_file_of_something_else_is_refused(folder, tmp_path, monkeypatch):
+    _, vgg, linear = folder
+    save_file({k: v for k, v in vgg.items() if "28" not in k}, tmp_path / "vgg16.safetensors")
+    save_file(linear, tmp_path / "lpips_vgg.safetensors")
+    monkeypatch.setenv("ICO3D_MODELS", str(tmp_path))
+    with pytest.raises(ModelError, match="weights of LPIPS"):
+        room.lpips(np.zeros((32, 32, 3)), np.zeros((32, 32, 3)))
+
+
+def test_without_weights_it_is_not_measured_and_says_so_once(tmp_path, monkeypatch, caplog):
+    monkeypatch.setenv("ICO3D_MODELS", str(tmp_path))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    with caplog.at_level(logging.WARNING):
+        values = [room.lpips(np.zeros((32, 32, 3)), np.zeros((32, 32, 3))) for _ in range(3)]
+    assert values == [None] * 3
+    assert [record.levelname for record in caplog.records] == ["WARNING"]

@@ -1,0 +1,72 @@
+import type { BodyInfo } from '../bundle/manifest.ts';
+import type { BakedWindow, Curve } from './window.ts';
+
+const WIDTH = 1024; // texels per row: one texel is one Gaussian
+
+/** The size of a slot's textures: every window of the body fits. */
+export interface Capacity {
+  count: number; // Gaussians
+  width: number; // texels
+  rows: number;
+  ranks: [number, number, number]; // of positions, rotations, log-scales
+}
+
+/** A window as its textures hold it. */
+export interface PackedWindow {
+  window: BakedWindow['info'];
+  curve: Curve;
+  rest: Float32Array; // 2 layers of texels: centre, log-scales
+  colours: Uint8Array; // texels
+  basis: Int16Array; // 1 + P + R + L layers of texels: quaternion, positions, rotations, log-scales
+}
+
+/** What the largest window needs. */
+export function capacityOf({ windows }: BodyInfo): Capacity {
+  const most = (value: (window: BodyInfo['windows'][number]) => number) => Math.max(...windows.map(value));
+  const count = most((window) => window.num_gaussians);
+  const ranks = [0, 1, 2].map((part) => most((window) => window.ranks[part]!));
+  return { count, width: WIDTH, rows: Math.ceil(count / WIDTH), ranks: ranks as Capacity['ranks'] };
+}
+
+/** Lays a window out for textures; what a smaller one leaves free is 0. */
+export function pack(window: BakedWindow, capacity: Capacity): PackedWindow {
+  const { width, rows, ranks } = capacity;
+  const layer = 4 * width * rows;
+  const rest = new Float32Array(2 * layer);
+  spread(window.means, 3, rest, 0);
+  spread(window.scales, 3, rest, layer);
+  const colours = new Uint8Array(layer);
+  colours.set(window.rgba);
+  const basis = new Int16Array((1 + ranks[0] + ranks[1] + ranks[2]) * layer);
+  basis.set(window.quats);
+  const parts = [window.positionBasis, window.rotationBasis, window.scaleBasis];
+  let begin = layer;
+  parts.forEach((part, i) => {
+    const size = i === 1 ? 4 : 3;
+    const length = size * window.info.num_gaussians;
+    for (let k = 0; k < window.info.ranks[i]!; k++) {
+      spread(part.subarray(k * length, (k + 1) * length), size, basis, begin + k * layer);
+    }
+    begin += ranks[i]! * layer;
+  });
+  return { window: window.info, curve: window.curve, rest, colours, basis };
+}
+
+/** Writes rows of 3 or 4 values into texels of 4, from `begin` on. */
+function spread<T extends Float32Array | Int16Array>(values: T, size: number, texels: T, begin: number): void {
+  if (size === 4) {
+    texels.set(values, begin);
+    return;
+  }
+  for (let from = 0, to = begin; from < values.length; from += 3, to += 4) {
+    texels[to] = values[from]!;
+    texels[to + 1] = values[from + 1]!;
+    texels[to + 2] = values[from + 2]!;
+  }
+}
+
+/** Where each of a window's coefficients goes among those of the capacity's ranks. */
+export function coefficientPlaces(window: BakedWindow['info'], { ranks }: Capacity): number[] {
+  const begins = [0, ranks[0], ranks[0] + ranks[1]];
+  return window.ranks.flatMap((rank, part) => Array.from({ length: rank }, (_, k) => begins[part]! + k));
+}

@@ -1,0 +1,84 @@
+import type { Body } from '../body/body.ts';
+import { byId } from './elements.ts';
+import { icon } from './icons.ts';
+
+const REFRESH = 100; // ms
+
+/** Play, pause and scrub: where a body is in its time. */
+export class PlayerBar {
+  private readonly body: Body;
+  private readonly button = byId<HTMLButtonElement>('play');
+  private readonly scrub = byId<HTMLInputElement>('scrub');
+  private readonly clock = byId<HTMLOutputElement>('clock');
+  private resumes = false; // once the slider is let go
+
+  /** @param frame s between two frames of the recording: a step of the arrow keys */
+  constructor(body: Body, frame: number) {
+    this.body = body;
+    this.scrub.max = String(body.timeline.duration);
+    this.scrub.step = String(frame / 10);
+    this.button.onclick = () => this.toggle();
+    this.scrub.oninput = () => body.playback.seek(this.scrub.valueAsNumber);
+    this.scrub.onkeydown = (event) => this.key(event, frame);
+    this.scrub.onpointerdown = () => this.hold();
+    this.scrub.onpointerup = this.scrub.onpointercancel = () => this.release();
+    byId('stage').addEventListener('keydown', (event) => this.space(event));
+    byId('player').hidden = false;
+    setInterval(() => this.refresh(), REFRESH);
+    this.refresh();
+  }
+
+  private toggle(): void {
+    this.body.playback.playing = !this.body.playback.playing;
+    this.refresh();
+  }
+
+  private space(event: KeyboardEvent): void {
+    if (event.key !== ' ') return;
+    event.preventDefault();
+    this.toggle();
+  }
+
+  /** Arrow keys go from frame to frame. */
+  private key(event: KeyboardEvent, frame: number): void {
+    const step = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
+    if (step === undefined) return;
+    event.preventDefault();
+    const { playback } = this.body;
+    playback.seek((Math.round(playback.time / frame) + step) * frame);
+    this.refresh();
+  }
+
+  private hold(): void {
+    const { playback } = this.body;
+    this.resumes = playback.playing;
+    playback.playing = false;
+  }
+
+  private release(): void {
+    this.body.playback.playing ||= this.resumes;
+    this.resumes = false;
+    this.refresh();
+  }
+
+  private refresh(): void {
+    const { playback, timeline, shown } = this.body;
+    this.scrub.value = String(playback.time);
+    this.scrub.setAttribute('aria-valuetext', `${playback.time.toFixed(1)} seconds`);
+    this.clock.textContent = `${label(playback.time)} / ${label(timeline.duration)}`;
+    byId('player').setAttribute('aria-busy', String(shown?.waiting ?? true));
+    const plays = playback.playing || this.resumes;
+    const name = plays ? 'Pause' : 'Play';
+    if (this.button.title === name) return;
+    this.button.title = name;
+    this.button.setAttribute('aria-label', name);
+    this.button.replaceChildren(icon(plays ? 'pause' : 'play'));
+  }
+}
+
+/** Minutes and seconds: 1:05.3. */
+export function label(seconds: number): string {
+  const tenths = Math.round(seconds * 10);
+  const minutes = Math.floor(tenths / 600);
+  return `${minutes}:${((tenths % 600) / 10).toFixed(1).padStart(4, '0')}`;
+}
