@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ico3d.errors import MissingExtraError
+from ico3d.capture import extras
 
 RAFT_CHECKPOINTS = {
     "raft_large": "raft_large_C_T_SKHT_V2-ff5fadd5.pth",
@@ -135,8 +135,4 @@ def opencv() -> Any:
     Raises:
         MissingExtraError: If it is not installed.
     """
-    try:
-        import cv2
-    except ImportError as error:
-        raise MissingExtraError("opencv-contrib-python", "body", "optical flow") from error
-    return cv2
+    return extras.opencv("optical flow")

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ico3d.capture.decoding import largest_channel
 from ico3d.capture.dna.smc import SmcFile
 
 log = logging.getLogger(__name__)
@@ -140,5 +141,5 @@ def row(table: np.ndarray | None, frame: int) -> np.ndarray | None:
 
 
 def person(picture: np.ndarray) -> np.ndarray:
-    """(H, W) float32 of a mask picture: 1 where its largest channel is above the middle."""
-    return (picture[..., :3].max(-1) > 127).astype(np.float32)
+    """uint8 (H, W) of a mask picture: 255 where its largest channel is above the middle."""
+    return np.where(largest_channel(picture) > 127, np.uint8(255), np.uint8(0))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ico3d.capture.decoding import decoded
+from ico3d.capture.decoding import decoded, unit
 from ico3d.capture.dna.annotations import person
 from ico3d.capture.dna.smc import SmcFile
 from ico3d.capture.poses import rigid, turned
@@ -66,4 +66,4 @@ class Kinect:
         """(H, W) float32, 1 on the person, or None where there is none."""
         inside = f"Kinect/{camera}/mask/{frame}"
         held = self._file.encoded(inside)
-        return None if held is None else person(decoded(held, f"{self._file.path}: {inside}"))
+        return None if held is None else unit(person(decoded(held, f"{self._file.path}: {inside}")))

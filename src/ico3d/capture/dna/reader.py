@@ -73,7 +73,7 @@ class DnaRendering(Capture):
         device = self._devices[camera]
         inside = f"Mask/{device.number}/mask/{self._index(frame)}"
         picture = self._decoded(self._annotations, device, inside)
-        return None if picture is None else device.lens.straightened(person(picture))
+        return None if picture is None else unit(device.lens.straightened(person(picture)))
 
     def keypoints_2d(self, camera: int, frame: int) -> np.ndarray | None:
         """(J, 3) pixels of the straightened picture, and confidence; None where there are none."""

@@ -14,6 +14,8 @@ from ico3d.errors import CaptureError
 PURPOSE = "reading SMC files"
 LARGEST = 256 * 2**20
 """Bytes that one piece may have; a damaged header can promise any number."""
+MOST_VALUES = 16
+"""That an attribute may have."""
 DAMAGED = (OSError, KeyError, ValueError, TypeError, RuntimeError, OverflowError, MemoryError)
 """What h5py raises for files with damage."""
 
@@ -48,7 +50,11 @@ class SmcFile:
         """An attribute of a group, or None."""
         with self._guard(inside):
             node = self._find(inside)
-            return None if node is None else node.attrs.get(name)
+            if node is None or name not in node.attrs:
+                return None
+            if np.prod(node.attrs.get_id(name).shape, dtype=float) > MOST_VALUES:
+                raise self._damaged(f"the attribute {name} of {inside or 'the file'}")
+            return node.attrs[name]
 
     def encoded(self, inside: str) -> bytes | None:
         """What an encoded picture's dataset holds, or None where there is none."""

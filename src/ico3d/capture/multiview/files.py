@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.capture.decoding import decoded, size_of
+from ico3d.capture.decoding import decoded, largest_channel, size_of
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.clip import Clip, OpenClips
 from ico3d.errors import CaptureError
@@ -43,7 +43,7 @@ class RecordedFiles:
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
         """uint8 (H, W), the largest channel of the mask picture, or None where there is none."""
         picture = self._decoded("masks", camera, frame)
-        return None if picture is None else picture[..., :3].max(-1)
+        return None if picture is None else largest_channel(picture)
 
     def plate(self, camera: int) -> np.ndarray | None:
         """The clean plate, uint8 RGB (H, W, 3), or None where there is none."""
