@@ -1,0 +1,147 @@
+"""A whole person: a trained head on a trained body, as the exact models draw it."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from scipy.spatial.transform import Rotation, Slerp
+
+from ico3d.body.trained import TrainedBody
+from ico3d.common.files import write_atomic
+from ico3d.errors import ModelError
+from ico3d.head.trained import TrainedHead
+from ico3d.splat.gaussians import Gaussians, cat
+from ico3d.training.checkpoint import load_tensors, save_tensors
+
+ABOUT = "avatar.json"
+"""The file by which a folder is known to hold an avatar."""
+HEAD, BODY, PLACEMENT = "head", "body", "placement.safetensors"
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where a head is on a body, frame by frame (design section 2).
+
+    Attributes:
+        canonical_from_head: (4, 4) G: a similarity from the space of the head's model to that of
+            the head poses; the identity where both come from one capture.
+        world_from_canonical: (F, 4, 4) rigid W_i, one per frame of the body.
+    """
+
+    canonical_from_head: np.ndarray
+    world_from_canonical: np.ndarray
+
+    def world_from_head(self, frame: float) -> np.ndarray:
+        """(4, 4) similarity W·G at a frame, between frames as viewers interpolate it."""
+        return self.pose(frame) @ self.canonical_from_head
+
+    def pose(self, frame: float) -> np.ndarray:
+        """(4, 4) rigid W at a frame, which is clamped to the clip; turns by slerp between."""
+        poses = self.world_from_canonical
+        place = min(max(frame, 0.0), len(poses) - 1.0)
+        first = min(int(place), len(poses) - 2)
+        if len(poses) == 1 or place == int(place):
+            return poses[int(place)].copy()
+        part, pair = place - first, poses[first : first + 2]
+        pose = np.eye(4)
+        pose[:3, :3] = Slerp([0.0, 1.0], Rotation.from_matrix(pair[:, :3, :3]))(part).as_matrix()
+        pose[:3, 3] = (1 - part) * pair[0, :3, 3] + part * pair[1, :3, 3]
+        return pose
+
+
+@dataclass
+class TrainedAvatar:
+    """A head that was fitted to a body: `Avatar(t, expression)` of the design.
+
+    Attributes:
+        head: Only those of its Gaussians that are drawn on the body, in the body's colours.
+        body: Trained around the head.
+        placement: Where the head is.
+        expressions: (F, B) what drives the head through the recorded clip.
+        summary: How it was made: provenance of both captures, what was measured, settings.
+    """
+
+    head: TrainedHead
+    body: TrainedBody
+    placement: Placement
+    expressions: np.ndarray
+    summary: dict
+
+    @property
+    def seconds(self) -> float:
+        """How long the clip lasts."""
+        return self.body.seconds
+
+    @property
+    def fps(self) -> float:
+        """Frames per second of the clip."""
+        return self.body.fps
+
+    def expression(self, seconds: float) -> np.ndarray:
+        """(B,) recorded expression at a time, linear between frames."""
+        place = min(max(seconds * self.fps, 0.0), len(self.expressions) - 1.0)
+        first = min(int(place), max(len(self.expressions) - 2, 0))
+        after = min(first + 1, len(self.expressions) - 1)
+        part = np.float32(place - first)
+        return (1 - part) * self.expressions[first] + part * self.expressions[after]
+
+    def head_gaussians(self, seconds: float, expression: np.ndarray | None = None) -> Gaussians:
+        """The head alone, in the world.
+
+        Args:
+            seconds: When, for its place.
+            expression: (B,); the recorded one by default.
+        """
+        values = self.expression(seconds) if expression is None else expression
+        with torch.no_grad():
+            drawn = self.head.model(torch.from_numpy(np.asarray(values, np.float32)))
+            return drawn.transform(self.placement.world_from_head(seconds * self.fps))
+
+    def gaussians(self, seconds: float, expression: np.ndarray | None = None) -> Gaussians:
+        """The whole person in the world, the body's Gaussians first; arguments as for the head."""
+        with torch.no_grad():
+            body = self.body.gaussians(seconds)
+        return cat([body, self.head_gaussians(seconds, expression)])
+
+    def save(self, folder: Path) -> None:
+        """Writes the head and the placement beside the body, which lies in `folder/body` already."""
+        (folder / HEAD).mkdir(parents=True, exist_ok=True)
+        self.head.save(folder / HEAD)
+        tensors = {
+            "canonical_from_head": torch.from_numpy(self.placement.canonical_from_head),
+            "world_from_canonical": torch.from_numpy(self.placement.world_from_canonical),
+            "expressions": torch.from_numpy(self.expressions),
+        }
+        save_tensors(folder / PLACEMENT, tensors, {})
+        write_atomic(folder / ABOUT, json.dumps({"summary": self.summary}, indent=1).encode())
+
+    @classmethod
+    def load(cls, folder: Path | str) -> "TrainedAvatar":
+        """Reads what `save` wrote.
+
+        Raises:
+            ModelError: If the folder holds no avatar, or a damaged one.
+        """
+        folder = Path(folder)
+        try:
+            summary = json.loads((folder / ABOUT).read_text())["summary"]
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise ModelError(
+                f"{folder} holds no avatar ({error}): make one with ico3d assemble."
+            ) from error
+        tensors, _ = load_tensors(folder / PLACEMENT)
+        head, body = TrainedHead.load(folder / HEAD), TrainedBody.load(folder / BODY)
+        size = head.model.shape.expression_size
+        expected = {
+            "canonical_from_head": (4, 4),
+            "world_from_canonical": (body.windows[-1].last + 1, 4, 4),
+            "expressions": (body.windows[-1].last + 1, size),
+        }
+        for name, shape in expected.items():
+            if name not in tensors or tuple(tensors[name].shape) != shape:
+                raise ModelError(f"{folder / PLACEMENT}: '{name}' must have the shape {shape}.")
+        values = {name: tensors[name].numpy() for name in expected}
+        placement = Placement(values["canonical_from_head"], values["world_from_canonical"])
+        return cls(head, body, placement, values["expressions"], summary)
