@@ -9,6 +9,7 @@ import torch
 from scipy.spatial import KDTree
 from torch import Tensor
 
+from ico3d.body.companion import Companion
 from ico3d.body.deformation import Deformation
 from ico3d.body.encoder import EncoderShape
 from ico3d.body.formulas import FREETIME, SPACETIME, Polynomial, Still
@@ -52,6 +53,7 @@ def begin_window(
     settings: BodySettings,
     dynamic: Dynamic,
     seed: int,
+    companion: Companion | None = None,
 ) -> Begin:
     """Round Gaussians on the person, at the window's centre frame or throughout it.
 
@@ -62,6 +64,7 @@ def begin_window(
         settings: How many, and the sizes of the deformation.
         dynamic: Tells which points move in this window.
         seed: Decides which points.
+        companion: Where nothing begins; about its border more does.
 
     Raises:
         CaptureError: If the masks of the cameras agree on no place.
@@ -73,6 +76,9 @@ def begin_window(
     else:
         frames = (window.center,)
     clouds, source = _clouds(capture, frames, -(-count // len(frames)), settings, rng)
+    if companion is not None:
+        pairs = zip(clouds, frames, strict=True)
+        clouds = [_beside(companion, cloud, frame, rng) for cloud, frame in pairs]
     points = np.concatenate(clouds)  # (P, 3)
     motion, extra = _motion(method, settings, capture, window, clouds, dynamic, rng)
     gaussians = _round(capture, frames, clouds, settings) | extra
@@ -92,6 +98,15 @@ def _clouds(
     """Points (each, 3) of every frame, and where they come from."""
     starts = [initial_points(capture, frame, each, rng, settings.initial) for frame in frames]
     return [resampled(start.points, each, rng) for start in starts], starts[0].source
+
+
+def _beside(
+    companion: Companion, points: np.ndarray, frame: int, rng: np.random.Generator
+) -> np.ndarray:
+    """(Q, 3) points of a frame that do not trespass, and those of the companion's border."""
+    places = np.concatenate([points, companion.border(frame, rng)])
+    trespass = companion.trespassing(torch.from_numpy(places).float(), frame)
+    return places[~trespass.cpu().numpy()]
 
 
 def _round(

@@ -7,6 +7,7 @@ from pathlib import Path
 import torch
 from rich.console import Console
 
+from ico3d.body.companion import CompanionSource
 from ico3d.body.finetune import FineTuner
 from ico3d.body.flow import clip_flow, dynamic_weights
 from ico3d.body.model import WindowModel
@@ -35,11 +36,18 @@ class BodyJob:
         method: SWinGS++ or what it is compared with.
         seed: All randomness follows from it.
         settings: How to train.
+        companion: Where the Gaussians come from that the body is trained with, if any.
     """
 
     method: Method
     seed: int
     settings: BodySettings
+    companion: CompanionSource | None = None
+
+    def about(self, capture: Path) -> dict:
+        """What a run of this job on a capture is known by, but for its settings."""
+        about = {"capture": str(capture.resolve()), "method": self.method, "seed": self.seed}
+        return about | ({"companion": self.companion.about()} if self.companion else {})
 
 
 @dataclass(frozen=True)
@@ -107,12 +115,13 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     def dynamic(points):
         return dynamic_weights(points, capture, window, clip_flow(capture, task.flow))
 
-    begin = begin_window(capture, window, job.method, job.settings, dynamic, job.seed)
+    companion = job.companion.open(_device()) if job.companion else None
+    begin = begin_window(capture, window, job.method, job.settings, dynamic, job.seed, companion)
     begin.model.to(_device())
     pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
     seed = job.seed + 1_000 * task.index
     trainer = BodyTrainer(
-        begin.model, window, pictures, job.method, job.settings, begin.extent, seed
+        begin.model, window, pictures, job.method, job.settings, begin.extent, seed, companion
     )
     loop = LoopSettings(
         task.steps,
@@ -155,8 +164,9 @@ def finetune_window(
     cameras = [camera for i, camera in enumerate(capture.cameras) if i not in held_out]
     pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
     seed = job.seed + 1_000 * task.index + 500
+    companion = job.companion.open(_device()) if job.companion else None
     tuner = FineTuner(
-        model, previous, window, pictures, cameras, job.settings, before["extent"], seed
+        model, previous, window, pictures, cameras, job.settings, before["extent"], seed, companion
     )
     loop = LoopSettings(
         job.settings.finetune_steps,
@@ -188,9 +198,7 @@ def train_body(
         SettingsError: If the folder holds a run with other settings.
         ModelError: If training diverges.
     """
-    about = asdict(job)
-    about |= {"capture": str(capture.path.resolve()), **about.pop("settings")}
-    run = RunFolder(folder, about)
+    run = RunFolder(folder, job.about(capture.path) | asdict(job.settings))
     if run.finished() is not None:
         return TrainedBody.load(folder)
     windows = plan_windows(capture, job, folder).windows
@@ -251,10 +259,9 @@ def _save(
 
 def _about(capture: Path, window: Window, job: BodyJob) -> dict:
     """What a window's run is known by: what fine-tuning does comes later."""
-    about = {"capture": str(capture.resolve()), "method": job.method, "seed": job.seed}
     settings = asdict(job.settings)
     kept = {name: value for name, value in settings.items() if name not in FINETUNING}
-    return about | asdict(window) | kept
+    return job.about(capture) | asdict(window) | kept
 
 
 def _device() -> torch.device:

@@ -1,0 +1,64 @@
+"""The similarity between two canonical head spaces, from landmarks that both have."""
+
+import numpy as np
+
+STEADY = (0, 1, 2, 14, 15, 16, 27, 28, 29, 30, 31, 33, 35, 36, 39, 42, 45)
+"""Multi-PIE landmarks that move little with the face: jaw ends, nose, corners of the eyes."""
+KEPT = 0.8
+"""Part of the landmarks that count in the end: the rest may be badly tracked."""
+
+
+def similarity(target: np.ndarray, source: np.ndarray) -> np.ndarray:
+    """The similarity that takes points to others with the least squares (Umeyama, 1991).
+
+    Args:
+        target: (P, 3), P ≥ 3, not on one line.
+        source: (P, 3).
+
+    Returns:
+        (4, 4) `target_from_source`: rotation, uniform scale, translation; never mirrors.
+
+    Raises:
+        ValueError: If the points lie on one line.
+    """
+    middles = target.mean(0), source.mean(0)  # (3,), (3,)
+    a, b = target - middles[0], source - middles[1]  # (P, 3)
+    left, sizes, right = np.linalg.svd(a.T @ b)
+    if sizes[1] < 1e-9 * max(sizes[0], 1e-12):
+        raise ValueError("points on one line do not tell a rotation")
+    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    rotation = left @ np.diag(signs) @ right
+    scale = (sizes * signs).sum() / np.square(b).sum()
+    matrix = np.eye(4)
+    matrix[:3, :3] = scale * rotation
+    matrix[:3, 3] = middles[0] - scale * rotation @ middles[1]
+    return matrix
+
+
+def canonical_from_head(body: np.ndarray, head: np.ndarray) -> tuple[np.ndarray, float]:
+    """G: from the head model's canonical space to that of the body's head poses.
+
+    The worst fifth of the steady landmarks is left out, and the rest fitted again.
+
+    Args:
+        body: (68, 3) landmarks in the space of the body's head poses, metres.
+        head: (68, 3) the same landmarks in the space of the head's model.
+
+    Returns:
+        (4, 4) similarity, and the root mean square distance of the landmarks that count, metres.
+    """
+    target, source = body[list(STEADY)], head[list(STEADY)]  # (P, 3)
+    matrix = similarity(target, source)
+    order = np.argsort(_distances(matrix, target, source))[: round(KEPT * len(target))]
+    matrix = similarity(target[order], source[order])
+    rest = _distances(matrix, target[order], source[order])
+    return matrix, float(np.sqrt(np.square(rest).mean()))
+
+
+def moved(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Points (…, 3) taken by a (4, 4) affine map."""
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def _distances(matrix: np.ndarray, target: np.ndarray, source: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(moved(matrix, source) - target, axis=1)  # (P,)
