@@ -106,7 +106,7 @@ class TrainedAvatar:
         return cat([body, self.head_gaussians(seconds, expression)])
 
     def save(self, folder: Path) -> None:
-        """Writes the head and the placement beside the body, which lies in `folder/body` already."""
+        """Writes head and placement beside the body, which lies in `folder/body` already."""
         (folder / HEAD).mkdir(parents=True, exist_ok=True)
         self.head.save(folder / HEAD)
         save_placement(folder / PLACEMENT, self.placement, self.expressions)

@@ -36,7 +36,6 @@ MAX_MEGABYTES = 1.7
 """MB of head.safetensors per 10,000 Gaussians, at most."""
 _PROBES = 32
 MEASURED_VIEWS = 40
-_SILENCE_SECONDS = 2
 
 Report = Callable[[str], None]
 
@@ -190,11 +189,7 @@ def _idle_expression(head: TrainedHead, capture: Capture) -> np.ndarray:
     if head.adaptor is None:
         recorded = training_expressions(head, capture)
         return recorded[np.abs(recorded).sum(axis=1).argmin()]
-    silence = np.zeros(16_000 * _SILENCE_SECONDS, np.float32)
-    features = torch.from_numpy(load_encoder(head.encoder).features(silence, 16_000))
-    with torch.no_grad():
-        rows = head.adaptor.track(features)  # (T, 32)
-    return np.concatenate([rows[len(rows) // 2].numpy(), _open_eyes(capture)])
+    return np.concatenate([head.neutral()[: -len(EYE_NAMES)], _open_eyes(capture)])
 
 
 def _open_eyes(capture: Capture) -> np.ndarray:

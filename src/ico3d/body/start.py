@@ -9,7 +9,7 @@ import torch
 from scipy.spatial import KDTree
 from torch import Tensor
 
-from ico3d.body.companion import Companion
+from ico3d.body.companion import Companion, Pruning
 from ico3d.body.deformation import Deformation
 from ico3d.body.encoder import EncoderShape
 from ico3d.body.formulas import FREETIME, SPACETIME, Polynomial, Still
@@ -19,6 +19,7 @@ from ico3d.body.settings import BodySettings, Method
 from ico3d.body.tunable import MlpShape
 from ico3d.body.windows import Window
 from ico3d.capture.capture import Capture
+from ico3d.splat.density import Population
 from ico3d.splat.initial import resampled, spacing
 
 PADDING = 0.15
@@ -86,6 +87,20 @@ def begin_window(
     shared = motion.initial(generator) if isinstance(motion, Deformation) else {}
     extent = float(np.ptp(points, axis=0).max() / 2)
     return Begin(WindowModel(motion, gaussians, shared), extent, source)
+
+
+def continued_window(model: WindowModel, window: Window, companion: Companion | None) -> Begin:
+    """A trained window as the begin of another training.
+
+    Args:
+        model: Changed in place: what trespasses is removed.
+        window: Its frames.
+        companion: Where nothing begins.
+    """
+    if companion is not None:
+        Pruning(companion, window).carry_out(model, Population(model.gaussians, {}))
+    low, high = np.percentile(model.gaussians["means"].numpy(), (0.5, 99.5), axis=0)  # (3,) each
+    return Begin(model, float((high - low).max() / 2), "a trained body")
 
 
 def _clouds(

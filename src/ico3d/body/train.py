@@ -7,14 +7,14 @@ from pathlib import Path
 import torch
 from rich.console import Console
 
-from ico3d.body.companion import CompanionSource
+from ico3d.body.companion import Companion, CompanionSource
 from ico3d.body.finetune import FineTuner
 from ico3d.body.flow import clip_flow, dynamic_weights
 from ico3d.body.model import WindowModel
 from ico3d.body.plan import Plan, PlanSettings, make_plan, print_plan, save_plan
 from ico3d.body.plan_picture import draw_plan
 from ico3d.body.settings import ONE_WINDOW, BodySettings, Method
-from ico3d.body.start import begin_window
+from ico3d.body.start import Begin, begin_window, continued_window
 from ico3d.body.trained import ABOUT, UNTUNED, TrainedBody, load_window, save_window
 from ico3d.body.trainer import BodyTrainer
 from ico3d.body.views import BodyViews
@@ -37,16 +37,20 @@ class BodyJob:
         seed: All randomness follows from it.
         settings: How to train.
         companion: Where the Gaussians come from that the body is trained with, if any.
+        continued: Folder of a body with the same windows to go on from, instead of from points.
     """
 
     method: Method
     seed: int
     settings: BodySettings
     companion: CompanionSource | None = None
+    continued: Path | None = None
 
     def about(self, capture: Path) -> dict:
         """What a run of this job on a capture is known by, but for its settings."""
         about = {"capture": str(capture.resolve()), "method": self.method, "seed": self.seed}
+        if self.continued is not None:
+            about["continued"] = str(self.continued.resolve())
         return about | ({"companion": self.companion.about()} if self.companion else {})
 
 
@@ -112,11 +116,8 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
         return finished["train_seconds"]
     capture = capture or Capture.open(task.capture)
 
-    def dynamic(points):
-        return dynamic_weights(points, capture, window, clip_flow(capture, task.flow))
-
     companion = job.companion.open(_device()) if job.companion else None
-    begin = begin_window(capture, window, job.method, job.settings, dynamic, job.seed, companion)
+    begin = _begin(task, capture, companion)
     begin.model.to(_device())
     pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
     seed = job.seed + 1_000 * task.index
@@ -133,6 +134,19 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     summary = {"train_seconds": seconds, "num_gaussians": len(trainer.model)}
     run.finish({**summary, "extent": begin.extent, "source": begin.source})
     return seconds
+
+
+def _begin(task: WindowTask, capture: Capture, companion: Companion | None) -> Begin:
+    """What a window's training begins with."""
+    job, window = task.job, task.window
+    if job.continued is not None:
+        body = TrainedBody.load(job.continued)
+        return continued_window(body.models[task.index], window, companion)
+
+    def dynamic(points):
+        return dynamic_weights(points, capture, window, clip_flow(capture, task.flow))
+
+    return begin_window(capture, window, job.method, job.settings, dynamic, job.seed, companion)
 
 
 def finetune_window(
@@ -201,7 +215,10 @@ def train_body(
     run = RunFolder(folder, job.about(capture.path) | asdict(job.settings))
     if run.finished() is not None:
         return TrainedBody.load(folder)
-    windows = plan_windows(capture, job, folder).windows
+    if job.continued is not None:
+        windows = TrainedBody.load(job.continued).windows
+    else:
+        windows = plan_windows(capture, job, folder).windows
     tasks = [
         WindowTask(
             capture.path, folder / "windows" / f"{index:04d}", folder / "flow", window, index, job

@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+import torch
 
 from ico3d.capture.capture import Capture
+from ico3d.common.expression import EYE_NAMES
 from ico3d.common.files import write_atomic
 from ico3d.errors import ModelError
 from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack, SpeechTrack, speech_features
@@ -16,6 +18,8 @@ from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.training.checkpoint import load_tensors, save_tensors
 
+SILENCE = 2
+"""Seconds, in the middle of which a voice has been silent for long."""
 Inputs = Literal["speech", "blendshapes"]
 
 
@@ -60,6 +64,16 @@ class TrainedHead:
                 f"({self.encoder_sha256[:12]}, not {encoder.sha256[:12]}): train it again."
             )
         return SpeechTrack(capture, speech_features(capture, encoder), self.adaptor)
+
+    def neutral(self) -> np.ndarray:
+        """(B,) float32: silence, with open eyes and brows at rest."""
+        if self.adaptor is None:
+            return np.zeros(self.model.shape.expression_size, np.float32)
+        silence = np.zeros(16_000 * SILENCE, np.float32)
+        features = torch.from_numpy(load_encoder(self.encoder).features(silence, 16_000))
+        with torch.no_grad():
+            rows = self.adaptor.track(features)  # (T, 32)
+        return np.concatenate([rows[len(rows) // 2].numpy(), np.zeros(len(EYE_NAMES), np.float32)])
 
     def save(self, folder: Path) -> None:
         """Writes `model.safetensors`, `adaptor.safetensors` and `head.json` into a folder."""

@@ -1,0 +1,114 @@
+"""The head's colours under the light of the body's studio (paper, head–body integration).
+
+Only the last layer of the head's network that makes colours is learnt: a hundred numbers or two,
+so that a few small pictures of the face suffice and nothing of what drives the face is forgotten.
+It happens once, before the windows are trained in parallel with the head as it then is.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from rich.progress import track
+from torch import Tensor, nn
+
+from ico3d.avatar.avatar import Placement
+from ico3d.avatar.joining.face_views import FaceView
+from ico3d.errors import ModelError
+from ico3d.head.model import HeadModel
+from ico3d.splat.gaussians import Gaussians
+from ico3d.splat.render import render
+
+CERTAIN = 0.5
+"""Part of a pixel that the head and the person must fill, to count."""
+
+
+@dataclass(frozen=True)
+class RecolourSettings:
+    """How the colours are learnt.
+
+    Attributes:
+        steps: One picture each.
+        rate: Learning rate of Adam; decays to a tenth.
+        seed: Decides the order of the pictures.
+    """
+
+    steps: int = 800
+    rate: float = 3e-3
+    seed: int = 0
+
+
+def recolour(
+    model: HeadModel,
+    placement: Placement,
+    expressions: np.ndarray,
+    views: Sequence[FaceView],
+    settings: RecolourSettings,
+) -> None:
+    """Fits the head's colours to pictures of the body's capture, in place.
+
+    Args:
+        model: Of the head; only its last colour layer changes.
+        placement: Where the head is.
+        expressions: (F, B) of the body's frames.
+        views: What to agree with.
+        settings: How.
+
+    Raises:
+        ModelError: If the head is of a variant without such a layer.
+    """
+    if not model.shape.has_mlp:
+        raise ModelError(
+            "this head's variant has no network whose colours could be matched: train one with "
+            "--variant full, or assemble with --set match_colors=False."
+        )
+    layer, frozen = model.color_branch, _Frozen(model, placement, expressions)
+    optimiser = torch.optim.Adam(layer.parameters(), settings.rate)
+    decay = torch.optim.lr_scheduler.ExponentialLR(optimiser, 0.1 ** (1 / settings.steps))
+    rng = np.random.default_rng(settings.seed)
+    order = np.concatenate(
+        [rng.permutation(len(views)) for _ in range(-(-settings.steps // len(views)))]
+    )
+    for index in track(order[: settings.steps], "matching colours", transient=True):
+        optimiser.zero_grad()
+        _difference(layer, frozen, views[index]).backward()
+        optimiser.step()
+        decay.step()
+    optimiser.zero_grad()
+
+
+@torch.no_grad()
+def color_difference(
+    model: HeadModel, placement: Placement, expressions: np.ndarray, views: Sequence[FaceView]
+) -> float:
+    """Mean absolute difference of head and pictures where the head covers them."""
+    frozen = _Frozen(model, placement, expressions)
+    return float(np.mean([_difference(model.color_branch, frozen, view) for view in views]))
+
+
+class _Frozen:
+    """What of the head does not change: made once per frame."""
+
+    def __init__(self, model: HeadModel, placement: Placement, expressions: np.ndarray):
+        self._model, self._placement, self._expressions = model, placement, expressions
+        self._made: dict[int, tuple[Tensor, Gaussians]] = {}
+
+    @torch.no_grad()
+    def at(self, frame: int) -> tuple[Tensor, Gaussians]:
+        """What the layer takes in (N, hidden), and the head's Gaussians in the world."""
+        if frame not in self._made:
+            values = torch.from_numpy(self._expressions[frame])  # (B,)
+            hidden = self._model.hidden(self._model.blended(values), values)  # (N, hidden)
+            drawn = self._model(values).transform(self._placement.world_from_head(frame))
+            self._made[frame] = hidden, drawn.detach()
+        return self._made[frame]
+
+
+def _difference(layer: nn.Linear, frozen: _Frozen, view: FaceView) -> Tensor:
+    """L1 over the pixels that head and person fill."""
+    hidden, drawn = frozen.at(view.frame)
+    rendering = render(replace(drawn, colors=layer(hidden).sigmoid()), [view.camera], view.image)
+    weight = ((rendering.alpha[0] > CERTAIN) & (view.mask > CERTAIN)).float()  # (H, W)
+    difference = (rendering.rgb[0] - view.image).abs().mean(-1)  # (H, W)
+    return (difference * weight).sum() / weight.sum().clamp_min(1)
