@@ -52,8 +52,8 @@ class JoiningSettings:
     """
 
     match_colors: bool = True
-    color_steps: int = 800
-    color_rate: float = 3e-3
+    color_steps: int = 1500
+    color_rate: float = 3e-2
     pruning: bool = True
     border_points: int = 400
 

@@ -34,8 +34,8 @@ class RecolourSettings:
         seed: Decides the order of the pictures.
     """
 
-    steps: int = 800
-    rate: float = 3e-3
+    steps: int = 1500
+    rate: float = 3e-2
     seed: int = 0
 
 
