@@ -24,8 +24,10 @@ BAND = 0.12
 CERTAIN = 0.5
 
 
-def gap(head: Gaussians, body: Gaussians, world_from_head: np.ndarray, region: HeadRegion) -> float:
-    """The widest opening between a head's rim and a body, metres.
+def gap(
+    head: Gaussians, body: Gaussians, world_from_head: np.ndarray, region: HeadRegion
+) -> float | None:
+    """The widest opening between a head's rim and a body, metres; None where one is not opaque.
 
     Of every opaque Gaussian of the rim the distance to the nearest opaque one of the body, less
     the larger standard deviations of both; the median of the widest hundredth, as single Gaussians
@@ -42,7 +44,7 @@ def gap(head: Gaussians, body: Gaussians, world_from_head: np.ndarray, region: H
     rim = (depth > 0) & (depth < RIM) & (head.opacities.numpy() > OPAQUE)
     seen = body.opacities > OPAQUE
     if not rim.any() or not seen.any():
-        return float("inf")
+        return None
     distances, nearest = KDTree(body.means[seen].numpy()).query(head.means.numpy()[rim])
     reach = (
         head.scales.max(1).values.numpy()[rim] + body.scales[seen].max(1).values.numpy()[nearest]
@@ -51,8 +53,8 @@ def gap(head: Gaussians, body: Gaussians, world_from_head: np.ndarray, region: H
     return float(np.median(open_[-max(len(open_) // 100, 1) :]))
 
 
-def largest_gap(avatar: TrainedAvatar, region: HeadRegion) -> float:
-    """The widest opening in any frame of the clip, metres."""
+def largest_gap(avatar: TrainedAvatar, region: HeadRegion) -> float | None:
+    """The widest opening in any frame of the clip, metres; None if there is no border at all."""
     gaps = []
     for frame in range(len(avatar.placement.world_from_canonical)):
         seconds = frame / avatar.fps
@@ -60,7 +62,7 @@ def largest_gap(avatar: TrainedAvatar, region: HeadRegion) -> float:
             body = avatar.body.gaussians(seconds)
         where = avatar.placement.world_from_head(frame)
         gaps.append(gap(avatar.head_gaussians(seconds), body, where, region))
-    return max(gaps)
+    return max((width for width in gaps if width is not None), default=None)
 
 
 @dataclass(frozen=True)
