@@ -160,8 +160,8 @@ def load_placement(file: Path) -> tuple[Placement, np.ndarray]:
         values = {name: tensors[name].numpy() for name in names}
     except KeyError as error:
         raise ModelError(f"{file} lacks {error}: assemble the avatar again.") from error
-    count = len(values["expressions"])
-    expected = ((4, 4), (count, 4, 4), (count, *values["expressions"].shape[1:2]))
+    count, size = [*values["expressions"].shape, 0, 0][:2]
+    expected = ((4, 4), (count, 4, 4), (count, size))
     for name, shape in zip(names, expected, strict=True):
         if values[name].shape != shape or not np.isfinite(values[name]).all():
             raise ModelError(f"{file}: '{name}' must be finite and have the shape {shape}.")

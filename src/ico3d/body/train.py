@@ -20,6 +20,7 @@ from ico3d.body.trainer import BodyTrainer
 from ico3d.body.views import BodyViews
 from ico3d.body.windows import Window
 from ico3d.capture.capture import Capture
+from ico3d.errors import ModelError
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.run import RunFolder
 
@@ -216,7 +217,7 @@ def train_body(
     if run.finished() is not None:
         return TrainedBody.load(folder)
     if job.continued is not None:
-        windows = TrainedBody.load(job.continued).windows
+        windows = _fitting(TrainedBody.load(job.continued), capture, job).windows
     else:
         windows = plan_windows(capture, job, folder).windows
     tasks = [
@@ -235,6 +236,26 @@ def train_body(
             seconds += finetune_window(after, capture, task.folder, load_window(source.file))
         body = _save(capture, folder, job, [tasks[0], *tuned], seconds)
     run.finish({"train_seconds": seconds, "num_gaussians": sum(map(len, body.models))})
+    return body
+
+
+def _fitting(body: TrainedBody, capture: Capture, job: BodyJob) -> TrainedBody:
+    """A body that a job goes on from.
+
+    Raises:
+        ModelError: If it is of another method or another clip.
+    """
+    if body.method != job.method:
+        raise ModelError(
+            f"{job.continued} was trained with --method {body.method}: only a body of the method "
+            f"{job.method} can be gone on from."
+        )
+    frames = body.windows[-1].last + 1
+    if (frames, body.fps) != (capture.num_frames, capture.fps):
+        raise ModelError(
+            f"{job.continued} has {frames} frames at {body.fps:g} per second, {capture.path} has "
+            f"{capture.num_frames} at {capture.fps:g}: go on from a body of this capture."
+        )
     return body
 
 

@@ -28,7 +28,7 @@ from ico3d.body.settings import BodySettings
 from ico3d.body.train import BodyJob, Runner, train_body
 from ico3d.capture.canonical import canonical_landmarks
 from ico3d.capture.capture import Capture
-from ico3d.errors import CaptureError, ModelError
+from ico3d.errors import CaptureError, ModelError, SettingsError
 from ico3d.head.trained import TrainedHead
 from ico3d.training.checkpoint import save_tensors
 from ico3d.training.run import RunFolder
@@ -56,6 +56,19 @@ class JoiningSettings:
     color_rate: float = 3e-2
     pruning: bool = True
     border_points: int = 400
+
+    def __post_init__(self):
+        """Checks the numbers.
+
+        Raises:
+            SettingsError: If one is impossible.
+        """
+        if self.color_steps < 1 or not self.color_rate > 0 or self.border_points < 0:
+            raise SettingsError(
+                f"color_steps={self.color_steps}, color_rate={self.color_rate}, border_points="
+                f"{self.border_points} are impossible: steps and rate are above 0, points not "
+                "below; match_colors=false leaves the colours as they are."
+            )
 
 
 @dataclass(frozen=True)
@@ -116,12 +129,13 @@ def assemble(
     if run.finished() is not None:
         return TrainedAvatar.load(folder)
     source = HeadSource(folder.resolve(), assembly.joining.border_points, assembly.joining.pruning)
-    job = BodyJob("swings++", assembly.seed, assembly.body, source, assembly.continued)
+    continued = assembly.continued and assembly.continued.resolve()
+    job = BodyJob("swings++", assembly.seed, assembly.body, source, continued)
     body = train_body(capture, folder / BODY, job, runner)
     placement, expressions = load_placement(folder / PLACEMENT)
     head = TrainedHead.load(folder / HEAD)
     summary = {
-        "head": head.summary["capture"],
+        "head": head.summary.get("capture", {}),
         "body": capture.provenance,
         "settings": asdict(assembly.joining),
         "train_seconds": body.summary["train_seconds"],
@@ -177,25 +191,25 @@ def measured(avatar: TrainedAvatar, capture: Capture, say: Say) -> dict:
     """How well head and body fit, in figures for `avatar.json`."""
     landmarks = _landmarks(avatar.head, Path(HEAD))
     region = HeadRegion.around(landmarks)
+    found: dict = {}
     widest = largest_gap(avatar, region)
-    found: dict = {"gap_mm": round(1e3 * widest, 2)}
+    if widest is None:
+        say("head and body: nothing opaque lies at the head's border, so no gap can be measured.")
+    else:
+        found["gap_mm"] = round(1e3 * widest, 2)
+        say(f"head and body: the widest gap is {found['gap_mm']:.1f} mm.")
     held_out = list(capture.split.test_cameras) or None
     try:
         views = face_views(capture, avatar.placement, region, landmarks, held_out, MEASURED)
-    except CaptureError:  # no test camera in front: the gap is all that can be said
-        views = []
-    if views:
-        found |= {n: round(v, 4) for n, v in asdict(seam_scores(avatar, views)).items()}
+        scores = seam_scores(avatar, views)
+    except CaptureError as error:  # no test camera in front: the gap is all that can be said
+        say(f"the seam in pictures is not measured: {error}")
+        return found
     say(
-        f"head and body: the widest gap is {found['gap_mm']:.1f} mm"
-        + (
-            f"; PSNR of the face {found['psnr_face']:.1f} dB, about its border "
-            f"{found['psnr_border']:.1f} dB, step of colour {found['color_step']:.4f}."
-            if views
-            else "."
-        )
+        f"held-out pictures: PSNR of the face {scores.psnr_face:.1f} dB, about its border "
+        f"{scores.psnr_border:.1f} dB, step of colour {scores.color_step:.4f}."
     )
-    return found
+    return found | {name: round(value, 4) for name, value in asdict(scores).items()}
 
 
 def _match_colors(
@@ -206,6 +220,11 @@ def _match_colors(
     assembly: Assembly,
     say: Say,
 ) -> None:
+    if not head.model.shape.has_mlp:
+        raise ModelError(
+            f"{assembly.head}: this variant of head has no network whose colours could be matched: "
+            "train one with --variant full, or assemble with --set match_colors=false."
+        )
     joining, landmarks = assembly.joining, _landmarks(head, assembly.head)
     views = face_views(capture, placement, HeadRegion.around(landmarks), landmarks)
     before = color_difference(head.model, placement, expressions, views)

@@ -51,7 +51,13 @@ class HeadSource:
     def about(self) -> dict:
         """Settings, and a hash of the files that decide what is drawn."""
         digest = hashlib.sha256()
-        for file in (self.folder / HEAD / "model.safetensors", self.folder / PLACEMENT):
+        head = self.folder / HEAD
+        for file in (
+            head / "model.safetensors",
+            head / "head.json",
+            self.folder / PLACEMENT,
+            self.folder / SEAM,
+        ):
             digest.update(file.read_bytes())
         settings = {"border_points": self.border_points, "pruning": self.pruning}
         return settings | {"head": digest.hexdigest()}

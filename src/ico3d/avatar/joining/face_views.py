@@ -21,6 +21,8 @@ MARGIN = 0.35
 """About the face, as a part of its size in the picture."""
 MOST = 240
 """Pictures."""
+LEAST = 4
+"""Pixels that a crop is wide and high."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +75,13 @@ def face_views(
     chosen = [seen[i] for i in _spread(len(seen), most)]
     views = [_view(capture, placement, landmarks, *place) for place in chosen]
     found = [view for view in views if view is not None]
-    if not found:
+    if not seen:
         raise CaptureError(f"{capture.path}: no camera sees the face: check the head's poses.")
+    if not found:
+        raise CaptureError(
+            f"{capture.path}: no camera in front of the face has a picture of it with a mask: look "
+            "with ico3d capture check."
+        )
     return found
 
 
@@ -92,17 +99,21 @@ def faces(
 def _view(
     capture: Capture, placement: Placement, landmarks: np.ndarray, frame: int, index: int
 ) -> FaceView | None:
+    """The picture of a camera; None where it shows no face, or there is none."""
     camera = capture.cameras[index]
-    image, mask = capture.image(index, frame), capture.mask(index, frame)
-    if image is None or mask is None:
+    points = moved(placement.world_from_head(frame), landmarks)  # (68, 3)
+    if (moved(camera.world_to_camera, points)[:, 2] <= 0).any():
         return None
-    pixels, depths = camera.project(moved(placement.world_from_head(frame), landmarks))
+    pixels, _ = camera.project(points)  # (68, 2)
     low, high = pixels.min(0), pixels.max(0)
     reach = MARGIN * (high - low).max()
     size = np.array([camera.width, camera.height])
     left, top = np.floor(low - reach).clip(0, size - 1).astype(int)
     right, bottom = np.ceil(high + reach).clip(1, size).astype(int)
-    if (depths <= 0).any() or right - left < 4 or bottom - top < 4:
+    if right - left < LEAST or bottom - top < LEAST:
+        return None
+    image, mask = capture.image(index, frame), capture.mask(index, frame)
+    if image is None or mask is None:
         return None
     cut = slice(top, bottom), slice(left, right)
     crop = camera.cropped(int(left), int(top), int(right - left), int(bottom - top))

@@ -15,13 +15,16 @@ from torch import Tensor, nn
 
 from ico3d.avatar.avatar import Placement
 from ico3d.avatar.joining.face_views import FaceView
-from ico3d.errors import ModelError
 from ico3d.head.model import HeadModel
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
 CERTAIN = 0.5
 """Part of a pixel that the head and the person must fill, to count."""
+MEMORY = 2**30
+"""Bytes for what is made once per frame."""
+FLOATS = 14
+"""Of a Gaussian."""
 
 
 @dataclass(frozen=True)
@@ -49,20 +52,13 @@ def recolour(
     """Fits the head's colours to pictures of the body's capture, in place.
 
     Args:
-        model: Of the head; only its last colour layer changes.
+        model: Of the head, of a variant with a network; only its last colour layer changes.
         placement: Where the head is.
         expressions: (F, B) of the body's frames.
         views: What to agree with.
         settings: How.
 
-    Raises:
-        ModelError: If the head is of a variant without such a layer.
     """
-    if not model.shape.has_mlp:
-        raise ModelError(
-            "this head's variant has no network whose colours could be matched: train one with "
-            "--variant full, or assemble with --set match_colors=False."
-        )
     layer, frozen = model.color_branch, _Frozen(model, placement, expressions)
     optimiser = torch.optim.Adam(layer.parameters(), settings.rate)
     decay = torch.optim.lr_scheduler.ExponentialLR(optimiser, 0.1 ** (1 / settings.steps))
@@ -88,11 +84,13 @@ def color_difference(
 
 
 class _Frozen:
-    """What of the head does not change: made once per frame."""
+    """What of the head does not change: made once per frame, as far as that fits into memory."""
 
     def __init__(self, model: HeadModel, placement: Placement, expressions: np.ndarray):
         self._model, self._placement, self._expressions = model, placement, expressions
         self._made: dict[int, tuple[Tensor, Gaussians]] = {}
+        floats = len(model) * (model.shape.hidden + FLOATS)
+        self._room = max(MEMORY // (4 * floats), 1)
 
     @torch.no_grad()
     def at(self, frame: int) -> tuple[Tensor, Gaussians]:
@@ -101,6 +99,8 @@ class _Frozen:
             values = torch.from_numpy(self._expressions[frame])  # (B,)
             hidden = self._model.hidden(self._model.blended(values), values)  # (N, hidden)
             drawn = self._model(values).transform(self._placement.world_from_head(frame))
+            if len(self._made) >= self._room:
+                self._made.pop(next(iter(self._made)))  # the oldest
             self._made[frame] = hidden, drawn.detach()
         return self._made[frame]
 

@@ -29,8 +29,10 @@ BAND = 0.12
 CERTAIN = 0.5
 
 
-def gap(head: Gaussians, body: Gaussians, world_from_head: np.ndarray, region: HeadRegion) -> float:
-    """The widest opening between a head's rim and a body, metres.
+def gap(
+    head: Gaussians, body: Gaussians, world_from_head: np.ndarray, region: HeadRegion
+) -> float | None:
+    """The widest opening between a head's rim and a body, metres; None where one is not opaque.
 
     Of every Gaussian of the rim that somebody outside can see, the distance to the nearest opaque
     one of the body, less the larger standard deviations of both; the median of the widest
@@ -48,7 +50,7 @@ def gap(head: Gaussians, body: Gaussians, world_from_head: np.ndarray, region: H
     rim[rim] = _seen_from_outside(head, torch.from_numpy(rim), body)
     solid = body.opacities > OPAQUE
     if not rim.any() or not solid.any():
-        return float("inf")
+        return None
     distances, nearest = KDTree(body.means[solid].numpy()).query(head.means.numpy()[rim])
     sizes = head.scales.max(1).values.numpy(), body.scales[solid].max(1).values.numpy()
     opening = np.sort((distances - sizes[0][rim] - sizes[1][nearest]).clip(min=0))
@@ -71,8 +73,8 @@ def _looking_at(middle: np.ndarray, angle: float) -> Camera:
     return Camera(PIXELS, PIXELS, intrinsics, look_at(eye, middle), "around")
 
 
-def largest_gap(avatar: TrainedAvatar, region: HeadRegion) -> float:
-    """The widest opening in any frame of the clip, metres."""
+def largest_gap(avatar: TrainedAvatar, region: HeadRegion) -> float | None:
+    """The widest opening in any frame of the clip, metres; None if there is no border at all."""
     gaps = []
     for frame in range(len(avatar.placement.world_from_canonical)):
         seconds = frame / avatar.fps
@@ -80,7 +82,7 @@ def largest_gap(avatar: TrainedAvatar, region: HeadRegion) -> float:
             body = avatar.body.gaussians(seconds)
         where = avatar.placement.world_from_head(frame)
         gaps.append(gap(avatar.head_gaussians(seconds), body, where, region))
-    return max(gaps)
+    return max((width for width in gaps if width is not None), default=None)
 
 
 @dataclass(frozen=True)

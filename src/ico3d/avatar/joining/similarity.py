@@ -2,10 +2,15 @@
 
 import numpy as np
 
+from ico3d.errors import ModelError
+
 STEADY = (0, 1, 2, 14, 15, 16, 27, 28, 29, 30, 31, 33, 35, 36, 39, 42, 45)
 """Multi-PIE landmarks that move little with the face: jaw ends, nose, corners of the eyes."""
 KEPT = 0.8
 """Part of the landmarks that count in the end: the rest may be badly tracked."""
+TRIPLES = 60
+"""Of landmarks, from which fits begin: one without a bad landmark is among them."""
+ROUNDS = 20
 
 
 def similarity(target: np.ndarray, source: np.ndarray) -> np.ndarray:
@@ -38,7 +43,7 @@ def similarity(target: np.ndarray, source: np.ndarray) -> np.ndarray:
 def canonical_from_head(body: np.ndarray, head: np.ndarray) -> tuple[np.ndarray, float]:
     """G: from the head model's canonical space to that of the body's head poses.
 
-    The worst fifth of the steady landmarks is left out, and the rest fitted again.
+    Least trimmed squares: the four fifths of the steady landmarks that agree best count.
 
     Args:
         body: (68, 3) landmarks in the space of the body's head poses, metres.
@@ -46,13 +51,35 @@ def canonical_from_head(body: np.ndarray, head: np.ndarray) -> tuple[np.ndarray,
 
     Returns:
         (4, 4) similarity, and the root mean square distance of the landmarks that count, metres.
+
+    Raises:
+        ModelError: If they are no face.
     """
     target, source = body[list(STEADY)], head[list(STEADY)]  # (P, 3)
-    matrix = similarity(target, source)
-    order = np.argsort(_distances(matrix, target, source))[: round(KEPT * len(target))]
-    matrix = similarity(target[order], source[order])
-    rest = _distances(matrix, target[order], source[order])
-    return matrix, float(np.sqrt(np.square(rest).mean()))
+    rng = np.random.default_rng(0)
+    begins = [np.arange(len(target))]
+    begins += [rng.choice(len(target), 3, replace=False) for _ in range(TRIPLES)]
+    fits = [fit for begin in begins if (fit := _trimmed(target, source, begin)) is not None]
+    if not fits:
+        raise ModelError("the landmarks lie on one line: track head and body again.")
+    return min(fits, key=lambda fit: fit[1])
+
+
+def _trimmed(
+    target: np.ndarray, source: np.ndarray, chosen: np.ndarray
+) -> tuple[np.ndarray, float] | None:
+    """Fits to some points (P, 3), then again and again to those that agree best; None if flat."""
+    for _ in range(ROUNDS):
+        before = chosen
+        try:
+            matrix = similarity(target[chosen], source[chosen])
+        except ValueError:
+            return None
+        away = _distances(matrix, target, source)  # (P,)
+        chosen = np.sort(np.argsort(away, kind="stable")[: round(KEPT * len(target))])
+        if np.array_equal(chosen, before):
+            break
+    return matrix, float(np.sqrt(np.square(away[chosen]).mean()))
 
 
 def moved(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
