@@ -6,11 +6,13 @@ It happens once, before the windows are trained in parallel with the head as it 
 """
 
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 from rich.progress import track
+from scipy.spatial import KDTree
 from torch import Tensor, nn
 
 from ico3d.avatar.avatar import Placement
@@ -21,6 +23,7 @@ from ico3d.splat.render import render
 
 CERTAIN = 0.5
 """Part of a pixel that the head and the person must fill, to count."""
+NEIGHBOURS = 3
 MEMORY = 2**30
 """Bytes for what is made once per frame."""
 FLOATS = 14
@@ -34,11 +37,14 @@ class RecolourSettings:
     Attributes:
         steps: One picture each.
         rate: Learning rate of Adam; decays to a tenth.
+        smoothness: Weight of how differently neighbours change: light changes all along a cheek,
+            but what a few small pictures leave open must not become spots.
         seed: Decides the order of the pictures.
     """
 
     steps: int = 1500
     rate: float = 3e-2
+    smoothness: float = 0.3
     seed: int = 0
 
 
@@ -60,6 +66,7 @@ def recolour(
 
     """
     layer, frozen = model.color_branch, _Frozen(model, placement, expressions)
+    before, pairs = deepcopy(layer).requires_grad_(False), _neighbours(model)
     optimiser = torch.optim.Adam(layer.parameters(), settings.rate)
     decay = torch.optim.lr_scheduler.ExponentialLR(optimiser, 0.1 ** (1 / settings.steps))
     rng = np.random.default_rng(settings.seed)
@@ -68,10 +75,24 @@ def recolour(
     )
     for index in track(order[: settings.steps], "matching colours", transient=True):
         optimiser.zero_grad()
-        _difference(layer, frozen, views[index]).backward()
+        hidden, _ = frozen.at(views[index].frame)
+        change = layer(hidden) - before(hidden)  # (N, 3)
+        uneven = (change[pairs[:, 0]] - change[pairs[:, 1]]).square().mean()
+        loss = _difference(layer, frozen, views[index]) + settings.smoothness * uneven
+        loss.backward()
         optimiser.step()
         decay.step()
     optimiser.zero_grad()
+
+
+def _neighbours(model: HeadModel) -> Tensor:
+    """(P, 2) pairs of Gaussians that are next to one another."""
+    means = model.means.detach().cpu().numpy()
+    count = min(NEIGHBOURS + 1, len(means))
+    _, nearest = KDTree(means).query(means, k=count)  # (N, K + 1), itself first
+    others = np.asarray(nearest).reshape(len(means), count)[:, 1:]  # (N, K)
+    first = np.repeat(np.arange(len(means)), count - 1)
+    return torch.from_numpy(np.stack([first, others.ravel()], 1))
 
 
 @torch.no_grad()
@@ -106,9 +127,9 @@ class _Frozen:
 
 
 def _difference(layer: nn.Linear, frozen: _Frozen, view: FaceView) -> Tensor:
-    """L1 over the pixels that head and person fill."""
+    """L1 over the pixels that head and person fill, but for mouth and eyes."""
     hidden, drawn = frozen.at(view.frame)
     rendering = render(replace(drawn, colors=layer(hidden).sigmoid()), [view.camera], view.image)
-    weight = ((rendering.alpha[0] > CERTAIN) & (view.mask > CERTAIN)).float()  # (H, W)
+    weight = ((rendering.alpha[0] > CERTAIN) & (view.mask > CERTAIN)) * view.steady  # (H, W)
     difference = (rendering.rgb[0] - view.image).abs().mean(-1)  # (H, W)
     return (difference * weight).sum() / weight.sum().clamp_min(1)
