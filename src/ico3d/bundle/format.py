@@ -16,6 +16,7 @@ from ico3d.bundle.decode import parse_json
 from ico3d.bundle.head import HEAD, POSES, BakedHead, poses_from_bytes
 from ico3d.bundle.manifest import MANIFEST, FileEntry, Manifest, check_manifest
 from ico3d.bundle.onnx_check import check_onnx
+from ico3d.bundle.packaged import bundle_path
 from ico3d.errors import BundleError
 
 SPEECH = "speech.onnx"
@@ -58,12 +59,12 @@ class Bundle:
 
     @staticmethod
     def open(path: Path | str) -> "Bundle":
-        """Opens a folder or an uncompressed zip and checks all of it.
+        """Opens a folder or an uncompressed zip and checks all of it; `demo` is the packaged one.
 
         Raises:
             BundleError: If there is none, or it is damaged, unsafe or of another version.
         """
-        return Bundle(open_archive(Path(path)))
+        return Bundle(open_archive(bundle_path(path)))
 
     @property
     def names(self) -> tuple[str, ...]:
