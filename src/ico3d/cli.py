@@ -31,6 +31,7 @@ VERBS: dict[str, Verb] = {
     "train body": Verb("ico3d.body.commands", "TrainBody", "train SWinGS++ on a body in motion"),
     "train speech": Verb("ico3d.speech.commands", "TrainSpeech", "train the speech encoder"),
     "evaluate": Verb("ico3d.measure.commands", "Evaluate", "measure a model on held-out frames"),
+    "animate": Verb("ico3d.avatar.animate", "Animate", "find a body's rest and gestures"),
     "bake": Verb("ico3d.avatar.commands", "Bake", "make the bundle that browsers play"),
     "bundle info": Verb("ico3d.bundle.commands", "Info", "check a bundle, say what is in it"),
     "render": Verb("ico3d.avatar.film.command", "Render", "film a body along a path of cameras"),
