@@ -1,5 +1,6 @@
 """What a head is baked from: expressions, and how much each of its logits is seen."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,7 +76,7 @@ def expressions_of(head: TrainedHead, capture: Capture, frames) -> np.ndarray:
         return np.stack([track.at(frame).numpy() for frame in frames])
 
 
-def spoken_expressions(head: TrainedHead, texts: tuple[str, ...], seed: int = 0) -> np.ndarray:
+def spoken_expressions(head: TrainedHead, texts: Sequence[str], seed: int = 0) -> np.ndarray:
     """(T, B) of synthetic voices that read texts to a head driven by speech, with blinks.
 
     Raises:
