@@ -89,8 +89,13 @@ class BakedAvatar:
         """
         index, tau = place_in(self.spans, seconds * self.fps)
         head = baked_gaussians(self.head, np.asarray(expression, np.float32))
-        pose = Placement(np.eye(4), self.world_from_head).pose(seconds * self.fps)
+        pose = pose_at(self.world_from_head, seconds * self.fps)
         return cat([window_gaussians(self.window(index), tau), head.transform(pose)])
+
+
+def pose_at(world_from_head: np.ndarray, frame: float) -> np.ndarray:
+    """(4, 4) of poses (F, 4, 4) at a frame, which is clamped; between frames lerp and slerp."""
+    return Placement(np.eye(4), world_from_head).pose(frame)
 
 
 def place_in(spans: Sequence[Span], frame: float) -> tuple[int, float]:

@@ -82,16 +82,21 @@ def spoken_expressions(head: TrainedHead, texts: Sequence[str], seed: int = 0) -
     Raises:
         MissingExtraError: If espeak-ng is not installed.
     """
-    assert head.adaptor is not None
-    encoder, rows = load_encoder(head.encoder), []
+    rows = []
     for number, text in enumerate(texts):
         speech = synthesize(text, _VOICES[number % len(_VOICES)], rate=150)
-        features = torch.from_numpy(encoder.features(speech.samples, speech.rate))  # (T, D)
-        with torch.no_grad():
-            rows.append(head.adaptor.track(features).numpy())  # (T, 32)
+        rows.append(lips_of(head, speech.samples, speech.rate))
     lips = np.concatenate(rows)
     eyes = EyeBehaviour(seed).values(np.arange(len(lips)) / FEATURE_RATE)
     return np.concatenate([lips, eyes], 1)
+
+
+def lips_of(head: TrainedHead, samples: np.ndarray, rate: int) -> np.ndarray:
+    """(T, 32) what a sound (S,) does to a head driven by speech, 25 rows per second."""
+    assert head.adaptor is not None
+    features = torch.from_numpy(load_encoder(head.encoder).features(samples, rate))  # (T, D)
+    with torch.no_grad():
+        return head.adaptor.track(features).numpy()
 
 
 def importance_of(head: TrainedHead, capture: Capture) -> np.ndarray:

@@ -235,9 +235,13 @@ def standing_camera(
     avatar: TrainedAvatar, person: BakedAvatar, capture: Capture | None
 ) -> CameraInfo:
     """In front of the person, so far away that all of it is seen."""
+    return body_bundle.standing_camera(*_box(person), capture, front_of(avatar))
+
+
+def front_of(avatar: TrainedAvatar) -> np.ndarray:
+    """(3,) where the face looks, on average."""
     turns = avatar.placement.world_from_canonical[:, :3, :3]  # (F, 3, 3)
-    front = turns.mean(axis=0) @ avatar.placement.canonical_from_head[:3, :3] @ _FACING
-    return body_bundle.standing_camera(*_box(person), capture, front)
+    return turns.mean(axis=0) @ avatar.placement.canonical_from_head[:3, :3] @ _FACING
 
 
 def _span(avatar: TrainedAvatar) -> Window:
