@@ -15,7 +15,7 @@ relative to the height of the face, from chin to brows."""
 BEHIND_EARS = 0.3
 """How far behind the ends of the jaw line it ends; beyond, cameras in front see nothing."""
 FACE_RADIUS = 0.6
-JAW_RADIUS = 0.17
+JAW_RADIUS = 0.13
 
 
 @dataclass(frozen=True)

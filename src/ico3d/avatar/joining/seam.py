@@ -12,13 +12,18 @@ from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.joining.face_views import FaceView
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.similarity import moved
+from ico3d.common.camera import Camera, look_at
 from ico3d.errors import CaptureError
+from ico3d.splat.density import contributions
 from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
 
 RIM = 0.008
 """Metres inside the border in which the head's Gaussians are its rim."""
 OPAQUE = 0.3
+"""Opacity, and pixels of a picture, from which a Gaussian counts."""
+AROUND, DISTANCE, PIXELS, WIDE = 8, 1.2, 160, 0.4
+"""Cameras around a head, metres to them, the size of their pictures, and metres these show."""
 BAND = 0.12
 """Width of the band to either side of the border in pictures, as a part of the face's width."""
 CERTAIN = 0.5
@@ -29,9 +34,9 @@ def gap(
 ) -> float | None:
     """The widest opening between a head's rim and a body, metres; None where one is not opaque.
 
-    Of every opaque Gaussian of the rim the distance to the nearest opaque one of the body, less
-    the larger standard deviations of both; the median of the widest hundredth, as single Gaussians
-    are no hole.
+    Of every Gaussian of the rim that somebody outside can see, the distance to the nearest opaque
+    one of the body, less the larger standard deviations of both; the median of the widest
+    hundredth, as single Gaussians are no hole.
 
     Args:
         head: In the world.
@@ -41,16 +46,31 @@ def gap(
     """
     local = moved(np.linalg.inv(world_from_head), head.means.double().numpy())  # (N, 3)
     depth = region.depth(local)
-    rim = (depth > 0) & (depth < RIM) & (head.opacities.numpy() > OPAQUE)
-    seen = body.opacities > OPAQUE
-    if not rim.any() or not seen.any():
+    rim = (depth > 0) & (depth < RIM)
+    rim[rim] = _seen_from_outside(head, torch.from_numpy(rim), body)
+    solid = body.opacities > OPAQUE
+    if not rim.any() or not solid.any():
         return None
-    distances, nearest = KDTree(body.means[seen].numpy()).query(head.means.numpy()[rim])
-    reach = (
-        head.scales.max(1).values.numpy()[rim] + body.scales[seen].max(1).values.numpy()[nearest]
-    )
-    open_ = np.sort((distances - reach).clip(min=0))
-    return float(np.median(open_[-max(len(open_) // 100, 1) :]))
+    distances, nearest = KDTree(body.means[solid].numpy()).query(head.means.numpy()[rim])
+    sizes = head.scales.max(1).values.numpy(), body.scales[solid].max(1).values.numpy()
+    opening = np.sort((distances - sizes[0][rim] - sizes[1][nearest]).clip(min=0))
+    return float(np.median(opening[-max(len(opening) // 100, 1) :]))
+
+
+def _seen_from_outside(head: Gaussians, chosen: torch.Tensor, body: Gaussians) -> np.ndarray:
+    """(R,) bool: which of the chosen Gaussians of a head (N,) are seen by cameras around it."""
+    middle = head.means.mean(0).double().numpy()
+    cameras = [_looking_at(middle, angle) for angle in np.arange(AROUND) * 2 * np.pi / AROUND]
+    given = contributions(cat([head, body]), cameras)[:, : len(head)]  # (C, N)
+    return (given.max(0).values[chosen] > OPAQUE).numpy()
+
+
+def _looking_at(middle: np.ndarray, angle: float) -> Camera:
+    """A camera level with a head, in a world with y up."""
+    eye = middle + DISTANCE * np.array([np.sin(angle), 0.0, np.cos(angle)])
+    focal = PIXELS * DISTANCE / WIDE
+    intrinsics = np.array([[focal, 0, PIXELS / 2], [0, focal, PIXELS / 2], [0, 0, 1]])
+    return Camera(PIXELS, PIXELS, intrinsics, look_at(eye, middle), "around")
 
 
 def largest_gap(avatar: TrainedAvatar, region: HeadRegion) -> float | None:
