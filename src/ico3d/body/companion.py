@@ -67,9 +67,9 @@ class Pruning:
         """Looks at `MOMENTS` of the window."""
         self._companion, self._window = companion, window
 
-    def due(self, step: int) -> bool:
-        """Whether to remove after a step; the first ones begin where they may be."""
-        return step > 0 and step % PRUNE_EVERY == 0
+    def due(self, step: int, steps: int) -> bool:
+        """Whether to remove after a step of so many: every now and then, and after the last."""
+        return (step > 0 and step % PRUNE_EVERY == 0) or step == steps - 1
 
     @torch.no_grad()
     def carry_out(self, model: WindowModel, population: Population) -> int:

@@ -75,7 +75,7 @@ class FineTuner:
         else:
             values = self._remember(index)
         self._learner.update(index / self._settings.finetune_steps, self._settings.finetune_rate)
-        self._learner.prune(index)
+        self._learner.prune(index, self._settings.finetune_steps)
         return values
 
     def tensors(self) -> dict[str, Tensor]:

@@ -103,9 +103,14 @@ class Learner:
             return gaussians
         return cat([gaussians, self.companion.gaussians(frame)])
 
-    def prune(self, index: int) -> None:
-        """Removes what stands where the companion is, if it is time for that."""
-        if self._pruning is not None and self._pruning.due(index):
+    def prune(self, index: int, steps: int) -> None:
+        """Removes what stands where the companion is, if it is time for that.
+
+        Args:
+            index: Step just done.
+            steps: Of all of the training.
+        """
+        if self._pruning is not None and self._pruning.due(index, steps):
             self._pruning.carry_out(self.model, self.population)
 
     def loss(self, rendering: Rendering, example: Example) -> Tensor:

@@ -62,7 +62,7 @@ class BodyTrainer:
         learner.update(progress)
         rate = self._settings.rates()["means"].at(progress)
         self._strategy.adapt(learner.population, index, rate)
-        learner.prune(index)
+        learner.prune(index, self._steps)
         return {
             "loss": loss.item(),
             "psnr": masked_psnr(rendering, example),
