@@ -42,9 +42,9 @@ class RecolourSettings:
         seed: Decides the order of the pictures.
     """
 
-    steps: int = 1500
+    steps: int = 800
     rate: float = 3e-2
-    smoothness: float = 0.3
+    smoothness: float = 0.05
     seed: int = 0
 
 
