@@ -30,6 +30,7 @@ VERBS: dict[str, Verb] = {
     "train static": Verb("ico3d.scene.commands", "TrainStatic", "train a scene that stands still"),
     "train body": Verb("ico3d.body.commands", "TrainBody", "train SWinGS++ on a body in motion"),
     "train speech": Verb("ico3d.speech.commands", "TrainSpeech", "train the speech encoder"),
+    "assemble": Verb("ico3d.avatar.joining.command", "Assemble", "put a head on a person's body"),
     "evaluate": Verb("ico3d.measure.commands", "Evaluate", "measure a model on held-out frames"),
     "bake": Verb("ico3d.avatar.commands", "Bake", "make the bundle that browsers play"),
     "bundle info": Verb("ico3d.bundle.commands", "Info", "check a bundle, say what is in it"),

@@ -9,7 +9,7 @@ import numpy as np
 from ico3d.avatar import comparison, staging
 from ico3d.avatar.bake_head import MAX_RANK, BakeSettings, HeadBaker, megabytes_per_10k
 from ico3d.avatar.render_bundle import baked_gaussians
-from ico3d.avatar.samples import Samples, lips_of, training_expressions
+from ico3d.avatar.samples import Samples, training_expressions
 from ico3d.bundle.format import HEAD, LICENSES, POSES, SPEECH, THUMBNAIL, write_bundle
 from ico3d.bundle.head import BakedHead, poses_to_bytes
 from ico3d.bundle.manifest import (
@@ -33,7 +33,6 @@ RANKS = (16, 20, 24, 28, MAX_RANK)
 MAX_MEGABYTES = 1.7
 """MB of head.safetensors per 10,000 Gaussians, at most."""
 MEASURED_VIEWS = 40
-_SILENCE_SECONDS = 2
 
 Report = Callable[[str], None]
 
@@ -167,9 +166,7 @@ def idle_expression(head: TrainedHead, recorded: np.ndarray) -> np.ndarray:
     """
     if head.adaptor is None:
         return recorded[np.abs(recorded).sum(axis=1).argmin()]
-    silence = np.zeros(16_000 * _SILENCE_SECONDS, np.float32)
-    lips = lips_of(head, silence, 16_000)  # (T, 32)
-    return np.concatenate([lips[len(lips) // 2], _open_eyes(recorded[:, SPEECH_SIZE:])])
+    return np.concatenate([head.neutral()[:SPEECH_SIZE], _open_eyes(recorded[:, SPEECH_SIZE:])])
 
 
 def _open_eyes(recorded: np.ndarray) -> np.ndarray:
