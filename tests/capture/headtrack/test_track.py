@@ -1,6 +1,7 @@
 """`ico3d capture track` on recordings of synthetic people, whose heads are known exactly."""
 
 import importlib.util
+import json
 import os
 import shutil
 from pathlib import Path
@@ -128,6 +129,18 @@ def test_what_cannot_be_tracked_is_one_sentence(tmp_path, capsys, cameras, messa
     error = capsys.readouterr().err
     assert message in error and error.strip().count("\n") <= 1
     assert not (folder / NAME).exists()
+
+
+def test_cameras_in_wrong_places_are_told_from_faces_that_are_not_there(head, tmp_path, capsys):
+    _, folder = head
+    copy = shutil.copytree(folder, tmp_path / "wrong", ignore=shutil.ignore_patterns(NAME))
+    about = json.loads((copy / "cameras.json").read_text())
+    about["num_frames"] = 1
+    for index, camera in enumerate(about["cameras"]):
+        camera["world_to_camera"][1][3] += 0.1 * index
+    (copy / "cameras.json").write_text(json.dumps(about))
+    assert main(["capture", "track", str(copy)]) == 1
+    assert "no two agree on where one is" in capsys.readouterr().err
 
 
 def test_other_captures_are_pointed_to_resize(head, capsys):

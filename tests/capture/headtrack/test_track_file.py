@@ -12,6 +12,7 @@ from ico3d.capture.capture import Capture
 from ico3d.capture.check import examine
 from ico3d.capture.expressions import BLENDSHAPES
 from ico3d.capture.headtrack.track_file import NAME, HeadTrack
+from ico3d.capture.multiview.resizing import resize_capture
 from ico3d.capture.resized import ResizedCapture
 from ico3d.errors import CaptureError
 
@@ -66,6 +67,15 @@ def test_a_capture_gives_what_was_tracked(folder):
     np.testing.assert_array_equal(small.landmarks_3d(1), track.landmarks[1])
     with pytest.raises(CaptureError, match="frames 0 to 2, not 3"):
         capture.world_from_head(3)
+
+
+def test_smaller_pictures_keep_the_track(folder, tmp_path):
+    track = _track()
+    track.write(folder)
+    resize_capture(folder, tmp_path / "small", 16, 1)
+    small = Capture.open(tmp_path / "small")
+    np.testing.assert_array_equal(small.world_from_head(2), track.world_from_head[2])
+    np.testing.assert_allclose(small.landmarks(4, 2), Capture.open(folder).landmarks(4, 2) / 2)
 
 
 def test_interpolated_frames_are_told(folder):
