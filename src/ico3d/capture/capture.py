@@ -92,6 +92,10 @@ class Capture(ABC):
         """(68, 2) Multi-PIE landmarks in pixels of this camera, also for views without image."""
         return None
 
+    def landmarks_3d(self, frame: int) -> np.ndarray | None:
+        """(68, 3) Multi-PIE landmarks of a frame in canonical head space, metres."""
+        return None
+
     def points(self, frame: int = 0) -> np.ndarray | None:
         """(P, 3) surface points of a frame: of bodies in the world, else in head space."""
         return None

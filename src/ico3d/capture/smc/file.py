@@ -77,12 +77,15 @@ class SmcFile:
             plain = _is(node, "Dataset") and node.dtype == np.uint8 and node.ndim == 1
             return node[:count].tobytes() if plain else b""
 
-    def numbers(self, inside: str, shape: tuple[int | None, ...]) -> np.ndarray | None:
+    def numbers(
+        self, inside: str, shape: tuple[int | None, ...], holes: bool = False
+    ) -> np.ndarray | None:
         """Finite float64 numbers, or None where there is no such dataset.
 
         Args:
             inside: The dataset.
             shape: What it must have; None stands for any length.
+            holes: Whether NaN may stand for what is not known.
 
         Raises:
             CaptureError: If they have another shape or are not finite.
@@ -97,7 +100,7 @@ class SmcFile:
             raise CaptureError(
                 f"{self.path}: {inside} has shape {values.shape}, expected {wanted}."
             )
-        if values.dtype.kind not in "fiub" or not np.isfinite(values).all():
+        if values.dtype.kind not in "fiub" or not _sound(values, holes):
             raise CaptureError(f"{self.path}: {inside} holds values that are no finite numbers.")
         return values.astype(np.float64)
 
@@ -160,6 +163,11 @@ class SmcFile:
 
     def _damaged(self, inside: str) -> CaptureError:
         return CaptureError(f"{self.path}: {inside} is damaged: fetch the file again.")
+
+
+def _sound(values: np.ndarray, holes: bool) -> bool:
+    """Whether all are finite, or NaN where there may be holes."""
+    return bool((np.isfinite(values) | (np.isnan(values) & holes)).all())
 
 
 def _is(node: Any, kind: Literal["Group", "Dataset"]) -> bool:
