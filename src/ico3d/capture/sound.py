@@ -17,7 +17,6 @@ def read_sound_file(path: Path) -> Sound | None:
         CaptureError: If it is damaged.
     """
     import soundfile
-    import soxr
 
     if not path.is_file():
         return None
@@ -25,7 +24,14 @@ def read_sound_file(path: Path) -> Sound | None:
         samples, rate = soundfile.read(path, dtype="float32")
     except (OSError, ValueError, RuntimeError) as error:
         raise CaptureError(f"{path} cannot be read: {error}.") from error
-    mono = samples.mean(1) if samples.ndim == 2 else samples
+    return mono(samples, rate)
+
+
+def mono(samples: np.ndarray, rate: int) -> Sound:
+    """Samples (S,) or (S, channels) float32 of any rate as mono at 16 kHz."""
+    import soxr
+
+    one = samples.mean(1) if samples.ndim == 2 else samples
     if rate != RATE:
-        mono = soxr.resample(mono, rate, RATE, quality="VHQ")
-    return Sound(np.asarray(mono, np.float32), RATE)
+        one = soxr.resample(one, rate, RATE, quality="VHQ")
+    return Sound(np.asarray(one, np.float32), RATE)
