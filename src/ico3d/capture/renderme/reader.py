@@ -159,7 +159,7 @@ class RenderMe360(SmcCapture):
     def inspect(self) -> list[Finding]:
         """Missing and damaged pictures and annotations."""
         masks = self._holding(mask_folder(self._devices[0].name))
-        track = self.head_track
+        track = self.head_motion
         found = 0 if track is None else int(np.isfinite(track.points).all((1, 2)).sum())
         fitted = len(self.flame_fits.frames)
         return examine_files(self._raw, masks, self._devices, self.num_frames, fitted, found)

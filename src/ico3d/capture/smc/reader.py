@@ -9,7 +9,7 @@ import numpy as np
 from ico3d.capture.capture import Capture
 from ico3d.capture.decoding import decoded
 from ico3d.capture.finding import Finding, missing_and_damaged
-from ico3d.capture.head_track import HeadTrack, track_head
+from ico3d.capture.headtrack.from_landmarks import HeadMotion, head_from_landmarks
 from ico3d.capture.poses import nearest_axis, turn_upright, turned, up_of_cameras
 from ico3d.capture.smc.cameras import SmcCamera
 from ico3d.capture.smc.file import SmcFile
@@ -44,20 +44,20 @@ class SmcCapture(Capture):
         return None
 
     @cached_property
-    def head_track(self) -> HeadTrack | None:
+    def head_motion(self) -> HeadMotion | None:
         """The head as its landmarks in space show it, or None where they do not."""
         points = self.face_points()
-        return None if points is None else track_head(points)
+        return None if points is None else head_from_landmarks(points)
 
     def world_from_head(self, frame: int) -> np.ndarray | None:
         """(4, 4) W_i, or None where the face was not found."""
         index = self.index(frame)
-        return None if self.head_track is None else self.head_track.pose(index)
+        return None if self.head_motion is None else self.head_motion.pose(index)
 
     def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
         """(68, 2) pixels of the landmarks in space, or None where the face was not found."""
         index = self.index(frame)
-        points = None if self.head_track is None else self.head_track.landmarks(index)
+        points = None if self.head_motion is None else self.head_motion.landmarks(index)
         return None if points is None else self.cameras[camera].project(points)[0]
 
     def landmarks_3d(self, frame: int) -> np.ndarray | None:
@@ -66,7 +66,7 @@ class SmcCapture(Capture):
         Landmarks that a frame lacks are those of the mean face.
         """
         pose = self.world_from_head(frame)
-        points = None if self.head_track is None else self.head_track.landmarks(frame)
+        points = None if self.head_motion is None else self.head_motion.landmarks(frame)
         if pose is None or points is None:
             return None
         return (points - pose[:3, 3]) @ pose[:3, :3]

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ico3d.capture.pose_smoothing import smoothed_poses
-from ico3d.capture.rigid import procrustes, to_body
+from ico3d.capture.headtrack.procrustes import procrustes
+from ico3d.capture.headtrack.shape import inverse, moved
+from ico3d.capture.headtrack.whittaker import smoothed_poses
 
 LANDMARKS = 68
 HOLDING = np.ones(LANDMARKS, bool)
@@ -20,7 +21,7 @@ BEHIND = 0.07
 
 
 @dataclass(frozen=True)
-class HeadTrack:
+class HeadMotion:
     """Where a head was.
 
     Canonical head space: origin in the head between the eyes, +x to the person's left, +y up the
@@ -48,7 +49,7 @@ class HeadTrack:
         return points if np.isfinite(points).all() else None
 
 
-def track_head(points: np.ndarray) -> HeadTrack | None:
+def head_from_landmarks(points: np.ndarray) -> HeadMotion | None:
     """Fits a rigid head to the landmarks of a face.
 
     Generalised Procrustes analysis over all frames, by landmarks that the expression moves little,
@@ -66,10 +67,9 @@ def track_head(points: np.ndarray) -> HeadTrack | None:
         return None
     motion = motion.in_frame(head_frame(motion.shape))
     poses = smoothed_poses(motion)
-    local = to_body(poses, points)
-    local = np.where(np.isfinite(local), local, motion.shape)  # (F, 68, 3)
-    filled = local @ poses[:, :3, :3].transpose(0, 2, 1) + poses[:, None, :3, 3]
-    return HeadTrack(poses, motion.shape, filled)
+    local = moved(inverse(poses), points)  # (F, 68, 3)
+    filled = moved(poses, np.where(np.isfinite(local), local, motion.shape))
+    return HeadMotion(poses, motion.shape, filled)
 
 
 def head_frame(face: np.ndarray) -> np.ndarray:

@@ -1,8 +1,10 @@
-"""Rigid motion of points: where a body was in each frame, and which of its points stay on it."""
+"""Rigid motion of points of which some are missing or wrong, and how steady each of them is."""
 
 from dataclasses import dataclass
 
 import numpy as np
+
+from ico3d.capture.headtrack.shape import inverse, moved, rigid_fit
 
 FEWEST_POINTS = 6
 """Points that a frame must show; fewer may lie on a line."""
@@ -39,7 +41,7 @@ class RigidMotion:
 
 
 def fit_poses(shape: np.ndarray, points: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """The rigid motions that take a shape to where its points are seen (Kabsch, 1976).
+    """The rigid motions that take a shape to where its points are seen.
 
     Args:
         shape: (K, 3) metres.
@@ -49,17 +51,9 @@ def fit_poses(shape: np.ndarray, points: np.ndarray, weights: np.ndarray) -> np.
     Returns:
         (F, 4, 4) least-squares poses; NaN for frames with fewer than `FEWEST_POINTS` weights.
     """
-    total = np.maximum(weights.sum(1), np.finfo(float).tiny)[:, None]  # (F, 1)
-    middle = weights @ shape / total  # (F, 3)
-    center = np.einsum("fk,fkc->fc", weights, points) / total  # (F, 3)
-    held, moved = shape - middle[:, None], points - center[:, None]  # (F, K, 3)
-    left, _, right = np.linalg.svd(np.einsum("fk,fki,fkj->fij", weights, moved, held))
-    mirrored = np.linalg.det(left @ right) < 0
-    left[mirrored, :, 2] *= -1
-    poses = np.tile(np.eye(4), (len(points), 1, 1))
-    poses[:, :3, :3] = left @ right
-    poses[:, :3, 3] = center - np.einsum("fij,fj->fi", poses[:, :3, :3], middle)
-    poses[(weights > 0).sum(1) < FEWEST_POINTS] = np.nan
+    enough = (weights > 0).sum(1) >= FEWEST_POINTS
+    poses = np.full((len(points), 4, 4), np.nan)
+    poses[enough] = rigid_fit(shape, points[enough], weights[enough])
     return poses
 
 
@@ -83,7 +77,7 @@ def procrustes(points: np.ndarray, held: np.ndarray) -> RigidMotion:
     weights = trust * (held & np.isfinite(shape).all(-1))
     poses = fit_poses(np.nan_to_num(shape), filled, weights)
     for _ in range(ROUNDS):
-        local = to_body(poses, points)  # (F, K, 3)
+        local = moved(inverse(poses), points)  # (F, K, 3)
         shape = _means(local, trust)
         away = np.linalg.norm(local - shape, axis=-1)  # (F, K)
         spreads = _spreads(away)
@@ -93,11 +87,6 @@ def procrustes(points: np.ndarray, held: np.ndarray) -> RigidMotion:
         if np.nanmax(np.abs(poses - before), initial=0.0) < 1e-12:
             break
     return RigidMotion(shape, poses, spreads, weights)
-
-
-def to_body(poses: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """(F, K, 3) points of each frame in the coordinates of the body at (F, 4, 4) poses."""
-    return (points - poses[:, None, :3, 3]) @ poses[:, :3, :3]
 
 
 def _means(local: np.ndarray, trust: np.ndarray) -> np.ndarray:
