@@ -46,7 +46,7 @@ def similarity_fit(source: np.ndarray, target: np.ndarray, weights: np.ndarray) 
     share = weights / weights.sum(-1, keepdims=True)
     middles = [np.einsum("...n,...nc->...c", share, points) for points in (source, target)]
     poses[:, :3, :3] *= scales[:, None, None]
-    poses[:, :3, 3] = middles[1] - np.einsum("fij,...j->fi", poses[:, :3, :3], middles[0])
+    poses[:, :3, 3] = middles[1] - (poses[:, :3, :3] @ middles[0][..., None])[..., 0]
     return poses
 
 
@@ -64,7 +64,7 @@ def _fit(
     turns = (left * signs[:, None]) @ right  # (F, 3, 3)
     poses = np.tile(np.eye(4), (len(turns), 1, 1))
     poses[:, :3, :3] = turns
-    poses[:, :3, 3] = to_middle - np.einsum("fij,...j->fi", turns, from_middle)
+    poses[:, :3, 3] = to_middle - (turns @ from_middle[..., None])[..., 0]
     return poses, (stretch * signs).sum(-1) / (share * here**2).sum((-1, -2))
 
 
