@@ -11,7 +11,8 @@ export interface Still {
 export async function takeStill(page: Page, expression: number[]): Promise<Still> {
   const { attributes, coefficients } = await page.evaluate(async (row) => {
     const { stage, head, splats } = window.ico3d!;
-    head!.show(row);
+    head!.express(row);
+    head!.place(0);
     await stage.still();
     const { rgba } = splats(head!.generator);
     return { attributes: [...rgba], coefficients: [...head!.generator.shown] };

@@ -1,8 +1,8 @@
 import { describe, expect, test } from 'vitest';
-import { Playback } from '../src/body/playback.ts';
 import { Slots, type Shown, type Slot } from '../src/body/slots.ts';
 import { Timeline } from '../src/body/timeline.ts';
 import type { WindowInfo } from '../src/bundle/manifest.ts';
+import { Playback } from '../src/motion/playback.ts';
 
 const TICK = 1 / 30;
 const SORT = 3 * TICK; // until what was put into a slot has been sorted
@@ -59,7 +59,7 @@ class Theatre {
       await new Promise((resolve) => setImmediate(resolve));
       const last = this.log.at(-1);
       if (last && !last.waiting) this.playback.advance(TICK);
-      const shown = this.slots.update(this.playback.time, this.playback.direction, this.now);
+      const shown = this.slots.update(this.playback.time, this.playback.stops(), this.now);
       if (shown) {
         expect(this.content[shown.slot]).toBe(shown.window); // what is seen is there …
         expect(this.now).toBeGreaterThanOrEqual(this.sortedAt[shown.slot]); // … sorted …

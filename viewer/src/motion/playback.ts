@@ -1,9 +1,11 @@
-/** Where the body is on its time line: played forwards, at the end backwards, and so on. */
-export class Playback {
+import type { Motion } from './motion.ts';
+
+/** A body alone on its time line: played forwards, at the end backwards, and so on. */
+export class Playback implements Motion {
   time = 0; // s
   playing: boolean;
-  direction: 1 | -1 = 1;
-  private readonly duration: number;
+  readonly duration: number;
+  private direction: 1 | -1 = 1;
 
   /** @param duration of the whole, s */
   constructor(duration: number, playing: boolean) {
@@ -11,7 +13,10 @@ export class Playback {
     this.playing = playing;
   }
 
-  /** Goes on by `step` seconds, if it plays. */
+  stops(): number[] {
+    return this.direction === 1 ? [this.duration, 0] : [0, this.duration];
+  }
+
   advance(step: number): void {
     if (!this.playing) return;
     this.time += this.direction * step;
@@ -21,8 +26,13 @@ export class Playback {
     }
   }
 
-  /** Goes to a time. */
+  /** Goes to a time; plays on from there if it plays. */
   seek(seconds: number): void {
     this.time = Math.min(Math.max(seconds, 0), this.duration);
+  }
+
+  hold(seconds: number): void {
+    this.playing = false;
+    this.seek(seconds);
   }
 }
