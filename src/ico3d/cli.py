@@ -32,6 +32,7 @@ VERBS: dict[str, Verb] = {
     "train speech": Verb("ico3d.speech.commands", "TrainSpeech", "train the speech encoder"),
     "evaluate": Verb("ico3d.measure.commands", "Evaluate", "measure a model on held-out frames"),
     "bake": Verb("ico3d.avatar.commands", "Bake", "make the bundle that browsers play"),
+    "bundle info": Verb("ico3d.bundle.commands", "Info", "check a bundle, say what is in it"),
     "render": Verb("ico3d.avatar.film.command", "Render", "film a body along a path of cameras"),
     "convert": Verb("ico3d.splat.commands", "Convert", "convert files of 3D Gaussians"),
     "serve": Verb("ico3d.chat.commands", "Serve", "serve a bundle and talk with it"),

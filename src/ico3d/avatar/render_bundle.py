@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 
+from ico3d.avatar.avatar import Placement
 from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.evaluate import attributes
 from ico3d.bundle.format import Bundle
@@ -12,7 +13,7 @@ from ico3d.bundle.head import BakedHead
 from ico3d.bundle.manifest import CameraInfo
 from ico3d.common.camera import Camera, look_at
 from ico3d.errors import BundleError
-from ico3d.splat.gaussians import Gaussians
+from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
 
 
@@ -55,6 +56,53 @@ def body_gaussians(bundle: Bundle, seconds: float) -> Gaussians:
     window = body.windows[index]
     tau = (frame - window.first) / (window.last - window.first)
     return window_gaussians(bundle.window(index), tau)
+
+
+def avatar_gaussians(
+    bundle: Bundle, body_seconds: float, expression: Sequence[float] | np.ndarray
+) -> Gaussians:
+    """The whole person in the world, the body's Gaussians first; the body's time places the head.
+
+    Args:
+        bundle: Of a head and a body.
+        body_seconds: Where in the body's motion; clamped to it.
+        expression: (B,).
+
+    Raises:
+        BundleError: If the bundle lacks the body or the head.
+    """
+    body = body_gaussians(bundle, body_seconds)
+    head, poses = bundle.require_head()
+    assert bundle.manifest.body is not None
+    pose = Placement(np.eye(4), poses).pose(body_seconds * bundle.manifest.body.fps)
+    drawn = baked_gaussians(head, np.asarray(expression, np.float32))
+    return cat([body, drawn.transform(pose)])
+
+
+def render_avatar(
+    bundle: Bundle,
+    body_seconds: float,
+    expression: Sequence[float] | np.ndarray,
+    camera: Camera,
+    background: np.ndarray | None = None,
+) -> np.ndarray:
+    """Renders a whole person as a viewer does: (H, W, 3) float32 display RGB.
+
+    Args:
+        bundle: Of a head and a body.
+        body_seconds: Where in the body's motion.
+        expression: (B,).
+        camera: In world space.
+        background: (3,) or (H, W, 3); the bundle's own colour by default.
+
+    Raises:
+        BundleError: If the bundle lacks the body or the head.
+    """
+    behind = np.array(bundle.manifest.background) if background is None else background
+    gaussians = avatar_gaussians(bundle, body_seconds, expression)
+    with torch.no_grad():
+        picture = render(gaussians, [camera], torch.tensor(behind).float()).rgb[0]
+    return picture.numpy()  # (H, W, 3)
 
 
 def render_body(bundle: Bundle, seconds: float, camera: Camera) -> np.ndarray:
