@@ -50,3 +50,16 @@ export function psnr(a: Uint8Array, b: Uint8Array): number {
 export function worst(a: ArrayLike<number>, b: ArrayLike<number>): number {
   return Array.from(a).reduce((most, value, i) => Math.max(most, Math.abs(value - b[i]!)), 0);
 }
+
+/** A part of a picture (H, W, 3). */
+export function crop(
+  picture: Uint8Array,
+  width: number,
+  part: { left: number; top: number; width: number; height: number },
+): Uint8Array {
+  const rows = Array.from({ length: part.height }, (_, y) => {
+    const begin = 3 * ((part.top + y) * width + part.left);
+    return [...picture.subarray(begin, begin + 3 * part.width)];
+  });
+  return Uint8Array.from(rows.flat());
+}

@@ -1,5 +1,7 @@
 import type { Motion } from './motion.ts';
 
+const LONGEST_STEP = 0.25; // s that may pass at once, e.g. after the page was hidden
+
 /** A body alone on its time line: played forwards, at the end backwards, and so on. */
 export class Playback implements Motion {
   time = 0; // s
@@ -19,7 +21,7 @@ export class Playback implements Motion {
 
   advance(step: number): void {
     if (!this.playing) return;
-    this.time += this.direction * step;
+    this.time += this.direction * Math.min(step, LONGEST_STEP);
     while (this.time < 0 || this.time > this.duration) {
       this.direction = this.time < 0 ? 1 : -1;
       this.time = this.time < 0 ? -this.time : 2 * this.duration - this.time;
