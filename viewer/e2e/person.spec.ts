@@ -13,9 +13,8 @@ const TIMES = [0, 1, 2.4];
 const person = makePerson({ gaussians: '600,900', times: TIMES, pictures: `${WIDTH}x${HEIGHT}` });
 const [start, end] = person.rest;
 const pixels = 3 * WIDTH * HEIGHT;
-// Held for long: on a busy machine a window may be late, and what is late is caught up with.
-const PLAN: [number, number][] = [[0, 0.8], [2, 1.6], [4, 2.6], [13, 2.6], [15, 1.8], [17, 0.8]];
-const SPEECH = 18; // s
+const PLAN: [number, number][] = [[0, 0.8], [2, 1.6], [4, 2.6]];
+const SPEECH = 100; // s: longer than any test
 
 let server: Awaited<ReturnType<typeof servePage>>;
 let browser: Browser;
@@ -28,19 +27,16 @@ async function open(calm = false): Promise<void> {
   page = await browser.open(server.url);
 }
 
-/** Gives the page an utterance of some seconds of noise, and what the server would plan for it. */
-async function speak(utterance: number, seconds: number): Promise<void> {
+/** Gives the page an utterance of noise, and what the server would plan for its beginning. */
+async function speak(utterance: number): Promise<void> {
   await page.evaluate(`window.noise = ${noise}`);
-  await page.evaluate(
-    ([id, plan]) => {
-      const { director } = window.ico3d!;
-      director!.plan(id, plan.slice(0, 3)); // the rest comes later, as speech does
-      setTimeout(() => director!.plan(id, plan.slice(3)), 2000);
-    },
-    [utterance, PLAN] as const,
-  );
-  await feed(page, utterance, seconds);
+  await page.evaluate(([id, plan]) => window.ico3d!.director!.plan(id, plan), [utterance, PLAN] as const);
+  await feed(page, utterance, SPEECH);
 }
+
+/** Waits until the person shows a time of its body. */
+const shows = (time: number) =>
+  page.waitForFunction((seconds) => Math.abs(window.ico3d!.body!.time - seconds) < 1e-6, time, { timeout: 60_000 });
 
 /** Runs until the person has been at rest, silent, for two seconds. */
 async function settle(): Promise<Step[]> {
@@ -92,7 +88,7 @@ describe('a whole person', () => {
 
   test('idles in its rest span, and the head follows the body', async () => {
     await watchSteps(page);
-    await page.waitForTimeout(5000);
+    await page.waitForFunction(() => window.steps!.length > 20 && window.steps!.at(-1)!.at > 4, undefined, { timeout: 60_000 });
     const steps = await readSteps(page);
     const times = steps.map(({ time }) => time);
     expect(steps.every(atRest)).toBe(true);
@@ -104,33 +100,29 @@ describe('a whole person', () => {
     console.log(`${steps.length} pictures`);
   });
 
-  test('gestures as planned while it speaks, then returns to rest', async () => {
+  test('gestures as planned while it speaks; silenced, it goes back from where it is', async () => {
     await page.waitForTimeout(500);
     await watchSteps(page);
-    await speak(0, SPEECH);
+    await speak(0);
+    await shows(2.6); // and stays: more is not planned yet
+    await page.evaluate(() => {
+      const { director, conversation } = window.ico3d!;
+      const { seconds } = conversation!.player.heard()!;
+      director!.plan(0, [[seconds + 0.5, 2.6], [seconds + 1.5, 1.8]]);
+    });
+    await shows(1.8);
+    expect(await page.evaluate(() => window.ico3d!.conversation!.bodyTime())).toBeCloseTo(1.8, 6);
+    await page.evaluate(() => window.ico3d!.conversation!.interrupt());
     const steps = await settle();
     const spoken = steps.filter(({ heard }) => heard !== null);
-    expect(Math.max(...spoken.map(({ time }) => time))).toBeGreaterThan(2.5);
-    const held = spoken.filter(({ heard }) => heard!.seconds > 10 && heard!.seconds < 12.9);
-    for (const { time } of held) expect(time).toBeCloseTo(2.6, 6);
+    expect(Math.max(...steps.map(({ time }) => time))).toBeCloseTo(2.6, 6);
+    expect(new Set(spoken.map(({ window }) => window))).toEqual(new Set([0, 1, 2]));
+    expect(excess(steps, person.fastest)).toBeLessThan(1e-9);
     for (const { time, head } of steps) {
       headAt(person, time).forEach((value, k) => expect(head[k]).toBeCloseTo(value, 3));
     }
-    expect(excess(steps, person.fastest)).toBeLessThan(1e-9);
-    expect(new Set(spoken.map(({ window }) => window))).toEqual(new Set([0, 1, 2]));
     const late = steps.filter(({ waiting }) => waiting).length;
     console.log(`${spoken.length} pictures while it spoke, ${steps.length - spoken.length} at rest; ${late} waited`);
-  });
-
-  test('silenced in the middle of a gesture, it goes back from where it is', async () => {
-    await watchSteps(page);
-    await speak(0, SPEECH);
-    await page.waitForFunction(() => window.ico3d!.body!.time > 1.8, undefined, { timeout: 30_000 });
-    await page.evaluate(() => window.ico3d!.conversation!.interrupt());
-    const steps = await settle();
-    expect(excess(steps, person.fastest)).toBeLessThan(1e-9);
-    expect(Math.max(...steps.map(({ time }) => time))).toBeLessThan(2.6);
-    expect(await page.evaluate(() => window.ico3d!.conversation!.bodyTime() === window.ico3d!.body!.time)).toBe(true);
   });
 
   test('fits into the screen of a phone, and can be seen from all around', async () => {
@@ -155,10 +147,9 @@ describe('a visitor who wants little motion', () => {
   test('sees the body stand where the rest ends, and the face talk', async () => {
     await page.waitForTimeout(300);
     await watchSteps(page);
-    await speak(0, 6);
-    const steps = await settle();
-    const faces = new Set(steps.map(({ face }) => face));
-    expect(faces.size).toBeGreaterThan(2);
+    await speak(0);
+    await page.waitForFunction(() => new Set(window.steps!.map(({ face }) => face)).size > 4);
+    const steps = await readSteps(page);
     expect(new Set(steps.map(({ time }) => time))).toEqual(new Set([end]));
   });
 

@@ -131,8 +131,9 @@ describe('the time line', () => {
 
 test('playback turns around at both ends without a jump', () => {
   const playback = new Playback(1, true);
+  const prompt = { time: 0, waiting: false };
   const seen = Array.from({ length: 60 }, () => {
-    playback.advance(0.07);
+    playback.advance(0.07, prompt);
     return playback.time;
   });
   expect(Math.max(...seen)).toBeGreaterThan(0.95);
@@ -141,10 +142,12 @@ test('playback turns around at both ends without a jump', () => {
   playback.seek(7);
   expect(playback.time).toBe(1);
   playback.playing = false;
-  playback.advance(1);
+  playback.advance(1, prompt);
   expect(playback.time).toBe(1);
   playback.playing = true;
-  playback.advance(100.5);
+  playback.advance(100.5, prompt);
+  expect(playback.time).toBe(0.75);
+  playback.advance(0.1, { time: 0.75, waiting: true });
   expect(playback.time).toBe(0.75);
 });
 

@@ -30,7 +30,7 @@ class Rehearsal {
     const begin = this.log.length;
     for (const end = this.now + seconds - 1e-9; this.now < end; ) {
       this.now += tick;
-      this.director.advance(tick);
+      this.director.advance(tick, { time: this.director.time, waiting: false });
       this.log.push({ now: this.now, time: this.director.time, sound: this.spoken()?.seconds ?? null });
     }
     return this.log.slice(begin);

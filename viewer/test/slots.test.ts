@@ -63,7 +63,7 @@ class Theatre {
       this.waiting = this.waiting.filter(({ due }) => due > this.now);
       await new Promise((resolve) => setImmediate(resolve));
       const last = this.log.at(-1);
-      if (last && !last.waiting) this.motion.advance(TICK);
+      if (last) this.motion.advance(TICK, last);
       const shown = this.slots.update(this.motion.time, this.motion.stops(), this.now);
       if (shown) {
         expect(this.content[shown.slot]).toBe(shown.window); // what is seen is there …
@@ -169,15 +169,32 @@ describe('windows in two slots', () => {
     director.plan(0, [[0, 1], [3, 3.5], [3.5, 3.5], [7.5, 0], [8, 0.6]]);
     const begin = theatre.now;
     const motion = director.advance.bind(director);
-    director.advance = (step) => {
+    director.advance = (step, seen) => {
       spoken = { utterance: 0, seconds: theatre.now - begin };
-      motion(step);
+      motion(step, seen);
     };
     const log = (await theatre.run(8)).filter((shown) => shown !== null);
     expect(log.every(({ waiting }) => !waiting)).toBe(true);
     const order = log.map(({ window }) => window).filter((window, i, all) => window !== all[i - 1]);
     expect(order).toEqual([1, 2, 3, 4, 5, 4, 3, 2, 1, 0]);
     for (const jump of jumps(log)) expect(jump).toBeLessThanOrEqual(1.2 * TICK + 1e-9);
+  });
+
+  test('a person whose windows are late waits at the border and goes on from there', async () => {
+    const animation = { fps: 15, num_frames: 55, rest: { start: 0, end: 6 }, min_speed: 0.6, max_speed: 1.2 };
+    const spoken = { utterance: 0, seconds: 0 };
+    const director = new MotionDirector(animation, () => spoken);
+    director.plan(0, [[0, 0], [3.6, 3.6]]);
+    const theatre = new Theatre([9, 18, 27, 36, 45, 54], 2, director);
+    const motion = director.advance.bind(director);
+    director.advance = (step, seen) => {
+      spoken.seconds += step; // the sound does not wait
+      motion(step, seen);
+    };
+    const log = (await theatre.run(14)).filter((shown) => shown !== null);
+    expect(log.some(({ waiting }) => waiting)).toBe(true);
+    for (const jump of jumps(log)) expect(jump).toBeLessThanOrEqual(1.2 * TICK + 1e-9);
+    expect(log.at(-1)!.time).toBe(3.6);
   });
 
   test('one window alone is played there and back', async () => {

@@ -49,7 +49,7 @@ export class Body implements Actor {
 
   tick(step: number): boolean {
     const { motion } = this;
-    if (this.shown && !this.shown.waiting) motion.advance(step);
+    if (this.shown) motion.advance(step, this.shown);
     this.shown = this.slots.update(motion.time, motion.stops(), performance.now() / 1000);
     return SLOTS.map((slot) => this.pose(slot)).includes(true);
   }

@@ -1,7 +1,7 @@
 import type { AnimationInfo } from '../bundle/animation.ts';
 import { DISPLAY_LEAD } from '../face/face.ts';
 import { clamp, Glide } from './glide.ts';
-import type { Motion } from './motion.ts';
+import type { Motion, Seen } from './motion.ts';
 import { SpeechPath } from './path.ts';
 
 /** An utterance that is heard now. */
@@ -66,8 +66,9 @@ export class MotionDirector implements Motion {
     return path ? [path.at(seconds).time, ...path.after(seconds), this.end] : [this.end];
   }
 
-  advance(step: number): void {
+  advance(step: number, seen: Seen): void {
     if (this.held) return;
+    if (seen.waiting) this.glide.time = seen.time; // from there it goes on, or it would jump
     const heard = this.heard();
     const path = heard && this.paths.get(heard.utterance);
     if (path) this.speak(path, { ...heard, seconds: heard.seconds + DISPLAY_LEAD }, step);

@@ -1,4 +1,4 @@
-import type { Motion } from './motion.ts';
+import type { Motion, Seen } from './motion.ts';
 
 const LONGEST_STEP = 0.25; // s that may pass at once, e.g. after the page was hidden
 
@@ -19,8 +19,8 @@ export class Playback implements Motion {
     return this.direction === 1 ? [this.duration, 0] : [0, this.duration];
   }
 
-  advance(step: number): void {
-    if (!this.playing) return;
+  advance(step: number, { waiting }: Seen): void {
+    if (!this.playing || waiting) return;
     this.time += this.direction * Math.min(step, LONGEST_STEP);
     while (this.time < 0 || this.time > this.duration) {
       this.direction = this.time < 0 ? 1 : -1;
