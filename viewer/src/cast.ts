@@ -8,6 +8,7 @@ import { Head, sway } from './head/head.ts';
 import { MotionDirector, type Spoken } from './motion/director.ts';
 import type { Motion } from './motion/motion.ts';
 import { Playback } from './motion/playback.ts';
+import { makeBackdrop } from './stage/backdrop.ts';
 import type { Stage } from './stage/stage.ts';
 
 /** Who is on stage: a head, a body that plays, or a whole person whose body a director moves. */
@@ -35,6 +36,8 @@ export interface CastPorts {
  */
 export async function makeCast(manifest: Manifest, stage: Stage, calm: boolean, ports: CastPorts): Promise<Cast> {
   const { head, body } = manifest;
+  const backdrop = await makeBackdrop(manifest, ports.loaded);
+  if (backdrop) stage.add(backdrop);
   if (head && body) return makePerson(manifest, head, body, stage, calm, ports);
   if (head) return { head: await makeHead(manifest, head, stage, calm ? () => 0 : sway(head), ports) };
   const timeline = new Timeline(body!);

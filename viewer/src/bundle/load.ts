@@ -11,6 +11,9 @@ export interface HeadFiles {
   poses: Float32Array; // (F,4,4) row-major world_from_head
 }
 
+/** The names that splats behind a person may have. */
+export const BACKGROUNDS = ['background.spz', 'background.ply'];
+
 const ROOT = 'bundle/';
 const HEAD_FILES = ['head.safetensors', 'head_poses.safetensors'] as const;
 
@@ -40,7 +43,8 @@ export async function loadHead(
 
 /** Bytes that must come before there is somebody to see. */
 export function bytesToFirstSight({ head, body, files }: Manifest): number {
-  const names = [...(head ? HEAD_FILES : []), ...(body ? [body.windows[0]!.file] : [])];
+  const behind = BACKGROUNDS.filter((name) => name in files);
+  const names = [...behind, ...(head ? HEAD_FILES : []), ...(body ? [body.windows[0]!.file] : [])];
   return names.reduce((sum, name) => sum + (files[name]?.size ?? 0), 0);
 }
 
