@@ -36,6 +36,7 @@ def test_a_whole_person_reads_back(tmp_path):
     assert bundle.head is not None and bundle.window(1).num_gaussians == 23
     assert bundle.world_from_head.shape == (FRAMES, 4, 4)
     assert bundle.background == "background.ply"
+    assert bundle.animation.rest.end == 2 and bundle.animation.num_frames == FRAMES
     assert bundle.read("background.ply") == ply()
     assert json.loads(bundle.read("animation.json")) == ANIMATION
 
@@ -80,7 +81,12 @@ def test_one_background_is_enough(tmp_path):
     refused_when_written(tmp_path, whole_manifest(), files, "does not belong")
 
 
-@pytest.mark.parametrize("animation", [b"", b"{", b"NaN", b"\xff"])
+OTHER_BODY = json.dumps({**ANIMATION, "fps": 25.0}).encode()
+
+
+@pytest.mark.parametrize(
+    "animation", [b"", b"[]", b"{", b'{"version": 1}', b"NaN", b"\xff", OTHER_BODY]
+)
 def test_a_hostile_animation_is_refused(tmp_path, animation):
     path = tmp_path / "a.ico3d"
     write_bundle(path, whole_manifest(), whole_files() | {"animation.json": animation})

@@ -67,6 +67,7 @@ class Bake:
     def _bake_head(self, report) -> None:
         from ico3d.avatar import baking, comparison, staging
         from ico3d.avatar.persona import load_persona
+        from ico3d.avatar.samples import recorded_samples
         from ico3d.bundle.limits import MAX_RANK
         from ico3d.capture.capture import Capture
         from ico3d.head.trained import TrainedHead
@@ -77,7 +78,8 @@ class Bake:
         head, capture = TrainedHead.load(self.model), Capture.open(self.files[0])
         neutral = staging.background_colour(capture, 0)
         views = comparison.references(head, capture, neutral, baking.MEASURED_VIEWS)
-        result = baking.bake(head, views, capture, self.rank, report)
+        samples = recorded_samples(head, capture)
+        result = baking.bake(head, views, samples, self.rank, report)
         if self.strip:
             _save_picture(comparison.strip(result.head, views), self.strip)
         if not self.force:

@@ -1,7 +1,7 @@
 """What baking costs a body: exact and baked windows beside each other and the recording."""
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -14,8 +14,11 @@ from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.manifest import Loss
 from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera, look_at
+from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
 
+HeadAt = Callable[[float], Gaussians]
+"""The head on a body, in the world, at a frame."""
 VIEWS = 24
 """Pictures per window that baking is measured with."""
 _PROBE_SIZE, _PROBE_FOV = 256, 40.0
@@ -31,6 +34,7 @@ class View:
         background: (3,) or (H, W, 3).
         truth: (H, W, 3), or None.
         mask: (H, W) the person, or None.
+        beside: Who is in the picture, too: the head on the body.
     """
 
     camera: Camera
@@ -38,6 +42,7 @@ class View:
     background: torch.Tensor
     truth: np.ndarray | None = None
     mask: np.ndarray | None = None
+    beside: Gaussians | None = None
 
 
 def recorded_views(capture: Capture, span: Span, count: int = VIEWS) -> Iterator[View]:
@@ -90,6 +95,13 @@ def ring_of_cameras(low: np.ndarray, high: np.ndarray, count: int = 4) -> list[C
     return [Camera(_PROBE_SIZE, _PROBE_SIZE, intrinsics, look_at(e, middle)) for e in eyes]
 
 
+def with_head(views: Iterable[View], span: Span, head: HeadAt | None) -> Iterator[View]:
+    """The same views with the head in the picture that the body has at that time, if any."""
+    for view in views:
+        frame = span.first + view.tau * (span.last - span.first)
+        yield view if head is None else replace(view, beside=head(frame))
+
+
 def measure_window(
     body: MovingBody,
     index: int,
@@ -121,15 +133,19 @@ def _exact_picture(body: MovingBody, index: int, view: View) -> tuple[np.ndarray
     """(H, W, 3) and alpha (H, W) of the exact body."""
     with torch.no_grad():
         gaussians = body.window_gaussians(index, view.tau).to("cpu")
-        drawn = render(gaussians, [view.camera], view.background)
+        drawn = render(_together(gaussians, view), [view.camera], view.background)
     return drawn.rgb[0].numpy(), drawn.alpha[0].numpy()
 
 
 def _picture(baked: BakedWindow, view: View) -> np.ndarray:
     """(H, W, 3) of the baked body."""
     with torch.no_grad():
-        gaussians = window_gaussians(baked, view.tau)
+        gaussians = _together(window_gaussians(baked, view.tau), view)
         return render(gaussians, [view.camera], view.background).rgb[0].numpy()
+
+
+def _together(body: Gaussians, view: View) -> Gaussians:
+    return body if view.beside is None else cat([body, view.beside])
 
 
 def _mean(values: list[float]) -> float | None:

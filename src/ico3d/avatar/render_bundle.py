@@ -74,9 +74,14 @@ def avatar_gaussians(
     body = body_gaussians(bundle, body_seconds)
     head, poses = bundle.require_head()
     assert bundle.manifest.body is not None
-    pose = Placement(np.eye(4), poses).pose(body_seconds * bundle.manifest.body.fps)
     drawn = baked_gaussians(head, np.asarray(expression, np.float32))
+    pose = pose_at(poses, body_seconds * bundle.manifest.body.fps)
     return cat([body, drawn.transform(pose)])
+
+
+def pose_at(world_from_head: np.ndarray, frame: float) -> np.ndarray:
+    """(4, 4) of poses (F, 4, 4) at a frame of the body, as a viewer places the head."""
+    return Placement(np.eye(4), world_from_head).pose(frame)
 
 
 def render_avatar(

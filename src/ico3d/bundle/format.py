@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.bundle import limits
+from ico3d.bundle.animation import ANIMATION, Animation
 from ico3d.bundle.archive import Archive, open_archive, write_zip
 from ico3d.bundle.backdrop import BACKGROUNDS, check_background
 from ico3d.bundle.body import BakedWindow
-from ico3d.bundle.decode import parse_json
 from ico3d.bundle.head import HEAD, POSES, BakedHead, poses_from_bytes
 from ico3d.bundle.manifest import MANIFEST, FileEntry, Manifest, check_manifest
 from ico3d.bundle.onnx_check import check_onnx
@@ -20,7 +20,6 @@ from ico3d.bundle.packaged import bundle_path
 from ico3d.errors import BundleError
 
 SPEECH = "speech.onnx"
-ANIMATION = "animation.json"
 THUMBNAIL = "thumbnail.png"
 LICENSES = "LICENSES.txt"
 
@@ -39,7 +38,7 @@ class Bundle:
     manifest: Manifest
     head: BakedHead | None
     world_from_head: np.ndarray | None
-    animation: dict | None
+    animation: Animation | None
 
     def __init__(self, archive: Archive):
         """Reads and checks every file; use `Bundle.open`.
@@ -123,8 +122,9 @@ class Bundle:
         for index in range(len(self.manifest.body.windows) if self.manifest.body else 0):
             self.window(index)  # not kept: together they may be large
         self.animation = None
-        if self.manifest.is_whole:
-            self.animation = parse_json(self.read(ANIMATION), ANIMATION)
+        if self.manifest.is_whole and self.manifest.body is not None:
+            self.animation = Animation.from_bytes(self.read(ANIMATION))
+            self.animation.check_body(self.manifest.body)
         if self.background is not None:
             check_background(self.read(self.background), self.background)
         _check_thumbnail(self.read(THUMBNAIL))
