@@ -33,7 +33,7 @@ VERBS: dict[str, Verb] = {
     "evaluate": Verb("ico3d.measure.commands", "Evaluate", "measure a model on held-out frames"),
     "bake": Verb("ico3d.avatar.commands", "Bake", "make the bundle that browsers play"),
     "bundle info": Verb("ico3d.bundle.commands", "Info", "check a bundle, say what is in it"),
-    "render": Verb("ico3d.avatar.film.command", "Render", "film a body along a path of cameras"),
+    "render": Verb("ico3d.avatar.film.command", "Render", "film a person who talks or moves"),
     "convert": Verb("ico3d.splat.commands", "Convert", "convert files of 3D Gaussians"),
     "serve": Verb("ico3d.chat.commands", "Serve", "serve a bundle and talk with it"),
     "bench body": Verb("ico3d.measure.commands", "BenchBody", "compare methods for bodies"),

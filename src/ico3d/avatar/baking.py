@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from ico3d.avatar import comparison, staging
 from ico3d.avatar.bake_head import MAX_RANK, BakeSettings, HeadBaker, megabytes_per_10k
 from ico3d.avatar.render_bundle import baked_gaussians
-from ico3d.avatar.samples import Samples, training_expressions
+from ico3d.avatar.samples import Samples, lips_of, training_expressions
 from ico3d.bundle.format import HEAD, LICENSES, POSES, SPEECH, THUMBNAIL, write_bundle
 from ico3d.bundle.head import BakedHead, poses_to_bytes
 from ico3d.bundle.manifest import (
@@ -169,10 +168,8 @@ def idle_expression(head: TrainedHead, recorded: np.ndarray) -> np.ndarray:
     if head.adaptor is None:
         return recorded[np.abs(recorded).sum(axis=1).argmin()]
     silence = np.zeros(16_000 * _SILENCE_SECONDS, np.float32)
-    features = torch.from_numpy(load_encoder(head.encoder).features(silence, 16_000))
-    with torch.no_grad():
-        rows = head.adaptor.track(features)  # (T, 32)
-    return np.concatenate([rows[len(rows) // 2].numpy(), _open_eyes(recorded[:, SPEECH_SIZE:])])
+    lips = lips_of(head, silence, 16_000)  # (T, 32)
+    return np.concatenate([lips[len(lips) // 2], _open_eyes(recorded[:, SPEECH_SIZE:])])
 
 
 def _open_eyes(recorded: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ from ico3d.avatar.measure_body import (
     probe_views,
     recorded_views,
     ring_of_cameras,
-    with_head,
+    window_pair,
 )
 from ico3d.avatar.render_bundle import window_gaussians
 from ico3d.bundle.body import BakedWindow
@@ -187,7 +187,8 @@ def strip(body: MovingBody, results: list[WindowResult], capture: Capture | None
     for index, (span, result) in enumerate(zip(body.windows, results, strict=True)):
         probes = probe_views(ring_of_cameras(*seen_box(result.window)), span, 1)
         views = list(recorded_views(capture, span, 1)) if capture else probes
-        lines.append(comparison_line(body, index, result.window, views[0]))
+        pair = window_pair(body, index, result.window, None)
+        lines.append(comparison_line(*pair, views[0]))
     return (np.vstack(lines).clip(0, 1) * 255 + 0.5).astype(np.uint8)
 
 
@@ -201,8 +202,7 @@ def _attempts(
         baked = baker.baked(shape)
         recorded = recorded_views(capture, span) if capture else []
         probes = probe_views(ring_of_cameras(*seen_box(baked)), span)
-        recorded, probes = (with_head(views, span, head) for views in (recorded, probes))
-        loss = measure_window(body, index, baked, recorded, probes)
+        loss = measure_window(body, index, baked, recorded, probes, head)
         yield WindowResult(baked, baked.to_bytes(window_file(index)), seconds, loss)
 
 
@@ -250,17 +250,28 @@ def seen_box(
     return low, high
 
 
-def standing_camera(low: np.ndarray, high: np.ndarray, capture: Capture | None) -> CameraInfo:
-    """Level with the body's middle, from the capture's first camera; without one, along +z."""
+def standing_camera(
+    low: np.ndarray, high: np.ndarray, capture: Capture | None, front: np.ndarray | None = None
+) -> CameraInfo:
+    """Level with the body's middle, so far away that all of it is seen.
+
+    Args:
+        low: (3,) least coordinates.
+        high: (3,) greatest coordinates.
+        capture: Its cameras stand upright, more or less; without one, y is up.
+        front: (3,) where the person looks; by default toward the capture's first camera, without
+            one along +z.
+    """
     up, toward = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
     if capture is not None:
         rotations = np.stack([camera.world_to_camera[:3, :3] for camera in capture.cameras])
-        up = -rotations[:, 1].mean(axis=0)  # cameras stand upright, more or less
+        up = -rotations[:, 1].mean(axis=0)
         up /= np.linalg.norm(up)
         toward = capture.cameras[0].camera_to_world[:3, 3] - (low + high) / 2
-        toward -= up * (toward @ up)
-        toward /= np.linalg.norm(toward)
-    return staging.standing_view(low, high, up, toward)
+    if front is not None:
+        toward = front
+    toward = toward - up * (toward @ up)
+    return staging.standing_view(low, high, up, toward / np.linalg.norm(toward))
 
 
 def _mean_loss(losses: list[Loss]) -> Loss:

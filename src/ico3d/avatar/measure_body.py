@@ -1,14 +1,15 @@
 """What baking costs a body: exact and baked windows beside each other and the recording."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
 
-from ico3d.avatar.bake_body import SAMPLES_PER_FRAME, MovingBody, Span
+from ico3d.avatar.bake_body import SAMPLES_PER_FRAME, MovingBody
 from ico3d.avatar.comparison import psnr
 from ico3d.avatar.render_bundle import window_gaussians
+from ico3d.avatar.spans import Span
 from ico3d.avatar.staging import NEUTRAL
 from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.manifest import Loss
@@ -17,6 +18,8 @@ from ico3d.common.camera import Camera, look_at
 from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
 
+At = Callable[[float], Gaussians]
+"""Somebody in the world at τ in [0, 1] of a span of time."""
 HeadAt = Callable[[float], Gaussians]
 """The head on a body, in the world, at a frame."""
 VIEWS = 24
@@ -34,7 +37,6 @@ class View:
         background: (3,) or (H, W, 3).
         truth: (H, W, 3), or None.
         mask: (H, W) the person, or None.
-        beside: Who is in the picture, too: the head on the body.
     """
 
     camera: Camera
@@ -42,7 +44,6 @@ class View:
     background: torch.Tensor
     truth: np.ndarray | None = None
     mask: np.ndarray | None = None
-    beside: Gaussians | None = None
 
 
 def recorded_views(capture: Capture, span: Span, count: int = VIEWS) -> Iterator[View]:
@@ -95,57 +96,60 @@ def ring_of_cameras(low: np.ndarray, high: np.ndarray, count: int = 4) -> list[C
     return [Camera(_PROBE_SIZE, _PROBE_SIZE, intrinsics, look_at(e, middle)) for e in eyes]
 
 
-def with_head(views: Iterable[View], span: Span, head: HeadAt | None) -> Iterator[View]:
-    """The same views with the head in the picture that the body has at that time, if any."""
-    for view in views:
-        frame = span.first + view.tau * (span.last - span.first)
-        yield view if head is None else replace(view, beside=head(frame))
-
-
 def measure_window(
     body: MovingBody,
     index: int,
     baked: BakedWindow,
     recorded: Iterable[View],
     probes: Iterable[View],
+    head: HeadAt | None = None,
 ) -> Loss:
+    """Mean PSNR on the person: against the recording, and against the exact model."""
+    return measure(*window_pair(body, index, baked, head), recorded, probes)
+
+
+def window_pair(
+    body: MovingBody, index: int, baked: BakedWindow, head: HeadAt | None
+) -> tuple[At, At]:
+    """The exact and the baked window at τ, each with the exact head on it, if there is one."""
+    span = body.windows[index]
+
+    def together(gaussians: Gaussians, tau: float) -> Gaussians:
+        frame = span.first + tau * (span.last - span.first)
+        return gaussians if head is None else cat([gaussians, head(frame)])
+
+    return (
+        lambda tau: together(body.window_gaussians(index, tau).to("cpu"), tau),
+        lambda tau: together(window_gaussians(baked, tau), tau),
+    )
+
+
+def measure(exact: At, baked: At, recorded: Iterable[View], probes: Iterable[View]) -> Loss:
     """Mean PSNR on the person: against the recording, and against the exact model."""
     exact_psnr, baked_psnr, likeness = [], [], []
     for view in recorded:
         assert view.truth is not None
-        exact, ours = _exact_picture(body, index, view)[0], _picture(baked, view)
-        exact_psnr.append(psnr(exact, view.truth, view.mask))
+        model, ours = _drawn(exact, view)[0], _drawn(baked, view)[0]
+        exact_psnr.append(psnr(model, view.truth, view.mask))
         baked_psnr.append(psnr(ours, view.truth, view.mask))
     for view in probes:
-        exact, alpha = _exact_picture(body, index, view)
+        model, alpha = _drawn(exact, view)
         if alpha.any():
-            likeness.append(psnr(_picture(baked, view), exact, alpha))
+            likeness.append(psnr(_drawn(baked, view)[0], model, alpha))
     return Loss(_mean(exact_psnr), _mean(baked_psnr), _mean(likeness))
 
 
-def comparison_line(body: MovingBody, index: int, baked: BakedWindow, view: View) -> np.ndarray:
+def comparison_line(exact: At, baked: At, view: View) -> np.ndarray:
     """[recorded |] exact | baked of one view, side by side: (H, W·3 or W·2, 3) float32."""
-    pictures = [_exact_picture(body, index, view)[0], _picture(baked, view)]
+    pictures = [_drawn(model, view)[0] for model in (exact, baked)]
     return np.hstack(pictures if view.truth is None else [view.truth, *pictures])
 
 
-def _exact_picture(body: MovingBody, index: int, view: View) -> tuple[np.ndarray, np.ndarray]:
-    """(H, W, 3) and alpha (H, W) of the exact body."""
+def _drawn(person: At, view: View) -> tuple[np.ndarray, np.ndarray]:
+    """(H, W, 3) and alpha (H, W)."""
     with torch.no_grad():
-        gaussians = body.window_gaussians(index, view.tau).to("cpu")
-        drawn = render(_together(gaussians, view), [view.camera], view.background)
+        drawn = render(person(view.tau), [view.camera], view.background)
     return drawn.rgb[0].numpy(), drawn.alpha[0].numpy()
-
-
-def _picture(baked: BakedWindow, view: View) -> np.ndarray:
-    """(H, W, 3) of the baked body."""
-    with torch.no_grad():
-        gaussians = _together(window_gaussians(baked, view.tau), view)
-        return render(gaussians, [view.camera], view.background).rgb[0].numpy()
-
-
-def _together(body: Gaussians, view: View) -> Gaussians:
-    return body if view.beside is None else cat([body, view.beside])
 
 
 def _mean(values: list[float]) -> float | None:

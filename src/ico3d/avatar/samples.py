@@ -1,5 +1,6 @@
 """What a head is baked from: expressions, and how much each of its logits is seen."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,22 +76,27 @@ def expressions_of(head: TrainedHead, capture: Capture, frames) -> np.ndarray:
         return np.stack([track.at(frame).numpy() for frame in frames])
 
 
-def spoken_expressions(head: TrainedHead, texts: tuple[str, ...], seed: int = 0) -> np.ndarray:
+def spoken_expressions(head: TrainedHead, texts: Sequence[str], seed: int = 0) -> np.ndarray:
     """(T, B) of synthetic voices that read texts to a head driven by speech, with blinks.
 
     Raises:
         MissingExtraError: If espeak-ng is not installed.
     """
-    assert head.adaptor is not None
-    encoder, rows = load_encoder(head.encoder), []
+    rows = []
     for number, text in enumerate(texts):
         speech = synthesize(text, _VOICES[number % len(_VOICES)], rate=150)
-        features = torch.from_numpy(encoder.features(speech.samples, speech.rate))  # (T, D)
-        with torch.no_grad():
-            rows.append(head.adaptor.track(features).numpy())  # (T, 32)
+        rows.append(lips_of(head, speech.samples, speech.rate))
     lips = np.concatenate(rows)
     eyes = EyeBehaviour(seed).values(np.arange(len(lips)) / FEATURE_RATE)
     return np.concatenate([lips, eyes], 1)
+
+
+def lips_of(head: TrainedHead, samples: np.ndarray, rate: int) -> np.ndarray:
+    """(T, 32) what a sound (S,) does to a head driven by speech, 25 rows per second."""
+    assert head.adaptor is not None
+    features = torch.from_numpy(load_encoder(head.encoder).features(samples, rate))  # (T, D)
+    with torch.no_grad():
+        return head.adaptor.track(features).numpy()
 
 
 def importance_of(head: TrainedHead, capture: Capture) -> np.ndarray:
