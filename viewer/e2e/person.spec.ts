@@ -2,7 +2,7 @@ import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, beforeEach, describe, expect, test } from 'vitest';
 import { Browser } from '../support/browser.ts';
 import { feed, noise } from '../support/feeder.ts';
-import { excess, headAt, makePerson, readSteps, watchSteps, type Step } from '../support/person.ts';
+import { atRest, excess, headAt, makePerson, readSteps, settle, watchSteps } from '../support/person.ts';
 import { crop, psnr, takePixels } from '../support/pictures.ts';
 import { servePage } from '../support/static.ts';
 
@@ -20,8 +20,6 @@ let server: Awaited<ReturnType<typeof servePage>>;
 let browser: Browser;
 let page: Page;
 
-const atRest = ({ time }: Step) => time >= start - 1e-6 && time <= end + 1e-6;
-
 async function open(calm = false): Promise<void> {
   browser = await Browser.launch({ width: WIDTH, height: HEIGHT, calm });
   page = await browser.open(server.url);
@@ -37,17 +35,6 @@ async function speak(utterance: number): Promise<void> {
 /** Waits until the person shows a time of its body. */
 const shows = (time: number) =>
   page.waitForFunction((seconds) => Math.abs(window.ico3d!.body!.time - seconds) < 1e-6, time, { timeout: 60_000 });
-
-/** Runs until the person has been at rest, silent, for two seconds. */
-async function settle(): Promise<Step[]> {
-  for (const limit = Date.now() + 60_000; Date.now() < limit; ) {
-    await page.waitForTimeout(500);
-    const steps = await readSteps(page);
-    const last = steps.filter(({ at }) => at > steps.at(-1)!.at - 2);
-    if (steps.length > 5 && last.every((step) => step.heard === null && atRest(step))) return steps;
-  }
-  throw new Error('the person does not come to rest');
-}
 
 beforeAll(async () => (server = await servePage(person.folder)));
 afterAll(() => server?.close());
@@ -91,7 +78,7 @@ describe('a whole person', () => {
     await page.waitForFunction(() => window.steps!.length > 20 && window.steps!.at(-1)!.at > 4, undefined, { timeout: 60_000 });
     const steps = await readSteps(page);
     const times = steps.map(({ time }) => time);
-    expect(steps.every(atRest)).toBe(true);
+    expect(steps.every((step) => atRest(person, step))).toBe(true);
     expect(Math.max(...times) - Math.min(...times)).toBeGreaterThan(0.5 * (end - start));
     expect(excess(steps, person.fastest)).toBeLessThan(1e-9);
     for (const { time, head } of steps) {
@@ -113,7 +100,7 @@ describe('a whole person', () => {
     await shows(1.8);
     expect(await page.evaluate(() => window.ico3d!.conversation!.bodyTime())).toBeCloseTo(1.8, 6);
     await page.evaluate(() => window.ico3d!.conversation!.interrupt());
-    const steps = await settle();
+    const steps = await settle(page, person);
     const spoken = steps.filter(({ heard }) => heard !== null);
     expect(Math.max(...steps.map(({ time }) => time))).toBeCloseTo(2.6, 6);
     expect(new Set(spoken.map(({ window }) => window))).toEqual(new Set([0, 1, 2]));

@@ -97,3 +97,19 @@ export function excess(steps: Step[], fastest: number): number {
   const allowed = steps.slice(1).map(({ at }, i) => fastest * (at - steps[i]!.at));
   return Math.max(...moved.map((way, i) => way - allowed[i]!));
 }
+
+/** Whether a picture shows the person within its rest loop. */
+export function atRest({ rest: [start, end] }: PersonReference, { time }: Step): boolean {
+  return time >= start - 1e-6 && time <= end + 1e-6;
+}
+
+/** Waits until the person has been at rest, silent, for two seconds; all that the pictures showed. */
+export async function settle(page: Page, person: PersonReference): Promise<Step[]> {
+  for (const limit = Date.now() + 60_000; Date.now() < limit; ) {
+    await page.waitForTimeout(500);
+    const steps = await readSteps(page);
+    const last = steps.filter(({ at }) => at > steps.at(-1)!.at - 2);
+    if (steps.length > 5 && last.every((step) => step.heard === null && atRest(person, step))) return steps;
+  }
+  throw new Error('the person does not come to rest');
+}
