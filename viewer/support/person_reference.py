@@ -1,6 +1,6 @@
 """A whole person – the swinging body and a random head on it, on a floor – as Python draws it.
 
-Run: python viewer/support/person_reference.py OUT [--gaussians N,N] [--times S,S,…] [--pictures WxH]
+Run: python viewer/support/person_reference.py OUT [--gaussians N,N] [--times S,…] [--pictures WxH]
 
 Writes OUT/person.ico3d, OUT/bundle/ (its files), OUT/poses.json (the head's place in each frame)
 and, if asked, OUT/pictures.u8 (T, H, W, 3) of the times and OUT/painted.u8: the same with the head
@@ -10,6 +10,7 @@ painted over the body, as if nothing of the body were before it.
 import argparse
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,8 +34,6 @@ from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "bundle"))
-from dataclasses import replace
-
 from random_bundle import random_files, random_head, random_manifest
 
 FPS = 15.0
@@ -120,7 +119,8 @@ def main() -> None:
     parser.add_argument("--pictures", help="WxH")
     arguments = parser.parse_args()
     out = arguments.out
-    write_person(out / "person.ico3d", *map(int, arguments.gaussians.split(",")))
+    on_head, on_body = map(int, arguments.gaussians.split(","))
+    write_person(out / "person.ico3d", on_head, on_body)
     bundle = Bundle.open(out / "person.ico3d")
     for name in bundle.names:
         (out / "bundle" / name).parent.mkdir(parents=True, exist_ok=True)
@@ -128,7 +128,8 @@ def main() -> None:
     (out / "poses.json").write_text(json.dumps(head_poses().tolist()))
     times = [float(time) for time in arguments.times.split(",") if time]
     if arguments.pictures:
-        draw(bundle, times, *map(int, arguments.pictures.split("x")), out)
+        width, height = map(int, arguments.pictures.split("x"))
+        draw(bundle, times, width, height, out)
 
 
 if __name__ == "__main__":
