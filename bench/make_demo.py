@@ -14,8 +14,8 @@ from pathlib import Path
 import tyro
 
 from ico3d.bundle.format import Bundle
+from ico3d.bundle.packaged import FILE
 
-PACKAGED = Path(__file__).parents[1] / "src/ico3d/chat/data/demo.ico3d"
 MAX_BYTES = 12 << 20
 
 
@@ -38,7 +38,7 @@ class Demo:
     subject: tyro.conf.Positional[Path]
     work: Path
     licences: tuple[Path, ...]
-    out: Path = PACKAGED
+    out: Path = FILE
     frames: int = 1600
     size: int = 384
     steps: int | None = None

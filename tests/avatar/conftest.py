@@ -10,6 +10,7 @@ import torch
 from ico3d.avatar import baking, comparison
 from ico3d.avatar.bake_head import BakeSettings
 from ico3d.avatar.persona import load_persona
+from ico3d.avatar.samples import recorded_samples
 from ico3d.bundle.format import Bundle
 from ico3d.capture.capture import Capture, Sound, last_eleventh
 from ico3d.common.camera import Camera, look_at
@@ -147,7 +148,8 @@ def baked(request, tmp_path_factory):
     head, capture = make(folder)
     views = comparison.references(head, capture, (0.5, 0.5, 0.5), 6)
     quick = BakeSettings(hidden=64, augmented=100, steps=300)
-    result = baking.bake(head, views, capture, 8, [].append, quick)
+    samples = recorded_samples(head, capture)
+    result = baking.bake(head, views, samples, 8, [].append, quick)
     out = folder / "planted.ico3d"
     baking.write(out, "Planted", result, head, capture, load_persona(None), "A notice.")
     return head, capture, Bundle.open(out)

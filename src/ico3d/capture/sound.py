@@ -10,8 +10,12 @@ from ico3d.errors import CaptureError
 RATE = 16_000
 
 
-def read_sound_file(path: Path) -> Sound | None:
-    """A sound file as mono at 16 kHz, or None where there is none.
+def read_sound_file(path: Path, wanted: int = RATE) -> Sound | None:
+    """A sound file as mono, or None where there is none.
+
+    Args:
+        path: Of any kind that libsndfile reads.
+        wanted: Samples per second of the result.
 
     Raises:
         CaptureError: If it is damaged.
@@ -26,6 +30,6 @@ def read_sound_file(path: Path) -> Sound | None:
     except (OSError, ValueError, RuntimeError) as error:
         raise CaptureError(f"{path} cannot be read: {error}.") from error
     mono = samples.mean(1) if samples.ndim == 2 else samples
-    if rate != RATE:
-        mono = soxr.resample(mono, rate, RATE, quality="VHQ")
-    return Sound(np.asarray(mono, np.float32), RATE)
+    if rate != wanted:
+        mono = soxr.resample(mono, rate, wanted, quality="VHQ")
+    return Sound(np.asarray(mono, np.float32), wanted)

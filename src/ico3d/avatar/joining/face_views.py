@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from ico3d.avatar.avatar import Placement
-from ico3d.avatar.joining.region import HeadRegion
+from ico3d.avatar.joining.region import BROWS, CHIN, HeadRegion
 from ico3d.avatar.joining.similarity import moved
 from ico3d.capture.capture import Capture
 from ico3d.capture.pictures import train_cameras
@@ -21,6 +21,9 @@ MARGIN = 0.35
 """About the face, as a part of its size in the picture."""
 MOST = 240
 """Pictures."""
+CHANGING = ((slice(48, 68), 0.3), (slice(36, 42), 0.14), (slice(42, 48), 0.14))
+"""Landmarks of mouth and eyes, and how far about their middle they change the face, as a part of
+its height."""
 LEAST = 4
 """Pixels that a crop is wide and high."""
 
@@ -35,6 +38,7 @@ class FaceView:
         camera: Of the crop, in the world.
         image: (H, W, 3).
         mask: (H, W) the person.
+        steady: (H, W) 1 but for mouth and eyes, which look otherwise with every expression.
     """
 
     frame: int
@@ -42,6 +46,7 @@ class FaceView:
     camera: Camera
     image: Tensor
     mask: Tensor
+    steady: Tensor
 
 
 def face_views(
@@ -72,7 +77,7 @@ def face_views(
         for camera in chosen_cameras
         if faces(capture.cameras[camera], placement.world_from_head(frame), region, landmarks)
     ]
-    chosen = [seen[i] for i in spread(len(seen), most)]
+    chosen = [seen[i] for i in _spread(len(seen), most)]
     views = [_view(capture, placement, landmarks, *place) for place in chosen]
     found = [view for view in views if view is not None]
     if not seen:
@@ -118,9 +123,21 @@ def _view(
     cut = slice(top, bottom), slice(left, right)
     crop = camera.cropped(int(left), int(top), int(right - left), int(bottom - top))
     parts = torch.from_numpy(image[cut].copy()), torch.from_numpy(mask[cut].copy())
-    return FaceView(frame, index, crop, *parts)
+    steady = torch.from_numpy(_steady(pixels - (left, top), image[cut].shape[:2]))
+    return FaceView(frame, index, crop, *parts, steady)
 
 
-def spread(count: int, most: int) -> list[int]:
+def _steady(pixels: np.ndarray, size: tuple[int, ...]) -> np.ndarray:
+    """(H, W) float32: 0 in discs about mouth and eyes, whose landmarks are at pixels (68, 2)."""
+    rows, columns = np.indices(size) + 0.5  # (H, W) each
+    height = np.linalg.norm(pixels[BROWS].mean(0) - pixels[CHIN])
+    steady = np.ones(size, np.float32)
+    for part, radius in CHANGING:
+        x, y = pixels[part].mean(0)
+        steady[np.hypot(columns - x, rows - y) < radius * height] = 0
+    return steady
+
+
+def _spread(count: int, most: int) -> list[int]:
     """Indices of at most so many of `count` things, evenly spread."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int)).tolist()
