@@ -17,6 +17,13 @@ from ico3d.avatar.joining.region import HeadRegion
 SETTINGS = RecolourSettings(steps=150)
 
 
+@pytest.fixture
+def head(head):
+    """As it is when it has just been loaded."""
+    head.model.requires_grad_()
+    return head
+
+
 def parts_of(capture, head):
     """Placement, expressions and views, for training and held out."""
     placement = Placement(capture.canonical_from_head, head_poses(capture))
@@ -51,7 +58,7 @@ def test_one_seed_one_result(head, abroad):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(module, "MEMORY", memory)
             recolour(head.model, placement, expressions, views, RecolourSettings(steps=12))
-        found.append(head.model.color_branch.weight.clone())
+        found.append(head.model.color_branch.weight.detach().clone())
     assert torch.equal(*found)
 
 
@@ -62,12 +69,12 @@ def test_light_changes_little_between_neighbours(head, abroad):
     for view in views:
         view.image.add_(0.3 * torch.randn(view.image.shape, generator=noise)).clamp_(0, 1)
     start = {name: value.clone() for name, value in head.model.state_dict().items()}
-    nearest = KDTree(head.model.means.numpy()).query(head.model.means.numpy(), k=2)[1][:, 1]
+    nearest = KDTree(start["means"].numpy()).query(start["means"].numpy(), k=2)[1][:, 1]
     values = torch.from_numpy(expressions[0])
     rough = []
     for weight in (SETTINGS.smoothness, 0.0):
         head.model.load_state_dict(start)
-        before = head.model.logits(values)[:, :3]
+        before = head.model.logits(values)[:, :3].detach()
         recolour(head.model, placement, expressions, views, replace(SETTINGS, smoothness=weight))
         change = head.model.logits(values)[:, :3] - before
         rough.append(float((change - change[nearest]).detach().square().mean()))
