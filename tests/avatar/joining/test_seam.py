@@ -95,7 +95,7 @@ def avatar(person):
 def test_the_largest_gap_of_all_frames(avatar):
     """A body that drops by centimetres in one frame opens by about as much there."""
     region = HeadRegion.around(face())
-    closed = largest_gap(avatar, region)
+    closed = largest_gap(avatar, region) or 0.0
     avatar.body._drop = {2: 0.5, 4: 0.02}
     open_ = largest_gap(avatar, region)
     assert (
