@@ -24,6 +24,7 @@ VERBS: dict[str, Verb] = {
     "capture synthetic": Verb("ico3d.capture.commands", "Synthetic", "record a synthetic person"),
     "capture import": Verb("ico3d.capture.commands", "Import", "take over COLMAP or nerfstudio"),
     "capture masks": Verb("ico3d.capture.commands", "Masks", "cut people out by clean plates"),
+    "capture track": Verb("ico3d.capture.commands", "Track", "find the head in many cameras"),
     "capture resize": Verb("ico3d.capture.commands", "Resize", "write it with smaller pictures"),
     "capture check": Verb("ico3d.capture.commands", "Check", "check it, draw a contact sheet"),
     "train head": Verb("ico3d.head.commands", "TrainHead", "train HeadGaS++ on a capture"),

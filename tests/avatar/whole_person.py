@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import torch
-from conftest import PlantedCapture, planted_model
+from planted import PlantedCapture, planted_model
 from test_bake_body import FilmedPerson
 
 from ico3d.avatar.avatar import BODY, Placement, TrainedAvatar

@@ -4,14 +4,24 @@ from pathlib import Path
 import pytest
 
 
-@pytest.fixture(scope="session")
-def layout():
-    """The writer of talking-portrait folders."""
-    path = Path(__file__).with_name("portrait_folder.py")
-    spec = importlib.util.spec_from_file_location("portrait_folder", path)
+def _module(name):
+    """A file beside this one."""
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="session")
+def layout():
+    """The writer of talking-portrait folders."""
+    return _module("portrait_folder")
+
+
+@pytest.fixture(scope="session")
+def faces():
+    """Landmarks of a face, and heads that move."""
+    return _module("faces")
 
 
 @pytest.fixture

@@ -16,26 +16,25 @@ PICTURES = (".jpg", ".jpeg", ".png")
 
 @dataclass(frozen=True)
 class Animate:
-    """Finds where a body rests and the key frames of its gestures, or shows those of a bundle.
+    """Finds where a body rests and the key frames of its gestures, or shows those it has.
 
-    The file can be edited by hand: add or remove actions, change their scores (those with higher
-    ones are visited more often), the ends of the rest loop, or the speeds; then look at it with
-    --animation.
+    A bundle has its own. Folders of models have none until somebody writes one there with --out:
+    it can be edited by hand (add or remove actions, change their scores: those with higher ones
+    are visited more often; the ends of the rest loop; the speeds), looked at with --contact-sheet,
+    and goes into the bundle.
 
     Attributes:
         model: A folder of ico3d train body or ico3d assemble, or a bundle.
-        out: The animation.json to write.
+        out: The file to write, usually MODEL/animation.json.
         contact_sheet: Draw it here, NAME.jpg or NAME.png: the rest loop's ends and the actions
             from the front, and how fast the hands are.
-        animation: Show this animation.json instead of looking for key frames.
-        capture: See the body from the first camera's side of its capture; without, as someone
+        capture: See a body from the side of the first camera of its capture; without, as someone
             stands before it in a world with y up. Avatars and bundles know their front.
     """
 
     model: tyro.conf.Positional[Path]
     out: Path | None = None
     contact_sheet: Path | None = None
-    animation: Path | None = None
     capture: Path | None = None
 
     def run(self) -> None:
@@ -43,14 +42,14 @@ class Animate:
 
         Raises:
             ModelError: If a folder holds a damaged model.
-            BundleError: If the bundle or the animation cannot be used, or there is no body.
+            BundleError: If there is no body, or its animation makes no sense.
             SettingsError: If the contact sheet would be no picture.
         """
         from rich.console import Console
         from rich.progress import track
 
         from ico3d.avatar.animated import open_person
-        from ico3d.avatar.keyframes import Motion, window_places
+        from ico3d.avatar.keyframes import Motion, find_animation, window_places
         from ico3d.common.files import write_atomic
         from ico3d.errors import SettingsError
 
@@ -61,20 +60,12 @@ class Animate:
             window_places(person), "measuring motion", len(person.windows), transient=True
         )
         motion = Motion.of(person, places)
-        animation = self._animation(person, motion)
+        animation = person.animation or find_animation(motion)
         Console().print(table(animation, motion))
         if self.out:
             write_atomic(self.out, animation.to_bytes())
         if self.contact_sheet:
             self._draw(person, animation, motion, self.contact_sheet)
-
-    def _animation(self, person: "Person", motion: "Motion") -> "Animation":
-        """The one that was given, else the person's own, else what is found."""
-        from ico3d.avatar.keyframes import find_animation
-
-        if self.animation is None:
-            return person.animation or find_animation(motion)
-        return read_animation(self.animation, motion)
 
     def _draw(self, person: "Person", animation: "Animation", motion: "Motion", path: Path) -> None:
         from ico3d.avatar.animation_sheet import draw_sheet
@@ -82,29 +73,6 @@ class Animate:
 
         cameras = Capture.open(self.capture).cameras if self.capture else None
         draw_sheet(person, animation, motion, cameras, path)
-
-
-def read_animation(path: Path, motion: "Motion") -> "Animation":
-    """Reads an animation.json and checks that it is for a clip.
-
-    Raises:
-        BundleError: If it cannot be read, makes no sense, or is for another body.
-    """
-    from ico3d.bundle.animation import Animation
-    from ico3d.errors import BundleError
-
-    try:
-        animation = Animation.from_bytes(path.read_bytes())
-    except OSError as error:
-        raise BundleError(f"{path}: cannot be read ({error.strerror}).") from error
-    except BundleError as error:
-        raise BundleError(f"{path}: {error}") from error
-    if (animation.fps, animation.num_frames) != (motion.fps, len(motion.speeds)):
-        raise BundleError(
-            f"{path}: it is for a body of {animation.num_frames} frames at {animation.fps:g} per "
-            f"second, but this one has {len(motion.speeds)} at {motion.fps:g}."
-        )
-    return animation
 
 
 def table(animation: "Animation", motion: "Motion"):

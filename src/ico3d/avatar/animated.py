@@ -9,8 +9,11 @@ import numpy as np
 
 from ico3d.avatar.avatar import ABOUT as AVATAR
 from ico3d.avatar.avatar import TrainedAvatar
-from ico3d.avatar.bake_body import MovingBody, Span
+from ico3d.avatar.bake_body import MovingBody
+from ico3d.avatar.keyframes import read_animation
 from ico3d.avatar.render_bundle import avatar_gaussians, body_gaussians, window_gaussians
+from ico3d.avatar.spans import Span
+from ico3d.avatar.whole_bundle import front_of
 from ico3d.body.trained import ABOUT as BODY
 from ico3d.body.trained import TrainedBody
 from ico3d.bundle.animation import Animation
@@ -18,16 +21,13 @@ from ico3d.bundle.format import Bundle
 from ico3d.errors import BundleError
 from ico3d.splat.gaussians import Gaussians
 
-_FACING = np.array([0.0, 0.0, 1.0])
-"""Where a face looks in the space of its head's model."""
-
 
 class Person(MovingBody, Protocol):
     """A body, perhaps with a head."""
 
     @property
     def animation(self) -> Animation | None:
-        """Its own, if it has one."""
+        """What lies beside it, or in the bundle; None where key frames are to be found."""
         ...
 
     @property
@@ -52,11 +52,12 @@ class TrainedPerson:
     Attributes:
         body: What moves.
         avatar: What is seen; None for a body alone.
+        animation: Of the model's folder.
     """
 
     body: TrainedBody
-    avatar: TrainedAvatar | None = None
-    animation: None = None
+    avatar: TrainedAvatar | None
+    animation: Animation | None
 
     def __post_init__(self):
         """Takes over what the body says of itself."""
@@ -65,10 +66,8 @@ class TrainedPerson:
 
     @property
     def facing(self) -> np.ndarray | None:
-        """The head's direction at the beginning."""
-        if self.avatar is None:
-            return None
-        return self.avatar.placement.world_from_head(0.0)[:3, :3] @ _FACING
+        """Where the face looks, if there is one."""
+        return self.avatar and front_of(self.avatar)
 
     def gaussians(self, seconds: float) -> Gaussians:
         """With the head, if there is one."""
@@ -123,11 +122,13 @@ def open_person(path: Path) -> Person:
 
     Raises:
         ModelError: If a folder holds a damaged model.
-        BundleError: If it is none, and no bundle with a body either.
+        BundleError: If it is none, and no bundle with a body either; or if there is an animation
+            that makes no sense, or is for another body.
     """
     if (path / AVATAR).is_file():
         avatar = TrainedAvatar.load(path)
-        return TrainedPerson(avatar.body, avatar)
+        return TrainedPerson(avatar.body, avatar, read_animation(path, avatar.body))
     if (path / BODY).is_file():
-        return TrainedPerson(TrainedBody.load(path))
+        body = TrainedBody.load(path)
+        return TrainedPerson(body, None, read_animation(path, body))
     return BakedPerson(Bundle.open(path))

@@ -7,6 +7,7 @@ long, and where they slow down away from rest, motion can turn around or be held
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import torch
@@ -14,7 +15,8 @@ from scipy.signal import find_peaks
 from scipy.spatial import KDTree
 
 from ico3d.avatar.bake_body import MovingBody
-from ico3d.bundle.animation import Action, Animation, Rest
+from ico3d.bundle.animation import ANIMATION, Action, Animation, Rest
+from ico3d.errors import BundleError
 
 SEEN = 0.1
 """Opacity from which a Gaussian counts."""
@@ -87,6 +89,27 @@ def window_places(body: MovingBody) -> Iterator[np.ndarray]:
         opacities = torch.stack([gaussians.opacities for gaussians in shown]).mean(0)  # (N,)
         seen = opacities > SEEN if (opacities > SEEN).any() else opacities >= 0
         yield torch.stack([gaussians.means[seen] for gaussians in shown]).numpy()
+
+
+def read_animation(folder: Path, body: MovingBody) -> Animation | None:
+    """The `animation.json` of a model's folder, if somebody put one there.
+
+    Raises:
+        BundleError: If it makes no sense, or is for another body.
+    """
+    file, frames = folder / ANIMATION, body.windows[-1].last + 1
+    if not file.is_file():
+        return None
+    try:
+        animation = Animation.from_bytes(file.read_bytes())
+    except BundleError as error:
+        raise BundleError(f"{folder}: {error}") from error
+    if (animation.fps, animation.num_frames) != (body.fps, frames):
+        raise BundleError(
+            f"{file} is for a body of {animation.num_frames} frames at {animation.fps:g} per "
+            f"second, but this one has {frames} at {body.fps:g}: delete it to find key frames anew."
+        )
+    return animation
 
 
 def find_animation(motion: Motion) -> Animation:

@@ -10,7 +10,7 @@ import torch
 from ico3d.avatar import baking, body_bundle, comparison, measure_body, staging
 from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.body_bundle import WindowResult
-from ico3d.avatar.keyframes import Motion, find_animation
+from ico3d.avatar.keyframes import Motion, find_animation, read_animation
 from ico3d.avatar.render_bundle import BakedAvatar
 from ico3d.avatar.samples import (
     Samples,
@@ -164,12 +164,9 @@ def animation_of(folder: Path, avatar: TrainedAvatar) -> Animation:
     """`animation.json` of the avatar's folder, where somebody put one, else what is found.
 
     Raises:
-        BundleError: If the file makes no sense.
+        BundleError: If the file makes no sense, or is for another body.
     """
-    file = folder / ANIMATION
-    if file.is_file():
-        return Animation.from_bytes(file.read_bytes())
-    return find_animation(Motion.of(avatar.body))
+    return read_animation(folder, avatar.body) or find_animation(Motion.of(avatar.body))
 
 
 def write(

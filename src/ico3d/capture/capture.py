@@ -93,7 +93,7 @@ class Capture(ABC):
         return None
 
     def landmarks_3d(self, frame: int) -> np.ndarray | None:
-        """(68, 3) landmarks in canonical head space, metres."""
+        """(68, 3) Multi-PIE landmarks of a frame in canonical head space, metres."""
         return None
 
     def points(self, frame: int = 0) -> np.ndarray | None:
@@ -127,7 +127,8 @@ class Capture(ABC):
         raise CaptureError(
             f"{path} is in no format known here: expected a talking-portrait folder "
             "(transforms_train.json), a synthetic capture (capture.json), a multiview folder "
-            "(cameras.json) or a DNA-Rendering recording (.smc and _annots.smc); "
+            "(cameras.json), a RenderMe-360 recording (_raw.smc and _anno.smc) or a DNA-Rendering "
+            "recording (.smc and _annots.smc); "
             "other recordings come in with ico3d capture import."
         )
 

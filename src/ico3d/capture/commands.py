@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
+from ico3d.capture.headtrack.command import Track as Track
 from ico3d.capture.multiview.commands import Import as Import
 from ico3d.capture.multiview.commands import Masks as Masks
 from ico3d.capture.multiview.commands import Resize as Resize

@@ -27,6 +27,20 @@ def _multiview(path: Path) -> Capture:
     return MultiviewCapture(path)
 
 
+def _renderme(path: Path) -> Capture:
+    """Opens a RenderMe-360 recording."""
+    from ico3d.capture.renderme.reader import RenderMe360
+
+    return RenderMe360(path)
+
+
+def _is_renderme(path: Path) -> bool:
+    """Recognises SMC files by their names."""
+    from ico3d.capture.renderme.files import is_recording
+
+    return is_recording(path)
+
+
 def _dna(path: Path) -> Capture:
     """Opens a DNA-Rendering recording."""
     from ico3d.capture.dna.reader import DnaRendering
@@ -50,6 +64,7 @@ FORMATS: list[tuple[Callable[[Path], bool], Callable[[Path], Capture]]] = [
     (_holds("transforms_train.json"), _portrait),
     (_holds("capture.json"), _synthetic),
     (_holds("cameras.json"), _multiview),
+    (_is_renderme, _renderme),
     (_is_dna, _dna),
 ]
-"""Pairs of (recognises a path, opens it)."""
+"""Pairs of (recognises a path, opens it); SMC files of other names are DNA-Rendering's."""

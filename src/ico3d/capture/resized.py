@@ -57,6 +57,10 @@ class ResizedCapture(Capture):
         scale = (small.width / large.width, small.height / large.height)
         return None if marks is None else marks * scale
 
+    def landmarks_3d(self, frame: int) -> np.ndarray | None:
+        """(68, 3) of the capture."""
+        return self.whole.landmarks_3d(frame)
+
     def audio(self) -> Sound | None:
         """The sound of the capture."""
         return self.whole.audio()

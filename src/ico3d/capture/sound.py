@@ -21,7 +21,6 @@ def read_sound_file(path: Path, wanted: int = RATE) -> Sound | None:
         CaptureError: If it is damaged.
     """
     import soundfile
-    import soxr
 
     if not path.is_file():
         return None
@@ -29,7 +28,14 @@ def read_sound_file(path: Path, wanted: int = RATE) -> Sound | None:
         samples, rate = soundfile.read(path, dtype="float32")
     except (OSError, ValueError, RuntimeError) as error:
         raise CaptureError(f"{path} cannot be read: {error}.") from error
-    mono = samples.mean(1) if samples.ndim == 2 else samples
+    return mono(samples, rate, wanted)
+
+
+def mono(samples: np.ndarray, rate: int, wanted: int = RATE) -> Sound:
+    """Samples (S,) or (S, channels) float32 of any rate as mono at a rate, 16 kHz by default."""
+    import soxr
+
+    one = samples.mean(1) if samples.ndim == 2 else samples
     if rate != wanted:
-        mono = soxr.resample(mono, rate, wanted, quality="VHQ")
-    return Sound(np.asarray(mono, np.float32), wanted)
+        one = soxr.resample(one, rate, wanted, quality="VHQ")
+    return Sound(np.asarray(one, np.float32), wanted)

@@ -1,7 +1,6 @@
 """The head's colours under another light."""
 
-from dataclasses import replace
-
+import numpy as np
 import pytest
 import torch
 from planted_person import face
@@ -72,10 +71,26 @@ def test_light_changes_little_between_neighbours(head, abroad):
     nearest = KDTree(start["means"].numpy()).query(start["means"].numpy(), k=2)[1][:, 1]
     values = torch.from_numpy(expressions[0])
     rough = []
-    for weight in (SETTINGS.smoothness, 0.0):
+    for weight in (module.ROUGHNESS, 0.0):
         head.model.load_state_dict(start)
         before = head.model.logits(values)[:, :3].detach()
-        recolour(head.model, placement, expressions, views, replace(SETTINGS, smoothness=weight))
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(module, "ROUGHNESS", weight)
+            recolour(head.model, placement, expressions, views, SETTINGS)
         change = head.model.logits(values)[:, :3] - before
         rough.append(float((change - change[nearest]).detach().square().mean()))
     assert rough[0] < 0.5 * rough[1]
+
+
+def test_roughness_is_the_mean_square_of_neighbours_differences(head):
+    """By hand, with the six nearest of every Gaussian."""
+    generator = torch.Generator().manual_seed(1)
+    hidden = torch.randn(len(head.model), 64, generator=generator)
+    change = torch.randn(3, 64, generator=generator)
+    light, means = (hidden @ change.T).numpy(), head.model.means.detach().numpy()
+    total = 0.0
+    for index, place in enumerate(means):
+        nearest = np.argsort(np.linalg.norm(means - place, axis=1))[1:7]
+        total += np.square(light[index] - light[nearest]).sum() / 6
+    found = float((change @ module._roughness(head.model, [hidden, hidden]) * change).sum())
+    assert found == pytest.approx(total / len(means), rel=1e-4)

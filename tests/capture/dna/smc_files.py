@@ -27,6 +27,7 @@ class Rig:
         up: Which way is up in the world of the files.
         annotated: With masks, keypoints and SMPL-X, as parts 1 and 2 have them.
         expression_rows, betas_rows: Rows of these; all frames by default.
+        keypoints: (T, J, 3) in space; a few at random by default.
     """
 
     cameras: tuple[int, ...] = (0, 1, 2, 3, 47, 48, 59)
@@ -38,6 +39,7 @@ class Rig:
     annotated: bool = True
     expression_rows: int | None = None
     betas_rows: int | None = None
+    keypoints: np.ndarray | None = None
 
     def size(self, camera: int) -> tuple[int, int]:
         return self.sizes[camera >= FIRST_12MP]
@@ -147,7 +149,8 @@ def write_annotations(file: h5py.File, rig: Rig) -> None:
         for frame in range(1, rig.frames):
             masks[str(frame)] = masks["0"]  # a hard link: the person stands still
         file[f"Keypoints_2D/{camera:02d}"] = keypoints_2d(rig, camera)
-    file["Keypoints_3D/keypoints3d"] = keypoints_3d(rig.frames)
+    points = keypoints_3d(rig.frames) if rig.keypoints is None else rig.keypoints
+    file["Keypoints_3D/keypoints3d"] = points
     parts = smplx(rig.frames)
     parts["expression"] = parts["expression"][: rig.expression_rows]
     parts["betas"] = parts["betas"][: rig.betas_rows]

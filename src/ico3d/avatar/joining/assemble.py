@@ -52,7 +52,7 @@ class JoiningSettings:
     """
 
     match_colors: bool = True
-    color_steps: int = 1500
+    color_steps: int = 800
     color_rate: float = 3e-2
     pruning: bool = True
     border_points: int = 400

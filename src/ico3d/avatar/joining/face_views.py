@@ -19,7 +19,7 @@ WIDEST = np.cos(np.radians(65.0))
 """Of the angle between where the face looks and the camera: farther aside it is seen askew."""
 MARGIN = 0.35
 """About the face, as a part of its size in the picture."""
-MOST = 240
+MOST = 120
 """Pictures."""
 CHANGING = ((slice(48, 68), 0.3), (slice(36, 42), 0.14), (slice(42, 48), 0.14))
 """Landmarks of mouth and eyes, and how far about their middle they change the face, as a part of

@@ -2,11 +2,11 @@
 
 Only the last layer of the head's network that makes colours is learnt: a hundred numbers or two,
 so that a few small pictures of the face suffice and nothing of what drives the face is forgotten.
-It happens once, before the windows are trained in parallel with the head as it then is.
+The change may tint everything at will, but differs little between neighbours, as light does. It
+happens once, before the windows are trained in parallel with the head as it then is.
 """
 
 from collections.abc import Sequence
-from copy import deepcopy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,15 +16,17 @@ from scipy.spatial import KDTree
 from torch import Tensor, nn
 
 from ico3d.avatar.avatar import Placement
-from ico3d.avatar.joining.face_views import FaceView
+from ico3d.avatar.joining.face_views import FaceView, spread
 from ico3d.head.model import HeadModel
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
 CERTAIN = 0.5
 """Part of a pixel that the head and the person must fill, to count."""
-NEIGHBOURS = 3
-"""Of each Gaussian, that shall change alike."""
+ROUGHNESS = 0.02
+"""Weight of the squared difference of neighbours' light, in logits, beside the L1 of pictures."""
+NEIGHBOURS, FRAMES = 6, 8
+"""Of each Gaussian, in so many frames, that are compared."""
 MEMORY = 2**30
 """Bytes for what is made once per frame."""
 FLOATS = 14
@@ -38,14 +40,11 @@ class RecolourSettings:
     Attributes:
         steps: One picture each.
         rate: Learning rate of Adam; decays to a tenth.
-        smoothness: Weight of how differently neighbours change: light changes all along a cheek,
-            but what a few small pictures leave open must not become spots.
         seed: Decides the order of the pictures.
     """
 
-    steps: int = 1500
+    steps: int = 800
     rate: float = 3e-2
-    smoothness: float = 0.3
     seed: int = 0
 
 
@@ -65,8 +64,9 @@ def recolour(
         views: What to agree with.
         settings: How.
     """
-    layer, frozen = model.color_branch, _Frozen(model, placement, expressions)
-    before, pairs = deepcopy(layer).requires_grad_(False), _neighbours(model)
+    frozen = _Frozen(model, placement, expressions)
+    layer = _Relit(model.color_branch)
+    roughness = _roughness(model, [frozen.at(frame)[0] for frame in _some(views)])
     optimiser = torch.optim.Adam(layer.parameters(), settings.rate)
     decay = torch.optim.lr_scheduler.ExponentialLR(optimiser, 0.1 ** (1 / settings.steps))
     rng = np.random.default_rng(settings.seed)
@@ -75,24 +75,11 @@ def recolour(
     )
     for index in track(order[: settings.steps], "matching colours", transient=True):
         optimiser.zero_grad()
-        hidden, _ = frozen.at(views[index].frame)
-        change = layer(hidden) - before(hidden)  # (N, 3)
-        uneven = (change[pairs[:, 0]] - change[pairs[:, 1]]).square().mean()
-        loss = _difference(layer, frozen, views[index]) + settings.smoothness * uneven
-        loss.backward()
+        penalty = ROUGHNESS * (layer.local @ roughness * layer.local).sum()
+        (_difference(layer, frozen, views[index]) + penalty).backward()
         optimiser.step()
         decay.step()
-    optimiser.zero_grad()
-
-
-def _neighbours(model: HeadModel) -> Tensor:
-    """(P, 2) pairs of Gaussians that are next to one another."""
-    means = model.means.detach().cpu().numpy()
-    count = min(NEIGHBOURS + 1, len(means))
-    _, nearest = KDTree(means).query(means, k=count)  # (N, K + 1), itself first
-    others = np.asarray(nearest).reshape(len(means), count)[:, 1:]  # (N, K)
-    first = np.repeat(np.arange(len(means)), count - 1)
-    return torch.from_numpy(np.stack([first, others.ravel()], 1))
+    layer.write(model.color_branch)
 
 
 @torch.no_grad()
@@ -102,6 +89,58 @@ def color_difference(
     """Mean absolute difference of head and pictures where the head covers them."""
     frozen = _Frozen(model, placement, expressions)
     return float(np.mean([_difference(model.color_branch, frozen, view) for view in views]))
+
+
+class _Relit(nn.Module):
+    """The colour layer (W, b) as (1 + M)·W + D, b + c: M and c tint, D is light from somewhere."""
+
+    def __init__(self, layer: nn.Linear):
+        super().__init__()
+        self._weight, self._bias = layer.weight.detach().clone(), layer.bias.detach().clone()
+        self.tint = nn.Parameter(torch.zeros(3, 3))
+        self.local = nn.Parameter(torch.zeros_like(self._weight))  # (3, hidden)
+        self.offset = nn.Parameter(torch.zeros(3))
+
+    def forward(self, hidden: Tensor) -> Tensor:
+        """(N, 3) logits of colours."""
+        return nn.functional.linear(hidden, *self._values())
+
+    @torch.no_grad()
+    def write(self, layer: nn.Linear) -> None:
+        """Makes it the layer's weights."""
+        for parameter, value in zip((layer.weight, layer.bias), self._values(), strict=True):
+            parameter.copy_(value)
+
+    def _values(self) -> tuple[Tensor, Tensor]:
+        return self._weight + self.tint @ self._weight + self.local, self._bias + self.offset
+
+
+@torch.no_grad()
+def _roughness(model: HeadModel, hidden: Sequence[Tensor]) -> Tensor:
+    """(hidden, hidden) R: D·R·Dᵀ is how much D·h differs between neighbours, squared, per channel.
+
+    Light changes slowly over a face. Without this, small pictures leave the layer free to paint
+    blotches that only larger ones would show.
+
+    Args:
+        model: Where the Gaussians are.
+        hidden: (N, hidden) what the layer takes in, by frame.
+    """
+    means = model.means.detach().numpy()
+    _, nearest = KDTree(means).query(means, k=min(1 + NEIGHBOURS, len(means)))  # (N, 1 + K)
+    others = torch.from_numpy(np.asarray(nearest)[:, 1:])  # (N, K)
+    total = torch.zeros(hidden[0].shape[1], hidden[0].shape[1])
+    for values in hidden:
+        for neighbour in others.T:
+            step = values - values[neighbour]  # (N, hidden)
+            total += step.T @ step / (len(step) * others.shape[1] * len(hidden))
+    return total
+
+
+def _some(views: Sequence[FaceView]) -> list[int]:
+    """A few frames of views, evenly spread."""
+    frames = sorted({view.frame for view in views})
+    return [frames[index] for index in spread(len(frames), FRAMES)]
 
 
 class _Frozen:
@@ -126,7 +165,7 @@ class _Frozen:
         return self._made[frame]
 
 
-def _difference(layer: nn.Linear, frozen: _Frozen, view: FaceView) -> Tensor:
+def _difference(layer: nn.Module, frozen: _Frozen, view: FaceView) -> Tensor:
     """L1 over the pixels that head and person fill, but for mouth and eyes."""
     hidden, drawn = frozen.at(view.frame)
     rendering = render(replace(drawn, colors=layer(hidden).sigmoid()), [view.camera], view.image)

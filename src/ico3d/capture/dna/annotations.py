@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ico3d.capture.decoding import largest_channel
-from ico3d.capture.dna.smc import SmcFile
+from ico3d.capture.smc.file import SmcFile
 
 log = logging.getLogger(__name__)
 JOINTS = 55

@@ -4,42 +4,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ico3d.capture.decoding import size_of
-from ico3d.capture.dna.smc import SmcFile
-from ico3d.capture.lens import Lens
-from ico3d.capture.poses import rigid
+from ico3d.capture.smc.cameras import SmcCamera, picture_size, read_camera
+from ico3d.capture.smc.file import SmcFile
 from ico3d.errors import CaptureError
 
 GROUPS = ("Camera_5mp", "Camera_12mp")
 
 
 @dataclass(frozen=True)
-class Device:
+class Device(SmcCamera):
     """One camera as the files describe it.
 
     Attributes:
         number: Its number in the files, 0 to 59.
-        group: The group of the main file that holds its pictures.
-        lens: Size, intrinsics and distortion of its recorded pictures.
-        camera_to_world: (4, 4) in the world of the files.
         colours: (256, 3) uint8 for RGB: what each recorded value is corrected to.
     """
 
     number: int
-    group: str
-    lens: Lens
-    camera_to_world: np.ndarray
     colours: np.ndarray
-
-    @property
-    def pictures(self) -> str:
-        """The group of its pictures in the main file."""
-        return f"{self.group}/{self.number}/color"
-
-    @property
-    def name(self) -> str:
-        """Two digits."""
-        return f"{self.number:02d}"
 
 
 def read_devices(main: SmcFile, annotations: SmcFile) -> tuple[list[Device], list[str]]:
@@ -58,7 +40,7 @@ def read_devices(main: SmcFile, annotations: SmcFile) -> tuple[list[Device], lis
             if not annotations.keys(f"Camera_Parameter/{number:02d}"):
                 lost.append(f"{number:02d}")
                 continue
-            size = size or _picture_size(main, f"{group}/{number}/color")
+            size = size or picture_size(main, f"{group}/{number}/color")
             if size is not None:
                 devices.append(_device(annotations, group, number, size))
     if not devices:
@@ -69,31 +51,12 @@ def read_devices(main: SmcFile, annotations: SmcFile) -> tuple[list[Device], lis
     return devices, lost
 
 
-def _picture_size(main: SmcFile, pictures: str) -> tuple[int, int] | None:
-    """Width and height of a camera's first picture, the same in its group."""
-    for frame in main.keys(pictures)[:1]:
-        where = f"{pictures}/{frame}"
-        return size_of(main.encoded(where) or b"", f"{main.path}: {where}")
-    return None
-
-
 def _device(annotations: SmcFile, group: str, number: int, size: tuple[int, int]) -> Device:
     """One camera."""
-    inside = f"Camera_Parameter/{number:02d}"
-
-    def read(name: str, shape: tuple[int, ...]) -> np.ndarray:
-        values = annotations.numbers(f"{inside}/{name}", shape)
-        if values is None:
-            raise CaptureError(f"{annotations.path}: camera {number:02d} has no {name}.")
-        return values
-
-    intrinsics = read("K", (3, 3))
-    intrinsics[:2, 2] += 0.5  # calibrated with OpenCV, which counts from pixel centres
-    lens = Lens(f"{number:02d}", *size, intrinsics, tuple(read("D", (5,)).tolist()))
+    inside, name = f"Camera_Parameter/{number:02d}", f"{number:02d}"
+    camera = read_camera(annotations, inside, name, size, f"{group}/{number}/color")
     polynomial = annotations.numbers(f"{inside}/Color_Calibration", (3, 3))
-    return Device(
-        number, group, lens, rigid(read("RT", (4, 4)), f"camera {number:02d}"), colours(polynomial)
-    )
+    return Device(camera.lens, camera.camera_to_world, camera.pictures, number, colours(polynomial))
 
 
 def colours(polynomial: np.ndarray | None) -> np.ndarray:

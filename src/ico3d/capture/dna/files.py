@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from ico3d.capture.smc.finding_files import only_one, smc_files
 from ico3d.errors import CaptureError
 
 ANNOTATIONS, KINECT = "_annots", "_kinect"
@@ -52,10 +53,7 @@ def find_files(path: Path) -> Files:
 
 def _mains(folder: Path) -> list[Path]:
     """Main files in a folder."""
-    if not folder.is_dir():
-        return []
-    found = sorted(p for p in folder.iterdir() if p.suffix == ".smc" and p.is_file())
-    return [p for p in found if not p.stem.endswith((ANNOTATIONS, KINECT))]
+    return [p for p in smc_files(folder) if not p.stem.endswith((ANNOTATIONS, KINECT))]
 
 
 def _only_main(path: Path) -> Path:
@@ -64,11 +62,7 @@ def _only_main(path: Path) -> Path:
         if path.stem.endswith((ANNOTATIONS, KINECT)):
             raise CaptureError(f"{path} has no pictures: name the main file instead.")
         return path
-    mains = _mains(path)
-    if len(mains) != 1:
-        names = ", ".join(p.name for p in mains[:3]) + (", …" if mains[3:] else "")
-        raise CaptureError(f"{path} holds {len(mains)} recordings ({names}): name one of them.")
-    return mains[0]
+    return only_one(path, _mains(path))
 
 
 def _companion(main: Path, kind: str, suffix: str) -> Path | None:

@@ -6,8 +6,8 @@ import numpy as np
 
 from ico3d.capture.decoding import decoded, unit
 from ico3d.capture.dna.annotations import person
-from ico3d.capture.dna.smc import SmcFile
 from ico3d.capture.poses import rigid, turned
+from ico3d.capture.smc.file import SmcFile
 from ico3d.errors import CaptureError
 
 

@@ -6,31 +6,31 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.capture.capture import Capture, all_frames
-from ico3d.capture.decoding import decoded, unit
+from ico3d.capture.capture import all_frames
+from ico3d.capture.decoding import unit
 from ico3d.capture.dna.annotations import BodyFits, SmplX, gender_of, person, row
-from ico3d.capture.dna.calibration import GROUPS, Device, read_devices
+from ico3d.capture.dna.calibration import GROUPS, read_devices
 from ico3d.capture.dna.examine import examine_files
 from ico3d.capture.dna.files import find_files
 from ico3d.capture.dna.kinect import Kinect
-from ico3d.capture.dna.smc import SmcFile
 from ico3d.capture.extras import opencv
 from ico3d.capture.finding import Finding
-from ico3d.capture.poses import nearest_axis, turn_upright, turned, up_of_cameras
-from ico3d.common.camera import Camera
-from ico3d.errors import CaptureError
+from ico3d.capture.poses import turned
+from ico3d.capture.smc.file import SmcFile
+from ico3d.capture.smc.reader import SmcCapture, count_frames
 
 log = logging.getLogger(__name__)
 FPS = 15.0
-MOST_FRAMES = 100_000
+WHOLE_BODY = 133
+"""Keypoints of COCO-WholeBody: 17 of the body, 6 of the feet, 68 of the face, 42 of the hands."""
+FACE = np.arange(23, 91)
 
 
-class DnaRendering(Capture):
+class DnaRendering(SmcCapture):
     """One performance of DNA-Rendering: 60 cameras around a whole person.
 
-    Pictures and masks come straightened, colours corrected. The world of the files is turned by
-    right angles so that +y is up; what the files say in their own world, such as SMPL-X, states
-    how to get to the capture's.
+    Pictures and masks come straightened, colours corrected. What the files say in their own world,
+    such as SMPL-X, states how to get to the capture's.
     """
 
     kind = "dna-rendering"
@@ -47,22 +47,19 @@ class DnaRendering(Capture):
             MissingExtraError: If h5py or OpenCV is not installed.
         """
         files = find_files(path)
-        self.path = files.main
         self._main, self._annotations = SmcFile(files.main), SmcFile(files.annotations)
         self._kinect_path = files.kinect
         self._devices, lost = read_devices(self._main, self._annotations)
         if lost:
             log.warning("%s: cameras without calibration left out: %s", path, ", ".join(lost))
-        self.num_frames = self._count_frames()
-        places = [device.camera_to_world for device in self._devices]
-        self._upright = turn_upright(nearest_axis(up_of_cameras(places)))
-        self.cameras = tuple(self._camera(device) for device in self._devices)
+        count = count_frames(self._main, GROUPS, self._devices[0].pictures)
+        super().__init__(files.main, self._devices, count)
         self.split = all_frames(self.num_frames, self.cameras)
 
     def image(self, camera: int, frame: int) -> np.ndarray | None:
         """The straightened picture with corrected colours, or None where there is none."""
         device = self._devices[camera]
-        picture = self._decoded(self._main, device, f"{device.pictures}/{self._index(frame)}")
+        picture = self.decoded(self._main, device, f"{device.pictures}/{self.index(frame)}")
         if picture is None:
             return None
         corrected = opencv("correcting colours").LUT(picture, device.colours[None])  # (H, W, 3)
@@ -71,36 +68,51 @@ class DnaRendering(Capture):
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
         """The straightened mask; None in parts of the data set that have none."""
         device = self._devices[camera]
-        inside = f"Mask/{device.number}/mask/{self._index(frame)}"
-        picture = self._decoded(self._annotations, device, inside)
+        inside = f"Mask/{device.number}/mask/{self.index(frame)}"
+        picture = self.decoded(self._annotations, device, inside)
         return None if picture is None else unit(device.lens.straightened(person(picture)))
 
     def keypoints_2d(self, camera: int, frame: int) -> np.ndarray | None:
         """(J, 3) pixels of the straightened picture, and confidence; None where there are none."""
         device = self._devices[camera]
         table = self._annotations.numbers(f"Keypoints_2D/{device.name}", (None, None, 3))
-        found = row(table, self._index(frame))
+        found = row(table, self.index(frame))
         if found is None:
             return None
         pixels = device.lens.straightened_points(found[:, :2] + 0.5)  # (J, 2)
         return np.concatenate([pixels, found[:, 2:]], 1)
 
     def keypoints_3d(self, frame: int) -> np.ndarray | None:
-        """(J, 3) metres in the capture's world, or None where there are none."""
-        table = self._annotations.numbers("Keypoints_3D/keypoints3d", (None, None, 3))
-        found = row(table, self._index(frame))
-        return None if found is None else found @ self._upright.T
+        """(J, 3) metres in the capture's world, or None where there are none; NaN if not found."""
+        found = row(self._all_keypoints(), self.index(frame))
+        return None if found is None else found @ self.upright.T
+
+    def face_points(self) -> np.ndarray | None:
+        """(F, 68, 3) face keypoints of COCO-WholeBody, which are in the order of Multi-PIE."""
+        table = self._all_keypoints()
+        if table is None or table.shape[1] != WHOLE_BODY:
+            return None
+        points = np.full((self.num_frames, len(FACE), 3), np.nan)
+        known = table[: self.num_frames, FACE] @ self.upright.T
+        points[: len(known)] = known
+        points[(points == 0).all(-1)] = np.nan  # what triangulation could not find
+        return points
+
+    def _all_keypoints(self) -> np.ndarray | None:
+        """(T, J, 3) metres in the world of the files."""
+        inside = "Keypoints_3D/keypoints3d"
+        return self._annotations.numbers(inside, (None, None, 3), holes=True)
 
     def smplx(self, frame: int) -> SmplX | None:
         """The body model's parameters of a frame, or None where there are none."""
-        return None if self._fits is None else self._fits.at(self._index(frame))
+        return None if self._fits is None else self._fits.at(self.index(frame))
 
     @cached_property
     def kinect(self) -> Kinect | None:
         """The depth cameras, or None where their file is not there."""
         if self._kinect_path is None:
             return None
-        return Kinect(SmcFile(self._kinect_path), self._upright)
+        return Kinect(SmcFile(self._kinect_path), self.upright)
 
     @property
     def provenance(self) -> dict:
@@ -127,46 +139,5 @@ class DnaRendering(Capture):
         if not self._annotations.keys("SMPLx"):
             return None
         gender = gender_of(self._main.attribute("", "gender"))
-        turn = turned(self._upright, np.eye(4))
+        turn = turned(self.upright, np.eye(4))
         return BodyFits(self._annotations, self.num_frames, gender, turn)
-
-    def _camera(self, device: Device) -> Camera:
-        """The pinhole camera of the straightened pictures."""
-        inverse = np.linalg.inv(turned(self._upright, device.camera_to_world))
-        lens = device.lens
-        return Camera(lens.width, lens.height, lens.straight_intrinsics, inverse, device.name)
-
-    def _count_frames(self) -> int:
-        """Frames the file announces; without an announcement, those of the first camera."""
-        announced = [self._main.attribute(group, "num_frame") for group in GROUPS]
-        try:
-            counts = [
-                int(np.asarray(value).reshape(())) for value in announced if value is not None
-            ]
-        except (TypeError, ValueError) as error:
-            raise CaptureError(f"{self.path}: num_frame is damaged: fetch it again.") from error
-        count = max(counts) if counts else len(self._main.keys(self._devices[0].pictures))
-        if not 1 <= count <= MOST_FRAMES:
-            raise CaptureError(f"{self.path} announces {count} frames: fetch it again.")
-        return count
-
-    def _index(self, frame: int) -> int:
-        if not 0 <= frame < self.num_frames:
-            raise CaptureError(f"{self.path} has frames 0 to {self.num_frames - 1}, not {frame}.")
-        return frame
-
-    def _decoded(self, file: SmcFile, device: Device, inside: str) -> np.ndarray | None:
-        """A picture of a camera, uint8 RGB (H, W, 3)."""
-        held = file.encoded(inside)
-        if held is None:
-            return None
-        frame = inside.rpartition("/")[2]
-        what = f"{file.path}: camera {device.name}, frame {frame} ({inside})"
-        picture = decoded(held, what)[..., :3]
-        height, width = picture.shape[:2]
-        if (width, height) != (device.lens.width, device.lens.height):
-            raise CaptureError(
-                f"{what} has {width}x{height} pixels; the first of its kind "
-                f"{device.lens.width}x{device.lens.height}."
-            )
-        return picture

@@ -6,7 +6,9 @@ import numpy as np
 
 from ico3d.capture.capture import Capture, Sound, all_frames
 from ico3d.capture.decoding import unit
+from ico3d.capture.expressions import BLENDSHAPES
 from ico3d.capture.finding import Finding, missing_and_damaged
+from ico3d.capture.headtrack.track_file import HeadTrack, read_track
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import read_description
 from ico3d.capture.multiview.files import RecordedFiles
@@ -46,6 +48,8 @@ class MultiviewCapture(Capture):
             for place in self._about.places
         )
         self.split = all_frames(self.num_frames, self.cameras)
+        self._track = read_track(path, self.num_frames, len(self.cameras))
+        self.blendshape_names = None if self._track is None else BLENDSHAPES
 
     def image(self, camera: int, frame: int) -> np.ndarray | None:
         """The straightened picture, or None where there is none."""
@@ -71,6 +75,29 @@ class MultiviewCapture(Capture):
     def audio(self) -> Sound | None:
         """`audio.wav`, or None."""
         return read_sound_file(self.path / "audio.wav")
+
+    def world_from_head(self, frame: int) -> np.ndarray | None:
+        """(4, 4) as `ico3d capture track` found it, or None where it has not."""
+        return None if self._track is None else self._track.world_from_head[self._index(frame)]
+
+    def eyes(self, frame: int) -> np.ndarray | None:
+        """(7,) likewise."""
+        return None if self._track is None else self._track.eyes[self._index(frame)]
+
+    def blendshapes(self, frame: int) -> np.ndarray | None:
+        """(52,) likewise."""
+        return None if self._track is None else self._track.blendshapes[self._index(frame)]
+
+    def landmarks_3d(self, frame: int) -> np.ndarray | None:
+        """(68, 3) landmarks in canonical head space, metres, likewise."""
+        return None if self._track is None else self._track.landmarks[self._index(frame)]
+
+    def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
+        """(68, 2) the tracked landmarks in pixels of the camera, wherever it looks."""
+        if self._track is None:
+            return None
+        seen = self.cameras[camera].moved(self._track.world_from_head[self._index(frame)])
+        return seen.project(self._track.landmarks[frame])[0]
 
     def points(self, frame: int = 0) -> np.ndarray | None:
         """(P, 3) of `points/FRAME.npy`, or None where the frame has none."""
@@ -105,6 +132,8 @@ class MultiviewCapture(Capture):
         elif (self.path / "backgrounds").is_dir():
             text = f"none yet: ico3d capture masks {self.path} makes them from the clean plates"
             findings.append(Finding("mask files", "warn", text))
+        if self._track is not None:
+            findings.append(_gaps_of(self._track))
         return findings
 
     def _inspect_pictures(self) -> Finding:
@@ -141,3 +170,16 @@ class MultiviewCapture(Capture):
         if not 0 <= frame < self.num_frames:
             raise CaptureError(f"{self.path} has frames 0 to {self.num_frames - 1}, not {frame}.")
         return frame
+
+
+def _gaps_of(track: HeadTrack) -> Finding:
+    """Which frames of a tracked head are interpolated."""
+    found = track.gaps
+    if not found:
+        return Finding("head", "ok", f"tracked in all {len(track.views)} frames")
+    longest = max(found, key=lambda gap: gap[1] - gap[0])
+    text = (
+        f"interpolated in {int((~track.tracked).sum())} of {len(track.views)} frames, "
+        f"longest from {longest[0]} to {longest[1]}"
+    )
+    return Finding("head", "warn", text)

@@ -46,6 +46,11 @@ class SmcFile:
             # Names that are no UTF-8 come as bytes; ours are all digits.
             return [k for k in group if isinstance(k, str)] if _is(group, "Group") else []
 
+    def holds(self, inside: str) -> bool:
+        """Whether there is such a group or dataset."""
+        with self._guard(inside):
+            return self._find(inside) is not None
+
     def attribute(self, inside: str, name: str) -> Any:
         """An attribute of a group, or None."""
         with self._guard(inside):
@@ -77,12 +82,15 @@ class SmcFile:
             plain = _is(node, "Dataset") and node.dtype == np.uint8 and node.ndim == 1
             return node[:count].tobytes() if plain else b""
 
-    def numbers(self, inside: str, shape: tuple[int | None, ...]) -> np.ndarray | None:
+    def numbers(
+        self, inside: str, shape: tuple[int | None, ...] | None, holes: bool = False
+    ) -> np.ndarray | None:
         """Finite float64 numbers, or None where there is no such dataset.
 
         Args:
             inside: The dataset.
-            shape: What it must have; None stands for any length.
+            shape: What it must have; None stands for any length, or for any shape at all.
+            holes: Whether NaN may stand for what is not known.
 
         Raises:
             CaptureError: If they have another shape or are not finite.
@@ -90,16 +98,20 @@ class SmcFile:
         values = self._read(inside)
         if values is None:
             return None
-        if len(shape) != values.ndim or any(
-            wanted not in (None, got) for wanted, got in zip(shape, values.shape, strict=True)
-        ):
+        if shape is not None and not _fits(values.shape, shape):
             wanted = " x ".join("any" if n is None else str(n) for n in shape) or "a single number"
             raise CaptureError(
                 f"{self.path}: {inside} has shape {values.shape}, expected {wanted}."
             )
-        if values.dtype.kind not in "fiub" or not np.isfinite(values).all():
+        if values.dtype.kind not in "fiub" or not _sound(values, holes):
             raise CaptureError(f"{self.path}: {inside} holds values that are no finite numbers.")
         return values.astype(np.float64)
+
+    def shape(self, inside: str) -> tuple[int, ...] | None:
+        """The shape of a dataset, or None where there is none."""
+        with self._guard(inside):
+            node = self._find(inside)
+            return node.shape if _is(node, "Dataset") else None
 
     def pixels(self, inside: str) -> np.ndarray | None:
         """(H, W) whole numbers of a picture that is not encoded, or None where there is none."""
@@ -118,7 +130,7 @@ class SmcFile:
                 raise self._damaged(inside)
             if node.external or node.is_virtual or node.dtype.hasobject or node.nbytes > LARGEST:
                 raise self._damaged(inside)
-            return np.asarray(node[()])
+            return None if node.shape is None else np.asarray(node[()])
 
     def _find(self, inside: str) -> Any:
         """A group or dataset by its path ("" is the file), or None.
@@ -160,6 +172,18 @@ class SmcFile:
 
     def _damaged(self, inside: str) -> CaptureError:
         return CaptureError(f"{self.path}: {inside} is damaged: fetch the file again.")
+
+
+def _fits(found: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
+    """Whether a shape is the wanted one, where None stands for any length."""
+    return len(found) == len(wanted) and all(
+        n in (None, m) for n, m in zip(wanted, found, strict=True)
+    )
+
+
+def _sound(values: np.ndarray, holes: bool) -> bool:
+    """Whether all are finite, or NaN where there may be holes."""
+    return bool((np.isfinite(values) | (np.isnan(values) & holes)).all())
 
 
 def _is(node: Any, kind: Literal["Group", "Dataset"]) -> bool:

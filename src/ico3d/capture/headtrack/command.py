@@ -1,0 +1,74 @@
+"""The command `ico3d capture track`."""
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+MOST_WORKERS = 8
+"""Each holds a large picture and a face model."""
+MOST_GAPS = 5
+"""Gaps that the report lists."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """Find the head in a multiview recording: its pose, landmarks, eyes and blendshapes.
+
+    MediaPipe reads the face in every camera that sees it; what the cameras agree on becomes one
+    rigid head that moves through the recording. Writes tracking.safetensors into the folder,
+    anew at each run.
+
+    Attributes:
+        folder: A multiview folder; ico3d capture resize makes one of any capture.
+        check: A contact sheet to draw, .jpg or .png.
+        workers: Threads.
+    """
+
+    folder: Annotated[Path, tyro.conf.Positional]
+    check: Path | None = None
+    workers: int = field(default_factory=lambda: min(os.cpu_count() or 1, MOST_WORKERS))
+
+    def run(self) -> None:
+        """Runs it.
+
+        Raises:
+            CaptureError: If the folder is no multiview recording, or no two cameras see a face.
+            MissingExtraError: If MediaPipe or SciPy is not installed.
+            MissingModelError: If MediaPipe's face model is not there.
+            SettingsError: If the contact sheet's name is not that of a picture.
+        """
+        from rich.console import Console
+
+        from ico3d.capture.capture import Capture
+        from ico3d.capture.headtrack.sheet import check_name, write_sheet
+        from ico3d.errors import CaptureError, MissingExtraError
+
+        try:
+            from ico3d.capture.headtrack.tracker import track_head
+        except ModuleNotFoundError as error:
+            raise MissingExtraError(error.name or "scipy", "train", "tracking a head") from None
+
+        capture = Capture.open(self.folder)
+        if capture.kind != "multiview":
+            raise CaptureError(
+                f"{self.folder} is a {capture.kind} capture, and tracks are kept in multiview "
+                f"folders: make one with ico3d capture resize {self.folder} OUT."
+            )
+        if self.check is not None:
+            check_name(self.check)
+        track, report = track_head(self.folder, self.workers)
+        written = track.write(self.folder)
+        if self.check is not None:
+            write_sheet(capture, track, self.check)
+        say = Console(stderr=True).print
+        say(
+            f"{report.tracked} of {report.num_frames} frames tracked by {report.views:.1f} cameras "
+            f"on average, reprojection error {report.reprojection:.2f} px: {written}"
+        )
+        if report.gaps:
+            runs = [f"{a}" if a == b else f"{a}-{b}" for a, b in report.gaps[:MOST_GAPS]]
+            more = ", …" if report.gaps[MOST_GAPS:] else ""
+            say(f"[yellow]warning:[/] frames {', '.join(runs)}{more} are interpolated.")

@@ -1,0 +1,225 @@
+"""The face of one moment in all cameras that see it."""
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from queue import SimpleQueue
+
+import numpy as np
+
+from ico3d.capture.capture import Capture
+from ico3d.capture.face import MESH_LANDMARKS, CanonicalFace, Face, FaceReader
+from ico3d.capture.headtrack.crops import HEAD, Part, around, search
+from ico3d.capture.headtrack.shape import similarity_fit
+from ico3d.capture.headtrack.triangulation import Sightings, agreeing, robust, sightings
+from ico3d.errors import CaptureError
+
+SEES_FACE = np.cos(np.radians(100.0))
+"""Cameras further round the head are not asked again; MediaPipe knows faces up to some 80°."""
+SIDEWAYS = np.cos(np.radians(75.0))
+"""Cameras that see a face from further aside guess most of it."""
+SPARSE = 6
+"""One landmark in so many suffices to see which cameras agree."""
+LEAST_FRONTAL, LEAST_SIGHT = 0.02, 0.05
+"""What a camera's word counts from there, and about a landmark that faces away from it."""
+
+
+@dataclass(frozen=True)
+class Head:
+    """A head of one moment.
+
+    Attributes:
+        points: (468, 3) metres in the world.
+        center: (3,) the middle of the head.
+        forward: (3,) where it faces.
+        faces: Of the cameras that agree: what each shows, landmarks in pixels of its picture.
+    """
+
+    points: np.ndarray
+    center: np.ndarray
+    forward: np.ndarray
+    faces: dict[int, Face]
+
+    def frontality(self, capture: Capture, camera: int) -> float:
+        """Cosine of the angle between where the head faces and where the camera stands."""
+        way = capture.cameras[camera].camera_to_world[:3, 3] - self.center
+        return float(_cosine(self.forward, way))
+
+    def most_frontal(self, capture: Capture) -> int:
+        """The camera that sees the face best, of those that agree."""
+        return max(self.faces, key=lambda camera: self.frontality(capture, camera))
+
+
+class Finder:
+    """Finds a head in the pictures of all cameras, several at a time.
+
+    Attributes:
+        capture: The recording.
+        disagreements: How often cameras showed faces, but no two of them the same one.
+    """
+
+    def __init__(self, source: Path, canonical: CanonicalFace, readers: Sequence[FaceReader]):
+        """Opens the capture once for each camera: their videos are decoded side by side.
+
+        Args:
+            source: A capture of any format.
+            canonical: MediaPipe's face.
+            readers: One for each thread.
+        """
+        self.capture = Capture.open(source)
+        self._opened = [Capture.open(source) for _ in self.capture.cameras]
+        self._canonical, self._normals = canonical, vertex_normals(canonical)
+        self._readers: SimpleQueue[FaceReader] = SimpleQueue()
+        for reader in readers:
+            self._readers.put(reader)
+        self._pool = ThreadPoolExecutor(len(readers))
+        self.disagreements = 0
+
+    def close(self) -> None:
+        """Ends the threads."""
+        self._pool.shutdown(cancel_futures=True)
+
+    def find(self, frame: int, before: Head | None) -> Head | None:
+        """The head of a frame.
+
+        Args:
+            frame: Which.
+            before: The head a moment ago, if it was found.
+
+        Returns:
+            The head, or None where fewer than two cameras show one face.
+        """
+        head = None if before is None else self._placed(self._near(frame, before))
+        if head is not None:
+            return head
+        found = self._placed(self._everywhere(frame))
+        if found is None:
+            return None
+        # Once more, now that all cameras know where to look: parts cut alike are read alike.
+        return self._placed(self._near(frame, found)) or found
+
+    def _near(self, frame: int, head: Head) -> dict[int, Face]:
+        """Faces close to where the head was."""
+        return self._look(frame, self._facing(head), lambda camera: self._around(camera, head))
+
+    def _everywhere(self, frame: int) -> dict[int, Face]:
+        """Faces anywhere on the person."""
+
+        def parts(camera: int) -> list[Part]:
+            lens = self.capture.cameras[camera]
+            return search(lens.height, lens.width, self._opened[camera].mask(camera, frame))
+
+        return self._look(frame, range(len(self.capture.cameras)), parts)
+
+    def _facing(self, head: Head) -> list[int]:
+        """Cameras that may see the face."""
+        cameras = range(len(self.capture.cameras))
+        return [
+            camera
+            for camera in cameras
+            if head.frontality(self.capture, camera) > SEES_FACE and self._around(camera, head)
+        ]
+
+    def _around(self, camera: int, head: Head) -> list[Part]:
+        """Parts of a picture around a head: close, and wider for one that moved."""
+        lens = self.capture.cameras[camera]
+        parts = [around(lens, head.center, size) for size in (HEAD, 1.5 * HEAD)]
+        return [part for part in parts if part is not None]
+
+    def _look(
+        self, frame: int, cameras: Sequence[int], parts: Callable[[int], list[Part]]
+    ) -> dict[int, Face]:
+        """The first face that each camera shows in one of its parts."""
+
+        def look(camera: int) -> Face | None:
+            image = self._opened[camera].image(camera, frame)
+            return None if image is None else self._read(image, parts(camera))
+
+        found = zip(cameras, self._pool.map(look, cameras), strict=True)
+        return {camera: face for camera, face in found if face is not None}
+
+    def _read(self, image: np.ndarray, parts: list[Part]) -> Face | None:
+        """The first face in one of the parts, landmarks in pixels of the picture."""
+        reader = self._readers.get()
+        try:
+            for part in parts:
+                face = reader.read(part.cut(image))
+                if face is not None:
+                    return Face(part.whole(face.landmarks), face.blendshapes, face.pose)
+            return None
+        finally:
+            self._readers.put(reader)
+
+    def _placed(self, faces: dict[int, Face]) -> Head | None:
+        """The head that most cameras agree on."""
+        if len(faces) < 2:
+            return None
+        cameras = [self.capture.cameras[camera] for camera in faces]
+        pixels = np.stack([face.landmarks[:MESH_LANDMARKS] for face in faces.values()])
+        seen = sightings(cameras, pixels)  # (C, 468)
+        agree = agreeing(Sightings(seen.world_to_camera, seen.rays[:, ::SPARSE]))
+        if not agree.any():
+            self.disagreements += 1
+            return None
+        seen = seen.of(agree)
+        points, _ = robust(seen, np.ones(seen.rays.shape[:2]))
+        for _ in range(2):  # how well a camera sees a landmark depends on how the head is turned
+            sight = self._sight(points, seen.centers)
+            points, _ = robust(seen, sight)
+        place = self._fit(points)
+        kept = [camera for camera, ok in zip(faces, agree, strict=True) if ok]
+        forward = place[:3, 2] / np.linalg.norm(place[:3, 2])
+        return Head(points, place[:3, 3], forward, {camera: faces[camera] for camera in kept})
+
+    def _fit(self, points: np.ndarray) -> np.ndarray:
+        """(4, 4) similarity that takes the canonical face to points (468, 3)."""
+        face = self._canonical
+        return similarity_fit(face.vertices, points[None], np.maximum(face.rigidity, 1e-3))[0]
+
+    def _sight(self, points: np.ndarray, centers: np.ndarray) -> np.ndarray:
+        """(C, 468) in (0, 1]: how well cameras see the face, times how they see its skin there."""
+        place = self._fit(points)
+        normals = self._normals @ place[:3, :3].T
+        skin = _cosine(normals, centers[:, None] - points)  # (C, 468)
+        face = _cosine(place[:3, 2], centers - place[:3, 3])  # (C,)
+        frontal = np.maximum((face - SIDEWAYS) / (1 - SIDEWAYS), LEAST_FRONTAL)
+        return frontal[:, None] * np.maximum(skin, LEAST_SIGHT)
+
+
+@contextmanager
+def finder(source: Path, canonical: CanonicalFace, model: Path, workers: int) -> Iterator[Finder]:
+    """A finder whose models are closed in the end.
+
+    Raises:
+        CaptureError: If the capture has one camera only.
+    """
+    with ExitStack() as stack:
+        readers = [stack.enter_context(FaceReader(model)) for _ in range(workers)]
+        found = Finder(source, canonical, readers)
+        stack.callback(found.close)
+        if len(found.capture.cameras) < 2:
+            raise CaptureError(
+                f"{source} has one camera, and a place in space takes two; "
+                "ico3d capture portrait tracks videos of one camera."
+            )
+        yield found
+
+
+def _cosine(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Of the angles between vectors (..., 3)."""
+    lengths = np.linalg.norm(first, axis=-1) * np.linalg.norm(second, axis=-1)
+    return (first * second).sum(-1) / lengths
+
+
+def vertex_normals(face: CanonicalFace) -> np.ndarray:
+    """(468, 3) outward unit normals, means of those of the triangles around by their areas."""
+    corners = face.vertices[face.triangles]  # (T, 3, 3)
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # (T, 3)
+    normals = np.zeros_like(face.vertices)
+    for corner in range(3):
+        np.add.at(normals, face.triangles[:, corner], flat)
+    if normals[:, 2].mean() < 0:
+        normals = -normals  # the face looks along +z
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)

@@ -1,0 +1,91 @@
+"""The file `tracking.safetensors` of a multiview folder: `docs/captures-multiview.md`."""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from ico3d.capture.expressions import BLENDSHAPES
+from ico3d.common.expression import EYE_NAMES
+from ico3d.common.files import write_atomic
+from ico3d.errors import CaptureError
+
+NAME = "tracking.safetensors"
+
+
+@dataclass(frozen=True)
+class HeadTrack:
+    """A head through F frames recorded by C cameras.
+
+    Attributes:
+        world_from_head: (F, 4, 4) float64, rigid, metres.
+        landmarks: (F, 68, 3) float32, Multi-PIE, in canonical head space, metres.
+        eyes: (F, 7) float32 in the order of `EYE_NAMES`.
+        blendshapes: (F, 52) float32, MediaPipe's, in its order.
+        views: (F, C) uint8, 1 where the camera's picture tells of the frame; frames that no camera
+            tells of are interpolated.
+    """
+
+    world_from_head: np.ndarray
+    landmarks: np.ndarray
+    eyes: np.ndarray
+    blendshapes: np.ndarray
+    views: np.ndarray
+
+    @property
+    def tracked(self) -> np.ndarray:
+        """(F,) bool: frames that were measured."""
+        return np.any(self.views, axis=1)
+
+    @property
+    def gaps(self) -> list[tuple[int, int]]:
+        """First and last frame of each run of frames that were interpolated."""
+        edges = np.flatnonzero(np.diff(np.concatenate([[1], self.tracked.astype(int), [1]])))
+        return [(int(start), int(stop) - 1) for start, stop in edges.reshape(-1, 2)]
+
+    def write(self, folder: Path) -> Path:
+        """Writes the file into a folder, whole or not at all."""
+        arrays = {f.name: np.ascontiguousarray(getattr(self, f.name)) for f in fields(self)}
+        write_atomic(folder / NAME, save(arrays))
+        return folder / NAME
+
+
+def read_track(folder: Path, num_frames: int, num_cameras: int) -> HeadTrack | None:
+    """Reads the file of a folder.
+
+    Args:
+        folder: A multiview folder.
+        num_frames: Its frames.
+        num_cameras: Its cameras.
+
+    Returns:
+        The track, or None where the folder has none.
+
+    Raises:
+        CaptureError: If the file is damaged or belongs to another recording.
+    """
+    file = folder / NAME
+    if not file.is_file():
+        return None
+    mend = "delete it and run ico3d capture track again"
+    try:
+        arrays = load(file.read_bytes())
+    except (OSError, SafetensorError, ValueError, KeyError) as error:
+        raise CaptureError(f"{file} is damaged: {mend}.") from error
+    shapes = {
+        "world_from_head": (num_frames, 4, 4),
+        "landmarks": (num_frames, 68, 3),
+        "eyes": (num_frames, len(EYE_NAMES)),
+        "blendshapes": (num_frames, len(BLENDSHAPES)),
+        "views": (num_frames, num_cameras),
+    }
+    for name, shape in shapes.items():
+        array = arrays.get(name)
+        if array is None or array.shape != shape:
+            found = "nothing" if array is None else f"{array.shape}"
+            raise CaptureError(f"{file}: '{name}' must be {shape}, found {found}: {mend}.")
+        if not np.isfinite(array).all():
+            raise CaptureError(f"{file}: '{name}' holds NaN or infinity: {mend}.")
+    return HeadTrack(**{name: arrays[name] for name in shapes})

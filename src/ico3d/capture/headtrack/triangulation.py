@@ -1,0 +1,127 @@
+"""Points in space from where several calibrated cameras see them, some of them wrongly.
+
+Residuals are metres: how far a camera's ray passes by a point, across the viewing direction. What
+a network reads off a face cut out and scaled to one size errs by a share of the face, so that
+cameras near and far, fine and coarse, err by alike distances.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from ico3d.common.camera import Camera
+
+SPREAD = 0.003
+"""Metres by which landmarks of a face usually stray from where they are."""
+AGREEING = 0.012
+"""Metres by which half of a camera's landmarks may miss for it to show the same face."""
+LEAST_ANGLE = np.radians(4.0)
+"""Rays that meet at a smaller angle leave the depth open."""
+ROUNDS = 8
+
+
+@dataclass(frozen=True)
+class Sightings:
+    """Where C cameras see the same N points at one moment.
+
+    Attributes:
+        world_to_camera: (C, 3, 4) OpenCV axes, metres.
+        rays: (C, N, 2) where each ray crosses the plane at depth 1 of its camera.
+    """
+
+    world_to_camera: np.ndarray
+    rays: np.ndarray
+
+    def of(self, cameras: np.ndarray) -> "Sightings":
+        """Those of some of the cameras, an index or mask along the first axis."""
+        return Sightings(self.world_to_camera[cameras], self.rays[cameras])
+
+    @property
+    def centers(self) -> np.ndarray:
+        """(C, 3) where the cameras stand."""
+        turns, shifts = self.world_to_camera[:, :, :3], self.world_to_camera[:, :, 3:]
+        return -(turns.transpose(0, 2, 1) @ shifts)[..., 0]  # (C, 3)
+
+
+def sightings(cameras: list[Camera], pixels: np.ndarray) -> Sightings:
+    """Sightings from pixels (C, N, 2), pixel centres at +0.5."""
+    lenses = np.stack([camera.intrinsics for camera in cameras])  # (C, 3, 3)
+    focal, center = lenses[:, [0, 1], [0, 1]], lenses[:, :2, 2]  # (C, 2)
+    rays = (pixels - center[:, None]) / focal[:, None]  # (C, N, 2)
+    return Sightings(np.stack([c.world_to_camera[:3] for c in cameras]), rays)
+
+
+def triangulate(seen: Sightings, weights: np.ndarray) -> np.ndarray:
+    """(N, 3) points of the least weighted sum of squared residuals.
+
+    Args:
+        seen: By at least two cameras.
+        weights: (C, N); each point needs two cameras with weight.
+    """
+    matrix, right = _system(seen)
+    weighted = matrix * weights[..., None, None]
+    normal = np.einsum("cnrp,cnrq->npq", weighted, matrix)  # (N, 3, 3)
+    pull = np.einsum("cnrp,cnr->np", weighted, right)  # (N, 3)
+    return np.linalg.solve(normal, pull[..., None])[..., 0]
+
+
+def misses(seen: Sightings, points: np.ndarray) -> np.ndarray:
+    """(C, N) metres by which the rays pass by points (N, 3); infinite behind the camera."""
+    matrix, right = _system(seen)
+    away = np.linalg.norm(np.einsum("cnrp,np->cnr", matrix, points) - right, axis=-1)
+    last = seen.world_to_camera[:, 2]
+    depths = points @ last[:, :3].T + last[:, 3]  # (N, C)
+    return np.where(depths.T > 0, away, np.inf)
+
+
+def agreeing(seen: Sightings, tolerance: float = AGREEING) -> np.ndarray:
+    """(C,) bool: the largest set of cameras that show one face.
+
+    Every pair of cameras places the face; the pair wins that most others agree with, then the
+    closest (RANSAC with all pairs, for there are few). None agree where no pair does.
+    """
+    best, best_score = np.zeros(len(seen.rays), bool), (1, 0.0)
+    for pair in combinations(range(len(seen.rays)), 2):
+        two = seen.of(np.array(pair))
+        ones = np.ones(two.rays.shape[:2])
+        if _meeting_angle(two) < LEAST_ANGLE:
+            continue
+        away = np.median(misses(seen, triangulate(two, ones)), axis=1)  # (C,)
+        found = away < tolerance
+        score = (int(found.sum()), -float(away[found].sum()))
+        if found[list(pair)].all() and score > best_score:
+            best, best_score = found, score
+    return best
+
+
+def robust(seen: Sightings, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points of least robust residuals: a camera that errs about a landmark loses its say there.
+
+    Args:
+        seen: By cameras that agree.
+        weights: (C, N) positive: how well each camera sees each point.
+
+    Returns:
+        (N, 3) points, and the (C, N) weights they were found with (Cauchy's, times `weights`).
+    """
+    kept = weights
+    for _ in range(ROUNDS):
+        away = misses(seen, triangulate(seen, kept))
+        kept = np.maximum(weights / (1 + (away / SPREAD) ** 2), 1e-9)
+    return triangulate(seen, kept), kept
+
+
+def _system(seen: Sightings) -> tuple[np.ndarray, np.ndarray]:
+    """(C, N, 2, 3) and (C, N, 2): matrix · point − right side are residuals in metres."""
+    rows = seen.world_to_camera[:, None]  # (C, 1, 3, 4)
+    system = rows[:, :, :2] - seen.rays[..., None] * rows[:, :, 2:]  # (C, N, 2, 4)
+    return system[..., :3], -system[..., 3]
+
+
+def _meeting_angle(two: Sightings) -> float:
+    """Radians between the middle rays of two cameras."""
+    middles = np.append(two.rays.mean(1), np.ones((2, 1)), 1)  # (2, 3)
+    ways = np.einsum("cji,cj->ci", two.world_to_camera[:, :, :3], middles)  # (2, 3) in the world
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    return float(np.arccos(np.clip(ways[0] @ ways[1], -1, 1)))

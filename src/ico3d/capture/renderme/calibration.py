@@ -1,0 +1,57 @@
+"""Cameras and frame rate of a RenderMe-360 recording."""
+
+from collections.abc import Sequence
+
+from ico3d.capture.smc.cameras import SmcCamera, picture_size, read_camera
+from ico3d.capture.smc.file import SmcFile
+from ico3d.errors import CaptureError
+
+FPS, MANY_FPS = 30.0, 15.0
+"""Speech that many cameras recorded has every other frame."""
+MANY = 38
+"""How many they are."""
+
+
+def read_cameras(raw: SmcFile, calibration: SmcFile) -> tuple[list[SmcCamera], list[str]]:
+    """All cameras that have pictures and a calibration, by number.
+
+    Returns:
+        The cameras, and the names of those that have pictures but no calibration.
+
+    Raises:
+        CaptureError: If there are none, or one is damaged.
+    """
+    cameras, lost = [], []
+    for name in sorted(key for key in raw.keys("Camera") if key.isdecimal()):
+        pictures = f"Camera/{name}/color"
+        size = picture_size(raw, pictures)
+        if size is None:
+            continue  # parts with speech list cameras that took no part
+        if calibration.keys(f"Calibration/{name}"):
+            inside = f"Calibration/{name}"
+            cameras.append(read_camera(calibration, inside, name, size, pictures))
+        else:
+            lost.append(name)
+    if not cameras:
+        raise CaptureError(
+            f"{raw.path} has no camera with pictures and a calibration: "
+            "is it the raw file of a RenderMe-360 recording?"
+        )
+    return cameras, lost
+
+
+def frame_rate(
+    part: str, cameras: Sequence[SmcCamera], num_frames: int, seconds: float | None
+) -> float:
+    """Frames per second, which the files do not state.
+
+    Args:
+        part: What was performed.
+        cameras: Those with pictures.
+        num_frames: How many frames each has.
+        seconds: Length of the sound, which decides where there is one.
+    """
+    if seconds:
+        measured = num_frames / seconds
+        return FPS if measured * measured > FPS * MANY_FPS else MANY_FPS
+    return MANY_FPS if part.startswith("s") and len(cameras) == MANY else FPS

@@ -1,0 +1,224 @@
+"""Reads a recording of the RenderMe-360 data set: `docs/captures-renderme.md`."""
+
+import logging
+from functools import cached_property
+from itertools import islice, product
+from pathlib import Path
+
+import numpy as np
+
+from ico3d.capture.capture import Sound, last_eleventh
+from ico3d.capture.decoding import largest_channel, unit
+from ico3d.capture.finding import Finding
+from ico3d.capture.hull import Silhouette, visual_hull
+from ico3d.capture.renderme.calibration import frame_rate, read_cameras
+from ico3d.capture.renderme.examine import examine_files, mask_folder
+from ico3d.capture.renderme.files import find_files
+from ico3d.capture.renderme.flame import FlameFit, FlameFits
+from ico3d.capture.renderme.landmarks import MULTI_PIE, POINTS, in_known_order, in_space
+from ico3d.capture.smc.file import SmcFile
+from ico3d.capture.smc.reader import SmcCapture, count_frames
+from ico3d.capture.sound import mono
+from ico3d.errors import CaptureError
+
+log = logging.getLogger(__name__)
+SOUND = "Camera/00/audio"
+LOUDEST = 1.01
+JUDGED = 8
+"""Sets of landmarks by which their order is recognised."""
+HEAD_RADIUS, HULL_EDGE = 0.25, 0.005
+"""Metres around the head that its surface is looked for in, and of the voxels it is carved from."""
+
+
+class RenderMe360(SmcCapture):
+    """One part of RenderMe-360: up to 60 cameras around a head.
+
+    Pictures and mattes come straightened. Head poses are those of the skull in the FLAME fits,
+    where there are any; else those of the landmarks that several cameras see.
+    """
+
+    kind = "renderme-360"
+
+    def __init__(self, path: Path):
+        """Opens the files and reads the calibration; pictures are read when asked for.
+
+        Args:
+            path: The raw file, or a folder that holds one recording.
+
+        Raises:
+            CaptureError: If a file is missing or damaged, or the folder holds several recordings.
+            MissingExtraError: If h5py or OpenCV is not installed.
+        """
+        files = find_files(path)
+        self._name = files.name
+        self._raw = SmcFile(files.raw)
+        known = (files.annotations,) if files.annotations else ()
+        self._files = (*(SmcFile(file) for file in known), self._raw)
+        if not any(file.holds("Calibration") for file in self._files):
+            raise CaptureError(
+                f"{files.raw} lacks its annotations with the calibration: "
+                f"put {files.name}_anno.smc beside it."
+            )
+        self._devices, lost = read_cameras(self._raw, self._holding("Calibration"))
+        if lost:
+            log.warning("%s: cameras without calibration left out: %s", path, ", ".join(lost))
+        count = count_frames(self._raw, ["Camera"], self._devices[0].pictures)
+        super().__init__(files.raw, self._devices, count)
+        self.fps = frame_rate(files.part, self._devices, count, self._seconds())
+        self.split = last_eleventh(count)
+        self.flame_fits = FlameFits(self._holding("FLAME"), count, self.upright)
+
+    def image(self, camera: int, frame: int) -> np.ndarray | None:
+        """The straightened picture, or None where there is none."""
+        device = self._devices[camera]
+        picture = self.decoded(self._raw, device, f"{device.pictures}/{self.index(frame)}")
+        return None if picture is None else unit(device.lens.straightened(picture))
+
+    def mask(self, camera: int, frame: int) -> np.ndarray | None:
+        """The straightened matte, between 0 and 1 along hair; None where there is none."""
+        device = self._devices[camera]
+        folder = mask_folder(device.name)
+        picture = self.decoded(self._holding(folder), device, f"{folder}/{self.index(frame)}")
+        if picture is None:
+            return None
+        return unit(device.lens.straightened(largest_channel(picture)))
+
+    def audio(self) -> Sound | None:
+        """The whole sound, 16 kHz mono; only parts with speech have one."""
+        file = self._holding(SOUND)
+        samples, rate = file.numbers(f"{SOUND}/audio", None), self._sample_rate()
+        if samples is None or rate is None:
+            return None
+        if samples.ndim > 2 or np.abs(samples).max(initial=0.0) > LOUDEST:
+            raise CaptureError(f"{file.path}: {SOUND}/audio is no sound between -1 and 1.")
+        return mono(np.clip(samples, -1, 1).astype(np.float32), rate)
+
+    def flame(self, frame: int) -> FlameFit | None:
+        """The face model's parameters and vertices, or None where there are none."""
+        return self.flame_fits.at(self.index(frame))
+
+    def world_from_head(self, frame: int) -> np.ndarray | None:
+        """(4, 4) of the skull in the FLAME fit, else of the landmarks in space, else None."""
+        if self.flame_fits.frames:
+            return self.flame_fits.pose(self.index(frame))
+        return super().world_from_head(frame)
+
+    def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
+        """(68, 2) as the files have them; elsewhere those in space, projected; else None."""
+        own = self._landmarks_in(camera, self.index(frame)) if self._ordered else None
+        return super().landmarks(camera, frame) if own is None else own
+
+    def keypoints_2d(self, camera: int, frame: int) -> np.ndarray | None:
+        """(106, 2) pixels of the straightened picture; None where the face was not found."""
+        lens, name = self._devices[camera].lens, self._devices[camera].name
+        inside = f"Keypoints2d/{name}/{self.index(frame)}"
+        file = self._holding("Keypoints2d")
+        found = file.numbers(inside, None, holes=True)
+        if found is None or not found.size:
+            return None
+        if found.shape != (POINTS, 2):
+            raise CaptureError(
+                f"{file.path}: {inside} has shape {found.shape}, expected {POINTS} x 2."
+            )
+        return lens.straightened_points(found + 0.5)
+
+    def keypoints_3d(self, frame: int) -> np.ndarray | None:
+        """(73, 3) metres in the capture's world, in the files' own order, or None."""
+        inside = f"Keypoints3d/{self.index(frame)}"
+        found = self._holding("Keypoints3d").numbers(inside, None, holes=True)
+        return None if found is None or not found.size else found.reshape(-1, 3) @ self.upright.T
+
+    def face_points(self) -> np.ndarray | None:
+        """(F, 68, 3) triangulated from the cameras that have landmarks of a frame."""
+        if len(self._face_cameras) < 2 or not self._ordered:
+            return None
+        return np.stack([self._in_space(frame) for frame in range(self.num_frames)])
+
+    def points(self, frame: int = 0) -> np.ndarray | None:
+        """(P, 3) in head space: FLAME's vertices, else the visual hull of the mattes, or None."""
+        pose, surface = self.world_from_head(frame), self.flame_fits.vertices(frame)
+        if pose is None:
+            return None
+        if surface is None:
+            surface = self._hull(frame)
+        if surface is None:
+            return None
+        local = (surface - pose[:3, 3]) @ pose[:3, :3]  # (P, 3)
+        return local[np.linalg.norm(local, axis=1) < HEAD_RADIUS]
+
+    @property
+    def provenance(self) -> dict:
+        """The data set, and the licence that whoever fetched it has signed."""
+        return {
+            "kind": self.kind,
+            "sources": [f"RenderMe-360 (NeurIPS 2023), recording {self._name}"],
+            "consent": "given to the makers of RenderMe-360",
+            "licence": "RenderMe-360 licence agreement",
+        }
+
+    def inspect(self) -> list[Finding]:
+        """Missing and damaged pictures and annotations."""
+        masks = self._holding(mask_folder(self._devices[0].name))
+        track = self.head_motion
+        found = 0 if track is None else int(np.isfinite(track.points).all((1, 2)).sum())
+        fitted = len(self.flame_fits.frames)
+        return examine_files(self._raw, masks, self._devices, self.num_frames, fitted, found)
+
+    @cached_property
+    def _ordered(self) -> bool:
+        """Whether the landmarks are in the order that is known here."""
+        views = product(range(self.num_frames), self._face_cameras)
+        faces = (self._landmarks_in(camera, frame) for frame, camera in views)
+        judged = [in_known_order(f) for f in islice((f for f in faces if f is not None), JUDGED)]
+        ordered = 2 * sum(judged) >= len(judged)
+        if not ordered:
+            log.warning("%s: landmarks in an order not known here are left out.", self.path)
+        return ordered
+
+    @cached_property
+    def _face_cameras(self) -> list[int]:
+        """Cameras that have landmarks of any frame."""
+        file = self._holding("Keypoints2d")
+        names = [device.name for device in self._devices]
+        return [c for c, name in enumerate(names) if file.keys(f"Keypoints2d/{name}")]
+
+    def _landmarks_in(self, camera: int, frame: int) -> np.ndarray | None:
+        """(68, 2) of the files, or None where the face was not found."""
+        points = self.keypoints_2d(camera, frame)
+        return None if points is None else points[MULTI_PIE]
+
+    def _in_space(self, frame: int) -> np.ndarray:
+        """(68, 3) in the world; NaN where not found."""
+        found = {camera: self._landmarks_in(camera, frame) for camera in self._face_cameras}
+        seen = {camera: marks for camera, marks in found.items() if marks is not None}
+        pixels = np.array(list(seen.values())).reshape(-1, len(MULTI_PIE), 2)  # (C, 68, 2)
+        return in_space([self.cameras[camera] for camera in seen], pixels)
+
+    def _hull(self, frame: int) -> np.ndarray | None:
+        """(P, 3) surface of the visual hull in the world."""
+        seen = []
+        for index, camera in enumerate(self.cameras):
+            mask = self.mask(index, frame)
+            if mask is not None:
+                seen.append(Silhouette.of(camera, mask))
+        hull = visual_hull(seen, HULL_EDGE)
+        return None if hull is None else hull.surface
+
+    def _seconds(self) -> float | None:
+        """Length of the sound."""
+        shape, rate = self._holding(SOUND).shape(f"{SOUND}/audio"), self._sample_rate()
+        return shape[0] / rate if shape and rate else None
+
+    def _sample_rate(self) -> int | None:
+        """Of the sound."""
+        file = self._holding(SOUND)
+        rate = file.numbers(f"{SOUND}/sample_rate", None)
+        if rate is None:
+            return None
+        if rate.size != 1 or not 1000 <= rate.item() <= 400_000:
+            raise CaptureError(f"{file.path}: {SOUND}/sample_rate is no sample rate.")
+        return round(rate.item())
+
+    def _holding(self, group: str) -> SmcFile:
+        """The file with a group; the last where none has it."""
+        return next((file for file in self._files if file.holds(group)), self._files[-1])

@@ -1,0 +1,172 @@
+"""What is written in the documented layout comes back."""
+
+import cv2
+import h5py
+import numpy as np
+import pytest
+
+from ico3d.capture.capture import Capture
+
+UP = np.diag([1.0, -1.0, -1.0, 1.0])
+"""From the world of the files, which has +y down, to the capture's."""
+
+
+@pytest.fixture(scope="module")
+def plain(smc, tmp_path_factory):
+    """A recording without distortion."""
+    return smc.write_recording(tmp_path_factory.mktemp("plain"))
+
+
+def test_a_folder_and_its_raw_file_are_the_same_recording(plain):
+    for path in (plain, plain.parent):
+        capture = Capture.open(path)
+        assert (capture.kind, capture.path) == ("renderme-360", plain)
+        assert (capture.fps, capture.num_frames) == (30.0, 4)
+        assert [c.name for c in capture.cameras] == ["00", "18", "22", "25", "28", "32", "45"]
+        assert {(c.width, c.height) for c in capture.cameras} == {(48, 40)}
+        assert (capture.split.train, capture.split.test) == ((0, 1, 2), (3,))
+        assert "0026_e0" in capture.provenance["sources"][0]
+
+
+def test_annotations_in_the_folders_of_the_data_set(plain, tmp_path):
+    raw, anno = tmp_path / "raw" / "0026", tmp_path / "anno" / "0026"
+    for folder, kind in ((raw, "raw"), (anno, "anno")):
+        folder.mkdir(parents=True)
+        (folder / f"0026_e0_{kind}.smc").symlink_to(plain.with_name(f"0026_e0_{kind}.smc"))
+    assert Capture.open(raw).world_from_head(0) is not None
+
+
+def test_pictures_are_those_of_the_jpeg_decoder_and_mattes_keep_their_edges(plain, smc):
+    capture = Capture.open(plain)
+    for index, camera in enumerate(smc.Rig().cameras):
+        stream = smc.encoded(smc.picture(camera, 2, (40, 48)), "JPEG")
+        expected = cv2.imdecode(stream, cv2.IMREAD_COLOR)[..., ::-1]
+        image, mask = capture.image(index, 2), capture.mask(index, 2)
+        assert image.dtype == np.float32 and mask.dtype == np.float32
+        np.testing.assert_array_equal(np.rint(image * 255), expected)
+        np.testing.assert_array_equal(np.rint(mask * 255), smc.matte((40, 48)).max(-1))
+    assert ((mask > 0.1) & (mask < 0.9)).any()
+
+
+def test_cameras_are_inverses_of_rt_in_a_world_with_y_up(plain, smc):
+    rig = smc.Rig()
+    for camera, number in zip(Capture.open(plain).cameras, rig.cameras, strict=True):
+        np.testing.assert_allclose(
+            camera.camera_to_world, UP @ rig.camera_to_world(number), atol=1e-12
+        )
+        expected = rig.intrinsics()
+        expected[:2, 2] += 0.5
+        np.testing.assert_allclose(camera.intrinsics, expected)
+        assert camera.camera_to_world[1, 3] == pytest.approx(0.1)
+
+
+def test_pictures_and_landmarks_are_straightened_alike(smc, tmp_path):
+    rig = smc.Rig(cameras=(25, 28), frames=1, size=(300, 360), distortion=(-0.1, 0.05, 0, 0, 0.03))
+    raw = smc.write_recording(tmp_path, rig)
+    world = smc.face_in_files(rig, 0)
+    with h5py.File(raw.with_name("0026_e0_anno.smc"), "a") as file:
+        for number in rig.cameras:
+            to_camera = np.linalg.inv(rig.camera_to_world(number))
+            bent, _ = cv2.projectPoints(
+                world, cv2.Rodrigues(to_camera[:3, :3])[0], to_camera[:3, 3],
+                rig.intrinsics(), np.array(rig.distortion),
+            )  # fmt: skip
+            marks = file[f"Keypoints2d/{number}/0"]
+            values = marks[()]
+            values[smc.MULTI_PIE] = bent[:, 0]
+            marks[...] = values
+    capture = Capture.open(raw)
+    for index, camera in enumerate(capture.cameras):
+        expected = camera.project(world @ UP[:3, :3])[0]
+        np.testing.assert_allclose(capture.landmarks(index, 0), expected, atol=0.01)
+
+
+def test_the_head_is_the_skull_of_the_fits(smc, faces, tmp_path):
+    """Also while the neck bends, the jaw opens and the brows rise."""
+    rig = smc.Rig(frames=40, cameras=(22, 25))
+    capture = Capture.open(smc.write_recording(tmp_path, rig, same_picture=True))
+    found = np.stack([capture.world_from_head(frame) for frame in range(40)])
+    assert max(faces.errors(found, rig.world_from_skull())) < 1e-6
+    fixed = np.linalg.inv(rig.world_from_skull()[7]) @ found[7]
+    np.testing.assert_allclose(fixed[:3, :3], np.eye(3), atol=1e-9)  # FLAME's axes
+    assert np.linalg.norm(fixed[:3, 3]) < 0.15  # the middle of the skull
+    for frame in (0, 31):
+        local = capture.points(frame)
+        world = smc.flame_vertices(rig, frame) + smc.flame(rig, frame)["cam"][1:]
+        again = faces.moved(found[frame][None], local)[0]
+        wanted = world @ UP[:3, :3]
+        near = np.linalg.norm(wanted - found[frame, :3, 3], axis=1) < 0.25
+        np.testing.assert_allclose(again, wanted[near], atol=1e-9)
+        expected = rig.world_from_skull()[frame]
+        face = faces.moved(expected[None], faces.face())[0]
+        marks = faces.moved(found[frame][None], capture.landmarks_3d(frame))[0]
+        np.testing.assert_allclose(marks, face, atol=1e-6)
+
+
+def test_the_parts_of_a_fit(plain, smc):
+    fit, parts = Capture.open(plain).flame(2), smc.flame(smc.Rig(), 2)
+    pairs = {"global_pose": "global_pose", "neck_pose": "neck_pose", "jaw_pose": "jaw_pose"}
+    for name, held in {**pairs, "shape": "shape", "expression": "exp"}.items():
+        np.testing.assert_array_equal(getattr(fit, name), parts[held])
+    eyes = np.stack([parts["left_eye_pose"], parts["right_eye_pose"]])
+    np.testing.assert_array_equal(fit.eye_poses, eyes)
+    expected = (parts["verts"] + parts["cam"][1:4]) @ UP[:3, :3]
+    np.testing.assert_allclose(fit.vertices, expected, atol=1e-12)
+
+
+def test_landmarks_are_read_where_there_are_some_and_projected_elsewhere(plain, smc):
+    capture, rig = Capture.open(plain), smc.Rig()
+    for index, number in enumerate(rig.cameras):
+        expected = rig.camera(number).project(smc.face_in_files(rig, 1))[0] + 0.5
+        np.testing.assert_allclose(capture.landmarks(index, 1), expected, atol=1e-4)
+    assert capture.keypoints_2d(0, 1) is None and capture.keypoints_2d(3, 1).shape == (106, 2)
+    raw = np.random.default_rng(1).normal(size=(73, 3))
+    np.testing.assert_allclose(capture.keypoints_3d(1), raw @ UP[:3, :3])
+
+
+def test_heads_of_parts_without_fits_come_from_landmarks(smc, faces, tmp_path):
+    rig = smc.Rig(part="h1_2b", frames=20, size=(200, 240))
+    capture = Capture.open(smc.write_recording(tmp_path, rig, same_picture=True))
+    assert capture.flame(0) is None
+    found = np.stack([capture.world_from_head(frame) for frame in range(20)])
+    assert max(faces.errors(found, rig.world_from_skull())) < 1e-5
+    face = faces.moved(rig.world_from_skull()[:1], faces.face())[0]
+    marks = faces.moved(found[:1], capture.landmarks_3d(0))[0]
+    np.testing.assert_allclose(marks, face, atol=1e-6)
+    hull = capture.points(0)  # of round mattes: a ball
+    assert len(hull) > 1000 and np.linalg.norm(hull, axis=1).max() < 0.25
+
+
+@pytest.mark.parametrize("place", ("raw", "anno"))
+@pytest.mark.parametrize("channels", (1, 2))
+def test_sound_lies_in_either_file(smc, tmp_path, place, channels):
+    tone = 0.5 * np.sin(2 * np.pi * 440 * np.arange(48_000 * 2) / 48_000)
+    sound = tone if channels == 1 else np.stack([tone, tone], 1)
+    rig = smc.Rig(part="s1_all", cameras=(25,), frames=60, sound=sound, sound_in=place)
+    capture = Capture.open(smc.write_recording(tmp_path, rig, same_picture=True))
+    heard = capture.audio()
+    assert heard.rate == 16_000 and len(heard.samples) == 32_000
+    expected = 0.5 * np.sin(2 * np.pi * 440 * np.arange(32_000) / 16_000)
+    np.testing.assert_allclose(heard.samples[500:-500], expected[500:-500], atol=1e-3)
+    assert capture.fps == 30 and capture.world_from_head(0) is None
+
+
+def test_the_sound_tells_the_frame_rate(smc, tmp_path):
+    rig = smc.Rig(part="s3_all", cameras=(22, 25), frames=30, sound=np.zeros(48_000 * 2))
+    assert Capture.open(smc.write_recording(tmp_path, rig, same_picture=True)).fps == 15
+
+
+def test_speech_by_38_cameras_has_15_frames_per_second(smc, tmp_path):
+    rig = smc.Rig(part="s3_all", cameras=tuple(range(38)), frames=2, size=(8, 10), seen=False)
+    raw = smc.write_recording(tmp_path, rig)
+    with h5py.File(raw, "a") as file:
+        for number in range(38, 60):  # listed, but they took no part
+            file.create_group(f"Camera/{number}/color")
+    capture = Capture.open(raw)
+    assert capture.fps == 15 and len(capture.cameras) == 38
+    assert Capture.open(smc.write_recording(tmp_path / "e", smc.Rig(frames=2))).fps == 30
+
+
+def test_expressions_have_no_sound_and_no_eyes(plain):
+    capture = Capture.open(plain)
+    assert capture.audio() is None and capture.eyes(0) is None and capture.background(0) is None
