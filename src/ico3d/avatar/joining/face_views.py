@@ -77,7 +77,7 @@ def face_views(
         for camera in chosen_cameras
         if faces(capture.cameras[camera], placement.world_from_head(frame), region, landmarks)
     ]
-    chosen = [seen[i] for i in _spread(len(seen), most)]
+    chosen = [seen[i] for i in spread(len(seen), most)]
     views = [_view(capture, placement, landmarks, *place) for place in chosen]
     found = [view for view in views if view is not None]
     if not seen:
@@ -138,6 +138,6 @@ def _steady(pixels: np.ndarray, size: tuple[int, ...]) -> np.ndarray:
     return steady
 
 
-def _spread(count: int, most: int) -> list[int]:
+def spread(count: int, most: int) -> list[int]:
     """Indices of at most so many of `count` things, evenly spread."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int)).tolist()
