@@ -79,7 +79,7 @@ def test_light_changes_little_between_neighbours(head, abroad):
             recolour(head.model, placement, expressions, views, SETTINGS)
         change = head.model.logits(values)[:, :3] - before
         rough.append(float((change - change[nearest]).detach().square().mean()))
-    assert rough[0] < 0.5 * rough[1]
+    assert rough[0] < 0.75 * rough[1]
 
 
 def test_roughness_is_the_mean_square_of_neighbours_differences(head):
