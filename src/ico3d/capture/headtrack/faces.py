@@ -53,7 +53,12 @@ class Head:
 
 
 class Finder:
-    """Finds a head in the pictures of all cameras, several at a time."""
+    """Finds a head in the pictures of all cameras, several at a time.
+
+    Attributes:
+        capture: The recording.
+        disagreements: How often cameras showed faces, but no two of them the same one.
+    """
 
     def __init__(self, source: Path, canonical: CanonicalFace, readers: Sequence[FaceReader]):
         """Opens the capture once for each camera: their videos are decoded side by side.
@@ -70,6 +75,7 @@ class Finder:
         for reader in readers:
             self._readers.put(reader)
         self._pool = ThreadPoolExecutor(len(readers))
+        self.disagreements = 0
 
     def close(self) -> None:
         """Ends the threads."""
@@ -155,6 +161,7 @@ class Finder:
         seen = sightings(cameras, pixels)  # (C, 468)
         agree = agreeing(Sightings(seen.world_to_camera, seen.rays[:, ::SPARSE]))
         if not agree.any():
+            self.disagreements += 1
             return None
         seen = seen.of(agree)
         points, _ = robust(seen, np.ones(seen.rays.shape[:2]))

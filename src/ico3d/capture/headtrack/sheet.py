@@ -14,6 +14,8 @@ from ico3d.errors import SettingsError
 
 FRAMES, CAMERAS = 6, 4
 """Rows, and columns at most."""
+SHOWN = 0.34
+"""Metres that a tile shows."""
 AXIS = 0.1
 """Metres of the drawn head axes."""
 COLOURS = ((255, 60, 60), (60, 220, 60), (80, 150, 255))
@@ -66,7 +68,7 @@ def _row(capture: Capture, track: HeadTrack, frame: int) -> list[Image.Image]:
 def _tile(capture: Capture, track: HeadTrack, camera: int, frame: int) -> Image.Image:
     """The head in one picture."""
     lens = capture.cameras[camera].moved(track.world_from_head[frame])
-    part = around(lens, np.zeros(3))
+    part = around(lens, np.zeros(3), SHOWN)
     image = capture.image(camera, frame)
     assert part is not None and image is not None  # the camera saw the face
     tile = Image.fromarray(part.cut(image))

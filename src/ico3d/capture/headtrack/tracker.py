@@ -9,7 +9,7 @@ from ico3d.capture.alignment import rigid_landmarks
 from ico3d.capture.capture import Capture
 from ico3d.capture.expressions import BLENDSHAPES, eyes_of_blendshapes
 from ico3d.capture.face import canonical_face
-from ico3d.capture.headtrack.faces import Head, finder
+from ico3d.capture.headtrack.faces import Finder, Head, finder
 from ico3d.capture.headtrack.shape import inverse, moved, rigid_head
 from ico3d.capture.headtrack.smoothing import filled, filled_poses, smoothed_poses
 from ico3d.capture.headtrack.track_file import HeadTrack
@@ -19,6 +19,8 @@ from ico3d.common.files import model_file
 from ico3d.errors import CaptureError
 
 PURPOSE = "tracking a head"
+SIZES = (0.6, 1.6)
+"""Smallest and largest head by the usual one, children included."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ def track_head(source: Path, workers: int) -> tuple[HeadTrack, Report]:
         The track and how good it is.
 
     Raises:
-        CaptureError: If fewer than two cameras show a face in any frame.
+        CaptureError: If no two cameras agree on a face in any frame, or its size is not human.
         MissingExtraError: If MediaPipe is not installed.
         MissingModelError: If the face model is not there.
     """
@@ -66,12 +68,22 @@ def track_head(source: Path, workers: int) -> tuple[HeadTrack, Report]:
                     heads[frame] = last
                 advance()
     if not heads:
-        raise CaptureError(
-            f"{source}: no frame shows a face to two cameras at least; a head is tracked where two "
-            "cameras before the person see the face, 30 pixels high and more, and agree."
-        )
+        raise CaptureError(f"{source}: {_nothing(found)}.")
     track = assemble(capture, heads, canonical.vertices)
     return track, report(capture, heads, track)
+
+
+def _nothing(found: Finder) -> str:
+    """Why no head was found, and what to do."""
+    if found.disagreements:
+        return (
+            "cameras show faces, but no two agree on where one is; are the calibration and its "
+            "scale (metres) right, and do the cameras run in step?"
+        )
+    return (
+        "no frame shows a face to two cameras at least; a head is tracked where two cameras "
+        "before the person see the face, 20 pixels high and more"
+    )
 
 
 def assemble(capture: Capture, heads: dict[int, Head], canonical: np.ndarray) -> HeadTrack:
@@ -81,10 +93,14 @@ def assemble(capture: Capture, heads: dict[int, Head], canonical: np.ndarray) ->
         capture: Who recorded them.
         heads: Frame to head.
         canonical: (468, 3) MediaPipe's face, metres.
+
+    Raises:
+        CaptureError: If the head is so large or small that the world cannot be in metres.
     """
     frames, count = np.array(sorted(heads)), capture.num_frames
     points = np.stack([heads[frame].points for frame in frames])  # (K, 468, 3)
     rigid = rigid_head(points, canonical, rigid_landmarks(canonical))
+    _check_size(capture, rigid.shape, canonical)
     # In the space of each frame's own pose landmarks are free of what that pose errs by.
     marks = moved(inverse(rigid.poses), points)[:, MULTI_PIE]  # (K, 68, 3)
     shapes = np.stack(
@@ -101,6 +117,16 @@ def assemble(capture: Capture, heads: dict[int, Head], canonical: np.ndarray) ->
         every,
         views,
     )
+
+
+def _check_size(capture: Capture, shape: np.ndarray, canonical: np.ndarray) -> None:
+    """Whether a head is of a size that heads have."""
+    size = float(np.linalg.norm(np.ptp(shape, axis=0)) / np.linalg.norm(np.ptp(canonical, axis=0)))
+    if not SIZES[0] < size < SIZES[1]:
+        raise CaptureError(
+            f"{capture.path}: the head is {size:.2g} times as large as usual, so the cameras are "
+            "not in metres; import the recording again with --scale."
+        )
 
 
 def report(capture: Capture, heads: dict[int, Head], track: HeadTrack) -> Report:

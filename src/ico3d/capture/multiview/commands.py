@@ -88,7 +88,8 @@ class Resize:
     """Write any capture again with smaller pictures, as a multiview folder.
 
     Recordings of 5 or 12 megapixels are decoded, corrected and straightened once instead of at each
-    look. Keeps pictures, masks, clean plates, sound and surface points.
+    look. Keeps pictures, masks, clean plates, sound, surface points and the tracked head of a
+    multiview folder.
 
     Attributes:
         source: A capture of any format.

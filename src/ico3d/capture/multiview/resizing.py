@@ -1,13 +1,16 @@
 """Writes any capture again with smaller pictures, as a multiview folder."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 
 from ico3d.capture.capture import Capture
+from ico3d.capture.headtrack.track_file import NAME as TRACK
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import Description, Place
 from ico3d.capture.multiview.parallel import View, each_camera
+from ico3d.capture.multiview.reader import MultiviewCapture
 from ico3d.capture.multiview.writing import new_folder
 from ico3d.capture.portrait_files import save_picture
 from ico3d.capture.resized import ResizedCapture
@@ -83,6 +86,9 @@ def _write_rest(capture: ResizedCapture, work: Path) -> None:
     sound = capture.audio()
     if sound is not None:
         soundfile.write(work / "audio.wav", sound.samples, sound.rate)
+    track = capture.path / TRACK
+    if capture.kind == MultiviewCapture.kind and track.is_file():
+        shutil.copyfile(track, work / TRACK)  # in metres, whatever the size of the pictures
     if capture.split.test:
         return  # a head: its points lie in head space, for which there is no place
     for frame in range(capture.num_frames):
