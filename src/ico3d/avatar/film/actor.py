@@ -9,7 +9,13 @@ import numpy as np
 from ico3d.avatar import baking, body_bundle, staging
 from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.film.film import back_and_forth, extent
-from ico3d.avatar.render_bundle import BakedAvatar, baked_gaussians, body_gaussians, pose_at
+from ico3d.avatar.render_bundle import (
+    BakedAvatar,
+    backdrop_gaussians,
+    baked_gaussians,
+    body_gaussians,
+    pose_at,
+)
 from ico3d.avatar.samples import lips_of
 from ico3d.avatar.whole_bundle import animation_of, front_of
 from ico3d.bundle.animation import Animation
@@ -20,6 +26,8 @@ from ico3d.common.expression import SPEECH_SIZE
 from ico3d.speech.runtime import SpeechModel
 from ico3d.splat.gaussians import Gaussians
 
+Draw = Callable[[float, np.ndarray], Gaussians]
+"""A time of the body, in seconds, and an expression (B,) → the person in the world."""
 Lips = Callable[[np.ndarray, int], np.ndarray]
 """A sound (S,) and its rate → what the mouth does, (T, 32) at 25 rows per second."""
 
@@ -38,9 +46,10 @@ class Actor:
         eye_offset: Where the seven eye and brow values start in the expression, if it has them.
         lips: Moves the mouth; None where no sound does.
         animation: How the body moves while it talks; None where head and body are not both there.
+        backdrop: What stands behind the person, in the world.
     """
 
-    draw: Callable[[float, np.ndarray], Gaussians]
+    draw: Draw
     seconds: float
     view: CameraInfo
     background: tuple[float, float, float]
@@ -48,6 +57,7 @@ class Actor:
     eye_offset: int | None
     lips: Lips | None
     animation: Animation | None
+    backdrop: Gaussians | None = None
 
 
 def bundle_actor(bundle: Bundle) -> Actor:
@@ -69,10 +79,11 @@ def bundle_actor(bundle: Bundle) -> Actor:
         draw, seconds = _swaying_head(bundle)
     at = head.eye_offset if head else None
     stage = (manifest.camera, manifest.background)
-    return Actor(draw, seconds, *stage, idle, at, lips, bundle.animation)
+    behind = backdrop_gaussians(bundle)
+    return Actor(draw, seconds, *stage, idle, at, lips, bundle.animation, behind)
 
 
-def _swaying_head(bundle: Bundle) -> tuple[Callable[[float, np.ndarray], Gaussians], float]:
+def _swaying_head(bundle: Bundle) -> tuple[Draw, float]:
     """A head alone sways as it was recorded, back and forth."""
     head, poses = bundle.require_head()
     assert bundle.manifest.head is not None

@@ -78,7 +78,8 @@ class Render:
             background = GREY if actor is None else actor.background
         seconds = self.seconds if sound is None else person.seconds
         cameras = self._cameras(person, actor, max(1, round(seconds * self.fps)))
-        seen: Iterable = pictures(person, cameras, self.fps, background)
+        backdrop = None if actor is None else actor.backdrop
+        seen: Iterable = pictures(person, cameras, self.fps, background, backdrop)
         shown = track(seen, "filming", len(cameras), transient=True)
         write_video(self.out, shown, self._sides, self.fps, sound)
         Console().print(f"{self.out}: {len(cameras)} pictures at {self.fps:g} per second.")
