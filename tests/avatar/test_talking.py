@@ -83,6 +83,7 @@ def test_a_head_alone_sways_back_and_forth(bundles):
     bundle = Bundle.open(bundles / "head.ico3d")
     actor = bundle_actor(bundle)
     talk = speech(actor, hum(5.0), 0)
+    assert actor.portrait == actor.view == bundle.manifest.camera
     assert actor.seconds == pytest.approx(49 / 25) and talk.body_times[-1] == 5.0
     face = talk.expressions[50]
     there, back = actor.draw(49 / 25 - 0.4, face), actor.draw(49 / 25 + 0.4, face)
@@ -142,6 +143,11 @@ def test_a_film_of_the_exact_person(tmp_path):
     assert actor.seconds == avatar.seconds and len(actor.idle) == 39
     low = avatar.gaussians(0.0).means.min(0).values.numpy()
     assert actor.view.eye[2] > 1 and low[1] < actor.view.target[1] < 1.7
+    camera = visitor_camera(actor.portrait, 256, 256)
+    head = avatar.head_gaussians(0.3).means.numpy().astype(float)
+    pixels, depths = camera.project(head)
+    assert (depths > 0).all() and 60 < np.ptp(pixels[:, 1]) < 128  # a face that can be found
+    assert pixels.min() > 0 and pixels.mean(0)[1] < 110
     file, sound = said(tmp_path, 0.6)
     Render(tmp_path / "avatar", tmp_path / "a.mp4", audio=file, size=(48, 64), fps=25).run()
     check_streams(tmp_path / "a.mp4", 0.6, 25, sound)
