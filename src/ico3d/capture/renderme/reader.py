@@ -136,15 +136,12 @@ class RenderMe360(SmcCapture):
 
     def points(self, frame: int = 0) -> np.ndarray | None:
         """(P, 3) in head space: FLAME's vertices, else the visual hull of the mattes, or None."""
-        pose, surface = self.world_from_head(frame), self.flame_fits.vertices(frame)
+        pose, vertices = self.world_from_head(frame), self.flame_fits.vertices(frame)
         if pose is None:
             return None
-        if surface is None:
-            surface = self._hull(frame)
-        if surface is None:
-            return None
-        local = (surface - pose[:3, 3]) @ pose[:3, :3]  # (P, 3)
-        return local[np.linalg.norm(local, axis=1) < HEAD_RADIUS]
+        inside = None if vertices is None else (vertices - pose[:3, 3]) @ pose[:3, :3]  # (P, 3)
+        surface = self._hull(frame) if inside is None else inside
+        return None if surface is None else surface[np.linalg.norm(surface, axis=1) < HEAD_RADIUS]
 
     @property
     def provenance(self) -> dict:
@@ -195,14 +192,23 @@ class RenderMe360(SmcCapture):
         return in_space([self.cameras[camera] for camera in seen], pixels)
 
     def _hull(self, frame: int) -> np.ndarray | None:
-        """(P, 3) surface of the visual hull in the world."""
+        """(P, 3) in head space: the visual hull of each camera's matte nearest in time."""
         seen = []
         for index, camera in enumerate(self.cameras):
-            mask = self.mask(index, frame)
-            if mask is not None:
-                seen.append(Silhouette.of(camera, mask))
+            nearest = self._nearest_matte(index, frame)
+            pose = None if nearest is None else self.world_from_head(nearest)
+            mask = None if nearest is None else self.mask(index, nearest)
+            if pose is not None and mask is not None:
+                seen.append(Silhouette.of(camera.moved(pose), mask))
         hull = visual_hull(seen, HULL_EDGE)
         return None if hull is None else hull.surface
+
+    def _nearest_matte(self, camera: int, frame: int) -> int | None:
+        """The frame with a matte of this camera that is nearest to a frame."""
+        folder = mask_folder(self._devices[camera].name)
+        found = [int(key) for key in self._holding(folder).keys(folder) if key.isdecimal()]
+        inside = [other for other in found if other < self.num_frames]
+        return min(inside, key=lambda other: (abs(other - frame), other), default=None)
 
     def _seconds(self) -> float | None:
         """Length of the sound."""
