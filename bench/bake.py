@@ -16,6 +16,7 @@ import tyro
 
 from ico3d.avatar import baking, comparison, staging
 from ico3d.avatar.bake_head import BakeSettings, HeadBaker, megabytes_per_10k
+from ico3d.avatar.samples import recorded_samples
 from ico3d.capture.capture import Capture
 from ico3d.head.trained import TrainedHead
 
@@ -41,8 +42,8 @@ class Bench:
         head, capture = TrainedHead.load(self.model), Capture.open(self.capture)
         neutral = staging.background_colour(capture, 0)
         views = comparison.references(head, capture, neutral, baking.MEASURED_VIEWS)
-        expressions = baking.training_expressions(head, capture)
-        importance = baking.importance_of(head, capture)
+        samples = recorded_samples(head, capture)
+        expressions, importance = samples.expressions, samples.importance
         rows = []
         for name, weights in (("image", importance), ("uniform", np.ones_like(importance))):
             start = time.perf_counter()

@@ -2,8 +2,9 @@
 
     python bench/make_demo.py human_face_f.npz --licences ICT-FaceKit-LICENSE.txt --work WORK
 
-Three steps of the command line, each skipped when WORK holds its result already; the seed
-decides everything. Look at WORK/strip.png (recorded | exact | baked) before shipping it.
+Head and body are recorded in two studios whose light differs. Steps of the command line, each
+skipped when WORK holds its result already; the seed decides everything. Look at WORK/check and
+WORK/strip.png (recorded | exact | baked) before shipping it.
 """
 
 import subprocess
@@ -14,8 +15,8 @@ from pathlib import Path
 import tyro
 
 from ico3d.bundle.format import Bundle
+from ico3d.bundle.packaged import FILE
 
-PACKAGED = Path(__file__).parents[1] / "src/ico3d/chat/data/demo.ico3d"
 MAX_BYTES = 12 << 20
 
 
@@ -25,54 +26,58 @@ class Demo:
 
     Attributes:
         subject: Subject file (.npz) of ico3d capture synthetic.
-        work: Folder for capture, model and strip.
+        work: Folder for captures, models and pictures.
         licences: Notices that the subject's sources ask for.
         out: The bundle to write.
-        frames: Frames at 25 per second to record.
-        size: Width and height of the pictures.
-        steps: Steps of training; those of the preset by default.
-        gaussians: Gaussians of the head; those of the preset by default.
+        head_frames: Frames of the head at 25 per second.
+        body_frames: Frames of the body at 15 per second.
+        size: Height of the pictures.
+        body: Changes to the cpu preset of the body, as name=value.
+        jobs: Windows of the body that train at once.
         seed: Of recording and training.
     """
 
     subject: tyro.conf.Positional[Path]
     work: Path
     licences: tuple[Path, ...]
-    out: Path = PACKAGED
-    frames: int = 1600
+    out: Path = FILE
+    head_frames: int = 1600
+    body_frames: int = 76
     size: int = 384
-    steps: int | None = None
-    gaussians: int | None = None
+    body: tuple[str, ...] = (
+        "max_gaussians=9000",
+        "initial_gaussians=5000",
+        "steps_per_frame=250",
+        "finetune_steps=1500",
+    )
+    jobs: int = 2
     seed: int = 0
 
     def run(self) -> None:
-        """Records, trains, bakes, checks."""
-        capture, model = self.work / "capture", self.work / "model"
-        if not capture.exists():
-            self._record(capture)
-        changes = self._changes()
-        ico3d("train head", capture, model, "--inputs", "speech", "--seed", self.seed, *changes)
+        """Records, trains, assembles, bakes, checks."""
+        work, seed = self.work, ("--seed", self.seed)
+        # moods and glances are nothing that a voice could drive
+        face = ("--rig", "bust", "--light", "studio", "--no-lively", "--cameras", 6)
+        self._record(work / "head-capture", self.head_frames, *face)
+        rings = ("--rig", "body", "--light", "warm", "--motion", "talk", "--cameras", 20)
+        self._record(work / "body-capture", self.body_frames, *rings, "--fps", 15)
+        ico3d("train head", work / "head-capture", work / "head", "--inputs", "speech", *seed)
+        parts = (work / "head", work / "body-capture", work / "avatar")
+        how = ("--set", *self.body, "--jobs", self.jobs, "--check", work / "check")
+        ico3d("assemble", *parts, *seed, *how)
+        files = (work / "avatar", work / "head-capture", work / "body-capture", self.out)
         notices = ("--licences", *self.licences)
-        ico3d("bake", model, capture, self.out, "--strip", self.work / "strip.png", *notices)
+        ico3d("bake", *files, "--strip", work / "strip.png", *notices)
         size = self.out.stat().st_size
         if size > MAX_BYTES:
             sys.exit(f"{self.out} has {size / 1e6:.1f} MB, more than a package should carry.")
         print(Bundle.open(self.out).manifest.loss, f"{size / 1e6:.2f} MB")
 
-    def _record(self, capture: Path) -> None:
-        # moods and glances are nothing that a voice could drive
-        shot = ("--rig", "bust", "--no-lively", "--cameras", 6)
-        size = ("--frames", self.frames, "--size", self.size, *shot)
-        ico3d("capture synthetic", capture, "--subject", self.subject, *size, "--seed", self.seed)
-
-    def _changes(self) -> list[str]:
-        values = {
-            "steps": self.steps,
-            "initial_gaussians": self.gaussians,
-            "max_gaussians": self.gaussians,
-        }
-        changes = [f"{name}={value}" for name, value in values.items() if value is not None]
-        return ["--set", *changes] if changes else []
+    def _record(self, capture: Path, frames: int, *shot: object) -> None:
+        if (capture / "capture.json").exists():
+            return
+        size = ("--frames", frames, "--size", self.size, "--seed", self.seed)
+        ico3d("capture synthetic", capture, "--subject", self.subject, *size, *shot)
 
 
 def ico3d(verb: str, *words: object) -> None:

@@ -258,7 +258,7 @@ def test_gaussians_that_come_and_go_are_refused(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["one", "two", "three"], "needs MODEL CAPTURE OUT"),
+        (["one", "two", "three"], "needs HEAD CAPTURE OUT"),
         (["out.ico3d", "--rank", "20"], "--rank is for heads"),
     ],
 )

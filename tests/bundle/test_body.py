@@ -11,16 +11,15 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from random_body import (
     RANKS,
-    body_files,
     body_manifest,
     random_window,
     random_windows,
     write_random_body,
 )
-from random_bundle import random_files, random_head, random_manifest
+from random_bundle import random_head, random_manifest
 
 from ico3d.bundle.body import BakedWindow
-from ico3d.bundle.format import Bundle, write_bundle
+from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import Manifest
 from ico3d.errors import BundleError
 
@@ -129,14 +128,6 @@ def test_a_bundle_of_a_body_alone_reads_back(tmp_path):
         bundle.window(2)
     with pytest.raises(BundleError, match="a body only, no head"):
         bundle.require_head()
-
-
-def test_head_and_body_share_a_bundle(tmp_path):
-    head = random_head(50)
-    manifest = replace(random_manifest(head), body=BODY)
-    write_bundle(tmp_path / "a.ico3d", manifest, random_files(head) | body_files(WINDOWS))
-    bundle = Bundle.open(tmp_path / "a.ico3d")
-    assert bundle.require_head()[0].num_gaussians == 50 and bundle.window(1).num_gaussians == 23
 
 
 def test_bundles_from_before_bodies_are_read():

@@ -52,6 +52,16 @@ def body(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def person(tmp_path_factory):
+    """A bundle of a head on a body."""
+    for name in ("random_bundle", "random_body"):
+        random_bundle_module(name)
+    path = tmp_path_factory.mktemp("bundle") / "person.ico3d"
+    random_bundle_module("random_whole").write_random_whole(path)
+    return Bundle.open(path)
+
+
+@pytest.fixture(scope="session")
 def question():
     """ "Who are you?" as (S,) int16 at 16 kHz, without the silence around it."""
     speech = synthesize("What is your name?", voice="en-us", rate=150)

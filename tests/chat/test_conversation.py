@@ -20,6 +20,7 @@ from ico3d.chat.protocol import (
     State,
     Stop,
     Text,
+    Timeline,
     Transcript,
 )
 from ico3d.measure.page import open_page
@@ -71,6 +72,7 @@ async def test_spoken_question_is_understood_and_answered(served, question):
     assert states == ["listening", "thinking", "speaking", "idle"]
     assert [m.text for m in page.messages(Answer, since)] == ["I am Random."]
     assert_gapless(sound_of(page, 1), page.messages(End, since)[0])
+    assert not page.messages(Timeline)  # a head alone has no body to move
     rows = np.concatenate([m.expressions for m in sound_of(page, 1)]).astype(np.float32)
     assert rows.shape[1] == 39 and np.isfinite(rows).all()
     assert rows[:, :32].std(axis=0).max() > 0.01  # the mouth moves

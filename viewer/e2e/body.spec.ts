@@ -2,6 +2,7 @@ import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import { Browser } from '../support/browser.ts';
 import { makeBody } from '../support/body.ts';
+import type { Playback } from '../src/motion/playback.ts';
 import { psnr, takePixels, worst } from '../support/pictures.ts';
 import { ChatServer } from '../support/server.ts';
 
@@ -166,8 +167,8 @@ describe('a body alone, served by ico3d serve', () => {
   test('the player is worked with the mouse and with the keyboard', async () => {
     await page.setViewportSize({ width: 360, height: 120 });
     await page.evaluate(() => window.ico3d!.stage.start());
-    const time = () => page.evaluate(() => window.ico3d!.body!.playback.time);
-    const playing = () => page.evaluate(() => window.ico3d!.body!.playback.playing);
+    const time = () => page.evaluate(() => window.ico3d!.body!.motion.time);
+    const playing = () => page.evaluate(() => (window.ico3d!.body!.motion as Playback).playing);
     expect(await playing()).toBe(false);
     await page.fill('#scrub', '2.4');
     await page.waitForFunction(() => window.ico3d!.body!.shown!.window === 2);

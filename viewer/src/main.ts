@@ -1,14 +1,14 @@
 import type { SplatGenerator } from '@sparkjsdev/spark';
 import './style.css';
-import { Body } from './body/body.ts';
-import { readBakedWindow } from './body/window.ts';
-import { loadFile, loadHead, loadManifest } from './bundle/load.ts';
-import { blinkIndices, type BodyInfo, type HeadInfo, type Manifest } from './bundle/manifest.ts';
-import { parseSafetensors } from './bundle/safetensors.ts';
+import type { Body } from './body/body.ts';
+import { bytesToFirstSight, loadManifest } from './bundle/load.ts';
+import { blinkIndices, type HeadInfo, type Manifest } from './bundle/manifest.ts';
+import { makeCast, type Cast } from './cast.ts';
 import { PageError, sentenceOf } from './errors.ts';
 import { Face } from './face/face.ts';
 import { IdleFace } from './face/idle.ts';
-import { Head } from './head/head.ts';
+import type { Head } from './head/head.ts';
+import type { MotionDirector } from './motion/director.ts';
 import { readSplats, type Splats } from './stage/readback.ts';
 import { Stage } from './stage/stage.ts';
 import { socketUrl } from './talk/connection.ts';
@@ -25,13 +25,14 @@ declare global {
       stage: Stage;
       head?: Head;
       body?: Body;
+      director?: MotionDirector;
       conversation?: Conversation;
       splats: (generator: SplatGenerator) => Splats;
     };
   }
 }
 
-const STILL = matchMedia('(prefers-reduced-motion: reduce)').matches;
+const CALM = matchMedia('(prefers-reduced-motion: reduce)').matches;
 const overlay = new Overlay();
 run().catch((error: unknown) => {
   if (!(error instanceof PageError)) console.error(error);
@@ -46,18 +47,16 @@ async function run(): Promise<void> {
   overlay.greet(name);
 
   const stage = new Stage(byId<HTMLCanvasElement>('stage'), manifest);
-  const head = manifest.head ? await makeHead(manifest, manifest.head) : undefined;
-  const body = manifest.body ? makeBody(manifest, manifest.body, stage) : undefined;
-  for (const actor of [head, body]) if (actor) stage.add(actor);
   const page = makePage(overlay, () => stage.frames);
-  stage.start();
-  await body?.ready();
+  const conversation = manifest.head ? new Conversation(socketUrl(location), page.view) : undefined;
+  const { head, body, playback, director } = await enter(manifest, stage, conversation);
+  if (body && playback) new PlayerBar(body, playback, 1 / manifest.body!.fps);
 
-  const conversation = head && new Conversation(socketUrl(location), page.view);
-  window.ico3d = { stage, head, body, conversation, splats: (generator) => readSplats(stage, generator) };
+  window.ico3d = { stage, head, body, director, conversation, splats: (generator) => readSplats(stage, generator) };
   if (head && conversation) {
-    conversation.bodyTime = () => body?.playback.time ?? head.bodyTime;
     head.director = makeFace(manifest.head!, conversation);
+    conversation.bodyTime = () => body?.time ?? 0;
+    conversation.gestures = director ?? null;
     await mayTalk(conversation);
   }
   overlay.hide();
@@ -65,26 +64,18 @@ async function run(): Promise<void> {
   else byId('play').focus();
 }
 
-async function makeHead(manifest: Manifest, info: HeadInfo): Promise<Head> {
-  return new Head(await loadHead(manifest, info, (fraction) => overlay.progress(fraction)), !STILL);
-}
-
-/** A body whose windows come from the server as they are needed. */
-function makeBody(manifest: Manifest, info: BodyInfo, stage: Stage): Body {
-  const load = async (index: number) => {
-    const window = info.windows[index]!;
-    const file = await loadFile(manifest, window.file, progressOf(manifest, window.file));
-    return readBakedWindow(parseSafetensors(file, window.file), info, window);
-  };
-  const body = new Body(info, !STILL, stage.spark, { load, failed: (error) => showNotice(sentenceOf(error)) });
-  new PlayerBar(body, 1 / info.fps);
-  return body;
-}
-
-/** Counts the bytes of a file on the overlay's bar. */
-function progressOf(manifest: Manifest, file: string): (bytes: number) => void {
+/** Brings everybody on stage and waits until they can be seen. */
+async function enter(manifest: Manifest, stage: Stage, conversation?: Conversation): Promise<Cast> {
+  const total = bytesToFirstSight(manifest);
   let loaded = 0;
-  return (bytes) => overlay.progress((loaded += bytes) / manifest.files[file]!.size);
+  const cast = await makeCast(manifest, stage, CALM, {
+    heard: () => conversation?.player.heard() ?? null,
+    loaded: (bytes) => overlay.progress(Math.min(1, (loaded += bytes) / total)),
+    failed: (error) => showNotice(sentenceOf(error)),
+  });
+  stage.start();
+  await cast.body?.ready();
+  return cast;
 }
 
 function makeFace(info: HeadInfo, conversation: Conversation): Face {

@@ -133,12 +133,12 @@ export interface SpeechMessage {
   expressions: Matrix;
 }
 
-/** Which body time belongs to which time of the sound. */
+/** Which body time belongs to which time of the sound, straight between the points. The points go on where those of an earlier message ended; what was planned from the first one's time on is replaced. After the last one the body stays, until the utterance ends. */
 export interface TimelineMessage {
   type: "timeline";
   /** Which answer. */
   utterance: number;
-  /** (audio time, body time) pairs, seconds. */
+  /** (audio time, body time) pairs, seconds, audio time ascending. */
   points: [number, number][];
 }
 

@@ -5,12 +5,14 @@ export const AHEAD = 1.5;
 
 /**
  * Feeds the page's player with `seconds` of noise from an utterance on, in pieces of 100–200 ms
- * with a face that goes round once a second (cos 2πt, sin 2πt). Returns at once.
+ * with a face that goes round once a second (cos 2πt, sin 2πt, 0 …). Returns at once.
  */
 export function feed(page: Page, utterance: number, seconds: number): Promise<void> {
   return page.evaluate(
     ([id, duration, ahead]) => {
-      const { player } = window.ico3d!.conversation!;
+      const { head, conversation } = window.ico3d!;
+      const { player } = conversation!;
+      const columns = head!.expression.length;
       const began = performance.now();
       window.pieces = [];
       let sample = 0;
@@ -21,12 +23,12 @@ export function feed(page: Page, utterance: number, seconds: number): Promise<vo
           // Never 0, so that silence is told from sound: −16384…16383 by a hash of the sample.
           const pcm = Int16Array.from({ length: count }, (_, i) => window.noise!(sample + i));
           const rows = Math.floor(((sample + count) / 24000) * 25) - row + 1;
-          const values = new Float32Array(2 * rows);
+          const values = new Float32Array(columns * rows);
           for (let i = 0; i < rows; i++) {
             const angle = (2 * Math.PI * (row + i)) / 25;
-            values.set([Math.cos(angle), Math.sin(angle)], 2 * i);
+            values.set([Math.cos(angle), Math.sin(angle)], columns * i);
           }
-          const expressions = { rows, columns: 2, values };
+          const expressions = { rows, columns, values };
           player.play({ utterance: id, first_sample: sample, first_expression: row, pcm, expressions });
           window.pieces!.push({ sample, count });
           sample += count;

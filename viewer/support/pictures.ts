@@ -11,7 +11,8 @@ export interface Still {
 export async function takeStill(page: Page, expression: number[]): Promise<Still> {
   const { attributes, coefficients } = await page.evaluate(async (row) => {
     const { stage, head, splats } = window.ico3d!;
-    head!.show(row);
+    head!.express(row);
+    head!.place(0);
     await stage.still();
     const { rgba } = splats(head!.generator);
     return { attributes: [...rgba], coefficients: [...head!.generator.shown] };
@@ -48,4 +49,17 @@ export function psnr(a: Uint8Array, b: Uint8Array): number {
 /** The largest difference between two arrays. */
 export function worst(a: ArrayLike<number>, b: ArrayLike<number>): number {
   return Array.from(a).reduce((most, value, i) => Math.max(most, Math.abs(value - b[i]!)), 0);
+}
+
+/** A part of a picture (H, W, 3). */
+export function crop(
+  picture: Uint8Array,
+  width: number,
+  part: { left: number; top: number; width: number; height: number },
+): Uint8Array {
+  const rows = Array.from({ length: part.height }, (_, y) => {
+    const begin = 3 * ((part.top + y) * width + part.left);
+    return [...picture.subarray(begin, begin + 3 * part.width)];
+  });
+  return Uint8Array.from(rows.flat());
 }

@@ -2,12 +2,12 @@ import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { describe, expect, test } from 'vitest';
 import { capacityOf, coefficientPlaces, pack } from '../src/body/packed.ts';
-import { Playback } from '../src/body/playback.ts';
 import { SortWatch } from '../src/body/sorting.ts';
 import { Timeline } from '../src/body/timeline.ts';
 import { coefficientsAt, readBakedWindow } from '../src/body/window.ts';
 import { checkManifest } from '../src/bundle/manifest.ts';
 import { parseSafetensors, type Tensor } from '../src/bundle/safetensors.ts';
+import { Playback } from '../src/motion/playback.ts';
 import { label } from '../src/ui/player.ts';
 import { makeBody } from '../support/body.ts';
 import { arrayBuffer } from '../support/reference.ts';
@@ -113,11 +113,13 @@ describe('the time line', () => {
     expect([timeline.contains(0, 0.4), timeline.contains(1, 0.4), timeline.contains(2, 0.4)]).toEqual([true, true, false]);
   });
 
-  test('knows what comes next in both directions, turning at the ends', () => {
-    expect([0, 1, 2].map((window) => timeline.ahead(window, 1, 1))).toEqual([1, 2, 1]);
-    expect([0, 1, 2].map((window) => timeline.ahead(window, -1, 1))).toEqual([1, 0, 1]);
-    expect([0, 1, 2].map((window) => timeline.ahead(window, 1, 2))).toEqual([2, 1, 0]);
-    expect(new Timeline({ fps: 1, windows: [{ last: 3 }] as typeof body.windows }).ahead(0, 1, 2)).toBe(0);
+  test('knows the windows on the way from stop to stop', () => {
+    expect([0, 1, 2].map((window) => timeline.route(window, [1.2, 0], 2))).toEqual([[1, 2], [2, 1], [1, 0]]);
+    expect([0, 1, 2].map((window) => timeline.route(window, [0, 1.2], 2))).toEqual([[1, 2], [0, 1], [1, 0]]);
+    expect(timeline.route(0, [0.4, 0.1, 0.5, 0.4, 1.1], 9)).toEqual([1, 2]); // a border belongs to both
+    expect(timeline.route(2, [0.2, 0.3], 9)).toEqual([1, 0]);
+    expect(timeline.route(1, [], 2)).toEqual([]);
+    expect([0, 1, 2].map((window) => timeline.beside(window))).toEqual([[1], [2, 0], [1]]);
   });
 
   test('places a time in its window', () => {
@@ -129,8 +131,9 @@ describe('the time line', () => {
 
 test('playback turns around at both ends without a jump', () => {
   const playback = new Playback(1, true);
+  const prompt = { time: 0, waiting: false };
   const seen = Array.from({ length: 60 }, () => {
-    playback.advance(0.07);
+    playback.advance(0.07, prompt);
     return playback.time;
   });
   expect(Math.max(...seen)).toBeGreaterThan(0.95);
@@ -139,11 +142,13 @@ test('playback turns around at both ends without a jump', () => {
   playback.seek(7);
   expect(playback.time).toBe(1);
   playback.playing = false;
-  playback.advance(1);
+  playback.advance(1, prompt);
   expect(playback.time).toBe(1);
   playback.playing = true;
-  playback.advance(100.5);
-  expect(playback.time).toBeGreaterThanOrEqual(0);
+  playback.advance(100.5, prompt);
+  expect(playback.time).toBe(0.75);
+  playback.advance(0.1, { time: 0.75, waiting: true });
+  expect(playback.time).toBe(0.75);
 });
 
 describe('a change has been sorted', () => {

@@ -1,8 +1,9 @@
+import { MathUtils, Matrix4, Object3D } from 'three';
 import { describe, expect, test } from 'vitest';
 import { Face, type Heard } from '../src/face/face.ts';
 import { IdleFace, lidClosure } from '../src/face/idle.ts';
 import { ExpressionTrack } from '../src/face/track.ts';
-import { backAndForth } from '../src/head/poses.ts';
+import { backAndForth, Poses } from '../src/head/poses.ts';
 
 const FPS = 25;
 const matrix = (...rows: number[][]) => ({
@@ -94,13 +95,34 @@ describe('a resting face', () => {
 });
 
 test.each([
-  [0, 0, 0],
-  [1.25, 1, 0.25],
-  [3, 2, 1],
-  [3.5, 2, 0.5],
-  [5, 1, 0],
-  [6, 0, 0],
-  [600.5, 0, 0.5],
-])('row %d of four runs back and forth', (row, index, fraction) => {
-  expect(backAndForth(row, 4)).toEqual({ index, next: index + 1, fraction });
+  [0, 0],
+  [1.25, 1.25],
+  [3, 3],
+  [3.5, 2.5],
+  [5, 1],
+  [6, 0],
+  [600.5, 0.5],
+])('row %d of four runs back and forth', (row, at) => {
+  expect(backAndForth(row, 4)).toBe(at);
+  expect(backAndForth(row, 1)).toBe(0);
+});
+
+describe('poses of a head', () => {
+  const turn = (degrees: number, x: number) => new Matrix4().makeRotationY(MathUtils.degToRad(degrees)).setPosition(x, 0, 0);
+  const rows = [turn(0, 0), turn(40, 2), turn(-20, 3)].flatMap((matrix) => matrix.transpose().toArray());
+  const poses = new Poses(Float32Array.from(rows));
+  test.each([
+    [-1, 0, 0],
+    [0, 0, 0],
+    [0.25, 10, 0.5],
+    [1, 40, 2],
+    [1.5, 10, 2.5],
+    [2, -20, 3],
+    [7, -20, 3],
+  ])('row %d lies between its neighbours, held at the ends', (row, degrees, x) => {
+    const object = new Object3D();
+    poses.apply(row, object);
+    expect(MathUtils.radToDeg(object.rotation.y)).toBeCloseTo(degrees, 4);
+    expect(object.position.x).toBeCloseTo(x, 5);
+  });
 });

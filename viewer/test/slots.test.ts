@@ -1,8 +1,10 @@
 import { describe, expect, test } from 'vitest';
-import { Playback } from '../src/body/playback.ts';
 import { Slots, type Shown, type Slot } from '../src/body/slots.ts';
 import { Timeline } from '../src/body/timeline.ts';
 import type { WindowInfo } from '../src/bundle/manifest.ts';
+import { MotionDirector, type Spoken } from '../src/motion/director.ts';
+import type { Motion } from '../src/motion/motion.ts';
+import { Playback } from '../src/motion/playback.ts';
 
 const TICK = 1 / 30;
 const SORT = 3 * TICK; // until what was put into a slot has been sorted
@@ -22,10 +24,13 @@ class Theatre {
   mostAtOnce = 0;
   private readonly sortedAt: [number, number] = [0, 0];
   private waiting: { due: number; act: () => void }[] = [];
+  private readonly motion: Motion;
 
-  constructor(lasts: number[], latency: number) {
+  /** @param motion what moves the body; by default its playback there and back */
+  constructor(lasts: number[], latency: number, motion?: Motion) {
     this.timeline = new Timeline({ fps: 15, windows: lasts.map((last) => ({ last })) as WindowInfo[] });
     this.playback = new Playback(this.timeline.duration, true);
+    this.motion = motion ?? this.playback;
     this.latency = latency;
     this.slots = new Slots<number>(this.timeline, {
       load: (window) => this.load(window),
@@ -58,8 +63,8 @@ class Theatre {
       this.waiting = this.waiting.filter(({ due }) => due > this.now);
       await new Promise((resolve) => setImmediate(resolve));
       const last = this.log.at(-1);
-      if (last && !last.waiting) this.playback.advance(TICK);
-      const shown = this.slots.update(this.playback.time, this.playback.direction, this.now);
+      if (last) this.motion.advance(TICK, last);
+      const shown = this.slots.update(this.motion.time, this.motion.stops(), this.now);
       if (shown) {
         expect(this.content[shown.slot]).toBe(shown.window); // what is seen is there …
         expect(this.now).toBeGreaterThanOrEqual(this.sortedAt[shown.slot]); // … sorted …
@@ -149,6 +154,47 @@ describe('windows in two slots', () => {
     await theatre.run(16); // to the end and back
     expect(theatre.fetched.filter((window) => window === 2).length).toBe(2);
     expect(theatre.fetched.length).toBeLessThan(30);
+  });
+
+  test('a person who rests in one window and gestures through others: each is there in time', async () => {
+    const animation = { fps: 15, num_frames: 55, rest: { start: 11, end: 17 }, min_speed: 0.6, max_speed: 1.2 };
+    let spoken: Spoken | null = null;
+    const director = new MotionDirector(animation, () => spoken);
+    const theatre = new Theatre([9, 18, 27, 36, 45, 54], 0.3, director);
+    const rest = (await theatre.run(4)).filter((shown) => shown !== null);
+    expect(new Set(rest.map(({ window }) => window))).toEqual(new Set([1]));
+    expect(theatre.fetched.slice().sort()).toEqual([0, 1, 2]); // what is beside it waits
+
+    // To the last window, back through all of them to the first, and to the rest.
+    director.plan(0, [[0, 1], [3, 3.5], [3.5, 3.5], [7.5, 0], [8, 0.6]]);
+    const begin = theatre.now;
+    const motion = director.advance.bind(director);
+    director.advance = (step, seen) => {
+      spoken = { utterance: 0, seconds: theatre.now - begin };
+      motion(step, seen);
+    };
+    const log = (await theatre.run(8)).filter((shown) => shown !== null);
+    expect(log.every(({ waiting }) => !waiting)).toBe(true);
+    const order = log.map(({ window }) => window).filter((window, i, all) => window !== all[i - 1]);
+    expect(order).toEqual([1, 2, 3, 4, 5, 4, 3, 2, 1, 0]);
+    for (const jump of jumps(log)) expect(jump).toBeLessThanOrEqual(1.2 * TICK + 1e-9);
+  });
+
+  test('a person whose windows are late waits at the border and goes on from there', async () => {
+    const animation = { fps: 15, num_frames: 55, rest: { start: 0, end: 6 }, min_speed: 0.6, max_speed: 1.2 };
+    const spoken = { utterance: 0, seconds: 0 };
+    const director = new MotionDirector(animation, () => spoken);
+    director.plan(0, [[0, 0], [3.6, 3.6]]);
+    const theatre = new Theatre([9, 18, 27, 36, 45, 54], 2, director);
+    const motion = director.advance.bind(director);
+    director.advance = (step, seen) => {
+      spoken.seconds += step; // the sound does not wait
+      motion(step, seen);
+    };
+    const log = (await theatre.run(14)).filter((shown) => shown !== null);
+    expect(log.some(({ waiting }) => waiting)).toBe(true);
+    for (const jump of jumps(log)) expect(jump).toBeLessThanOrEqual(1.2 * TICK + 1e-9);
+    expect(log.at(-1)!.time).toBe(3.6);
   });
 
   test('one window alone is played there and back', async () => {

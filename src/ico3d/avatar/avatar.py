@@ -106,15 +106,10 @@ class TrainedAvatar:
         return cat([body, self.head_gaussians(seconds, expression)])
 
     def save(self, folder: Path) -> None:
-        """Writes the head and the placement beside the body, which lies in `folder/body` already."""
+        """Writes head and placement beside the body, which lies in `folder/body` already."""
         (folder / HEAD).mkdir(parents=True, exist_ok=True)
         self.head.save(folder / HEAD)
-        tensors = {
-            "canonical_from_head": torch.from_numpy(self.placement.canonical_from_head),
-            "world_from_canonical": torch.from_numpy(self.placement.world_from_canonical),
-            "expressions": torch.from_numpy(self.expressions),
-        }
-        save_tensors(folder / PLACEMENT, tensors, {})
+        save_placement(folder / PLACEMENT, self.placement, self.expressions)
         write_atomic(folder / ABOUT, json.dumps({"summary": self.summary}, indent=1).encode())
 
     @classmethod
@@ -131,17 +126,44 @@ class TrainedAvatar:
             raise ModelError(
                 f"{folder} holds no avatar ({error}): make one with ico3d assemble."
             ) from error
-        tensors, _ = load_tensors(folder / PLACEMENT)
         head, body = TrainedHead.load(folder / HEAD), TrainedBody.load(folder / BODY)
-        size = head.model.shape.expression_size
-        expected = {
-            "canonical_from_head": (4, 4),
-            "world_from_canonical": (body.windows[-1].last + 1, 4, 4),
-            "expressions": (body.windows[-1].last + 1, size),
-        }
-        for name, shape in expected.items():
-            if name not in tensors or tuple(tensors[name].shape) != shape:
-                raise ModelError(f"{folder / PLACEMENT}: '{name}' must have the shape {shape}.")
-        values = {name: tensors[name].numpy() for name in expected}
-        placement = Placement(values["canonical_from_head"], values["world_from_canonical"])
-        return cls(head, body, placement, values["expressions"], summary)
+        placement, expressions = load_placement(folder / PLACEMENT)
+        frames = len(placement.world_from_canonical), body.windows[-1].last + 1
+        sizes = expressions.shape[1], head.model.shape.expression_size
+        if frames[0] != frames[1] or sizes[0] != sizes[1]:
+            raise ModelError(
+                f"{folder}: head, body and placement do not belong together: it has {frames[0]} "
+                f"head poses for {frames[1]} frames, and {sizes[0]} inputs for {sizes[1]}."
+            )
+        return cls(head, body, placement, expressions, summary)
+
+
+def save_placement(file: Path, placement: Placement, expressions: np.ndarray) -> None:
+    """Writes where a head is and what drives it (F, B), frame by frame."""
+    tensors = {
+        "canonical_from_head": torch.from_numpy(placement.canonical_from_head),
+        "world_from_canonical": torch.from_numpy(placement.world_from_canonical),
+        "expressions": torch.from_numpy(expressions),
+    }
+    save_tensors(file, tensors, {})
+
+
+def load_placement(file: Path) -> tuple[Placement, np.ndarray]:
+    """Reads what `save_placement` wrote.
+
+    Raises:
+        ModelError: If the file is missing or damaged.
+    """
+    tensors, _ = load_tensors(file)
+    names = ("canonical_from_head", "world_from_canonical", "expressions")
+    try:
+        values = {name: tensors[name].numpy() for name in names}
+    except KeyError as error:
+        raise ModelError(f"{file} lacks {error}: assemble the avatar again.") from error
+    count, size = [*values["expressions"].shape, 0, 0][:2]
+    expected = ((4, 4), (count, 4, 4), (count, size))
+    for name, shape in zip(names, expected, strict=True):
+        if values[name].shape != shape or not np.isfinite(values[name]).all():
+            raise ModelError(f"{file}: '{name}' must be finite and have the shape {shape}.")
+    poses = Placement(values["canonical_from_head"], values["world_from_canonical"])
+    return poses, values["expressions"]

@@ -9,6 +9,7 @@ import torch
 
 from ico3d.avatar.bake_head import LEAST_ALPHA
 from ico3d.avatar.motion_clusters import Channel, components, group
+from ico3d.avatar.spans import Span
 from ico3d.bundle.body import QUAT_UNIT, BakedWindow
 from ico3d.errors import BundleError
 from ico3d.splat.gaussians import Gaussians
@@ -20,20 +21,6 @@ _MOST_FADING = 0.02
 """How much an opacity may change within a window, which has but one; more would be seen."""
 GAUSSIANS_PER_CLUSTER = 140
 """At least, on average: each cluster's curves take their room, too."""
-
-
-class Span(Protocol):
-    """Frames first … last, both included."""
-
-    @property
-    def first(self) -> int:
-        """The first frame."""
-        ...
-
-    @property
-    def last(self) -> int:
-        """The last frame."""
-        ...
 
 
 class MovingBody(Protocol):

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from ico3d.avatar import comparison, staging
 from ico3d.avatar.bake_head import MAX_RANK, BakeSettings, HeadBaker, megabytes_per_10k
-from ico3d.avatar.importance import logit_importance
 from ico3d.avatar.render_bundle import baked_gaussians
+from ico3d.avatar.samples import Samples, training_expressions
 from ico3d.bundle.format import HEAD, LICENSES, POSES, SPEECH, THUMBNAIL, write_bundle
 from ico3d.bundle.head import BakedHead, poses_to_bytes
 from ico3d.bundle.manifest import (
@@ -25,7 +24,6 @@ from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
 from ico3d.errors import BundleError
 from ico3d.head.expressions import FEATURE_RATE
 from ico3d.head.trained import TrainedHead
-from ico3d.head.views import view_of
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.export import export_speech
 from ico3d.speech.network import SpeechAdaptor
@@ -34,9 +32,7 @@ RANKS = (16, 20, 24, 28, MAX_RANK)
 """Tried in this order. Not fewer: means over views would not notice that rare blinks are lost."""
 MAX_MEGABYTES = 1.7
 """MB of head.safetensors per 10,000 Gaussians, at most."""
-_PROBES = 32
 MEASURED_VIEWS = 40
-_SILENCE_SECONDS = 2
 
 Report = Callable[[str], None]
 
@@ -56,10 +52,8 @@ class BakedResult:
 
     def __str__(self) -> str:
         """One line for people."""
-        loss = self.loss
         return (
-            f"rank {self.head.rank}: {loss.psnr_exact:.2f} dB exact, {loss.psnr_baked:.2f} dB "
-            f"baked, {loss.psnr_baked_vs_exact:.2f} dB baked against exact, "
+            f"rank {self.head.rank}: {comparison.in_words(self.loss)}, "
             f"{self.megabytes:.2f} MB per 10,000 of {self.head.num_gaussians} Gaussians"
         )
 
@@ -67,7 +61,7 @@ class BakedResult:
 def bake(
     head: TrainedHead,
     views: list[comparison.Reference],
-    capture: Capture,
+    samples: Samples,
     rank: int | None,
     report: Report,
     settings: BakeSettings | None = None,
@@ -77,16 +71,14 @@ def bake(
     Args:
         head: The exact head.
         views: What to measure with.
-        capture: Whose training frames give the expressions.
+        samples: What it is baked from.
         rank: K, or None to choose.
         report: Is told each result.
         settings: Of the fit; the usual ones where None.
     """
     report("sampling the exact head …")
-    recorded, importance = training_expressions(head, capture), importance_of(head, capture)
-    baker = HeadBaker(
-        head.model, recorded, importance, rank or MAX_RANK, settings or BakeSettings()
-    )
+    chosen = settings or BakeSettings()
+    baker = HeadBaker(head.model, samples.expressions, samples.importance, rank or MAX_RANK, chosen)
     results = []
     for candidate in (rank,) if rank else RANKS:
         baked = baker.baked(candidate)
@@ -96,7 +88,7 @@ def bake(
             return result
         results.append(result)
     within = [result for result in results if result.megabytes <= MAX_MEGABYTES]
-    return max(within or results, key=lambda result: result.loss.psnr_baked or 0)
+    return max(within or results, key=lambda result: result.loss.psnr_baked_vs_exact or 0)
 
 
 def check(result: BakedResult) -> None:
@@ -135,7 +127,7 @@ def write(
     """
     poses = staging.idle_motion(capture)
     frontal = staging.frontal_camera(capture)
-    idle = _idle_expression(head, capture)
+    idle = idle_expression(head, training_expressions(head, capture))
     seen = baked_gaussians(result.head, idle)
     middle = poses[len(poses) // 2]
     points = seen.means[seen.opacities > 0.1].numpy() @ middle[:3, :3].T + middle[:3, 3]
@@ -148,12 +140,12 @@ def write(
     }
     speech = None
     if head.adaptor is not None:
-        files[SPEECH], speech = _speech(head.adaptor, head.encoder)
+        files[SPEECH], speech = speech_file(head.adaptor, head.encoder)
     if notices:
         files[LICENSES] = notices.encode()
     manifest = Manifest(
         name=name,
-        head=_head_info(result.head, head, idle, capture.fps, len(poses)),
+        head=head_info(result.head, head, idle, capture.fps, len(poses)),
         body=None,
         speech=speech,
         camera=camera,
@@ -165,51 +157,27 @@ def write(
     return write_bundle(out, manifest, files)
 
 
-def training_expressions(head: TrainedHead, capture: Capture) -> np.ndarray:
-    """(T, B) of the training frames."""
-    track = head.track(capture)
-    with torch.no_grad():
-        return np.stack([track.at(frame).numpy() for frame in capture.split.train])
+def idle_expression(head: TrainedHead, recorded: np.ndarray) -> np.ndarray:
+    """(B,) silence with open eyes; for blendshapes, the most neutral face that was recorded.
 
-
-def importance_of(head: TrainedHead, capture: Capture) -> np.ndarray:
-    """(N, 4) as training frames see it, from all cameras in turn."""
-    frames = capture.split.train
-    frames = [frames[i] for i in np.linspace(0, len(frames) - 1, _PROBES).astype(int)]
-    frames = [frame for frame in frames if capture.world_from_head(frame) is not None]
-    cameras = [view_of(capture, i % len(capture.cameras), f).camera for i, f in enumerate(frames)]
-    track = head.track(capture)
-    with torch.no_grad():
-        expressions = torch.stack([track.at(frame) for frame in frames])  # (P, B)
-    colour = torch.tensor(staging.background_colour(capture, 0))
-    return logit_importance(head.model, expressions, cameras, colour, seed=0)
-
-
-def _idle_expression(head: TrainedHead, capture: Capture) -> np.ndarray:
-    """(B,) silence with open eyes; for blendshapes, the most neutral face that was recorded."""
+    Args:
+        head: Whose face.
+        recorded: (T, B) what it usually does.
+    """
     if head.adaptor is None:
-        recorded = training_expressions(head, capture)
         return recorded[np.abs(recorded).sum(axis=1).argmin()]
-    silence = np.zeros(16_000 * _SILENCE_SECONDS, np.float32)
-    features = torch.from_numpy(load_encoder(head.encoder).features(silence, 16_000))
-    with torch.no_grad():
-        rows = head.adaptor.track(features)  # (T, 32)
-    return np.concatenate([rows[len(rows) // 2].numpy(), _open_eyes(capture)])
+    return np.concatenate([head.neutral()[:SPEECH_SIZE], _open_eyes(recorded[:, SPEECH_SIZE:])])
 
 
-def _open_eyes(capture: Capture) -> np.ndarray:
-    """(7,) brows at their usual place, lids as open as they usually get."""
-    rows = [capture.eyes(frame) for frame in capture.split.train]
-    known = np.array([row for row in rows if row is not None and np.isfinite(row).all()])
-    if len(known) == 0:
-        return np.zeros(len(EYE_NAMES), np.float32)
-    eyes = np.median(known, axis=0)
+def _open_eyes(recorded: np.ndarray) -> np.ndarray:
+    """(7,) brows at their usual place, lids as open as they usually get, from (T, 7)."""
+    eyes = np.median(recorded, axis=0)
     lids = [i for i, name in enumerate(EYE_NAMES) if "Blink" in name]
-    eyes[lids] = np.percentile(known[:, lids], 10, axis=0)
+    eyes[lids] = np.percentile(recorded[:, lids], 10, axis=0)
     return eyes.astype(np.float32)
 
 
-def _speech(adaptor: SpeechAdaptor, encoder_name: str) -> tuple[bytes, SpeechInfo]:
+def speech_file(adaptor: SpeechAdaptor, encoder_name: str) -> tuple[bytes, SpeechInfo]:
     """`speech.onnx` and what the manifest says about it."""
     encoder = load_encoder(encoder_name)
     kind = "mel" if encoder.name == "builtin" else "features"
@@ -217,9 +185,10 @@ def _speech(adaptor: SpeechAdaptor, encoder_name: str) -> tuple[bytes, SpeechInf
     return export_speech(adaptor, encoder), info
 
 
-def _head_info(
+def head_info(
     baked: BakedHead, head: TrainedHead, idle: np.ndarray, fps: float, num_poses: int
 ) -> HeadInfo:
+    """What the manifest says about a head."""
     speech = head.adaptor is not None
     return HeadInfo(
         num_gaussians=baked.num_gaussians,

@@ -6,14 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.avatar import staging
+from ico3d.avatar import comparison, staging
 from ico3d.avatar.bake_body import SAMPLES_PER_FRAME, MovingBody, Shape, WindowBaker
 from ico3d.avatar.measure_body import (
+    HeadAt,
     comparison_line,
     measure_window,
     probe_views,
     recorded_views,
     ring_of_cameras,
+    window_pair,
 )
 from ico3d.avatar.render_bundle import window_gaussians
 from ico3d.bundle.body import BakedWindow
@@ -74,8 +76,7 @@ class WindowResult:
     @property
     def drop(self) -> float | None:
         """What is lost against ground truth, in dB; None where there is none."""
-        exact, baked = self.loss.psnr_exact, self.loss.psnr_baked
-        return None if exact is None or baked is None else exact - baked
+        return comparison.drop(self.loss)
 
     @property
     def acceptable(self) -> bool:
@@ -96,30 +97,26 @@ class WindowResult:
 
     def __str__(self) -> str:
         """One line for people."""
-        loss, window = self.loss, self.window
+        window = self.window
         shape = f"{window.num_clusters} × {'/'.join(map(str, window.ranks))}"
-        against = ""
-        if self.drop is not None:
-            against = (
-                f"{loss.psnr_exact:.2f} dB exact, {loss.psnr_baked:.2f} dB baked "
-                f"({self.drop:+.3f} dB lost), "
-            )
         return (
             f"{window.num_gaussians} Gaussians, {self.seconds:.2f} s, {shape} components: "
-            f"{against}{loss.psnr_baked_vs_exact:.1f} dB baked against exact, "
-            f"{self.bytes_per_gaussian:.1f} bytes per Gaussian"
+            f"{comparison.in_words(self.loss)}, {self.bytes_per_gaussian:.1f} bytes per Gaussian"
         )
 
 
-def bake(body: MovingBody, capture: Capture | None) -> Iterator[WindowResult]:
+def bake(
+    body: MovingBody, capture: Capture | None, head: HeadAt | None = None
+) -> Iterator[WindowResult]:
     """Bakes window after window, each in the smallest shape that loses little, or the best.
 
     Args:
         body: The exact body.
         capture: Its recording, to measure with; None to measure against the exact body only.
+        head: The exact head on it, which is in the recorded pictures.
     """
     for index in range(len(body.windows)):
-        yield _best(_attempts(body, index, capture))
+        yield _best(_attempts(body, index, capture, head))
 
 
 def check(results: list[WindowResult]) -> None:
@@ -162,8 +159,8 @@ def write(
         notices: Text of LICENSES.txt; no such file where it is empty.
     """
     windows = [result.window for result in results]
-    info = _body_info(windows, body)
-    camera = _camera(np.array(info.low), np.array(info.high), capture)
+    info = body_info(windows, body)
+    camera = standing_camera(np.array(info.low), np.array(info.high), capture)
     background = staging.background_colour(capture, 0) if capture else staging.NEUTRAL
     files = {window_file(i): result.data for i, result in enumerate(results)}
     files[THUMBNAIL] = staging.thumbnail(window_gaussians(windows[0], 0.0), camera, background)
@@ -188,21 +185,24 @@ def strip(body: MovingBody, results: list[WindowResult], capture: Capture | None
     """[recorded |] exact | baked of each window's begin, one below the other: uint8."""
     lines = []
     for index, (span, result) in enumerate(zip(body.windows, results, strict=True)):
-        probes = probe_views(ring_of_cameras(*_seen_box(result.window)), span, 1)
+        probes = probe_views(ring_of_cameras(*seen_box(result.window)), span, 1)
         views = list(recorded_views(capture, span, 1)) if capture else probes
-        lines.append(comparison_line(body, index, result.window, views[0]))
+        pair = window_pair(body, index, result.window, None)
+        lines.append(comparison_line(*pair, views[0]))
     return (np.vstack(lines).clip(0, 1) * 255 + 0.5).astype(np.uint8)
 
 
-def _attempts(body: MovingBody, index: int, capture: Capture | None) -> Iterator[WindowResult]:
+def _attempts(
+    body: MovingBody, index: int, capture: Capture | None, head: HeadAt | None
+) -> Iterator[WindowResult]:
     """A window in one shape after the other."""
     span, baker = body.windows[index], WindowBaker(body, index)
     seconds = (span.last - span.first) / body.fps
     for shape in SHAPES:
         baked = baker.baked(shape)
         recorded = recorded_views(capture, span) if capture else []
-        probes = probe_views(ring_of_cameras(*_seen_box(baked)), span)
-        loss = measure_window(body, index, baked, recorded, probes)
+        probes = probe_views(ring_of_cameras(*seen_box(baked)), span)
+        loss = measure_window(body, index, baked, recorded, probes, head)
         yield WindowResult(baked, baked.to_bytes(window_file(index)), seconds, loss)
 
 
@@ -217,8 +217,9 @@ def _best(attempts: Iterator[WindowResult]) -> WindowResult:
     return max(within or tried, key=lambda result: result.loss.psnr_baked_vs_exact or 0.0)
 
 
-def _body_info(windows: list[BakedWindow], body: MovingBody) -> BodyInfo:
-    boxes = [_seen_box(window, (0.0, 0.5, 1.0)) for window in windows]
+def body_info(windows: list[BakedWindow], body: MovingBody) -> BodyInfo:
+    """What the manifest says about a body."""
+    boxes = [seen_box(window, (0.0, 0.5, 1.0)) for window in windows]
     infos = [
         WindowInfo(
             first=span.first,
@@ -237,7 +238,7 @@ def _body_info(windows: list[BakedWindow], body: MovingBody) -> BodyInfo:
     )
 
 
-def _seen_box(
+def seen_box(
     window: BakedWindow, taus: tuple[float, ...] = (0.5,)
 ) -> tuple[np.ndarray, np.ndarray]:
     """Least and greatest coordinates of what is seen, but for a few strays."""
@@ -249,17 +250,28 @@ def _seen_box(
     return low, high
 
 
-def _camera(low: np.ndarray, high: np.ndarray, capture: Capture | None) -> CameraInfo:
-    """Level with the body's middle, from the capture's first camera; without one, along +z."""
+def standing_camera(
+    low: np.ndarray, high: np.ndarray, capture: Capture | None, front: np.ndarray | None = None
+) -> CameraInfo:
+    """Level with the body's middle, so far away that all of it is seen.
+
+    Args:
+        low: (3,) least coordinates.
+        high: (3,) greatest coordinates.
+        capture: Its cameras stand upright, more or less; without one, y is up.
+        front: (3,) where the person looks; by default toward the capture's first camera, without
+            one along +z.
+    """
     up, toward = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
     if capture is not None:
         rotations = np.stack([camera.world_to_camera[:3, :3] for camera in capture.cameras])
-        up = -rotations[:, 1].mean(axis=0)  # cameras stand upright, more or less
+        up = -rotations[:, 1].mean(axis=0)
         up /= np.linalg.norm(up)
         toward = capture.cameras[0].camera_to_world[:3, 3] - (low + high) / 2
-        toward -= up * (toward @ up)
-        toward /= np.linalg.norm(toward)
-    return staging.standing_view(low, high, up, toward)
+    if front is not None:
+        toward = front
+    toward = toward - up * (toward @ up)
+    return staging.standing_view(low, high, up, toward / np.linalg.norm(toward))
 
 
 def _mean_loss(losses: list[Loss]) -> Loss:

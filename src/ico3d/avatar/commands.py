@@ -1,5 +1,6 @@
 """The verb `ico3d bake`."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
@@ -7,7 +8,13 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import tyro
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from ico3d.avatar.body_bundle import WindowResult
     from ico3d.bundle.manifest import Persona
+    from ico3d.capture.capture import Capture
+
+FILES = "[CAPTURE ...] OUT"
 
 
 @dataclass(frozen=True)
@@ -15,13 +22,15 @@ class Bake:
     """Makes the bundle that browsers play, and measures what baking costs on test pictures.
 
     Attributes:
-        model: A model folder of ico3d train head or ico3d train body.
-        files: The capture it was trained on, and the bundle to write, NAME.ico3d. Bodies can do
-            without the capture; then they are measured against the exact model only.
+        model: A model folder of ico3d train head, ico3d train body or ico3d assemble.
+        files: The recordings it was made from, and the bundle to write, NAME.ico3d. A head: CAPTURE
+            OUT. A body: [CAPTURE] OUT. A whole person: [HEAD_CAPTURE [BODY_CAPTURE]] OUT. Without
+            its capture, a body is measured against the exact model only; without that of its head,
+            a whole person is baked from what synthetic voices say.
         rank: Number of basis vectors of a head, 1 to 64; by default the smallest from 16 on that
             keeps the bounds: at most 0.3 dB lost against ground truth, at least 45 dB against the
             exact model, at most 1.7 MB per 10,000 Gaussians. Bodies: at most 0.1 dB lost, at most
-            110 bytes per Gaussian and window.
+            110 bytes per Gaussian and window. Whole persons: besides, at most 0.3 dB lost.
         name: The avatar's name; by default the persona's, of bodies the bundle's.
         persona: JSON file with name, greeting and notes; for heads, by default that of the package.
         licences: Text files with notices that the sources ask for; they go into LICENSES.txt.
@@ -30,7 +39,9 @@ class Bake:
     """
 
     model: tyro.conf.Positional[Path]
-    files: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="[CAPTURE] OUT")]
+    files: Annotated[
+        tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="[CAPTURE ...] OUT")
+    ]
     rank: int | None = None
     name: str | None = None
     persona: Path | None = None
@@ -47,15 +58,19 @@ class Bake:
         """
         from rich.console import Console
 
-        from ico3d.body.trained import ABOUT
+        from ico3d.avatar.avatar import ABOUT as AVATAR
+        from ico3d.body.trained import ABOUT as BODY
         from ico3d.bundle.format import Bundle
 
         console = Console()
-        is_body = (self.model / ABOUT).is_file()
-        least, most = (1, 2) if is_body else (2, 2)
+        is_whole, is_body = ((self.model / about).is_file() for about in (AVATAR, BODY))
+        least, most = (1, 3) if is_whole else (1, 2) if is_body else (2, 2)
         if not least <= len(self.files) <= most:
-            self._refuse("ico3d bake needs MODEL CAPTURE OUT; only bodies can do without CAPTURE.")
-        bake = self._bake_body if is_body else self._bake_head
+            self._refuse(
+                "ico3d bake needs HEAD CAPTURE OUT, BODY [CAPTURE] OUT, or "
+                "AVATAR [HEAD_CAPTURE [BODY_CAPTURE]] OUT."
+            )
+        bake = self._bake_whole if is_whole else self._bake_body if is_body else self._bake_head
         bake(console.print)
         Bundle.open(self._out)
         console.print(f"{self._out}: {self._out.stat().st_size / 1e6:.2f} MB.")
@@ -67,17 +82,17 @@ class Bake:
     def _bake_head(self, report) -> None:
         from ico3d.avatar import baking, comparison, staging
         from ico3d.avatar.persona import load_persona
-        from ico3d.bundle.limits import MAX_RANK
+        from ico3d.avatar.samples import recorded_samples
         from ico3d.capture.capture import Capture
         from ico3d.head.trained import TrainedHead
 
-        if self.rank is not None and not 1 <= self.rank <= MAX_RANK:
-            self._refuse(f"--rank must lie between 1 and {MAX_RANK}, not {self.rank}.")
+        self._check_rank()
         persona, notices = load_persona(self.persona), self._notices()
         head, capture = TrainedHead.load(self.model), Capture.open(self.files[0])
         neutral = staging.background_colour(capture, 0)
         views = comparison.references(head, capture, neutral, baking.MEASURED_VIEWS)
-        result = baking.bake(head, views, capture, self.rank, report)
+        samples = recorded_samples(head, capture)
+        result = baking.bake(head, views, samples, self.rank, report)
         if self.strip:
             _save_picture(comparison.strip(result.head, views), self.strip)
         if not self.force:
@@ -86,28 +101,57 @@ class Bake:
         baking.write(self._out, name, result, head, capture, persona, notices)
 
     def _bake_body(self, report) -> None:
-        from rich.progress import track
-
         from ico3d.avatar import body_bundle
         from ico3d.body.trained import TrainedBody
-        from ico3d.capture.capture import Capture
 
         if self.rank is not None:
             self._refuse("--rank is for heads: what a body keeps is chosen window by window.")
         persona, notices = self._body_persona(), self._notices()
-        body = TrainedBody.load(self.model)
-        capture = Capture.open(self.files[0]) if len(self.files) > 1 else None
-        results = []
-        for result in track(body_bundle.bake(body, capture), "baking", len(body.windows)):
-            report(f"window {len(results)}: {result}")
-            results.append(result)
-        rate = body_bundle.megabits_per_second(results)
-        report(f"{rate:.2f} Mbit/s while it plays.")
+        body, capture = TrainedBody.load(self.model), self._capture(0)
+        results = _watched(body_bundle.bake(body, capture), len(body.windows), report)
         if self.strip:
             _save_picture(body_bundle.strip(body, results, capture), self.strip)
         if not self.force:
             body_bundle.check(results)
         body_bundle.write(self._out, persona, results, body, capture, notices)
+
+    def _bake_whole(self, report) -> None:
+        from ico3d.avatar import baking, body_bundle, comparison, whole_bundle
+        from ico3d.avatar.avatar import TrainedAvatar
+        from ico3d.avatar.persona import load_persona
+
+        self._check_rank()
+        persona, notices = load_persona(self.persona), self._notices()
+        avatar = TrainedAvatar.load(self.model)
+        animation = whole_bundle.animation_of(self.model, avatar)
+        head_capture, body_capture = self._capture(0), self._capture(1)
+        samples, views = whole_bundle.head_samples(avatar, head_capture, persona)
+        head = baking.bake(avatar.head, views, samples, self.rank, report)
+        windows = whole_bundle.bake_windows(avatar, body_capture)
+        windows = _watched(windows, len(avatar.body.windows), report)
+        parts = (head.head, windows, samples.expressions)
+        result = whole_bundle.put_together(avatar, *parts, body_capture)
+        report(f"the whole person: {comparison.in_words(result.loss)}.")
+        if self.strip:
+            _save_picture(whole_bundle.strip(avatar, result.person, body_capture), self.strip)
+        if not self.force:
+            baking.check(head)
+            body_bundle.check(windows)
+            whole_bundle.check(result)
+        about = (persona, self.name or persona.name, notices)
+        whole_bundle.write(self._out, avatar, result, animation, body_capture, about)
+
+    def _capture(self, index: int) -> "Capture | None":
+        """The one that was named in this place before the bundle, if any."""
+        from ico3d.capture.capture import Capture
+
+        return Capture.open(self.files[index]) if index < len(self.files) - 1 else None
+
+    def _check_rank(self) -> None:
+        from ico3d.bundle.limits import MAX_RANK
+
+        if self.rank is not None and not 1 <= self.rank <= MAX_RANK:
+            self._refuse(f"--rank must lie between 1 and {MAX_RANK}, not {self.rank}.")
 
     def _body_persona(self) -> "Persona":
         """The one that was given; bodies alone do not talk and need but a name."""
@@ -130,6 +174,22 @@ class Bake:
         from ico3d.errors import SettingsError
 
         raise SettingsError(sentence)
+
+
+def _watched(
+    windows: "Iterator[WindowResult]", count: int, report: Callable[[str], None]
+) -> "list[WindowResult]":
+    """Bakes all windows while the progress is shown."""
+    from rich.progress import track
+
+    from ico3d.avatar.body_bundle import megabits_per_second
+
+    results = []
+    for result in track(windows, "baking", count):
+        report(f"window {len(results)}: {result}")
+        results.append(result)
+    report(f"{megabits_per_second(results):.2f} Mbit/s while it plays.")
+    return results
 
 
 def _save_picture(picture, path: Path) -> None:

@@ -1,21 +1,27 @@
 """What baking costs a body: exact and baked windows beside each other and the recording."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 
-from ico3d.avatar.bake_body import SAMPLES_PER_FRAME, MovingBody, Span
+from ico3d.avatar.bake_body import SAMPLES_PER_FRAME, MovingBody
 from ico3d.avatar.comparison import psnr
 from ico3d.avatar.render_bundle import window_gaussians
+from ico3d.avatar.spans import Span
 from ico3d.avatar.staging import NEUTRAL
 from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.manifest import Loss
 from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera, look_at
+from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
 
+At = Callable[[float], Gaussians]
+"""Somebody in the world at τ in [0, 1] of a span of time."""
+HeadAt = Callable[[float], Gaussians]
+"""The head on a body, in the world, at a frame."""
 VIEWS = 24
 """Pictures per window that baking is measured with."""
 _PROBE_SIZE, _PROBE_FOV = 256, 40.0
@@ -96,40 +102,54 @@ def measure_window(
     baked: BakedWindow,
     recorded: Iterable[View],
     probes: Iterable[View],
+    head: HeadAt | None = None,
 ) -> Loss:
+    """Mean PSNR on the person: against the recording, and against the exact model."""
+    return measure(*window_pair(body, index, baked, head), recorded, probes)
+
+
+def window_pair(
+    body: MovingBody, index: int, baked: BakedWindow, head: HeadAt | None
+) -> tuple[At, At]:
+    """The exact and the baked window at τ, each with the exact head on it, if there is one."""
+    span = body.windows[index]
+
+    def together(gaussians: Gaussians, tau: float) -> Gaussians:
+        frame = span.first + tau * (span.last - span.first)
+        return gaussians if head is None else cat([gaussians, head(frame)])
+
+    return (
+        lambda tau: together(body.window_gaussians(index, tau).to("cpu"), tau),
+        lambda tau: together(window_gaussians(baked, tau), tau),
+    )
+
+
+def measure(exact: At, baked: At, recorded: Iterable[View], probes: Iterable[View]) -> Loss:
     """Mean PSNR on the person: against the recording, and against the exact model."""
     exact_psnr, baked_psnr, likeness = [], [], []
     for view in recorded:
         assert view.truth is not None
-        exact, ours = _exact_picture(body, index, view)[0], _picture(baked, view)
-        exact_psnr.append(psnr(exact, view.truth, view.mask))
+        model, ours = _drawn(exact, view)[0], _drawn(baked, view)[0]
+        exact_psnr.append(psnr(model, view.truth, view.mask))
         baked_psnr.append(psnr(ours, view.truth, view.mask))
     for view in probes:
-        exact, alpha = _exact_picture(body, index, view)
+        model, alpha = _drawn(exact, view)
         if alpha.any():
-            likeness.append(psnr(_picture(baked, view), exact, alpha))
+            likeness.append(psnr(_drawn(baked, view)[0], model, alpha))
     return Loss(_mean(exact_psnr), _mean(baked_psnr), _mean(likeness))
 
 
-def comparison_line(body: MovingBody, index: int, baked: BakedWindow, view: View) -> np.ndarray:
+def comparison_line(exact: At, baked: At, view: View) -> np.ndarray:
     """[recorded |] exact | baked of one view, side by side: (H, W·3 or W·2, 3) float32."""
-    pictures = [_exact_picture(body, index, view)[0], _picture(baked, view)]
+    pictures = [_drawn(model, view)[0] for model in (exact, baked)]
     return np.hstack(pictures if view.truth is None else [view.truth, *pictures])
 
 
-def _exact_picture(body: MovingBody, index: int, view: View) -> tuple[np.ndarray, np.ndarray]:
-    """(H, W, 3) and alpha (H, W) of the exact body."""
+def _drawn(person: At, view: View) -> tuple[np.ndarray, np.ndarray]:
+    """(H, W, 3) and alpha (H, W)."""
     with torch.no_grad():
-        gaussians = body.window_gaussians(index, view.tau).to("cpu")
-        drawn = render(gaussians, [view.camera], view.background)
+        drawn = render(person(view.tau), [view.camera], view.background)
     return drawn.rgb[0].numpy(), drawn.alpha[0].numpy()
-
-
-def _picture(baked: BakedWindow, view: View) -> np.ndarray:
-    """(H, W, 3) of the baked body."""
-    with torch.no_grad():
-        gaussians = window_gaussians(baked, view.tau)
-        return render(gaussians, [view.camera], view.background).rgb[0].numpy()
 
 
 def _mean(values: list[float]) -> float | None:

@@ -1,18 +1,22 @@
 """Rendering baked avatars in Python: the picture that the page must show."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import torch
 
+from ico3d.avatar.avatar import Placement
+from ico3d.avatar.spans import Span
 from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.evaluate import attributes
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.head import BakedHead
-from ico3d.bundle.manifest import CameraInfo
+from ico3d.bundle.manifest import BodyInfo, CameraInfo
 from ico3d.common.camera import Camera, look_at
 from ico3d.errors import BundleError
-from ico3d.splat.gaussians import Gaussians
+from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
 
 
@@ -41,20 +45,119 @@ def window_gaussians(window: BakedWindow, tau: float) -> Gaussians:
     )
 
 
+@dataclass(frozen=True)
+class BakedAvatar:
+    """A whole person as a viewer draws it.
+
+    Attributes:
+        head: In the space of the head poses.
+        window: Gives a window of the body by its number.
+        spans: The windows' frames.
+        fps: Frames per second.
+        world_from_head: (F, 4, 4) rigid, one per frame.
+    """
+
+    head: BakedHead
+    window: Callable[[int], BakedWindow]
+    spans: Sequence[Span]
+    fps: float
+    world_from_head: np.ndarray
+
+    @staticmethod
+    def of(bundle: Bundle) -> "BakedAvatar":
+        """The person in a bundle; its windows are read as they come.
+
+        Raises:
+            BundleError: If it lacks the body or the head.
+        """
+        body = _require_body(bundle)
+        head, poses = bundle.require_head()
+        window = lru_cache(maxsize=2)(bundle.window)
+        return BakedAvatar(head, window, body.windows, body.fps, poses)
+
+    @property
+    def seconds(self) -> float:
+        """How long the clip lasts."""
+        return self.spans[-1].last / self.fps
+
+    def gaussians(self, seconds: float, expression: Sequence[float] | np.ndarray) -> Gaussians:
+        """In the world, the body's Gaussians first; the body's time places the head.
+
+        Args:
+            seconds: Where in the body's motion; clamped to it.
+            expression: (B,).
+        """
+        index, tau = place_in(self.spans, seconds * self.fps)
+        head = baked_gaussians(self.head, np.asarray(expression, np.float32))
+        pose = pose_at(self.world_from_head, seconds * self.fps)
+        return cat([window_gaussians(self.window(index), tau), head.transform(pose)])
+
+
+def pose_at(world_from_head: np.ndarray, frame: float) -> np.ndarray:
+    """(4, 4) of poses (F, 4, 4) at a frame, which is clamped; between frames lerp and slerp."""
+    return Placement(np.eye(4), world_from_head).pose(frame)
+
+
+def place_in(spans: Sequence[Span], frame: float) -> tuple[int, float]:
+    """The window that shows a frame, which is clamped to the clip, and τ in it."""
+    frame = min(max(frame, 0.0), spans[-1].last)
+    index = next(i for i, span in enumerate(spans) if frame <= span.last)
+    span = spans[index]
+    return index, (frame - span.first) / (span.last - span.first)
+
+
 def body_gaussians(bundle: Bundle, seconds: float) -> Gaussians:
     """The body at a time; before its first and after its last frame it stands still.
 
     Raises:
         BundleError: If the bundle has no body.
     """
-    body = bundle.manifest.body
-    if body is None:
-        raise BundleError("this bundle has no body.")
-    frame = min(max(seconds * body.fps, 0.0), body.windows[-1].last)
-    index = next(i for i, window in enumerate(body.windows) if frame <= window.last)
-    window = body.windows[index]
-    tau = (frame - window.first) / (window.last - window.first)
+    body = _require_body(bundle)
+    index, tau = place_in(body.windows, seconds * body.fps)
     return window_gaussians(bundle.window(index), tau)
+
+
+def _require_body(bundle: Bundle) -> BodyInfo:
+    if bundle.manifest.body is None:
+        raise BundleError(f"the bundle of '{bundle.manifest.name}' has no body.")
+    return bundle.manifest.body
+
+
+def avatar_gaussians(
+    bundle: Bundle, body_seconds: float, expression: Sequence[float] | np.ndarray
+) -> Gaussians:
+    """The whole person of a bundle; see `BakedAvatar.gaussians`.
+
+    Raises:
+        BundleError: If the bundle lacks the body or the head.
+    """
+    return BakedAvatar.of(bundle).gaussians(body_seconds, expression)
+
+
+def render_avatar(
+    bundle: Bundle,
+    body_seconds: float,
+    expression: Sequence[float] | np.ndarray,
+    camera: Camera,
+    background: np.ndarray | None = None,
+) -> np.ndarray:
+    """Renders a whole person as a viewer does: (H, W, 3) float32 display RGB.
+
+    Args:
+        bundle: Of a head and a body.
+        body_seconds: Where in the body's motion.
+        expression: (B,).
+        camera: In world space.
+        background: (3,) or (H, W, 3); the bundle's own colour by default.
+
+    Raises:
+        BundleError: If the bundle lacks the body or the head.
+    """
+    behind = np.array(bundle.manifest.background) if background is None else background
+    gaussians = avatar_gaussians(bundle, body_seconds, expression)
+    with torch.no_grad():
+        picture = render(gaussians, [camera], torch.tensor(behind).float()).rgb[0]
+    return picture.numpy()  # (H, W, 3)
 
 
 def render_body(bundle: Bundle, seconds: float, camera: Camera) -> np.ndarray:

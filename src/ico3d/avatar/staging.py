@@ -1,6 +1,7 @@
 """How a baked avatar is presented: motion, the visitor's camera, background, thumbnail."""
 
 import io
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import torch
@@ -112,6 +113,20 @@ def provenance(about: dict, where: str) -> Provenance:
         )
     except (KeyError, TypeError) as error:
         raise BundleError(f"{where}: its provenance lacks {error}.") from error
+
+
+def joint_provenance(parts: Sequence[Provenance]) -> Provenance:
+    """That of somebody who was recorded more than once: everything that is said, once."""
+
+    def said(values: Iterable[str]) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(values))
+
+    return Provenance(
+        kind=", ".join(said(part.kind for part in parts)),
+        sources=said(source for part in parts for source in part.sources),
+        consent="; ".join(said(part.consent for part in parts)),
+        licence="; ".join(said(part.licence for part in parts)),
+    )
 
 
 def thumbnail(

@@ -54,7 +54,7 @@ class TrainBody:
         from ico3d.capture.capture import Capture
         from ico3d.training.changes import with_changes
 
-        runner = None if self.plan else self._runner()
+        runner = None if self.plan else runner_of(self.jobs, self.ray)
         settings = with_changes(settings_for(self.preset, self.method), self.set)
         job = BodyJob(self.method, self.seed, settings)
         capture = Capture.open(self.capture)
@@ -68,21 +68,26 @@ class TrainBody:
             f"trained in {seconds:.0f} s."
         )
 
-    def _runner(self) -> "Runner | None":
-        """Who trains the windows.
 
-        Raises:
-            SettingsError: If it cannot be.
-        """
-        from ico3d.body.cluster import RayCluster
-        from ico3d.body.jobs import train_windows
-        from ico3d.body.processes import Processes
+def runner_of(jobs: int, ray: str | None) -> "Runner | None":
+    """Who trains the windows; None for this process.
 
-        if self.jobs < 1 or (self.jobs > 1 and self.ray):
-            raise SettingsError(
-                f"--jobs {self.jobs} is impossible here: it counts processes of this machine, one "
-                "or more, and a Ray cluster decides by itself how many windows train at once."
-            )
-        if self.ray:
-            return partial(train_windows, crew=RayCluster(self.ray))
-        return partial(train_windows, crew=Processes(self.jobs)) if self.jobs > 1 else None
+    Args:
+        jobs: Processes of this machine.
+        ray: Address of a Ray cluster.
+
+    Raises:
+        SettingsError: If it cannot be.
+    """
+    from ico3d.body.cluster import RayCluster
+    from ico3d.body.jobs import train_windows
+    from ico3d.body.processes import Processes
+
+    if jobs < 1 or (jobs > 1 and ray):
+        raise SettingsError(
+            f"--jobs {jobs} is impossible here: it counts processes of this machine, one "
+            "or more, and a Ray cluster decides by itself how many windows train at once."
+        )
+    if ray:
+        return partial(train_windows, crew=RayCluster(ray))
+    return partial(train_windows, crew=Processes(jobs)) if jobs > 1 else None

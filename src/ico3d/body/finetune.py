@@ -6,6 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ico3d.body.companion import Companion
 from ico3d.body.learner import Learner
 from ico3d.body.model import CANONICAL, WindowModel
 from ico3d.body.novel_views import novel_camera
@@ -39,6 +40,7 @@ class FineTuner:
         settings: BodySettings,
         extent: float,
         seed: int,
+        companion: Companion | None = None,
     ):
         """Gets ready for the first step.
 
@@ -51,13 +53,15 @@ class FineTuner:
             settings: Rates and weights.
             extent: Size of the person in metres.
             seed: All randomness follows from it.
+            companion: Who is in the pictures, too.
         """
         for name, tensor in {**model.gaussians, **model.shared}.items():
             tensor.requires_grad_(name in CANONICAL)
-        self._learner = Learner(model, window, pictures, settings, extent, seed)
+        self._learner = Learner(model, window, pictures, settings, extent, seed, companion)
         self._settings, self._cameras = settings, cameras
+        self._shared = window.first
         with torch.no_grad():
-            self._goal = previous.at(1.0)
+            self._goal = self._learner.accompanied(previous.at(1.0), self._shared)
 
     @property
     def model(self) -> WindowModel:
@@ -71,6 +75,7 @@ class FineTuner:
         else:
             values = self._remember(index)
         self._learner.update(index / self._settings.finetune_steps, self._settings.finetune_rate)
+        self._learner.prune(index, self._settings.finetune_steps)
         return values
 
     def tensors(self) -> dict[str, Tensor]:
@@ -93,7 +98,8 @@ class FineTuner:
         color = torch.from_numpy(rng.random(3)).to(self._goal.means)
         with torch.no_grad():
             goal = render(self._goal, [camera], color).rgb
-        loss = l1(render(self.model.at(0.0), [camera], color).rgb, goal)
+        person = self._learner.accompanied(self.model.at(0.0), self._shared)
+        loss = l1(render(person, [camera], color).rgb, goal)
         loss.backward()
         return {"loss": loss.item(), "difference": loss.item()}
 

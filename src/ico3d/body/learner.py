@@ -7,6 +7,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ico3d.body.companion import Companion, Pruning
 from ico3d.body.deformation import GRID, MLP
 from ico3d.body.model import WindowModel
 from ico3d.body.settings import BodySettings
@@ -14,7 +15,7 @@ from ico3d.body.views import BodyViews, Example
 from ico3d.body.windows import Window
 from ico3d.capture.pictures import View
 from ico3d.splat.density import Population
-from ico3d.splat.gaussians import Gaussians
+from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.losses import l1, photometric
 from ico3d.splat.render import render
 from ico3d.splat.rendering import Rendering
@@ -29,6 +30,7 @@ class Learner:
         optimiser: Its moments.
         views: All recorded views of the window's frames.
         affine: (C, 3, 4) corrections of colours by camera: they begin as none.
+        companion: Whose Gaussians are drawn after the model's, or None.
     """
 
     def __init__(
@@ -39,6 +41,7 @@ class Learner:
         settings: BodySettings,
         extent: float,
         seed: int,
+        companion: Companion | None = None,
     ):
         """Has learnt nothing yet.
 
@@ -49,7 +52,10 @@ class Learner:
             settings: Rates and weights.
             extent: Size of the person in metres; the means' rate refers to it.
             seed: All randomness follows from it and from the step's number.
+            companion: Who is in the pictures, too.
         """
+        self.companion = companion
+        self._pruning = Pruning(companion, window) if companion else None
         self.model, self.optimiser = model, Optimiser()
         self.views = pictures.views
         self._pictures, self._window, self._settings = pictures, window, settings
@@ -86,10 +92,26 @@ class Learner:
         return self._pictures.example(view, self.random(index, 1).random(3), self.model.device)
 
     def draw(self, gaussians: Gaussians, view: View, example: Example) -> Rendering:
-        """The picture that a view's camera would take."""
-        seen = self._corrected(gaussians, view.camera_index)
+        """The picture that a view's camera would take, with the companion in it."""
+        seen = self._corrected(self.accompanied(gaussians, view.frame), view.camera_index)
         absgrad = self._settings.absgrad
         return render(seen, [view.camera], example.color, absgrad=absgrad)
+
+    def accompanied(self, gaussians: Gaussians, frame: int) -> Gaussians:
+        """The Gaussians, and after them the companion's of a frame."""
+        if self.companion is None:
+            return gaussians
+        return cat([gaussians, self.companion.gaussians(frame)])
+
+    def prune(self, index: int, steps: int) -> None:
+        """Removes what stands where the companion is, if it is time for that.
+
+        Args:
+            index: Step just done.
+            steps: Of all of the training.
+        """
+        if self._pruning is not None and self._pruning.due(index, steps):
+            self._pruning.carry_out(self.model, self.population)
 
     def loss(self, rendering: Rendering, example: Example) -> Tensor:
         """λ_1·L1 + λ_s·(1 − SSIM) + λ_m·L1 of the masks (paper, loss of the body)."""

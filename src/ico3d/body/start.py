@@ -9,6 +9,7 @@ import torch
 from scipy.spatial import KDTree
 from torch import Tensor
 
+from ico3d.body.companion import Companion, Pruning
 from ico3d.body.deformation import Deformation
 from ico3d.body.encoder import EncoderShape
 from ico3d.body.formulas import FREETIME, SPACETIME, Polynomial, Still
@@ -18,6 +19,7 @@ from ico3d.body.settings import BodySettings, Method
 from ico3d.body.tunable import MlpShape
 from ico3d.body.windows import Window
 from ico3d.capture.capture import Capture
+from ico3d.splat.density import Population
 from ico3d.splat.initial import resampled, spacing
 
 PADDING = 0.15
@@ -52,6 +54,7 @@ def begin_window(
     settings: BodySettings,
     dynamic: Dynamic,
     seed: int,
+    companion: Companion | None = None,
 ) -> Begin:
     """Round Gaussians on the person, at the window's centre frame or throughout it.
 
@@ -62,6 +65,7 @@ def begin_window(
         settings: How many, and the sizes of the deformation.
         dynamic: Tells which points move in this window.
         seed: Decides which points.
+        companion: Where nothing begins; about its border more does.
 
     Raises:
         CaptureError: If the masks of the cameras agree on no place.
@@ -73,6 +77,9 @@ def begin_window(
     else:
         frames = (window.center,)
     clouds, source = _clouds(capture, frames, -(-count // len(frames)), settings, rng)
+    if companion is not None:
+        pairs = zip(clouds, frames, strict=True)
+        clouds = [_beside(companion, cloud, frame, rng) for cloud, frame in pairs]
     points = np.concatenate(clouds)  # (P, 3)
     motion, extra = _motion(method, settings, capture, window, clouds, dynamic, rng)
     gaussians = _round(capture, frames, clouds, settings) | extra
@@ -80,6 +87,20 @@ def begin_window(
     shared = motion.initial(generator) if isinstance(motion, Deformation) else {}
     extent = float(np.ptp(points, axis=0).max() / 2)
     return Begin(WindowModel(motion, gaussians, shared), extent, source)
+
+
+def continued_window(model: WindowModel, window: Window, companion: Companion | None) -> Begin:
+    """A trained window as the begin of another training.
+
+    Args:
+        model: Changed in place: what trespasses is removed.
+        window: Its frames.
+        companion: Where nothing begins.
+    """
+    if companion is not None:
+        Pruning(companion, window).carry_out(model, Population(model.gaussians, {}))
+    low, high = np.percentile(model.gaussians["means"].numpy(), (0.5, 99.5), axis=0)  # (3,) each
+    return Begin(model, float((high - low).max() / 2), "a trained body")
 
 
 def _clouds(
@@ -92,6 +113,15 @@ def _clouds(
     """Points (each, 3) of every frame, and where they come from."""
     starts = [initial_points(capture, frame, each, rng, settings.initial) for frame in frames]
     return [resampled(start.points, each, rng) for start in starts], starts[0].source
+
+
+def _beside(
+    companion: Companion, points: np.ndarray, frame: int, rng: np.random.Generator
+) -> np.ndarray:
+    """(Q, 3) points of a frame that do not trespass, and those of the companion's border."""
+    places = np.concatenate([points, companion.border(frame, rng)])
+    trespass = companion.trespassing(torch.from_numpy(places).float(), frame)
+    return places[~trespass.cpu().numpy()]
 
 
 def _round(

@@ -7,18 +7,20 @@ from pathlib import Path
 import torch
 from rich.console import Console
 
+from ico3d.body.companion import Companion, CompanionSource
 from ico3d.body.finetune import FineTuner
 from ico3d.body.flow import clip_flow, dynamic_weights
 from ico3d.body.model import WindowModel
 from ico3d.body.plan import Plan, PlanSettings, make_plan, print_plan, save_plan
 from ico3d.body.plan_picture import draw_plan
 from ico3d.body.settings import ONE_WINDOW, BodySettings, Method
-from ico3d.body.start import begin_window
+from ico3d.body.start import Begin, begin_window, continued_window
 from ico3d.body.trained import ABOUT, UNTUNED, TrainedBody, load_window, save_window
 from ico3d.body.trainer import BodyTrainer
 from ico3d.body.views import BodyViews
 from ico3d.body.windows import Window
 from ico3d.capture.capture import Capture
+from ico3d.errors import ModelError
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.run import RunFolder
 
@@ -35,11 +37,22 @@ class BodyJob:
         method: SWinGS++ or what it is compared with.
         seed: All randomness follows from it.
         settings: How to train.
+        companion: Where the Gaussians come from that the body is trained with, if any.
+        continued: Folder of a body with the same windows to go on from, instead of from points.
     """
 
     method: Method
     seed: int
     settings: BodySettings
+    companion: CompanionSource | None = None
+    continued: Path | None = None
+
+    def about(self, capture: Path) -> dict:
+        """What a run of this job on a capture is known by, but for its settings."""
+        about = {"capture": str(capture.resolve()), "method": self.method, "seed": self.seed}
+        if self.continued is not None:
+            about["continued"] = str(self.continued.resolve())
+        return about | ({"companion": self.companion.about()} if self.companion else {})
 
 
 @dataclass(frozen=True)
@@ -104,15 +117,13 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
         return finished["train_seconds"]
     capture = capture or Capture.open(task.capture)
 
-    def dynamic(points):
-        return dynamic_weights(points, capture, window, clip_flow(capture, task.flow))
-
-    begin = begin_window(capture, window, job.method, job.settings, dynamic, job.seed)
+    companion = job.companion.open(_device()) if job.companion else None
+    begin = _begin(task, capture, companion)
     begin.model.to(_device())
     pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
     seed = job.seed + 1_000 * task.index
     trainer = BodyTrainer(
-        begin.model, window, pictures, job.method, job.settings, begin.extent, seed
+        begin.model, window, pictures, job.method, job.settings, begin.extent, seed, companion
     )
     loop = LoopSettings(
         task.steps,
@@ -124,6 +135,19 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     summary = {"train_seconds": seconds, "num_gaussians": len(trainer.model)}
     run.finish({**summary, "extent": begin.extent, "source": begin.source})
     return seconds
+
+
+def _begin(task: WindowTask, capture: Capture, companion: Companion | None) -> Begin:
+    """What a window's training begins with."""
+    job, window = task.job, task.window
+    if job.continued is not None:
+        body = TrainedBody.load(job.continued)
+        return continued_window(body.models[task.index], window, companion)
+
+    def dynamic(points):
+        return dynamic_weights(points, capture, window, clip_flow(capture, task.flow))
+
+    return begin_window(capture, window, job.method, job.settings, dynamic, job.seed, companion)
 
 
 def finetune_window(
@@ -155,8 +179,9 @@ def finetune_window(
     cameras = [camera for i, camera in enumerate(capture.cameras) if i not in held_out]
     pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
     seed = job.seed + 1_000 * task.index + 500
+    companion = job.companion.open(_device()) if job.companion else None
     tuner = FineTuner(
-        model, previous, window, pictures, cameras, job.settings, before["extent"], seed
+        model, previous, window, pictures, cameras, job.settings, before["extent"], seed, companion
     )
     loop = LoopSettings(
         job.settings.finetune_steps,
@@ -188,12 +213,13 @@ def train_body(
         SettingsError: If the folder holds a run with other settings.
         ModelError: If training diverges.
     """
-    about = asdict(job)
-    about |= {"capture": str(capture.path.resolve()), **about.pop("settings")}
-    run = RunFolder(folder, about)
+    run = RunFolder(folder, job.about(capture.path) | asdict(job.settings))
     if run.finished() is not None:
         return TrainedBody.load(folder)
-    windows = plan_windows(capture, job, folder).windows
+    if job.continued is not None:
+        windows = _fitting(TrainedBody.load(job.continued), capture, job).windows
+    else:
+        windows = plan_windows(capture, job, folder).windows
     tasks = [
         WindowTask(
             capture.path, folder / "windows" / f"{index:04d}", folder / "flow", window, index, job
@@ -210,6 +236,26 @@ def train_body(
             seconds += finetune_window(after, capture, task.folder, load_window(source.file))
         body = _save(capture, folder, job, [tasks[0], *tuned], seconds)
     run.finish({"train_seconds": seconds, "num_gaussians": sum(map(len, body.models))})
+    return body
+
+
+def _fitting(body: TrainedBody, capture: Capture, job: BodyJob) -> TrainedBody:
+    """A body that a job goes on from.
+
+    Raises:
+        ModelError: If it is of another method or another clip.
+    """
+    if body.method != job.method:
+        raise ModelError(
+            f"{job.continued} was trained with --method {body.method}: only a body of the method "
+            f"{job.method} can be gone on from."
+        )
+    frames = body.windows[-1].last + 1
+    if (frames, body.fps) != (capture.num_frames, capture.fps):
+        raise ModelError(
+            f"{job.continued} has {frames} frames at {body.fps:g} per second, {capture.path} has "
+            f"{capture.num_frames} at {capture.fps:g}: go on from a body of this capture."
+        )
     return body
 
 
@@ -251,10 +297,9 @@ def _save(
 
 def _about(capture: Path, window: Window, job: BodyJob) -> dict:
     """What a window's run is known by: what fine-tuning does comes later."""
-    about = {"capture": str(capture.resolve()), "method": job.method, "seed": job.seed}
     settings = asdict(job.settings)
     kept = {name: value for name, value in settings.items() if name not in FINETUNING}
-    return about | asdict(window) | kept
+    return job.about(capture) | asdict(window) | kept
 
 
 def _device() -> torch.device:

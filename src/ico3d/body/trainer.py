@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 from torch import Tensor
 
+from ico3d.body.companion import Companion
 from ico3d.body.deformation import GRID, Deformation
 from ico3d.body.density import density_control
 from ico3d.body.encoder import space_smoothness, time_change, time_smoothness
@@ -28,11 +29,12 @@ class BodyTrainer:
         settings: BodySettings,
         extent: float,
         seed: int,
+        companion: Companion | None = None,
     ):
         """Gets ready for the first step; arguments as for `Learner`."""
         for tensor in (*model.gaussians.values(), *model.shared.values()):
             tensor.requires_grad_()
-        self._learner = Learner(model, window, pictures, settings, extent, seed)
+        self._learner = Learner(model, window, pictures, settings, extent, seed, companion)
         self._settings = settings
         self._steps = settings.steps_of(len(window))
         self._strategy = density_control(method, settings, self._steps, seed, extent)
@@ -55,11 +57,12 @@ class BodyTrainer:
         rendering = learner.draw(gaussians, view, example)
         loss = learner.loss(rendering, example) + self._penalties()
         loss.backward()
-        self._strategy.observe(rendering.info, index)
+        self._strategy.observe(rendering.info.first(len(gaussians)), index)
         progress = index / self._steps
         learner.update(progress)
         rate = self._settings.rates()["means"].at(progress)
         self._strategy.adapt(learner.population, index, rate)
+        learner.prune(index, self._steps)
         return {
             "loss": loss.item(),
             "psnr": masked_psnr(rendering, example),

@@ -9,11 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.bundle import limits
+from ico3d.bundle.animation import ANIMATION, Animation
 from ico3d.bundle.archive import Archive, open_archive, write_zip
+from ico3d.bundle.backdrop import BACKGROUNDS, check_background
 from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.head import HEAD, POSES, BakedHead, poses_from_bytes
 from ico3d.bundle.manifest import MANIFEST, FileEntry, Manifest, check_manifest
 from ico3d.bundle.onnx_check import check_onnx
+from ico3d.bundle.packaged import bundle_path
 from ico3d.errors import BundleError
 
 SPEECH = "speech.onnx"
@@ -27,13 +30,15 @@ class Bundle:
     Attributes:
         manifest: What the bundle says of itself.
         head: The baked head, None where there is only a body.
-        world_from_head: (F, 4, 4) float32 head poses at `manifest.head.fps`, to be played back
-            and forth; None without a head.
+        world_from_head: (F, 4, 4) float32 head poses at `manifest.head.fps`: one per frame of the
+            body, or, without a body, to be played back and forth; None without a head.
+        animation: How a whole person moves; None where there is a head or a body only.
     """
 
     manifest: Manifest
     head: BakedHead | None
     world_from_head: np.ndarray | None
+    animation: Animation | None
 
     def __init__(self, archive: Archive):
         """Reads and checks every file; use `Bundle.open`.
@@ -53,17 +58,22 @@ class Bundle:
 
     @staticmethod
     def open(path: Path | str) -> "Bundle":
-        """Opens a folder or an uncompressed zip and checks all of it.
+        """Opens a folder or an uncompressed zip and checks all of it; `demo` is the packaged one.
 
         Raises:
             BundleError: If there is none, or it is damaged, unsafe or of another version.
         """
-        return Bundle(open_archive(Path(path)))
+        return Bundle(open_archive(bundle_path(path)))
 
     @property
     def names(self) -> tuple[str, ...]:
         """The names that `read` knows, the manifest first."""
         return (MANIFEST, *self.manifest.files)
+
+    @property
+    def background(self) -> str | None:
+        """Name of the file with the splats behind the person; None where there are none."""
+        return next((name for name in BACKGROUNDS if name in self.manifest.files), None)
 
     def read(self, name: str) -> bytes:
         """The content of one file, verified again against its hash at each reading.
@@ -111,6 +121,12 @@ class Bundle:
             self.world_from_head = poses_from_bytes(self.read(POSES), info.num_poses)
         for index in range(len(self.manifest.body.windows) if self.manifest.body else 0):
             self.window(index)  # not kept: together they may be large
+        self.animation = None
+        if self.manifest.is_whole and self.manifest.body is not None:
+            self.animation = Animation.from_bytes(self.read(ANIMATION))
+            self.animation.check_body(self.manifest.body)
+        if self.background is not None:
+            check_background(self.read(self.background), self.background)
         _check_thumbnail(self.read(THUMBNAIL))
         if self.manifest.speech is not None:
             check_onnx(self.read(SPEECH), SPEECH, self.manifest.speech.input, "expression")
@@ -162,11 +178,14 @@ def _check_required(manifest: Manifest) -> None:
     required = {THUMBNAIL} | ({SPEECH} if manifest.speech else set())
     required |= {HEAD, POSES} if manifest.head else set()
     required |= {window.file for window in manifest.body.windows} if manifest.body else set()
+    required |= {ANIMATION} if manifest.is_whole else set()
     for name in sorted(required - set(manifest.files)):
         raise BundleError(f"{name}: is missing.")
     for name in manifest.files:
-        if name not in required | {LICENSES}:
+        if name not in required | {LICENSES, *BACKGROUNDS}:
             raise BundleError(f"{name[:80]}: does not belong into this bundle.")
+    if set(BACKGROUNDS) <= set(manifest.files):
+        raise BundleError(f"a bundle holds one of {' and '.join(BACKGROUNDS)}, not both.")
 
 
 def _check_thumbnail(data: bytes) -> None:

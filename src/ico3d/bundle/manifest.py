@@ -36,8 +36,8 @@ class HeadInfo:
         eye_offset: Where the seven eye and brow values (`capture.EYE_NAMES`) start in the
             expression; null where it has none.
         expression_names: One name each for blendshapes; empty for speech.
-        fps: Rate of head poses.
-        num_poses: F, the number of head poses.
+        fps: Rate of head poses; on a body, that of the body.
+        num_poses: F, the number of head poses; on a body, one per frame of it.
         idle_expression: (B,) the neutral face in silence with open eyes.
     """
 
@@ -148,7 +148,7 @@ class Persona:
 class Loss:
     """What baking costs on held-out pictures, dB of PSNR; null where not measured.
 
-    Of whole pictures for heads, on the person for bodies.
+    Of whole pictures for heads, on the person for bodies and whole persons.
 
     Attributes:
         psnr_exact: The exact model against ground truth.
@@ -187,6 +187,11 @@ class Manifest:
     files: dict[str, FileEntry] = field(default_factory=dict)
     format: str = FORMAT
     version: int = VERSION
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it is of a whole person: a head on a body."""
+        return self.head is not None and self.body is not None
 
     def to_json(self) -> bytes:
         """UTF-8 JSON, the same bytes for the same manifest."""
@@ -232,6 +237,8 @@ def check_manifest(manifest: Manifest) -> None:
         _check_head(manifest.head)
     if manifest.body is not None:
         _check_body(manifest.body)
+    if manifest.head is not None and manifest.body is not None:
+        _check_together(manifest.head, manifest.body)
     _check_speech(manifest)
     _check_camera(manifest.camera)
     _require(all(0 <= c <= 1 for c in manifest.background), "background", "lie between 0 and 1")
@@ -271,6 +278,13 @@ def _check_body(body: BodyInfo) -> None:
     _require(len(body.windows) > 0, "body.windows", "hold one at least")
     for index, window in enumerate(body.windows):
         _check_window(body, index, window)
+
+
+def _check_together(head: HeadInfo, body: BodyInfo) -> None:
+    """A head on a body is placed frame by frame of the body."""
+    _require(head.fps == body.fps, "head.fps", "be that of the body")
+    frames = body.windows[-1].last + 1
+    _require(head.num_poses == frames, "head.num_poses", f"be {frames}, one per frame of the body")
 
 
 def _check_window(body: BodyInfo, index: int, window: WindowInfo) -> None:

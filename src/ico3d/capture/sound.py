@@ -10,8 +10,12 @@ from ico3d.errors import CaptureError
 RATE = 16_000
 
 
-def read_sound_file(path: Path) -> Sound | None:
-    """A sound file as mono at 16 kHz, or None where there is none.
+def read_sound_file(path: Path, wanted: int = RATE) -> Sound | None:
+    """A sound file as mono, or None where there is none.
+
+    Args:
+        path: Of any kind that libsndfile reads.
+        wanted: Samples per second of the result.
 
     Raises:
         CaptureError: If it is damaged.
@@ -24,14 +28,14 @@ def read_sound_file(path: Path) -> Sound | None:
         samples, rate = soundfile.read(path, dtype="float32")
     except (OSError, ValueError, RuntimeError) as error:
         raise CaptureError(f"{path} cannot be read: {error}.") from error
-    return mono(samples, rate)
+    return mono(samples, rate, wanted)
 
 
-def mono(samples: np.ndarray, rate: int) -> Sound:
-    """Samples (S,) or (S, channels) float32 of any rate as mono at 16 kHz."""
+def mono(samples: np.ndarray, rate: int, wanted: int = RATE) -> Sound:
+    """Samples (S,) or (S, channels) float32 of any rate as mono at a rate, 16 kHz by default."""
     import soxr
 
     one = samples.mean(1) if samples.ndim == 2 else samples
-    if rate != RATE:
-        one = soxr.resample(one, rate, RATE, quality="VHQ")
-    return Sound(np.asarray(one, np.float32), RATE)
+    if rate != wanted:
+        one = soxr.resample(one, rate, wanted, quality="VHQ")
+    return Sound(np.asarray(one, np.float32), wanted)

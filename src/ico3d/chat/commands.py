@@ -8,9 +8,8 @@ from typing import Annotated
 
 import tyro
 
-from ico3d.errors import BundleError, MissingExtraError
-
-DEMO = Path(__file__).parent / "data" / "demo.ico3d"
+from ico3d.bundle import packaged
+from ico3d.errors import MissingExtraError
 
 
 @dataclass(frozen=True)
@@ -18,7 +17,7 @@ class Serve:
     """Serves a bundle: a page where anyone can talk with it, or watch it if it is a body alone.
 
     Attributes:
-        bundle: The avatar: NAME.ico3d or its folder.
+        bundle: The avatar: NAME.ico3d or its folder; `demo` is the one of the package.
         host: Address to listen on; other machines reach it only if it is not 127.0.0.1.
         port: Port to listen on; 0 takes any that is free.
         settings: TOML or JSON file that chooses services and timing.
@@ -85,12 +84,8 @@ class Demo:
         Raises:
             BundleError: If the package came without it.
         """
-        if not DEMO.is_file():
-            raise BundleError(
-                "this installation has no demo avatar (chat/data/demo.ico3d): "
-                "make one with `ico3d bake` and serve it with `ico3d serve`."
-            )
-        Serve(DEMO, self.host, self.port, self.settings, self.open, self.verbose).run()
+        demo = Path(packaged.NAME)
+        Serve(demo, self.host, self.port, self.settings, self.open, self.verbose).run()
 
 
 def described(services) -> list[str]:

@@ -23,10 +23,12 @@ from pipecat.turns.user_stop import TurnAnalyzerUserTurnStopStrategy
 from pipecat.turns.user_turn_strategies import UserTurnStrategies
 from pipecat.workers.runner import WorkerRunner
 
+from ico3d.bundle.animation import Animation
 from ico3d.bundle.manifest import HeadInfo, Persona
 from ico3d.chat.expression import ExpressionProcessor
 from ico3d.chat.face import Face
 from ico3d.chat.frames import Utterances
+from ico3d.chat.gestures import Gestures
 from ico3d.chat.listener import Captions, PageInput
 from ico3d.chat.page import Page
 from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Clock
@@ -50,6 +52,7 @@ class Avatar:
         persona: Who the avatar is.
         services: Who listens, thinks and speaks.
         settings: Services and timing.
+        animation: How its body moves; None for a head alone.
     """
 
     head: HeadInfo
@@ -57,6 +60,7 @@ class Avatar:
     persona: Persona
     services: Chosen
     settings: ChatSettings
+    animation: Animation | None
 
 
 @dataclass(frozen=True)
@@ -80,7 +84,10 @@ class Conversation:
         self._utterances = Utterances()
         self._input = PageInput()
         self._captions = Captions(page, self._timer)
-        self._speaker = Speaker(page, self._utterances, self._timer)
+        gestures = avatar.animation and Gestures(
+            avatar.animation, page, self._utterances, avatar.settings.gestures
+        )
+        self._speaker = Speaker(page, self._utterances, self._timer, gestures)
         self._worker: PipelineWorker | None = None
         self._task: asyncio.Task | None = None
 

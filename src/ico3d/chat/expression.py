@@ -92,7 +92,9 @@ class ExpressionProcessor(FrameProcessor):
     async def _end_utterance(self) -> None:
         await self._end_sentence()
         if self._utterance is not None:
-            await self.push_frame(UtteranceEndFrame(self._utterance, self._next_row * ROW))
+            samples = self._next_row * ROW
+            self._utterances.made(self._utterance, samples, complete=True)
+            await self.push_frame(UtteranceEndFrame(self._utterance, samples))
         self._reset()
 
     async def _push(self, pieces: list[Piece]) -> None:
@@ -101,6 +103,7 @@ class ExpressionProcessor(FrameProcessor):
             text, self._text = self._text, None
             row = piece.first_row
             assert self._utterance is not None
+            self._utterances.made(self._utterance, row * ROW + len(piece.pcm))
             await self.push_frame(
                 SpeechFrame(self._utterance, row * ROW, row, piece.pcm, piece.expressions, text)
             )

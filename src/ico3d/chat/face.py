@@ -8,6 +8,7 @@ import numpy as np
 from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.bundle.manifest import HeadInfo
 from ico3d.chat.protocol import EXPRESSION_FPS, SPEECH_RATE
+from ico3d.common.expression import expression_rows
 from ico3d.errors import BundleError
 from ico3d.speech.eyes import EyeBehaviour
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions
@@ -53,13 +54,9 @@ class Face:
         Returns:
             (n, B) float32.
         """
-        rows = np.tile(np.array(self._info.idle_expression, np.float32), (len(lips), 1))  # (n, B)
-        rows[:, : lips.shape[1]] = lips
-        at = self._info.eye_offset
-        if at is not None:
-            times = start + np.arange(len(lips)) / EXPRESSION_FPS
-            rows[:, at : at + 7] = self._eyes.values(times)
-        return rows
+        times = start + np.arange(len(lips)) / EXPRESSION_FPS
+        idle, at = np.array(self._info.idle_expression), self._info.eye_offset
+        return expression_rows(idle, lips, self._eyes.values(times), at)
 
 
 class StillLips:

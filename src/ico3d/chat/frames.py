@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from pipecat.frames.frames import DataFrame
 
+from ico3d.chat.protocol import SPEECH_RATE
+
 
 @dataclass
 class SpeechFrame(DataFrame):
@@ -41,17 +43,27 @@ class UtteranceEndFrame(DataFrame):
 
 
 class Utterances:
-    """Numbers the answers of a session and knows which of them were stopped."""
+    """Numbers the answers of a session; knows how long they are and which were stopped."""
 
     def __init__(self):
         """None yet."""
         self.last = -1
         self._stopped_through = -1
+        self._sound: dict[int, tuple[float, bool]] = {}
 
     def begin(self) -> int:
         """The number of a new answer."""
         self.last += 1
         return self.last
+
+    def made(self, utterance: int, samples: int, complete: bool = False) -> None:
+        """So many samples of an answer have been made, sent or not; all of them if complete."""
+        self._sound = {n: sound for n, sound in self._sound.items() if n > self._stopped_through}
+        self._sound[utterance] = samples / SPEECH_RATE, complete
+
+    def sound(self, utterance: int) -> tuple[float, bool]:
+        """Seconds of an answer that have been made, and whether that is all of it."""
+        return self._sound.get(utterance, (0.0, False))
 
     def stop_all(self) -> None:
         """Everything begun so far is over."""

@@ -9,9 +9,18 @@ from collections import deque
 import numpy as np
 
 from ico3d.chat.frames import SpeechFrame
-from ico3d.chat.protocol import Answer, End, ServerMessage, Speech, State, Stop, Transcript
+from ico3d.chat.protocol import (
+    Answer,
+    End,
+    ServerMessage,
+    Speech,
+    State,
+    Stop,
+    Timeline,
+    Transcript,
+)
 
-KEPT = 256  # messages that can be sent again: more than 30 s of speech
+KEPT = 320  # messages that can be sent again: more than 30 s of speech and motion
 HALF = 65000.0  # float16 ends at 65504
 MAX_WAITING = 2000  # messages a page may leave unread before its connection is given up
 
@@ -98,7 +107,7 @@ class Page:
         if isinstance(message, Stop):
             self._forget(message.utterance)
         final = isinstance(message, Transcript) and message.final
-        if final or isinstance(message, Answer | Speech | End | Stop):
+        if final or isinstance(message, Answer | Speech | Timeline | End | Stop):
             self._log.append(message)
         self._put(message)
 

@@ -19,6 +19,7 @@ MAX_RATE = 100  # messages per second a client may send for long
 MAX_BURST = 200  # messages it may send at once
 RESUME_SECONDS = 30  # how long a session waits for its page to come back
 MAX_AHEAD_SECONDS = 2.0  # how far speech may run ahead of its playback
+MAX_POINTS = 500  # of a timeline in one message
 MAX_EXACT = 2**53  # largest whole number JavaScript holds
 
 
@@ -237,15 +238,18 @@ class Speech:
 
 @dataclass(frozen=True)
 class Timeline:
-    """Which body time belongs to which time of the sound.
+    """Which body time belongs to which time of the sound, straight between the points.
+
+    The points go on where those of an earlier message ended; what was planned from the first
+    one's time on is replaced. After the last one the body stays, until the utterance ends.
 
     Attributes:
         utterance: Which answer.
-        points: (audio time, body time) pairs, seconds.
+        points: (audio time, body time) pairs, seconds, audio time ascending.
     """
 
     utterance: Count
-    points: Annotated[list[tuple[Seconds, Seconds]], Length(0, 500)]
+    points: Annotated[list[tuple[Seconds, Seconds]], Length(0, MAX_POINTS)]
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,8 @@ def open_avatar(bundle: Bundle, settings: ChatSettings) -> Avatar:
         ModelError: If the bundle's speech model cannot be used.
     """
     head, speech = open_face(bundle)
-    return Avatar(head, speech, bundle.manifest.persona, choose(settings), settings)
+    persona, services = bundle.manifest.persona, choose(settings)
+    return Avatar(head, speech, persona, services, settings, bundle.animation)
 
 
 def make_app(

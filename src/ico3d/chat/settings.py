@@ -26,6 +26,7 @@ class ChatSettings:
         pause: Seconds of silence after which the end of a turn is considered.
         end_silence: Seconds of silence that end a turn even if it sounded unfinished.
         max_sessions: How many visitors at once, those included whose connection dropped.
+        gestures: Whether a body gestures while it speaks; otherwise it is held at rest.
     """
 
     recognition: str = "pocketsphinx"
@@ -39,6 +40,7 @@ class ChatSettings:
     pause: float = 0.2
     end_silence: float = 0.6
     max_sessions: int = 4
+    gestures: bool = True
 
     def __post_init__(self):
         """Checks ranges.
@@ -67,8 +69,8 @@ def read_settings(path: Path | None) -> ChatSettings:
     for name, value in values.items():
         if name not in fields:
             raise SettingsError(f"{path}: there is no setting '{name}'.")
-        accepted = (int, float) if fields[name] is float else fields[name]
-        if not isinstance(value, accepted) or isinstance(value, bool):  # type: ignore[arg-type]
+        accepted = (int, float) if fields[name] is float else (fields[name],)
+        if type(value) not in accepted:
             raise SettingsError(f"{path}: '{name}' must be of type {fields[name].__name__}.")  # type: ignore[union-attr]
     return ChatSettings(**values)
 

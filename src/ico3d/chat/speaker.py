@@ -20,6 +20,7 @@ from pipecat.frames.frames import (
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
 from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame, Utterances
+from ico3d.chat.gestures import Gestures
 from ico3d.chat.page import Page
 from ico3d.chat.playback import Playback
 from ico3d.chat.protocol import Answer, Clock, End, Metrics, Stop
@@ -36,11 +37,13 @@ class Speaker(FrameProcessor):
         page: Page,
         utterances: Utterances,
         timer: TurnTimer,
+        gestures: Gestures | None = None,
         now: Callable[[], float] = time.monotonic,
     ):
-        """A speaker for one session."""
+        """A speaker for one session; `gestures` move its body, if it has one."""
         super().__init__()
         self._page, self._utterances, self._timer, self._now = page, utterances, timer, now
+        self._gestures = gestures
         self._playback = Playback()
         self._moved = asyncio.Event()  # the page's clock or connection changed
         self._speaking: int | None = None
@@ -50,7 +53,11 @@ class Speaker(FrameProcessor):
         """The page says how far it has played."""
         self._playback.clock(message.utterance, message.position, self._now())
         self._moved.set()
-        if message.utterance == self._speaking and message.position > 0 and self._turn_start:
+        if message.utterance != self._speaking:
+            return
+        if self._gestures is not None:
+            self._gestures.clock(message, self._playback.position(self._now()))
+        if message.position > 0 and self._turn_start:
             first_sample = self._now() - message.position
             values = {"voice_to_voice": 1000 * (first_sample - self._turn_start)}
             self._page.send(Metrics("played", values))
@@ -128,6 +135,8 @@ class Speaker(FrameProcessor):
         utterance, self._speaking, self._turn_start = self._speaking, None, None
         if self._page.state != "listening":
             self._page.show("idle")
+        if self._gestures is not None:
+            self._gestures.stop()
         if utterance is not None:
             self._page.send(Stop(utterance))
             await self.broadcast_frame(BotStoppedSpeakingFrame)

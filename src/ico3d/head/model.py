@@ -144,11 +144,15 @@ class HeadModel(nn.Module):
         """φ: features (N, w) of an expression (B,) to logits (N, 4)."""
         if not self.shape.has_mlp:
             return features
+        hidden = self.hidden(features, expression)  # (N, hidden)
+        return torch.cat([self.color_branch(hidden), self.opacity_branch(hidden)], 1)  # (N, 4)
+
+    def hidden(self, features: Tensor, expression: Tensor) -> Tensor:
+        """What φ's last layer takes in (N, hidden); arguments as for `decode`."""
         parts = [features, self.encoded_positions()]
         if not self.shape.blends:
             parts.append(expression.expand(len(self), -1))  # (N, B)
-        hidden = nn.functional.leaky_relu(self.trunk(torch.cat(parts, 1)), 0.01)  # (N, hidden)
-        return torch.cat([self.color_branch(hidden), self.opacity_branch(hidden)], 1)  # (N, 4)
+        return nn.functional.leaky_relu(self.trunk(torch.cat(parts, 1)), 0.01)  # (N, hidden)
 
     def encoded_positions(self) -> Tensor:
         """γ(μ): (N, 3 + 6·L), positions relative to the head box with their sines and cosines."""

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from ico3d.capture.canonical import canonical_landmarks
 from ico3d.capture.capture import Capture
 from ico3d.errors import CaptureError
 from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack, SpeechTrack, speech_features
@@ -83,7 +84,8 @@ def train_head(
         "capture": capture.provenance,
         "settings": asdict(job.settings),
     }
-    head = TrainedHead(trainer.model, job.inputs, names, *encoder, adaptor, summary)
+    landmarks = canonical_landmarks(capture)
+    head = TrainedHead(trainer.model, job.inputs, names, *encoder, adaptor, summary, landmarks)
     head.save(folder)
     run.finish({"train_seconds": seconds, "num_gaussians": len(trainer.model)})
     return head

@@ -5,7 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+import torch
+
 from ico3d.capture.capture import Capture
+from ico3d.common.expression import EYE_NAMES
 from ico3d.common.files import write_atomic
 from ico3d.errors import ModelError
 from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack, SpeechTrack, speech_features
@@ -14,6 +18,8 @@ from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.training.checkpoint import load_tensors, save_tensors
 
+SILENCE = 2
+"""Seconds, in the middle of which a voice has been silent for long."""
 Inputs = Literal["speech", "blendshapes"]
 
 
@@ -29,6 +35,8 @@ class TrainedHead:
         encoder_sha256: Of its weights: an adaptor fits no other.
         adaptor: The trained speech adaptor for `speech`, else None.
         summary: How it was made: provenance of the capture, seconds of training, settings.
+        landmarks: (68, 3) Multi-PIE landmarks in canonical head space, metres; None where the
+            capture has none. They tell where the head belongs on a body.
     """
 
     model: HeadModel
@@ -38,6 +46,7 @@ class TrainedHead:
     encoder_sha256: str
     adaptor: SpeechAdaptor | None
     summary: dict
+    landmarks: np.ndarray | None = None
 
     def track(self, capture: Capture) -> ExpressionTrack:
         """The expressions that drive this head through a capture.
@@ -56,6 +65,16 @@ class TrainedHead:
             )
         return SpeechTrack(capture, speech_features(capture, encoder), self.adaptor)
 
+    def neutral(self) -> np.ndarray:
+        """(B,) float32: silence, with open eyes and brows at rest."""
+        if self.adaptor is None:
+            return np.zeros(self.model.shape.expression_size, np.float32)
+        silence = np.zeros(16_000 * SILENCE, np.float32)
+        features = torch.from_numpy(load_encoder(self.encoder).features(silence, 16_000))
+        with torch.no_grad():
+            rows = self.adaptor.track(features)  # (T, 32)
+        return np.concatenate([rows[len(rows) // 2].numpy(), np.zeros(len(EYE_NAMES), np.float32)])
+
     def save(self, folder: Path) -> None:
         """Writes `model.safetensors`, `adaptor.safetensors` and `head.json` into a folder."""
         self.model.save(folder / "model.safetensors")
@@ -68,6 +87,7 @@ class TrainedHead:
             "encoder": self.encoder,
             "encoder_sha256": self.encoder_sha256,
             "summary": self.summary,
+            "landmarks": None if self.landmarks is None else self.landmarks.round(6).tolist(),
         }
         write_atomic(folder / "head.json", json.dumps(about, indent=1).encode())
 
@@ -83,14 +103,28 @@ class TrainedHead:
             about = json.loads((folder / "head.json").read_text())
             inputs, names = about["inputs"], tuple(about["blendshape_names"])
             encoder = about["encoder"], about["encoder_sha256"]
-            summary = about["summary"]
+            summary, landmarks = about["summary"], _landmarks(about.get("landmarks"))
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ModelError(
                 f"{folder} holds no trained head ({error}): train one with ico3d train head."
             ) from error
         adaptor = _load_adaptor(folder / "adaptor.safetensors") if inputs == "speech" else None
         model = HeadModel.load(folder / "model.safetensors")
-        return cls(model, inputs, names, *encoder, adaptor, summary)
+        return cls(model, inputs, names, *encoder, adaptor, summary, landmarks)
+
+
+def _landmarks(values: list | None) -> np.ndarray | None:
+    """(68, 3); heads of earlier versions say nothing of them.
+
+    Raises:
+        ValueError: If it is something else.
+    """
+    if values is None:
+        return None
+    landmarks = np.asarray(values, np.float64)
+    if landmarks.shape != (68, 3) or not np.isfinite(landmarks).all():
+        raise ValueError("landmarks must be 68 points")
+    return landmarks
 
 
 def _load_adaptor(path: Path) -> SpeechAdaptor:

@@ -154,7 +154,8 @@ class BenchTalk:
     """Times spoken questions to a served bundle, from their end to the answer's first sound.
 
     Attributes:
-        bundle: The avatar to serve; the server runs as a process of its own.
+        bundle: The avatar to serve, `demo` for that of the package; the server runs as a process
+            of its own.
         turns: How many questions.
         question: Recorded question (WAV, PCM16 mono 16 kHz); synthetic voices ask by default.
         json: File for the figures.

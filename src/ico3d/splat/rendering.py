@@ -1,7 +1,7 @@
 """What a render gives."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import torch
@@ -32,6 +32,10 @@ class RenderInfo:
         """(C, N) bool: whether the camera sees the Gaussian at all."""
         return self.radii > 0
 
+    def first(self, count: int) -> "RenderInfo":
+        """What is known of the first Gaussians of the render, where others came after them."""
+        return replace(self, radii=self.radii[:, :count])
+
     def screen_gradients(self) -> Tensor:
         """(C, N) length of the loss's gradient by the splat's centre.
 
@@ -46,7 +50,8 @@ class RenderInfo:
             raise RuntimeError("screen gradients exist only after backward of a render")
         half = torch.tensor([self.width / 2, self.height / 2]).to(self.means2d)  # (2,)
         gradient = self.means2d.grad if self.absolute is None else self.absolute()  # (C, N, 2)
-        return (gradient * half).norm(dim=-1)  # (C, N)
+        count = self.radii.shape[1]
+        return (gradient[:, :count] * half).norm(dim=-1)  # (C, N)
 
 
 @dataclass

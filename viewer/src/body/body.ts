@@ -1,11 +1,11 @@
 import type { BodyInfo } from '../bundle/manifest.ts';
+import type { Motion } from '../motion/motion.ts';
 import type { Actor } from '../stage/stage.ts';
 import { WindowGenerator } from './generator.ts';
 import { capacityOf, pack, type PackedWindow } from './packed.ts';
-import { Playback } from './playback.ts';
 import { Slots, type Shown, type Slot } from './slots.ts';
 import { SortWatch, type Sorter } from './sorting.ts';
-import { Timeline } from './timeline.ts';
+import type { Timeline } from './timeline.ts';
 import type { BakedWindow } from './window.ts';
 
 const SLOTS = [0, 1] as const;
@@ -19,21 +19,21 @@ export interface BodyPorts {
   failed(error: unknown): void;
 }
 
-/** The body on stage: its windows come and go in two slots while it plays. */
+/** The body on stage: its windows come and go in two slots while it moves. */
 export class Body implements Actor {
   readonly objects: [WindowGenerator, WindowGenerator];
-  readonly playback: Playback;
-  readonly timeline: Timeline;
+  readonly motion: Motion;
   /** What the next picture shows of the body; null until its first window is there. */
   shown: Shown | null = null;
   private failure: unknown = null;
+  private readonly timeline: Timeline;
   private readonly slots: Slots<PackedWindow>;
   private readonly watches: [SortWatch, SortWatch];
 
-  constructor(info: BodyInfo, playing: boolean, sorter: Sorter, ports: BodyPorts) {
+  constructor(info: BodyInfo, timeline: Timeline, motion: Motion, sorter: Sorter, ports: BodyPorts) {
     const capacity = capacityOf(info);
-    this.timeline = new Timeline(info);
-    this.playback = new Playback(this.timeline.duration, playing);
+    this.timeline = timeline;
+    this.motion = motion;
     this.objects = [new WindowGenerator(capacity), new WindowGenerator(capacity)];
     this.watches = [new SortWatch(sorter), new SortWatch(sorter)];
     this.slots = new Slots(this.timeline, {
@@ -48,10 +48,15 @@ export class Body implements Actor {
   }
 
   tick(step: number): boolean {
-    if (this.shown && !this.shown.waiting) this.playback.advance(step);
-    const { time, direction } = this.playback;
-    this.shown = this.slots.update(time, direction, performance.now() / 1000);
+    const { motion } = this;
+    if (this.shown) motion.advance(step, this.shown);
+    this.shown = this.slots.update(motion.time, motion.stops(), performance.now() / 1000);
     return SLOTS.map((slot) => this.pose(slot)).includes(true);
+  }
+
+  /** The body time that is seen, s. */
+  get time(): number {
+    return this.shown?.time ?? this.motion.time;
   }
 
   drawing(now: number): void {
@@ -64,7 +69,7 @@ export class Body implements Actor {
    * @throws whatever kept the first window from being fetched
    */
   async ready(): Promise<void> {
-    while (this.shown?.time !== this.playback.time) {
+    while (this.shown?.time !== this.motion.time) {
       if (!this.shown && this.failure) throw this.failure;
       await new Promise((resolve) => setTimeout(resolve, POLL));
     }
@@ -72,8 +77,7 @@ export class Body implements Actor {
 
   /** Goes to a time and stays there; resolves when it is on stage, which must have been started. */
   async show(seconds: number): Promise<void> {
-    this.playback.playing = false;
-    this.playback.seek(seconds);
+    this.motion.hold(seconds);
     await this.ready();
   }
 
@@ -86,7 +90,7 @@ export class Body implements Actor {
   private pose(slot: Slot): boolean {
     const window = this.slots.windowIn(slot);
     if (window === null) return false;
-    const time = this.timeline.clamp(window, this.playback.time);
+    const time = this.timeline.clamp(window, this.motion.time);
     const tau = this.timeline.tau(window, this.shown?.slot === slot ? this.shown.time : time);
     return this.objects[slot].pose(tau, this.shown?.slot === slot);
   }

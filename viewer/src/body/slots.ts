@@ -1,6 +1,6 @@
 import type { Timeline } from './timeline.ts';
 
-const AHEAD = 2; // windows that are fetched before they are needed
+const AHEAD = 2; // windows on the way that are fetched before they are needed
 const MOST_AT_ONCE = 3; // fetches, however fast somebody scrubs
 const RETRY = 2; // s after a window could not be fetched
 
@@ -51,26 +51,31 @@ export class Slots<T> {
    * Decides what is seen of the body at a time, and gets what comes next.
    *
    * @param time s, of the body
+   * @param stops s: where it goes from there (`Motion.stops`)
    * @param now s, of a clock that only runs forward
    * @returns null until the first window is there
    */
-  update(time: number, direction: 1 | -1, now: number): Shown | null {
+  update(time: number, stops: readonly number[], now: number): Shown | null {
     const before = this.seen;
     const shown = this.show(time);
     const wanted = shown && !shown.waiting ? shown.window : this.timeline.windowAt(time);
-    const next = this.timeline.ahead(wanted, direction, 1);
+    const order = this.order(wanted, stops);
     // What was seen until now goes one picture later, so that no picture has both to pay for.
-    if (this.seen === before) this.fill(shown && !shown.waiting ? next : wanted);
-    const order = [wanted];
-    for (let steps = 1; steps <= AHEAD; steps++) order.push(this.timeline.ahead(wanted, direction, steps));
+    if (this.seen === before) this.fill(shown && !shown.waiting ? order[1] : wanted);
     this.fetch(order, now);
-    this.forget([...order, this.timeline.ahead(wanted, direction === 1 ? -1 : 1, 1)]);
+    this.forget(order);
     return shown;
   }
 
   /** The window in a slot, null while it is empty. */
   windowIn(slot: Slot): number | null {
     return this.held[slot];
+  }
+
+  /** What is wanted first and then: the way, and what is beside it, where motion may turn to. */
+  private order(wanted: number, stops: readonly number[]): number[] {
+    const { timeline } = this;
+    return [...new Set([wanted, ...timeline.route(wanted, stops, AHEAD), ...timeline.beside(wanted)])];
   }
 
   private show(time: number): Shown | null {
@@ -94,9 +99,10 @@ export class Slots<T> {
   }
 
   /** Puts a window into the idle slot as soon as it has been fetched. */
-  private fill(window: number): void {
+  private fill(window: number | undefined): void {
+    if (window === undefined || this.held.includes(window)) return;
     const content = this.ready.get(window);
-    if (content === undefined || this.held.includes(window)) return;
+    if (content === undefined) return;
     const slot = this.idle();
     this.held[slot] = window;
     this.ports.put(slot, content);

@@ -35,12 +35,25 @@ export class Timeline {
     return (seconds - begin) / (this.borders[window + 1]! - begin);
   }
 
-  /** The window that is played `steps` after this one; at either end playback turns around. */
-  ahead(window: number, direction: 1 | -1, steps: number): number {
-    const last = this.count - 1;
-    if (last === 0) return 0;
-    let at = window + direction * steps;
-    while (at < 0 || at > last) at = at < 0 ? -at : 2 * last - at;
-    return at;
+  /**
+   * The windows that follow a window, at most `most`, on the way from stop to stop.
+   *
+   * @param stops s; from one to the next it goes straight
+   */
+  route(window: number, stops: readonly number[], most: number): number[] {
+    const route: number[] = [];
+    let at = window;
+    for (const stop of stops) {
+      while (!this.contains(at, stop) && route.length < most) {
+        at += stop > this.borders[at]! ? 1 : -1;
+        route.push(at);
+      }
+    }
+    return route;
+  }
+
+  /** The windows beside a window. */
+  beside(window: number): number[] {
+    return [window + 1, window - 1].filter((at) => at >= 0 && at < this.count);
   }
 }

@@ -1,6 +1,7 @@
 import { PageError } from '../errors.ts';
 import { readBakedHead, type BakedHead } from '../head/baked.ts';
-import { checkManifest, type HeadInfo, type Manifest } from './manifest.ts';
+import { checkAnimation, type AnimationInfo } from './animation.ts';
+import { checkManifest, type BodyInfo, type HeadInfo, type Manifest } from './manifest.ts';
 import { parseSafetensors, takeTensor } from './safetensors.ts';
 
 /** A head's files, checked and ready for the GPU. */
@@ -10,7 +11,11 @@ export interface HeadFiles {
   poses: Float32Array; // (F,4,4) row-major world_from_head
 }
 
+/** The names that splats behind a person may have. */
+export const BACKGROUNDS = ['background.spz', 'background.ply'];
+
 const ROOT = 'bundle/';
+const HEAD_FILES = ['head.safetensors', 'head_poses.safetensors'] as const;
 
 /** The thumbnail's address. */
 export const THUMBNAIL = `${ROOT}thumbnail.png`;
@@ -21,33 +26,40 @@ export async function loadManifest(): Promise<Manifest> {
   return checkManifest(await response.json().catch(() => null));
 }
 
-/**
- * Fetches and checks a head.
- *
- * @param onProgress called with the loaded fraction, 0 to 1
- */
+/** Fetches and checks a head; `onBytes` is called with the number of bytes that came. */
 export async function loadHead(
   manifest: Manifest,
   info: HeadInfo,
-  onProgress: (fraction: number) => void,
+  onBytes: (n: number) => void,
 ): Promise<HeadFiles> {
-  const names = ['head.safetensors', 'head_poses.safetensors'];
-  const total = names.reduce((sum, name) => sum + (manifest.files[name]?.size ?? 0), 0);
-  let loaded = 0;
-  const [head, poses] = await Promise.all(
-    names.map((name) =>
-      loadFile(manifest, name, (bytes) => {
-        loaded += bytes;
-        onProgress(Math.min(1, loaded / total));
-      }),
-    ),
-  );
-  const poseTensors = parseSafetensors(poses!, names[1]!);
+  const [head, poses] = await Promise.all(HEAD_FILES.map((name) => loadFile(manifest, name, onBytes)));
+  const poseTensors = parseSafetensors(poses!, HEAD_FILES[1]);
   return {
     info,
-    baked: readBakedHead(parseSafetensors(head!, names[0]!), info, names[0]!),
-    poses: takeTensor(poseTensors, 'world_from_head', 'F32', [info.num_poses, 4, 4], names[1]!).data as Float32Array,
+    baked: readBakedHead(parseSafetensors(head!, HEAD_FILES[0]), info, HEAD_FILES[0]),
+    poses: takeTensor(poseTensors, 'world_from_head', 'F32', [info.num_poses, 4, 4], HEAD_FILES[1]).data as Float32Array,
   };
+}
+
+/** Bytes that must come before there is somebody to see. */
+export function bytesToFirstSight({ head, body, files }: Manifest): number {
+  const behind = BACKGROUNDS.filter((name) => name in files);
+  const names = [...behind, ...(head ? HEAD_FILES : []), ...(body ? [body.windows[0]!.file] : [])];
+  return names.reduce((sum, name) => sum + (files[name]?.size ?? 0), 0);
+}
+
+/** Fetches and checks how a whole person moves. */
+export async function loadAnimation(manifest: Manifest, body: BodyInfo): Promise<AnimationInfo> {
+  const text = new TextDecoder().decode(await loadFile(manifest, 'animation.json'));
+  return checkAnimation(parseJson(text), body);
+}
+
+function parseJson(text: string): unknown {
+  try {
+    return JSON.parse(text);
+  } catch {
+    return null;
+  }
 }
 
 async function get(name: string): Promise<Response> {

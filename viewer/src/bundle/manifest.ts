@@ -73,6 +73,7 @@ export function checkManifest(value: unknown): Manifest {
   if (!head && !body) bad('head');
   if (head) checkHead(head);
   if (body) checkBody(body);
+  if (head && body) checkTogether(head, body);
   for (const key of ['eye', 'target', 'up'] as const) if (!isNumbers(camera?.[key], 3)) bad(`camera.${key}`);
   if (!(camera.fov_y > 0 && camera.fov_y < 180)) bad('camera.fov_y');
   if (!isNumbers(background, 3)) bad('background');
@@ -98,6 +99,12 @@ function checkBody(body: BodyInfo): void {
     const counted = isNumbers(ranks, 3) && ranks.every((rank) => isCount(rank, MOST_LAYERS));
     if (!counted || ranks[0] + ranks[1] + ranks[2] > MOST_LAYERS) bad(`body.windows[${i}].ranks`);
   });
+}
+
+/** A head is carried by its body: it has a pose for each of the body's frames. */
+function checkTogether(head: HeadInfo, body: BodyInfo): void {
+  if (head.fps !== body.fps) bad('head.fps');
+  if (head.num_poses !== body.windows.at(-1)!.last + 1) bad('head.num_poses');
 }
 
 function isCount(value: unknown, most: number): boolean {

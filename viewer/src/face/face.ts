@@ -3,7 +3,8 @@ import { smooth, type IdleFace } from './idle.ts';
 import { mix, type ExpressionTrack } from './track.ts';
 
 const EASE = 0.16; // s from one source of expressions to the next
-const DISPLAY_LEAD = 1 / 60; // s: what is drawn now lights the screen about one refresh later
+/** What is drawn now lights the screen about one refresh later, s. */
+export const DISPLAY_LEAD = 1 / 60;
 
 /** An utterance that is heard now. */
 export interface Heard {

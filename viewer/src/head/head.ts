@@ -1,7 +1,8 @@
 import type { HeadFiles } from '../bundle/load.ts';
+import type { HeadInfo } from '../bundle/manifest.ts';
 import type { Actor } from '../stage/stage.ts';
 import { HeadGenerator } from './generator.ts';
-import { PoseLoop } from './poses.ts';
+import { backAndForth, Poses } from './poses.ts';
 
 /** What the face shows, decided anew each tick. */
 export interface Director {
@@ -9,40 +10,53 @@ export interface Director {
   expression(out: Float32Array): boolean;
 }
 
-/** The head on stage: it shows what its director decides and sways as it was captured. */
+/** Says, `step` seconds after it was asked last, at which row of its poses a head is. */
+export type Carrier = (step: number) => number;
+
+/** A head alone sways as it was captured, back and forth for ever. */
+export function sway({ fps, num_poses: count }: HeadInfo): Carrier {
+  let seconds = 0;
+  return (step) => backAndForth((seconds += step) * fps, count);
+}
+
+/** The head on stage: it shows what its director decides, where something carries it. */
 export class Head implements Actor {
   readonly generator: HeadGenerator;
   readonly objects: HeadGenerator[];
   readonly expression: Float32Array;
   director: Director | null = null;
-  bodyTime = 0; // s along the captured motion
-  private readonly moving: boolean;
-  private readonly poses: PoseLoop;
+  row = NaN; // of the poses, as shown
+  private readonly carrier: Carrier;
+  private readonly poses: Poses;
 
-  /** @param moving the head follows the captured motion */
-  constructor({ info, baked, poses }: HeadFiles, moving: boolean) {
-    this.moving = moving;
+  constructor({ info, baked, poses }: HeadFiles, carrier: Carrier) {
+    this.carrier = carrier;
     this.generator = new HeadGenerator(baked);
     this.objects = [this.generator];
-    this.poses = new PoseLoop(poses, info.fps);
-    this.expression = Float32Array.from(info.idle_expression);
-    this.show(this.expression);
+    this.poses = new Poses(poses);
+    this.expression = new Float32Array(info.expression_size);
+    this.express(info.idle_expression);
+    this.place(carrier(0));
   }
 
-  /** Shows one expression, with the head where it is at a time. */
-  show(expression: ArrayLike<number>, poseSeconds = 0): void {
-    this.poses.apply(poseSeconds, this.generator);
+  /** Shows one expression. */
+  express(expression: ArrayLike<number>): void {
     this.expression.set(expression);
     this.generator.express(this.expression);
   }
 
+  /** Goes to a row of its poses. */
+  place(row: number): void {
+    this.row = row;
+    this.poses.apply(row, this.generator);
+  }
+
   tick(step: number): boolean {
-    if (this.moving) {
-      this.bodyTime += step;
-      this.poses.apply(this.bodyTime, this.generator);
-    }
+    const row = this.carrier(step);
+    const moved = row !== this.row;
+    if (moved) this.place(row);
     const changed = this.director?.expression(this.expression) ?? false;
     if (changed) this.generator.express(this.expression);
-    return changed || this.moving;
+    return changed || moved;
   }
 }

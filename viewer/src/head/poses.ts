@@ -1,14 +1,12 @@
 import * as THREE from 'three';
 
-/** The captured head motion, played back and forth for ever. */
-export class PoseLoop {
+/** The captured poses of a head. */
+export class Poses {
   private readonly positions: THREE.Vector3[] = [];
   private readonly rotations: THREE.Quaternion[] = [];
-  private readonly fps: number;
 
   /** @param poses (F,4,4) row-major world_from_head */
-  constructor(poses: Float32Array, fps: number) {
-    this.fps = fps;
+  constructor(poses: Float32Array) {
     for (let i = 0; i < poses.length; i += 16) {
       const position = new THREE.Vector3();
       const rotation = new THREE.Quaternion();
@@ -18,20 +16,26 @@ export class PoseLoop {
     }
   }
 
-  /** Writes the pose at `seconds` to an object. */
-  apply(seconds: number, object: THREE.Object3D): void {
-    const { index, next, fraction } = backAndForth(seconds * this.fps, this.positions.length);
+  get count(): number {
+    return this.positions.length;
+  }
+
+  /** Writes the pose at a row, between two or held at the ends, to an object. */
+  apply(row: number, object: THREE.Object3D): void {
+    const last = this.count - 1;
+    const at = Math.min(Math.max(row, 0), last);
+    const index = Math.floor(at);
+    const next = Math.min(index + 1, last);
+    const fraction = at - index;
     object.position.lerpVectors(this.positions[index]!, this.positions[next]!, fraction);
     object.quaternion.slerpQuaternions(this.rotations[index]!, this.rotations[next]!, fraction);
   }
 }
 
 /** Where in a sequence of `length` rows a point that runs to the end and back is. */
-export function backAndForth(row: number, length: number): { index: number; next: number; fraction: number } {
+export function backAndForth(row: number, length: number): number {
   const last = length - 1;
-  if (last === 0) return { index: 0, next: 0, fraction: 0 };
+  if (last === 0) return 0;
   const phase = row % (2 * last);
-  const at = phase > last ? 2 * last - phase : phase;
-  const index = Math.min(Math.floor(at), last - 1);
-  return { index, next: index + 1, fraction: at - index };
+  return phase > last ? 2 * last - phase : phase;
 }

@@ -5,12 +5,11 @@ import { AROUND, IN_FRONT, Orbit } from './orbit.ts';
 
 export const TICK = 1 / 30; // s between changes
 const LEAST_ALPHA = 1 / 255; // a splat ends where its alpha falls under this
-const LONGEST_STEP = 0.25; // s that may pass at once, e.g. after the page was hidden
 
 /** What moves on stage: a head, a body. */
 export interface Actor {
   readonly objects: THREE.Object3D[]; // always the same ones
-  /** Goes on by `step` seconds; returns false if it looks as before. */
+  /** Goes on by `step` seconds, many after the page was hidden; returns false if it looks as before. */
   tick(step: number): boolean;
   /** A picture is about to be drawn; `now` in ms, performance clock. */
   drawing?(now: number): void;
@@ -82,7 +81,7 @@ export class Stage {
   }
 
   private tick(now: number): void {
-    const step = Math.min(now - this.lastTime, LONGEST_STEP);
+    const step = this.lastTime && now - this.lastTime;
     this.lastTime = now;
     // Ticks stay on their grid, or a 144-Hz screen would turn 30 Hz into 28.8.
     this.lastTick = now - this.lastTick > 2 * TICK ? now : this.lastTick + TICK;

@@ -5,6 +5,14 @@ import type { ServerMessage, Services, StateMessage, WelcomeMessage } from '../p
 import { Connection } from './connection.ts';
 import { TurnTimer, VoiceMeter } from './latency.ts';
 
+/** Who moves the body while it speaks. */
+export interface Gestures {
+  /** Takes what the server planned for an utterance: (s of sound, s of body). */
+  plan(utterance: number, points: readonly [number, number][]): void;
+  /** Utterances are counted from the start again. */
+  reset(): void;
+}
+
 const CLOCK_PERIOD = 200; // ms between reports of what has been heard
 
 /** What the page shows of a conversation. */
@@ -25,6 +33,7 @@ export class Conversation {
   readonly player = new Player();
   /** Where the body is on its own time line; 0 without a body. */
   bodyTime: () => number = () => 0;
+  gestures: Gestures | null = null;
   private readonly view: ConversationView;
   private readonly connection: Connection;
   private readonly microphone: Microphone;
@@ -98,7 +107,10 @@ export class Conversation {
   }
 
   private welcome(message: WelcomeMessage): void {
-    if (!message.resumed) this.player.reset();
+    if (!message.resumed) {
+      this.player.reset();
+      this.gestures?.reset();
+    }
     this.view.services(message.services);
     this.view.state('idle');
     for (const notice of message.notices) this.view.notice(notice);
@@ -114,6 +126,8 @@ export class Conversation {
         return this.view.answer(message.text);
       case 'speech':
         return this.player.play(message);
+      case 'timeline':
+        return this.gestures?.plan(message.utterance, message.points);
       case 'end':
         return this.player.end(message.utterance, message.samples);
       case 'stop':

@@ -1,4 +1,5 @@
 import type { Body } from '../body/body.ts';
+import type { Playback } from '../motion/playback.ts';
 import { byId } from './elements.ts';
 import { icon } from './icons.ts';
 
@@ -7,18 +8,20 @@ const REFRESH = 100; // ms
 /** Play, pause and scrub: where a body is in its time. */
 export class PlayerBar {
   private readonly body: Body;
+  private readonly playback: Playback;
   private readonly button = byId<HTMLButtonElement>('play');
   private readonly scrub = byId<HTMLInputElement>('scrub');
   private readonly clock = byId<HTMLOutputElement>('clock');
   private resumes = false; // once the slider is let go
 
   /** @param frame s between two frames of the recording: a step of the arrow keys */
-  constructor(body: Body, frame: number) {
+  constructor(body: Body, playback: Playback, frame: number) {
     this.body = body;
-    this.scrub.max = String(body.timeline.duration);
+    this.playback = playback;
+    this.scrub.max = String(playback.duration);
     this.scrub.step = String(frame / 10);
     this.button.onclick = () => this.toggle();
-    this.scrub.oninput = () => body.playback.seek(this.scrub.valueAsNumber);
+    this.scrub.oninput = () => playback.seek(this.scrub.valueAsNumber);
     this.scrub.onkeydown = (event) => this.key(event, frame);
     this.scrub.onpointerdown = () => this.hold();
     this.scrub.onpointerup = this.scrub.onpointercancel = () => this.release();
@@ -29,7 +32,7 @@ export class PlayerBar {
   }
 
   private toggle(): void {
-    this.body.playback.playing = !this.body.playback.playing;
+    this.playback.playing = !this.playback.playing;
     this.refresh();
   }
 
@@ -44,29 +47,29 @@ export class PlayerBar {
     const step = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
     if (step === undefined) return;
     event.preventDefault();
-    const { playback } = this.body;
+    const { playback } = this;
     playback.seek((Math.round(playback.time / frame) + step) * frame);
     this.refresh();
   }
 
   private hold(): void {
-    const { playback } = this.body;
+    const { playback } = this;
     this.resumes = playback.playing;
     playback.playing = false;
   }
 
   private release(): void {
-    this.body.playback.playing ||= this.resumes;
+    this.playback.playing ||= this.resumes;
     this.resumes = false;
     this.refresh();
   }
 
   private refresh(): void {
-    const { playback, timeline, shown } = this.body;
+    const { playback } = this;
     this.scrub.value = String(playback.time);
     this.scrub.setAttribute('aria-valuetext', `${playback.time.toFixed(1)} seconds`);
-    this.clock.textContent = `${label(playback.time)} / ${label(timeline.duration)}`;
-    byId('player').setAttribute('aria-busy', String(shown?.waiting ?? true));
+    this.clock.textContent = `${label(playback.time)} / ${label(playback.duration)}`;
+    byId('player').setAttribute('aria-busy', String(this.body.shown?.waiting ?? true));
     const plays = playback.playing || this.resumes;
     const name = plays ? 'Pause' : 'Play';
     if (this.button.title === name) return;

@@ -3,97 +3,169 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 if TYPE_CHECKING:
+    from ico3d.avatar.film.actor import Actor
     from ico3d.avatar.film.film import Moving
+    from ico3d.capture.capture import Capture, Sound
     from ico3d.common.camera import Camera
+
+ORBIT, START = "orbit", "start"
+"""Camera paths that have names."""
+GREY = (0.84, 0.855, 0.88)
 
 
 @dataclass(frozen=True)
 class Render:
-    """Films a trained body from viewpoints where no camera stood.
+    """Films a person: somebody who talks, or a recorded motion from where no camera stood.
 
-    Time runs along with the camera; where the film is longer than the clip, back and forth.
+    With --audio, lips follow the sound, the body gestures, and the film is as long as the sound.
+    Without, time runs along with the camera; where the film is longer than the clip, back and
+    forth.
 
     Attributes:
-        model: A model folder that ico3d train body wrote.
+        model: A bundle (`demo` is the one of the package), as it was baked, or a model folder that
+            ico3d assemble or ico3d train body wrote, as the exact model shows it.
         out: The video to write, NAME.mp4.
+        audio: The sound to say: WAV, FLAC or MP3.
         capture: Orbit as the cameras of this capture stand around the person; without, level with
-            a person in a world with y up.
-        path: `orbit`, once around the person, or a JSON file with key cameras: {"cameras":
-            [{"eye": [x, y, z], "target": [x, y, z], "up": [0, 1, 0], "fov_y": 40}, ...]}, metres
-            and degrees; up and fov_y can be left out.
-        seconds: How long the film lasts.
+            a person in a world with y up. Of what ico3d assemble wrote: the body's recording.
+        path: `orbit`, once around the person; `start`, where visitors stand, for the whole film; or
+            a JSON file with key cameras: {"cameras": [{"eye": [x, y, z], "target": [x, y, z],
+            "up": [0, 1, 0], "fov_y": 40}, ...]}, metres and degrees; up and fov_y can be left out.
+            By default `start` with --audio, else `orbit`.
+        seconds: How long a film without --audio lasts.
         fps: Pictures per second.
-        size: Width and height in pixels, even numbers.
-        background: Colour behind the person, as in HTML: a name or #rrggbb.
+        size: Width and height in pixels, even numbers; one number for a square.
+        background: Colour behind the person, as in HTML: a name or #rrggbb; by default the
+            bundle's own, else a light grey.
+        seed: Of blinks and gestures.
     """
 
     model: tyro.conf.Positional[Path]
     out: tyro.conf.Positional[Path]
+    audio: Path | None = None
     capture: Path | None = None
-    path: str = "orbit"
+    path: str | None = None
     seconds: float = 8.0
     fps: float = 30.0
-    size: tuple[int, int] = (540, 960)
-    background: str = "#d6dbe0"
+    size: Annotated[tuple[int, ...], tyro.conf.arg(metavar="W [H]")] = (540, 960)
+    background: str | None = None
+    seed: int = 0
 
     def run(self) -> None:
         """Renders and writes the video.
 
         Raises:
             SettingsError: If the settings make no sense.
-            ModelError: If there is no body.
+            ModelError: If the folder holds nobody who can be filmed.
+            BundleError: If the bundle fails a check.
+            CaptureError: If the sound cannot be read.
         """
         from rich.console import Console
         from rich.progress import track
 
         from ico3d.avatar.film.film import pictures
         from ico3d.avatar.film.video import write_video
-        from ico3d.body.trained import TrainedBody
 
         background = self._checked()
-        body = TrainedBody.load(self.model)
-        cameras = self._cameras(body)
-        seen: Iterable = pictures(body, cameras, self.fps, background)
+        sound = self._sound()
+        person, actor = self._person(sound)
+        if background is None:
+            background = GREY if actor is None else actor.background
+        seconds = self.seconds if sound is None else person.seconds
+        cameras = self._cameras(person, actor, max(1, round(seconds * self.fps)))
+        seen: Iterable = pictures(person, cameras, self.fps, background)
         shown = track(seen, "filming", len(cameras), transient=True)
-        write_video(self.out, shown, self.size, self.fps)
+        write_video(self.out, shown, self._sides, self.fps, sound)
         Console().print(f"{self.out}: {len(cameras)} pictures at {self.fps:g} per second.")
 
-    def _checked(self) -> tuple[float, ...]:
-        """The background's colour in [0, 1], when all the rest is sound too."""
+    @property
+    def _sides(self) -> tuple[int, int]:
+        return self.size[0], self.size[-1]
+
+    def _checked(self) -> tuple[float, ...] | None:
+        """The background's colour in [0, 1], if one was given, when all the rest is sound too."""
         from PIL import ImageColor
 
         from ico3d.errors import SettingsError
 
-        if any(side < 2 or side % 2 for side in self.size):
+        if not 1 <= len(self.size) <= 2 or any(side < 2 or side % 2 for side in self.size):
             raise SettingsError("--size needs an even width and height: H.264 has no others.")
         if not (self.seconds > 0 and 0 < self.fps <= 1000 and self.seconds * self.fps >= 1):
             raise SettingsError("--seconds and --fps must be above 0 and make one picture or more.")
         if self.out.suffix != ".mp4":
             raise SettingsError(f"{self.out}: a film is written to a file NAME.mp4.")
+        if self.background is None:
+            return None
         try:
             red, green, blue, *_ = ImageColor.getrgb(self.background)
         except ValueError as error:
             raise SettingsError(f"--background: {error}.") from error
         return red / 255, green / 255, blue / 255
 
-    def _cameras(self, person: "Moving") -> list["Camera"]:
+    def _sound(self) -> "Sound | None":
+        from ico3d.avatar.film.video import SOUND_RATE
+        from ico3d.capture.sound import read_sound_file
+        from ico3d.errors import SettingsError
+
+        if self.audio is None:
+            return None
+        sound = read_sound_file(self.audio, SOUND_RATE)
+        if sound is None or len(sound.samples) == 0:
+            raise SettingsError(f"--audio: there is no sound in {self.audio}.")
+        return sound
+
+    def _person(self, sound: "Sound | None") -> tuple["Moving", "Actor | None"]:
+        """Who is filmed, and, but for bodies of their own, how they talk and where they stand."""
+        from ico3d.avatar.avatar import ABOUT as AVATAR
+        from ico3d.avatar.film import actor, performance
+        from ico3d.body.trained import ABOUT as BODY
+        from ico3d.body.trained import TrainedBody
+        from ico3d.bundle.format import Bundle
+        from ico3d.bundle.manifest import MANIFEST
+        from ico3d.bundle.packaged import bundle_path
+        from ico3d.errors import SettingsError
+
+        path = bundle_path(self.model)
+        if path.is_dir() and (path / AVATAR).is_file():
+            found = actor.avatar_actor(path, self._opened_capture())
+        elif path.is_dir() and not (path / MANIFEST).is_file():
+            if sound is not None and (path / BODY).is_file():
+                raise SettingsError(f"{path} is a body alone, which does not talk: no --audio.")
+            return TrainedBody.load(path), None
+        else:
+            found = actor.bundle_actor(Bundle.open(path))
+        if sound is not None:
+            return performance.speech(found, sound, self.seed), found
+        return performance.motion(found, self.seconds, self.seed), found
+
+    def _opened_capture(self) -> "Capture | None":
+        from ico3d.capture.capture import Capture
+
+        return None if self.capture is None else Capture.open(self.capture)
+
+    def _cameras(self, person: "Moving", actor: "Actor | None", count: int) -> list["Camera"]:
         """One for each picture."""
         from ico3d.avatar.film import camera_path
         from ico3d.avatar.film.film import extent
-        from ico3d.capture.capture import Capture
+        from ico3d.avatar.render_bundle import visitor_camera
+        from ico3d.errors import SettingsError
 
-        count = round(self.seconds * self.fps)
-        if self.path != "orbit":
-            keys = camera_path.read_key_cameras(Path(self.path), *self.size)
+        path = self.path or (ORBIT if self.audio is None else START)
+        if path == START:
+            if actor is None:
+                raise SettingsError("--path start: nobody said where visitors of a body stand.")
+            return [visitor_camera(actor.view, *self._sides)] * count
+        if path != ORBIT:
+            keys = camera_path.read_key_cameras(Path(path), *self._sides)
             return camera_path.through(keys, count)
-        points = extent(person)
-        if self.capture is None:
+        points, capture = extent(person), self._opened_capture()
+        if capture is None:
             ring = camera_path.ring_around(points)
         else:
-            ring = camera_path.ring_of(Capture.open(self.capture).cameras, points)
-        return camera_path.orbit(ring, points, count, *self.size)
+            ring = camera_path.ring_of(capture.cameras, points)
+        return camera_path.orbit(ring, points, count, *self._sides)

@@ -108,7 +108,7 @@ class SyntheticCapture(Capture):
         seen = self.cameras[camera].moved(self._frames["world_from_head"][self._index(frame)])
         return seen.project(self._frames["landmarks"][frame])[0]
 
-    def landmarks_3d(self, frame: int) -> np.ndarray:
+    def landmarks_3d(self, frame: int) -> np.ndarray | None:
         """(68, 3) landmarks in canonical head space, metres."""
         return self._frames["landmarks"][self._index(frame)]
 

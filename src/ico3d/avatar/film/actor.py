@@ -1,0 +1,112 @@
+"""Who can be filmed: bundles as viewers draw them, and avatars as the exact models do."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ico3d.avatar import baking, body_bundle, staging
+from ico3d.avatar.avatar import TrainedAvatar
+from ico3d.avatar.film.film import back_and_forth, extent
+from ico3d.avatar.render_bundle import BakedAvatar, baked_gaussians, body_gaussians, pose_at
+from ico3d.avatar.samples import lips_of
+from ico3d.avatar.whole_bundle import animation_of, front_of
+from ico3d.bundle.animation import Animation
+from ico3d.bundle.format import SPEECH, Bundle
+from ico3d.bundle.manifest import CameraInfo
+from ico3d.capture.capture import Capture
+from ico3d.common.expression import SPEECH_SIZE
+from ico3d.speech.runtime import SpeechModel
+from ico3d.splat.gaussians import Gaussians
+
+Lips = Callable[[np.ndarray, int], np.ndarray]
+"""A sound (S,) and its rate → what the mouth does, (T, 32) at 25 rows per second."""
+
+
+@dataclass(frozen=True)
+class Actor:
+    """Somebody who can be filmed.
+
+    Attributes:
+        draw: Gaussians in the world at a time of the body (of a head alone: of its motion, which
+            goes back and forth), with an expression (B,).
+        seconds: How long the recorded motion lasts.
+        view: Where a visitor stands.
+        background: Colour in [0, 1].
+        idle: (B,) the face at rest; (0,) without a head.
+        eye_offset: Where the seven eye and brow values start in the expression, if it has them.
+        lips: Moves the mouth; None where no sound does.
+        animation: How the body moves while it talks; None where head and body are not both there.
+    """
+
+    draw: Callable[[float, np.ndarray], Gaussians]
+    seconds: float
+    view: CameraInfo
+    background: tuple[float, float, float]
+    idle: np.ndarray
+    eye_offset: int | None
+    lips: Lips | None
+    animation: Animation | None
+
+
+def bundle_actor(bundle: Bundle) -> Actor:
+    """The baked person of a bundle.
+
+    Raises:
+        ModelError: If its speech model cannot be used.
+    """
+    manifest = bundle.manifest
+    head, body = manifest.head, manifest.body
+    lips = SpeechModel(bundle.read(SPEECH)).expressions if manifest.speech else None
+    idle = np.array(head.idle_expression if head else (), np.float32)
+    if bundle.manifest.is_whole:
+        person = BakedAvatar.of(bundle)
+        draw, seconds = person.gaussians, person.seconds
+    elif body is not None:
+        draw, seconds = lambda at, _: body_gaussians(bundle, at), body.windows[-1].last / body.fps
+    else:
+        draw, seconds = _swaying_head(bundle)
+    at = head.eye_offset if head else None
+    stage = (manifest.camera, manifest.background)
+    return Actor(draw, seconds, *stage, idle, at, lips, bundle.animation)
+
+
+def _swaying_head(bundle: Bundle) -> tuple[Callable[[float, np.ndarray], Gaussians], float]:
+    """A head alone sways as it was recorded, back and forth."""
+    head, poses = bundle.require_head()
+    assert bundle.manifest.head is not None
+    fps = bundle.manifest.head.fps
+    seconds = (len(poses) - 1) / fps
+
+    def draw(at: float, expression: np.ndarray) -> Gaussians:
+        pose = pose_at(poses, back_and_forth(at, seconds) * fps)
+        return baked_gaussians(head, expression).transform(pose)
+
+    return draw, seconds
+
+
+def avatar_actor(folder: Path, capture: Capture | None) -> Actor:
+    """The exact person of a folder that `ico3d assemble` wrote.
+
+    Args:
+        folder: See there.
+        capture: The body's recording says which way is up; y is where there is none.
+    """
+    avatar = TrainedAvatar.load(folder)
+    points = extent(avatar)
+    low, high = points.min(0), points.max(0)
+    view = body_bundle.standing_camera(low, high, capture, front_of(avatar))
+    background = staging.background_colour(capture, 0) if capture else staging.NEUTRAL
+    head = avatar.head
+    driven = head.adaptor is not None
+    return Actor(
+        avatar.gaussians,
+        avatar.seconds,
+        view,
+        background,
+        baking.idle_expression(head, avatar.expressions),
+        SPEECH_SIZE if driven else None,
+        (lambda samples, rate: lips_of(head, samples, rate)) if driven else None,
+        animation_of(folder, avatar),
+    )

@@ -1,0 +1,1 @@
+"""Putting a head on a body: alignment, colours, the seam (paper, head–body integration)."""

@@ -1,0 +1,243 @@
+"""From a trained head and a capture of the whole person to an avatar, in one go."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from ico3d.avatar.avatar import (
+    BODY,
+    HEAD,
+    PLACEMENT,
+    Placement,
+    TrainedAvatar,
+    load_placement,
+    save_placement,
+)
+from ico3d.avatar.joining.companion import SEAM, HeadSource
+from ico3d.avatar.joining.cropping import cropped, near_border
+from ico3d.avatar.joining.driving import head_poses, recorded_expressions
+from ico3d.avatar.joining.face_views import face_views
+from ico3d.avatar.joining.recolour import RecolourSettings, color_difference, recolour
+from ico3d.avatar.joining.region import HeadRegion
+from ico3d.avatar.joining.seam import largest_gap, seam_scores
+from ico3d.avatar.joining.similarity import canonical_from_head
+from ico3d.body.settings import BodySettings
+from ico3d.body.train import BodyJob, Runner, train_body
+from ico3d.capture.canonical import canonical_landmarks
+from ico3d.capture.capture import Capture
+from ico3d.errors import CaptureError, ModelError, SettingsError
+from ico3d.head.trained import TrainedHead
+from ico3d.training.checkpoint import save_tensors
+from ico3d.training.run import RunFolder
+
+SEAM_REACH = 0.012
+"""Metres to either side of the border in which the head's Gaussians show where it runs."""
+MEASURED = 60
+"""Pictures by test cameras."""
+
+
+@dataclass(frozen=True)
+class JoiningSettings:
+    """How a head is put on a body.
+
+    Attributes:
+        match_colors: Whether the head takes on the light of the body's studio.
+        color_steps: Steps of that, one picture each.
+        color_rate: Its learning rate.
+        pruning: Whether the body's Gaussians are kept out of the face.
+        border_points: Gaussians about the border that each window begins with.
+    """
+
+    match_colors: bool = True
+    color_steps: int = 800
+    color_rate: float = 3e-2
+    pruning: bool = True
+    border_points: int = 400
+
+    def __post_init__(self):
+        """Checks the numbers.
+
+        Raises:
+            SettingsError: If one is impossible.
+        """
+        if self.color_steps < 1 or not self.color_rate > 0 or self.border_points < 0:
+            raise SettingsError(
+                f"color_steps={self.color_steps}, color_rate={self.color_rate}, border_points="
+                f"{self.border_points} are impossible: steps and rate are above 0, points not "
+                "below; match_colors=false leaves the colours as they are."
+            )
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """What to assemble.
+
+    Attributes:
+        head: Folder of the trained head.
+        joining: How the head is put on.
+        body: How the body is trained.
+        seed: All randomness follows from it.
+        continued: Folder of a body that was trained without the head, to go on from.
+    """
+
+    head: Path
+    joining: JoiningSettings
+    body: BodySettings
+    seed: int
+    continued: Path | None = None
+
+    def about(self, capture: Path) -> dict:
+        """What a run of it is known by."""
+        paths = {"head": str(self.head.resolve()), "capture": str(capture.resolve())}
+        if self.continued:
+            paths["continued"] = str(self.continued.resolve())
+        return paths | {"seed": self.seed} | asdict(self.joining) | asdict(self.body)
+
+
+Say = Callable[[str], None]
+
+
+def prepare(capture: Capture, folder: Path, assembly: Assembly, say: Say) -> RunFolder:
+    """Opens the avatar's folder and places the head, where that is not done yet."""
+    run = RunFolder(folder, assembly.about(capture.path))
+    if not (folder / SEAM).is_file():  # written last of the head's files
+        place_head(capture, folder, assembly, say)
+    return run
+
+
+def assemble(
+    capture: Capture, folder: Path, assembly: Assembly, say: Say, runner: Runner | None = None
+) -> TrainedAvatar:
+    """Makes an avatar, or goes on with an interrupted run of the same settings.
+
+    Args:
+        capture: Of the whole person, with head poses.
+        folder: The avatar's folder.
+        assembly: What to do.
+        say: Told what was found.
+        runner: Trains the windows; one after another in this process by default.
+
+    Raises:
+        CaptureError: If the capture lacks something that is needed.
+        ModelError: If the head does not fit.
+        SettingsError: If the folder holds a run with other settings.
+    """
+    run = prepare(capture, folder, assembly, say)
+    if run.finished() is not None:
+        return TrainedAvatar.load(folder)
+    source = HeadSource(folder.resolve(), assembly.joining.border_points, assembly.joining.pruning)
+    continued = assembly.continued and assembly.continued.resolve()
+    job = BodyJob("swings++", assembly.seed, assembly.body, source, continued)
+    body = train_body(capture, folder / BODY, job, runner)
+    placement, expressions = load_placement(folder / PLACEMENT)
+    head = TrainedHead.load(folder / HEAD)
+    summary = {
+        "head": head.summary.get("capture", {}),
+        "body": capture.provenance,
+        "settings": asdict(assembly.joining),
+        "train_seconds": body.summary["train_seconds"],
+    }
+    avatar = TrainedAvatar(head, body, placement, expressions, summary)
+    avatar = replace(avatar, summary=summary | measured(avatar, capture, say))
+    avatar.save(folder)
+    run.finish(avatar.summary)
+    return avatar
+
+
+def place_head(capture: Capture, folder: Path, assembly: Assembly, say: Say) -> None:
+    """Aligns the head, crops it and matches its colours; writes its part of the folder."""
+    head = TrainedHead.load(assembly.head)
+    landmarks = _landmarks(head, assembly.head)
+    region = HeadRegion.around(landmarks)
+    placement = align(capture, landmarks, say)
+    seam = near_border(head, region, SEAM_REACH)
+    head = cropped(head, region)
+    expressions = recorded_expressions(head, capture, head.neutral())
+    if assembly.joining.match_colors:
+        _match_colors(head, capture, placement, expressions, assembly, say)
+    (folder / HEAD).mkdir(parents=True, exist_ok=True)
+    head.save(folder / HEAD)
+    save_placement(folder / PLACEMENT, placement, expressions)
+    save_tensors(folder / SEAM, {"seam": torch.from_numpy(seam)}, {})
+
+
+def align(capture: Capture, landmarks: np.ndarray, say: Say) -> Placement:
+    """Where the head is in the world of the body's capture.
+
+    Args:
+        capture: Of the body.
+        landmarks: (68, 3) in the space of the head's model.
+        say: Told how well they fit.
+
+    Raises:
+        CaptureError: If the capture has no head poses, or no landmarks to compare.
+    """
+    poses = head_poses(capture)
+    there = canonical_landmarks(capture)
+    if there is None:
+        raise CaptureError(
+            f"{capture.path} has no landmarks of the face: find them with ico3d capture track."
+        )
+    matrix, rest = canonical_from_head(there, landmarks)
+    scale = np.cbrt(np.linalg.det(matrix[:3, :3]))
+    say(f"head on body: landmarks agree within {1e3 * rest:.1f} mm, scale {scale:.4f}.")
+    return Placement(matrix, poses)
+
+
+def measured(avatar: TrainedAvatar, capture: Capture, say: Say) -> dict:
+    """How well head and body fit, in figures for `avatar.json`."""
+    landmarks = _landmarks(avatar.head, Path(HEAD))
+    region = HeadRegion.around(landmarks)
+    found: dict = {}
+    widest = largest_gap(avatar, region)
+    if widest is None:
+        say("head and body: nothing opaque lies at the head's border, so no gap can be measured.")
+    else:
+        found["gap_mm"] = round(1e3 * widest, 2)
+        say(f"head and body: the widest gap is {found['gap_mm']:.1f} mm.")
+    held_out = list(capture.split.test_cameras) or None
+    try:
+        views = face_views(capture, avatar.placement, region, landmarks, held_out, MEASURED)
+        scores = seam_scores(avatar, views)
+    except CaptureError as error:  # no test camera in front: the gap is all that can be said
+        say(f"the seam in pictures is not measured: {error}")
+        return found
+    say(
+        f"held-out pictures: PSNR of the face {scores.psnr_face:.1f} dB, about its border "
+        f"{scores.psnr_border:.1f} dB, step of colour {scores.color_step:.4f}."
+    )
+    return found | {name: round(value, 4) for name, value in asdict(scores).items()}
+
+
+def _match_colors(
+    head: TrainedHead,
+    capture: Capture,
+    placement: Placement,
+    expressions: np.ndarray,
+    assembly: Assembly,
+    say: Say,
+) -> None:
+    if not head.model.shape.has_mlp:
+        raise ModelError(
+            f"{assembly.head}: this variant of head has no network whose colours could be matched: "
+            "train one with --variant full, or assemble with --set match_colors=false."
+        )
+    joining, landmarks = assembly.joining, _landmarks(head, assembly.head)
+    views = face_views(capture, placement, HeadRegion.around(landmarks), landmarks)
+    before = color_difference(head.model, placement, expressions, views)
+    settings = RecolourSettings(joining.color_steps, joining.color_rate, assembly.seed)
+    recolour(head.model, placement, expressions, views, settings)
+    after = color_difference(head.model, placement, expressions, views)
+    say(f"colours: the face differed by {before:.4f} from {len(views)} pictures, now {after:.4f}.")
+
+
+def _landmarks(head: TrainedHead, folder: Path) -> np.ndarray:
+    if head.landmarks is None:
+        raise ModelError(
+            f"{folder} does not say where the face of its head is: its capture had no landmarks, "
+            "or an earlier version trained it; train it again with ico3d train head."
+        )
+    return head.landmarks

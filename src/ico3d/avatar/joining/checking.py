@@ -1,0 +1,65 @@
+"""Pictures by which people see whether a head is where it belongs."""
+
+from pathlib import Path
+
+import numpy as np
+import torch
+from PIL import Image
+
+from ico3d.avatar.avatar import HEAD, PLACEMENT, load_placement
+from ico3d.avatar.joining.face_views import FaceView, face_views
+from ico3d.avatar.joining.region import HeadRegion
+from ico3d.avatar.joining.similarity import moved
+from ico3d.capture.capture import Capture
+from ico3d.errors import ModelError
+from ico3d.head.trained import TrainedHead
+from ico3d.splat.render import render
+
+PICTURES = 12
+LEAST_HEIGHT = 256
+"""Pixels that a face is enlarged to."""
+MARK = (0.1, 1.0, 0.3)
+
+
+def write_checks(folder: Path, capture: Capture, out: Path) -> None:
+    """Writes `FRAME_CAMERA.png`: recorded | the head drawn over it | landmarks over it.
+
+    Args:
+        folder: The avatar's folder; its head is placed already.
+        capture: Of the body.
+        out: Where to write.
+
+    Raises:
+        CaptureError: If no camera sees the face.
+    """
+    head = TrainedHead.load(folder / HEAD)
+    placement, expressions = load_placement(folder / PLACEMENT)
+    if head.landmarks is None:
+        raise ModelError(f"{folder / HEAD} has no landmarks: assemble the avatar again.")
+    region, everybody = HeadRegion.around(head.landmarks), list(range(len(capture.cameras)))
+    views = face_views(capture, placement, region, head.landmarks, everybody, PICTURES)
+    out.mkdir(parents=True, exist_ok=True)
+    for view in views:
+        where = placement.world_from_head(view.frame)
+        with torch.no_grad():
+            drawn = head.model(torch.from_numpy(expressions[view.frame])).transform(where)
+            over = render(drawn, [view.camera], view.image).rgb[0].numpy()
+        marked = _marked(view, moved(where, head.landmarks))
+        row = np.hstack([view.image.numpy(), over, marked])
+        name = f"{view.frame:06d}_{capture.cameras[view.camera_index].name}.png"
+        _enlarged(row).save(out / name)
+
+
+def _marked(view: FaceView, points: np.ndarray) -> np.ndarray:
+    """The picture with points (P, 3) of the world on it."""
+    picture = view.image.numpy().copy()
+    pixels = np.floor(view.camera.project(points)[0]).astype(int)  # (P, 2)
+    inside = ((pixels >= 0) & (pixels < (view.camera.width, view.camera.height))).all(1)
+    picture[pixels[inside, 1], pixels[inside, 0]] = MARK
+    return picture
+
+
+def _enlarged(picture: np.ndarray) -> Image.Image:
+    image = Image.fromarray((picture.clip(0, 1) * 255 + 0.5).astype(np.uint8))
+    factor = max(1, -(-LEAST_HEIGHT // image.height))
+    return image.resize((image.width * factor, image.height * factor), Image.Resampling.LANCZOS)

@@ -1,0 +1,46 @@
+"""Gaussians of a head model that are drawn on a body."""
+
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from ico3d.avatar.joining.region import HeadRegion
+from ico3d.errors import ModelError
+from ico3d.head.model import GAUSSIAN_AXES, HeadModel
+from ico3d.head.trained import TrainedHead
+
+
+def cropped(head: TrainedHead, region: HeadRegion) -> TrainedHead:
+    """The head with those Gaussians only that lie in a region of its canonical space.
+
+    Raises:
+        ModelError: If none do.
+    """
+    depth = region.depth(head.model.means.detach().cpu().numpy().astype(np.float64))  # (N,)
+    keep = torch.nonzero(torch.from_numpy(depth > 0))[:, 0]  # (K,)
+    if len(keep) == 0:
+        raise ModelError("no Gaussian of the head lies where its landmarks say that the face is.")
+    return replace(head, model=_selected(head.model, keep))
+
+
+def _selected(model: HeadModel, keep: torch.Tensor) -> HeadModel:
+    """A model of its own with some of the Gaussians."""
+    chosen = HeadModel(model.shape, len(keep))
+    values = dict(model.state_dict())
+    for name, axis in GAUSSIAN_AXES.items():
+        values[name] = values[name].index_select(axis, keep.to(values[name].device))
+    chosen.load_state_dict(values)
+    return chosen
+
+
+def near_border(head: TrainedHead, region: HeadRegion, reach: float) -> np.ndarray:
+    """(P, 3) float64 places of a head's Gaussians that lie about the border of a region.
+
+    Args:
+        head: As it was trained, on both sides of the border.
+        region: Which part is drawn.
+        reach: Metres to either side.
+    """
+    means = head.model.means.detach().cpu().numpy().astype(np.float64)  # (N, 3)
+    return means[np.abs(region.depth(means)) < reach]

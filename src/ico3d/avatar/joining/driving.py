@@ -1,0 +1,57 @@
+"""What a head needs to know of every frame of a body's capture: its place and its expression."""
+
+import logging
+
+import numpy as np
+import torch
+
+from ico3d.capture.capture import Capture
+from ico3d.errors import CaptureError
+from ico3d.head.trained import TrainedHead
+
+log = logging.getLogger(__name__)
+
+RIGID = 1e-3
+"""How far a rotation times its transpose may be from 1."""
+
+
+def head_poses(capture: Capture) -> np.ndarray:
+    """W_i of all frames, (F, 4, 4) float64 rigid.
+
+    Raises:
+        CaptureError: If a frame has none, or one that is not rigid.
+    """
+    poses = [capture.world_from_head(frame) for frame in range(capture.num_frames)]
+    lacking = [i for i, p in enumerate(poses) if p is None or not np.isfinite(p).all()]
+    if lacking:
+        raise CaptureError(
+            f"{capture.path}: frame {lacking[0]} has no head pose ({len(lacking)} have none): "
+            "find them with ico3d capture track."
+        )
+    stacked = np.stack([pose for pose in poses if pose is not None]).astype(np.float64)
+    turns = stacked[:, :3, :3]  # (F, 3, 3)
+    askew = np.abs(turns @ turns.mT - np.eye(3)).max((1, 2)) > RIGID  # (F,)
+    askew |= np.linalg.det(turns) < 0
+    if askew.any():
+        raise CaptureError(
+            f"{capture.path}: the head pose of frame {int(askew.argmax())} stretches or mirrors: "
+            "a head pose turns and moves; find them anew with ico3d capture track."
+        )
+    return stacked
+
+
+def recorded_expressions(head: TrainedHead, capture: Capture, neutral: np.ndarray) -> np.ndarray:
+    """(F, B) float32: what drives the head as the person looked while the body was recorded.
+
+    Args:
+        head: Which.
+        capture: Of the whole person.
+        neutral: (B,) for captures that tell nothing about the face.
+    """
+    try:
+        track = head.track(capture)
+        with torch.no_grad():
+            return np.stack([track.at(frame).numpy() for frame in range(capture.num_frames)])
+    except CaptureError as error:
+        log.warning("%s The head keeps a neutral face while the body is trained.", error)
+        return np.repeat(neutral[None], capture.num_frames, 0).astype(np.float32)

@@ -1,0 +1,143 @@
+"""Pictures of a body's capture in which the face is seen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ico3d.avatar.avatar import Placement
+from ico3d.avatar.joining.region import BROWS, CHIN, HeadRegion
+from ico3d.avatar.joining.similarity import moved
+from ico3d.capture.capture import Capture
+from ico3d.capture.pictures import train_cameras
+from ico3d.common.camera import Camera
+from ico3d.errors import CaptureError
+
+WIDEST = np.cos(np.radians(65.0))
+"""Of the angle between where the face looks and the camera: farther aside it is seen askew."""
+MARGIN = 0.35
+"""About the face, as a part of its size in the picture."""
+MOST = 120
+"""Pictures."""
+CHANGING = ((slice(48, 68), 0.3), (slice(36, 42), 0.14), (slice(42, 48), 0.14))
+"""Landmarks of mouth and eyes, and how far about their middle they change the face, as a part of
+its height."""
+LEAST = 4
+"""Pixels that a crop is wide and high."""
+
+
+@dataclass(frozen=True)
+class FaceView:
+    """A picture cropped to the head.
+
+    Attributes:
+        frame: When.
+        camera_index: Whose.
+        camera: Of the crop, in the world.
+        image: (H, W, 3).
+        mask: (H, W) the person.
+        steady: (H, W) 1 but for mouth and eyes, which look otherwise with every expression.
+    """
+
+    frame: int
+    camera_index: int
+    camera: Camera
+    image: Tensor
+    mask: Tensor
+    steady: Tensor
+
+
+def face_views(
+    capture: Capture,
+    placement: Placement,
+    region: HeadRegion,
+    landmarks: np.ndarray,
+    cameras: Sequence[int] | None = None,
+    most: int = MOST,
+) -> list[FaceView]:
+    """Views of the face from in front, evenly spread over frames and cameras.
+
+    Args:
+        capture: Of the whole person.
+        placement: Where the head is.
+        region: Of the head's model, for where the face looks.
+        landmarks: (68, 3) in the space of the head's model.
+        cameras: Which cameras; the training ones by default.
+        most: Views at most.
+
+    Raises:
+        CaptureError: If no camera sees the face.
+    """
+    chosen_cameras = train_cameras(capture) if cameras is None else cameras
+    seen = [
+        (frame, camera)
+        for frame in range(capture.num_frames)
+        for camera in chosen_cameras
+        if faces(capture.cameras[camera], placement.world_from_head(frame), region, landmarks)
+    ]
+    chosen = [seen[i] for i in spread(len(seen), most)]
+    views = [_view(capture, placement, landmarks, *place) for place in chosen]
+    found = [view for view in views if view is not None]
+    if not seen:
+        raise CaptureError(f"{capture.path}: no camera sees the face: check the head's poses.")
+    if not found:
+        raise CaptureError(
+            f"{capture.path}: no camera in front of the face has a picture of it with a mask: look "
+            "with ico3d capture check."
+        )
+    return found
+
+
+def faces(
+    camera: Camera, world_from_head: np.ndarray, region: HeadRegion, landmarks: np.ndarray
+) -> bool:
+    """Whether a camera is in front of a face."""
+    centre = moved(world_from_head, landmarks.mean(0))
+    towards = camera.camera_to_world[:3, 3] - centre
+    forward = world_from_head[:3, :3] @ region.forward
+    cosine = towards @ forward / (np.linalg.norm(towards) * np.linalg.norm(forward))
+    return bool(cosine > WIDEST)
+
+
+def _view(
+    capture: Capture, placement: Placement, landmarks: np.ndarray, frame: int, index: int
+) -> FaceView | None:
+    """The picture of a camera; None where it shows no face, or there is none."""
+    camera = capture.cameras[index]
+    points = moved(placement.world_from_head(frame), landmarks)  # (68, 3)
+    if (moved(camera.world_to_camera, points)[:, 2] <= 0).any():
+        return None
+    pixels, _ = camera.project(points)  # (68, 2)
+    low, high = pixels.min(0), pixels.max(0)
+    reach = MARGIN * (high - low).max()
+    size = np.array([camera.width, camera.height])
+    left, top = np.floor(low - reach).clip(0, size - 1).astype(int)
+    right, bottom = np.ceil(high + reach).clip(1, size).astype(int)
+    if right - left < LEAST or bottom - top < LEAST:
+        return None
+    image, mask = capture.image(index, frame), capture.mask(index, frame)
+    if image is None or mask is None:
+        return None
+    cut = slice(top, bottom), slice(left, right)
+    crop = camera.cropped(int(left), int(top), int(right - left), int(bottom - top))
+    parts = torch.from_numpy(image[cut].copy()), torch.from_numpy(mask[cut].copy())
+    steady = torch.from_numpy(_steady(pixels - (left, top), image[cut].shape[:2]))
+    return FaceView(frame, index, crop, *parts, steady)
+
+
+def _steady(pixels: np.ndarray, size: tuple[int, ...]) -> np.ndarray:
+    """(H, W) float32: 0 in discs about mouth and eyes, whose landmarks are at pixels (68, 2)."""
+    rows, columns = np.indices(size) + 0.5  # (H, W) each
+    height = np.linalg.norm(pixels[BROWS].mean(0) - pixels[CHIN])
+    steady = np.ones(size, np.float32)
+    for part, radius in CHANGING:
+        x, y = pixels[part].mean(0)
+        steady[np.hypot(columns - x, rows - y) < radius * height] = 0
+    return steady
+
+
+def spread(count: int, most: int) -> list[int]:
+    """Indices of at most so many of `count` things, evenly spread."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int)).tolist()

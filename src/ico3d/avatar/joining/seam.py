@@ -1,0 +1,154 @@
+"""How well a head sits on a body: the gap in space, and the seam in pictures."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from scipy.ndimage import binary_dilation
+from scipy.spatial import KDTree
+
+from ico3d.avatar.avatar import TrainedAvatar
+from ico3d.avatar.joining.face_views import FaceView
+from ico3d.avatar.joining.region import HeadRegion
+from ico3d.avatar.joining.similarity import moved
+from ico3d.common.camera import Camera, look_at
+from ico3d.errors import CaptureError
+from ico3d.splat.density import contributions
+from ico3d.splat.gaussians import Gaussians, cat
+from ico3d.splat.render import render
+
+RIM = 0.008
+"""Metres inside the border in which the head's Gaussians are its rim."""
+OPAQUE = 0.3
+"""Opacity, and pixels of a picture, from which a Gaussian counts."""
+AROUND, DISTANCE, PIXELS, WIDE = 8, 1.2, 160, 0.4
+"""Cameras around a head, metres to them, the size of their pictures, and metres these show."""
+BAND = 0.12
+"""Width of the band to either side of the border in pictures, as a part of the face's width."""
+CERTAIN = 0.5
+
+
+def gap(
+    head: Gaussians, body: Gaussians, world_from_head: np.ndarray, region: HeadRegion
+) -> float | None:
+    """The widest opening between a head's rim and a body, metres; None where one is not opaque.
+
+    Of every Gaussian of the rim that somebody outside can see, the distance to the nearest opaque
+    one of the body, less the larger standard deviations of both; the median of the widest
+    hundredth, as single Gaussians are no hole.
+
+    Args:
+        head: In the world.
+        body: In the world.
+        world_from_head: (4, 4) where the head is.
+        region: Of the head's model.
+    """
+    local = moved(np.linalg.inv(world_from_head), head.means.double().numpy())  # (N, 3)
+    depth = region.depth(local)
+    rim = (depth > 0) & (depth < RIM)
+    rim[rim] = _seen_from_outside(head, torch.from_numpy(rim), body)
+    solid = body.opacities > OPAQUE
+    if not rim.any() or not solid.any():
+        return None
+    distances, nearest = KDTree(body.means[solid].numpy()).query(head.means.numpy()[rim])
+    sizes = head.scales.max(1).values.numpy(), body.scales[solid].max(1).values.numpy()
+    opening = np.sort((distances - sizes[0][rim] - sizes[1][nearest]).clip(min=0))
+    return float(np.median(opening[-max(len(opening) // 100, 1) :]))
+
+
+def _seen_from_outside(head: Gaussians, chosen: torch.Tensor, body: Gaussians) -> np.ndarray:
+    """(R,) bool: which of the chosen Gaussians of a head (N,) are seen by cameras around it."""
+    middle = head.means.mean(0).double().numpy()
+    cameras = [_looking_at(middle, angle) for angle in np.arange(AROUND) * 2 * np.pi / AROUND]
+    given = contributions(cat([head, body]), cameras)[:, : len(head)]  # (C, N)
+    return (given.max(0).values[chosen] > OPAQUE).numpy()
+
+
+def _looking_at(middle: np.ndarray, angle: float) -> Camera:
+    """A camera level with a head, in a world with y up."""
+    eye = middle + DISTANCE * np.array([np.sin(angle), 0.0, np.cos(angle)])
+    focal = PIXELS * DISTANCE / WIDE
+    intrinsics = np.array([[focal, 0, PIXELS / 2], [0, focal, PIXELS / 2], [0, 0, 1]])
+    return Camera(PIXELS, PIXELS, intrinsics, look_at(eye, middle), "around")
+
+
+def largest_gap(avatar: TrainedAvatar, region: HeadRegion) -> float | None:
+    """The widest opening in any frame of the clip, metres; None if there is no border at all."""
+    gaps = []
+    for frame in range(len(avatar.placement.world_from_canonical)):
+        seconds = frame / avatar.fps
+        with torch.no_grad():
+            body = avatar.body.gaussians(seconds)
+        where = avatar.placement.world_from_head(frame)
+        gaps.append(gap(avatar.head_gaussians(seconds), body, where, region))
+    return max((width for width in gaps if width is not None), default=None)
+
+
+@dataclass(frozen=True)
+class SeamScores:
+    """How pictures look about the face's border; means over views.
+
+    Attributes:
+        psnr_face: dB where the head is, but for the border.
+        psnr_border: dB in the band about the border.
+        color_step: How much the mean colour changes across the border beyond what it does in the
+            recorded pictures, length of the RGB difference.
+    """
+
+    psnr_face: float
+    psnr_border: float
+    color_step: float
+
+
+def seam_scores(avatar: TrainedAvatar, views: Sequence[FaceView]) -> SeamScores:
+    """Compares an avatar with recorded pictures of its face.
+
+    Args:
+        avatar: With the expressions that were recorded.
+        views: What was recorded.
+
+    Raises:
+        CaptureError: If no view shows the border.
+    """
+    found = [scores for view in views if (scores := _scores_of(avatar, view)) is not None]
+    if not found:
+        raise CaptureError("no picture shows the border between head and body.")
+    errors = np.mean([scores[:2] for scores in found], axis=0)  # (2,)
+    face, border = -10 * np.log10(np.maximum(errors, 1e-10))
+    return SeamScores(float(face), float(border), float(np.mean([s[2] for s in found])))
+
+
+@torch.no_grad()
+def _scores_of(avatar: TrainedAvatar, view: FaceView) -> tuple[float, float, float] | None:
+    """Squared errors of the face and the border, and the step of colour; None without a border."""
+    seconds = view.frame / avatar.fps
+    head, body = avatar.head_gaussians(seconds), avatar.body.gaussians(seconds)
+    drawn = render(cat([body, head]), [view.camera], view.image).rgb[0].numpy()  # (H, W, 3)
+    inner, outer, face = _bands(_share(head, body, view), view.mask.numpy() > CERTAIN)
+    if not inner.any() or not outer.any() or not face.any():
+        return None
+    truth = view.image.numpy()
+    squares = np.square(drawn - truth).mean(-1)  # (H, W)
+    step = (drawn - truth)[inner].mean(0) - (drawn - truth)[outer].mean(0)  # (3,)
+    errors = squares[face].mean(), squares[inner | outer].mean()
+    return float(errors[0]), float(errors[1]), float(np.linalg.norm(step))
+
+
+def _share(head: Gaussians, body: Gaussians, view: FaceView) -> np.ndarray:
+    """(H, W) how much of each pixel is head."""
+    white, black = torch.ones_like(head.means), torch.zeros_like(body.means)
+    marked = cat([replace(body, colors=black), replace(head, colors=white)])
+    return render(marked, [view.camera]).rgb[0, :, :, 0].numpy()
+
+
+def _bands(share: np.ndarray, person: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(H, W) bool each: head next to the border, body next to it, and the rest of the head."""
+    head = (share > CERTAIN) & person
+    body = (share < 1 - CERTAIN) & person
+    columns = np.flatnonzero(head.any(0))
+    width = columns[-1] - columns[0] + 1 if len(columns) else 0
+    reach = max(round(BAND * width), 2)
+    inner = head & np.asarray(binary_dilation(body, iterations=reach), bool)
+    outer = body & np.asarray(binary_dilation(head, iterations=reach), bool)
+    return inner, outer, head & ~inner

@@ -1,0 +1,94 @@
+"""The verb `ico3d bundle info`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import tyro
+
+if TYPE_CHECKING:
+    from ico3d.bundle.format import Bundle
+
+
+@dataclass(frozen=True)
+class Info:
+    """Checks a bundle and says what is in it.
+
+    Attributes:
+        bundle: The avatar: NAME.ico3d or its folder; `demo` is the one of the package.
+        json: Also write it to this file.
+    """
+
+    bundle: tyro.conf.Positional[Path]
+    json: Path | None = None
+
+    def run(self) -> None:
+        """Prints the figures, writes what was asked for.
+
+        Raises:
+            BundleError: If there is no bundle, or it fails a check.
+        """
+        import json
+
+        from rich.console import Console
+
+        from ico3d.bundle.format import Bundle
+        from ico3d.bundle.packaged import bundle_path
+        from ico3d.common.files import write_atomic
+
+        found = figures(Bundle.open(self.bundle), bundle_path(self.bundle))
+        if self.json is not None:
+            write_atomic(self.json, json.dumps(found, indent=1, ensure_ascii=False).encode())
+        console = Console(highlight=False, soft_wrap=True)
+        for name, value in found.items():
+            if value is not None:
+                console.print(f"{name:18} {_line(value)}", markup=False)
+
+
+def figures(bundle: "Bundle", path: Path) -> dict[str, Any]:
+    """What a bundle holds, as JSON can say it.
+
+    Args:
+        bundle: The opened bundle.
+        path: Where it lies.
+
+    Returns:
+        `bytes` on disk; `head_gaussians`, null without a head; `body_windows`, how many, 0 without
+        a body; `body_gaussians` of each window; `provenance`; and further facts.
+    """
+    from ico3d.bundle.decode import encode
+
+    manifest = bundle.manifest
+    head, body, speech = manifest.head, manifest.body, manifest.speech
+    sizes = {name: entry.size for name, entry in manifest.files.items()}
+    last = body.windows[-1].last if body else 0
+    return {
+        "name": manifest.name,
+        "bytes": path.stat().st_size if path.is_file() else sum(map(len, _contents(bundle))),
+        "version": manifest.version,
+        "head_gaussians": head.num_gaussians if head else None,
+        "head_rank": head.rank if head else None,
+        "inputs": head.inputs if head else None,
+        "speech_encoder": speech.encoder if speech else None,
+        "body_windows": len(body.windows) if body else 0,
+        "body_gaussians": [window.num_gaussians for window in body.windows] if body else [],
+        "body_seconds": last / body.fps if body else None,
+        "animation": bundle.animation is not None,
+        "background": bundle.background,
+        "loss": encode(manifest.loss),
+        "provenance": encode(manifest.provenance),
+        "files": sizes,
+    }
+
+
+def _contents(bundle: "Bundle"):
+    return (bundle.read(name) for name in bundle.names)
+
+
+def _line(value: Any) -> str:
+    """One value for people."""
+    if isinstance(value, dict):
+        return ", ".join(f"{key}: {_line(part)}" for key, part in value.items())
+    if isinstance(value, list):
+        return "; ".join(map(_line, value)) or "–"
+    return f"{value:,}" if isinstance(value, int) and not isinstance(value, bool) else str(value)

@@ -1,0 +1,293 @@
+"""Procedural body animation: captured frames in a new order, as long as a speech.
+
+Follows the paper's section "Procedural Body Animation": motion goes along the captured frames,
+forwards or backwards, from one action's key frame to another picked at random, and ends at the
+end of the rest loop together with the speech. The path is a list of points (audio time, body
+time), straight between them.
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from ico3d.bundle.animation import Animation
+
+Point = tuple[float, float]
+"""Seconds of the speech, seconds of body time."""
+EASE = 0.2
+"""Seconds in which motion starts from standing still, or ends."""
+RAMP = 4
+"""Straight pieces that stand for one such acceleration."""
+STEP = 0.25
+"""Seconds between points of steady motion, so that a path can be handed out piece by piece."""
+SHORTEST = 0.25
+"""Seconds of body time between two actions, at least: nearer ones look like trembling."""
+PAUSE = 0.6
+"""Seconds that a pose is held at a key frame, at most; half of the poses are not."""
+LINGER = 1.0
+"""Seconds that an action is held for want of time to reach another, at most."""
+AGAIN = 0.25
+"""How likely it is to go straight back to where one came from, relative to elsewhere."""
+SAME = 1e-6
+"""Seconds of body time that are no distance."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a body is when its plan begins.
+
+    Attributes:
+        body_time: Seconds.
+        velocity: Body seconds per second, negative when it plays backwards; 0 if it stands still,
+            or may start in either direction.
+    """
+
+    body_time: float
+    velocity: float = 0.0
+
+
+def plan(
+    animation: Animation,
+    start: Start,
+    seconds: float,
+    random: np.random.Generator,
+    gestures: bool = True,
+) -> list[Point]:
+    """The motion during a speech of known length.
+
+    It begins at (0, start.body_time) and ends at the last frame of the rest loop when the speech
+    ends; if that cannot be reached so soon, as soon as it can. A moving body first goes on to the
+    next key frame in its direction, for motion turns around at key frames and at the ends of the
+    rest loop only. Speeds are within the animation's limits, but for `EASE` seconds around
+    standing still.
+
+    Args:
+        animation: The key frames.
+        start: Where the body is.
+        seconds: How long the speech lasts.
+        random: Decides which actions are visited, how fast, and how long poses are held.
+        gestures: False keeps the body at rest: it goes there and is held while the face talks.
+    """
+    planner = Planner(animation, start, random, gestures=gestures)
+    planner.end(seconds)
+    return planner.points()
+
+
+class Planner:
+    """The motion during a speech that is still growing; what was handed out stays as it was.
+
+    At every moment the body could be back at rest when the sound known so far has ended, or
+    `overrun` seconds later. Decisions are made as late as possible: a motion begins when points
+    beyond its beginning are asked for.
+    """
+
+    def __init__(
+        self,
+        animation: Animation,
+        start: Start,
+        random: np.random.Generator,
+        at: float = 0.0,
+        gestures: bool = True,
+        overrun: float = 0.0,
+    ):
+        """A plan of which nothing is known yet but its first point.
+
+        Args:
+            animation: The key frames.
+            start: Where the body is.
+            random: Decides everything that is random.
+            at: Seconds of the speech at which it is there.
+            gestures: False keeps the body at rest.
+            overrun: Seconds that motion may last beyond the known sound of a speech that has not
+                ended; then more gestures fit into sound that comes in small pieces.
+        """
+        self._animation, self._random, self._overrun = animation, random, overrun
+        fps = animation.fps
+        self._home, self._back = animation.rest.end / fps, animation.rest.start / fps
+        actions = {action.frame / fps: action.score for action in animation.actions}
+        self._turns = (self._back, self._home, *actions)
+        self._gestures, self._actions = gestures, actions if gestures else {}
+        self._place = min(max(start.body_time, 0.0), animation.seconds)
+        self._before = self._place  # where the last motion began
+        self._velocity = start.velocity
+        self._time = self._known = at
+        self._end: float | None = None
+        self._decided: deque[Point] = deque([(at, self._place)])  # and not yet handed out
+
+    def know(self, seconds: float) -> None:
+        """The speech lasts so long at least."""
+        self._known = max(self._known, seconds)
+
+    def end(self, seconds: float) -> None:
+        """The speech lasts just so long."""
+        self._known = self._end = seconds
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the last point has been handed out."""
+        return not self._decided and self._has_arrived()
+
+    def points(self, until: float = math.inf) -> list[Point]:
+        """The points that follow those handed out before.
+
+        Args:
+            until: Seconds of the speech of the last one. It is cut to the known sound unless the
+                speech has ended: then there is always a way on to the end, if it is later.
+        """
+        if self._end is None:
+            until = min(until, self._known)
+        while self._time < until and not self._has_arrived():
+            self._decide(until)
+        found = []
+        while self._decided and self._decided[0][0] <= until:
+            found.append(self._decided.popleft())
+        return found
+
+    def _has_arrived(self) -> bool:
+        if self._end is None or not self._is_at(self._home):
+            return False
+        return self._time >= self._end - 1e-9
+
+    def _is_at(self, place: float) -> bool:
+        return abs(self._place - place) <= SAME and self._velocity == 0
+
+    @property
+    def _left(self) -> float:
+        """Seconds until the body must be back."""
+        return self._known + (self._overrun if self._end is None else 0.0) - self._time
+
+    @property
+    def _cruise(self) -> float:
+        return (self._animation.min_speed + self._animation.max_speed) / 2
+
+    def _decide(self, until: float) -> None:
+        """One motion, or one stretch of standing still."""
+        speed = float(self._random.uniform(self._animation.min_speed, self._animation.max_speed))
+        target = self._pick(speed)
+        if self._velocity:
+            self._go_on(target)
+        elif target is not None:
+            self._pause(target, speed)
+            self._go(target, speed)
+        elif self._is_at(self._home):
+            self._hold((until if self._end is None else self._end) - self._time)
+        else:
+            self._return(until, speed)
+
+    def _pick(self, speed: float) -> float | None:
+        """Where to go: an action from which the rest can be reached in time; else the rest loop."""
+        places = [place for place in self._actions if self._fits(place, speed)]
+        if places:
+            weights = np.array([self._weight(place) for place in places])
+            return places[self._random.choice(len(places), p=weights / weights.sum())]
+        if self._gestures and self._is_at(self._home) and self._fits(self._back, speed):
+            return self._back
+        return None
+
+    def _weight(self, place: float) -> float:
+        again = AGAIN if abs(place - self._before) <= SAME else 1.0
+        return again * (0.05 + self._actions[place])
+
+    def _fits(self, place: float, speed: float) -> bool:
+        way = place - self._place
+        if abs(way) < SHORTEST or self._velocity * way < 0:
+            return False
+        there = travel(abs(way), self._first_speed or speed, 1 if self._velocity else 2)
+        return there + travel(abs(self._home - place), self._cruise) <= self._left
+
+    @property
+    def _first_speed(self) -> float:
+        """That of a body in motion, within the limits; 0 if it stands still."""
+        if self._velocity == 0:
+            return 0.0
+        return min(max(abs(self._velocity), self._animation.min_speed), self._animation.max_speed)
+
+    def _go_on(self, target: float | None) -> None:
+        """A body in motion goes on; where nothing lies ahead, it stops at once."""
+        if target is None:
+            ahead = [place - self._place for place in self._turns]
+            ahead = [way for way in ahead if way * self._velocity > 0 and abs(way) > SAME]
+            target = self._place + min(ahead, key=abs) if ahead else None
+        if target is None:
+            self._velocity = 0.0
+        else:
+            self._go(target, self._first_speed)
+
+    def _pause(self, target: float, speed: float) -> None:
+        """Holds the pose for a moment, if there is one to spare."""
+        pause = max(0.0, float(self._random.uniform(-PAUSE, PAUSE)))
+        there = travel(abs(target - self._place), speed)
+        home = travel(abs(self._home - target), self._cruise)
+        self._hold(min(pause, self._left - there - home))
+
+    def _return(self, until: float, speed: float) -> None:
+        """Goes back to the end of the rest loop, or waits while sound may come."""
+        way = abs(self._home - self._place)
+        slowest, fastest = (
+            travel(way, limit) for limit in (self._animation.min_speed, self._animation.max_speed)
+        )
+        spare = self._left - travel(way, self._cruise)
+        if spare > LINGER:
+            self._go(self._home, speed)
+        elif self._end is None and spare > SAME:
+            self._hold(min(until - self._time, spare))
+        else:
+            self._hold(self._left - slowest)
+            self._go(self._home, speed_for(way, min(max(self._left, fastest), slowest)))
+
+    def _hold(self, seconds: float) -> None:
+        if seconds > 0:
+            self._time += seconds
+            self._decided.append((self._time, self._place))
+
+    def _go(self, target: float, speed: float) -> None:
+        """Moves to a place, faster at first and slower at last."""
+        way, moving = target - self._place, self._velocity != 0
+        for seconds, part in leg(abs(way), speed, moving):
+            self._decided.append((self._time + seconds, self._place + math.copysign(part, way)))
+        self._time = self._decided[-1][0]
+        self._before, self._place, self._velocity = self._place, target, 0.0
+
+
+def ease_seconds(way: float, speed: float, eased: int) -> float:
+    """How long each acceleration takes: less where the way is too short for `EASE`."""
+    return min(EASE, 2 * way / (eased * speed))
+
+
+def travel(way: float, speed: float, eased: int = 2) -> float:
+    """Seconds of a motion over some body seconds.
+
+    Args:
+        way: Body seconds.
+        speed: In the middle.
+        eased: How many of its two ends stand still.
+    """
+    return way / speed + eased * ease_seconds(way, speed, eased) / 2
+
+
+def speed_for(way: float, seconds: float) -> float:
+    """The speed in the middle of a motion that lasts so long: the inverse of `travel`."""
+    return way / (seconds - EASE) if seconds >= 2 * EASE else 2 * way / seconds
+
+
+def leg(way: float, speed: float, moving: bool) -> list[Point]:
+    """A motion from 0 to `way`: points (seconds, body seconds) after its beginning.
+
+    Args:
+        way: Body seconds, above 0.
+        speed: In the middle.
+        moving: Whether it begins at this speed instead of standing still.
+    """
+    ease = ease_seconds(way, speed, 1 if moving else 2)
+    ramp = [(ease * i / RAMP, speed * ease * (i / RAMP) ** 2 / 2) for i in range(1, RAMP + 1)]
+    points = [] if moving else list(ramp)
+    at, place = points[-1] if points else (0.0, 0.0)
+    end = travel(way, speed, 1 if moving else 2)
+    steady = end - ease - at
+    count = math.ceil(steady / STEP) if steady > 1e-9 else 0
+    for i in range(1, count + 1):
+        points.append((at + steady * i / count, place + speed * steady * i / count))
+    ending = [(end - seconds, way - part) for seconds, part in [(0.0, 0.0), *ramp[:-1]]]
+    return points + ending[::-1]

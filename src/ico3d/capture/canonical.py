@@ -1,0 +1,54 @@
+"""Where the landmarks of a face are in canonical head space."""
+
+import numpy as np
+
+from ico3d.capture.capture import Capture
+
+MOST_FRAMES = 60
+"""Of a capture that are looked at, spread evenly."""
+LEAST_RAYS = 2
+
+
+def canonical_landmarks(capture: Capture) -> np.ndarray | None:
+    """(68, 3) mean landmarks in canonical head space, metres; None where a capture has none.
+
+    Given in space where the format has them so; else from all cameras and frames at once: the head
+    poses make one picture of them all.
+    """
+    frames = _spread(capture.num_frames)
+    given = [capture.landmarks_3d(frame) for frame in frames]
+    known = [points for points in given if points is not None and np.isfinite(points).all()]
+    if known:
+        return np.mean(known, axis=0)
+    return _triangulated(capture, frames)
+
+
+def _triangulated(capture: Capture, frames: list[int]) -> np.ndarray | None:
+    """Nearest points (68, 3) to the rays of all views."""
+    normal, right, rays = np.zeros((68, 3, 3)), np.zeros((68, 3)), 0
+    for frame in frames:
+        pose = capture.world_from_head(frame)
+        if pose is None or not np.isfinite(pose).all():
+            continue
+        for index, camera in enumerate(capture.cameras):
+            pixels = capture.landmarks(index, frame)
+            if pixels is None or not np.isfinite(pixels).all():
+                continue
+            seen = camera.moved(pose)
+            eye, directions = seen.camera_to_world[:3, 3], _directions(seen, pixels)
+            across = np.eye(3) - directions[:, :, None] * directions[:, None]  # (68, 3, 3)
+            normal, right, rays = normal + across, right + across @ eye, rays + 1
+    if rays < LEAST_RAYS or np.linalg.cond(normal).max() > 1e8:
+        return None
+    return np.linalg.solve(normal, right[..., None])[..., 0]
+
+
+def _directions(camera, pixels: np.ndarray) -> np.ndarray:
+    """(P, 3) unit directions of the rays through pixels (P, 2)."""
+    ends = np.concatenate([pixels, np.ones((len(pixels), 1))], 1)  # (P, 3)
+    rays = ends @ np.linalg.inv(camera.intrinsics).T @ camera.world_to_camera[:3, :3]  # (P, 3)
+    return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+
+
+def _spread(count: int) -> list[int]:
+    return np.unique(np.linspace(0, count - 1, MOST_FRAMES).round().astype(int)).tolist()

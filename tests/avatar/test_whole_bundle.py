@@ -1,0 +1,156 @@
+"""Baking a whole person, from its folder to the bundle that is opened again."""
+
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "bundle"))
+from random_bundle import random_head
+from test_bake_body import NOISE, SIZE
+from whole_person import FPS, FRAMES, NECK, WholeFilmed, head_recording, write_whole_person
+
+from ico3d.avatar import baking, whole_bundle
+from ico3d.avatar.bake_head import BakeSettings
+from ico3d.avatar.comparison import psnr
+from ico3d.avatar.persona import load_persona
+from ico3d.avatar.render_bundle import avatar_gaussians, baked_gaussians, visitor_camera
+from ico3d.bundle.animation import Animation, Rest
+from ico3d.bundle.format import Bundle
+from ico3d.bundle.manifest import Loss
+from ico3d.capture.capture import Capture
+from ico3d.cli import main
+from ico3d.errors import BundleError
+from ico3d.splat.render import render
+
+QUICK = BakeSettings(hidden=64, augmented=100, steps=300)
+
+
+@pytest.fixture(scope="module")
+def avatar(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("whole") / "avatar"
+    return folder, write_whole_person(folder)
+
+
+@pytest.fixture(scope="module")
+def baked(avatar, tmp_path_factory):
+    """What the command line prints, the bundle and the strip."""
+    folder, person = avatar
+    out = tmp_path_factory.mktemp("baked")
+    recordings = {"head": head_recording(out / "head"), "body": WholeFilmed(person, out / "body")}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Capture, "open", lambda path: recordings[Path(path).name])
+        patch.setattr(baking, "BakeSettings", lambda: QUICK)
+        words = [folder, "head", "body", out / "a.ico3d", "--strip", out / "strip.png"]
+        assert main(["bake", *map(str, words), "--rank", "16", "--name", "Both", "--force"]) == 0
+    return Bundle.open(out / "a.ico3d"), out / "strip.png", person, recordings["body"]
+
+
+def test_the_bundle_says_what_it_is(baked):
+    bundle, _, person, _ = baked
+    manifest = bundle.manifest
+    assert (manifest.name, manifest.persona.name) == ("Both", "Iris")
+    assert (manifest.head.fps, manifest.head.num_poses) == (FPS, FRAMES)
+    assert [(w.first, w.last) for w in manifest.body.windows] == [(0, 8), (8, 14)]
+    assert manifest.speech.encoder == "builtin" and bundle.read("speech.onnx")
+    assert manifest.provenance.kind == "planted, filmed"
+    assert manifest.provenance.sources == ("a seed",)
+    assert manifest.provenance.licence == "CC0-1.0; CC-BY-4.0"
+    assert bundle.animation.num_frames == FRAMES
+    np.testing.assert_allclose(manifest.background, (0.3, 0.4, 0.5), atol=1e-4)
+    np.testing.assert_allclose(
+        bundle.world_from_head, person.placement.world_from_canonical, atol=1e-6
+    )
+
+
+def test_the_baked_person_stands_and_looks_as_the_exact_one(baked):
+    bundle, _, person, capture = baked
+    for frame in (0, 5.5, 8, 14):
+        expression = person.expression(frame / FPS)
+        exact = person.gaussians(frame / FPS)
+        ours = avatar_gaussians(bundle, frame / FPS, expression)
+        behind = torch.tensor((0.3, 0.4, 0.5))
+        pictures = [render(g, [capture.cameras[0]], behind).rgb[0].numpy() for g in (exact, ours)]
+        assert psnr(*pictures) > 35
+    centre = ours.means[-290:].mean(0).numpy()
+    expected = exact.means[-300:].mean(0).numpy()
+    np.testing.assert_allclose(centre, expected, atol=0.01)
+
+
+def test_the_loss_is_that_of_the_whole_person(baked):
+    loss = baked[0].manifest.loss
+    assert loss.psnr_exact == pytest.approx(-20 * np.log10(NOISE), abs=0.4)
+    assert loss.psnr_exact - loss.psnr_baked < 0.3 and loss.psnr_baked_vs_exact > 32
+
+
+def test_the_visitor_sees_all_of_the_person_from_its_front(baked):
+    bundle, _, person, _ = baked
+    camera = visitor_camera(bundle.manifest.camera, 64, 64)
+    seen = person.gaussians(0.0).means.numpy()
+    pixels, depths = camera.project(seen.astype(float))
+    assert (depths > 0).all() and np.mean((pixels > 2) & (pixels < 62)) > 0.99
+    assert np.ptp(pixels[:, 1]) > 30
+    face = person.placement.world_from_head(0)[:3, :3] @ (0, 0, 1)
+    toward = camera.camera_to_world[:3, 3] - NECK
+    cosine = face @ toward / np.linalg.norm(face) / np.linalg.norm(toward)
+    assert cosine > 0.95
+
+
+def test_the_strip_shows_recorded_exact_and_baked(baked):
+    from PIL import Image
+
+    assert Image.open(baked[1]).size == (3 * SIZE, 4 * SIZE)
+
+
+def test_a_head_moves_as_gaussians_do(avatar):
+    head, similarity = random_head(40), avatar[1].placement.canonical_from_head
+    face = np.linspace(-1, 1, 39)
+    moved = baked_gaussians(whole_bundle.moved_head(head, similarity), face)
+    expected = baked_gaussians(head, face).transform(similarity)
+    torch.testing.assert_close(moved.means, expected.means)
+    torch.testing.assert_close(moved.scales, expected.scales, rtol=4e-3, atol=0)
+    units = [torch.nn.functional.normalize(g.quats) for g in (expected, moved)]
+    assert (units[0] * units[1]).sum(1).abs().min() > 1 - 1e-5
+    assert torch.equal(moved.colors, expected.colors)
+
+
+def test_without_a_recording_voices_say_how_the_face_moves(avatar):
+    person = avatar[1]
+    persona = load_persona(None)
+    few = type(persona)(persona.name, persona.greeting, persona.notes[:2])
+    samples, views = whole_bundle.head_samples(person, None, few)
+    assert samples.expressions.shape[1] == 39 and len(samples.expressions) > FRAMES + 50
+    assert samples.expressions[FRAMES:, 32 + 5].max() > 0.9  # somebody blinks
+    assert samples.importance.shape == (300, 4) and views[0].truth is None
+    assert all(view.exact.std() > 0.02 for view in views)
+
+
+def test_an_edited_animation_is_taken(avatar, tmp_path):
+    folder, person = avatar
+    found = whole_bundle.animation_of(folder, person)
+    assert (found.num_frames, found.fps) == (FRAMES, FPS)
+    edited = Animation(FPS, FRAMES, Rest(2, 5), ())
+    shutil.copytree(folder, tmp_path / "avatar")
+    (tmp_path / "avatar" / "animation.json").write_bytes(edited.to_bytes())
+    assert whole_bundle.animation_of(tmp_path / "avatar", person) == edited
+    (tmp_path / "avatar" / "animation.json").write_text(json.dumps({"version": 1}))
+    with pytest.raises(BundleError, match=r"animation\.json"):
+        whole_bundle.animation_of(tmp_path / "avatar", person)
+
+
+def test_what_costs_too_much_is_refused(baked):
+    result = whole_bundle.WholeResult(None, [], np.zeros(39), Loss(30.0, 29.8, 40.0))
+    whole_bundle.check(result)
+    bad = whole_bundle.WholeResult(None, [], np.zeros(39), Loss(30.0, 29.6, 40.0))
+    with pytest.raises(BundleError, match="whole person too much"):
+        whole_bundle.check(bad)
+
+
+def test_too_many_files_are_refused(avatar, capsys):
+    assert main(["bake", str(avatar[0]), "a", "b", "c", "d"]) == 1
+    assert "AVATAR [HEAD_CAPTURE [BODY_CAPTURE]] OUT" in capsys.readouterr().err

@@ -1,0 +1,129 @@
+/** In the page: the animated person, and the same splats standing still, drawn as fast as can be. */
+import { dyno, SplatMesh, type PackedSplats } from '@sparkjsdev/spark';
+import * as THREE from 'three';
+import type { BakedWindow } from '../../src/body/window.ts';
+import { readBakedWindow } from '../../src/body/window.ts';
+import { loadFile, loadHead, loadManifest } from '../../src/bundle/load.ts';
+import { parseSafetensors } from '../../src/bundle/safetensors.ts';
+import type { HeadFiles } from '../../src/bundle/load.ts';
+import { ExpressionTrack } from '../../src/face/track.ts';
+import { Poses } from '../../src/head/poses.ts';
+
+/** A frame that was drawn. */
+export interface Frame {
+  ms: number; // since the one before
+  window: number; // of the body, -1 in the still scene
+  uploaded: boolean; // a window into the idle slot
+}
+
+declare global {
+  interface Window {
+    scenes?: { animated(frames: number): Promise<Frame[]>; still(frames: number): Promise<Frame[]> };
+  }
+}
+
+const STEP = 0.1; // s: windows change every ten frames
+const { stage, head, body, director, conversation } = window.ico3d!;
+const gl = stage.renderer.getContext();
+const identity = await makeStill();
+let sound = 0; // s
+let uploaded = false;
+perform();
+window.scenes = { animated: (frames) => run(true, frames), still: (frames) => run(false, frames) };
+
+/** Draws one scene; a frame ends when the GPU has done all of it. */
+async function run(animated: boolean, frames: number): Promise<Frame[]> {
+  for (const object of [...head!.objects, ...body!.objects]) object.visible = animated;
+  identity.visible = !animated;
+  await stage.still();
+  const log: Frame[] = [];
+  for (let last = NaN; log.length < frames; ) {
+    await new Promise((resolve) => setTimeout(resolve)); // lets sorts and windows arrive
+    uploaded = false;
+    if (animated) move();
+    else identity.updateVersion();
+    stage.draw();
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+    const now = performance.now();
+    const frame = { ms: now - last, window: animated ? body!.shown!.window : -1, uploaded };
+    if (!Number.isNaN(last)) log.push(frame);
+    last = now;
+  }
+  return log;
+}
+
+/** One tick of a person who speaks and gestures through all of the recording, back and forth. */
+function move(): void {
+  sound += STEP;
+  body!.tick(STEP);
+  head!.tick(STEP);
+}
+
+/** Sound without end, a face that changes, and a plan from end to end. */
+function perform(): void {
+  const columns = head!.expression.length;
+  const rows = 25 * 60;
+  const values = Float32Array.from({ length: rows * columns }, () => Math.random() - 0.5);
+  const track = new ExpressionTrack(25);
+  track.add(0, { rows, columns, values });
+  conversation!.player.heard = () => ({ utterance: 0, seconds: sound, track });
+  director!.plan(0, Array.from({ length: 100 }, (_, i) => [3.2 * i, i % 2 ? Infinity : 0]));
+  const [first, second] = body!.objects;
+  for (const slot of [first, second]) {
+    const hold = slot.hold.bind(slot);
+    slot.hold = (content) => {
+      uploaded = true;
+      hold(content);
+    };
+  }
+}
+
+/** The first window and the head as splats that go through an identity modifier. */
+async function makeStill(): Promise<SplatMesh> {
+  const manifest = await loadManifest();
+  const info = manifest.body!.windows[0]!;
+  const file = await loadFile(manifest, info.file);
+  const window = readBakedWindow(parseSafetensors(file, info.file), manifest.body!, info);
+  const files = await loadHead(manifest, manifest.head!, () => {});
+  const mesh = new SplatMesh({
+    constructSplats: (splats) => {
+      addBody(splats, window);
+      addHead(splats, files);
+    },
+    objectModifier: dyno.dynoBlock({ gsplat: dyno.Gsplat }, { gsplat: dyno.Gsplat }, ({ gsplat }) => ({ gsplat })),
+  });
+  await mesh.initialized;
+  mesh.visible = false;
+  stage.scene.add(mesh);
+  return mesh;
+}
+
+function addBody(splats: PackedSplats, { info, means, scales, quats, rgba }: BakedWindow): void {
+  for (let i = 0; i < info.num_gaussians; i++) {
+    const [w, x, y, z] = quats.subarray(4 * i, 4 * i + 4);
+    const [r, g, b, a] = rgba.subarray(4 * i, 4 * i + 4);
+    splats.pushSplat(
+      new THREE.Vector3().fromArray(means, 3 * i),
+      new THREE.Vector3().fromArray(scales, 3 * i),
+      new THREE.Quaternion(x, y, z, w).normalize(),
+      a! / 255,
+      new THREE.Color(r! / 255, g! / 255, b! / 255),
+    );
+  }
+}
+
+function addHead(splats: PackedSplats, { baked, poses }: HeadFiles): void {
+  const place = new THREE.Object3D();
+  new Poses(poses).apply(0, place);
+  for (let i = 0; i < baked.count; i++) {
+    const [w, x, y, z] = baked.quats.subarray(4 * i, 4 * i + 4);
+    const [r, g, b, a] = baked.meanLogits.subarray(4 * i, 4 * i + 4).map((logit) => 1 / (1 + Math.exp(-logit)));
+    splats.pushSplat(
+      new THREE.Vector3().fromArray(baked.means, 3 * i).applyQuaternion(place.quaternion).add(place.position),
+      new THREE.Vector3(...baked.scales.subarray(3 * i, 3 * i + 3).map(Math.exp)),
+      new THREE.Quaternion(x, y, z, w).premultiply(place.quaternion).normalize(),
+      a!,
+      new THREE.Color(r!, g!, b!),
+    );
+  }
+}
