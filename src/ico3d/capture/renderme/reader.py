@@ -10,7 +10,7 @@ import numpy as np
 from ico3d.capture.capture import Sound, last_eleventh
 from ico3d.capture.decoding import largest_channel, unit
 from ico3d.capture.finding import Finding
-from ico3d.capture.hull import Silhouette, visual_hull
+from ico3d.capture.head_surface import head_hull
 from ico3d.capture.renderme.calibration import frame_rate, read_cameras
 from ico3d.capture.renderme.examine import examine_files, mask_folder
 from ico3d.capture.renderme.files import find_files
@@ -26,8 +26,8 @@ SOUND = "Camera/00/audio"
 LOUDEST = 1.01
 JUDGED = 8
 """Sets of landmarks by which their order is recognised."""
-HEAD_RADIUS, HULL_EDGE = 0.25, 0.005
-"""Metres around the head that its surface is looked for in, and of the voxels it is carved from."""
+HEAD_RADIUS = 0.25
+"""Metres around the head that its surface is looked for in."""
 
 
 class RenderMe360(SmcCapture):
@@ -137,14 +137,11 @@ class RenderMe360(SmcCapture):
     def points(self, frame: int = 0) -> np.ndarray | None:
         """(P, 3) in head space: FLAME's vertices, else the visual hull of the mattes, or None."""
         pose, surface = self.world_from_head(frame), self.flame_fits.vertices(frame)
-        if pose is None:
-            return None
-        if surface is None:
-            surface = self._hull(frame)
-        if surface is None:
-            return None
-        local = (surface - pose[:3, 3]) @ pose[:3, :3]  # (P, 3)
-        return local[np.linalg.norm(local, axis=1) < HEAD_RADIUS]
+        if pose is None or surface is None:
+            local = head_hull(self, frame)
+        else:
+            local = (surface - pose[:3, 3]) @ pose[:3, :3]  # (P, 3)
+        return None if local is None else local[np.linalg.norm(local, axis=1) < HEAD_RADIUS]
 
     @property
     def provenance(self) -> dict:
@@ -193,16 +190,6 @@ class RenderMe360(SmcCapture):
         seen = {camera: marks for camera, marks in found.items() if marks is not None}
         pixels = np.array(list(seen.values())).reshape(-1, len(MULTI_PIE), 2)  # (C, 68, 2)
         return in_space([self.cameras[camera] for camera in seen], pixels)
-
-    def _hull(self, frame: int) -> np.ndarray | None:
-        """(P, 3) surface of the visual hull in the world."""
-        seen = []
-        for index, camera in enumerate(self.cameras):
-            mask = self.mask(index, frame)
-            if mask is not None:
-                seen.append(Silhouette.of(camera, mask))
-        hull = visual_hull(seen, HULL_EDGE)
-        return None if hull is None else hull.surface
 
     def _seconds(self) -> float | None:
         """Length of the sound."""
