@@ -44,7 +44,12 @@ class Demo:
     head_frames: int = 1600
     body_frames: int = 76
     size: int = 384
-    body: tuple[str, ...] = ("max_gaussians=9000", "initial_gaussians=5000", "finetune_steps=1500")
+    body: tuple[str, ...] = (
+        "max_gaussians=9000",
+        "initial_gaussians=5000",
+        "steps_per_frame=250",
+        "finetune_steps=1500",
+    )
     jobs: int = 2
     seed: int = 0
 

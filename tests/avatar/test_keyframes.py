@@ -111,6 +111,12 @@ def test_somebody_who_always_moves_rests_where_it_is_calmest():
     assert rest.end - rest.start >= 5 and 30 <= rest.start < rest.end <= 58
 
 
+def test_a_steady_wave_does_not_rest_all_the_time():
+    speeds = np.abs(np.sin(np.arange(200) / 3)) + 0.01
+    rest = find_rest(Motion(15.0, speeds, ()))
+    assert 6 <= rest.end - rest.start <= 8
+
+
 @pytest.mark.parametrize("count", [2, 3])
 def test_the_shortest_clips_have_a_rest(count):
     places = tuple(np.random.default_rng(0).normal(size=(count, 50, 3)))

@@ -129,4 +129,4 @@ def _curve(axes: "Axes", animation: Animation, motion: Motion) -> None:
         xlabel="frame",
         ylabel="speed of the hands, m/s",
     )
-    axes.legend(loc="upper left", fontsize=8)
+    axes.legend(loc="lower right", fontsize=8)

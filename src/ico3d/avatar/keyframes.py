@@ -5,6 +5,7 @@ from how fast the hands are, which are what moves most: somebody rests while the
 long, and where they slow down away from rest, motion can turn around or be held.
 """
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -123,16 +124,17 @@ def find_rest(motion: Motion) -> Rest:
     """The longest span in which the hands are calm, from one of their slowest frames to another.
 
     Calm is what is slower than the clip's division into slow and fast frames; where that leaves
-    no span of `LEAST_REST`, somewhat faster motion counts too.
+    no span of `LEAST_REST`, the calmest one of that length is taken.
     """
     speeds = motion.speeds
     bound = max(CALM, _division(speeds))
-    wanted = min(LEAST_REST * motion.fps, len(speeds) - 1)
+    wanted = min(math.ceil(LEAST_REST * motion.fps), len(speeds) - 1)
     first, last = _longest_run(speeds <= bound)
-    while last - first < wanted:
-        bound *= 1.1
-        first, last = _longest_run(speeds <= bound)
-    part = max(int(ENDS * (last - first)), 0) + 1
+    if last - first < wanted:
+        sums = np.convolve(speeds, np.ones(wanted + 1), "valid")
+        first = int(np.argmin(sums))
+        last = first + wanted
+    part = int(ENDS * (last - first)) + 1
     start = first + int(np.argmin(speeds[first : first + part]))
     end = last - int(np.argmin(speeds[last - part + 1 : last + 1][::-1]))
     return Rest(start, end)
@@ -174,9 +176,9 @@ def _still_span(motion: Motion, frame: int) -> tuple[int, int]:
 
 def _hands(step: np.ndarray) -> float:
     """Metres that the hands move in a step of the Gaussians (N, 3)."""
-    moved = np.linalg.norm(step, axis=1)
-    low, high = np.quantile(moved, FASTEST)
-    return float(moved[(moved >= low) & (moved <= high)].mean())
+    moved = np.sort(np.linalg.norm(step, axis=1))  # (N,)
+    first, last = (int(part * len(moved)) for part in FASTEST)
+    return float(moved[first : max(last, first + 1)].mean())
 
 
 def _division(speeds: np.ndarray) -> float:

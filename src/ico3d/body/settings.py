@@ -163,7 +163,8 @@ CPU = BodySettings(
     densify_gradient=0.0,
     densify_growth=0.12,
     absgrad=True,
-    finetune_steps=2_500,
+    finetune_steps=3_500,
+    finetune_rate=0.5,
     checkpoint_every=500,
 )
 

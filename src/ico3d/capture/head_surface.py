@@ -10,7 +10,7 @@ EDGE = 0.005
 
 
 def head_hull(capture: Capture, frame: int) -> np.ndarray | None:
-    """The visual hull of the masks of a frame.
+    """The visual hull of each camera's mask nearest in time: not all take all frames.
 
     Args:
         capture: With masks and head poses.
@@ -19,13 +19,17 @@ def head_hull(capture: Capture, frame: int) -> np.ndarray | None:
     Returns:
         (P, 3) in canonical head space, metres; None where poses, masks or a hull are lacking.
     """
-    pose = capture.world_from_head(frame)
-    if pose is None:
-        return None
-    seen = []
-    for index, camera in enumerate(capture.cameras):
-        mask = capture.mask(index, frame)
-        if mask is not None:
-            seen.append(Silhouette.of(camera, mask))
-    hull = visual_hull(seen, EDGE)
-    return None if hull is None else (hull.surface - pose[:3, 3]) @ pose[:3, :3]
+    order = sorted(range(capture.num_frames), key=lambda other: (abs(other - frame), other))
+    posed = [other for other in order if capture.world_from_head(other) is not None]
+    found = (_silhouette(capture, camera, posed) for camera in range(len(capture.cameras)))
+    hull = visual_hull([seen for seen in found if seen is not None], EDGE)
+    return None if hull is None else hull.surface
+
+
+def _silhouette(capture: Capture, camera: int, frames: list[int]) -> Silhouette | None:
+    """The mask of the first of the frames that has one, as seen from head space."""
+    for frame in frames:
+        pose, mask = capture.world_from_head(frame), capture.mask(camera, frame)
+        if pose is not None and mask is not None:
+            return Silhouette.of(capture.cameras[camera].moved(pose), mask)
+    return None

@@ -36,7 +36,7 @@ def model():
 
 def _recorded(folder: Path, **settings) -> tuple[Capture, Path]:
     """A synthetic capture, and the same without what is known about the head."""
-    values = dict(text="", lively=True, light="studio", motion="showcase", seed=1)
+    values = dict(text="", lively=True, light="studio", motion="talk", seed=0)
     record(Recording(**values | settings), folder / "truth", 2)
     resize_capture(folder / "truth", folder / "recording", settings["size"], 2)
     assert Capture.open(folder / "recording").world_from_head(0) is None
@@ -104,7 +104,7 @@ def test_small_faces_in_pictures_of_a_whole_person_are_found(tmp_path):
     if not PERSON.is_file():
         pytest.skip("../shared/subjects is not here")
     shape = dict(subject=str(PERSON), rig="body", cameras=8, views_per_frame=8)
-    truth, folder = _recorded(tmp_path, frames=3, fps=3.0, size=576, **shape)
+    truth, folder = _recorded(tmp_path, frames=4, fps=15.0, size=576, **shape)
     assert main(["capture", "track", str(folder)]) == 0
     degrees, metres = _agreement(truth, Capture.open(folder))
     assert degrees.max() < 2.0 and metres.max() < 0.005

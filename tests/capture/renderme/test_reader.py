@@ -137,6 +137,20 @@ def test_heads_of_parts_without_fits_come_from_landmarks(smc, faces, tmp_path):
     assert len(hull) > 1000 and np.linalg.norm(hull, axis=1).max() < 0.25
 
 
+def test_the_hull_takes_mattes_of_other_frames_where_a_frame_has_few(smc, tmp_path):
+    rig = smc.Rig(part="h0", frames=6, cameras=(0, 10, 22, 25, 28, 45), size=(80, 96))
+    raw = smc.write_recording(tmp_path, rig, same_picture=True)
+    all_views = Capture.open(raw).points(0)
+    thin = smc.write_recording(tmp_path / "thin", rig, same_picture=True)
+    with h5py.File(thin.with_name("0026_h0_anno.smc"), "a") as file:
+        for turn, camera in enumerate(rig.cameras):
+            for frame in set(range(6)) - {turn}:
+                del file[f"Camera/{camera:02d}/mask/{frame}"]
+    few = Capture.open(thin).points(0)
+    near = np.linalg.norm(few[:, None] - all_views[None, ::5], axis=-1).min(1)
+    assert len(few) > 0.5 * len(all_views) and np.median(near) < 0.02
+
+
 @pytest.mark.parametrize("place", ("raw", "anno"))
 @pytest.mark.parametrize("channels", (1, 2))
 def test_sound_lies_in_either_file(smc, tmp_path, place, channels):

@@ -8,7 +8,6 @@ import { parseSafetensors } from '../../src/bundle/safetensors.ts';
 import type { HeadFiles } from '../../src/bundle/load.ts';
 import { ExpressionTrack } from '../../src/face/track.ts';
 import { Poses } from '../../src/head/poses.ts';
-import { TICK } from '../../src/stage/stage.ts';
 
 /** A frame that was drawn. */
 export interface Frame {
@@ -23,6 +22,7 @@ declare global {
   }
 }
 
+const STEP = 0.1; // s: windows change every ten frames
 const { stage, head, body, director, conversation } = window.ico3d!;
 const gl = stage.renderer.getContext();
 const identity = await makeStill();
@@ -54,9 +54,9 @@ async function run(animated: boolean, frames: number): Promise<Frame[]> {
 
 /** One tick of a person who speaks and gestures through all of the recording, back and forth. */
 function move(): void {
-  sound += TICK;
-  body!.tick(TICK);
-  head!.tick(TICK);
+  sound += STEP;
+  body!.tick(STEP);
+  head!.tick(STEP);
 }
 
 /** Sound without end, a face that changes, and a plan from end to end. */

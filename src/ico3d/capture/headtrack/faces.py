@@ -71,6 +71,7 @@ class Finder:
         self.capture = Capture.open(source)
         self._opened = [Capture.open(source) for _ in self.capture.cameras]
         self._canonical, self._normals = canonical, vertex_normals(canonical)
+        self._opposite = opposite_vertices(canonical)
         self._readers: SimpleQueue[FaceReader] = SimpleQueue()
         for reader in readers:
             self._readers.put(reader)
@@ -145,12 +146,25 @@ class Finder:
         reader = self._readers.get()
         try:
             for part in parts:
-                face = reader.read(part.cut(image))
+                face = self._both_ways(reader, part.cut(image))
                 if face is not None:
                     return Face(part.whole(face.landmarks), face.blendshapes, face.pose)
             return None
         finally:
             self._readers.put(reader)
+
+    def _both_ways(self, reader: FaceReader, picture: np.ndarray) -> Face | None:
+        """The face in a picture; its landmarks read in the mirror, too: errors of sides cancel."""
+        face = reader.read(picture)
+        if face is None:
+            return None
+        other = reader.read(picture[:, ::-1])
+        if other is None:
+            return face
+        landmarks = face.landmarks.copy()
+        back = other.landmarks[self._opposite] * [-1, 1] + [picture.shape[1], 0]  # (468, 2)
+        landmarks[:MESH_LANDMARKS] = (landmarks[:MESH_LANDMARKS] + back) / 2
+        return Face(landmarks, face.blendshapes, face.pose)
 
     def _placed(self, faces: dict[int, Face]) -> Head | None:
         """The head that most cameras agree on."""
@@ -223,3 +237,9 @@ def vertex_normals(face: CanonicalFace) -> np.ndarray:
     if normals[:, 2].mean() < 0:
         normals = -normals  # the face looks along +z
     return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def opposite_vertices(face: CanonicalFace) -> np.ndarray:
+    """(468,) for each vertex the one on the other side of the symmetric face."""
+    mirrored = face.vertices * [-1, 1, 1]
+    return np.linalg.norm(mirrored[:, None] - face.vertices, axis=-1).argmin(1)

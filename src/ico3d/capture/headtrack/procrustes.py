@@ -11,8 +11,8 @@ FEWEST_POINTS = 6
 ROUNDS = 40
 SPREAD_FLOOR = 1e-9
 """Metres: points without any noise have weights that are finite all the same."""
-STEADIEST = 0.5
-"""No point counts as steadier than this part of the median: it would hold the others."""
+STEADY_QUARTER, STEADIEST = 0.25, 0.5
+"""No point counts as steadier than half of what the steadiest quarter stray: it would be alone."""
 MEDIAN_LENGTH = 1.538
 """Median length of a vector whose three components are normal with deviation 1."""
 
@@ -80,7 +80,7 @@ def procrustes(points: np.ndarray, held: np.ndarray) -> RigidMotion:
         local = moved(inverse(poses), points)  # (F, K, 3)
         shape = _means(local, trust)
         away = np.linalg.norm(local - shape, axis=-1)  # (F, K)
-        spreads = _spreads(away)
+        spreads = _spreads(away, held)
         trust = _trust(seen, away / spreads)
         weights = trust * (held & np.isfinite(spreads)) / spreads**2
         before, poses = poses, fit_poses(np.nan_to_num(shape), filled, weights)
@@ -98,14 +98,14 @@ def _means(local: np.ndarray, trust: np.ndarray) -> np.ndarray:
     return np.divide(sums, total, out=np.full_like(sums, np.nan), where=total > 0)
 
 
-def _spreads(away: np.ndarray) -> np.ndarray:
+def _spreads(away: np.ndarray, held: np.ndarray) -> np.ndarray:
     """(K,) robust standard deviations along an axis from lengths (F, K)."""
     known = np.isfinite(away)
     lengths = np.ma.median(np.ma.array(np.where(known, away, 0.0), mask=~known), axis=0)
     spreads = np.ma.filled(lengths / MEDIAN_LENGTH, np.inf)
-    seen = np.isfinite(spreads)
-    floor = STEADIEST * float(np.median(spreads[seen])) if seen.any() else 0.0
-    return np.maximum(spreads, max(floor, SPREAD_FLOOR))
+    steady = spreads[held & np.isfinite(spreads)]
+    floor = STEADIEST * np.quantile(steady, STEADY_QUARTER) if len(steady) else 0.0
+    return np.maximum(spreads, max(float(floor), SPREAD_FLOOR))
 
 
 def _trust(seen: np.ndarray, normed: np.ndarray) -> np.ndarray:

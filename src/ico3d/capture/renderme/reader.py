@@ -136,12 +136,12 @@ class RenderMe360(SmcCapture):
 
     def points(self, frame: int = 0) -> np.ndarray | None:
         """(P, 3) in head space: FLAME's vertices, else the visual hull of the mattes, or None."""
-        pose, surface = self.world_from_head(frame), self.flame_fits.vertices(frame)
-        if pose is None or surface is None:
-            local = head_hull(self, frame)
-        else:
-            local = (surface - pose[:3, 3]) @ pose[:3, :3]  # (P, 3)
-        return None if local is None else local[np.linalg.norm(local, axis=1) < HEAD_RADIUS]
+        pose, vertices = self.world_from_head(frame), self.flame_fits.vertices(frame)
+        if pose is None:
+            return None
+        inside = None if vertices is None else (vertices - pose[:3, 3]) @ pose[:3, :3]  # (P, 3)
+        surface = head_hull(self, frame) if inside is None else inside
+        return None if surface is None else surface[np.linalg.norm(surface, axis=1) < HEAD_RADIUS]
 
     @property
     def provenance(self) -> dict:
