@@ -4,6 +4,8 @@ import re
 import shlex
 import subprocess
 import sys
+import time
+import urllib.error
 import urllib.request
 from collections.abc import Callable
 from pathlib import Path
@@ -11,6 +13,8 @@ from pathlib import Path
 from ico3d.cli import VERBS, main
 
 GUIDES = Path(__file__).parents[2] / "docs" / "guides"
+PATIENCE = 60
+"""Seconds until a server must answer."""
 BLOCK = re.compile(r"^```bash\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
@@ -60,7 +64,17 @@ def _visit(words: list[str]) -> None:
             assert server.stdout is not None
             url = re.search(r"http://[\d.]+:\d+", server.stdout.readline())
             assert url is not None, f"{words} served nothing"
-            with urllib.request.urlopen(f"{url[0]}/bundle/manifest.json", timeout=30) as answer:
-                assert b"ico3d-bundle" in answer.read()
+            assert b"ico3d-bundle" in _fetched(f"{url[0]}/bundle/manifest.json")
         finally:
             server.terminate()
+
+
+def _fetched(url: str) -> bytes:
+    """The answer of a server that is about to start."""
+    for _ in range(PATIENCE):
+        try:
+            with urllib.request.urlopen(url, timeout=30) as answer:
+                return answer.read()
+        except urllib.error.URLError:
+            time.sleep(1)
+    raise AssertionError(f"{url} did not answer in {PATIENCE} s")

@@ -12,6 +12,7 @@ from ico3d.bundle.format import Bundle
 from ico3d.capture.capture import Capture
 
 pytest.importorskip("anny")
+pytestmark = pytest.mark.slow
 MODEL = "face_landmarker.task"
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "models"
 
