@@ -20,12 +20,17 @@ from whole_person import write_whole_person
 
 from ico3d.avatar.film.actor import avatar_actor, bundle_actor
 from ico3d.avatar.film.command import Render
+from ico3d.avatar.film.film import pictures
 from ico3d.avatar.film.performance import motion, speech
+from ico3d.avatar.render_bundle import visitor_camera
 from ico3d.bundle import packaged
-from ico3d.bundle.format import Bundle
+from ico3d.bundle.format import Bundle, add_files, read_background
 from ico3d.capture.capture import Sound
-from ico3d.errors import ModelError, SettingsError
+from ico3d.errors import BundleError, ModelError, SettingsError
 from ico3d.speech.runtime import SpeechModel
+from ico3d.splat.files.formats import write_gaussians
+from ico3d.splat.files.raw import RawGaussians
+from ico3d.splat.gaussians import Gaussians
 
 FPS, RATE = 15.0, 16_000
 SHARED = Path(__file__).parents[3] / "shared" / "speech"
@@ -78,6 +83,7 @@ def test_a_head_alone_sways_back_and_forth(bundles):
     bundle = Bundle.open(bundles / "head.ico3d")
     actor = bundle_actor(bundle)
     talk = speech(actor, hum(5.0), 0)
+    assert actor.portrait == actor.view == bundle.manifest.camera
     assert actor.seconds == pytest.approx(49 / 25) and talk.body_times[-1] == 5.0
     face = talk.expressions[50]
     there, back = actor.draw(49 / 25 - 0.4, face), actor.draw(49 / 25 + 0.4, face)
@@ -137,6 +143,11 @@ def test_a_film_of_the_exact_person(tmp_path):
     assert actor.seconds == avatar.seconds and len(actor.idle) == 39
     low = avatar.gaussians(0.0).means.min(0).values.numpy()
     assert actor.view.eye[2] > 1 and low[1] < actor.view.target[1] < 1.7
+    camera = visitor_camera(actor.portrait, 256, 256)
+    head = avatar.head_gaussians(0.3).means.numpy().astype(float)
+    pixels, depths = camera.project(head)
+    assert (depths > 0).all() and 60 < np.ptp(pixels[:, 1]) < 128  # a face that can be found
+    assert pixels.min() > 0 and pixels.mean(0)[1] < 110
     file, sound = said(tmp_path, 0.6)
     Render(tmp_path / "avatar", tmp_path / "a.mp4", audio=file, size=(48, 64), fps=25).run()
     check_streams(tmp_path / "a.mp4", 0.6, 25, sound)
@@ -146,6 +157,31 @@ def test_a_silent_film_goes_around_a_bundle(bundles, tmp_path):
     Render(bundles / "whole.ico3d", tmp_path / "a.mp4", size=(48,), seconds=0.3).run()
     with av.open(str(tmp_path / "a.mp4")) as file:
         assert len(file.streams) == 1 and sum(1 for _ in file.decode(video=0)) == 9
+
+
+def test_what_stands_behind_is_in_the_film(bundles, tmp_path):
+    ground = Gaussians(
+        means=torch.tensor([[0.0, 0.0, -3.0]]),
+        quats=torch.tensor([[1.0, 0, 0, 0]]),
+        scales=torch.full((1, 3), 1.0),
+        opacities=torch.tensor([0.99]),
+        colors=torch.tensor([[0.1, 0.7, 0.2]]),
+    )
+    path = tmp_path / "a.ico3d"
+    shutil.copy(bundles / "whole.ico3d", path)
+    write_gaussians(tmp_path / "ground.ply", RawGaussians.from_gaussians(ground))
+    add_files(path, read_background(tmp_path / "ground.ply"))
+    actor = bundle_actor(Bundle.open(path))
+    torch.testing.assert_close(actor.backdrop.colors, ground.colors, atol=1e-5, rtol=0)
+    torch.testing.assert_close(actor.backdrop.means, ground.means)
+    shown, camera = motion(actor, 1.0, 0), visitor_camera(actor.view, 32, 32)
+    with_it, without = (
+        next(pictures(shown, [camera], 30, actor.background, behind))
+        for behind in (actor.backdrop, None)
+    )
+    assert np.abs(with_it[16, 28].astype(int) - without[16, 28]).max() > 15
+    with pytest.raises(BundleError, match=r"named \.spz or \.ply"):
+        read_background(tmp_path / "ground.obj")
 
 
 def test_who_cannot_talk_is_told(bundles, tmp_path):

@@ -34,6 +34,7 @@ class Bake:
         name: The avatar's name; by default the persona's, of bodies the bundle's.
         persona: JSON file with name, greeting and notes; for heads, by default that of the package.
         licences: Text files with notices that the sources ask for; they go into LICENSES.txt.
+        background: Splats that stand behind the person, in the same world: .spz or .ply.
         strip: Also write a picture here: recorded | exact | baked.
         force: Write the bundle although it breaks a bound.
     """
@@ -46,6 +47,7 @@ class Bake:
     name: str | None = None
     persona: Path | None = None
     licences: tuple[Path, ...] = ()
+    background: Path | None = None
     strip: Path | None = None
     force: bool = False
 
@@ -60,7 +62,7 @@ class Bake:
 
         from ico3d.avatar.avatar import ABOUT as AVATAR
         from ico3d.body.trained import ABOUT as BODY
-        from ico3d.bundle.format import Bundle
+        from ico3d.bundle.format import Bundle, add_files, read_background
 
         console = Console()
         is_whole, is_body = ((self.model / about).is_file() for about in (AVATAR, BODY))
@@ -71,7 +73,10 @@ class Bake:
                 "AVATAR [HEAD_CAPTURE [BODY_CAPTURE]] OUT."
             )
         bake = self._bake_whole if is_whole else self._bake_body if is_body else self._bake_head
+        behind = read_background(self.background) if self.background else {}
         bake(console.print)
+        if behind:
+            add_files(self._out, behind)
         Bundle.open(self._out)
         console.print(f"{self._out}: {self._out.stat().st_size / 1e6:.2f} MB.")
 

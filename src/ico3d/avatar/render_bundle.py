@@ -1,8 +1,10 @@
 """Rendering baked avatars in Python: the picture that the page must show."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import torch
@@ -16,6 +18,8 @@ from ico3d.bundle.head import BakedHead
 from ico3d.bundle.manifest import BodyInfo, CameraInfo
 from ico3d.common.camera import Camera, look_at
 from ico3d.errors import BundleError
+from ico3d.splat import harmonics
+from ico3d.splat.files.formats import read_gaussians
 from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
 
@@ -132,6 +136,23 @@ def avatar_gaussians(
         BundleError: If the bundle lacks the body or the head.
     """
     return BakedAvatar.of(bundle).gaussians(body_seconds, expression)
+
+
+def backdrop_gaussians(bundle: Bundle) -> Gaussians | None:
+    """What stands behind the person, in the world, without harmonics; None where nothing does.
+
+    Raises:
+        GaussianFileError: If the file is damaged.
+    """
+    if bundle.background is None:
+        return None
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / bundle.background
+        file.write_bytes(bundle.read(bundle.background))
+        found = read_gaussians(file).with_degree(0).to_gaussians()
+    assert found.sh is not None
+    colors = (found.sh[:, 0] * harmonics.C0 + 0.5).clamp(min=0)  # (N, 3)
+    return replace(found, sh=None, colors=colors)
 
 
 def render_avatar(

@@ -159,6 +159,34 @@ def write_bundle(path: Path | str, manifest: Manifest, files: Mapping[str, bytes
     return written
 
 
+def read_background(path: Path) -> dict[str, bytes]:
+    """A file of splats as the part of a bundle that it becomes: its name there, and its content.
+
+    Raises:
+        BundleError: If it cannot be read, or bundles hold no such file.
+    """
+    name = f"background{path.suffix.lower()}"
+    if name not in BACKGROUNDS:
+        raise BundleError(f"{path}: splats behind a person must be named .spz or .ply.")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise BundleError(f"{path}: cannot be read ({error.strerror}).") from error
+    check_background(data, name)
+    return {name: data}
+
+
+def add_files(path: Path, more: Mapping[str, bytes]) -> None:
+    """Puts further files into a bundle.
+
+    Raises:
+        BundleError: If they do not belong into it.
+    """
+    bundle = Bundle.open(path)
+    files = {name: bundle.read(name) for name in bundle.manifest.files}
+    write_bundle(path, bundle.manifest, files | dict(more))
+
+
 def _check_listing(manifest: Manifest, archive: Archive) -> None:
     """The files that are there must be just those the manifest lists, with their sizes."""
     _check_required(manifest)

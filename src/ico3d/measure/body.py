@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import torch
@@ -19,18 +20,27 @@ from ico3d.measure.flicker import border_flicker, novel_cameras
 from ico3d.measure.lpips import lpips
 from ico3d.measure.metrics import moving_pixels, psnr, psnr_moving
 from ico3d.measure.scores import Scores, add_picture, write_pictures
+from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
 QUALITY = ("psnr", "psnr_mask", "psnr_moving", "ssim", "lpips")
 """Metrics of a picture; of several pictures, their mean over those that allow them."""
 
 
-class BodyRenderer:
-    """Renders a trained body at the frames of a capture."""
+class Drawn(Protocol):
+    """A body, or a whole person."""
 
-    def __init__(self, body: TrainedBody, capture: Capture):
-        """Binds the body to the capture's clock and clean plates."""
-        self._body, self._capture = body, capture
+    def gaussians(self, seconds: float) -> Gaussians:
+        """Activated Gaussians in the world at a time."""
+        ...
+
+
+class BodyRenderer:
+    """Renders somebody at the frames of a capture."""
+
+    def __init__(self, drawn: Drawn, capture: Capture):
+        """Binds them to the capture's clock and clean plates."""
+        self._drawn, self._capture = drawn, capture
         self._plate = lru_cache(1)(self._read_plate)
         self.seconds: list[float] = []
 
@@ -40,7 +50,7 @@ class BodyRenderer:
         behind = self._plate(camera)
         seen = self._capture.cameras[camera]
         begin = time.perf_counter()
-        gaussians = self._body.gaussians(frame / self._capture.fps)
+        gaussians = self._drawn.gaussians(frame / self._capture.fps)
         rgb = render(gaussians, [seen], behind).rgb[0].clamp(0, 1).cpu()
         self.seconds.append(time.perf_counter() - begin)
         return rgb.numpy()
@@ -98,6 +108,7 @@ def evaluate_body(
     frames: Sequence[int] | None = None,
     spans: Sequence[Window] | None = None,
     images: Path | None = None,
+    drawn: Drawn | None = None,
 ) -> dict:
     """All metrics of design section 2 that a body has, those of pictures as means over them.
 
@@ -114,6 +125,8 @@ def evaluate_body(
         spans: Frames to report on one by one; by default the body's windows. A frame in two of
             them counts for the earlier, which shows it.
         images: Folder for pictures, or None.
+        drawn: Who is in the pictures: the whole person of an avatar, whose `body` this is; by
+            default the body alone. `flicker` and `num_gaussians` are the body's anyway.
 
     Returns:
         Metric keys to values, None where this capture does not allow the metric; `per_window`,
@@ -125,7 +138,7 @@ def evaluate_body(
     """
     cameras = _test_cameras(capture) if cameras is None else cameras
     frames = _shown(body, capture) if frames is None else frames
-    renderer = BodyRenderer(body, capture)
+    renderer = BodyRenderer(drawn or body, capture)
     found = _measured(renderer, capture, cameras, frames, images)
     if not found:
         raise CaptureError(f"{capture.path} has no picture in the frames to measure.")

@@ -12,16 +12,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Measures a trained head, body or static scene against a capture, its own or another.
+    """Measures a trained head, body, whole person or static scene against a capture.
 
     Attributes:
-        model: A model folder that ico3d train head, train body or train static wrote.
+        model: A model folder that ico3d train head, train body, train static or assemble wrote.
         capture: The capture with the truth; its sound or blendshapes drive the head.
         json: File for the metrics.
         images: Folder for pictures: {pred,gt,mask}/CAMERA/%06d.png.
         frames: The capture's test frames (of a single moment: its test cameras), or all of them
-            (for a capture that trained nothing); of bodies: all frames by the test cameras, or by
-            all cameras.
+            (for a capture that trained nothing); of bodies and whole persons: all frames by the
+            test cameras, or by all cameras.
         plots: Of bodies: folder for PSNR over frames and by camera, as pictures.
         untuned: Of bodies: measure the windows as they were before temporal fine-tuning.
     """
@@ -53,7 +53,8 @@ class Evaluate:
             console.print(f"{name:16} {'not measured' if value is None else f'{value:.5g}'}")
 
     def _metrics(self, capture: "Capture") -> dict:
-        """Measures what the folder holds: a scene, a body, else a head."""
+        """Measures what the folder holds: a scene, a whole person, a body, else a head."""
+        from ico3d.avatar.avatar import ABOUT as AVATAR
         from ico3d.body.trained import ABOUT as BODY
         from ico3d.scene.trained import ABOUT as SCENE
 
@@ -63,8 +64,8 @@ class Evaluate:
 
             scene = TrainedScene.load(self.model)
             return evaluate_scene(scene, capture, self.frames, self.images)
-        if (self.model / BODY).is_file():
-            return self._body(capture)
+        if (self.model / AVATAR).is_file() or (self.model / BODY).is_file():
+            return self._body(capture, (self.model / AVATAR).is_file())
         from ico3d.head.trained import TrainedHead
         from ico3d.measure.evaluate import evaluate_head
 
@@ -72,14 +73,19 @@ class Evaluate:
         frames = capture.split.test if self.frames == "test" else range(capture.num_frames)
         return evaluate_head(head, capture, frames, self.images)
 
-    def _body(self, capture: "Capture") -> dict:
+    def _body(self, capture: "Capture", with_head: bool) -> dict:
+        from dataclasses import replace
+
+        from ico3d.avatar.avatar import BODY, TrainedAvatar
         from ico3d.body.trained import ABOUT, UNTUNED, TrainedBody
         from ico3d.measure.body import evaluate_body
         from ico3d.measure.body_plots import plot_body
 
-        body = TrainedBody.load(self.model, UNTUNED if self.untuned else ABOUT)
+        folder = self.model / BODY if with_head else self.model
+        body = TrainedBody.load(folder, UNTUNED if self.untuned else ABOUT)
+        drawn = replace(TrainedAvatar.load(self.model), body=body) if with_head else body
         cameras = range(len(capture.cameras)) if self.frames == "all" else None
-        metrics = evaluate_body(body, capture, cameras, images=self.images)
+        metrics = evaluate_body(body, capture, cameras, images=self.images, drawn=drawn)
         if self.plots is not None:
             plot_body(metrics, self.plots)
         return metrics

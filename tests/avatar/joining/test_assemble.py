@@ -24,6 +24,7 @@ from ico3d.body.trainer import BodyTrainer
 from ico3d.capture.capture import Capture
 from ico3d.errors import CaptureError, ModelError, SettingsError
 from ico3d.head.model import HeadModel, HeadShape
+from ico3d.measure.body import evaluate_body
 
 TINY = {
     "initial_gaussians": 400,
@@ -131,6 +132,16 @@ def test_colours_match(made):
     assert summary["psnr_face"] > 20 and summary["psnr_border"] > 18
     assert summary["color_step"] < 0.1 and summary["gap_mm"] < 30
     assert summary["settings"]["border_points"] == 60
+
+
+def test_the_whole_person_is_measured(made):
+    """By the test cameras: better than the body, which lacks a face."""
+    capture, _, _, avatar, *_ = made
+    whole = evaluate_body(avatar.body, capture, drawn=avatar)
+    alone = evaluate_body(avatar.body, capture)
+    assert whole["psnr_mask"] > alone["psnr_mask"] + 0.5
+    assert [entry["camera"] for entry in whole["per_camera"]] == ["c1", "c6"]
+    assert len(whole["per_frame"]) == FRAMES
 
 
 def test_pictures_show_whether_the_head_fits(made, tmp_path):

@@ -8,8 +8,14 @@ import numpy as np
 
 from ico3d.avatar import baking, body_bundle, staging
 from ico3d.avatar.avatar import TrainedAvatar
-from ico3d.avatar.film.film import back_and_forth, extent
-from ico3d.avatar.render_bundle import BakedAvatar, baked_gaussians, body_gaussians, pose_at
+from ico3d.avatar.film.film import MOMENTS, back_and_forth, extent
+from ico3d.avatar.render_bundle import (
+    BakedAvatar,
+    backdrop_gaussians,
+    baked_gaussians,
+    body_gaussians,
+    pose_at,
+)
 from ico3d.avatar.samples import lips_of
 from ico3d.avatar.whole_bundle import animation_of, front_of
 from ico3d.bundle.animation import Animation
@@ -20,8 +26,16 @@ from ico3d.common.expression import SPEECH_SIZE
 from ico3d.speech.runtime import SpeechModel
 from ico3d.splat.gaussians import Gaussians
 
+Draw = Callable[[float, np.ndarray], Gaussians]
+"""A time of the body, in seconds, and an expression (B,) → the person in the world."""
 Lips = Callable[[np.ndarray, int], np.ndarray]
 """A sound (S,) and its rate → what the mouth does, (T, 32) at 25 rows per second."""
+
+
+PORTRAIT = 2.8
+"""Height of a portrait of a whole person, in heights of its head."""
+CHEST = 0.7
+"""How far the middle of the portrait is below that of the head, likewise."""
 
 
 @dataclass(frozen=True)
@@ -33,21 +47,25 @@ class Actor:
             goes back and forth), with an expression (B,).
         seconds: How long the recorded motion lasts.
         view: Where a visitor stands.
+        portrait: Nearer to the face, where there is one.
         background: Colour in [0, 1].
         idle: (B,) the face at rest; (0,) without a head.
         eye_offset: Where the seven eye and brow values start in the expression, if it has them.
         lips: Moves the mouth; None where no sound does.
         animation: How the body moves while it talks; None where head and body are not both there.
+        backdrop: What stands behind the person, in the world.
     """
 
-    draw: Callable[[float, np.ndarray], Gaussians]
+    draw: Draw
     seconds: float
     view: CameraInfo
+    portrait: CameraInfo
     background: tuple[float, float, float]
     idle: np.ndarray
     eye_offset: int | None
     lips: Lips | None
     animation: Animation | None
+    backdrop: Gaussians | None = None
 
 
 def bundle_actor(bundle: Bundle) -> Actor:
@@ -60,19 +78,24 @@ def bundle_actor(bundle: Bundle) -> Actor:
     head, body = manifest.head, manifest.body
     lips = SpeechModel(bundle.read(SPEECH)).expressions if manifest.speech else None
     idle = np.array(head.idle_expression if head else (), np.float32)
+    portrait = manifest.camera
     if bundle.manifest.is_whole:
         person = BakedAvatar.of(bundle)
         draw, seconds = person.gaussians, person.seconds
+        poses = person.world_from_head
+        points = [person.head.means @ pose[:3, :3].T + pose[:3, 3] for pose in poses]
+        portrait = portrait_of(manifest.camera, np.concatenate(points))
     elif body is not None:
         draw, seconds = lambda at, _: body_gaussians(bundle, at), body.windows[-1].last / body.fps
     else:
         draw, seconds = _swaying_head(bundle)
     at = head.eye_offset if head else None
-    stage = (manifest.camera, manifest.background)
-    return Actor(draw, seconds, *stage, idle, at, lips, bundle.animation)
+    stage = (manifest.camera, portrait, manifest.background)
+    behind = backdrop_gaussians(bundle)
+    return Actor(draw, seconds, *stage, idle, at, lips, bundle.animation, behind)
 
 
-def _swaying_head(bundle: Bundle) -> tuple[Callable[[float, np.ndarray], Gaussians], float]:
+def _swaying_head(bundle: Bundle) -> tuple[Draw, float]:
     """A head alone sways as it was recorded, back and forth."""
     head, poses = bundle.require_head()
     assert bundle.manifest.head is not None
@@ -97,6 +120,8 @@ def avatar_actor(folder: Path, capture: Capture | None) -> Actor:
     points = extent(avatar)
     low, high = points.min(0), points.max(0)
     view = body_bundle.standing_camera(low, high, capture, front_of(avatar))
+    moments = np.linspace(0, avatar.seconds, MOMENTS)
+    face = [avatar.head_gaussians(float(moment)).means.numpy() for moment in moments]
     background = staging.background_colour(capture, 0) if capture else staging.NEUTRAL
     head = avatar.head
     driven = head.adaptor is not None
@@ -104,9 +129,28 @@ def avatar_actor(folder: Path, capture: Capture | None) -> Actor:
         avatar.gaussians,
         avatar.seconds,
         view,
+        portrait_of(view, np.concatenate(face)),
         background,
         baking.idle_expression(head, avatar.expressions),
         SPEECH_SIZE if driven else None,
         (lambda samples, rate: lips_of(head, samples, rate)) if driven else None,
         animation_of(folder, avatar),
     )
+
+
+def portrait_of(view: CameraInfo, head: np.ndarray) -> CameraInfo:
+    """A camera that looks the same way at head and chest: hands are seen where they gesture.
+
+    Args:
+        view: Where a visitor stands, to see all of the person.
+        head: (P, 3) places of the head's Gaussians in the world.
+    """
+    up = np.array(view.up) / np.linalg.norm(view.up)
+    toward = np.subtract(view.eye, view.target)
+    toward /= np.linalg.norm(toward)
+    low, high = np.percentile(head @ up, (0.5, 99.5))
+    middle = np.median(head, axis=0)
+    target = middle + up * ((low + high) / 2 - middle @ up - CHEST * (high - low))
+    away = PORTRAIT * (high - low) / 2 / np.tan(np.deg2rad(view.fov_y) / 2)
+    eye = target + toward * away
+    return CameraInfo(staging.triple(eye), staging.triple(target), view.up, view.fov_y)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ico3d.capture.capture import Capture, Sound
     from ico3d.common.camera import Camera
 
-ORBIT, START = "orbit", "start"
+ORBIT, START, PORTRAIT = "orbit", "start", "portrait"
 """Camera paths that have names."""
 GREY = (0.84, 0.855, 0.88)
 
@@ -33,10 +33,10 @@ class Render:
         audio: The sound to say: WAV, FLAC or MP3.
         capture: Orbit as the cameras of this capture stand around the person; without, level with
             a person in a world with y up. Of what ico3d assemble wrote: the body's recording.
-        path: `orbit`, once around the person; `start`, where visitors stand, for the whole film; or
-            a JSON file with key cameras: {"cameras": [{"eye": [x, y, z], "target": [x, y, z],
-            "up": [0, 1, 0], "fov_y": 40}, ...]}, metres and degrees; up and fov_y can be left out.
-            By default `start` with --audio, else `orbit`.
+        path: `orbit`, once around the person; `portrait`, before head and chest for the whole film;
+            `start`, where visitors stand; or a JSON file with key cameras: {"cameras": [{"eye": [x,
+            y, z], "target": [x, y, z], "up": [0, 1, 0], "fov_y": 40}, ...]}, metres and degrees; up
+            and fov_y can be left out. By default `portrait` with --audio, else `orbit`.
         seconds: How long a film without --audio lasts.
         fps: Pictures per second.
         size: Width and height in pixels, even numbers; one number for a square.
@@ -78,7 +78,8 @@ class Render:
             background = GREY if actor is None else actor.background
         seconds = self.seconds if sound is None else person.seconds
         cameras = self._cameras(person, actor, max(1, round(seconds * self.fps)))
-        seen: Iterable = pictures(person, cameras, self.fps, background)
+        backdrop = None if actor is None else actor.backdrop
+        seen: Iterable = pictures(person, cameras, self.fps, background, backdrop)
         shown = track(seen, "filming", len(cameras), transient=True)
         write_video(self.out, shown, self._sides, self.fps, sound)
         Console().print(f"{self.out}: {len(cameras)} pictures at {self.fps:g} per second.")
@@ -155,11 +156,12 @@ class Render:
         from ico3d.avatar.render_bundle import visitor_camera
         from ico3d.errors import SettingsError
 
-        path = self.path or (ORBIT if self.audio is None else START)
-        if path == START:
+        path = self.path or (ORBIT if self.audio is None else PORTRAIT)
+        if path in (START, PORTRAIT):
             if actor is None:
-                raise SettingsError("--path start: nobody said where visitors of a body stand.")
-            return [visitor_camera(actor.view, *self._sides)] * count
+                raise SettingsError(f"--path {path}: nobody said where visitors of a body stand.")
+            info = actor.view if path == START else actor.portrait
+            return [visitor_camera(info, *self._sides)] * count
         if path != ORBIT:
             keys = camera_path.read_key_cameras(Path(path), *self._sides)
             return camera_path.through(keys, count)

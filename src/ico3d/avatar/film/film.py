@@ -7,7 +7,7 @@ import numpy as np
 import torch
 
 from ico3d.common.camera import Camera
-from ico3d.splat.gaussians import Gaussians
+from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
 
 MOMENTS = 9
@@ -51,7 +51,11 @@ def extent(person: Moving) -> np.ndarray:
 
 @torch.no_grad()
 def pictures(
-    person: Moving, cameras: Sequence[Camera], fps: float, background: Sequence[float]
+    person: Moving,
+    cameras: Sequence[Camera],
+    fps: float,
+    background: Sequence[float],
+    backdrop: Gaussians | None = None,
 ) -> Iterator[np.ndarray]:
     """What the cameras see one after the other while time runs, back and forth through the clip.
 
@@ -60,6 +64,7 @@ def pictures(
         cameras: One per picture.
         fps: Pictures per second.
         background: (3,) colour in [0, 1].
+        backdrop: What stands behind the person, in the world.
 
     Yields:
         (H, W, 3) uint8.
@@ -67,5 +72,7 @@ def pictures(
     behind = torch.tensor(background)
     for number, camera in enumerate(cameras):
         gaussians = person.gaussians(back_and_forth(number / fps, person.seconds))
+        if backdrop is not None:
+            gaussians = cat([gaussians, backdrop])
         rgb = render(gaussians, [camera], behind).rgb[0].clamp(0, 1)  # (H, W, 3)
         yield (rgb * 255 + 0.5).to(torch.uint8).cpu().numpy()
