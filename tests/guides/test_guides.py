@@ -92,7 +92,7 @@ def test_phone(face, tracker, tmp_path, monkeypatch):
     recordings.phone(face, tmp_path)
     guide.follow("phone.md", SMALL)
     manifest = Bundle.open(Path("me.ico3d")).manifest
-    assert manifest.head is not None and manifest.provenance["consent"].startswith("I agree")
+    assert manifest.head is not None and manifest.provenance.consent.startswith("I agree")
 
 
 @pytest.mark.parametrize("name", ["many-cameras.md", "dna-renderme.md", "phone.md"])
