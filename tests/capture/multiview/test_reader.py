@@ -12,7 +12,9 @@ from PIL import Image
 
 from ico3d.capture.capture import Capture
 from ico3d.capture.check import examine
+from ico3d.capture.headtrack.track_file import HeadTrack
 from ico3d.cli import main
+from ico3d.common.camera import Camera, look_at
 from ico3d.errors import CaptureError
 
 BENT = [-0.2, 0.06, 0.002, -0.001, 0.01]
@@ -206,3 +208,36 @@ def test_descriptions_cut_or_changed_anywhere_are_one_sentence(folders, tmp_path
         Capture.open(folder).image(0, 0)
     except CaptureError as error:
         assert "\n" not in str(error)
+
+
+def test_a_folder_that_shows_a_head_is_split_by_time_and_has_its_hull(folders, tmp_path):
+    folder, middle, radius, frames = tmp_path / "head", np.array([0.1, 1.6, -0.2]), 0.1, 11
+    lens = np.array([[50.0, 0, 20], [0, 50, 16], [0, 0, 1]])
+    turns = np.arange(8) * np.pi / 4
+    eyes = middle + 0.6 * np.stack([np.sin(turns), 0.3 * np.cos(2 * turns), np.cos(turns)], 1)
+    cameras = [
+        Camera(40, 32, lens, look_at(eye, middle), f"c{number}") for number, eye in enumerate(eyes)
+    ]
+    y, x = np.mgrid[:32, :40] + 0.5
+    for camera, eye in zip(cameras, eyes, strict=True):
+        away = np.linalg.norm(eye - middle)
+        seen = 50 * radius / np.sqrt(away**2 - radius**2)  # pixels from the ball's middle
+        ball = (255 * (np.hypot(x - 20, y - 16) < seen)).astype(np.uint8)
+        folders.save(folder / f"images/{camera.name}/000000.png", folders.picture(0, 0))
+        folders.save(folder / f"masks/{camera.name}/000000.png", ball)
+    entries = [folders.entry(camera) for camera in cameras]
+    folders.write_cameras(folder, entries, frames, shows="head")
+    capture = Capture.open(folder)
+    assert capture.split.train == tuple(range(10)) and capture.split.test == (10,)
+    assert capture.points() is None  # nobody knows where head space is
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], middle - (0, 0.05, 0)
+    zeros = [np.zeros((frames, *s), np.float32) for s in ((68, 3), (7,), (52,))]
+    seen = np.ones((frames, len(cameras)), np.uint8)
+    HeadTrack(np.tile(pose, (frames, 1, 1)), *zeros, seen).write(folder)
+    points = Capture.open(folder).points()
+    np.testing.assert_allclose(points.mean(0), (0, 0.05, 0), atol=0.01)  # in head space
+    away = np.linalg.norm(points - (0, 0.05, 0), axis=1)
+    assert 0.9 * radius < away.min() and np.median(away) < 1.1 * radius
+    folders.write_cameras(folder, entries, frames, shows="hands")
+    fails(lambda: Capture.open(folder), "shows must be")

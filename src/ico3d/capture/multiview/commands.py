@@ -3,7 +3,7 @@
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -31,6 +31,7 @@ class Import:
         scale: Metres per unit of the source; COLMAP's worlds have any size.
         consent: What the person agreed to; goes into the avatar's manifest.
         licence: Licence of the recording; likewise.
+        shows: What fills the pictures: the whole body, or the head, to train one on.
     """
 
     source: Annotated[Path, tyro.conf.Positional]
@@ -40,6 +41,7 @@ class Import:
     scale: float = 1.0
     consent: str = "not stated"
     licence: str = "not stated"
+    shows: Literal["body", "head"] = "body"
 
     def run(self) -> None:
         """Runs it.
@@ -49,7 +51,8 @@ class Import:
         """
         from ico3d.capture.multiview.importing import ImportSettings, import_recording
 
-        settings = ImportSettings(self.images, self.fps, self.scale, self.consent, self.licence)
+        told = (self.consent, self.licence, self.shows)
+        settings = ImportSettings(self.images, self.fps, self.scale, *told)
         about = import_recording(self.source, self.out, settings)
         _say(about, self.out)
 

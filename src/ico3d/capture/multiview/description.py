@@ -16,6 +16,7 @@ from ico3d.errors import CaptureError
 NAME = "cameras.json"
 FORMAT, VERSION = "ico3d-multiview", 1
 MOST_FRAMES = 10_000_000
+SUBJECTS = ("body", "head")
 SAFE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 """Camera names are names of folders and files."""
 
@@ -44,6 +45,7 @@ class Description:
         sources: What the recording was made from.
         consent: What the person agreed to.
         licence: Licence of the recording.
+        shows: What fills the pictures: "body", or "head", with or without shoulders.
     """
 
     fps: float
@@ -52,12 +54,14 @@ class Description:
     sources: tuple[str, ...] = ()
     consent: str = "not stated"
     licence: str = "not stated"
+    shows: str = "body"
 
     def write(self, folder: Path) -> None:
         """Writes the file into a folder."""
         content = {
             "format": FORMAT,
             "version": VERSION,
+            "shows": self.shows,
             "fps": self.fps,
             "num_frames": self.num_frames,
             "sources": list(self.sources),
@@ -88,6 +92,9 @@ def read_description(folder: Path) -> Description:
     doubled = next((name for name in names if names.count(name) > 1), None)
     if doubled is not None:
         raise CaptureError(f"{file}: two cameras are called {doubled}.")
+    shows = content.get("shows", "body")
+    if shows not in SUBJECTS:
+        raise CaptureError(f'{file}: shows must be "body" or "head".')
     sources = content.get("sources", [])
     return Description(
         float(number(content, "fps", f"{file}", 1e-3, 1e5)),
@@ -96,6 +103,7 @@ def read_description(folder: Path) -> Description:
         tuple(map(str, sources)) if isinstance(sources, list) else (),
         str(content.get("consent", "not stated")),
         str(content.get("licence", "not stated")),
+        shows,
     )
 
 

@@ -6,6 +6,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -36,6 +37,7 @@ class ImportSettings:
         scale: Metres per unit of the source.
         consent: What the person agreed to.
         licence: Licence of the recording.
+        shows: What fills the pictures.
     """
 
     images: Path | None = None
@@ -43,6 +45,7 @@ class ImportSettings:
     scale: float = 1.0
     consent: str = "not stated"
     licence: str = "not stated"
+    shows: Literal["body", "head"] = "body"
 
     def __post_init__(self):
         """Checks the numbers.
@@ -79,7 +82,8 @@ def import_recording(source: Path, out: Path, settings: ImportSettings) -> Descr
     )
     count = max(max(row) for row in frames) + 1
     sources = (f"{foreign.tool}: {source.resolve().name}",)
-    about = Description(settings.fps, count, places, sources, settings.consent, settings.licence)
+    told = (settings.consent, settings.licence, settings.shows)
+    about = Description(settings.fps, count, places, sources, *told)
     with new_folder(out) as work:
         _copy(work, places, cameras, frames)
         if foreign.points is not None:

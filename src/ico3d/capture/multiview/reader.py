@@ -4,10 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.capture.capture import Capture, Sound, all_frames
+from ico3d.capture.capture import Capture, Sound, all_frames, last_eleventh
 from ico3d.capture.decoding import unit
 from ico3d.capture.expressions import BLENDSHAPES
 from ico3d.capture.finding import Finding, missing_and_damaged
+from ico3d.capture.head_surface import head_hull
 from ico3d.capture.headtrack.track_file import HeadTrack, read_track
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import read_description
@@ -47,7 +48,12 @@ class MultiviewCapture(Capture):
             )
             for place in self._about.places
         )
-        self.split = all_frames(self.num_frames, self.cameras)
+        self._shows_head = self._about.shows == "head"
+        self.split = (
+            last_eleventh(self.num_frames)
+            if self._shows_head
+            else all_frames(self.num_frames, self.cameras)
+        )
         self._track = read_track(path, self.num_frames, len(self.cameras))
         self.blendshape_names = None if self._track is None else BLENDSHAPES
 
@@ -100,10 +106,10 @@ class MultiviewCapture(Capture):
         return seen.project(self._track.landmarks[frame])[0]
 
     def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) of `points/FRAME.npy`, or None where the frame has none."""
+        """(P, 3) of `points/FRAME.npy`; of heads, else, the visual hull; None where neither is."""
         file = self.path / "points" / f"{self._index(frame):06d}.npy"
         if not file.is_file():
-            return None
+            return head_hull(self, frame) if self._shows_head else None
         try:
             points = np.load(file, allow_pickle=False)
         except (OSError, ValueError, EOFError) as error:

@@ -41,6 +41,7 @@ def resize_capture(source: Path, out: Path, height: int, workers: int) -> Descri
         tuple(known["sources"]),
         known["consent"],
         known["licence"],
+        "head" if capture.split.test else "body",
     )
     cameras = range(len(capture.cameras))
     with new_folder(out) as work:
@@ -90,7 +91,7 @@ def _write_rest(capture: ResizedCapture, work: Path) -> None:
     if capture.kind == MultiviewCapture.kind and track.is_file():
         shutil.copyfile(track, work / TRACK)  # in metres, whatever the size of the pictures
     if capture.split.test:
-        return  # a head: its points lie in head space, for which there is no place
+        return  # a head: its points lie in its own head space, tracking will find another
     for frame in range(capture.num_frames):
         points = capture.points(frame)
         if points is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from ico3d.capture.capture import Sound, last_eleventh
 from ico3d.capture.decoding import largest_channel, unit
 from ico3d.capture.finding import Finding
-from ico3d.capture.hull import Silhouette, visual_hull
+from ico3d.capture.head_surface import head_hull
 from ico3d.capture.renderme.calibration import frame_rate, read_cameras
 from ico3d.capture.renderme.examine import examine_files, mask_folder
 from ico3d.capture.renderme.files import find_files
@@ -26,8 +26,8 @@ SOUND = "Camera/00/audio"
 LOUDEST = 1.01
 JUDGED = 8
 """Sets of landmarks by which their order is recognised."""
-HEAD_RADIUS, HULL_EDGE = 0.25, 0.005
-"""Metres around the head that its surface is looked for in, and of the voxels it is carved from."""
+HEAD_RADIUS = 0.25
+"""Metres around the head that its surface is looked for in."""
 
 
 class RenderMe360(SmcCapture):
@@ -140,7 +140,7 @@ class RenderMe360(SmcCapture):
         if pose is None:
             return None
         inside = None if vertices is None else (vertices - pose[:3, 3]) @ pose[:3, :3]  # (P, 3)
-        surface = self._hull(frame) if inside is None else inside
+        surface = head_hull(self, frame) if inside is None else inside
         return None if surface is None else surface[np.linalg.norm(surface, axis=1) < HEAD_RADIUS]
 
     @property
@@ -190,25 +190,6 @@ class RenderMe360(SmcCapture):
         seen = {camera: marks for camera, marks in found.items() if marks is not None}
         pixels = np.array(list(seen.values())).reshape(-1, len(MULTI_PIE), 2)  # (C, 68, 2)
         return in_space([self.cameras[camera] for camera in seen], pixels)
-
-    def _hull(self, frame: int) -> np.ndarray | None:
-        """(P, 3) in head space: the visual hull of each camera's matte nearest in time."""
-        seen = []
-        for index, camera in enumerate(self.cameras):
-            nearest = self._nearest_matte(index, frame)
-            pose = None if nearest is None else self.world_from_head(nearest)
-            mask = None if nearest is None else self.mask(index, nearest)
-            if pose is not None and mask is not None:
-                seen.append(Silhouette.of(camera.moved(pose), mask))
-        hull = visual_hull(seen, HULL_EDGE)
-        return None if hull is None else hull.surface
-
-    def _nearest_matte(self, camera: int, frame: int) -> int | None:
-        """The frame with a matte of this camera that is nearest to a frame."""
-        folder = mask_folder(self._devices[camera].name)
-        found = [int(key) for key in self._holding(folder).keys(folder) if key.isdecimal()]
-        inside = [other for other in found if other < self.num_frames]
-        return min(inside, key=lambda other: (abs(other - frame), other), default=None)
 
     def _seconds(self) -> float | None:
         """Length of the sound."""

@@ -1,0 +1,80 @@
+"""Reads the commands of a guide and runs them."""
+
+import re
+import shlex
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable
+from pathlib import Path
+
+from ico3d.cli import VERBS, main
+
+GUIDES = Path(__file__).parents[2] / "docs" / "guides"
+PATIENCE = 60
+"""Seconds until a server must answer."""
+BLOCK = re.compile(r"^```bash\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def commands(name: str) -> list[list[str]]:
+    """The words of every command in the bash blocks of a guide, in order; comments left out."""
+    text = (GUIDES / name).read_text("utf-8")
+    lines = "".join(BLOCK.findall(text)).replace("\\\n", " ").splitlines()
+    return [words for line in lines if (words := shlex.split(line, comments=True))]
+
+
+def verb_of(words: list[str]) -> str:
+    """Which verb of ico3d a command is.
+
+    Raises:
+        StopIteration: If it is none: then the guide would not work.
+    """
+    assert words[0] == "ico3d", f"guides hold commands of ico3d alone, not {words[0]}"
+    return next(verb for verb in VERBS if words[1:][: len(verb.split())] == verb.split())
+
+
+def follow(
+    name: str, small: dict[str, str], instead: dict[str, Callable[[list[str]], None]] | None = None
+) -> None:
+    """Runs a guide in the current folder.
+
+    Args:
+        name: Of the guide's file.
+        small: Words to put behind the commands of a verb.
+        instead: What to do in the place of verbs that cannot run here.
+    """
+    for words in commands(name):
+        verb = verb_of(words)
+        if instead and verb in instead:
+            instead[verb](words)
+        elif verb == "serve":
+            _visit([*words[1:], *small[verb].split()])
+        else:
+            print("+", shlex.join(words), flush=True)
+            assert main([*words[1:], *small.get(verb, "").split()]) == 0, shlex.join(words)
+
+
+def _visit(words: list[str]) -> None:
+    """Serves until the avatar was seen once."""
+    command = [sys.executable, "-m", "ico3d.cli", *words]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            assert server.stdout is not None
+            url = re.search(r"http://[\d.]+:\d+", server.stdout.readline())
+            assert url is not None, f"{words} served nothing"
+            assert b"ico3d-bundle" in _fetched(f"{url[0]}/bundle/manifest.json")
+        finally:
+            server.terminate()
+
+
+def _fetched(url: str) -> bytes:
+    """The answer of a server that is about to start."""
+    for _ in range(PATIENCE):
+        try:
+            with urllib.request.urlopen(url, timeout=30) as answer:
+                return answer.read()
+        except urllib.error.URLError:
+            time.sleep(1)
+    raise AssertionError(f"{url} did not answer in {PATIENCE} s")

@@ -1,0 +1,106 @@
+"""The commands of docs/guides, as they stand there, on recordings of a few tiny pictures."""
+
+import importlib.util
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from ico3d.bundle.format import Bundle
+from ico3d.capture.capture import Capture
+
+pytest.importorskip("anny")
+pytestmark = pytest.mark.slow
+MODEL = "face_landmarker.task"
+SHARED = Path(__file__).resolve().parents[3] / "shared" / "models"
+
+
+def _module(name):
+    """A file beside this one."""
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+recordings, guide = _module("recordings"), _module("guide")
+SMALL = _module("small").SMALL
+
+
+@pytest.fixture(scope="module")
+def face(tmp_path_factory):
+    return recordings.person(tmp_path_factory.mktemp("studio") / "face")
+
+
+@pytest.fixture(scope="module")
+def body(face):
+    return recordings.in_warm_light(face, face.with_name("body"))
+
+
+@pytest.fixture
+def tracker(monkeypatch):
+    """Whether faces can be tracked here: MediaPipe's model is not part of ico3d."""
+    folder = Path(os.environ.get("ICO3D_MODELS", SHARED))
+    monkeypatch.setenv("ICO3D_MODELS", str(folder))
+    return (folder / MODEL).is_file()
+
+
+def _tracked(tracker, **truth):
+    """Commands that cannot run here, and what to do instead."""
+
+    def put(words):
+        folder = Path(words[3])
+        recordings.write_known_track(Capture.open(truth[folder.name]), folder)
+
+    return {} if tracker else {"capture track": put}
+
+
+def _is_whole(bundle):
+    manifest = Bundle.open(Path(bundle)).manifest
+    return manifest.head is not None and manifest.body is not None
+
+
+def _shows_something(picture):
+    with Image.open(picture) as opened:
+        return np.asarray(opened.convert("L")).std() > 5
+
+
+def test_many_cameras(face, body, tracker, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recordings.many_cameras(face, body, tmp_path)
+    guide.follow("many-cameras.md", SMALL, _tracked(tracker, face=face, body=body))
+    assert _is_whole("anna.ico3d")
+    assert all(_shows_something(p) for p in ("strip.png", "gestures.jpg", *Path("check").iterdir()))
+    assert Path("film.mp4").stat().st_size > 1000
+
+
+def test_dna_renderme(face, body, tracker, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recordings.data_sets(face, body, tmp_path)
+    guide.follow("dna-renderme.md", SMALL, _tracked(tracker, face="renderme", body="dna"))
+    assert _is_whole("person.ico3d")
+    assert "RenderMe-360" in str(Bundle.open(Path("person.ico3d")).manifest.provenance)
+
+
+def test_phone(face, tracker, tmp_path, monkeypatch):
+    if not tracker:
+        pytest.skip(f"{MODEL} is not here: a portrait cannot be tracked (set ICO3D_MODELS)")
+    monkeypatch.chdir(tmp_path)
+    recordings.phone(face, tmp_path)
+    guide.follow("phone.md", SMALL)
+    manifest = Bundle.open(Path("me.ico3d")).manifest
+    assert manifest.head is not None and manifest.provenance.consent.startswith("I agree")
+
+
+@pytest.mark.parametrize("name", ["many-cameras.md", "dna-renderme.md", "phone.md"])
+def test_links_lead_somewhere(name):
+    text = (guide.GUIDES / name).read_text("utf-8")
+    for target in re.findall(r"\]\(((?!https:)[^)]+)\)", text):
+        file, _, heading = target.partition("#")
+        page = (guide.GUIDES / file if file else guide.GUIDES / name).read_text("utf-8")
+        headings = re.findall(r"^#+ (.*)$", page, re.MULTILINE)
+        slugs = {re.sub(r"[^\w -]", "", h.lower()).replace(" ", "-") for h in headings}
+        assert not heading or heading in slugs, f"{name} links {target}"
