@@ -45,6 +45,15 @@ def test_the_body_keeps_clear_of_face_and_jaw(region):
     assert region.trespassing(np.zeros((0, 3))).shape == (0,)
 
 
+def test_what_hovers_before_the_face_is_no_part_of_it(region):
+    """Nothing of the face itself does, nor anything behind its foremost landmark."""
+    nose = face()[(face() @ region.forward).argmax()]
+    height = np.linalg.norm(face()[17:27].mean(0) - face()[CHIN])
+    before = nose + np.outer([0.19, 0.21], height * region.forward)
+    assert not region.floating(face()).any()
+    assert region.floating(before).tolist() == [False, True]
+
+
 def test_a_region_moves_and_grows_with_its_face(region):
     """Nothing in it depends on the space in which a head was recorded."""
     turn, move, size = Rotation.random(rng=np.random.default_rng(0)).as_matrix(), (1, 2, 3), 1.7
@@ -53,6 +62,7 @@ def test_a_region_moves_and_grows_with_its_face(region):
     placed = size * points @ turn.T + move
     np.testing.assert_allclose(there.depth(placed), size * region.depth(points), atol=1e-12)
     np.testing.assert_array_equal(there.trespassing(placed), region.trespassing(points))
+    np.testing.assert_array_equal(there.floating(placed), region.floating(points))
 
 
 @pytest.mark.parametrize("landmarks", [np.zeros((68, 3)), np.linspace([0] * 3, [1] * 3, 68)])
@@ -64,7 +74,8 @@ def test_what_is_no_face_is_refused(landmarks):
 
 def test_cropping_keeps_what_is_inside_as_it_is(head, region):
     """The same colours and opacities from the same places, fewer Gaussians; no more changes."""
-    inside = torch.from_numpy(region.depth(head.model.means.numpy().astype(float)) > 0)
+    means = head.model.means.numpy().astype(float)
+    inside = torch.from_numpy((region.depth(means) > 0) & ~region.floating(means))
     assert 100 < inside.sum() < len(head.model)
     part = cropped(head, region)
     assert len(part.model) == int(inside.sum()) and len(head.model) == 500

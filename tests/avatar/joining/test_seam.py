@@ -17,7 +17,7 @@ from ico3d.errors import CaptureError
 from ico3d.splat.gaussians import Gaussians
 
 FLAT = HeadRegion(
-    np.array([0, 0, 1.0]), np.array([0, 1.0, 0]), 0.0, -1.0, np.array([[0, 0.1, 0, 0.05]])
+    np.array([0, 0, 1.0]), np.array([0, 1.0, 0]), 0.0, -1.0, 1.0, np.array([[0, 0.1, 0, 0.05]])
 )
 """A head above the plane y = 0."""
 SIZE = 0.003

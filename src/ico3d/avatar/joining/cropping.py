@@ -17,8 +17,9 @@ def cropped(head: TrainedHead, region: HeadRegion) -> TrainedHead:
     Raises:
         ModelError: If none do.
     """
-    depth = region.depth(head.model.means.detach().cpu().numpy().astype(np.float64))  # (N,)
-    keep = torch.nonzero(torch.from_numpy(depth > 0))[:, 0]  # (K,)
+    means = head.model.means.detach().cpu().numpy().astype(np.float64)  # (N, 3)
+    inside = (region.depth(means) > 0) & ~region.floating(means)  # (N,)
+    keep = torch.nonzero(torch.from_numpy(inside))[:, 0]  # (K,)
     if len(keep) == 0:
         raise ModelError("no Gaussian of the head lies where its landmarks say that the face is.")
     return replace(head, model=_selected(head.model, keep))

@@ -14,6 +14,8 @@ BELOW_JAW = 0.2
 relative to the height of the face, from chin to brows."""
 BEHIND_EARS = 0.3
 """How far behind the ends of the jaw line it ends; beyond, cameras in front see nothing."""
+BEFORE_NOSE = 0.2
+"""How far before the foremost landmark the head's Gaussians may be."""
 FACE_RADIUS = 0.6
 JAW_RADIUS = 0.13
 
@@ -28,6 +30,7 @@ class HeadRegion:
             plane follows the lower jaw.
         under_at: Metres.
         behind_at: Metres; the head lies where x · forward > behind_at.
+        front_at: Metres; farther along `forward` nothing is a part of a face.
         spheres: (S, 4) centre and radius: the face, and along the jaw; the body keeps clear.
     """
 
@@ -35,6 +38,7 @@ class HeadRegion:
     under: np.ndarray
     under_at: float
     behind_at: float
+    front_at: float
     spheres: np.ndarray
 
     @staticmethod
@@ -63,6 +67,7 @@ class HeadRegion:
             under,
             float(under @ chin - BELOW_JAW * height),
             float(ends.mean(0) @ forward - BEHIND_EARS * height),
+            float((landmarks @ forward).max() + BEFORE_NOSE * height),
             np.array(spheres),
         )
 
@@ -71,6 +76,11 @@ class HeadRegion:
         return np.minimum(
             points @ self.under - self.under_at, points @ self.forward - self.behind_at
         )
+
+    def floating(self, points: np.ndarray) -> np.ndarray:
+        """(P,) bool: whether points (P, 3) hover before the face: cameras in front only, whose
+        rays they lie along, cannot tell that nothing is there."""
+        return points @ self.forward > self.front_at
 
     def trespassing(self, points: np.ndarray) -> np.ndarray:
         """(P,) bool: whether points (P, 3) are where the body keeps clear."""
