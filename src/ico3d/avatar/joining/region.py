@@ -78,8 +78,10 @@ class HeadRegion:
         )
 
     def floating(self, points: np.ndarray) -> np.ndarray:
-        """(P,) bool: whether points (P, 3) hover before the face: cameras in front only, whose
-        rays they lie along, cannot tell that nothing is there."""
+        """(P,) bool: whether points (P, 3) hover before the face.
+
+        Where all cameras are in front, some do: pictures do not tell that nothing is there.
+        """
         return points @ self.forward > self.front_at
 
     def trespassing(self, points: np.ndarray) -> np.ndarray:
