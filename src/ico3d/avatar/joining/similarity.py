@@ -4,9 +4,9 @@ import numpy as np
 
 from ico3d.errors import ModelError
 
-STEADY = (*range(27, 36), 36, 39, 42, 45)
-"""Multi-PIE landmarks that move little with the face: the nose, corners of the eyes. Not the jaw
-line: sources differ by centimetres about where on the cheek it runs."""
+STEADY = tuple(range(27, 68))
+"""Multi-PIE landmarks that count: nose, eyes, and lips, whose mean is about the same wherever
+somebody talks. Not jaw line and brows: sources differ by centimetres about where those run."""
 KEPT = 0.8
 """Part of the landmarks that count in the end: the rest may be badly tracked."""
 TRIPLES = 60
