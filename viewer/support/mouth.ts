@@ -33,6 +33,23 @@ export function watchMouth(page: Page): Promise<void> {
     const gl = stage.renderer.getContext();
     const draw = stage.draw.bind(stage);
     stage.draw = () => {};
+    if (window.ico3d!.body) {
+      // Of a whole person the face is but a few pixels: look closer, through the same lens.
+      const { camera } = stage.orbit;
+      const reach = 0.14; // m about the head's middle
+      const { x, y } = head!.generator.position.clone().project(camera);
+      const depth = camera.position.distanceTo(head!.generator.position);
+      const side = reach / (depth * Math.tan((camera.fov * Math.PI) / 360)); // of half the picture's height
+      const [width, height] = [camera.aspect, 1];
+      camera.setViewOffset(
+        width,
+        height,
+        ((x + 1) * width - side * width) / 2,
+        ((1 - y) * height - side * height) / 2,
+        side * width,
+        side * height,
+      );
+    }
     const lowerHalf = () => {
       draw();
       const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight >> 1];
