@@ -12,6 +12,7 @@ from ico3d.avatar.importance import logit_importance
 from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera, look_at
 from ico3d.common.espeak import synthesize
+from ico3d.common.spread import spread
 from ico3d.head.expressions import FEATURE_RATE
 from ico3d.head.model import HeadModel
 from ico3d.head.trained import TrainedHead
@@ -57,7 +58,7 @@ def samples_around(head: TrainedHead, expressions: np.ndarray) -> Samples:
 
 def references_around(head: TrainedHead, expressions: np.ndarray, count: int) -> list[Reference]:
     """What the exact head shows to the same cameras in some of these expressions (T, B)."""
-    rows = np.unique(np.linspace(0, len(expressions) - 1, count).round().astype(int))
+    rows = spread(len(expressions), count)
     cameras, colour = cameras_around(head.model, len(rows)), torch.tensor(staging.NEUTRAL)
     shown = torch.from_numpy(np.asarray(expressions[rows], np.float32))  # (V, B)
     pairs = zip(cameras, shown, strict=True)

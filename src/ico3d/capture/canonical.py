@@ -3,6 +3,7 @@
 import numpy as np
 
 from ico3d.capture.capture import Capture
+from ico3d.common.spread import spread
 
 MOST_FRAMES = 60
 """Of a capture that are looked at, spread evenly."""
@@ -15,7 +16,7 @@ def canonical_landmarks(capture: Capture) -> np.ndarray | None:
     Given in space where the format has them so; else from all cameras and frames at once: the head
     poses make one picture of them all.
     """
-    frames = _spread(capture.num_frames)
+    frames = spread(capture.num_frames, MOST_FRAMES)
     given = [capture.landmarks_3d(frame) for frame in frames]
     known = [points for points in given if points is not None and np.isfinite(points).all()]
     if known:
@@ -48,7 +49,3 @@ def _directions(camera, pixels: np.ndarray) -> np.ndarray:
     ends = np.concatenate([pixels, np.ones((len(pixels), 1))], 1)  # (P, 3)
     rays = ends @ np.linalg.inv(camera.intrinsics).T @ camera.world_to_camera[:3, :3]  # (P, 3)
     return rays / np.linalg.norm(rays, axis=1, keepdims=True)
-
-
-def _spread(count: int) -> list[int]:
-    return np.unique(np.linspace(0, count - 1, MOST_FRAMES).round().astype(int)).tolist()

@@ -13,6 +13,7 @@ from ico3d.capture.capture import Capture
 from ico3d.capture.contact_sheet import contact_sheet
 from ico3d.capture.finding import Finding
 from ico3d.common.files import write_atomic
+from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 
 SHOWN = 17
@@ -55,9 +56,8 @@ def examine(capture: Capture) -> list[Finding]:
 def sampled_views(capture: Capture, count: int) -> list[tuple[int, int]]:
     """Up to `count` (camera, frame) pairs with a picture, spread over frames and cameras."""
     frames = sorted({*capture.split.train, *capture.split.test})
-    chosen = np.unique(np.linspace(0, len(frames) - 1, min(count, len(frames))).round())
     views = []
-    for turn, index in enumerate(chosen.astype(int)):
+    for turn, index in enumerate(spread(len(frames), count)):
         cameras = np.roll(np.arange(len(capture.cameras)), -turn).tolist()
         # A capture may lack views: of each frame, the next camera that has one.
         seen = (c for c in cameras if capture.image(c, frames[index]) is not None)

@@ -144,7 +144,10 @@ class HeadModel(nn.Module):
         """φ: features (N, w) of an expression (B,) to logits (N, 4)."""
         if not self.shape.has_mlp:
             return features
-        hidden = self.hidden(features, expression)  # (N, hidden)
+        return self.branches(self.hidden(features, expression))
+
+    def branches(self, hidden: Tensor) -> Tensor:
+        """φ's last layer: (N, hidden) to logits (N, 4)."""
         return torch.cat([self.color_branch(hidden), self.opacity_branch(hidden)], 1)  # (N, 4)
 
     def hidden(self, features: Tensor, expression: Tensor) -> Tensor:

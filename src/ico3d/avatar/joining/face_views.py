@@ -13,6 +13,7 @@ from ico3d.avatar.joining.similarity import moved
 from ico3d.capture.capture import Capture
 from ico3d.capture.pictures import train_cameras
 from ico3d.common.camera import Camera
+from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 
 WIDEST = np.cos(np.radians(65.0))
@@ -136,8 +137,3 @@ def _steady(pixels: np.ndarray, size: tuple[int, ...]) -> np.ndarray:
         x, y = pixels[part].mean(0)
         steady[np.hypot(columns - x, rows - y) < radius * height] = 0
     return steady
-
-
-def spread(count: int, most: int) -> list[int]:
-    """Indices of at most so many of `count` things, evenly spread."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int)).tolist()

@@ -16,7 +16,8 @@ from scipy.spatial import KDTree
 from torch import Tensor, nn
 
 from ico3d.avatar.avatar import Placement
-from ico3d.avatar.joining.face_views import FaceView, spread
+from ico3d.avatar.joining.face_views import FaceView
+from ico3d.common.spread import spread
 from ico3d.head.model import HeadModel
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
@@ -158,7 +159,8 @@ class _Frozen:
         if frame not in self._made:
             values = torch.from_numpy(self._expressions[frame])  # (B,)
             hidden = self._model.hidden(self._model.blended(values), values)  # (N, hidden)
-            drawn = self._model(values).transform(self._placement.world_from_head(frame))
+            head = self._model.gaussians(self._model.branches(hidden))
+            drawn = head.transform(self._placement.world_from_head(frame))
             if len(self._made) >= self._room:
                 self._made.pop(next(iter(self._made)))  # the oldest
             self._made[frame] = hidden, drawn.detach()

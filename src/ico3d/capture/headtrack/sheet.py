@@ -10,6 +10,7 @@ from ico3d.capture.capture import Capture
 from ico3d.capture.headtrack.crops import READ_AT, Part, around
 from ico3d.capture.headtrack.track_file import HeadTrack
 from ico3d.common.files import write_atomic
+from ico3d.common.spread import spread
 from ico3d.errors import SettingsError
 
 FRAMES, CAMERAS = 6, 4
@@ -36,7 +37,7 @@ def write_sheet(capture: Capture, track: HeadTrack, path: Path) -> None:
     """
     check_name(path)
     known = np.flatnonzero(track.tracked)
-    frames = known[np.unique(np.linspace(0, len(known) - 1, FRAMES).round().astype(int))]
+    frames = known[spread(len(known), FRAMES)]
     rows = [_row(capture, track, int(frame)) for frame in frames]
     width = max(len(row) for row in rows) * READ_AT
     sheet = Image.new("RGB", (width, len(rows) * READ_AT), (24, 24, 24))
