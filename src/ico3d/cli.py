@@ -41,6 +41,7 @@ VERBS: dict[str, Verb] = {
     "serve": Verb("ico3d.chat.commands", "Serve", "serve a bundle and talk with it"),
     "weights list": Verb("ico3d.common.commands", "ListWeights", "weights that can be used"),
     "weights fetch": Verb("ico3d.common.commands", "FetchWeights", "download some of them"),
+    "weights onnx": Verb("ico3d.speech.commands", "ExportEncoder", "make an encoder servable"),
     "bench body": Verb("ico3d.measure.commands", "BenchBody", "compare methods for bodies"),
     "bench raster": Verb("ico3d.measure.commands", "BenchRaster", "time the rasteriser"),
     "bench talk": Verb("ico3d.measure.commands", "BenchTalk", "time question to answer"),

@@ -290,6 +290,22 @@ def model_file(name: str, purpose: str) -> Path:
     raise MissingModelError(f"{purpose} needs the model file '{name}': {how_to_get(name)}")
 
 
+def model_of(name: str) -> Path:
+    """Where weights of the table lie.
+
+    Raises:
+        MissingModelError: If they are not on this machine; the sentence says how to get them.
+    """
+    found = cached(name)
+    if found is None:
+        weights = weights_named(name)
+        raise MissingModelError(
+            f"the weights '{name}' are not here: fetch them with ico3d weights fetch {name} "
+            f"({weights.licence}), or put a copy of {weights.source} into {model_folders()[-1]}."
+        )
+    return found
+
+
 def how_to_get(file: str) -> str:
     """The end of a sentence that says where a missing file comes from."""
     place = (
