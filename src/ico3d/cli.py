@@ -43,6 +43,7 @@ VERBS: dict[str, Verb] = {
     "weights fetch": Verb("ico3d.common.commands", "FetchWeights", "download some of them"),
     "weights onnx": Verb("ico3d.speech.commands", "ExportEncoder", "make an encoder servable"),
     "bench body": Verb("ico3d.measure.commands", "BenchBody", "compare methods for bodies"),
+    "bench expression": Verb("ico3d.measure.commands", "BenchExpression", "measure the mouth"),
     "bench raster": Verb("ico3d.measure.commands", "BenchRaster", "time the rasteriser"),
     "bench talk": Verb("ico3d.measure.commands", "BenchTalk", "time question to answer"),
 }
