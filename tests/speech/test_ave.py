@@ -7,12 +7,13 @@ import warnings
 import numpy as np
 import pytest
 import torch
+from users_weights import write_ave
 
 from ico3d.cli import main
 from ico3d.errors import MissingModelError
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.export import export_speech, make_servable
-from ico3d.speech.network import AudioEncoder, SpeechAdaptor
+from ico3d.speech.network import SpeechAdaptor
 from ico3d.speech.runtime import StreamingExpressions, open_speech
 
 # channels in and out, kernel, stride, padding, residual
@@ -126,16 +127,7 @@ def slow_expressions(adaptor, features, silence):
 def users(tmp_path_factory):
     """A file in the published format in the user's folder, its tensors, an adaptor."""
     home = tmp_path_factory.mktemp("home")
-    torch.manual_seed(1)
-    network = AudioEncoder().eval()
-    for module in network.modules():
-        if isinstance(module, torch.nn.BatchNorm2d):
-            torch.nn.init.uniform_(module.running_var, 0.2, 0.6)
-            torch.nn.init.normal_(module.running_mean, std=0.1)
-            torch.nn.init.uniform_(module.weight, 0.5, 1.5)
-            torch.nn.init.normal_(module.bias, std=0.1)
-    state = {f"audio_encoder.{name}": value for name, value in network.state_dict().items()}
-    torch.save(state, home / "audio_visual_encoder.pth")
+    network = write_ave(home)
     numbers = {name: value.double().numpy() for name, value in network.state_dict().items()}
     return home, numbers, SpeechAdaptor(512)
 

@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 import torch
+from users_weights import write_hubert
 
 from ico3d.errors import MissingModelError, ModelError
 from ico3d.speech.blocks import SIZE, sound_blocks
@@ -27,35 +28,7 @@ def sound(seconds, rate=16000, seed=0):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """As the published folder: CTC head, PyTorch file, old names of the weight norm."""
-    torch.manual_seed(0)
-    config = transformers.HubertConfig(
-        hidden_size=32,
-        num_hidden_layers=2,
-        num_attention_heads=2,
-        intermediate_size=64,
-        conv_dim=(16,) * 7,
-        conv_bias=True,
-        feat_extract_norm="layer",
-        do_stable_layer_norm=True,
-        num_conv_pos_embeddings=16,
-        num_conv_pos_embedding_groups=4,
-        initializer_range=0.3,
-    )
-    folder = tmp_path_factory.mktemp("models") / "hubert-large-ls960-ft"
-    folder.mkdir()
-    model = transformers.HubertForCTC(config)
-    old = {"parametrizations.weight.original0": "weight_g"}
-    old |= {"parametrizations.weight.original1": "weight_v"}
-    state = {}
-    for name, value in model.state_dict().items():
-        for new, former in old.items():
-            name = name.replace(new, former)
-        state[name] = value
-    assert "hubert.encoder.pos_conv_embed.conv.weight_g" in state
-    torch.save(state, folder / "pytorch_model.bin")
-    config.save_pretrained(folder)
-    return folder, model.eval()
+    return write_hubert(tmp_path_factory.mktemp("models"))
 
 
 @pytest.fixture(autouse=True)

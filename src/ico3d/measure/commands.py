@@ -233,15 +233,18 @@ class BenchExpression:
         figures = bench(self.speech, Bundle.open(bundle_path(self.bundle)), self.random)
         if self.json is not None:
             write_atomic(self.json, json.dumps(figures, indent=1).encode())
-        table = Table("", "x real time", "stream - whole", "silence", "lips: r", "lag (ms)")
+        columns = ("x real time", "160 ms", "stream - whole", "silence", "lips: r", "lag (ms)")
+        table = Table("", *columns)
         for name, found in figures.items():
             lips = [
                 " ".join(f"{value:.{digits}f}" for value in (found[key] or {}).values())
                 for key, digits in (("lip_correlation", 2), ("lip_lag_ms", 0))
             ]
             still = max(found["silence_opening"].values())
-            speed, difference = found["real_time_factor"], found["streaming_difference"]
-            table.add_row(name, f"{speed:.3g}", f"{difference:.0e}", f"{still:.3f}", *lips)
+            speeds = (found[f"real_time_factor{which}"] for which in ("", "_slices"))
+            difference = f"{found['streaming_difference']:.0e}"
+            figures_of = (*(f"{speed:.3g}" for speed in speeds), difference, f"{still:.3f}")
+            table.add_row(name, *figures_of, *lips)
         Console().print(table)
 
 
