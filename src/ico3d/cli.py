@@ -39,6 +39,9 @@ VERBS: dict[str, Verb] = {
     "render": Verb("ico3d.avatar.film.command", "Render", "film a person who talks or moves"),
     "convert": Verb("ico3d.splat.commands", "Convert", "convert files of 3D Gaussians"),
     "serve": Verb("ico3d.chat.commands", "Serve", "serve a bundle and talk with it"),
+    "serve-module": Verb(
+        "ico3d.chat.modules.commands", "ServeModule", "serve one part of the conversation"
+    ),
     "bench body": Verb("ico3d.measure.commands", "BenchBody", "compare methods for bodies"),
     "bench raster": Verb("ico3d.measure.commands", "BenchRaster", "time the rasteriser"),
     "bench talk": Verb("ico3d.measure.commands", "BenchTalk", "time question to answer"),

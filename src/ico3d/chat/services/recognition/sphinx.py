@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from pipecat.frames.frames import (
+    EndFrame,
     Frame,
     InterimTranscriptionFrame,
     StartFrame,
@@ -84,6 +85,11 @@ class SphinxRecognition(STTService):
         await super().start(frame)
         self._task = self._task or self.create_task(self._decode_all())
 
+    async def stop(self, frame: EndFrame):
+        """Finishes what was said before the end."""
+        await self._sound.join()
+        await super().stop(frame)
+
     async def cleanup(self):
         """Ends the task and the thread."""
         await super().cleanup()
@@ -131,12 +137,13 @@ class SphinxRecognition(STTService):
                 text = await loop.run_in_executor(self._thread, self._finish)
                 await self._tell(text, final=True)
                 shown, fresh = "", 0
-                continue
-            text = await loop.run_in_executor(self._thread, self._decode, audio)
-            fresh += len(audio)
-            if fresh >= PARTIAL_EVERY * MICROPHONE_RATE * 2 and text and text != shown:
-                await self._tell(text, final=False)
-                shown, fresh = text, 0
+            else:
+                text = await loop.run_in_executor(self._thread, self._decode, audio)
+                fresh += len(audio)
+                if fresh >= PARTIAL_EVERY * MICROPHONE_RATE * 2 and text and text != shown:
+                    await self._tell(text, final=False)
+                    shown, fresh = text, 0
+            self._sound.task_done()
 
     async def _tell(self, text: str, final: bool) -> None:
         if not text:
