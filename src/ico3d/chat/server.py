@@ -11,7 +11,7 @@ from fastapi import FastAPI, Request, Response, WebSocket
 from fastapi.responses import JSONResponse, PlainTextResponse
 from fastapi.staticfiles import StaticFiles
 
-from ico3d.bundle.format import Bundle
+from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.chat import protocol
 from ico3d.chat.connection import Connection
 from ico3d.chat.conversation import Avatar
@@ -38,7 +38,8 @@ def open_avatar(bundle: Bundle, settings: ChatSettings) -> Avatar:
     """
     head, speech = open_face(bundle)
     persona, services = bundle.manifest.persona, choose(settings)
-    return Avatar(head, speech, persona, services, settings, bundle.animation)
+    sha256 = bundle.manifest.files[SPEECH].sha256 if speech else ""
+    return Avatar(head, speech, persona, services, settings, bundle.animation, sha256)
 
 
 def make_app(

@@ -1,9 +1,9 @@
 """`/v1/expressions`: a WebSocket that takes sound in pieces and gives the face that belongs to it.
 
-The server says `{"model": sha256, "rate": 24000, "fps": 25, "size": C}`. Then every binary frame
-of the client (PCM16, mono, little-endian, at most 64 KiB) is answered by one binary frame with the
-rows known now ((n, C) float32, little-endian, n may be 0), and the text frame `finish` by the
-rows that are left; what comes next is a new sound. Rows are those of `StreamingExpressions`.
+The server says `{"model": sha256, "rate": 24000, "fps": 25, "size": C}`. The text frame `start`
+begins a sound. Every binary frame (PCM16, mono, little-endian, at most 64 KiB) is answered by one
+binary frame with the rows known now ((n, C) float32, little-endian, n may be 0), and the text
+frame `finish` by the rows that are left. Rows are those of `StreamingExpressions`.
 """
 
 import asyncio
@@ -19,7 +19,7 @@ from ico3d.common.expression import SPEECH_SIZE
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions
 
 PATH = "/v1/expressions"
-FINISH = "finish"
+START, FINISH = "start", "finish"
 LARGEST = MAX_BINARY_FRAME  # bytes of one piece
 ROW = np.dtype("<f4")
 
@@ -51,11 +51,13 @@ async def _serve(socket: WebSocket, model: SpeechModel) -> None:
         piece = event.get("bytes")
         if piece is not None and len(piece) % 2 == 0 and len(piece) <= LARGEST:
             rows = await asyncio.to_thread(stream.push, samples_of(piece))
+        elif event.get("text") == START:
+            stream = StreamingExpressions(model, SPEECH_RATE)
+            continue
         elif event.get("text") == FINISH:
             rows = await asyncio.to_thread(stream.finish)
-            stream = StreamingExpressions(model, SPEECH_RATE)
         else:
-            await socket.close(BROKEN, "send PCM16 of at most 64 KiB, or 'finish'.")
+            await socket.close(BROKEN, "send start, PCM16 of at most 64 KiB, or finish.")
             return
         await socket.send_bytes(np.ascontiguousarray(rows, ROW).tobytes())
 

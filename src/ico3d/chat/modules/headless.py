@@ -4,7 +4,7 @@ import asyncio
 import time
 from collections.abc import AsyncGenerator, Callable, Sequence
 
-from pipecat.frames.frames import EndFrame, ErrorFrame, Frame
+from pipecat.frames.frames import CancelFrame, EndFrame, ErrorFrame, Frame
 from pipecat.pipeline.pipeline import Pipeline
 from pipecat.pipeline.worker import PipelineParams, PipelineWorker
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
@@ -48,8 +48,9 @@ async def run(
     """
     deadline = time.monotonic() + seconds
     found: asyncio.Queue[Frame | None] = asyncio.Queue()
+    pipeline = Pipeline([processor, Collector(found)])
     worker = PipelineWorker(
-        Pipeline([processor, Collector(found)]),
+        pipeline,
         params=PipelineParams(
             audio_in_sample_rate=MICROPHONE_RATE, audio_out_sample_rate=SPEECH_RATE
         ),
@@ -79,6 +80,8 @@ async def run(
                 raise ServiceError(frame.error)
             yield frame
     finally:
+        # past the worker, which waits for its EndFrame before it takes anything else
+        await pipeline.queue_frame(CancelFrame())
         await worker.cancel()
         await asyncio.gather(task, return_exceptions=True)
 

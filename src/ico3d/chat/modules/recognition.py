@@ -22,6 +22,7 @@ from ico3d.errors import MissingExtraError, ProtocolError
 
 CHUNK = MICROPHONE_RATE // 25  # samples: 40 ms, as a page sends them
 LEAD_IN = 12  # chunks before speech is announced: a VAD is that late too
+QUIET = np.zeros(MICROPHONE_RATE * 3 // 10, np.int16)  # around speech, as recognisers expect it
 DTYPES = {1: np.uint8, 2: np.dtype("<i2"), 4: np.dtype("<i4")}  # by bytes of a WAV's samples
 
 
@@ -59,6 +60,7 @@ def _answer(said: list[TranscriptionFrame], duration: float, form: str) -> Respo
 
 def heard(pcm: np.ndarray) -> list[Frame]:
     """(S,) int16 at 16 kHz as a conversation would bring it: one stretch of speech."""
+    pcm = np.concatenate([QUIET, pcm, QUIET])
     pieces = [pcm[at : at + CHUNK].tobytes() for at in range(0, len(pcm), CHUNK)]
     frames: list[Frame] = [InputAudioRawFrame(piece, MICROPHONE_RATE, 1) for piece in pieces]
     frames.insert(min(LEAD_IN, len(frames)), VADUserStartedSpeakingFrame())
