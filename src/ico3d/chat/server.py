@@ -16,9 +16,9 @@ from ico3d.chat import protocol
 from ico3d.chat.connection import Connection
 from ico3d.chat.conversation import Avatar
 from ico3d.chat.face import open_face
-from ico3d.chat.guard import Guard
+from ico3d.chat.guard import LOOPBACK, Guard
 from ico3d.chat.protocol import Welcome
-from ico3d.chat.services import choose
+from ico3d.chat.services import choose, offers
 from ico3d.chat.sessions import Sessions
 from ico3d.chat.settings import ChatSettings
 from ico3d.errors import BundleError, SettingsError
@@ -53,8 +53,10 @@ def make_app(
         host: The address that the server is bound to.
         sessions: Where sessions live; a new place by default.
     """
-    if avatar is not None and sessions is None:
-        sessions = Sessions(avatar)
+    if avatar is not None:
+        sessions = sessions or Sessions(avatar)
+        if host in LOOPBACK:  # the visitor is at home: it may cost money, and tells of the machine
+            sessions.offers = offers(avatar.settings)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:

@@ -3,16 +3,18 @@
 import asyncio
 import contextlib
 from dataclasses import dataclass
+from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 from pipecat.services.openai.stt import OpenAISTTService
 from pipecat.services.openai.tts import OpenAITTSService
 from starlette.responses import JSONResponse, PlainTextResponse
 
-from ico3d.chat import server
 from ico3d.chat.protocol import Answer, End, Error, Speech, State, Text
 from ico3d.chat.services import TABLES
 from ico3d.chat.services.provider import Provider
+from ico3d.chat.services.voice import espeak
 from ico3d.chat.settings import ChatSettings, Choice, Patience
 from ico3d.chat.supervision.apologies import APOLOGIES
 from ico3d.measure.page import open_page
@@ -21,8 +23,9 @@ from ..conftest import serving as serving_avatar
 from ..modules.serving import service_app, serving
 from ..modules.test_api import make_language, make_recognition, make_voice
 
-SORRY = APOLOGIES["en"]
-QUICK = Patience(language=1.5, voice=1.5)
+SORRY = {failed: sentence.split(". ")[0] + "." for failed, sentence in APOLOGIES["en"].items()}
+NO_VOICE = espeak.spoken(APOLOGIES["en"]["voice"], "en-us", espeak.Settings().rate)
+QUICK = Patience(language=3.0, voice=3.0)
 NOBODY = "http://127.0.0.1:9/v1"
 
 
@@ -75,12 +78,11 @@ def providers(monkeypatch):
 
 @contextlib.asynccontextmanager
 async def talking(bundle, microphone=False, **services):
-    """A page whose avatar has said hello."""
+    """A page whose avatar says hello."""
     settings = ChatSettings(patience=QUICK, **services)
     async with serving_avatar(bundle, settings) as (url, _):
         page, _ = await open_page(url, microphone=microphone)
-        await page.heard(0)
-        await page.wait(State, where=lambda m: m.state == "idle")
+        await page.wait(Speech)
         try:
             yield page
         finally:
@@ -88,44 +90,46 @@ async def talking(bundle, microphone=False, **services):
 
 
 async def asked(page, text="Who are you?"):
-    """The captions of the answer to a typed question, once it has been heard to its end."""
+    """First caption of the answer to a typed question, and whether it has the voice's apology."""
     since = len(page.log)
     await page.send(Text(text))
-    _, end = await page.wait(End, since)
-    assert sum(len(m.pcm) for m in page.messages(Speech, since)) == end.samples > 0
-    await page.heard(end.utterance)
-    await page.wait(State, since, where=lambda m: m.state == "idle")
-    assert page.messages(State, since)[-1].state == "idle"
-    return [m.text for m in page.messages(Answer, since)]
+    _, answer = await page.wait(Answer, since)
+    _, speech = await page.wait(Speech, since, where=lambda m: m.utterance == answer.utterance)
+    return answer.text, np.array_equal(speech.pcm, NO_VOICE[: len(speech.pcm)])
 
 
 def language_at(url):
     return Choice("openai", {"url": url, "model": "any"})
 
 
-@pytest.mark.parametrize(
-    "faults",
-    [
-        ["hang"],
-        ["garbage"],
-        ["empty"],
-        [500] * 3,
-        [404],
-        [401],
-    ],
-)
-async def test_a_language_model_that_fails_is_apologised_for(bundle, faults):
-    app = Fickle(service_app("language", make_language), *faults)
-    async with serving(app) as url, talking(bundle, language=language_at(f"{url}v1")) as page:
-        assert " ".join(await asked(page)) == SORRY["language"]
-        assert await asked(page) == ["I am Ada.", "I live in a box.", "Grüße, 你好!"]
+def voice_at(url):
+    return Choice("a-server", {"url": url})
 
 
-async def test_a_language_model_that_fails_once_is_asked_again(bundle):
-    app = Fickle(service_app("language", make_language), 500)
+async def test_a_language_model_that_fails_is_apologised_for(bundle):
+    app = Fickle(service_app("language", make_language))
     async with serving(app) as url, talking(bundle, language=language_at(f"{url}v1")) as page:
-        assert await asked(page) == ["I am Ada.", "I live in a box.", "Grüße, 你好!"]
-        assert app.asked == 2
+        for faults in ([500] * 3, ["garbage"], ["empty"], [404], ["hang"]):
+            app.faults = list(faults)
+            assert await asked(page) == (SORRY["language"], False), faults
+            assert not app.faults
+            assert await asked(page) == ("I am Ada.", False)
+        app.faults, app.asked = [500], 0
+        assert await asked(page) == ("I am Ada.", False)
+        assert app.asked == 2  # it was asked again
+
+
+async def test_after_an_apology_the_turn_ends(bundle):
+    async with talking(bundle, language=language_at(NOBODY), voice=voice_at(NOBODY)) as page:
+        since = len(page.log)
+        assert await asked(page) == (SORRY["language"], True)
+        _, end = await page.wait(End, since)
+        pieces = [m for m in page.messages(Speech, since) if m.utterance == end.utterance]
+        assert sum(len(m.pcm) for m in pieces) == end.samples
+        await page.heard(end.utterance)
+        ends = page.log.index(next(entry for entry in page.log[since:] if entry[1] is end))
+        await page.wait(State, ends, where=lambda m: m.state == "idle")
+        assert not page.messages(Error)  # espeak-ng could speak
 
 
 async def test_a_language_server_that_dies_and_comes_back(bundle):
@@ -134,48 +138,23 @@ async def test_a_language_server_that_dies_and_comes_back(bundle):
         first = await stack.enter_async_context(contextlib.AsyncExitStack())
         url = await first.enter_async_context(serving(app))
         page = await stack.enter_async_context(talking(bundle, language=language_at(f"{url}v1")))
-        assert (await asked(page))[0] == "I am Ada."
+        assert await asked(page) == ("I am Ada.", False)
         await first.aclose()
-        assert " ".join(await asked(page)) == SORRY["language"]
-        port = int(url.split(":")[2].rstrip("/"))
-        await stack.enter_async_context(serving(app, port))
-        assert (await asked(page))[0] == "I am Ada."
+        assert await asked(page) == (SORRY["language"], False)
+        await stack.enter_async_context(serving(app, urlsplit(url).port))
+        assert await asked(page) == ("I am Ada.", False)
 
 
-async def test_nobody_thinks_or_speaks(bundle):
-    services = {"language": language_at(NOBODY), "voice": Choice("a-server", {"url": NOBODY})}
-    async with talking(bundle, **services) as page:
-        assert " ".join(await asked(page)) == SORRY["language"]
-        assert not page.messages(Error)  # espeak-ng spoke
-
-
-@pytest.mark.parametrize("faults", [["hang"], ["empty"], [500] * 6, [401] * 2, [404] * 2])
-async def test_a_voice_that_fails_is_apologised_for_and_captions_go_on(bundle, faults):
+async def test_a_voice_that_fails_is_apologised_for_and_captions_go_on(bundle):
     app = Fickle(service_app("voice", make_voice))
-    async with serving(app) as url:
-        choice = Choice("a-server", {"url": f"{url}v1"})
-        async with talking(bundle, voice=choice) as page:
-            app.faults = list(faults * 2 if faults == ["empty"] else faults)
-            since = len(page.log)
-            assert await asked(page) == ["I am Random."]
-            _, end = await page.wait(End, since)
-            assert end.samples > 2 * server.protocol.SPEECH_RATE  # the apology, not the answer
-            app.faults = []
-            since = len(page.log)
-            assert await asked(page) == ["I am Random."]
-            _, end = await page.wait(End, since)
-            assert end.samples < 2 * server.protocol.SPEECH_RATE
-
-
-async def test_a_voice_that_fails_once_is_asked_again(bundle):
-    app = Fickle(service_app("voice", make_voice))
-    async with serving(app) as url:
-        async with talking(bundle, voice=Choice("a-server", {"url": f"{url}v1"})) as page:
-            app.asked, app.faults = 0, [404]
-            since = len(page.log)
-            assert await asked(page) == ["I am Random."]
-            _, end = await page.wait(End, since)
-            assert end.samples < 2 * server.protocol.SPEECH_RATE and app.asked == 2
+    async with serving(app) as url, talking(bundle, voice=voice_at(f"{url}v1")) as page:
+        for faults in ([500] * 6, ["empty"] * 2, [401] * 2, [404] * 2, ["hang"]):
+            app.faults = list(faults)
+            assert await asked(page) == ("I am Random.", True), faults
+            assert not app.faults
+            assert await asked(page) == ("I am Random.", False)
+        app.faults = [404]
+        assert await asked(page) == ("I am Random.", False)
 
 
 async def test_a_recogniser_that_fails_is_apologised_for(bundle, question):
@@ -185,6 +164,5 @@ async def test_a_recogniser_that_fails_is_apologised_for(bundle, question):
         async with talking(bundle, microphone=True, recognition=choice) as page:
             since = len(page.log)
             page.say(question)
-            await page.wait(End, since)
-            captions = " ".join(m.text for m in page.messages(Answer, since))
-            assert captions == SORRY["recognition"]
+            _, answer = await page.wait(Answer, since)
+            assert answer.text == SORRY["recognition"]

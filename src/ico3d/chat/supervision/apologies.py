@@ -63,7 +63,7 @@ APOLOGIES: dict[str, dict[Failed, str]] = {
 }
 """By language (ISO 639-1), then by what failed."""
 
-VOICES = {"zh": "cmn", "fr": "fr-fr", "en": "en-us"}
+VOICES = {"zh": "cmn", "en": "en-us"}
 """espeak-ng's names of languages where they are not the codes."""
 
 
