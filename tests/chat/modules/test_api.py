@@ -94,7 +94,6 @@ async def test_the_sdk_is_understood_by_our_recognition(question):
     async with serving(service_app("recognition", make_recognition)) as url:
         sdk, file = client(url), ("q.wav", wav(question), "audio/wav")
         create = sdk.audio.transcriptions.create
-        assert (await create(model="any", file=file)).text == "what is your name"
         assert await create(model="any", file=file, response_format="text") == "what is your name\n"
         verbose = await create(model="any", file=file, response_format="verbose_json")
         assert verbose.text == "what is your name"
@@ -193,7 +192,7 @@ class Odd(FrameProcessor):
     ],
 )
 async def test_what_goes_wrong_inside_is_an_answer(way, status, sentence):
-    app = service_app("language", lambda: Odd(way), Limits(seconds=0.5))
+    app = service_app("language", lambda: Odd(way), Limits(seconds=0.5 if status == 504 else 20))
     async with serving(app) as url, httpx.AsyncClient(base_url=url) as plain:
         body = {"model": "any", "messages": [{"role": "user", "content": "hi"}]}
         for stream in (False, True):
@@ -206,8 +205,11 @@ async def test_a_stream_that_breaks_is_not_taken_for_whole():
         stream = await client(url).chat.completions.create(
             model="any", messages=[{"role": "user", "content": "hi"}], stream=True
         )
-        with pytest.raises(Exception, match="incomplete chunked read"):  # of the SDK's own httpx
-            [chunk async for chunk in stream]
+        heard = []
+        with pytest.raises(openai.APIConnectionError):
+            async for chunk in stream:
+                heard.append(chunk.choices[0].delta.content)
+        assert heard == ["Half"]
 
 
 async def test_more_requests_than_allowed_are_told_to_wait():

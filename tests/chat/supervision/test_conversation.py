@@ -57,7 +57,7 @@ class Fickle:
 class Url:
     """Options of the services of these tests."""
 
-    url: str
+    url: str = ""
 
 
 @pytest.fixture(autouse=True)
