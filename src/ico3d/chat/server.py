@@ -54,7 +54,7 @@ def make_app(
         sessions: Where sessions live; a new place by default.
     """
     if avatar is not None:
-        sessions = sessions or Sessions(avatar)
+        sessions = Sessions(avatar) if sessions is None else sessions
         if host in LOOPBACK:  # the visitor is at home: it may cost money, and tells of the machine
             sessions.offers = offers(avatar.settings)
 

@@ -91,9 +91,9 @@ async def talking(bundle, microphone=False, **services):
 
 async def asked(page, text="Who are you?"):
     """First caption of the answer to a typed question, and whether it has the voice's apology."""
-    since = len(page.log)
+    since, before = len(page.log), page.messages(Speech)[-1].utterance
     await page.send(Text(text))
-    _, answer = await page.wait(Answer, since)
+    _, answer = await page.wait(Answer, since, where=lambda m: m.utterance > before)
     _, speech = await page.wait(Speech, since, where=lambda m: m.utterance == answer.utterance)
     return answer.text, np.array_equal(speech.pcm, NO_VOICE[: len(speech.pcm)])
 

@@ -23,6 +23,7 @@ TABLES: Mapping[str, Table] = {
     "voice": voice.PROVIDERS,
 }
 """Providers by kind and name."""
+LONGEST_HINDRANCE = 400  # characters: all offers go into one message
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ def offers(settings: ChatSettings) -> list[protocol.Offer]:
     for kind, table in TABLES.items():
         for key in table:
             service = named(settings, kind, key)
-            hindrance = service.provider.hindrance(service.options)
+            hindrance = service.provider.hindrance(service.options)[:LONGEST_HINDRANCE]
             found.append(protocol.Offer(kind, key, service.described().name, hindrance))  # type: ignore[arg-type]
     return found
 
