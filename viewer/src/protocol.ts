@@ -29,6 +29,18 @@ export interface Services {
   voice: Service;
 }
 
+/** A service that could do one of the three jobs; the best ones come first. */
+export interface Offer {
+  /** Which job. */
+  kind: "recognition" | "language" | "voice";
+  /** Its name in settings and wishes. */
+  key: string;
+  /** For the visitor's eyes, as in `services`. */
+  name: string;
+  /** What keeps it from working and what would mend it; empty if it works. */
+  hindrance: string;
+}
+
 /** First message of every connection. */
 export interface HelloMessage {
   type: "hello";
@@ -38,6 +50,8 @@ export interface HelloMessage {
   session: string | null;
   /** `index` of the last speech message that arrived; -1 when new. */
   last_index: number;
+  /** Keys of offers by kind that a new session is to use; heeded where `welcome` offers. */
+  wishes: Record<string, string>;
 }
 
 /** Sound from the microphone (binary). */
@@ -87,6 +101,8 @@ export interface WelcomeMessage {
   services: Services;
   /** Sentences the page shows once (what this avatar cannot do). */
   notices: string[];
+  /** Services to choose from; none where strangers may be talking. */
+  offers: Offer[];
 }
 
 /** What the avatar does now. */

@@ -30,12 +30,15 @@ from ico3d.chat.face import Face
 from ico3d.chat.frames import Utterances
 from ico3d.chat.gestures import Gestures
 from ico3d.chat.listener import Captions, PageInput
+from ico3d.chat.modules.mouth import RemoteMouth
 from ico3d.chat.page import Page
-from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Clock
+from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Clock, Error
 from ico3d.chat.services import Chosen
 from ico3d.chat.services.provider import Context
 from ico3d.chat.settings import ChatSettings, Turns
 from ico3d.chat.speaker import Speaker
+from ico3d.chat.supervision.language import AnswerGuard
+from ico3d.chat.supervision.voice import endure
 from ico3d.chat.timing import TurnTimer
 from ico3d.speech.runtime import SpeechModel
 
@@ -54,6 +57,7 @@ class Avatar:
         services: Who listens, thinks and speaks.
         settings: Services and timing.
         animation: How its body moves; None for a head alone.
+        speech_sha256: Of the file of `speech`, by which a remote module knows that it is its own.
     """
 
     head: HeadInfo
@@ -62,6 +66,7 @@ class Avatar:
     services: Chosen
     settings: ChatSettings
     animation: Animation | None
+    speech_sha256: str = ""
 
 
 @dataclass(frozen=True)
@@ -80,7 +85,7 @@ class Conversation:
 
     def __init__(self, avatar: Avatar, page: Page):
         """A conversation that has not started."""
-        self._avatar = avatar
+        self._avatar, self._page = avatar, page
         self._timer = TurnTimer(time.monotonic)
         self._utterances = Utterances()
         self._input = PageInput()
@@ -149,7 +154,8 @@ class Conversation:
 
     def _pipeline(self, parts: Parts) -> Pipeline:
         user, assistant = aggregators(parts.turn, self._avatar.settings.turns)
-        face = Face(self._avatar.head, self._avatar.speech)
+        face = make_face(self._avatar)
+        patience = self._avatar.settings.patience
         return Pipeline(
             [
                 self._input,
@@ -158,6 +164,9 @@ class Conversation:
                 self._captions,
                 user,
                 parts.language,
+                AnswerGuard(
+                    parts.recognition, parts.language, patience.language, patience.apologies
+                ),
                 parts.voice,
                 ExpressionProcessor(face, self._utterances, self._timer),
                 self._speaker,
@@ -165,14 +174,27 @@ class Conversation:
             ]
         )
 
+    def _complain(self, sentence: str) -> None:
+        self._page.send(Error(sentence, fatal=False))
+
     def _watch_voice(self, voice: FrameProcessor) -> None:
         """Takes the time at which the first sentence reaches the voice."""
         if isinstance(voice, TTSService):
+            patience = self._avatar.settings.patience
+            endure(voice, patience.voice, patience.apologies, self._complain)
 
             async def requested(*_):
                 self._timer.mark("language")
 
             voice.add_event_handler("on_tts_request", requested)
+
+
+def make_face(avatar: Avatar) -> Face:
+    """The face of one session, whose mouth another machine may move."""
+    settings, remote = avatar.settings.expression, None
+    if settings.use == "remote" and avatar.speech is not None:
+        remote = RemoteMouth(settings, avatar.speech, avatar.speech_sha256)
+    return Face(avatar.head, avatar.speech, remote=remote)
 
 
 def make_parts(avatar: Avatar) -> Parts:

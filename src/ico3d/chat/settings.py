@@ -53,6 +53,60 @@ class Turns:
 
 
 @dataclass(frozen=True)
+class Patience:
+    """How long services may take before the avatar apologises: the table `[patience]`.
+
+    Attributes:
+        language: Seconds until the first words of an answer, and between two pieces of it.
+        voice: Seconds until the first sound of a sentence, and between two pieces of it.
+        apologies: Language that the avatar apologises in, such as `de`; English where it is none
+            of those known.
+    """
+
+    language: float = 12.0
+    voice: float = 8.0
+    apologies: str = "en"
+
+    def __post_init__(self):
+        """Checks ranges.
+
+        Raises:
+            SettingsError: If there is no patience at all.
+        """
+        if min(self.language, self.voice) < 0.1:
+            raise SettingsError("chat settings: [patience] needs at least 0.1 seconds for each.")
+
+
+@dataclass(frozen=True)
+class Expression:
+    """Where sound becomes a moving face: the table `[expression]`.
+
+    Attributes:
+        use: `own` for the avatar's speech model in this process; `remote` for the same one on
+            another machine, and in this process whenever that fails.
+        url: Of `ico3d serve-module expression`, such as `http://192.168.1.5:8766`.
+        key_variable: Environment variable that holds its key, if it wants one.
+        timeout: Seconds that a piece of sound may take before the face goes on here.
+    """
+
+    use: str = "own"
+    url: str = ""
+    key_variable: str = ""
+    timeout: float = 0.5
+
+    def __post_init__(self):
+        """Checks that they fit together.
+
+        Raises:
+            SettingsError: If they do not.
+        """
+        if self.use not in ("own", "remote"):
+            raise SettingsError(f"chat settings: expression '{self.use}': use own or remote.")
+        if self.use == "remote" and not self.url.startswith(("http://", "https://")):
+            raise SettingsError("chat settings: [expression] needs the url of the remote module.")
+
+
+@dataclass(frozen=True)
 class ChatSettings:
     """Services and timing of a conversation; the file may be TOML or JSON.
 
@@ -61,6 +115,8 @@ class ChatSettings:
         language: Question to answer.
         voice: Text to speech.
         turns: When the visitor has finished.
+        patience: How long services may take.
+        expression: Where sound becomes a moving face.
         max_sessions: How many visitors at once, those included whose connection dropped.
         gestures: Whether a body gestures while it speaks; otherwise it is held at rest.
     """
@@ -69,6 +125,8 @@ class ChatSettings:
     language: Choice = Choice()
     voice: Choice = Choice()
     turns: Turns = Turns()
+    patience: Patience = Patience()
+    expression: Expression = Expression()
     max_sessions: int = 4
     gestures: bool = True
 

@@ -1,7 +1,7 @@
 import { Microphone } from '../audio/microphone.ts';
 import { Player } from '../audio/player.ts';
 import type { PageError } from '../errors.ts';
-import type { ServerMessage, Services, StateMessage, WelcomeMessage } from '../protocol.ts';
+import type { Offer, ServerMessage, Services, StateMessage, WelcomeMessage } from '../protocol.ts';
 import { Connection } from './connection.ts';
 import { TurnTimer, VoiceMeter } from './latency.ts';
 
@@ -20,7 +20,7 @@ export interface ConversationView {
   state(state: StateMessage['state'] | 'connecting'): void;
   question(text: string, final: boolean): void;
   answer(sentence: string): void;
-  services(services: Services): void;
+  services(services: Services, offers: readonly Offer[]): void;
   notice(sentence: string): void;
   microphone(open: boolean): void;
   latency(milliseconds: number): void;
@@ -77,6 +77,12 @@ export class Conversation {
     return sent;
   }
 
+  /** Starts anew with another service. */
+  choose(offer: Offer): void {
+    this.player.reset();
+    this.connection.restart({ [offer.kind]: offer.key });
+  }
+
   /** Silences the avatar at once. */
   interrupt(): void {
     const utterance = this.player.current;
@@ -111,7 +117,7 @@ export class Conversation {
       this.player.reset();
       this.gestures?.reset();
     }
-    this.view.services(message.services);
+    this.view.services(message.services, message.offers);
     this.view.state('idle');
     for (const notice of message.notices) this.view.notice(notice);
   }

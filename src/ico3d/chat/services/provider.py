@@ -1,5 +1,6 @@
 """What a provider of recognition, language or voice is."""
 
+import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -25,10 +26,17 @@ class Context:
     animation: Animation | None
 
 
-def always(settings: Any) -> bool:
-    """For providers that need nothing beyond their package."""
+def unhindered(settings: Any) -> str:
+    """For providers that need nothing beyond what `make` says is missing."""
     del settings
-    return True
+    return ""
+
+
+def lacks_package(package: str, extra: str) -> str:
+    """What hinders a provider that needs a package: nothing, or that it is not installed."""
+    if importlib.util.find_spec(package) is not None:
+        return ""
+    return f"{package} is not installed: pip install 'ico3d[{extra}]'."
 
 
 @dataclass(frozen=True)
@@ -40,15 +48,16 @@ class Provider:
         settings: Dataclass of its options.
         make: Makes the processor of one session from options and context; may take a while, runs
             in a thread. What is heavy and read only is shared between sessions.
-        works: Whether it would work here as these options say: packages installed, weights
-            there, server answering. Quick; asked where the best is wanted.
+        hindrance: What keeps it from working here as these options say (packages, weights, a
+            server that answers) and what would mend it, in one sentence for people; empty if
+            nothing does. Quick, and never raises: asked where the best is wanted.
         stand_in: True for the offline three.
     """
 
     title: str
     settings: type
     make: Callable[[Any, Context], FrameProcessor]
-    works: Callable[[Any], bool] = always
+    hindrance: Callable[[Any], str] = unhindered
     stand_in: bool = False
 
 

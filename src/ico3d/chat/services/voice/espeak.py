@@ -10,7 +10,7 @@ from pipecat.services.settings import TTSSettings
 from pipecat.services.tts_service import TTSService
 
 from ico3d.chat.protocol import SPEECH_RATE
-from ico3d.chat.services.provider import Context
+from ico3d.chat.services.provider import Context, lacks_package
 from ico3d.common.espeak import synthesize
 from ico3d.errors import MissingExtraError
 
@@ -59,6 +59,11 @@ def spoken(text: str, voice: str, rate: int) -> np.ndarray:
     speech = synthesize(text, voice, rate)
     samples = soxr.resample(speech.samples, speech.rate, SPEECH_RATE)  # (S,)
     return (np.clip(samples, -1, 1) * 32767).astype(np.int16)
+
+
+def hindrance(settings: Settings) -> str:
+    """Its package."""
+    return lacks_package("espeakng_loader", "voice")
 
 
 def make(settings: Settings, context: Context) -> EspeakVoice:
