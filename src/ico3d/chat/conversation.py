@@ -34,6 +34,8 @@ from ico3d.chat.page import Page
 from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Clock
 from ico3d.chat.services import Chosen
 from ico3d.chat.services.provider import Context
+from ico3d.chat.services.voice.clauses import ClauseProcessor
+from ico3d.chat.services.voice.markup import speakable
 from ico3d.chat.settings import ChatSettings, Turns
 from ico3d.chat.speaker import Speaker
 from ico3d.chat.timing import TurnTimer
@@ -95,7 +97,7 @@ class Conversation:
     async def start(self) -> None:
         """Builds and starts the pipeline (about 0.5 s, most of it in a thread)."""
         parts = await asyncio.to_thread(make_parts, self._avatar)
-        self._watch_voice(parts.voice)
+        self._prepare_voice(parts.voice)
         self._worker = PipelineWorker(
             self._pipeline(parts),
             params=PipelineParams(
@@ -158,6 +160,7 @@ class Conversation:
                 self._captions,
                 user,
                 parts.language,
+                ClauseProcessor(),
                 parts.voice,
                 ExpressionProcessor(face, self._utterances, self._timer),
                 self._speaker,
@@ -165,9 +168,10 @@ class Conversation:
             ]
         )
 
-    def _watch_voice(self, voice: FrameProcessor) -> None:
-        """Takes the time at which the first sentence reaches the voice."""
+    def _prepare_voice(self, voice: FrameProcessor) -> None:
+        """Keeps markup from it, and takes the time at which the first piece reaches it."""
         if isinstance(voice, TTSService):
+            voice.add_text_transformer(speakable)
 
             async def requested(*_):
                 self._timer.mark("language")

@@ -1,0 +1,100 @@
+"""Kokoro through pipecat's own service: 82 million parameters, on the CPU, nine languages."""
+
+import importlib.util
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipecat.services.tts_service import TTSService
+
+from ico3d.chat.protocol import SPEECH_RATE
+from ico3d.chat.services.provider import Context
+from ico3d.chat.services.voice.pieces import STARVED
+from ico3d.chat.services.voice.weights import require_files, weights_folder
+from ico3d.errors import MissingExtraError, SettingsError
+
+LANGUAGES = {
+    "a": "en-us",
+    "b": "en-gb",
+    "e": "es",
+    "f": "fr-fr",
+    "h": "hi",
+    "i": "it",
+    "j": "ja",
+    "p": "pt-br",
+    "z": "cmn",
+}
+"""espeak-ng's names, which Kokoro's words go through, by the first letter of a voice."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which of Kokoro's voices.
+
+    Attributes:
+        voice: Its name; the first letter is its language: `af_heart` American, `bf_emma` British,
+            `ef_dora` Spanish, `ff_siwis` French, `hf_alpha` Hindi, `if_sara` Italian, `jf_alpha`
+            Japanese, `pf_dora` Portuguese, `zf_xiaobei` Chinese.
+        language: What it speaks, such as `en-us`; empty for its own language.
+        speed: 1 is its own pace; 0.5 to 2.
+        folder: Where `kokoro-v1.0.onnx` and `voices-v1.0.bin` lie; empty for where
+            `ico3d weights fetch kokoro` puts them.
+    """
+
+    voice: str = "af_heart"
+    language: str = ""
+    speed: float = 1.0
+    folder: str = ""
+
+    def __post_init__(self):
+        """Checks the speed.
+
+        Raises:
+            SettingsError: If Kokoro cannot speak at it.
+        """
+        if not 0.5 <= self.speed <= 2:
+            raise SettingsError("chat settings: voice 'kokoro': speed must be 0.5 to 2.")
+
+
+def language(settings: Settings) -> str:
+    """What the voice speaks, in espeak-ng's name."""
+    return settings.language or LANGUAGES.get(settings.voice[:1], "en-us")
+
+
+def files(settings: Settings) -> tuple[Path, Path]:
+    """Model and voices."""
+    folder = weights_folder("kokoro", settings.folder)
+    return folder / "kokoro-v1.0.onnx", folder / "voices-v1.0.bin"
+
+
+def works(settings: Settings) -> bool:
+    """Whether package and files are there."""
+    installed = importlib.util.find_spec("kokoro_onnx") is not None
+    return installed and all(path.is_file() for path in files(settings))
+
+
+def make(settings: Settings, context: Context) -> TTSService:
+    """A voice for one session.
+
+    Raises:
+        MissingExtraError: If kokoro-onnx is not installed.
+        MissingModelError: If its files are not there.
+        SettingsError: If there is no such voice.
+    """
+    try:
+        from pipecat.services.kokoro.tts import KokoroTTSService
+    except ImportError:
+        raise MissingExtraError("kokoro-onnx", "kokoro", "the Kokoro voice") from None
+    model, voices = files(settings)
+    require_files("kokoro", model, voices)
+    try:
+        return KokoroTTSService(
+            model_path=str(model),
+            voices_path=str(voices),
+            sample_rate=SPEECH_RATE,
+            stop_frame_timeout_s=STARVED,
+            settings=KokoroTTSService.Settings(
+                voice=settings.voice, language=language(settings), speed=settings.speed
+            ),
+        )
+    except ValueError as error:
+        raise SettingsError(f"chat settings: voice 'kokoro': {error}.") from error

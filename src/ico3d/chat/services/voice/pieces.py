@@ -1,0 +1,57 @@
+"""A voice that is one function from a text to its sound."""
+
+import asyncio
+from collections.abc import AsyncGenerator, Callable
+
+import numpy as np
+from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
+from pipecat.services.settings import TTSSettings
+from pipecat.services.tts_service import TTSService
+
+from ico3d.chat.protocol import SPEECH_RATE
+from ico3d.errors import MissingExtraError
+
+STARVED = 60.0  # s that a sentence may take on a machine that is busy with other things
+
+
+class PieceVoice(TTSService):
+    """Speaks piece by piece, in a thread, with what `speak` makes of a text."""
+
+    def __init__(self, voice: str, speak: Callable[[str], np.ndarray]):
+        """For one session.
+
+        Args:
+            voice: Its name.
+            speak: A text as (S,) int16 samples at 24 kHz; called from threads.
+        """
+        super().__init__(
+            push_start_frame=True,
+            push_stop_frames=True,
+            stop_frame_timeout_s=STARVED,
+            sample_rate=SPEECH_RATE,
+            settings=TTSSettings(model=None, voice=voice, language=None),
+        )
+        self._speak = speak
+
+    async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame | None, None]:
+        """Yields the text's sound in one frame, or the error that it met."""
+        try:
+            pcm = await asyncio.to_thread(self._speak, text)
+        except Exception as error:
+            yield ErrorFrame(f"'{text}' could not be spoken: {error}")
+            return
+        yield TTSAudioRawFrame(pcm.tobytes(), SPEECH_RATE, 1, context_id=context_id)
+
+
+def at_speech_rate(samples: np.ndarray, rate: int) -> np.ndarray:
+    """A whole piece as (S,) int16 at 24 kHz, from (S,) floats in [-1, 1] at another rate.
+
+    Raises:
+        MissingExtraError: If soxr is not installed.
+    """
+    try:
+        import soxr
+    except ImportError:
+        raise MissingExtraError("soxr", "chat", "a voice") from None
+    resampled = soxr.resample(np.asarray(samples, np.float32), rate, SPEECH_RATE)  # (S,)
+    return (np.clip(resampled, -1, 1) * 32767).astype(np.int16)

@@ -1,0 +1,90 @@
+"""Piper through pipecat's own service: small voices for some forty languages, on the CPU.
+
+The package piper-tts is GPL-3.0: an extra that is loaded at run time.
+"""
+
+import importlib.util
+import json
+from collections.abc import AsyncGenerator
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipecat.audio.utils import create_stream_resampler
+from pipecat.frames.frames import Frame, TTSAudioRawFrame
+from pipecat.services.tts_service import TTSService
+
+from ico3d.chat.protocol import SPEECH_RATE
+from ico3d.chat.services.provider import Context
+from ico3d.chat.services.voice.pieces import STARVED
+from ico3d.chat.services.voice.weights import require_files, weights_folder
+from ico3d.errors import MissingExtraError, SettingsError
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which of Piper's voices.
+
+    Attributes:
+        voice: Its name, such as `en_US-lessac-medium` or `de_DE-thorsten-medium`.
+        folder: Where `VOICE.onnx` and `VOICE.onnx.json` lie; empty for where
+            `ico3d weights fetch piper` puts them.
+        cuda: Run on an NVIDIA GPU; needs onnxruntime-gpu.
+    """
+
+    voice: str = "en_US-lessac-medium"
+    folder: str = ""
+    cuda: bool = False
+
+
+def files(settings: Settings) -> tuple[Path, Path]:
+    """Model and description."""
+    folder = weights_folder("piper", settings.folder)
+    return folder / f"{settings.voice}.onnx", folder / f"{settings.voice}.onnx.json"
+
+
+def works(settings: Settings) -> bool:
+    """Whether package and files are there."""
+    installed = importlib.util.find_spec("piper") is not None
+    return installed and all(path.is_file() for path in files(settings))
+
+
+def make(settings: Settings, context: Context) -> TTSService:
+    """A voice for one session.
+
+    Raises:
+        MissingExtraError: If piper-tts is not installed.
+        MissingModelError: If the voice's files are not there.
+        SettingsError: If the voice would have to download more.
+    """
+    try:
+        from pipecat.services.piper.tts import PiperTTSService
+    except ImportError:
+        raise MissingExtraError("piper-tts", "piper", "the Piper voice") from None
+    model, description = files(settings)
+    require_files("piper", model, description)
+    if json.loads(description.read_bytes()).get("phoneme_type") == "pinyin":
+        raise SettingsError(
+            f"{model}: Piper's Chinese voices would download a dictionary in mid-talk: "
+            "use kokoro or openvoice."
+        )
+
+    class PiperVoice(PiperTTSService):
+        """pipecat's, whose resampler keeps the last 20 ms of a piece for the next one."""
+
+        async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame, None]:
+            await self._resampler.reset()  # the piece before may have been interrupted
+            async for frame in super().run_tts(text, context_id):
+                yield frame
+            if rest := await self._resampler.flush():
+                yield TTSAudioRawFrame(rest, SPEECH_RATE, 1, context_id=context_id)
+
+    voice = PiperVoice(
+        download_dir=model.parent,
+        use_cuda=settings.cuda,
+        sample_rate=SPEECH_RATE,
+        stop_frame_timeout_s=STARVED,
+        settings=PiperTTSService.Settings(voice=settings.voice),
+    )
+    # pipecat's forgets the sound before a pause of 0.2 s, which a slow machine makes
+    voice._resampler = create_stream_resampler(clear_after_secs=None)
+    return voice
