@@ -18,7 +18,7 @@ from pipecat.utils.text.simple_text_aggregator import SimpleTextAggregator
 from ico3d.chat.services.voice.markup import EMOJI
 
 LEAST_WORDS = 2  # of a clause: a single word sounds torn off, and is over before more has come
-LEAST_LETTERS = 6  # the same for scripts without spaces
+LEAST_LETTERS = 4  # the same for scripts without spaces
 MOST_WORDS = 12  # after which the first piece ends between two words, clause or not
 UNMARKED_LETTERS = 40  # after which a space ends a sentence of a script that has no full stop
 

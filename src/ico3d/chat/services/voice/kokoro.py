@@ -6,9 +6,8 @@ from pathlib import Path
 
 from pipecat.services.tts_service import TTSService
 
-from ico3d.chat.protocol import SPEECH_RATE
 from ico3d.chat.services.provider import Context
-from ico3d.chat.services.voice.pieces import STARVED
+from ico3d.chat.services.voice.pieces import OPTIONS, Prompt
 from ico3d.chat.services.voice.weights import require_files, weights_folder
 from ico3d.errors import MissingExtraError, SettingsError
 
@@ -86,15 +85,18 @@ def make(settings: Settings, context: Context) -> TTSService:
         raise MissingExtraError("kokoro-onnx", "kokoro", "the Kokoro voice") from None
     model, voices = files(settings)
     require_files("kokoro", model, voices)
+
+    class KokoroVoice(Prompt, KokoroTTSService):
+        """pipecat's, that does not stall after an error."""
+
     try:
-        return KokoroTTSService(
+        return KokoroVoice(
             model_path=str(model),
             voices_path=str(voices),
-            sample_rate=SPEECH_RATE,
-            stop_frame_timeout_s=STARVED,
             settings=KokoroTTSService.Settings(
                 voice=settings.voice, language=language(settings), speed=settings.speed
             ),
+            **OPTIONS,
         )
     except ValueError as error:
         raise SettingsError(f"chat settings: voice 'kokoro': {error}.") from error

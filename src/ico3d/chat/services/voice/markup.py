@@ -29,7 +29,7 @@ _RULES = tuple(
         (r"`+|~~", ""),
         (r"(?<!\d)\*\*+|\*\*+(?!\d)", ""),
         (r"(?<=[A-Za-z])\*(?=[A-Za-z])", " "),
-        (r"(?<![\d\s])\*|\*(?![\d\s])", ""),  # 2*3 and 2 * 3 keep theirs
+        (r"(?<![\d\s*])\*(?!\*)|(?<!\*)\*(?![\d\s*])", ""),  # 2*3 and 2 * 3 keep theirs
         (r"(?<!\w)_+(?=\S)|(?<=\S)_+(?!\w)", ""),  # snake_case keeps its own
         (r"(^|[ \t])\|(?=[ \t]|$)", r"\1"),  # between cells of a table
         (r"([0-9#*])\ufe0f?\u20e3", r"\1"),  # keys

@@ -10,7 +10,7 @@ from pipecat.services.openai.tts import OpenAITTSService
 
 from ico3d.chat.protocol import SPEECH_RATE
 from ico3d.chat.services.provider import Context
-from ico3d.chat.services.voice.pieces import STARVED
+from ico3d.chat.services.voice.pieces import OPTIONS, STARVED, Prompt
 from ico3d.errors import SettingsError
 
 CHUNK = 4800  # bytes that are passed on at once: 0.1 s
@@ -49,7 +49,7 @@ class Settings:
             )
 
 
-class ServerVoice(OpenAITTSService):
+class ServerVoice(Prompt, OpenAITTSService):
     """pipecat's service for voices of any name and sound of any rate, with short first pieces."""
 
     def __init__(self, settings: Settings):
@@ -60,9 +60,8 @@ class ServerVoice(OpenAITTSService):
             api_key=os.environ.get(settings.key_variable, "none"),
             base_url=settings.url or None,
             http_client=DefaultAsyncHttpxClient(timeout=settings.timeout),
-            sample_rate=SPEECH_RATE,
-            stop_frame_timeout_s=STARVED,
             settings=OpenAITTSService.Settings(model=settings.model, voice=settings.voice),
+            **OPTIONS,
         )
         self._client.max_retries = 1
         self._options = settings

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncGenerator, Callable
+from typing import Any
 
 import numpy as np
 from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
@@ -12,9 +13,29 @@ from ico3d.chat.protocol import SPEECH_RATE
 from ico3d.errors import MissingExtraError
 
 STARVED = 60.0  # s that a sentence may take on a machine that is busy with other things
+OPTIONS: dict[str, Any] = {
+    "sample_rate": SPEECH_RATE,
+    "stop_frame_timeout_s": STARVED,
+    "max_consecutive_zero_audio_contexts": 0,  # a voice that failed may work again
+}
+"""What every voice tells pipecat's base."""
 
 
-class PieceVoice(TTSService):
+class Prompt(TTSService):
+    """A voice whose sound is complete when `run_tts` ends.
+
+    pipecat knows that only of one that made sound, and would wait for one that met an error.
+    """
+
+    async def tts_process_generator(
+        self, context_id: str, generator: AsyncGenerator[Frame | None, None]
+    ) -> None:
+        """Passes on what `run_tts` yields."""
+        await super().tts_process_generator(context_id, generator)
+        self._is_yielding_frames_synchronously = True
+
+
+class PieceVoice(Prompt):
     """Speaks piece by piece, in a thread, with what `speak` makes of a text."""
 
     def __init__(self, voice: str, speak: Callable[[str], np.ndarray]):
@@ -27,9 +48,8 @@ class PieceVoice(TTSService):
         super().__init__(
             push_start_frame=True,
             push_stop_frames=True,
-            stop_frame_timeout_s=STARVED,
-            sample_rate=SPEECH_RATE,
             settings=TTSSettings(model=None, voice=voice, language=None),
+            **OPTIONS,
         )
         self._speak = speak
 

@@ -15,7 +15,7 @@ from pipecat.services.tts_service import TTSService
 
 from ico3d.chat.protocol import SPEECH_RATE
 from ico3d.chat.services.provider import Context
-from ico3d.chat.services.voice.pieces import STARVED
+from ico3d.chat.services.voice.pieces import OPTIONS, Prompt
 from ico3d.chat.services.voice.weights import require_files, weights_folder
 from ico3d.errors import MissingExtraError, SettingsError
 
@@ -68,7 +68,7 @@ def make(settings: Settings, context: Context) -> TTSService:
             "use kokoro or openvoice."
         )
 
-    class PiperVoice(PiperTTSService):
+    class PiperVoice(Prompt, PiperTTSService):
         """pipecat's, whose resampler keeps the last 20 ms of a piece for the next one."""
 
         async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame, None]:
@@ -81,9 +81,8 @@ def make(settings: Settings, context: Context) -> TTSService:
     voice = PiperVoice(
         download_dir=model.parent,
         use_cuda=settings.cuda,
-        sample_rate=SPEECH_RATE,
-        stop_frame_timeout_s=STARVED,
         settings=PiperTTSService.Settings(voice=settings.voice),
+        **OPTIONS,
     )
     # pipecat's forgets the sound before a pause of 0.2 s, which a slow machine makes
     voice._resampler = create_stream_resampler(clear_after_secs=None)
