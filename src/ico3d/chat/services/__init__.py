@@ -5,6 +5,7 @@ which need no download, and what is too small to be elsewhere. A new one is a mo
 `Settings` and one entry in the table of its kind.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,13 @@ from ico3d.chat.services import language, recognition, voice
 from ico3d.chat.services.provider import Context, Provider, Table
 from ico3d.chat.settings import BEST, ChatSettings, Choice, filled
 from ico3d.errors import SettingsError
+
+TABLES: Mapping[str, Table] = {
+    "recognition": recognition.PROVIDERS,
+    "language": language.PROVIDERS,
+    "voice": voice.PROVIDERS,
+}
+"""Providers by kind and name."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +67,7 @@ def choose(settings: ChatSettings) -> Chosen:
         SettingsError: If one is unknown, or its options are wrong.
     """
     return Chosen(
-        chosen(recognition.PROVIDERS, settings.recognition, "recognition"),
-        chosen(language.PROVIDERS, settings.language, "language"),
-        chosen(voice.PROVIDERS, settings.voice, "voice"),
+        **{kind: chosen(table, getattr(settings, kind), kind) for kind, table in TABLES.items()}
     )
 
 
@@ -74,19 +80,30 @@ def chosen(table: Table, choice: Choice, kind: str) -> Service:
         kind: What an error calls it.
 
     Raises:
-        SettingsError: If it is unknown, or its options are wrong.
+        SettingsError: If it is unknown, its options are wrong, or none works.
     """
     if choice.use == BEST:
         if choice.options:
             raise SettingsError(f"chat settings: {kind} has options but does not say 'use'.")
-        return next(
-            Service(provider, options)
-            for provider in table.values()
-            if provider.works(options := provider.settings())
-        )
+        return best(table, kind)
     provider = table.get(choice.use)
     if provider is None:
         names = " or ".join((*table, BEST))
         raise SettingsError(f"chat settings: {kind} '{choice.use}' is unknown, use {names}.")
     where = f"chat settings: {kind} '{choice.use}'"
     return Service(provider, filled(provider.settings, choice.options, where))
+
+
+def best(table: Table, kind: str) -> Service:
+    """The first of a table that works here.
+
+    Raises:
+        SettingsError: If none does.
+    """
+    hindrance = ""
+    for provider in table.values():
+        options = provider.settings()
+        hindrance = provider.hindrance(options)
+        if not hindrance:
+            return Service(provider, options)
+    raise SettingsError(f"no {kind} works here; the last one needs this: {hindrance}")

@@ -10,10 +10,19 @@ from ico3d.chat.protocol import SPEECH_RATE
 
 
 @pytest.fixture(autouse=True)
-def cache(tmp_path, monkeypatch):
-    """What would be kept for this user."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    return tmp_path / "cache" / "ico3d"
+def home(tmp_path, monkeypatch):
+    """The home of a user who has nothing."""
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.delenv("ICO3D_MODELS", raising=False)
+    return tmp_path / "home"
+
+
+@pytest.fixture
+def models(home):
+    """Where that user's weights lie."""
+    folder = home / ".cache" / "ico3d" / "models"
+    folder.mkdir(parents=True)
+    return folder
 
 
 @pytest.fixture

@@ -115,13 +115,16 @@ def install(monkeypatch):
             monkeypatch.setitem(sys.modules, name, module)
 
 
-def write_weights(folder, speakers=("en-us", "es", "fr", "zh", "jp", "kr")):
+PARTS = ("English", "Spanish", "French", "Chinese", "Japanese", "Korean")
+
+
+def write_weights(folder):
     """The files that the adapter looks for; only the speakers' embeddings are real."""
-    for part in ("converter", *(f"melo/{code}" for code in SPEAKERS)):
+    for part in ("OpenVoiceV2/converter", *(f"MeloTTS-{language}" for language in PARTS)):
         (folder / part).mkdir(parents=True)
         (folder / part / "config.json").write_text("{}")
         (folder / part / "checkpoint.pth").write_bytes(b"weights")
-    embeddings = folder / "base_speakers" / "ses"
+    embeddings = folder / "OpenVoiceV2" / "base_speakers" / "ses"
     embeddings.mkdir(parents=True)
-    for speaker in speakers:
+    for speaker in ("en-us", "en-india", "es", "fr", "zh", "jp", "kr"):
         torch.save(torch.full((1, 256, 1), 0.5), embeddings / f"{speaker}.pth")

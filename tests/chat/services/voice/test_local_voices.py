@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from ico3d.chat.protocol import SPEECH_RATE
+from ico3d.chat.services import chosen
 from ico3d.chat.services.voice import PROVIDERS, espeak, kokoro, piper
 from ico3d.chat.settings import Choice
 from ico3d.common.espeak import synthesize
@@ -80,7 +81,7 @@ node = onnx.helper.make_node
 
 
 @pytest.fixture
-def kokoro_files(tmp_path):
+def kokoro_files(models):
     """Kokoro's inputs and outputs with random weights, and two voices."""
     rng = np.random.default_rng(0)
     model = graph(
@@ -106,34 +107,37 @@ def kokoro_files(tmp_path):
             "weights": rng.normal(size=(1, 600)).astype(np.float32),
         },
     )
-    onnx.save(model, tmp_path / "kokoro-v1.0.onnx")
+    onnx.save(model, models / "kokoro-v1.0.onnx")
     styles = {name: np.full((510, 1, 256), 0.5, np.float32) for name in ("af_heart", "zf_xiaobei")}
-    with (tmp_path / "voices-v1.0.bin").open("wb") as file:
+    with (models / "voices-v1.0.bin").open("wb") as file:
         np.savez(file, **styles)
-    return str(tmp_path)
+    return models
 
 
 async def test_kokoro_speaks(say, kokoro_files):
     pytest.importorskip("kokoro_onnx")
-    settings = kokoro.Settings(folder=kokoro_files)
-    assert kokoro.works(settings)
-    pcm, errors = await say(kokoro.make(settings, None), "Hello there.")
+    assert kokoro.hindrance(kokoro.Settings()) == ""
+    pcm, errors = await say(kokoro.make(kokoro.Settings(), None), "Hello there.")
     assert not errors and len(pcm) > 600 * 5 and 8000 < np.abs(pcm).max() <= 16384
-    pcm, errors = await say(
-        kokoro.make(kokoro.Settings("zf_xiaobei", folder=kokoro_files), None), "你好。"
-    )
+    pcm, errors = await say(kokoro.make(kokoro.Settings("zf_xiaobei"), None), "你好。")
     assert not errors and len(pcm) > 600 * 2
 
 
-def test_kokoro_says_what_is_missing(kokoro_files, tmp_path):
+def test_kokoro_says_what_is_missing(models):
     pytest.importorskip("kokoro_onnx")
-    assert not kokoro.works(kokoro.Settings())
-    with pytest.raises(MissingModelError, match=r"fetch it with `ico3d weights fetch kokoro`\.$"):
+    missing = "the weights 'kokoro' are not here: ico3d weights fetch kokoro (Apache-2.0)."
+    assert kokoro.hindrance(kokoro.Settings()) == missing
+    with pytest.raises(MissingModelError) as error:
         kokoro.make(kokoro.Settings(), None)
-    with pytest.raises(SettingsError, match="'no_body' is not in the voices file"):
-        kokoro.make(kokoro.Settings("no_body", folder=kokoro_files), None)
+    assert str(error.value) == missing
     with pytest.raises(SettingsError, match="speed must be"):
         kokoro.Settings(speed=3)
+
+
+def test_kokoro_has_no_such_voice(kokoro_files):
+    pytest.importorskip("kokoro_onnx")
+    with pytest.raises(SettingsError, match="'no_body' is not in the voices file"):
+        kokoro.make(kokoro.Settings("no_body"), None)
 
 
 PIPER_RATE = 22050
@@ -142,7 +146,7 @@ PER_PHONEME = 1000  # samples
 
 
 @pytest.fixture
-def piper_files(tmp_path):
+def piper_files(models):
     """Piper's inputs, output and description; whatever it says is one pure tone."""
     model = graph(
         [
@@ -168,7 +172,7 @@ def piper_files(tmp_path):
             "step": np.float32(TONE),
         },
     )
-    onnx.save(model, tmp_path / "en_US-tone-low.onnx")
+    onnx.save(model, models / "en_US-tone-low.onnx")
     symbols = "_^$ .,!?abcdefghijklmnopqrstuvwxyzæðŋɐɑɔəɛɜɡɪɹɾʃʊʌʒθᵻˈˌː"
     description = {
         "audio": {"sample_rate": PIPER_RATE},
@@ -179,14 +183,14 @@ def piper_files(tmp_path):
         "inference": {"noise_scale": 0.667, "length_scale": 1, "noise_w": 0.8},
         "phoneme_id_map": {symbol: [number] for number, symbol in enumerate(symbols)},
     }
-    (tmp_path / "en_US-tone-low.onnx.json").write_text(json.dumps(description))
-    return tmp_path
+    (models / "en_US-tone-low.onnx.json").write_text(json.dumps(description))
+    return models
 
 
 async def test_piper_is_resampled_without_a_click_or_a_loss(say, piper_files):
     pytest.importorskip("piper")
-    settings = piper.Settings("en_US-tone-low", str(piper_files))
-    assert piper.works(settings)
+    settings = piper.Settings("en_US-tone-low")
+    assert piper.hindrance(settings) == ""
     one, errors = await say(piper.make(settings, None), "Hello there.")
     assert not errors
     seconds = len(one) / SPEECH_RATE
@@ -201,20 +205,23 @@ async def test_piper_is_resampled_without_a_click_or_a_loss(say, piper_files):
 
 def test_piper_says_what_is_missing(piper_files):
     pytest.importorskip("piper")
-    assert not piper.works(piper.Settings())
-    with pytest.raises(MissingModelError, match=r"fetch it with `ico3d weights fetch piper`\.$"):
+    missing = (
+        "the Piper voice 'en_US-ljspeech-high' is not here: fetch it with python -m "
+        f"piper.download_voices --download-dir {piper_files} en_US-ljspeech-high."
+    )
+    assert piper.hindrance(piper.Settings()) == missing
+    with pytest.raises(MissingModelError) as error:
         piper.make(piper.Settings(), None)
-    settings = piper.Settings("en_US-tone-low", str(piper_files))
+    assert str(error.value) == missing
     (piper_files / "en_US-tone-low.onnx.json").write_text('{"phoneme_type": "pinyin"}')
     with pytest.raises(SettingsError, match="use kokoro or openvoice"):
-        piper.make(settings, None)
+        piper.make(piper.Settings("en_US-tone-low"), None)
 
 
-def test_the_best_voice_is_one_that_is_here(kokoro_files, cache, monkeypatch):
-    from ico3d.chat.services import chosen
-
+def test_the_best_voice_is_one_that_is_here():
     assert chosen(PROVIDERS, Choice(), "voice").provider.title == "espeak-ng"
+
+
+def test_a_better_voice_is_taken_where_it_is_here(kokoro_files):
     pytest.importorskip("kokoro_onnx")
-    (cache / "weights").mkdir(parents=True)
-    (cache / "weights" / "kokoro").symlink_to(kokoro_files)
     assert chosen(PROVIDERS, Choice(), "voice").provider.title == "Kokoro"

@@ -18,6 +18,7 @@ from ico3d.chat.services.voice import openvoice  # noqa: E402
 from ico3d.errors import MissingModelError, SettingsError  # noqa: E402
 
 HERE = __file__.rpartition("/")[0]
+LANGUAGES = openvoice.LANGUAGES
 CONSENT = {"consent": "I agree that my voice speaks here.", "consent_by": "Änne Müller"}
 
 
@@ -30,12 +31,12 @@ def fake():
 
 
 @pytest.fixture
-def installed(fake, monkeypatch, tmp_path):
-    """The fake is installed; yields the folder with its weights."""
+def installed(fake, monkeypatch, models):
+    """The fake is installed; gives the folder of its weights."""
     fake.install(monkeypatch)
-    fake.write_weights(tmp_path / "weights")
+    fake.write_weights(models)
     monkeypatch.setattr(openvoice, "_ENGINES", {})
-    return str(tmp_path / "weights")
+    return models
 
 
 @pytest.fixture
@@ -50,8 +51,8 @@ def seconds(text):
 
 
 async def test_the_base_speaker_speaks(installed, fake, say):
-    settings = openvoice.Settings(folder=installed, speaker="EN-BR", speed=2.0)
-    assert openvoice.works(settings)
+    settings = openvoice.Settings("EN-BR", speed=2.0)
+    assert openvoice.hindrance(settings) == ""
     pcm, errors = await say(openvoice.make(settings, None), "Hello there, you.", "Good bye.")
     assert not errors
     expected = (seconds("Hello there, you.") + seconds("Good bye.")) / 2
@@ -62,15 +63,15 @@ async def test_the_base_speaker_speaks(installed, fake, say):
     assert not fake.ToneColorConverter.made  # nothing to convert to
 
 
-@pytest.mark.parametrize("language", openvoice.LANGUAGES)
+@pytest.mark.parametrize("language", LANGUAGES)
 async def test_six_languages(installed, fake, say, language):
-    settings = openvoice.Settings(language, folder=installed)
-    pcm, errors = await say(openvoice.make(settings, None), openvoice.LANGUAGES[language])
+    settings = openvoice.Settings("EN_INDIA" if language == "EN" else language)
+    pcm, errors = await say(openvoice.make(settings, None), LANGUAGES[language][1])
     assert not errors and len(pcm) and fake.TTS.made[0].language == language
 
 
 async def test_the_voice_becomes_that_of_the_reference(installed, fake, say, reference):
-    settings = openvoice.Settings(folder=installed, reference=reference, **CONSENT)
+    settings = openvoice.Settings(reference=reference, **CONSENT)
     pcm, errors = await say(openvoice.make(settings, None), "Hello there.")
     assert not errors and len(pcm) == pytest.approx(seconds("Hello there.") * SPEECH_RATE, abs=3)
     [converter] = fake.ToneColorConverter.made
@@ -80,13 +81,13 @@ async def test_the_voice_becomes_that_of_the_reference(installed, fake, say, ref
 
 
 async def test_without_the_watermark(installed, fake, say, reference):
-    settings = openvoice.Settings(folder=installed, reference=reference, watermark=False, **CONSENT)
+    settings = openvoice.Settings(reference=reference, watermark=False, **CONSENT)
     await say(openvoice.make(settings, None), "Hello.")
     assert fake.ToneColorConverter.made[0].messages == [None, None]
 
 
 def test_sessions_share_the_models(installed, fake, reference):
-    settings = openvoice.Settings(folder=installed, reference=reference, **CONSENT)
+    settings = openvoice.Settings(reference=reference, **CONSENT)
     voices = [openvoice.make(settings, None) for _ in range(3)]
     assert len(fake.TTS.made) == len(fake.ToneColorConverter.made) == 1
     assert len({id(voice) for voice in voices}) == 3
@@ -94,7 +95,7 @@ def test_sessions_share_the_models(installed, fake, reference):
 
 def test_a_voice_is_not_cloned_without_consent(installed, fake, reference):
     for given in ({}, {"consent": "yes"}, {"consent_by": "Ann"}, {**CONSENT, "consent": " "}):
-        settings = openvoice.Settings(folder=installed, reference=reference, **given)
+        settings = openvoice.Settings(reference=reference, **given)
         with pytest.raises(SettingsError) as refused:
             openvoice.make(settings, None)
         assert str(refused.value) == (
@@ -104,9 +105,9 @@ def test_a_voice_is_not_cloned_without_consent(installed, fake, reference):
     assert not fake.TTS.made  # nothing was loaded for it
 
 
-def test_consent_is_kept_with_the_recording(installed, fake, reference, cache, tmp_path):
-    openvoice.make(openvoice.Settings(folder=installed, reference=reference, **CONSENT), None)
-    [record] = (cache / "voices").glob("*.json")
+def test_consent_is_kept_with_the_recording(installed, fake, reference, home, tmp_path):
+    openvoice.make(openvoice.Settings(reference=reference, **CONSENT), None)
+    [record] = (home / ".cache/ico3d/voices").glob("*.json")
     kept = json.loads(record.read_text(encoding="utf-8"))
     assert kept["statement"] == CONSENT["consent"] and kept["by"] == "Änne Müller"
     assert kept["recording"] == "me.wav" and kept["sha256"] == record.stem
@@ -114,18 +115,18 @@ def test_consent_is_kept_with_the_recording(installed, fake, reference, cache, t
     assert abs((datetime.now(UTC) - at).total_seconds()) < 600
 
     openvoice._ENGINES.clear()
-    again = openvoice.Settings(folder=installed, reference=reference)
+    again = openvoice.Settings(reference=reference)
     openvoice.make(again, None)  # it has been stated
     assert json.loads(record.read_text(encoding="utf-8")) == kept
 
     other = tmp_path / "other.wav"
     soundfile.write(other, np.zeros(100), 16000)
     with pytest.raises(SettingsError, match="consent of its owner"):
-        openvoice.make(openvoice.Settings(folder=installed, reference=str(other)), None)
+        openvoice.make(openvoice.Settings(reference=str(other)), None)
 
 
-def test_an_embedding_is_computed_once(installed, fake, reference, cache):
-    settings = openvoice.Settings(folder=installed, reference=reference, **CONSENT)
+def test_an_embedding_is_computed_once(installed, fake, reference, home):
+    settings = openvoice.Settings(reference=reference, **CONSENT)
 
     def extracted():
         openvoice._ENGINES.clear()
@@ -133,28 +134,44 @@ def test_an_embedding_is_computed_once(installed, fake, reference, cache):
         return fake.ToneColorConverter.made[-1].extracted
 
     assert [extracted(), extracted()] == [1, 0]
-    [embedding] = (cache / "voices").glob("*.safetensors")
+    [embedding] = (home / ".cache/ico3d/voices").glob("*.safetensors")
     embedding.write_bytes(embedding.read_bytes()[:-7])
     assert [extracted(), extracted()] == [1, 0]  # a damaged one is made again
 
 
-def test_what_is_missing_is_said(installed, reference, fake, monkeypatch, tmp_path):
-    assert not openvoice.works(openvoice.Settings())
-    with pytest.raises(MissingModelError, match="`ico3d weights fetch openvoice`"):
+def test_what_is_missing_is_said(fake, monkeypatch, reference, models):
+    fake.install(monkeypatch)
+    missing = (
+        "the weights 'melotts-english' are not here: ico3d weights fetch melotts-english (MIT)."
+    )
+    assert openvoice.hindrance(openvoice.Settings()) == missing
+    with pytest.raises(MissingModelError) as error:
         openvoice.make(openvoice.Settings(), None)
-    with pytest.raises(SettingsError, match="speaker must be EN-US or EN-BR or EN_INDIA"):
-        openvoice.make(openvoice.Settings(folder=installed, speaker="Bob"), None)
-    with pytest.raises(SettingsError, match="language must be EN or ES"):
-        openvoice.Settings("DE")
-    with pytest.raises(SettingsError, match=r"nobody\.wav: cannot be read"):
-        openvoice.make(openvoice.Settings(folder=installed, reference="/nobody.wav"), None)
-    (tmp_path / "weights/base_speakers/ses/en-us.pth").unlink()
-    with pytest.raises(MissingModelError, match=r"en-us\.pth is missing"):
-        settings = openvoice.Settings(folder=installed, reference=reference, **CONSENT)
+    assert str(error.value) == missing
+    fake.write_weights(models)
+    (models / "OpenVoiceV2/converter/checkpoint.pth").unlink()
+    assert openvoice.hindrance(openvoice.Settings()) == ""
+    settings = openvoice.Settings(reference=reference, **CONSENT)
+    assert openvoice.hindrance(settings).startswith("the weights 'openvoice' are not here")
+    with pytest.raises(MissingModelError, match="ico3d weights fetch openvoice"):
         openvoice.make(settings, None)
     monkeypatch.setitem(sys.modules, "melo.api", None)
     with pytest.raises(SettingsError, match=r"needs the package 'melo.api'.*docs/conversation\.md"):
-        openvoice.make(openvoice.Settings(folder=installed), None)
+        openvoice.make(openvoice.Settings(), None)
+
+
+def test_what_is_not_installed_is_said():
+    if not is_installed("melo"):
+        assert openvoice.hindrance(openvoice.Settings()).startswith("melo is not installed: ")
+
+
+def test_wrong_settings_are_told(installed):
+    with pytest.raises(SettingsError, match="voice must be EN-US or EN-BR or EN_INDIA"):
+        openvoice.make(openvoice.Settings("EN-Bob"), None)
+    with pytest.raises(SettingsError, match=r"voice must begin with EN or ES or .*not be 'DE'"):
+        openvoice.Settings("DE")
+    with pytest.raises(SettingsError, match=r"nobody\.wav: cannot be read"):
+        openvoice.make(openvoice.Settings(reference="/nobody.wav"), None)
 
 
 def test_nothing_is_downloaded_meanwhile(installed, fake, monkeypatch):
@@ -170,10 +187,15 @@ def test_nothing_is_downloaded_meanwhile(installed, fake, monkeypatch):
         return np.zeros(100, np.float32)
 
     monkeypatch.setattr(fake.TTS, "tts_to_file", speak)
-    openvoice.make(openvoice.Settings(folder=installed), None)
+    openvoice.make(openvoice.Settings(), None)
     assert seen == [True] and not constants.HF_HUB_OFFLINE
     with pytest.raises(MissingModelError, match=r"downloaded \(offline mode is enabled\)"):
-        openvoice.make(openvoice.Settings("FR", folder=installed), None)
+        openvoice.make(
+            openvoice.Settings(
+                "FR",
+            ),
+            None,
+        )
     assert not constants.HF_HUB_OFFLINE
 
 

@@ -21,7 +21,7 @@ from pipecat.services.stt_service import STTService
 from pipecat.utils.time import time_now_iso8601
 
 from ico3d.chat.protocol import MICROPHONE_RATE
-from ico3d.chat.services.provider import Context
+from ico3d.chat.services.provider import Context, lacks_package
 from ico3d.errors import MissingExtraError
 
 LEAD_IN = 0.7  # s of sound before the VAD noticed speech: it needs 0.2 s to be sure
@@ -168,6 +168,11 @@ class SphinxRecognition(STTService):
 @dataclass(frozen=True)
 class Settings:
     """It has none."""
+
+
+def hindrance(settings: Settings) -> str:
+    """Its package."""
+    return lacks_package("pocketsphinx", "chat")
 
 
 def make(settings: Settings, context: Context) -> SphinxRecognition:

@@ -11,7 +11,6 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from ico3d.chat.services.voice.weights import cache_folder
 from ico3d.common.files import write_atomic
 from ico3d.errors import SettingsError
 
@@ -32,7 +31,7 @@ class Recording:
 
     def kept(self, suffix: str) -> Path:
         """The file that is kept of it."""
-        return cache_folder() / "voices" / f"{self.digest}{suffix}"
+        return Path.home() / ".cache" / "ico3d" / "voices" / f"{self.digest}{suffix}"
 
     def embedding(self, extract: Callable[[str], np.ndarray]) -> np.ndarray:
         """What `extract` makes of the file, float32; computed once."""

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from ico3d.chat.services.provider import Context
+from ico3d.chat.services.provider import Context, lacks_package
 from ico3d.chat.services.voice.pieces import PieceVoice, at_speech_rate
 from ico3d.common.espeak import synthesize
 
@@ -68,6 +68,11 @@ def spoken(text: str, voice: str, rate: int) -> np.ndarray:
     """A text as (S,) int16 samples at 24 kHz."""
     speech = synthesize(text, voice_for(text, voice), rate)
     return at_speech_rate(speech.samples, speech.rate)
+
+
+def hindrance(settings: Settings) -> str:
+    """Its packages."""
+    return lacks_package("espeakng_loader", "voice") or lacks_package("soxr", "chat")
 
 
 def make(settings: Settings, context: Context) -> PieceVoice:

@@ -1,14 +1,11 @@
 """Kokoro through pipecat's own service: 82 million parameters, on the CPU, nine languages."""
 
-import importlib.util
 from dataclasses import dataclass
-from pathlib import Path
 
 from pipecat.services.tts_service import TTSService
 
-from ico3d.chat.services.provider import Context
+from ico3d.chat.services.provider import Context, lacks_package, lacks_weights, weights_folder
 from ico3d.chat.services.voice.pieces import OPTIONS, Prompt
-from ico3d.chat.services.voice.weights import require_files, weights_folder
 from ico3d.errors import MissingExtraError, SettingsError
 
 LANGUAGES = {
@@ -35,14 +32,11 @@ class Settings:
             Japanese, `pf_dora` Portuguese, `zf_xiaobei` Chinese.
         language: What it speaks, such as `en-us`; empty for its own language.
         speed: 1 is its own pace; 0.5 to 2.
-        folder: Where `kokoro-v1.0.onnx` and `voices-v1.0.bin` lie; empty for where
-            `ico3d weights fetch kokoro` puts them.
     """
 
     voice: str = "af_heart"
     language: str = ""
     speed: float = 1.0
-    folder: str = ""
 
     def __post_init__(self):
         """Checks the speed.
@@ -59,16 +53,9 @@ def language(settings: Settings) -> str:
     return settings.language or LANGUAGES.get(settings.voice[:1], "en-us")
 
 
-def files(settings: Settings) -> tuple[Path, Path]:
-    """Model and voices."""
-    folder = weights_folder("kokoro", settings.folder)
-    return folder / "kokoro-v1.0.onnx", folder / "voices-v1.0.bin"
-
-
-def works(settings: Settings) -> bool:
-    """Whether package and files are there."""
-    installed = importlib.util.find_spec("kokoro_onnx") is not None
-    return installed and all(path.is_file() for path in files(settings))
+def hindrance(settings: Settings) -> str:
+    """Its package and its weights."""
+    return lacks_package("kokoro_onnx", "kokoro") or lacks_weights("kokoro")
 
 
 def make(settings: Settings, context: Context) -> TTSService:
@@ -83,16 +70,15 @@ def make(settings: Settings, context: Context) -> TTSService:
         from pipecat.services.kokoro.tts import KokoroTTSService
     except ImportError:
         raise MissingExtraError("kokoro-onnx", "kokoro", "the Kokoro voice") from None
-    model, voices = files(settings)
-    require_files("kokoro", model, voices)
+    folder = weights_folder("kokoro")
 
     class KokoroVoice(Prompt, KokoroTTSService):
         """pipecat's, that does not stall after an error."""
 
     try:
         return KokoroVoice(
-            model_path=str(model),
-            voices_path=str(voices),
+            model_path=str(folder / "kokoro-v1.0.onnx"),
+            voices_path=str(folder / "voices-v1.0.bin"),
             settings=KokoroTTSService.Settings(
                 voice=settings.voice, language=language(settings), speed=settings.speed
             ),

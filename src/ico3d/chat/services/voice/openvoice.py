@@ -15,21 +15,22 @@ from typing import Any
 
 import numpy as np
 
-from ico3d.chat.services.provider import Context
+from ico3d.chat.services.provider import Context, lacks_weights, weights_folder
 from ico3d.chat.services.voice.cloning import Recording, permitted_recording
 from ico3d.chat.services.voice.pieces import PieceVoice, at_speech_rate
-from ico3d.chat.services.voice.weights import require_files, weights_folder
 from ico3d.errors import MissingModelError, SettingsError
 
 LANGUAGES = {
-    "EN": "Hello.",
-    "ES": "Hola.",
-    "FR": "Bonjour.",
-    "ZH": "你好。",
-    "JP": "こんにちは。",
-    "KR": "안녕하세요.",
+    "EN": ("melotts-english", "Hello."),
+    "ES": ("melotts-spanish", "Hola."),
+    "FR": ("melotts-french", "Bonjour."),
+    "ZH": ("melotts-chinese", "你好。"),
+    "JP": ("melotts-japanese", "こんにちは。"),
+    "KR": ("melotts-korean", "안녕하세요."),
 }
-"""What it speaks, and a first word in each, which loads the rest of its models."""
+"""What it speaks: weights, and a first word, which loads the rest of its models."""
+
+INSTALL = "the commands are in docs/conversation.md under 'Voice'."
 
 
 @dataclass(frozen=True)
@@ -37,27 +38,23 @@ class Settings:
     """Whose voice.
 
     Attributes:
-        language: EN, ES, FR, ZH, JP or KR.
-        speaker: MeloTTS's speaker, such as `EN-US`; empty for the language's first.
+        voice: MeloTTS's speaker, who decides on the language: EN-US, EN-BR, EN_INDIA, EN-AU,
+            EN-Default, ES, FR, ZH, JP or KR.
         speed: 1 is its own pace.
         reference: WAV file of the voice to speak with; empty for the speaker's own voice.
         consent: What the owner of that voice has agreed to, in one sentence; kept on this machine.
         consent_by: The owner's name.
         watermark: Whether converted speech carries OpenVoice's inaudible mark; it takes time.
         device: `auto`, `cpu`, `cuda` or `mps`.
-        folder: Where the checkpoints lie; empty for where `ico3d weights fetch openvoice` puts
-            them.
     """
 
-    language: str = "EN"
-    speaker: str = ""
+    voice: str = "EN-US"
     speed: float = 1.0
     reference: str = ""
     consent: str = ""
     consent_by: str = ""
     watermark: bool = True
     device: str = "auto"
-    folder: str = ""
 
     def __post_init__(self):
         """Checks language and speed.
@@ -67,35 +64,21 @@ class Settings:
         """
         if self.language not in LANGUAGES:
             raise SettingsError(
-                f"chat settings: voice 'openvoice': language must be {' or '.join(LANGUAGES)}."
+                "chat settings: voice 'openvoice': voice must begin with "
+                f"{' or '.join(LANGUAGES)}, not be '{self.voice}'."
             )
         if not 0.25 <= self.speed <= 4:
             raise SettingsError("chat settings: voice 'openvoice': speed must be 0.25 to 4.")
 
-
-@dataclass(frozen=True)
-class Files:
-    """Where the parts of OpenVoice V2 lie, as its own archive and MeloTTS name them."""
-
-    folder: Path
-    language: str
+    @property
+    def language(self) -> str:
+        """MeloTTS's code."""
+        return self.voice[:2]
 
     @property
-    def base(self) -> tuple[Path, Path]:
-        """MeloTTS's description and weights of the language."""
-        folder = self.folder / "melo" / self.language
-        return folder / "config.json", folder / "checkpoint.pth"
-
-    @property
-    def converter(self) -> tuple[Path, Path]:
-        """The tone-colour converter's description and weights."""
-        folder = self.folder / "converter"
-        return folder / "config.json", folder / "checkpoint.pth"
-
-    def embedding(self, speaker: str) -> Path:
-        """The embedding of one of MeloTTS's speakers."""
-        name = speaker.lower().replace("_", "-")
-        return self.folder / "base_speakers" / "ses" / f"{name}.pth"
+    def weights(self) -> str:
+        """What `ico3d weights` calls MeloTTS's part for the language."""
+        return LANGUAGES[self.language][0]
 
 
 class Engine:
@@ -110,15 +93,14 @@ class Engine:
         """
         self._settings = settings
         self._lock = threading.Lock()
-        self._files = Files(weights_folder("openvoice", settings.folder), settings.language)
         self._converter: Any = None
         recording = permitted(settings)
         with loading():
             self._base = self._load_base()
-            self._speaker, self._speaker_id = self._find_speaker()
+            self._speaker_id = self._find_speaker()
             if recording:
                 self._converter = self._load_converter(recording)
-            self.speak(LANGUAGES[settings.language])
+            self.speak(LANGUAGES[settings.language][1])
 
     def speak(self, text: str) -> np.ndarray:
         """A text as (S,) int16 samples at 24 kHz."""
@@ -132,35 +114,38 @@ class Engine:
         return at_speech_rate(samples, rate)
 
     def _load_base(self) -> Any:
-        config, checkpoint = self._files.base
-        require_files("openvoice", config, checkpoint)
+        folder = weights_folder(self._settings.weights)
         from melo.api import TTS
 
-        language, device = self._settings.language, self._settings.device
-        return TTS(language, device, config_path=str(config), ckpt_path=str(checkpoint))
+        return TTS(
+            self._settings.language,
+            self._settings.device,
+            config_path=str(folder / "config.json"),
+            ckpt_path=str(folder / "checkpoint.pth"),
+        )
 
-    def _find_speaker(self) -> tuple[str, int]:
+    def _find_speaker(self) -> int:
         speakers = dict(self._base.hps.data.spk2id.items())
-        name = self._settings.speaker or next(iter(speakers))
-        if name not in speakers:
+        if self._settings.voice not in speakers:
             known = " or ".join(speakers)
-            raise SettingsError(f"chat settings: voice 'openvoice': speaker must be {known}.")
-        return name, speakers[name]
+            raise SettingsError(f"chat settings: voice 'openvoice': voice must be {known}.")
+        return speakers[self._settings.voice]
 
     def _load_converter(self, recording: Recording) -> Any:
-        config, checkpoint = self._files.converter
-        source = self._files.embedding(self._speaker)
-        require_files("openvoice", config, checkpoint, source)
+        folder = weights_folder("openvoice")
         import torch
         from openvoice.api import ToneColorConverter
 
         device = str(self._base.device)
-        converter = ToneColorConverter(str(config), device=device)
+        converter = ToneColorConverter(str(folder / "converter" / "config.json"), device=device)
+        checkpoint = folder / "converter" / "checkpoint.pth"
         converter.load_ckpt(str(checkpoint))
         if not self._settings.watermark:
             converter.watermark_model = None  # its constructor does not take this wish
         target = recording.embedding(lambda path: converter.extract_se([path]).cpu().numpy())
         self._target = torch.from_numpy(target).to(device)
+        name = self._settings.voice.lower().replace("_", "-")
+        source = folder / "base_speakers" / "ses" / f"{name}.pth"
         self._source = torch.load(source, map_location=device, weights_only=True)
         return converter
 
@@ -195,13 +180,11 @@ def loading() -> Iterator[None]:
             yield
     except ModuleNotFoundError as error:
         raise SettingsError(
-            f"the OpenVoice voice needs the package '{error.name}', which is not installed: "
-            "the command is in docs/conversation.md under 'Voice'."
+            f"OpenVoice needs the package '{error.name}', which is not installed: {INSTALL}"
         ) from error
     except OSError as error:
         raise MissingModelError(
-            f"OpenVoice lacks a part that would have to be downloaded ({error}): "
-            "fetch it with `ico3d weights fetch openvoice`."
+            f"OpenVoice lacks a part that would have to be downloaded ({error}): {INSTALL}"
         ) from error
 
 
@@ -232,11 +215,13 @@ def engine(settings: Settings) -> Engine:
         return _ENGINES[settings]
 
 
-def works(settings: Settings) -> bool:
-    """Whether packages and files are there."""
-    files = Files(weights_folder("openvoice", settings.folder), settings.language)
-    installed = all(importlib.util.find_spec(name) for name in ("melo", "openvoice"))
-    return installed and all(path.is_file() for path in files.base)
+def hindrance(settings: Settings) -> str:
+    """Its packages and its weights."""
+    for package in ("melo", "openvoice"):
+        if importlib.util.find_spec(package) is None:
+            return f"{package} is not installed: {INSTALL}"
+    needed = (settings.weights, "openvoice") if settings.reference else (settings.weights,)
+    return next((lack for name in needed if (lack := lacks_weights(name))), "")
 
 
 def make(settings: Settings, context: Context) -> PieceVoice:
@@ -246,4 +231,4 @@ def make(settings: Settings, context: Context) -> PieceVoice:
         MissingModelError: If files are not there.
         SettingsError: If packages, speaker, recording or consent are missing.
     """
-    return PieceVoice(settings.speaker or settings.language, engine(settings).speak)
+    return PieceVoice(settings.voice, engine(settings).speak)

@@ -3,7 +3,6 @@
 The package piper-tts is GPL-3.0: an extra that is loaded at run time.
 """
 
-import importlib.util
 import json
 from collections.abc import AsyncGenerator
 from dataclasses import dataclass
@@ -14,10 +13,10 @@ from pipecat.frames.frames import Frame, TTSAudioRawFrame
 from pipecat.services.tts_service import TTSService
 
 from ico3d.chat.protocol import SPEECH_RATE
-from ico3d.chat.services.provider import Context
+from ico3d.chat.services.provider import Context, lacks_package
 from ico3d.chat.services.voice.pieces import OPTIONS, Prompt
-from ico3d.chat.services.voice.weights import require_files, weights_folder
-from ico3d.errors import MissingExtraError, SettingsError
+from ico3d.common.weights import model_folders
+from ico3d.errors import MissingExtraError, MissingModelError, SettingsError
 
 
 @dataclass(frozen=True)
@@ -25,27 +24,38 @@ class Settings:
     """Which of Piper's voices.
 
     Attributes:
-        voice: Its name, such as `en_US-lessac-medium` or `de_DE-thorsten-medium`.
-        folder: Where `VOICE.onnx` and `VOICE.onnx.json` lie; empty for where
-            `ico3d weights fetch piper` puts them.
+        voice: Its name, such as `en_US-ljspeech-high` or `de_DE-thorsten-medium`; each has its own
+            licence.
         cuda: Run on an NVIDIA GPU; needs onnxruntime-gpu.
     """
 
-    voice: str = "en_US-lessac-medium"
-    folder: str = ""
+    voice: str = "en_US-ljspeech-high"
     cuda: bool = False
 
 
-def files(settings: Settings) -> tuple[Path, Path]:
-    """Model and description."""
-    folder = weights_folder("piper", settings.folder)
-    return folder / f"{settings.voice}.onnx", folder / f"{settings.voice}.onnx.json"
+def find_voice(settings: Settings) -> Path:
+    """The voice's model; its description lies beside it.
+
+    Raises:
+        MissingModelError: If it is not here.
+    """
+    names = f"{settings.voice}.onnx", f"{settings.voice}.onnx.json"
+    for folder in model_folders():
+        if all((folder / name).is_file() for name in names):
+            return folder / names[0]
+    fetch = f"python -m piper.download_voices --download-dir {model_folders()[-1]}"
+    raise MissingModelError(
+        f"the Piper voice '{settings.voice}' is not here: fetch it with {fetch} {settings.voice}."
+    )
 
 
-def works(settings: Settings) -> bool:
-    """Whether package and files are there."""
-    installed = importlib.util.find_spec("piper") is not None
-    return installed and all(path.is_file() for path in files(settings))
+def hindrance(settings: Settings) -> str:
+    """Its package and the voice's files."""
+    try:
+        find_voice(settings)
+    except MissingModelError as error:
+        return lacks_package("piper", "piper") or str(error)
+    return lacks_package("piper", "piper")
 
 
 def make(settings: Settings, context: Context) -> TTSService:
@@ -60,9 +70,8 @@ def make(settings: Settings, context: Context) -> TTSService:
         from pipecat.services.piper.tts import PiperTTSService
     except ImportError:
         raise MissingExtraError("piper-tts", "piper", "the Piper voice") from None
-    model, description = files(settings)
-    require_files("piper", model, description)
-    if json.loads(description.read_bytes()).get("phoneme_type") == "pinyin":
+    model = find_voice(settings)
+    if json.loads(Path(f"{model}.json").read_bytes()).get("phoneme_type") == "pinyin":
         raise SettingsError(
             f"{model}: Piper's Chinese voices would download a dictionary in mid-talk: "
             "use kokoro or openvoice."
