@@ -5,14 +5,20 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pipecat.frames.frames import (
     AggregatedTextFrame,
+    ErrorFrame,
     LLMFullResponseEndFrame,
     LLMFullResponseStartFrame,
     LLMTextFrame,
+    TTSTextFrame,
 )
+from pipecat.pipeline.pipeline import Pipeline
 from pipecat.tests.utils import run_test
 from pipecat.utils.text.simple_text_aggregator import SimpleTextAggregator
 
+from ico3d.chat.services.voice import espeak
 from ico3d.chat.services.voice.clauses import ClauseProcessor, Clauses
+from ico3d.chat.services.voice.markup import speakable
+from ico3d.common.espeak import synthesize
 
 
 async def cut(*deltas, aggregator=None):
@@ -115,3 +121,38 @@ async def test_what_was_interrupted_is_forgotten():
     await clauses.handle_interruption()
     assert [p.text async for p in clauses.aggregate("So then, you")] == ["So then,"]
     assert (await clauses.flush()).text == "you"
+
+
+ANSWER = (
+    "Grüß dich, **lieber Gast**! 😀 你好，世界。 مرحبا بك. Es sind 3,5 km bis 10:30 Uhr.\n"
+    "- `print(2*3)`\n```python\nx = 1\n```\nन॒मस्ते। Bis bald! 👋"
+)
+
+
+async def test_captions_show_what_was_written_and_the_voice_says_its_words():
+    voice = espeak.make(espeak.Settings("de"), None)
+    voice.add_text_transformer(speakable)
+    requests = []
+
+    async def requested(_, __, text):
+        requests.append(text.strip())
+
+    voice.add_event_handler("on_tts_request", requested)
+    answer = LLMFullResponseStartFrame(), LLMTextFrame(ANSWER), LLMFullResponseEndFrame()
+    down, up = await run_test(
+        Pipeline([ClauseProcessor(), voice]), frames_to_send=answer, start_timeout=60
+    )
+    assert not [frame for frame in up if isinstance(frame, ErrorFrame)]
+    pieces = [f for f in down if isinstance(f, AggregatedTextFrame) and f.will_be_spoken]
+    captions = "".join(f.text for f in pieces if not isinstance(f, TTSTextFrame))
+    fences = ANSWER.replace("```python", "").replace("```", "")
+    assert "".join(captions.split()) == "".join(fences.split())
+    assert requests == [
+        *("Grüß dich,", "lieber Gast!", "你好，世界。", "مرحبا بك."),
+        *("Es sind 3,5 km bis 10:30 Uhr.", "print(2*3)", "x = 1", "न॒मस्ते।", "Bis bald!"),
+    ]
+
+
+def test_the_voice_itself_reads_numbers():
+    symbols = "".join(event.symbol for event in synthesize("3.5", "en-us").events)
+    assert symbols == "θɹˈiːpɔɪntfˈaɪv"

@@ -1,6 +1,7 @@
 """Voices of this machine: espeak-ng, and Kokoro and Piper with random weights."""
 
 import json
+import time
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from ico3d.chat.protocol import SPEECH_RATE
 from ico3d.chat.services import chosen
 from ico3d.chat.services.voice import PROVIDERS, espeak, kokoro, piper
+from ico3d.chat.services.voice.pieces import STARVED
 from ico3d.chat.settings import Choice
 from ico3d.common.espeak import synthesize
 from ico3d.errors import MissingModelError, SettingsError
@@ -61,8 +63,10 @@ async def test_a_text_that_cannot_be_spoken_is_an_error_and_not_the_end(say):
         return speak(text)
 
     voice._speak = sometimes
+    began = time.monotonic()
     pcm, errors = await say(voice, "bad", "good")
     assert errors[0] == "'bad' could not be spoken: no such word" and len(pcm) > 3000
+    assert time.monotonic() - began < STARVED / 2  # nobody waited for what does not come
 
 
 def graph(nodes, inputs, output, constants):
@@ -121,6 +125,8 @@ async def test_kokoro_speaks(say, kokoro_files):
     assert not errors and len(pcm) > 600 * 5 and 8000 < np.abs(pcm).max() <= 16384
     pcm, errors = await say(kokoro.make(kokoro.Settings("zf_xiaobei"), None), "你好。")
     assert not errors and len(pcm) > 600 * 2
+    voices = [kokoro.make(kokoro.Settings(), None) for _ in range(2)]
+    assert voices[0]._kokoro is voices[1]._kokoro
 
 
 def test_kokoro_says_what_is_missing(models):
@@ -136,7 +142,7 @@ def test_kokoro_says_what_is_missing(models):
 
 def test_kokoro_has_no_such_voice(kokoro_files):
     pytest.importorskip("kokoro_onnx")
-    with pytest.raises(SettingsError, match="'no_body' is not in the voices file"):
+    with pytest.raises(SettingsError, match="voice must be af_heart or zf_xiaobei"):
         kokoro.make(kokoro.Settings("no_body"), None)
 
 

@@ -35,7 +35,7 @@ def installed(fake, monkeypatch, models):
     """The fake is installed; gives the folder of its weights."""
     fake.install(monkeypatch)
     fake.write_weights(models)
-    monkeypatch.setattr(openvoice, "_ENGINES", {})
+    openvoice.engine.cache_clear()
     return models
 
 
@@ -114,7 +114,7 @@ def test_consent_is_kept_with_the_recording(installed, fake, reference, home, tm
     at = datetime.fromisoformat(kept["at"])
     assert abs((datetime.now(UTC) - at).total_seconds()) < 600
 
-    openvoice._ENGINES.clear()
+    openvoice.engine.cache_clear()
     again = openvoice.Settings(reference=reference)
     openvoice.make(again, None)  # it has been stated
     assert json.loads(record.read_text(encoding="utf-8")) == kept
@@ -129,7 +129,7 @@ def test_an_embedding_is_computed_once(installed, fake, reference, home):
     settings = openvoice.Settings(reference=reference, **CONSENT)
 
     def extracted():
-        openvoice._ENGINES.clear()
+        openvoice.engine.cache_clear()
         openvoice.make(settings, None)
         return fake.ToneColorConverter.made[-1].extracted
 
@@ -141,6 +141,7 @@ def test_an_embedding_is_computed_once(installed, fake, reference, home):
 
 def test_what_is_missing_is_said(fake, monkeypatch, reference, models):
     fake.install(monkeypatch)
+    openvoice.engine.cache_clear()
     missing = (
         "the weights 'melotts-english' are not here: ico3d weights fetch melotts-english (MIT)."
     )

@@ -1,11 +1,15 @@
 """Kokoro through pipecat's own service: 82 million parameters, on the CPU, nine languages."""
 
+import functools
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
+from pipecat.audio.utils import create_stream_resampler
 from pipecat.services.tts_service import TTSService
 
 from ico3d.chat.services.provider import Context, lacks_package, lacks_weights, weights_folder
-from ico3d.chat.services.voice.pieces import OPTIONS, Prompt
+from ico3d.chat.services.voice.pieces import LOADING, OPTIONS, SYNCHRONOUS, Prompt
 from ico3d.errors import MissingExtraError, SettingsError
 
 LANGUAGES = {
@@ -59,7 +63,7 @@ def hindrance(settings: Settings) -> str:
 
 
 def make(settings: Settings, context: Context) -> TTSService:
-    """A voice for one session.
+    """A voice for one session; all share one model.
 
     Raises:
         MissingExtraError: If kokoro-onnx is not installed.
@@ -70,19 +74,31 @@ def make(settings: Settings, context: Context) -> TTSService:
         from pipecat.services.kokoro.tts import KokoroTTSService
     except ImportError:
         raise MissingExtraError("kokoro-onnx", "kokoro", "the Kokoro voice") from None
-    folder = weights_folder("kokoro")
 
     class KokoroVoice(Prompt, KokoroTTSService):
-        """pipecat's, that does not stall after an error."""
+        """pipecat's, with a model that is there: its own constructor loads or downloads one."""
 
-    try:
-        return KokoroVoice(
-            model_path=str(folder / "kokoro-v1.0.onnx"),
-            voices_path=str(folder / "voices-v1.0.bin"),
-            settings=KokoroTTSService.Settings(
-                voice=settings.voice, language=language(settings), speed=settings.speed
-            ),
-            **OPTIONS,
-        )
-    except ValueError as error:
-        raise SettingsError(f"chat settings: voice 'kokoro': {error}.") from error
+        def __init__(self, model: Any):
+            own = KokoroTTSService.Settings(
+                model=None,
+                voice=settings.voice,
+                language=language(settings),
+                speed=settings.speed,
+            )
+            TTSService.__init__(self, settings=own, **SYNCHRONOUS, **OPTIONS)
+            self._kokoro, self._resampler = model, create_stream_resampler()
+
+    with LOADING:
+        model = engine(weights_folder("kokoro"))
+    if settings.voice not in model.voices:
+        names = " or ".join(model.get_voices())
+        raise SettingsError(f"chat settings: voice 'kokoro': voice must be {names}.")
+    return KokoroVoice(model)
+
+
+@functools.cache
+def engine(folder: Path) -> Any:
+    """The model, loaded once."""
+    from kokoro_onnx import Kokoro
+
+    return Kokoro(str(folder / "kokoro-v1.0.onnx"), str(folder / "voices-v1.0.bin"))

@@ -5,6 +5,7 @@ MyShell and are MIT-licensed, as are their weights.
 """
 
 import contextlib
+import functools
 import importlib.util
 import tempfile
 import threading
@@ -17,7 +18,7 @@ import numpy as np
 
 from ico3d.chat.services.provider import Context, lacks_weights, weights_folder
 from ico3d.chat.services.voice.cloning import Recording, permitted_recording
-from ico3d.chat.services.voice.pieces import PieceVoice, at_speech_rate
+from ico3d.chat.services.voice.pieces import LOADING, PieceVoice, at_speech_rate
 from ico3d.errors import MissingModelError, SettingsError
 
 LANGUAGES = {
@@ -203,16 +204,8 @@ def offline() -> Iterator[None]:
         constants.HF_HUB_OFFLINE = before
 
 
-_LOADING = threading.Lock()
-_ENGINES: dict[Settings, Engine] = {}
-
-
-def engine(settings: Settings) -> Engine:
-    """The engine of these settings, loaded once."""
-    with _LOADING:
-        if settings not in _ENGINES:
-            _ENGINES[settings] = Engine(settings)
-        return _ENGINES[settings]
+engine = functools.cache(Engine)
+"""The engine of some settings, loaded once."""
 
 
 def hindrance(settings: Settings) -> str:
@@ -231,4 +224,5 @@ def make(settings: Settings, context: Context) -> PieceVoice:
         MissingModelError: If files are not there.
         SettingsError: If packages, speaker, recording or consent are missing.
     """
-    return PieceVoice(settings.voice, engine(settings).speak)
+    with LOADING:
+        return PieceVoice(settings.voice, engine(settings).speak)

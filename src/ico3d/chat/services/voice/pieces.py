@@ -1,6 +1,7 @@
 """A voice that is one function from a text to its sound."""
 
 import asyncio
+import threading
 from collections.abc import AsyncGenerator, Callable
 from typing import Any
 
@@ -19,6 +20,10 @@ OPTIONS: dict[str, Any] = {
     "max_consecutive_zero_audio_contexts": 0,  # a voice that failed may work again
 }
 """What every voice tells pipecat's base."""
+SYNCHRONOUS: dict[str, Any] = {"push_start_frame": True, "push_stop_frames": True}
+"""What those tell it besides that leave it to mark where a piece begins and ends."""
+LOADING = threading.Lock()
+"""Held while models are loaded, so that visitors who come at once share them."""
 
 
 class Prompt(TTSService):
@@ -46,9 +51,8 @@ class PieceVoice(Prompt):
             speak: A text as (S,) int16 samples at 24 kHz; called from threads.
         """
         super().__init__(
-            push_start_frame=True,
-            push_stop_frames=True,
             settings=TTSSettings(model=None, voice=voice, language=None),
+            **SYNCHRONOUS,
             **OPTIONS,
         )
         self._speak = speak

@@ -3,10 +3,12 @@
 The package piper-tts is GPL-3.0: an extra that is loaded at run time.
 """
 
+import functools
 import json
 from collections.abc import AsyncGenerator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pipecat.audio.utils import create_stream_resampler
 from pipecat.frames.frames import Frame, TTSAudioRawFrame
@@ -14,7 +16,7 @@ from pipecat.services.tts_service import TTSService
 
 from ico3d.chat.protocol import SPEECH_RATE
 from ico3d.chat.services.provider import Context, lacks_package
-from ico3d.chat.services.voice.pieces import OPTIONS, Prompt
+from ico3d.chat.services.voice.pieces import LOADING, OPTIONS, SYNCHRONOUS, Prompt
 from ico3d.common.weights import model_folders
 from ico3d.errors import MissingExtraError, MissingModelError, SettingsError
 
@@ -59,7 +61,7 @@ def hindrance(settings: Settings) -> str:
 
 
 def make(settings: Settings, context: Context) -> TTSService:
-    """A voice for one session.
+    """A voice for one session; all share one model.
 
     Raises:
         MissingExtraError: If piper-tts is not installed.
@@ -70,29 +72,41 @@ def make(settings: Settings, context: Context) -> TTSService:
         from pipecat.services.piper.tts import PiperTTSService
     except ImportError:
         raise MissingExtraError("piper-tts", "piper", "the Piper voice") from None
-    model = find_voice(settings)
-    if json.loads(Path(f"{model}.json").read_bytes()).get("phoneme_type") == "pinyin":
-        raise SettingsError(
-            f"{model}: Piper's Chinese voices would download a dictionary in mid-talk: "
-            "use kokoro or openvoice."
-        )
 
     class PiperVoice(Prompt, PiperTTSService):
-        """pipecat's, whose resampler keeps the last 20 ms of a piece for the next one."""
+        """pipecat's, with a model that is there: its own constructor loads or downloads one."""
+
+        def __init__(self, model: Any):
+            own = PiperTTSService.Settings(model=None, voice=settings.voice, language=None)
+            TTSService.__init__(self, settings=own, **SYNCHRONOUS, **OPTIONS)
+            self._voice = model
+            # its own forgets the sound before a pause of 0.2 s, which a slow machine makes
+            self._resampler = create_stream_resampler(clear_after_secs=None)
 
         async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame, None]:
+            """Yields the sound, and what its resampler would keep for the next piece: 20 ms."""
             await self._resampler.reset()  # the piece before may have been interrupted
             async for frame in super().run_tts(text, context_id):
                 yield frame
             if rest := await self._resampler.flush():
                 yield TTSAudioRawFrame(rest, SPEECH_RATE, 1, context_id=context_id)
 
-    voice = PiperVoice(
-        download_dir=model.parent,
-        use_cuda=settings.cuda,
-        settings=PiperTTSService.Settings(voice=settings.voice),
-        **OPTIONS,
-    )
-    # pipecat's forgets the sound before a pause of 0.2 s, which a slow machine makes
-    voice._resampler = create_stream_resampler(clear_after_secs=None)
-    return voice
+    with LOADING:
+        return PiperVoice(engine(find_voice(settings), settings.cuda))
+
+
+@functools.cache
+def engine(model: Path, cuda: bool) -> Any:
+    """The model, loaded once.
+
+    Raises:
+        SettingsError: If the voice would have to download more.
+    """
+    from piper import PiperVoice
+
+    if json.loads(Path(f"{model}.json").read_bytes()).get("phoneme_type") == "pinyin":
+        raise SettingsError(
+            f"{model}: Piper's Chinese voices would download a dictionary in mid-talk: "
+            "use kokoro or openvoice."
+        )
+    return PiperVoice.load(model, use_cuda=cuda)
