@@ -35,6 +35,8 @@ from ico3d.chat.page import Page
 from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Clock, Error
 from ico3d.chat.services import Chosen
 from ico3d.chat.services.provider import Context
+from ico3d.chat.services.voice.clauses import ClauseProcessor
+from ico3d.chat.services.voice.markup import speakable
 from ico3d.chat.settings import ChatSettings, Turns
 from ico3d.chat.speaker import Speaker
 from ico3d.chat.supervision.language import AnswerGuard
@@ -100,7 +102,7 @@ class Conversation:
     async def start(self) -> None:
         """Builds and starts the pipeline (about 0.5 s, most of it in a thread)."""
         parts = await asyncio.to_thread(make_parts, self._avatar)
-        self._watch_voice(parts.voice)
+        self._prepare_voice(parts.voice)
         self._worker = PipelineWorker(
             self._pipeline(parts),
             params=PipelineParams(
@@ -167,6 +169,7 @@ class Conversation:
                 AnswerGuard(
                     parts.recognition, parts.language, patience.language, patience.apologies
                 ),
+                ClauseProcessor(),
                 parts.voice,
                 ExpressionProcessor(face, self._utterances, self._timer),
                 self._speaker,
@@ -177,11 +180,12 @@ class Conversation:
     def _complain(self, sentence: str) -> None:
         self._page.send(Error(sentence, fatal=False))
 
-    def _watch_voice(self, voice: FrameProcessor) -> None:
-        """Takes the time at which the first sentence reaches the voice."""
+    def _prepare_voice(self, voice: FrameProcessor) -> None:
+        """Keeps markup and failures from it, and takes the time at which a piece reaches it."""
         if isinstance(voice, TTSService):
             patience = self._avatar.settings.patience
             endure(voice, patience.voice, patience.apologies, self._complain)
+            voice.add_text_transformer(speakable)
 
             async def requested(*_):
                 self._timer.mark("language")
