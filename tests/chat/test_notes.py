@@ -3,8 +3,8 @@
 import pytest
 
 from ico3d.bundle.manifest import Persona
-from ico3d.chat.services.notes import Notes, cosine, parse_note, plain, stem
-from ico3d.chat.services.persona import sentences
+from ico3d.chat.services.language.notes import Notes, cosine, parse_note, plain, stem
+from ico3d.chat.services.language.persona import sentences
 
 PERSONA = Persona(
     "Ada",

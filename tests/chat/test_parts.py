@@ -10,9 +10,10 @@ from ico3d.chat.frames import SpeechFrame, Utterances
 from ico3d.chat.page import MAX_WAITING, Outbox, Page
 from ico3d.chat.playback import Playback
 from ico3d.chat.protocol import Answer, End, Speech, State, Stop, Transcript
-from ico3d.chat.services import choose
-from ico3d.chat.services.sphinx import LOUDNESS, NOISE, Leveller
-from ico3d.chat.settings import ChatSettings, read_settings
+from ico3d.chat.services import choose, chosen
+from ico3d.chat.services.provider import Context, Provider
+from ico3d.chat.services.recognition.sphinx import LOUDNESS, NOISE, Leveller
+from ico3d.chat.settings import ChatSettings, Choice, Turns, read_settings
 from ico3d.chat.timing import TurnTimer
 from ico3d.errors import SettingsError
 from ico3d.speech.runtime import SpeechModel
@@ -185,9 +186,15 @@ def test_speech_is_levelled(level):
 
 def test_settings_come_from_toml_and_json(tmp_path):
     toml = tmp_path / "a.toml"
-    toml.write_text('language = "openai"\nend_silence = 1\n')
-    assert read_settings(toml) == ChatSettings(language="openai", end_silence=1)
-    assert choose(read_settings(toml)).described().language.stand_in is False
+    toml.write_text(
+        'voice = "espeak-ng"\n[turns]\nend_silence = 1\n[language]\nuse = "openai"\nmodel = "m"\n'
+    )
+    settings = read_settings(toml)
+    assert settings.turns == Turns(end_silence=1.0)
+    assert settings.language == Choice("openai", {"model": "m"})
+    chosen = choose(settings)
+    assert chosen.language.options.model == "m"
+    assert chosen.described().language.stand_in is False
     json = tmp_path / "a.json"
     json.write_text('{"max_sessions": 2}')
     assert read_settings(json).max_sessions == 2
@@ -196,7 +203,19 @@ def test_settings_come_from_toml_and_json(tmp_path):
 
 @pytest.mark.parametrize(
     "text",
-    ['voice = "nobody"', "max_sessions = 0", "max_sessions = true", "pause = 5", "x = 1", "= ="],
+    [
+        'voice = "nobody"',
+        "voice = 3",
+        '[voice]\nuse = "espeak-ng"\nrate = "fast"',
+        '[voice]\nuse = "espeak-ng"\nspeed = 3',
+        "[voice]\nrate = 3",
+        "max_sessions = 0",
+        "max_sessions = true",
+        "[turns]\npause = 5",
+        "turns = 5",
+        "x = 1",
+        "= =",
+    ],
 )
 def test_wrong_settings_are_one_sentence(tmp_path, text):
     path = tmp_path / "a.toml"
@@ -206,13 +225,22 @@ def test_wrong_settings_are_one_sentence(tmp_path, text):
     assert "\n" not in str(error.value)
 
 
+def provider(works: bool) -> Provider:
+    return Provider(f"works: {works}", Turns, lambda *_: None, lambda options: works)
+
+
+def test_the_best_is_the_first_that_works():
+    table = {"a": provider(False), "b": provider(True), "c": provider(True)}
+    assert chosen(table, Choice(), "voice").provider is table["b"]
+    assert chosen(table, Choice("a"), "voice").provider is table["a"], "asked for is not asked"
+
+
 def test_the_openai_service_is_pipecats_own():
     from pipecat.services.openai.llm import OpenAILLMService
 
     from ico3d.bundle.manifest import Persona
 
     persona = Persona("Ada", "Hello.", ("who are you => I am Ada.",))
-    made = choose(ChatSettings(language="openai")).language.make(
-        ChatSettings(openai_url="http://127.0.0.1:9/v1"), persona
-    )
+    settings = ChatSettings(language=Choice("openai", {"url": "http://127.0.0.1:9/v1"}))
+    made = choose(settings).language.make(Context(persona, None, None))
     assert isinstance(made, OpenAILLMService)

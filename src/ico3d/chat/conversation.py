@@ -33,7 +33,8 @@ from ico3d.chat.listener import Captions, PageInput
 from ico3d.chat.page import Page
 from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Clock
 from ico3d.chat.services import Chosen
-from ico3d.chat.settings import ChatSettings
+from ico3d.chat.services.provider import Context
+from ico3d.chat.settings import ChatSettings, Turns
 from ico3d.chat.speaker import Speaker
 from ico3d.chat.timing import TurnTimer
 from ico3d.speech.runtime import SpeechModel
@@ -147,7 +148,7 @@ class Conversation:
         self._speaker.release()
 
     def _pipeline(self, parts: Parts) -> Pipeline:
-        user, assistant = aggregators(parts.turn, self._avatar.settings)
+        user, assistant = aggregators(parts.turn, self._avatar.settings.turns)
         face = Face(self._avatar.head, self._avatar.speech)
         return Pipeline(
             [
@@ -176,22 +177,21 @@ class Conversation:
 
 def make_parts(avatar: Avatar) -> Parts:
     """Loads the models of one session."""
-    settings, services = avatar.settings, avatar.services
+    turns, services = avatar.settings.turns, avatar.services
+    context = Context(avatar.persona, avatar.head, avatar.animation)
     return Parts(
         SileroVADAnalyzer(
             sample_rate=MICROPHONE_RATE,
-            params=VADParams(stop_secs=settings.pause, min_volume=QUIETEST),
+            params=VADParams(stop_secs=turns.pause, min_volume=QUIETEST),
         ),
-        LocalSmartTurnAnalyzerV3(
-            params=SmartTurnParams(stop_secs=settings.end_silence - settings.pause)
-        ),
-        services.recognition.make(settings, avatar.persona),
-        services.language.make(settings, avatar.persona),
-        services.voice.make(settings, avatar.persona),
+        LocalSmartTurnAnalyzerV3(params=SmartTurnParams(stop_secs=turns.end_silence - turns.pause)),
+        services.recognition.make(context),
+        services.language.make(context),
+        services.voice.make(context),
     )
 
 
-def aggregators(turn: LocalSmartTurnAnalyzerV3, settings: ChatSettings) -> LLMContextAggregatorPair:
+def aggregators(turn: LocalSmartTurnAnalyzerV3, turns: Turns) -> LLMContextAggregatorPair:
     """The two halves that keep the conversation's context and decide on turns."""
     strategies = UserTurnStrategies(
         start=[VADUserTurnStartStrategy()],
@@ -199,6 +199,6 @@ def aggregators(turn: LocalSmartTurnAnalyzerV3, settings: ChatSettings) -> LLMCo
     )
     params = LLMUserAggregatorParams(
         user_turn_strategies=strategies,
-        user_turn_stop_timeout=max(NOTHING_HEARD, 2 * settings.end_silence),
+        user_turn_stop_timeout=max(NOTHING_HEARD, 2 * turns.end_silence),
     )
     return LLMContextAggregatorPair(LLMContext(), user_params=params)

@@ -3,11 +3,53 @@
 import dataclasses
 import json
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ico3d.errors import SettingsError
+
+BEST = "best"
+"""Name that chooses the best service that works here as it is."""
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which service does one of the jobs: a table of the settings file, or its name alone.
+
+    Attributes:
+        use: Name of the provider, or `best`.
+        options: Its own settings by name; the rest of the table.
+    """
+
+    use: str = BEST
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Turns:
+    """When the visitor has finished: the table `[turns]`.
+
+    Attributes:
+        pause: Seconds of silence after which the end of a turn is considered.
+        end_silence: Seconds of silence that end a turn even if it sounded unfinished.
+    """
+
+    pause: float = 0.2
+    end_silence: float = 0.6
+
+    def __post_init__(self):
+        """Checks ranges.
+
+        Raises:
+            SettingsError: If the timing makes no sense.
+        """
+        if not 0.1 <= self.pause <= self.end_silence <= 10:
+            raise SettingsError(
+                "chat settings: 0.1 <= pause <= end_silence <= 10 seconds must hold."
+            )
 
 
 @dataclass(frozen=True)
@@ -15,30 +57,18 @@ class ChatSettings:
     """Services and timing of a conversation; the file may be TOML or JSON.
 
     Attributes:
-        recognition: Speech to text: `pocketsphinx`.
-        language: Question to answer: `persona-notes` or `openai` (any server with that interface).
-        voice: Text to speech: `espeak-ng`.
-        espeak_voice: espeak-ng's language and variant.
-        espeak_rate: Words per minute.
-        openai_url: Address of the server for `openai`; empty for the provider's own.
-        openai_model: Name of its model.
-        openai_key_variable: Environment variable that holds the key.
-        pause: Seconds of silence after which the end of a turn is considered.
-        end_silence: Seconds of silence that end a turn even if it sounded unfinished.
+        recognition: Speech to text.
+        language: Question to answer.
+        voice: Text to speech.
+        turns: When the visitor has finished.
         max_sessions: How many visitors at once, those included whose connection dropped.
         gestures: Whether a body gestures while it speaks; otherwise it is held at rest.
     """
 
-    recognition: str = "pocketsphinx"
-    language: str = "persona-notes"
-    voice: str = "espeak-ng"
-    espeak_voice: str = "en-us+f3"
-    espeak_rate: int = 165
-    openai_url: str = ""
-    openai_model: str = "gpt-4.1-mini"
-    openai_key_variable: str = "OPENAI_API_KEY"
-    pause: float = 0.2
-    end_silence: float = 0.6
+    recognition: Choice = Choice()
+    language: Choice = Choice()
+    voice: Choice = Choice()
+    turns: Turns = Turns()
     max_sessions: int = 4
     gestures: bool = True
 
@@ -46,12 +76,8 @@ class ChatSettings:
         """Checks ranges.
 
         Raises:
-            SettingsError: If the timing or the number of sessions makes no sense.
+            SettingsError: If the number of sessions makes no sense.
         """
-        if not 0.1 <= self.pause <= self.end_silence <= 10:
-            raise SettingsError(
-                "chat settings: 0.1 <= pause <= end_silence <= 10 seconds must hold."
-            )
         if self.max_sessions < 1:
             raise SettingsError("chat settings: max_sessions must be at least 1.")
 
@@ -62,17 +88,60 @@ def read_settings(path: Path | None) -> ChatSettings:
     Raises:
         SettingsError: If the file is missing, malformed, or has unknown or wrong entries.
     """
-    if path is None:
-        return ChatSettings()
-    values = _parse(path)
-    fields = {field.name: field.type for field in dataclasses.fields(ChatSettings)}
-    for name, value in values.items():
+    return ChatSettings() if path is None else filled(ChatSettings, _parse(path), str(path))
+
+
+def filled(kind: type[T], values: Mapping[str, Any], where: str) -> T:
+    """A dataclass of settings with some values set.
+
+    Args:
+        kind: Its fields are numbers, words, truth values, lists of words, or such dataclasses.
+        values: By name of the field, as TOML and JSON give them.
+        where: What an error names as the place.
+
+    Raises:
+        SettingsError: If a name is unknown or a value is of the wrong type.
+    """
+    fields = {f.name: f.type for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    for name in values:
         if name not in fields:
-            raise SettingsError(f"{path}: there is no setting '{name}'.")
-        accepted = (int, float) if fields[name] is float else (fields[name],)
-        if type(value) not in accepted:
-            raise SettingsError(f"{path}: '{name}' must be of type {fields[name].__name__}.")  # type: ignore[union-attr]
-    return ChatSettings(**values)
+            raise SettingsError(f"{where}: there is no setting '{name}', use {_any_of(fields)}.")
+    return kind(**{name: _value(fields[name], v, where, name) for name, v in values.items()})
+
+
+def _value(kind: Any, value: Any, where: str, name: str) -> Any:
+    if kind is Choice:
+        return _choice(value, where, name)
+    if dataclasses.is_dataclass(kind) and isinstance(value, dict):
+        return filled(kind, value, f"{where} [{name}]")  # type: ignore[arg-type]
+    if kind == tuple[str, ...] and isinstance(value, list):
+        if all(isinstance(entry, str) for entry in value):
+            return tuple(value)
+    elif kind is float and type(value) is int:
+        return float(value)
+    elif type(value) is kind:
+        return value
+    raise SettingsError(f"{where}: '{name}' must be {_described(kind)}.")
+
+
+def _choice(value: Any, where: str, name: str) -> Choice:
+    if isinstance(value, str):
+        return Choice(value)
+    if not isinstance(value, dict) or not isinstance(value.get("use", BEST), str):
+        raise SettingsError(f"{where}: '{name}' must be a provider's name or a table with 'use'.")
+    options = {key: entry for key, entry in value.items() if key != "use"}
+    return Choice(value.get("use", BEST), options)
+
+
+def _described(kind: Any) -> str:
+    if kind == tuple[str, ...]:
+        return "a list of texts"
+    names = {str: "a text", int: "a whole number", float: "a number", bool: "true or false"}
+    return names.get(kind, "a table")
+
+
+def _any_of(names) -> str:
+    return " or ".join(names)
 
 
 def _parse(path: Path) -> dict[str, Any]:

@@ -1,74 +1,92 @@
 """The three services of a conversation, by name.
 
-pipecat's own services serve wherever one exists; those in this folder are the offline three, which
-need no download, and what is too small to be elsewhere. A new one is one entry in a table below.
+pipecat's own services serve wherever one exists; those in these folders are the offline three,
+which need no download, and what is too small to be elsewhere. A new one is a module with its
+`Settings` and one entry in the table of its kind.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from pipecat.processors.frame_processor import FrameProcessor
 
-from ico3d.bundle.manifest import Persona
 from ico3d.chat import protocol
-from ico3d.chat.services import espeak, openai, persona, sphinx
-from ico3d.chat.settings import ChatSettings
+from ico3d.chat.services import language, recognition, voice
+from ico3d.chat.services.provider import Context, Provider, Table
+from ico3d.chat.settings import BEST, ChatSettings, Choice, filled
 from ico3d.errors import SettingsError
-
-Factory = Callable[[ChatSettings, Persona], FrameProcessor]
 
 
 @dataclass(frozen=True)
-class Entry:
-    """One service.
+class Service:
+    """A provider with its options.
 
     Attributes:
-        title: For the visitor's eyes.
-        stand_in: True for the offline three.
-        make: Makes the processor for one session; may take a while, runs in a thread.
+        provider: Who does the job.
+        options: An instance of its settings.
     """
 
-    title: str
-    stand_in: bool
-    make: Factory
+    provider: Provider
+    options: Any
 
+    def make(self, context: Context) -> FrameProcessor:
+        """The processor of one session; may take a while."""
+        return self.provider.make(self.options, context)
 
-RECOGNITION = {"pocketsphinx": Entry("pocketsphinx", True, sphinx.make)}
-LANGUAGE = {
-    "persona-notes": Entry("persona notes", True, persona.make),
-    "openai": Entry("OpenAI-compatible server", False, openai.make),
-}
-VOICE = {"espeak-ng": Entry("espeak-ng", True, espeak.make)}
+    def described(self) -> protocol.Service:
+        """As the page is told."""
+        return protocol.Service(self.provider.title, self.provider.stand_in)
 
 
 @dataclass(frozen=True)
 class Chosen:
     """The services that the settings name."""
 
-    recognition: Entry
-    language: Entry
-    voice: Entry
+    recognition: Service
+    language: Service
+    voice: Service
 
     def described(self) -> protocol.Services:
         """As the page is told."""
-        entries = (self.recognition, self.language, self.voice)
-        return protocol.Services(*(protocol.Service(e.title, e.stand_in) for e in entries))
+        services = (self.recognition, self.language, self.voice)
+        return protocol.Services(*(service.described() for service in services))
 
 
 def choose(settings: ChatSettings) -> Chosen:
     """Finds the services that the settings name.
 
     Raises:
-        SettingsError: If one is unknown.
+        SettingsError: If one is unknown, or its options are wrong.
     """
     return Chosen(
-        _find(RECOGNITION, settings.recognition, "recognition"),
-        _find(LANGUAGE, settings.language, "language"),
-        _find(VOICE, settings.voice, "voice"),
+        chosen(recognition.PROVIDERS, settings.recognition, "recognition"),
+        chosen(language.PROVIDERS, settings.language, "language"),
+        chosen(voice.PROVIDERS, settings.voice, "voice"),
     )
 
 
-def _find(table: dict[str, Entry], name: str, kind: str) -> Entry:
-    if name not in table:
-        raise SettingsError(f"chat settings: {kind} '{name}' is unknown, use {' or '.join(table)}.")
-    return table[name]
+def chosen(table: Table, choice: Choice, kind: str) -> Service:
+    """A service by its name, or the first of the table that works here.
+
+    Args:
+        table: Providers of this kind.
+        choice: Which, and how.
+        kind: What an error calls it.
+
+    Raises:
+        SettingsError: If it is unknown, or its options are wrong.
+    """
+    if choice.use == BEST:
+        if choice.options:
+            raise SettingsError(f"chat settings: {kind} has options but does not say 'use'.")
+        return next(
+            Service(provider, options)
+            for provider in table.values()
+            if provider.works(options := provider.settings())
+        )
+    provider = table.get(choice.use)
+    if provider is None:
+        names = " or ".join((*table, BEST))
+        raise SettingsError(f"chat settings: {kind} '{choice.use}' is unknown, use {names}.")
+    where = f"chat settings: {kind} '{choice.use}'"
+    return Service(provider, filled(provider.settings, choice.options, where))

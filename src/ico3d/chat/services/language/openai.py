@@ -1,22 +1,38 @@
 """Any language model behind an OpenAI-compatible server, through pipecat's own service."""
 
 import os
+from dataclasses import dataclass
 
 from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.bundle.manifest import Persona
-from ico3d.chat.settings import ChatSettings
+from ico3d.chat.services.provider import Context
 
 
-def make(settings: ChatSettings, persona: Persona) -> FrameProcessor:
+@dataclass(frozen=True)
+class Settings:
+    """Which server.
+
+    Attributes:
+        url: Its address, such as `http://localhost:11434/v1`; empty for the provider's own.
+        model: Name of its model.
+        key_variable: Environment variable that holds the key.
+    """
+
+    url: str = ""
+    model: str = "gpt-4.1-mini"
+    key_variable: str = "OPENAI_API_KEY"
+
+
+def make(settings: Settings, context: Context) -> FrameProcessor:
     """A language model for one session that knows the persona's notes."""
     from pipecat.services.openai.llm import OpenAILLMService
 
     return OpenAILLMService(
-        api_key=os.environ.get(settings.openai_key_variable, "none"),
-        base_url=settings.openai_url or None,
+        api_key=os.environ.get(settings.key_variable, "none"),
+        base_url=settings.url or None,
         settings=OpenAILLMService.Settings(
-            model=settings.openai_model, system_instruction=instruction(persona)
+            model=settings.model, system_instruction=instruction(context.persona)
         ),
     )
 

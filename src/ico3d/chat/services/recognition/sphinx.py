@@ -4,6 +4,7 @@ import asyncio
 from collections import deque
 from collections.abc import AsyncGenerator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,9 +20,8 @@ from pipecat.services.settings import STTSettings
 from pipecat.services.stt_service import STTService
 from pipecat.utils.time import time_now_iso8601
 
-from ico3d.bundle.manifest import Persona
 from ico3d.chat.protocol import MICROPHONE_RATE
-from ico3d.chat.settings import ChatSettings
+from ico3d.chat.services.provider import Context
 from ico3d.errors import MissingExtraError
 
 LEAD_IN = 0.7  # s of sound before the VAD noticed speech: it needs 0.2 s to be sure
@@ -165,7 +165,12 @@ class SphinxRecognition(STTService):
         return hypothesis.hypstr if hypothesis else ""
 
 
-def make(settings: ChatSettings, persona: Persona) -> SphinxRecognition:
+@dataclass(frozen=True)
+class Settings:
+    """It has none."""
+
+
+def make(settings: Settings, context: Context) -> SphinxRecognition:
     """A recogniser for one session (about 90 MB and 0.3 s).
 
     Raises:

@@ -2,19 +2,32 @@
 
 import asyncio
 from collections.abc import AsyncGenerator
+from dataclasses import dataclass
 
 import numpy as np
 from pipecat.frames.frames import Frame, TTSAudioRawFrame
 from pipecat.services.settings import TTSSettings
 from pipecat.services.tts_service import TTSService
 
-from ico3d.bundle.manifest import Persona
 from ico3d.chat.protocol import SPEECH_RATE
-from ico3d.chat.settings import ChatSettings
+from ico3d.chat.services.provider import Context
 from ico3d.common.espeak import synthesize
 from ico3d.errors import MissingExtraError
 
 STARVED = 60.0  # s that a sentence may take on a machine that is busy with other things
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which voice.
+
+    Attributes:
+        voice: espeak-ng's language and variant.
+        rate: Words per minute.
+    """
+
+    voice: str = "en-us+f3"
+    rate: int = 165
 
 
 class EspeakVoice(TTSService):
@@ -48,12 +61,12 @@ def spoken(text: str, voice: str, rate: int) -> np.ndarray:
     return (np.clip(samples, -1, 1) * 32767).astype(np.int16)
 
 
-def make(settings: ChatSettings, persona: Persona) -> EspeakVoice:
+def make(settings: Settings, context: Context) -> EspeakVoice:
     """A voice for one session.
 
     Raises:
         MissingExtraError: If espeakng-loader or soxr is not installed.
         SettingsError: If there is no such voice.
     """
-    spoken("a", settings.espeak_voice, settings.espeak_rate)  # fails now rather than in mid-talk
-    return EspeakVoice(settings.espeak_voice, settings.espeak_rate)
+    spoken("a", settings.voice, settings.rate)  # fails now rather than in mid-talk
+    return EspeakVoice(settings.voice, settings.rate)

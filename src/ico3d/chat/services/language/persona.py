@@ -1,6 +1,7 @@
 """The offline language model: answers looked up in the persona's notes, sentence by sentence."""
 
 import re
+from dataclasses import dataclass
 
 from pipecat.frames.frames import (
     Frame,
@@ -12,9 +13,8 @@ from pipecat.frames.frames import (
 from pipecat.processors.aggregators.llm_context import LLMContext
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
-from ico3d.bundle.manifest import Persona
-from ico3d.chat.services.notes import Notes
-from ico3d.chat.settings import ChatSettings
+from ico3d.chat.services.language.notes import Notes
+from ico3d.chat.services.provider import Context
 
 
 class PersonaModel(FrameProcessor):
@@ -49,6 +49,11 @@ def sentences(text: str) -> list[str]:
     return [part for part in re.split(r"(?<=[.!?…])\s+", text.strip()) if part]
 
 
-def make(settings: ChatSettings, persona: Persona) -> PersonaModel:
+@dataclass(frozen=True)
+class Settings:
+    """It has none."""
+
+
+def make(settings: Settings, context: Context) -> PersonaModel:
     """A model for one session."""
-    return PersonaModel(Notes(persona))
+    return PersonaModel(Notes(context.persona))

@@ -1,0 +1,8 @@
+"""Speech to text."""
+
+from ico3d.chat.services.provider import Provider, Table
+from ico3d.chat.services.recognition import sphinx
+
+PROVIDERS: Table = {
+    "pocketsphinx": Provider("pocketsphinx", sphinx.Settings, sphinx.make, stand_in=True),
+}
