@@ -47,10 +47,12 @@ class VoiceFrame(SystemFrame):
     """What the last 20-100 ms from the microphone were; long before the VAD is sure.
 
     Parameters:
+        at: Seconds that the microphone has sent, these included.
         voiced: Whether there is a voice in them.
         plain: Whether all of the voice so far was one and the same vowel or hum.
     """
 
+    at: float = 0.0
     voiced: bool = False
     plain: bool = False
 

@@ -97,6 +97,7 @@ class VoiceDetector(VADProcessor):
         super().__init__(vad_analyzer=ear)
         self._ear = ear
         self._timbre = Timbre()
+        self._heard = 0.0  # s
         self._silence = AFTERGLOW  # s since a voice
         self._held = False
 
@@ -113,13 +114,14 @@ class VoiceDetector(VADProcessor):
             await self._hold()
 
     async def _tell(self, samples: np.ndarray) -> None:
-        voiced = self._ear.voiced
-        self._silence = 0.0 if voiced else self._silence + len(samples) / MICROPHONE_RATE
+        seconds, voiced = len(samples) / MICROPHONE_RATE, self._ear.voiced
+        self._heard += seconds
+        self._silence = 0.0 if voiced else self._silence + seconds
         if self._silence >= AFTERGLOW:
             self._timbre.forget()
             return
         self._timbre.hear(samples)
-        await self.push_frame(VoiceFrame(voiced, self._timbre.is_plain))
+        await self.push_frame(VoiceFrame(self._heard, voiced, self._timbre.is_plain))
 
     async def _hold(self) -> None:
         if self._held:

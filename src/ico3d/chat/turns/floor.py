@@ -2,7 +2,8 @@
 
 The avatar falls silent at the first sign of a voice, which costs nothing: its sound waits. What
 follows decides: a voice that goes on takes the floor, and so do words; "uh-huh" and a cough give
-it back. Everything is decided from what was heard and the time, so that it runs on any clock.
+it back. Voices are measured by the microphone's samples: sound that a busy machine takes late is
+no longer for it.
 """
 
 from collections.abc import Callable
@@ -31,7 +32,7 @@ class Voice:
     """A voice that began while the avatar spoke.
 
     Attributes:
-        since: When it began.
+        since: When it began, seconds of microphone.
         last: When it was last heard.
         words: What the recogniser has understood so far.
         paused: Whether the avatar is silent for it.
@@ -59,6 +60,7 @@ class Floor:
         self._settings, self._phrases, self._trusted, self._now = settings, phrases, trusted, now
         self._speaking = False
         self._voice: Voice | None = None
+        self._behind = 0.0  # clock less seconds of microphone
 
     @property
     def is_paused(self) -> bool:
@@ -68,7 +70,7 @@ class Floor:
     @property
     def is_disputed(self) -> bool:
         """Whether words that come now may be those of a voice over the avatar's."""
-        return self._voice is not None and self._now() - self._voice.last <= LATE
+        return self._voice is not None and self._time() - self._voice.last <= LATE
 
     @property
     def is_speaking(self) -> bool:
@@ -81,22 +83,23 @@ class Floor:
         if not speaking and self.is_paused:
             self._voice = None
 
-    def hear(self, voiced: bool, plain: bool = False) -> Verdict | None:
+    def hear(self, at: float, voiced: bool, plain: bool = False) -> Verdict | None:
         """The next 20-100 ms from the microphone.
 
         Args:
+            at: Seconds that it has sent, these included.
             voiced: Whether there is a voice in it.
             plain: Whether all of the voice so far was one and the same vowel or hum.
         """
-        now = self._now()
+        self._behind = self._now() - at
         if voiced and self._speaking and not self.is_paused:
-            self._voice = Voice(now, now)
+            self._voice = Voice(at, at)
             return Verdict.PAUSE
         if self._voice is None or not self._voice.paused:
             return None
         if voiced:
-            self._voice.last = now
-            lasting = now - self._voice.since >= self._needed(self._voice, plain)
+            self._voice.last = at
+            lasting = at - self._voice.since >= self._needed(self._voice, plain)
             return self._yield() if lasting else None
         return self.wait()
 
@@ -106,7 +109,7 @@ class Floor:
         if voice is None or not voice.paused:
             return None
         brief = voice.last - voice.since < BRIEF
-        if self._now() - voice.last < (GONE if brief else UNDERSTOOD):
+        if self._time() - voice.last < (GONE if brief else UNDERSTOOD):
             return None
         voice.paused = False
         return Verdict.RESUME
@@ -123,6 +126,10 @@ class Floor:
             return None
         paused, self._voice = voice.paused, None
         return Verdict.RESUME if paused else None
+
+    def _time(self) -> float:
+        """Seconds of microphone, gone on by the clock since it was heard last."""
+        return self._now() - self._behind
 
     def _is_turn(self, text: str, final: bool) -> bool:
         if not self._trusted:
