@@ -20,6 +20,7 @@ QUIETEST = 0.4  # smoothed volume of speech; it rises over 0.2 s, so more would 
 HINT = 0.5  # Silero's confidence that makes a first hint
 AUDIBLE = 0.01  # RMS of a voice that is near, full scale = 1
 PLAIN = 2.6  # dB; "uh-huh" and "aha" of 6 voices: up to 2.0, speech and "yeah": from 3.4
+FADED = 0.03  # of its loudest power: 15 dB down
 AFTERGLOW = 1.0  # s of silence behind a voice that are told of, too
 
 
@@ -79,6 +80,12 @@ class Timbre:
         return bool(self.spread < PLAIN)
 
     @property
+    def is_fading(self) -> bool:
+        """Whether its last frames are much quieter than its loudest."""
+        total = self._energies.sum(axis=1)
+        return bool(total[-2:].mean() < FADED * total.max()) if len(total) else False
+
+    @property
     def spread(self) -> float:
         """How much the spectrum's shape varies, dB (mean over bands of their deviations)."""
         total = self._energies.sum(axis=1)
@@ -115,13 +122,14 @@ class VoiceDetector(VADProcessor):
 
     async def _tell(self, samples: np.ndarray) -> None:
         seconds, voiced = len(samples) / MICROPHONE_RATE, self._ear.voiced
-        self._heard += seconds
+        at, self._heard = self._heard, self._heard + seconds
         self._silence = 0.0 if voiced else self._silence + seconds
         if self._silence >= AFTERGLOW:
             self._timbre.forget()
             return
         self._timbre.hear(samples)
-        await self.push_frame(VoiceFrame(self._heard, voiced, self._timbre.is_plain))
+        plain, fading = self._timbre.is_plain, self._timbre.is_fading
+        await self.push_frame(VoiceFrame(at, seconds, voiced, plain, fading))
 
     async def _hold(self) -> None:
         if self._held:

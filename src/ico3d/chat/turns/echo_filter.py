@@ -13,7 +13,7 @@ class EchoFilter(FrameProcessor):
     """Puts silence in the place of microphone sound that is nothing but the avatar's own."""
 
     def __init__(self, guard: EchoGuard, position: Callable[[], float | None]):
-        """A filter for one session; `position` tells what is heard now, seconds of the utterance."""
+        """A filter; `position` tells what is heard now, in seconds of the utterance."""
         super().__init__()
         self._guard, self._position = guard, position
 

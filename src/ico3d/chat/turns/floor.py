@@ -10,9 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
+from ico3d.chat.frames import VoiceFrame
 from ico3d.chat.settings import Turns
 from ico3d.chat.turns.phrases import Phrases
 
+LAST_SOUND = 0.16  # s; a voice that fades is given time to end: "okay" is over, a question goes on
 GONE = 0.2  # s of silence after which what never became a voice is over
 UNDERSTOOD = 0.6  # s of silence within which a recogniser tells what a short voice said
 BRIEF = 0.2  # s; no recogniser is asked about less
@@ -83,25 +85,20 @@ class Floor:
         if not speaking and self.is_paused:
             self._voice = None
 
-    def hear(self, at: float, voiced: bool, plain: bool = False) -> Verdict | None:
-        """The next 20-100 ms from the microphone.
-
-        Args:
-            at: Seconds that it has sent, these included.
-            voiced: Whether there is a voice in it.
-            plain: Whether all of the voice so far was one and the same vowel or hum.
-        """
-        self._behind = self._now() - at
-        if voiced and self._speaking and not self.is_paused:
-            self._voice = Voice(at, at)
+    def hear(self, sound: VoiceFrame) -> Verdict | None:
+        """The next piece from the microphone."""
+        end = sound.at + sound.seconds
+        self._behind = self._now() - end
+        if sound.voiced and self._speaking and not self.is_paused:
+            self._voice = Voice(sound.at, end)
             return Verdict.PAUSE
         if self._voice is None or not self._voice.paused:
             return None
-        if voiced:
-            self._voice.last = at
-            lasting = at - self._voice.since >= self._needed(self._voice, plain)
-            return self._yield() if lasting else None
-        return self.wait()
+        if not sound.voiced:
+            return self.wait()
+        self._voice.last = end
+        lasts = end - self._voice.since >= self._needed(self._voice, sound)
+        return self._yield() if lasts else None
 
     def wait(self) -> Verdict | None:
         """Time passes."""
@@ -136,10 +133,12 @@ class Floor:
             return final and self._phrases.is_command(text)
         return bool(text.strip()) and not self._phrases.are_backchannels(text)
 
-    def _needed(self, voice: Voice, plain: bool) -> float:
-        known = self._trusted and self._phrases.are_backchannels(voice.words)
+    def _needed(self, voice: Voice, sound: VoiceFrame) -> float:
+        """Seconds that a voice must last."""
         settings = self._settings
-        return settings.longest_backchannel if known or plain else settings.interrupt_after
+        if sound.plain or (self._trusted and self._phrases.are_backchannels(voice.words)):
+            return settings.longest_backchannel
+        return settings.interrupt_after + (LAST_SOUND if sound.fading else 0.0)
 
     def _yield(self) -> Verdict:
         self._voice = None
