@@ -21,6 +21,7 @@ HINT = 0.5  # Silero's confidence that makes a first hint
 AUDIBLE = 0.01  # RMS of a voice that is near, full scale = 1
 PLAIN = 2.6  # dB; "uh-huh" and "aha" of 6 voices: up to 2.0, speech and "yeah": from 3.4
 FADED = 0.03  # of its loudest power: 15 dB down
+KEPT = 100  # frames of a voice that are compared: 2 s
 AFTERGLOW = 1.0  # s of silence behind a voice that are told of, too
 
 
@@ -72,7 +73,8 @@ class Timbre:
         whole = len(samples) - len(samples) % self._bands.length
         self._rest = samples[whole:]
         fresh = self._bands.energies(samples[:whole])  # (frames, bands)
-        self._energies = np.concatenate([self._energies.reshape(-1, fresh.shape[1]), fresh])
+        known = self._energies[-KEPT:].reshape(-1, fresh.shape[1])
+        self._energies = np.concatenate([known, fresh])
 
     @property
     def is_plain(self) -> bool:
