@@ -97,7 +97,7 @@ class Floor:
         if not sound.voiced:
             return self.wait()
         self._voice.last = end
-        lasts = end - self._voice.since >= self._needed(self._voice, sound)
+        lasts = round(end - self._voice.since, 3) >= self._needed(self._voice, sound)
         return self._yield() if lasts else None
 
     def wait(self) -> Verdict | None:
@@ -106,7 +106,7 @@ class Floor:
         if voice is None or not voice.paused:
             return None
         brief = voice.last - voice.since < BRIEF
-        if self._time() - voice.last < (GONE if brief else UNDERSTOOD):
+        if round(self._time() - voice.last, 3) < (GONE if brief else UNDERSTOOD):
             return None
         voice.paused = False
         return Verdict.RESUME
