@@ -39,6 +39,8 @@ VERBS: dict[str, Verb] = {
     "render": Verb("ico3d.avatar.film.command", "Render", "film a person who talks or moves"),
     "convert": Verb("ico3d.splat.commands", "Convert", "convert files of 3D Gaussians"),
     "serve": Verb("ico3d.chat.commands", "Serve", "serve a bundle and talk with it"),
+    "weights list": Verb("ico3d.common.commands", "ListWeights", "weights that can be used"),
+    "weights fetch": Verb("ico3d.common.commands", "FetchWeights", "download some of them"),
     "bench body": Verb("ico3d.measure.commands", "BenchBody", "compare methods for bodies"),
     "bench raster": Verb("ico3d.measure.commands", "BenchRaster", "time the rasteriser"),
     "bench talk": Verb("ico3d.measure.commands", "BenchTalk", "time question to answer"),

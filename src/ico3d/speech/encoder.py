@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from ico3d.common.files import model_file
+from ico3d.common.weights import model_file
 from ico3d.errors import ModelError, SettingsError
 from ico3d.speech.mel import mel_windows
 from ico3d.speech.network import AudioEncoder, BuiltinEncoder
