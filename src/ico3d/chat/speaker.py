@@ -23,7 +23,7 @@ from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame, Utterances
 from ico3d.chat.gestures import Gestures
 from ico3d.chat.page import Page
 from ico3d.chat.playback import Playback
-from ico3d.chat.protocol import Answer, Clock, End, Metrics, Stop
+from ico3d.chat.protocol import Answer, Clock, End, Metrics, Pause, Resume, Stop
 from ico3d.chat.timing import TurnTimer
 
 SOONEST = 0.005  # s between two looks at the clock
@@ -47,6 +47,7 @@ class Speaker(FrameProcessor):
         self._playback = Playback()
         self._moved = asyncio.Event()  # the page's clock or connection changed
         self._speaking: int | None = None
+        self._paused = False
         self._turn_start: float | None = None  # of the turn that `played` is to be told of
 
     def clock(self, message: Clock) -> None:
@@ -69,7 +70,22 @@ class Speaker(FrameProcessor):
 
     def release(self) -> None:
         """The page is back."""
-        self._playback.release(self._now())
+        self._go_on()
+
+    def hush(self, silent: bool) -> None:
+        """Pauses what is heard, or goes on with it; nothing of it is lost."""
+        if self._speaking is None or silent == self._paused:
+            return
+        self._paused = silent
+        self._page.send(Pause(self._speaking) if silent else Resume(self._speaking))
+        if silent:
+            self._playback.hold(self._now())
+        else:
+            self._go_on()
+
+    def _go_on(self) -> None:
+        if self._page.is_attached and not self._paused:
+            self._playback.release(self._now())
         self._moved.set()
 
     def is_speaking(self, utterance: int | None) -> bool:
@@ -110,7 +126,7 @@ class Speaker(FrameProcessor):
             self._report()
 
     async def _begin(self, utterance: int) -> None:
-        self._speaking = utterance
+        self._speaking, self._paused = utterance, False
         self._playback.begin(utterance)
         self._page.show("speaking")
         await self.broadcast_frame(BotStartedSpeakingFrame)
@@ -138,6 +154,8 @@ class Speaker(FrameProcessor):
         if self._gestures is not None:
             self._gestures.stop()
         if utterance is not None:
+            self._paused = False
+            self._go_on()
             self._page.send(Stop(utterance))
             await self.broadcast_frame(BotStoppedSpeakingFrame)
 
