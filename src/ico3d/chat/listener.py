@@ -71,11 +71,8 @@ class Captions(FrameProcessor):
     async def process_frame(self, frame: Frame, direction: FrameDirection):
         """Looks at what passes; the aggregator's frames come from the other side."""
         await super().process_frame(frame, direction)
-        if isinstance(frame, InterimTranscriptionFrame):
-            self._show(Transcript(self._joined(frame.text), final=False))
-        elif isinstance(frame, TranscriptionFrame):
-            self._timer.mark("recognition")
-            self._show(Transcript(self._joined(frame.text), final=True))
+        if isinstance(frame, InterimTranscriptionFrame | TranscriptionFrame):
+            self._transcribed(frame.text, isinstance(frame, TranscriptionFrame))
         elif isinstance(frame, VADUserStartedSpeakingFrame):
             self._silent_since = None
             if not self._in_turn:
@@ -107,6 +104,13 @@ class Captions(FrameProcessor):
         assert self._silent_since is not None
         self._timer.start(ago=self._now() - self._silent_since)
         self._timer.mark("vad")
+
+    def _transcribed(self, text: str, final: bool) -> None:
+        """Takes a transcript, which may hold no words: they tell only that it was listened."""
+        if final:
+            self._timer.mark("recognition")
+        if text.strip():
+            self._show(Transcript(self._joined(text), final))
 
     def _show(self, transcript: Transcript) -> None:
         if not self._in_turn:
