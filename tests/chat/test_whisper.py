@@ -1,49 +1,20 @@
 """Whisper: a real model file through faster-whisper and pipecat, with random weights."""
 
-import time
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from pipecat.frames.frames import (
-    ErrorFrame,
-    InputAudioRawFrame,
-    TranscriptionFrame,
-    VADUserStartedSpeakingFrame,
-    VADUserStoppedSpeakingFrame,
-)
-from pipecat.pipeline.worker import PipelineParams
-from pipecat.tests.utils import run_test
 
-from ico3d.chat.services.provider import Context
 from ico3d.chat.services.recognition import PROVIDERS, whisper
 from ico3d.chat.services.recognition.segments import BLANK
 from ico3d.chat.services.recognition.whisper import Settings, find, hindrance, make
 from ico3d.errors import MissingModelError, SettingsError
 
+from .listening import NOBODY, listen, noise
+
 pytest.importorskip("faster_whisper")
 pytest.importorskip("transformers")
 pytest.importorskip("torch")
 
-NOBODY = Context(None, None, None)
 SENTENCE = "Wie heißt du? 你好 1,5 %"
-
-
-async def transcripts(service, *stretches):
-    """What a recogniser says to stretches of int16 samples; what goes wrong is raised."""
-    frames = []
-    for pcm in stretches:
-        frames.append(VADUserStartedSpeakingFrame(start_secs=0.2))
-        frames += [InputAudioRawFrame(part.tobytes(), 16000, 1) for part in np.split(pcm, 8)]
-        frames.append(VADUserStoppedSpeakingFrame(stop_secs=0.2, timestamp=time.time()))
-    params = PipelineParams(audio_in_sample_rate=16000)
-    down, up = await run_test(service, frames_to_send=frames, pipeline_params=params)
-    assert not [frame.error for frame in up if isinstance(frame, ErrorFrame)]
-    return [frame for frame in down if isinstance(frame, TranscriptionFrame)]
-
-
-def noise(seconds=1.0):
-    return np.random.default_rng(0).integers(-3000, 3000, int(seconds * 16000)).astype(np.int16)
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +44,8 @@ def models(tmp_path, monkeypatch):
 
 async def test_every_script_comes_through(german):
     service = make(Settings(model=str(german)), NOBODY)
-    frames = await transcripts(service, noise(), noise(2.0))
+    frames, errors = await listen(service, noise(), noise(2.0))
+    assert not errors
     assert [(frame.text, frame.finalized) for frame in frames] == [
         (SENTENCE, False),  # the other one is still to come
         (SENTENCE, True),
@@ -91,7 +63,7 @@ async def test_the_sound_reaches_the_model_as_it_is(random):
             return listener.transcribe(audio, **options)
 
     service._model = Watched()
-    (frame,) = await transcripts(service, pcm)
+    (frame,), _ = await listen(service, pcm)
     np.testing.assert_array_equal(heard[0][: len(pcm)], pcm.astype(np.float32) / 32768)
     expected, _ = listener.transcribe(heard[0], language="en")
     sure = [segment.text for segment in expected if segment.no_speech_prob < 0.4]
@@ -154,5 +126,5 @@ def test_an_incomplete_model_is_not_completed_by_a_download(models, german):
 def test_a_device_that_is_not_there_is_one_sentence(german):
     settings = Settings(str(german), precision="int4")
     with pytest.raises(SettingsError, match="cannot be used on cpu with int4") as error:
-        make(replace(settings), NOBODY)
+        make(settings, NOBODY)
     assert "\n" not in str(error.value)
