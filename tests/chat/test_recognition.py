@@ -49,6 +49,11 @@ class Recogniser(Segments, Scripted):
     pass
 
 
+def silent(avatar):
+    """Greets nobody."""
+    return replace(avatar, persona=replace(avatar.persona, greeting=""))
+
+
 def scripted(delay, *words):
     """Lets a server's sessions listen with a script, and greet nobody."""
     provider = Provider("script", Script, lambda script, _: Recogniser(longest=10.0, script=script))
@@ -56,7 +61,7 @@ def scripted(delay, *words):
     def adapt(avatar):
         service = Service(provider, Script(delay, words))
         services = replace(avatar.services, recognition=service)
-        return replace(avatar, services=services, persona=replace(avatar.persona, greeting=""))
+        return silent(replace(avatar, services=services))
 
     return adapt
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+from dataclasses import replace
 
 from fastapi import WebSocket, WebSocketDisconnect
 from loguru import logger
@@ -14,7 +15,9 @@ from ico3d.chat.protocol import (
     Audio,
     ClientMessage,
     Clock,
+    Deaf,
     Error,
+    Heard,
     Hello,
     Interrupt,
     Talk,
@@ -97,8 +100,7 @@ class Connection:
         return message
 
     async def _greet(self, session: Session, resumed: bool, last_index: int) -> None:
-        known = self._welcome
-        welcome = Welcome(known.version, session.id, resumed, known.services, known.notices)
+        welcome = replace(self._welcome, session=session.id, resumed=resumed)
         await self._socket.send_text(str(encode(welcome)))
         if resumed:
             session.page.replay(last_index)
@@ -137,6 +139,12 @@ class Connection:
             if not message.text.strip():
                 raise ProtocolError("text: is empty.")
             await conversation.ask(message.text.strip())
+        elif isinstance(message, Heard | Deaf) and self._welcome.dictation is None:
+            raise ProtocolError("this server listens itself.")
+        elif isinstance(message, Heard):
+            await conversation.heard(message)
+        elif isinstance(message, Deaf):
+            await conversation.deaf(message.reason)
         elif isinstance(message, Talk):
             await conversation.talk(message.pressed)
         elif isinstance(message, Interrupt):

@@ -19,7 +19,7 @@ from pipecat.frames.frames import (
 )
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
-from ico3d.chat.frames import TalkFrame
+from ico3d.chat.frames import DeafFrame, HeardFrame, TalkFrame
 from ico3d.chat.page import Page
 from ico3d.chat.protocol import MICROPHONE_RATE, Transcript
 from ico3d.chat.timing import TurnTimer
@@ -40,6 +40,14 @@ class PageInput(FrameProcessor):
     async def talk(self, pressed: bool) -> None:
         """The button of push to talk."""
         await self.push_frame(TalkFrame(pressed))
+
+    async def heard(self, result: int, text: str, final: bool) -> None:
+        """What the browser's recogniser understood."""
+        await self.push_frame(HeardFrame(result, text, final))
+
+    async def deaf(self) -> None:
+        """The browser cannot recognise speech."""
+        await self.push_frame(DeafFrame())
 
     async def ask(self, text: str) -> None:
         """A typed question: whatever is being said stops, then it is answered."""

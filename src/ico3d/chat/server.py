@@ -80,8 +80,10 @@ def make_app(
 def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
     """The WebSocket."""
     notices = [] if avatar.speech else [STILL]
-    described = avatar.services.described()
-    welcome = Welcome(protocol.VERSION, "-", False, described, notices)
+    services = avatar.services
+    welcome = Welcome(
+        protocol.VERSION, "-", False, services.described(), notices, services.dictation()
+    )
 
     @app.websocket("/ws")
     async def conversation(socket: WebSocket) -> None:
