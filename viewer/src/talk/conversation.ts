@@ -4,6 +4,7 @@ import type { PageError } from '../errors.ts';
 import type { ServerMessage, Services, StateMessage, WelcomeMessage } from '../protocol.ts';
 import { Connection } from './connection.ts';
 import { TurnTimer, VoiceMeter } from './latency.ts';
+import { Listening, type ListeningView } from './listening.ts';
 
 /** Who moves the body while it speaks. */
 export interface Gestures {
@@ -16,12 +17,11 @@ export interface Gestures {
 const CLOCK_PERIOD = 200; // ms between reports of what has been heard
 
 /** What the page shows of a conversation. */
-export interface ConversationView {
+export interface ConversationView extends ListeningView {
   state(state: StateMessage['state'] | 'connecting'): void;
   question(text: string, final: boolean): void;
   answer(sentence: string): void;
   services(services: Services): void;
-  notice(sentence: string): void;
   microphone(open: boolean): void;
   latency(milliseconds: number): void;
   metrics(name: string, values: Record<string, number>): void;
@@ -37,6 +37,7 @@ export class Conversation {
   private readonly view: ConversationView;
   private readonly connection: Connection;
   private readonly microphone: Microphone;
+  private readonly listening: Listening;
   private readonly meter = new VoiceMeter();
   private readonly timer = new TurnTimer();
   private sample = 0; // of the microphone
@@ -49,9 +50,11 @@ export class Conversation {
       lost: () => view.state('connecting'),
       failed: (error) => view.failed(error),
     });
+    this.listening = new Listening((message) => this.connection.send(message), view);
     this.microphone = new Microphone(
       (pcm) => this.hear(pcm),
       (error) => {
+        this.listening.close();
         view.microphone(false);
         view.notice(error.message);
       },
@@ -87,6 +90,7 @@ export class Conversation {
   /** Opens or closes the microphone; what hinders it is shown as a notice. */
   async toggleMicrophone(): Promise<void> {
     if (this.microphone.open) {
+      this.listening.close();
       this.microphone.stop();
       this.view.microphone(false);
       return;
@@ -94,6 +98,7 @@ export class Conversation {
     try {
       this.sample = 0;
       await this.microphone.start();
+      this.listening.open(this.microphone.track!);
     } catch (error) {
       this.view.notice((error as Error).message);
     }
@@ -111,6 +116,7 @@ export class Conversation {
       this.player.reset();
       this.gestures?.reset();
     }
+    this.listening.welcome(message);
     this.view.services(message.services);
     this.view.state('idle');
     for (const notice of message.notices) this.view.notice(notice);

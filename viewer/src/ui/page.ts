@@ -38,6 +38,7 @@ export function makePage(overlay: Overlay, frames: () => number): Page {
     answer: (sentence) => captions.answer(sentence),
     services: showStandIns,
     notice: showNotice,
+    sharesVoice: (shared) => (byId('shared-voice').hidden = !shared),
     microphone: (open) => controls.setMicrophone(open),
     latency: (milliseconds) => panel.latency(milliseconds),
     metrics: (name, values) => panel.metrics(name, values),
