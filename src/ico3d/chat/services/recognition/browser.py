@@ -26,7 +26,7 @@ from ico3d.chat.services.provider import Context
 from ico3d.chat.services.recognition.segments import blank
 from ico3d.chat.settings import BEST
 
-SETTLED = 0.4  # s without news in silence after which partial words are taken for final ones
+SETTLED = 0.5  # s without news in silence after which partial words are taken for final ones
 SLOWEST = 1.5  # s that a browser may take for its first words
 LATE = 3.0  # s after a voice in which its words may still come
 
