@@ -34,6 +34,8 @@ from ico3d.chat.settings import ChatSettings, Turns
 from ico3d.chat.speaker import Speaker
 from ico3d.chat.timing import TurnTimer
 from ico3d.chat.turns.detector import Ear, VoiceDetector
+from ico3d.chat.turns.echo import EchoGuard
+from ico3d.chat.turns.echo_filter import EchoFilter
 from ico3d.chat.turns.strategies import strategies
 from ico3d.speech.runtime import SpeechModel
 
@@ -85,7 +87,8 @@ class Conversation:
         gestures = avatar.animation and Gestures(
             avatar.animation, page, self._utterances, avatar.settings.gestures
         )
-        self._speaker = Speaker(page, self._utterances, self._timer, gestures)
+        self._echo = EchoGuard()
+        self._speaker = Speaker(page, self._utterances, self._timer, self._echo.sent, gestures)
         self._worker: PipelineWorker | None = None
         self._task: asyncio.Task | None = None
 
@@ -166,6 +169,7 @@ class Conversation:
         return Pipeline(
             [
                 self._input,
+                EchoFilter(self._echo, self._speaker.heard),
                 VoiceDetector(parts.ear),
                 parts.recognition,
                 self._captions,

@@ -40,6 +40,7 @@ export function makePage(overlay: Overlay, frames: () => number): Page {
     notice: showNotice,
     sharesVoice: (shared) => (byId('shared-voice').hidden = !shared),
     microphone: (open) => controls.setMicrophone(open),
+    talking: (held) => controls.setTalking(held),
     latency: (milliseconds) => panel.latency(milliseconds),
     metrics: (name, values) => panel.metrics(name, values),
     failed: (error) => overlay.fail(error.message),

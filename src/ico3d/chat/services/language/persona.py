@@ -39,9 +39,7 @@ class PersonaModel(FrameProcessor):
             await self.push_frame(LLMTextFrame(sentence + " "))
         await self.push_frame(LLMFullResponseEndFrame())
 
-    async def push_frame(
-        self, frame: Frame, direction: FrameDirection = FrameDirection.DOWNSTREAM
-    ):
+    async def push_frame(self, frame: Frame, direction: FrameDirection = FrameDirection.DOWNSTREAM):
         """Holds an answer until the turn that it answers has ended, as pipecat's services do."""
         for released in self._gate.process(frame, direction):
             await super().push_frame(*released)
