@@ -177,6 +177,22 @@ TABLE: dict[str, Weights] = {
             repository="Systran/faster-distil-whisper-large-v3",
             wanted=("model.bin", "*.json"),
         ),
+        *(
+            Weights(
+                f"whisper-{model}",
+                f"recognition, 99 languages, {remark}",
+                size * _MB,
+                "MIT",
+                repository=f"{owner}/faster-whisper-{model}",
+                wanted=("model.bin", "*.json", "vocabulary.*"),
+            )
+            for model, remark, size, owner in (
+                ("large-v3-turbo", "faster", 1620, "mobiuslabsgmbh"),
+                ("small", "smaller", 484, "Systran"),
+                ("base", "for a CPU", 145, "Systran"),
+                ("tiny", "for a slow CPU", 76, "Systran"),
+            )
+        ),
         Weights(
             "qwen2",
             "language model in process, CPU",
@@ -288,6 +304,22 @@ def model_file(name: str, purpose: str) -> Path:
     if found is not None:
         return found
     raise MissingModelError(f"{purpose} needs the model file '{name}': {how_to_get(name)}")
+
+
+def model_of(name: str) -> Path:
+    """Where weights of the table lie.
+
+    Raises:
+        MissingModelError: If they are not on this machine; the sentence says how to get them.
+    """
+    found = cached(name)
+    if found is None:
+        weights = weights_named(name)
+        raise MissingModelError(
+            f"the weights '{name}' are not here: fetch them with ico3d weights fetch {name} "
+            f"({weights.licence}), or put a copy of {weights.source} into {model_folders()[-1]}."
+        )
+    return found
 
 
 def how_to_get(file: str) -> str:
