@@ -55,3 +55,7 @@ class MissingExtraError(Ico3dError):
 
 class MissingModelError(Ico3dError):
     """A model file (weights) is needed and not there."""
+
+
+class DownloadError(Ico3dError):
+    """A download failed, or is not what it should be."""

@@ -88,6 +88,13 @@ export interface ClockMessage {
   body_time: number;
 }
 
+/** Push to talk: the visitor holds the button or lets it go. While it is held everything that comes from the microphone is one turn, whatever its pauses; letting go ends the turn at once. */
+export interface TalkMessage {
+  type: "talk";
+  /** True when the button goes down. */
+  pressed: boolean;
+}
+
 /** Answer to `hello`. */
 export interface WelcomeMessage {
   type: "welcome";
@@ -174,6 +181,20 @@ export interface StopMessage {
   utterance: number;
 }
 
+/** Somebody may be speaking: fall silent at once, but keep all that belongs to an utterance. `resume` or `stop` follows. */
+export interface PauseMessage {
+  type: "pause";
+  /** Which answer. */
+  utterance: number;
+}
+
+/** It was no interruption: go on with the sample at which an utterance fell silent. */
+export interface ResumeMessage {
+  type: "resume";
+  /** Which answer. */
+  utterance: number;
+}
+
 /** How long something took. */
 export interface MetricsMessage {
   type: "metrics";
@@ -197,7 +218,8 @@ export type ClientMessage =
   | AudioMessage
   | TextMessage
   | InterruptMessage
-  | ClockMessage;
+  | ClockMessage
+  | TalkMessage;
 
 export type ServerMessage =
   | WelcomeMessage
@@ -208,10 +230,12 @@ export type ServerMessage =
   | TimelineMessage
   | EndMessage
   | StopMessage
+  | PauseMessage
+  | ResumeMessage
   | MetricsMessage
   | ErrorMessage;
 
-const SERVER_TYPES = ["welcome", "state", "transcript", "answer", "speech", "timeline", "end", "stop", "metrics", "error"];
+const SERVER_TYPES = ["welcome", "state", "transcript", "answer", "speech", "timeline", "end", "stop", "pause", "resume", "metrics", "error"];
 
 const TENSORS: Record<string, readonly Tensor[]> = {
   audio: [["pcm", "int16"]],

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 from pipecat.audio.turn.smart_turn.base_smart_turn import SmartTurnParams
 from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
-from pipecat.audio.vad.silero import SileroVADAnalyzer
-from pipecat.audio.vad.vad_analyzer import VADAnalyzer, VADParams
 from pipecat.pipeline.pipeline import Pipeline
 from pipecat.pipeline.worker import PipelineParams, PipelineWorker
 from pipecat.processors.aggregators.llm_context import LLMContext
@@ -15,11 +13,8 @@ from pipecat.processors.aggregators.llm_response_universal import (
     LLMContextAggregatorPair,
     LLMUserAggregatorParams,
 )
-from pipecat.processors.audio.vad_processor import VADProcessor
 from pipecat.processors.frame_processor import FrameProcessor
 from pipecat.services.tts_service import TTSService
-from pipecat.turns.user_start import VADUserTurnStartStrategy
-from pipecat.turns.user_stop import TurnAnalyzerUserTurnStopStrategy
 from pipecat.turns.user_turn_strategies import UserTurnStrategies
 from pipecat.workers.runner import WorkerRunner
 
@@ -35,14 +30,19 @@ from ico3d.chat.page import Page
 from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Clock, Error
 from ico3d.chat.services import Chosen
 from ico3d.chat.services.provider import Context
+from ico3d.chat.services.voice.clauses import ClauseProcessor
+from ico3d.chat.services.voice.markup import speakable
 from ico3d.chat.settings import ChatSettings, Turns
 from ico3d.chat.speaker import Speaker
 from ico3d.chat.supervision.language import AnswerGuard
 from ico3d.chat.supervision.voice import endure
 from ico3d.chat.timing import TurnTimer
+from ico3d.chat.turns.detector import Ear, VoiceDetector
+from ico3d.chat.turns.echo import EchoGuard
+from ico3d.chat.turns.echo_filter import EchoFilter
+from ico3d.chat.turns.strategies import strategies
 from ico3d.speech.runtime import SpeechModel
 
-QUIETEST = 0.4  # smoothed volume of speech; it rises over 0.2 s, so more would notice it later
 NOTHING_HEARD = 1.5  # s without words after which a turn that was only noise is over
 
 
@@ -73,7 +73,7 @@ class Avatar:
 class Parts:
     """What takes a while to make; made in a thread."""
 
-    vad: VADAnalyzer
+    ear: Ear
     turn: LocalSmartTurnAnalyzerV3
     recognition: FrameProcessor
     language: FrameProcessor
@@ -93,14 +93,15 @@ class Conversation:
         gestures = avatar.animation and Gestures(
             avatar.animation, page, self._utterances, avatar.settings.gestures
         )
-        self._speaker = Speaker(page, self._utterances, self._timer, gestures)
+        self._echo = EchoGuard()
+        self._speaker = Speaker(page, self._utterances, self._timer, self._echo.sent, gestures)
         self._worker: PipelineWorker | None = None
         self._task: asyncio.Task | None = None
 
     async def start(self) -> None:
         """Builds and starts the pipeline (about 0.5 s, most of it in a thread)."""
         parts = await asyncio.to_thread(make_parts, self._avatar)
-        self._watch_voice(parts.voice)
+        self._prepare_voice(parts.voice)
         self._worker = PipelineWorker(
             self._pipeline(parts),
             params=PipelineParams(
@@ -135,6 +136,10 @@ class Conversation:
         self._timer.start()
         await self._input.ask(text)
 
+    async def talk(self, pressed: bool) -> None:
+        """The button of push to talk."""
+        await self._input.talk(pressed)
+
     async def interrupt(self, utterance: int | None) -> None:
         """Silence, if that utterance (any, for null) is being said or prepared."""
         if utterance is None or self._speaker.is_speaking(utterance):
@@ -153,13 +158,16 @@ class Conversation:
         self._speaker.release()
 
     def _pipeline(self, parts: Parts) -> Pipeline:
-        user, assistant = aggregators(parts.turn, self._avatar.settings.turns)
+        turns, patience = self._avatar.settings.turns, self._avatar.settings.patience
+        trusted = not self._avatar.services.recognition.provider.stand_in
+        chosen = strategies(parts.turn, turns, trusted, self._speaker.hush)
+        user, assistant = aggregators(chosen, turns)
         face = make_face(self._avatar)
-        patience = self._avatar.settings.patience
         return Pipeline(
             [
                 self._input,
-                VADProcessor(vad_analyzer=parts.vad),
+                EchoFilter(self._echo, self._speaker.heard),
+                VoiceDetector(parts.ear),
                 parts.recognition,
                 self._captions,
                 user,
@@ -167,6 +175,7 @@ class Conversation:
                 AnswerGuard(
                     parts.recognition, parts.language, patience.language, patience.apologies
                 ),
+                ClauseProcessor(),
                 parts.voice,
                 ExpressionProcessor(face, self._utterances, self._timer),
                 self._speaker,
@@ -177,11 +186,12 @@ class Conversation:
     def _complain(self, sentence: str) -> None:
         self._page.send(Error(sentence, fatal=False))
 
-    def _watch_voice(self, voice: FrameProcessor) -> None:
-        """Takes the time at which the first sentence reaches the voice."""
+    def _prepare_voice(self, voice: FrameProcessor) -> None:
+        """Keeps markup and failures from it, and takes the time at which a piece reaches it."""
         if isinstance(voice, TTSService):
             patience = self._avatar.settings.patience
             endure(voice, patience.voice, patience.apologies, self._complain)
+            voice.add_text_transformer(speakable)
 
             async def requested(*_):
                 self._timer.mark("language")
@@ -202,10 +212,7 @@ def make_parts(avatar: Avatar) -> Parts:
     turns, services = avatar.settings.turns, avatar.services
     context = Context(avatar.persona, avatar.head, avatar.animation)
     return Parts(
-        SileroVADAnalyzer(
-            sample_rate=MICROPHONE_RATE,
-            params=VADParams(stop_secs=turns.pause, min_volume=QUIETEST),
-        ),
+        Ear(turns.pause),
         LocalSmartTurnAnalyzerV3(params=SmartTurnParams(stop_secs=turns.end_silence - turns.pause)),
         services.recognition.make(context),
         services.language.make(context),
@@ -213,12 +220,8 @@ def make_parts(avatar: Avatar) -> Parts:
     )
 
 
-def aggregators(turn: LocalSmartTurnAnalyzerV3, turns: Turns) -> LLMContextAggregatorPair:
+def aggregators(strategies: UserTurnStrategies, turns: Turns) -> LLMContextAggregatorPair:
     """The two halves that keep the conversation's context and decide on turns."""
-    strategies = UserTurnStrategies(
-        start=[VADUserTurnStartStrategy()],
-        stop=[TurnAnalyzerUserTurnStopStrategy(turn_analyzer=turn)],
-    )
     params = LLMUserAggregatorParams(
         user_turn_strategies=strategies,
         user_turn_stop_timeout=max(NOTHING_HEARD, 2 * turns.end_silence),

@@ -12,7 +12,7 @@ from ico3d.chat.protocol import EXPRESSION_FPS, SPEECH_RATE
 from ico3d.common.expression import expression_rows
 from ico3d.errors import BundleError
 from ico3d.speech.eyes import EyeBehaviour
-from ico3d.speech.runtime import SpeechModel, StreamingExpressions
+from ico3d.speech.runtime import SpeechModel, StreamingExpressions, open_speech
 
 ROW = SPEECH_RATE // EXPRESSION_FPS  # samples of one row
 MOST, LEAST = 5, 3  # rows of a piece: 200 and 120 ms
@@ -105,13 +105,14 @@ def open_face(bundle: Bundle) -> tuple[HeadInfo, SpeechModel | None]:
 
     Raises:
         BundleError: If the bundle has no head.
+        MissingModelError: If it needs a speech encoder that is not on this machine.
         ModelError: If the bundle's speech model cannot be used.
     """
     info = bundle.manifest.head
     if info is None:
         raise BundleError(f"the bundle of '{bundle.manifest.name}' has no head to talk with.")
-    model = SpeechModel(bundle.read(SPEECH)) if bundle.manifest.speech else None
-    return info, model
+    speech = bundle.manifest.speech
+    return info, open_speech(bundle.read(SPEECH), speech.encoder, speech.sha256) if speech else None
 
 
 @dataclass(frozen=True)

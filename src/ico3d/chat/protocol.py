@@ -129,6 +129,20 @@ class Clock:
 
 
 @dataclass(frozen=True)
+class Talk:
+    """Push to talk: the visitor holds the button or lets it go.
+
+    While it is held everything that comes from the microphone is one turn, whatever its pauses;
+    letting go ends the turn at once.
+
+    Attributes:
+        pressed: True when the button goes down.
+    """
+
+    pressed: bool
+
+
+@dataclass(frozen=True)
 class Service:
     """One of the three services that make the conversation.
 
@@ -298,6 +312,30 @@ class Stop:
 
 
 @dataclass(frozen=True)
+class Pause:
+    """Somebody may be speaking: fall silent at once, but keep all that belongs to an utterance.
+
+    `resume` or `stop` follows.
+
+    Attributes:
+        utterance: Which answer.
+    """
+
+    utterance: Count
+
+
+@dataclass(frozen=True)
+class Resume:
+    """It was no interruption: go on with the sample at which an utterance fell silent.
+
+    Attributes:
+        utterance: Which answer.
+    """
+
+    utterance: Count
+
+
+@dataclass(frozen=True)
 class Metrics:
     """How long something took.
 
@@ -323,7 +361,7 @@ class Error:
     fatal: bool
 
 
-CLIENT_MESSAGES = (Hello, Audio, Text, Interrupt, Clock)
+CLIENT_MESSAGES = (Hello, Audio, Text, Interrupt, Clock, Talk)
 SERVER_MESSAGES = (
     Welcome,
     State,
@@ -333,10 +371,23 @@ SERVER_MESSAGES = (
     Timeline,
     End,
     Stop,
+    Pause,
+    Resume,
     Metrics,
     Error,
 )
-ClientMessage = Hello | Audio | Text | Interrupt | Clock
+ClientMessage = Hello | Audio | Text | Interrupt | Clock | Talk
 ServerMessage = (
-    Welcome | State | Transcript | Answer | Speech | Timeline | End | Stop | Metrics | Error
+    Welcome
+    | State
+    | Transcript
+    | Answer
+    | Speech
+    | Timeline
+    | End
+    | Stop
+    | Pause
+    | Resume
+    | Metrics
+    | Error
 )
