@@ -71,12 +71,12 @@ def question():
 
 
 @contextlib.asynccontextmanager
-async def serving(bundle, settings=None, resume_seconds=30.0):
-    """Yields the URL and the sessions of a running server."""
+async def serving(bundle, settings=None, resume_seconds=30.0, adapt=lambda avatar: avatar):
+    """Yields the URL and the sessions of a running server; `adapt` changes what they share."""
     listener = server.bind("127.0.0.1", 0)
     avatar, sessions = None, None
     if bundle.manifest.head:
-        avatar = server.open_avatar(bundle, settings or ChatSettings())
+        avatar = adapt(server.open_avatar(bundle, settings or ChatSettings()))
         sessions = Sessions(avatar, resume_seconds)
     running = server.make_server(server.make_app(bundle, avatar, "127.0.0.1", sessions))
     task = asyncio.create_task(running.serve(sockets=[listener]))

@@ -15,7 +15,9 @@ from ico3d.chat.protocol import (
     Audio,
     ClientMessage,
     Clock,
+    Deaf,
     Error,
+    Heard,
     Hello,
     Interrupt,
     Talk,
@@ -103,6 +105,7 @@ class Connection:
             session=session.id,
             resumed=resumed,
             services=session.services.described(),
+            dictation=session.services.dictation(),
             offers=self._sessions.offers,
         )
         await self._socket.send_text(str(encode(welcome)))
@@ -143,6 +146,12 @@ class Connection:
             if not message.text.strip():
                 raise ProtocolError("text: is empty.")
             await conversation.ask(message.text.strip())
+        elif isinstance(message, Heard | Deaf) and session.services.dictation() is None:
+            raise ProtocolError("this server listens itself.")
+        elif isinstance(message, Heard):
+            await conversation.heard(message)
+        elif isinstance(message, Deaf):
+            await conversation.deaf(message.reason)
         elif isinstance(message, Talk):
             await conversation.talk(message.pressed)
         elif isinstance(message, Interrupt):

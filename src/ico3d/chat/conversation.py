@@ -4,6 +4,7 @@ import asyncio
 import time
 from dataclasses import dataclass
 
+from loguru import logger
 from pipecat.audio.turn.smart_turn.base_smart_turn import SmartTurnParams
 from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
 from pipecat.pipeline.pipeline import Pipeline
@@ -27,7 +28,7 @@ from ico3d.chat.gestures import Gestures
 from ico3d.chat.listener import Captions, PageInput
 from ico3d.chat.modules.mouth import RemoteMouth
 from ico3d.chat.page import Page
-from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Clock, Error
+from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Clock, Error, Heard
 from ico3d.chat.services import Chosen
 from ico3d.chat.services.provider import Context
 from ico3d.chat.services.voice.clauses import ClauseProcessor
@@ -139,6 +140,15 @@ class Conversation:
     async def talk(self, pressed: bool) -> None:
         """The button of push to talk."""
         await self._input.talk(pressed)
+
+    async def heard(self, message: Heard) -> None:
+        """What the browser's recogniser understood."""
+        await self._input.heard(message.result, message.text, message.final)
+
+    async def deaf(self, reason: str) -> None:
+        """The browser cannot recognise speech."""
+        logger.info(f"the browser does not recognise speech: {reason!r}")
+        await self._input.deaf()
 
     async def interrupt(self, utterance: int | None) -> None:
         """Silence, if that utterance (any, for null) is being said or prepared."""

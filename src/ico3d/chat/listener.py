@@ -19,7 +19,7 @@ from pipecat.frames.frames import (
 )
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
-from ico3d.chat.frames import TalkFrame
+from ico3d.chat.frames import DeafFrame, HeardFrame, TalkFrame
 from ico3d.chat.page import Page
 from ico3d.chat.protocol import MICROPHONE_RATE, Transcript
 from ico3d.chat.timing import TurnTimer
@@ -40,6 +40,14 @@ class PageInput(FrameProcessor):
     async def talk(self, pressed: bool) -> None:
         """The button of push to talk."""
         await self.push_frame(TalkFrame(pressed))
+
+    async def heard(self, result: int, text: str, final: bool) -> None:
+        """What the browser's recogniser understood."""
+        await self.push_frame(HeardFrame(result, text, final))
+
+    async def deaf(self) -> None:
+        """The browser cannot recognise speech."""
+        await self.push_frame(DeafFrame())
 
     async def ask(self, text: str) -> None:
         """A typed question: whatever is being said stops, then it is answered."""
@@ -71,11 +79,8 @@ class Captions(FrameProcessor):
     async def process_frame(self, frame: Frame, direction: FrameDirection):
         """Looks at what passes; the aggregator's frames come from the other side."""
         await super().process_frame(frame, direction)
-        if isinstance(frame, InterimTranscriptionFrame):
-            self._show(Transcript(self._joined(frame.text), final=False))
-        elif isinstance(frame, TranscriptionFrame):
-            self._timer.mark("recognition")
-            self._show(Transcript(self._joined(frame.text), final=True))
+        if isinstance(frame, InterimTranscriptionFrame | TranscriptionFrame):
+            self._transcribed(frame.text, isinstance(frame, TranscriptionFrame))
         elif isinstance(frame, VADUserStartedSpeakingFrame):
             self._silent_since = None
             if not self._in_turn:
@@ -107,6 +112,13 @@ class Captions(FrameProcessor):
         assert self._silent_since is not None
         self._timer.start(ago=self._now() - self._silent_since)
         self._timer.mark("vad")
+
+    def _transcribed(self, text: str, final: bool) -> None:
+        """Takes a transcript, which may hold no words: they tell only that it was listened."""
+        if final:
+            self._timer.mark("recognition")
+        if text.strip():
+            self._show(Transcript(self._joined(text), final))
 
     def _show(self, transcript: Transcript) -> None:
         if not self._in_turn:

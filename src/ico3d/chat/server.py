@@ -83,8 +83,7 @@ def make_app(
 def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
     """The WebSocket."""
     notices = [] if avatar.speech else [STILL]
-    described = avatar.services.described()
-    welcome = Welcome(protocol.VERSION, "-", False, described, notices)
+    welcome = Welcome(protocol.VERSION, "-", False, avatar.services.described(), notices, None)
 
     @app.websocket("/ws")
     async def conversation(socket: WebSocket) -> None:

@@ -4,6 +4,7 @@ import type { PageError } from '../errors.ts';
 import type { Offer, ServerMessage, Services, StateMessage, WelcomeMessage } from '../protocol.ts';
 import { Connection } from './connection.ts';
 import { TurnTimer, VoiceMeter } from './latency.ts';
+import { Listening, type ListeningView } from './listening.ts';
 
 /** Who moves the body while it speaks. */
 export interface Gestures {
@@ -17,12 +18,11 @@ const CLOCK_PERIOD = 200; // ms between reports of what has been heard
 const KEPT_OPEN = 20_000; // ms after talking by the button: opening a microphone costs the first words
 
 /** What the page shows of a conversation. */
-export interface ConversationView {
+export interface ConversationView extends ListeningView {
   state(state: StateMessage['state'] | 'connecting'): void;
   question(text: string, final: boolean): void;
   answer(sentence: string): void;
   services(services: Services, offers: readonly Offer[]): void;
-  notice(sentence: string): void;
   microphone(open: boolean): void;
   talking(held: boolean): void;
   latency(milliseconds: number): void;
@@ -39,6 +39,7 @@ export class Conversation {
   private readonly view: ConversationView;
   private readonly connection: Connection;
   private readonly microphone: Microphone;
+  private readonly listening: Listening;
   private readonly meter = new VoiceMeter();
   private readonly timer = new TurnTimer();
   private sample = 0; // of the microphone
@@ -54,11 +55,13 @@ export class Conversation {
       lost: () => view.state('connecting'),
       failed: (error) => view.failed(error),
     });
+    this.listening = new Listening((message) => this.connection.send(message), view);
     this.microphone = new Microphone(
       (pcm) => this.hear(pcm),
       (error) => {
         this.open = false;
         this.release();
+        this.listening.close();
         view.microphone(false);
         view.notice(error.message);
       },
@@ -100,7 +103,7 @@ export class Conversation {
   /** Opens or closes the microphone; what hinders it is shown as a notice. */
   async toggleMicrophone(): Promise<void> {
     this.open = !this.open && (await this.startMicrophone());
-    if (!this.open) this.microphone.stop();
+    if (!this.open) this.stopMicrophone();
     this.view.microphone(this.open);
   }
 
@@ -120,17 +123,26 @@ export class Conversation {
     this.held = false;
     this.connection.send({ type: 'talk', pressed: false });
     this.view.talking(false);
+    if (this.open) return;
+    this.listening.close();
     this.closing = setTimeout(() => this.open || this.microphone.stop(), KEPT_OPEN);
   }
 
+  private stopMicrophone(): void {
+    this.listening.close();
+    this.microphone.stop();
+  }
+
   private async startMicrophone(): Promise<boolean> {
-    if (this.microphone.open) return true;
-    try {
-      this.sample = 0;
-      await this.microphone.start();
-    } catch (error) {
-      this.view.notice((error as Error).message);
+    if (!this.microphone.open) {
+      try {
+        this.sample = 0;
+        await this.microphone.start();
+      } catch (error) {
+        this.view.notice((error as Error).message);
+      }
     }
+    if (this.microphone.open) this.listening.open(this.microphone.track!);
     return this.microphone.open;
   }
 
@@ -146,6 +158,7 @@ export class Conversation {
       this.player.reset();
       this.gestures?.reset();
     }
+    this.listening.welcome(message);
     this.view.services(message.services, message.offers);
     this.view.state('idle');
     for (const notice of message.notices) this.view.notice(notice);

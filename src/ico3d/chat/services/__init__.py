@@ -14,6 +14,7 @@ from pipecat.processors.frame_processor import FrameProcessor
 from ico3d.chat import protocol
 from ico3d.chat.services import language, recognition, voice
 from ico3d.chat.services.provider import Context, Provider, Table
+from ico3d.chat.services.recognition import browser
 from ico3d.chat.settings import BEST, ChatSettings, Choice, filled
 from ico3d.errors import SettingsError
 
@@ -60,6 +61,14 @@ class Chosen:
         services = (self.recognition, self.language, self.voice)
         return protocol.Services(*(service.described() for service in services))
 
+    def dictation(self) -> protocol.Dictation | None:
+        """What the page is told where its browser recognises speech."""
+        options = self.recognition.options
+        if not isinstance(options, browser.Settings):
+            return None
+        listener = fallback(options)
+        return protocol.Dictation(options.language, listener and listener.provider.title)
+
 
 def choose(settings: ChatSettings) -> Chosen:
     """Finds the services that the settings name.
@@ -93,6 +102,18 @@ def chosen(table: Table, choice: Choice, kind: str) -> Service:
         raise SettingsError(f"chat settings: {kind} '{choice.use}' is unknown, use {names}.")
     where = f"chat settings: {kind} '{choice.use}'"
     return Service(provider, filled(provider.settings, choice.options, where))
+
+
+def fallback(options: browser.Settings) -> Service | None:
+    """The recogniser of the server for browsers that have none.
+
+    Raises:
+        SettingsError: If it is unknown, or none works.
+    """
+    if not options.fallback:
+        return None
+    table = {name: p for name, p in recognition.PROVIDERS.items() if p.make is not browser.make}
+    return chosen(table, Choice(options.fallback), "recognition")
 
 
 def best(table: Table, kind: str) -> Service:
