@@ -42,6 +42,9 @@ VERBS: dict[str, Verb] = {
     "weights list": Verb("ico3d.common.commands", "ListWeights", "weights that can be used"),
     "weights fetch": Verb("ico3d.common.commands", "FetchWeights", "download some of them"),
     "weights onnx": Verb("ico3d.speech.commands", "ExportEncoder", "make an encoder servable"),
+    "serve-module": Verb(
+        "ico3d.chat.modules.commands", "ServeModule", "serve one part of the conversation"
+    ),
     "bench body": Verb("ico3d.measure.commands", "BenchBody", "compare methods for bodies"),
     "bench expression": Verb("ico3d.measure.commands", "BenchExpression", "measure the mouth"),
     "bench raster": Verb("ico3d.measure.commands", "BenchRaster", "time the rasteriser"),

@@ -38,6 +38,10 @@ class ProtocolError(Ico3dError):
     """A message on the wire is malformed or over its limits."""
 
 
+class ServiceError(Ico3dError):
+    """A service of the conversation failed at its job."""
+
+
 class MissingExtraError(Ico3dError):
     """An optional package is needed and not installed."""
 

@@ -225,12 +225,12 @@ def test_wrong_settings_are_one_sentence(tmp_path, text):
     assert "\n" not in str(error.value)
 
 
-def provider(works: bool) -> Provider:
-    return Provider(f"works: {works}", Turns, lambda *_: None, lambda options: works)
+def provider(hindrance: str) -> Provider:
+    return Provider("a provider", Turns, lambda *_: None, lambda options: hindrance)
 
 
 def test_the_best_is_the_first_that_works():
-    table = {"a": provider(False), "b": provider(True), "c": provider(True)}
+    table = {"a": provider("its weights are missing."), "b": provider(""), "c": provider("")}
     assert chosen(table, Choice(), "voice").provider is table["b"]
     assert chosen(table, Choice("a"), "voice").provider is table["a"], "asked for is not asked"
 

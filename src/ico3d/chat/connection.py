@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+from dataclasses import replace
 
 from fastapi import WebSocket, WebSocketDisconnect
 from loguru import logger
@@ -17,6 +18,7 @@ from ico3d.chat.protocol import (
     Error,
     Hello,
     Interrupt,
+    Talk,
     Text,
     Welcome,
 )
@@ -45,7 +47,7 @@ class Connection:
         Args:
             socket: An accepted WebSocket.
             sessions: Where its session comes from.
-            welcome: What every page is told; its session and `resumed` are filled in.
+            welcome: What every page is told; what belongs to a session is filled in.
         """
         self._socket, self._sessions, self._welcome = socket, sessions, welcome
         self._limits = Limits()
@@ -96,8 +98,13 @@ class Connection:
         return message
 
     async def _greet(self, session: Session, resumed: bool, last_index: int) -> None:
-        known = self._welcome
-        welcome = Welcome(known.version, session.id, resumed, known.services, known.notices)
+        welcome = replace(
+            self._welcome,
+            session=session.id,
+            resumed=resumed,
+            services=session.services.described(),
+            offers=self._sessions.offers,
+        )
         await self._socket.send_text(str(encode(welcome)))
         if resumed:
             session.page.replay(last_index)
@@ -136,6 +143,8 @@ class Connection:
             if not message.text.strip():
                 raise ProtocolError("text: is empty.")
             await conversation.ask(message.text.strip())
+        elif isinstance(message, Talk):
+            await conversation.talk(message.pressed)
         elif isinstance(message, Interrupt):
             await conversation.interrupt(message.utterance)
         else:

@@ -7,6 +7,7 @@ import numpy as np
 
 from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.bundle.manifest import HeadInfo
+from ico3d.chat.modules.mouth import RemoteMouth
 from ico3d.chat.protocol import EXPRESSION_FPS, SPEECH_RATE
 from ico3d.common.expression import expression_rows
 from ico3d.errors import BundleError
@@ -32,17 +33,37 @@ class Lips(Protocol):
 class Face:
     """What all sentences of one session share: the model, and eyes that live on."""
 
-    def __init__(self, info: HeadInfo, model: SpeechModel | None, seed: int = 0):
-        """A face; without a model (heads driven by blendshapes) only the eyes move."""
+    def __init__(
+        self,
+        info: HeadInfo,
+        model: SpeechModel | None,
+        seed: int = 0,
+        remote: RemoteMouth | None = None,
+    ):
+        """A face.
+
+        Args:
+            info: What the head can do.
+            model: Sound to mouth; without one (heads driven by blendshapes) only the eyes move.
+            seed: Of the eyes' behaviour.
+            remote: Moves the mouth instead of the model.
+        """
         self._info = info
-        self._model = model
+        self._model, self._remote = model, remote
         self._eyes = EyeBehaviour(seed)
 
     def lips(self) -> Lips:
         """The mouth for a new sentence."""
+        if self._remote is not None:
+            return self._remote.lips()
         if self._model is not None:
             return StreamingExpressions(self._model, SPEECH_RATE)
         return StillLips()
+
+    def close(self) -> None:
+        """Nothing more will be said."""
+        if self._remote is not None:
+            self._remote.close()
 
     def rows(self, lips: np.ndarray, start: float) -> np.ndarray:
         """Whole expression rows.

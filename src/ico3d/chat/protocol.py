@@ -4,7 +4,7 @@ This file is the one source: `codec.py` reads the annotations to encode, decode 
 `python -m ico3d.chat.protocol_typescript` writes `viewer/src/protocol.ts` from them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import numpy as np
@@ -69,11 +69,13 @@ class Hello:
         version: Protocol version of the page.
         session: The session to go on with after a dropped connection; null for a new one.
         last_index: `index` of the last speech message that arrived; -1 when new.
+        wishes: Keys of offers by kind that a new session is to use; heeded where `welcome` offers.
     """
 
     version: Count
     session: Annotated[str, Length(1, 64)] | None
     last_index: Annotated[int, Range(-1, MAX_EXACT)]
+    wishes: Annotated[dict[str, Name], Length(0, 3)] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +129,20 @@ class Clock:
 
 
 @dataclass(frozen=True)
+class Talk:
+    """Push to talk: the visitor holds the button or lets it go.
+
+    While it is held everything that comes from the microphone is one turn, whatever its pauses;
+    letting go ends the turn at once.
+
+    Attributes:
+        pressed: True when the button goes down.
+    """
+
+    pressed: bool
+
+
+@dataclass(frozen=True)
 class Service:
     """One of the three services that make the conversation.
 
@@ -155,6 +171,23 @@ class Services:
 
 
 @dataclass(frozen=True)
+class Offer:
+    """A service that could do one of the three jobs; the best ones come first.
+
+    Attributes:
+        kind: Which job.
+        key: Its name in settings and wishes.
+        name: For the visitor's eyes, as in `services`.
+        hindrance: What keeps it from working and what would mend it; empty if it works.
+    """
+
+    kind: Literal["recognition", "language", "voice"]
+    key: Name
+    name: Name
+    hindrance: Sentence
+
+
+@dataclass(frozen=True)
 class Welcome:
     """Answer to `hello`.
 
@@ -164,6 +197,7 @@ class Welcome:
         resumed: True if this goes on with the session that `hello` named.
         services: Who listens, thinks and speaks.
         notices: Sentences the page shows once (what this avatar cannot do).
+        offers: Services to choose from; none where strangers may be talking.
     """
 
     version: Count
@@ -171,6 +205,7 @@ class Welcome:
     resumed: bool
     services: Services
     notices: Annotated[list[Sentence], Length(0, 8)]
+    offers: Annotated[list[Offer], Length(0, 64)] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -277,6 +312,30 @@ class Stop:
 
 
 @dataclass(frozen=True)
+class Pause:
+    """Somebody may be speaking: fall silent at once, but keep all that belongs to an utterance.
+
+    `resume` or `stop` follows.
+
+    Attributes:
+        utterance: Which answer.
+    """
+
+    utterance: Count
+
+
+@dataclass(frozen=True)
+class Resume:
+    """It was no interruption: go on with the sample at which an utterance fell silent.
+
+    Attributes:
+        utterance: Which answer.
+    """
+
+    utterance: Count
+
+
+@dataclass(frozen=True)
 class Metrics:
     """How long something took.
 
@@ -302,7 +361,7 @@ class Error:
     fatal: bool
 
 
-CLIENT_MESSAGES = (Hello, Audio, Text, Interrupt, Clock)
+CLIENT_MESSAGES = (Hello, Audio, Text, Interrupt, Clock, Talk)
 SERVER_MESSAGES = (
     Welcome,
     State,
@@ -312,10 +371,23 @@ SERVER_MESSAGES = (
     Timeline,
     End,
     Stop,
+    Pause,
+    Resume,
     Metrics,
     Error,
 )
-ClientMessage = Hello | Audio | Text | Interrupt | Clock
+ClientMessage = Hello | Audio | Text | Interrupt | Clock | Talk
 ServerMessage = (
-    Welcome | State | Transcript | Answer | Speech | Timeline | End | Stop | Metrics | Error
+    Welcome
+    | State
+    | Transcript
+    | Answer
+    | Speech
+    | Timeline
+    | End
+    | Stop
+    | Pause
+    | Resume
+    | Metrics
+    | Error
 )

@@ -11,14 +11,14 @@ from fastapi import FastAPI, Request, Response, WebSocket
 from fastapi.responses import JSONResponse, PlainTextResponse
 from fastapi.staticfiles import StaticFiles
 
-from ico3d.bundle.format import Bundle
+from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.chat import protocol
 from ico3d.chat.connection import Connection
 from ico3d.chat.conversation import Avatar
 from ico3d.chat.face import open_face
-from ico3d.chat.guard import Guard
+from ico3d.chat.guard import LOOPBACK, Guard
 from ico3d.chat.protocol import Welcome
-from ico3d.chat.services import choose
+from ico3d.chat.services import choose, offers
 from ico3d.chat.sessions import Sessions
 from ico3d.chat.settings import ChatSettings
 from ico3d.errors import BundleError, SettingsError
@@ -38,7 +38,8 @@ def open_avatar(bundle: Bundle, settings: ChatSettings) -> Avatar:
     """
     head, speech = open_face(bundle)
     persona, services = bundle.manifest.persona, choose(settings)
-    return Avatar(head, speech, persona, services, settings, bundle.animation)
+    sha256 = bundle.manifest.files[SPEECH].sha256 if speech else ""
+    return Avatar(head, speech, persona, services, settings, bundle.animation, sha256)
 
 
 def make_app(
@@ -52,8 +53,10 @@ def make_app(
         host: The address that the server is bound to.
         sessions: Where sessions live; a new place by default.
     """
-    if avatar is not None and sessions is None:
-        sessions = Sessions(avatar)
+    if avatar is not None:
+        sessions = Sessions(avatar) if sessions is None else sessions
+        if host in LOOPBACK:  # the visitor is at home: it may cost money, and tells of the machine
+            sessions.offers = offers(avatar.settings)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:

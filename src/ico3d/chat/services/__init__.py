@@ -5,7 +5,8 @@ which need no download, and what is too small to be elsewhere. A new one is a mo
 `Settings` and one entry in the table of its kind.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pipecat.processors.frame_processor import FrameProcessor
@@ -15,6 +16,14 @@ from ico3d.chat.services import language, recognition, voice
 from ico3d.chat.services.provider import Context, Provider, Table
 from ico3d.chat.settings import BEST, ChatSettings, Choice, filled
 from ico3d.errors import SettingsError
+
+TABLES: Mapping[str, Table] = {
+    "recognition": recognition.PROVIDERS,
+    "language": language.PROVIDERS,
+    "voice": voice.PROVIDERS,
+}
+"""Providers by kind and name."""
+LONGEST_HINDRANCE = 400  # characters: all offers go into one message
 
 
 @dataclass(frozen=True)
@@ -59,9 +68,7 @@ def choose(settings: ChatSettings) -> Chosen:
         SettingsError: If one is unknown, or its options are wrong.
     """
     return Chosen(
-        chosen(recognition.PROVIDERS, settings.recognition, "recognition"),
-        chosen(language.PROVIDERS, settings.language, "language"),
-        chosen(voice.PROVIDERS, settings.voice, "voice"),
+        **{kind: chosen(table, getattr(settings, kind), kind) for kind, table in TABLES.items()}
     )
 
 
@@ -74,19 +81,65 @@ def chosen(table: Table, choice: Choice, kind: str) -> Service:
         kind: What an error calls it.
 
     Raises:
-        SettingsError: If it is unknown, or its options are wrong.
+        SettingsError: If it is unknown, its options are wrong, or none works.
     """
     if choice.use == BEST:
         if choice.options:
             raise SettingsError(f"chat settings: {kind} has options but does not say 'use'.")
-        return next(
-            Service(provider, options)
-            for provider in table.values()
-            if provider.works(options := provider.settings())
-        )
+        return best(table, kind)
     provider = table.get(choice.use)
     if provider is None:
         names = " or ".join((*table, BEST))
         raise SettingsError(f"chat settings: {kind} '{choice.use}' is unknown, use {names}.")
     where = f"chat settings: {kind} '{choice.use}'"
     return Service(provider, filled(provider.settings, choice.options, where))
+
+
+def best(table: Table, kind: str) -> Service:
+    """The first of a table that works here.
+
+    Raises:
+        SettingsError: If none does.
+    """
+    hindrance = ""
+    for provider in table.values():
+        options = provider.settings()
+        hindrance = provider.hindrance(options)
+        if not hindrance:
+            return Service(provider, options)
+    raise SettingsError(f"no {kind} works here; the last one needs this: {hindrance}")
+
+
+def offers(settings: ChatSettings) -> list[protocol.Offer]:
+    """All services with what hinders them, as the page is told; asks each, so it may take 1 s."""
+    found = []
+    for kind, table in TABLES.items():
+        for key in table:
+            service = named(settings, kind, key)
+            hindrance = service.provider.hindrance(service.options)[:LONGEST_HINDRANCE]
+            found.append(protocol.Offer(kind, key, service.described().name, hindrance))  # type: ignore[arg-type]
+    return found
+
+
+def named(settings: ChatSettings, kind: str, key: str) -> Service:
+    """A service of a table, as the settings describe it where they do.
+
+    Raises:
+        SettingsError: If its options are wrong.
+    """
+    choice: Choice = getattr(settings, kind)
+    return chosen(TABLES[kind], choice if choice.use == key else Choice(key), kind)
+
+
+def wished(
+    services: Chosen,
+    settings: ChatSettings,
+    wishes: Mapping[str, str],
+    offered: Sequence[protocol.Offer],
+) -> Chosen:
+    """The services with a visitor's wishes, where they are offered and work."""
+    working = {(offer.kind, offer.key) for offer in offered if not offer.hindrance}
+    granted = {
+        kind: named(settings, kind, key) for kind, key in wishes.items() if (kind, key) in working
+    }
+    return replace(services, **granted)
