@@ -12,6 +12,7 @@ from fastapi.responses import JSONResponse, PlainTextResponse
 from fastapi.staticfiles import StaticFiles
 
 from ico3d.bundle.format import Bundle
+from ico3d.bundle.persona import Persona
 from ico3d.chat import protocol
 from ico3d.chat.connection import Connection
 from ico3d.chat.conversation import Avatar
@@ -28,8 +29,13 @@ TYPES = {".json": "application/json", ".png": "image/png", ".txt": "text/plain; 
 STILL = "This avatar is driven by blendshapes, not by sound: its lips do not move while it speaks."
 
 
-def open_avatar(bundle: Bundle, settings: ChatSettings) -> Avatar:
+def open_avatar(bundle: Bundle, settings: ChatSettings, persona: Persona | None = None) -> Avatar:
     """What the sessions share.
+
+    Args:
+        bundle: The avatar.
+        settings: Services and timing.
+        persona: Who it is; the bundle's by default.
 
     Raises:
         BundleError: If the bundle has no head.
@@ -37,7 +43,8 @@ def open_avatar(bundle: Bundle, settings: ChatSettings) -> Avatar:
         ModelError: If the bundle's speech model cannot be used.
     """
     head, speech = open_face(bundle)
-    persona, services = bundle.manifest.persona, choose(settings)
+    persona = persona or bundle.manifest.persona
+    services = choose(settings, persona.voice)
     return Avatar(head, speech, persona, services, settings, bundle.animation)
 
 

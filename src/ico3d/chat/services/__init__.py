@@ -5,7 +5,8 @@ which need no download, and what is too small to be elsewhere. A new one is a mo
 `Settings` and one entry in the table of its kind.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pipecat.processors.frame_processor import FrameProcessor
@@ -35,7 +36,9 @@ class Service:
 
     def described(self) -> protocol.Service:
         """As the page is told."""
-        return protocol.Service(self.provider.title, self.provider.stand_in)
+        title, detail = self.provider.title, self.provider.detail(self.options)
+        name = f"{title} ({detail})" if detail else title
+        return protocol.Service(name[: protocol.LONGEST_NAME], self.provider.stand_in)
 
 
 @dataclass(frozen=True)
@@ -52,8 +55,12 @@ class Chosen:
         return protocol.Services(*(service.described() for service in services))
 
 
-def choose(settings: ChatSettings) -> Chosen:
+def choose(settings: ChatSettings, voices: Mapping[str, str] | None = None) -> Chosen:
     """Finds the services that the settings name.
+
+    Args:
+        settings: Which services.
+        voices: The persona's voice for each provider of voices; settings that name one win.
 
     Raises:
         SettingsError: If one is unknown, or its options are wrong.
@@ -61,8 +68,17 @@ def choose(settings: ChatSettings) -> Chosen:
     return Chosen(
         chosen(recognition.PROVIDERS, settings.recognition, "recognition"),
         chosen(language.PROVIDERS, settings.language, "language"),
-        chosen(voice.PROVIDERS, settings.voice, "voice"),
+        with_voice(chosen(voice.PROVIDERS, settings.voice, "voice"), settings.voice, voices or {}),
     )
+
+
+def with_voice(service: Service, choice: Choice, voices: Mapping[str, str]) -> Service:
+    """A service that speaks with the persona's voice, unless the settings name another."""
+    names = [n for n, provider in voice.PROVIDERS.items() if provider is service.provider]
+    own = next((voices[name] for name in names if name in voices), None)
+    if own is None or "voice" in choice.options or not hasattr(service.options, "voice"):
+        return service
+    return replace(service, options=replace(service.options, voice=own))
 
 
 def chosen(table: Table, choice: Choice, kind: str) -> Service:

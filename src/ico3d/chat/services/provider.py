@@ -7,7 +7,8 @@ from typing import Any
 from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.bundle.animation import Animation
-from ico3d.bundle.manifest import HeadInfo, Persona
+from ico3d.bundle.manifest import HeadInfo
+from ico3d.bundle.persona import Persona
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,12 @@ def always(settings: Any) -> bool:
     return True
 
 
+def nothing(settings: Any) -> str:
+    """For providers whose title says all."""
+    del settings
+    return ""
+
+
 @dataclass(frozen=True)
 class Provider:
     """One way to do a job; an entry in the table of its kind.
@@ -43,6 +50,7 @@ class Provider:
         works: Whether it would work here as these options say: packages installed, weights
             there, server answering. Quick; asked where the best is wanted.
         stand_in: True for the offline three.
+        detail: Which model these options mean, for the visitor's eyes.
     """
 
     title: str
@@ -50,6 +58,7 @@ class Provider:
     make: Callable[[Any, Context], FrameProcessor]
     works: Callable[[Any], bool] = always
     stand_in: bool = False
+    detail: Callable[[Any], str] = nothing
 
 
 Table = dict[str, Provider]
