@@ -197,5 +197,5 @@ def test_the_settings_can_hold_the_body(tmp_path):
     path.write_text("gestures = false")
     assert read_settings(path) == ChatSettings(gestures=False)
     path.write_text("gestures = 1")
-    with pytest.raises(SettingsError, match="must be of type bool"):
+    with pytest.raises(SettingsError, match="must be true or false"):
         read_settings(path)

@@ -241,6 +241,8 @@ def test_the_openai_service_is_pipecats_own():
     from ico3d.bundle.manifest import Persona
 
     persona = Persona("Ada", "Hello.", ("who are you => I am Ada.",))
-    settings = ChatSettings(language=Choice("openai", {"url": "http://127.0.0.1:9/v1"}))
+    settings = ChatSettings(
+        language=Choice("openai", {"url": "http://127.0.0.1:9/v1", "model": "tiny"})
+    )
     made = choose(settings).language.make(Context(persona, None, None))
     assert isinstance(made, OpenAILLMService)

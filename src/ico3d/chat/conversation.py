@@ -4,13 +4,14 @@ import asyncio
 import time
 from dataclasses import dataclass
 
+from pipecat.adapters.llm.schemas.tools_schema import ToolsSchema
 from pipecat.audio.turn.smart_turn.base_smart_turn import SmartTurnParams
 from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
 from pipecat.audio.vad.silero import SileroVADAnalyzer
 from pipecat.audio.vad.vad_analyzer import VADAnalyzer, VADParams
 from pipecat.pipeline.pipeline import Pipeline
 from pipecat.pipeline.worker import PipelineParams, PipelineWorker
-from pipecat.processors.aggregators.llm_context import LLMContext
+from pipecat.processors.aggregators.llm_context import LLMContext, NotGiven
 from pipecat.processors.aggregators.llm_response_universal import (
     LLMContextAggregatorPair,
     LLMUserAggregatorParams,
@@ -30,13 +31,15 @@ from ico3d.chat.face import Face
 from ico3d.chat.frames import Utterances
 from ico3d.chat.gestures import Gestures
 from ico3d.chat.listener import Captions, PageInput
+from ico3d.chat.memory import remembering
 from ico3d.chat.page import Page
 from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Clock
 from ico3d.chat.services import Chosen
 from ico3d.chat.services.provider import Context
-from ico3d.chat.settings import ChatSettings, Turns
+from ico3d.chat.settings import ChatSettings
 from ico3d.chat.speaker import Speaker
 from ico3d.chat.timing import TurnTimer
+from ico3d.chat.tools import functions
 from ico3d.speech.runtime import SpeechModel
 
 QUIETEST = 0.4  # smoothed volume of speech; it rises over 0.2 s, so more would notice it later
@@ -88,6 +91,7 @@ class Conversation:
         gestures = avatar.animation and Gestures(
             avatar.animation, page, self._utterances, avatar.settings.gestures
         )
+        self._gestures = gestures
         self._speaker = Speaker(page, self._utterances, self._timer, gestures)
         self._worker: PipelineWorker | None = None
         self._task: asyncio.Task | None = None
@@ -148,8 +152,9 @@ class Conversation:
         self._speaker.release()
 
     def _pipeline(self, parts: Parts) -> Pipeline:
-        user, assistant = aggregators(parts.turn, self._avatar.settings.turns)
         face = Face(self._avatar.head, self._avatar.speech)
+        context = LLMContext(tools=self._functions(parts.language, face))
+        user, assistant = aggregators(parts.turn, self._avatar.settings, parts.language, context)
         return Pipeline(
             [
                 self._input,
@@ -164,6 +169,11 @@ class Conversation:
                 assistant,
             ]
         )
+
+    def _functions(self, language: FrameProcessor, face: Face) -> ToolsSchema | NotGiven:
+        settings = self._avatar.settings
+        moods = face.moods if self._avatar.head.eye_offset is not None else None
+        return functions(language, self._gestures, moods, settings.tools, settings.allow)
 
     def _watch_voice(self, voice: FrameProcessor) -> None:
         """Takes the time at which the first sentence reaches the voice."""
@@ -191,8 +201,14 @@ def make_parts(avatar: Avatar) -> Parts:
     )
 
 
-def aggregators(turn: LocalSmartTurnAnalyzerV3, turns: Turns) -> LLMContextAggregatorPair:
+def aggregators(
+    turn: LocalSmartTurnAnalyzerV3,
+    settings: ChatSettings,
+    language: FrameProcessor,
+    context: LLMContext,
+) -> LLMContextAggregatorPair:
     """The two halves that keep the conversation's context and decide on turns."""
+    turns = settings.turns
     strategies = UserTurnStrategies(
         start=[VADUserTurnStartStrategy()],
         stop=[TurnAnalyzerUserTurnStopStrategy(turn_analyzer=turn)],
@@ -201,4 +217,6 @@ def aggregators(turn: LocalSmartTurnAnalyzerV3, turns: Turns) -> LLMContextAggre
         user_turn_strategies=strategies,
         user_turn_stop_timeout=max(NOTHING_HEARD, 2 * turns.end_silence),
     )
-    return LLMContextAggregatorPair(LLMContext(), user_params=params)
+    return LLMContextAggregatorPair(
+        context, user_params=params, assistant_params=remembering(settings.memory, language)
+    )
