@@ -71,6 +71,12 @@ def question():
     return (samples[loud[0] : loud[-1]] * 32767).astype(np.int16)
 
 
+def free_port():
+    """A port that nobody listens on."""
+    with server.bind("127.0.0.1", 0) as listener:
+        return listener.getsockname()[1]
+
+
 @contextlib.asynccontextmanager
 async def serving(bundle, settings=None, resume_seconds=30.0, persona=None):
     """Yields the URL and the sessions of a running server; by default the offline one."""
