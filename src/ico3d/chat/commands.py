@@ -22,6 +22,7 @@ class Serve:
         port: Port to listen on; 0 takes any that is free.
         settings: TOML or JSON file that chooses services and timing.
         open: Open the page in a browser.
+        log: File that gets a line of JSON for each turn: times and counts, no words.
         verbose: Print what happens inside.
     """
 
@@ -30,6 +31,7 @@ class Serve:
     port: int = 8765
     settings: Path | None = None
     open: bool = False
+    log: Path | None = None
     verbose: bool = False
 
     def run(self) -> None:
@@ -41,13 +43,17 @@ class Serve:
         set_up_log(self.verbose)
         from ico3d.bundle.format import Bundle
         from ico3d.chat import server
+        from ico3d.chat.monitor import Monitor, TurnLog
+        from ico3d.chat.sessions import Sessions
         from ico3d.chat.settings import read_settings
 
         settings = read_settings(self.settings)
+        monitor = Monitor(TurnLog.open(self.log) if self.log else None)
         listener = server.bind(self.host, self.port)
         bundle = Bundle.open(self.bundle)
         avatar = server.open_avatar(bundle, settings) if bundle.manifest.head else None
-        app = server.make_app(bundle, avatar, self.host)
+        sessions = Sessions(avatar, monitor=monitor) if avatar else None
+        app = server.make_app(bundle, avatar, self.host, sessions)
         url = server.address(listener)
         print(f"{bundle.manifest.persona.name} is at {url} (Ctrl+C ends)")
         for line in described(avatar.services.described()) if avatar else []:
@@ -85,7 +91,7 @@ class Demo:
             BundleError: If the package came without it.
         """
         demo = Path(packaged.NAME)
-        Serve(demo, self.host, self.port, self.settings, self.open, self.verbose).run()
+        Serve(demo, self.host, self.port, self.settings, open=self.open, verbose=self.verbose).run()
 
 
 def described(services) -> list[str]:

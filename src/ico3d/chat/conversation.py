@@ -1,13 +1,13 @@
 """One conversation: the pipecat pipeline between a page's messages and the page."""
 
 import asyncio
-import time
 from dataclasses import dataclass
 
 from pipecat.audio.turn.smart_turn.base_smart_turn import SmartTurnParams
 from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
 from pipecat.audio.vad.silero import SileroVADAnalyzer
 from pipecat.audio.vad.vad_analyzer import VADAnalyzer, VADParams
+from pipecat.clocks.system_clock import SystemClock
 from pipecat.pipeline.pipeline import Pipeline
 from pipecat.pipeline.worker import PipelineParams, PipelineWorker
 from pipecat.processors.aggregators.llm_context import LLMContext
@@ -25,18 +25,20 @@ from pipecat.workers.runner import WorkerRunner
 
 from ico3d.bundle.animation import Animation
 from ico3d.bundle.manifest import HeadInfo, Persona
+from ico3d.chat.activity import Activity
 from ico3d.chat.expression import ExpressionProcessor
 from ico3d.chat.face import Face
 from ico3d.chat.frames import Utterances
 from ico3d.chat.gestures import Gestures
 from ico3d.chat.listener import Captions, PageInput
+from ico3d.chat.monitor import Visitor
 from ico3d.chat.page import Page
 from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Clock
 from ico3d.chat.services import Chosen
 from ico3d.chat.services.provider import Context
 from ico3d.chat.settings import ChatSettings, Turns
 from ico3d.chat.speaker import Speaker
-from ico3d.chat.timing import TurnTimer
+from ico3d.chat.timing import TurnObserver
 from ico3d.speech.runtime import SpeechModel
 
 QUIETEST = 0.4  # smoothed volume of speech; it rises over 0.2 s, so more would notice it later
@@ -78,17 +80,19 @@ class Parts:
 class Conversation:
     """A running pipeline. What the page says goes in here; what it shall hear goes to `Page`."""
 
-    def __init__(self, avatar: Avatar, page: Page):
+    def __init__(self, avatar: Avatar, page: Page, visitor: Visitor):
         """A conversation that has not started."""
         self._avatar = avatar
-        self._timer = TurnTimer(time.monotonic)
+        self.activity = Activity()
+        self._clock = SystemClock()
+        self._timing = TurnObserver(self._clock, page.send, visitor.turn, visitor.failed)
         self._utterances = Utterances()
         self._input = PageInput()
-        self._captions = Captions(page, self._timer)
+        self._captions = Captions(page)
         gestures = avatar.animation and Gestures(
             avatar.animation, page, self._utterances, avatar.settings.gestures
         )
-        self._speaker = Speaker(page, self._utterances, self._timer, gestures)
+        self._speaker = Speaker(page, self._utterances, gestures)
         self._worker: PipelineWorker | None = None
         self._task: asyncio.Task | None = None
 
@@ -101,6 +105,8 @@ class Conversation:
             params=PipelineParams(
                 audio_in_sample_rate=MICROPHONE_RATE, audio_out_sample_rate=SPEECH_RATE
             ),
+            clock=self._clock,
+            observers=[self._timing, self.activity],
             enable_rtvi=False,
             enable_turn_tracking=False,
             idle_timeout_secs=None,
@@ -127,17 +133,20 @@ class Conversation:
 
     async def ask(self, text: str) -> None:
         """A typed question."""
-        self._timer.start()
+        self.activity.touch()
         await self._input.ask(text)
 
     async def interrupt(self, utterance: int | None) -> None:
         """Silence, if that utterance (any, for null) is being said or prepared."""
+        self.activity.touch()
         if utterance is None or self._speaker.is_speaking(utterance):
             await self._input.broadcast_interruption()
 
     def clock(self, message: Clock) -> None:
         """Where the page is."""
+        self.activity.touch()  # it comes only while something plays
         self._speaker.clock(message)
+        self._timing.heard(message.utterance, message.position)
 
     def hold(self) -> None:
         """The connection dropped."""
@@ -159,18 +168,18 @@ class Conversation:
                 user,
                 parts.language,
                 parts.voice,
-                ExpressionProcessor(face, self._utterances, self._timer),
+                ExpressionProcessor(face, self._utterances),
                 self._speaker,
                 assistant,
             ]
         )
 
     def _watch_voice(self, voice: FrameProcessor) -> None:
-        """Takes the time at which the first sentence reaches the voice."""
+        """Takes the time at which the first clause reaches the voice."""
         if isinstance(voice, TTSService):
 
             async def requested(*_):
-                self._timer.mark("language")
+                self._timing.clause()
 
             voice.add_event_handler("on_tts_request", requested)
 

@@ -1,7 +1,5 @@
 """The input of the pipeline, and the processor that shows the visitor what was understood."""
 
-import time
-
 from pipecat.frames.frames import (
     Frame,
     InputAudioRawFrame,
@@ -13,13 +11,11 @@ from pipecat.frames.frames import (
     TranscriptionFrame,
     UserStartedSpeakingFrame,
     UserStoppedSpeakingFrame,
-    VADUserStoppedSpeakingFrame,
 )
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
 from ico3d.chat.page import Page
 from ico3d.chat.protocol import MICROPHONE_RATE, Transcript
-from ico3d.chat.timing import TurnTimer
 
 
 class PageInput(FrameProcessor):
@@ -49,10 +45,10 @@ class PageInput(FrameProcessor):
 class Captions(FrameProcessor):
     """Sends transcripts and the listening state to the page; stands behind the recogniser."""
 
-    def __init__(self, page: Page, timer: TurnTimer):
+    def __init__(self, page: Page):
         """Captions for one session."""
         super().__init__()
-        self._page, self._timer = page, timer
+        self._page = page
         self._words = ""  # of the pieces of this turn that are final
         self._listening = False
 
@@ -62,24 +58,14 @@ class Captions(FrameProcessor):
         if isinstance(frame, InterimTranscriptionFrame):
             self._page.send(Transcript(self._joined(frame.text), final=False))
         elif isinstance(frame, TranscriptionFrame):
-            self._timer.mark("recognition")
             self._words = self._joined(frame.text)
             self._page.send(Transcript(self._words, final=True))
-        elif isinstance(frame, VADUserStoppedSpeakingFrame) and self._is_down(direction):
-            noticed = time.time() - frame.timestamp
-            self._timer.start(ago=frame.stop_secs + noticed)
-            self._timer.mark("vad")
         elif isinstance(frame, UserStartedSpeakingFrame):
             self._page.show("listening")
             self._words = ""
         elif isinstance(frame, UserStoppedSpeakingFrame):
-            self._timer.mark("turn")
             self._page.show("thinking" if self._words else "idle")
         await self.push_frame(frame, direction)
 
     def _joined(self, text: str) -> str:
         return f"{self._words} {text}".strip()[:4000]
-
-    @staticmethod
-    def _is_down(direction: FrameDirection) -> bool:
-        return direction == FrameDirection.DOWNSTREAM

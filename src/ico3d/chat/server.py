@@ -17,6 +17,7 @@ from ico3d.chat.connection import Connection
 from ico3d.chat.conversation import Avatar
 from ico3d.chat.face import open_face
 from ico3d.chat.guard import Guard
+from ico3d.chat.monitor import CONTENT_TYPE
 from ico3d.chat.protocol import Welcome
 from ico3d.chat.services import choose
 from ico3d.chat.sessions import Sessions
@@ -78,7 +79,7 @@ def make_app(
 
 
 def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
-    """The WebSocket."""
+    """The WebSocket, and figures of what happens on it."""
     notices = [] if avatar.speech else [STILL]
     described = avatar.services.described()
     welcome = Welcome(protocol.VERSION, "-", False, described, notices)
@@ -87,6 +88,10 @@ def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
     async def conversation(socket: WebSocket) -> None:
         await socket.accept()
         await Connection(socket, sessions, welcome).run()
+
+    @app.get("/metrics")
+    async def metrics() -> Response:
+        return Response(sessions.monitor.exposition(), headers={"Content-Type": CONTENT_TYPE})
 
 
 def serve_file(bundle: Bundle, name: str, request: Request) -> Response:

@@ -4,8 +4,11 @@ import asyncio
 import secrets
 
 from ico3d.chat.conversation import Avatar, Conversation
+from ico3d.chat.monitor import Monitor, Visitor
 from ico3d.chat.page import Outbox, Page
-from ico3d.chat.protocol import RESUME_SECONDS, Hello
+from ico3d.chat.protocol import RESUME_SECONDS, Error, Hello
+
+IDLE = "Nothing was said for {:g} minutes, so this conversation has ended: reload the page."
 
 
 class FullError(Exception):
@@ -15,21 +18,28 @@ class FullError(Exception):
 class Session:
     """One visitor: a page, a conversation, and nothing that another one could see."""
 
-    def __init__(self, avatar: Avatar):
+    def __init__(self, avatar: Avatar, visitor: Visitor):
         """A session whose conversation has not started."""
         self.id = secrets.token_urlsafe(16)
         self.page = Page()
-        self.conversation = Conversation(avatar, self.page)
-        self.expiry: asyncio.TimerHandle | None = None
+        self.conversation = Conversation(avatar, self.page, visitor)
+        self.expiry: asyncio.TimerHandle | None = None  # while its page is away
+        self.idle_check: asyncio.TimerHandle | None = None
 
 
 class Sessions:
     """Opens, keeps and closes sessions."""
 
-    def __init__(self, avatar: Avatar, resume_seconds: float = RESUME_SECONDS):
-        """No visitors yet."""
+    def __init__(
+        self,
+        avatar: Avatar,
+        resume_seconds: float = RESUME_SECONDS,
+        monitor: Monitor | None = None,
+    ):
+        """No visitors yet; `monitor` counts them."""
         self._avatar = avatar
         self._resume_seconds = resume_seconds
+        self.monitor = monitor or Monitor()
         self._open: dict[str, Session] = {}
         self._closing: set[asyncio.Task] = set()
 
@@ -50,17 +60,20 @@ class Sessions:
         if session is not None:
             self._cancel_expiry(session)
             session.page.attach(outbox)
+            session.page.replay(hello.last_index)  # before anything new can get in between
             session.conversation.release()
             return session, True
         self._make_room()
-        session = Session(self._avatar)
+        session = Session(self._avatar, self.monitor.visitor())
         self._open[session.id] = session
         session.page.attach(outbox)
         try:
             await session.conversation.start()
         except BaseException:
             del self._open[session.id]
+            self.monitor.left("error")
             raise
+        self._check_idle(session)
         return session, False
 
     def leave(self, session: Session, outbox: Outbox) -> None:
@@ -68,12 +81,14 @@ class Sessions:
         if session.id in self._open and session.page.detach(outbox):
             session.conversation.hold()
             loop = asyncio.get_running_loop()
-            session.expiry = loop.call_later(self._resume_seconds, self._close_soon, session)
+            session.expiry = loop.call_later(
+                self._resume_seconds, self._close_soon, session, "left"
+            )
 
     async def close_all(self) -> None:
         """Ends every conversation."""
         for session in list(self._open.values()):
-            self._close_soon(session)
+            self._close_soon(session, "server")
         await asyncio.gather(*self._closing, return_exceptions=True)
 
     def _make_room(self) -> None:
@@ -81,14 +96,30 @@ class Sessions:
             return
         for session in self._open.values():
             if not session.page.is_attached:
-                self._close_soon(session)
+                self._close_soon(session, "room")
                 return
         raise FullError
 
-    def _close_soon(self, session: Session) -> None:
+    def _check_idle(self, session: Session) -> None:
+        """Ends a session in which nothing happens; looks again when that may be so."""
+        minutes = self._avatar.settings.idle_minutes
+        if minutes == 0 or session.id not in self._open:
+            return
+        left = 60 * minutes - session.conversation.activity.idle_seconds()
+        if left > 0:
+            loop = asyncio.get_running_loop()
+            session.idle_check = loop.call_later(left, self._check_idle, session)
+            return
+        session.page.end(Error(IDLE.format(minutes), fatal=True))
+        self._close_soon(session, "idle")
+
+    def _close_soon(self, session: Session, why: str) -> None:
         if self._open.pop(session.id, None) is None:
             return
+        self.monitor.left(why)
         self._cancel_expiry(session)
+        if session.idle_check is not None:
+            session.idle_check.cancel()
         task = asyncio.create_task(session.conversation.close())
         self._closing.add(task)
         task.add_done_callback(self._closing.discard)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -62,6 +63,8 @@ class ChatSettings:
         voice: Text to speech.
         turns: When the visitor has finished.
         max_sessions: How many visitors at once, those included whose connection dropped.
+        idle_minutes: A session ends when for so long nobody spoke or typed and nothing was played;
+            0 for never.
         gestures: Whether a body gestures while it speaks; otherwise it is held at rest.
     """
 
@@ -70,16 +73,19 @@ class ChatSettings:
     voice: Choice = Choice()
     turns: Turns = Turns()
     max_sessions: int = 4
+    idle_minutes: float = 10.0
     gestures: bool = True
 
     def __post_init__(self):
         """Checks ranges.
 
         Raises:
-            SettingsError: If the number of sessions makes no sense.
+            SettingsError: If the limits of sessions make no sense.
         """
         if self.max_sessions < 1:
             raise SettingsError("chat settings: max_sessions must be at least 1.")
+        if not 0 <= self.idle_minutes < math.inf:
+            raise SettingsError("chat settings: idle_minutes must be 0 (never) or more.")
 
 
 def read_settings(path: Path | None) -> ChatSettings:
