@@ -5,7 +5,6 @@ from datetime import UTC, datetime
 
 import numpy as np
 import pytest
-from pipecat.clocks.base_clock import BaseClock
 from pipecat.frames.frames import (
     BotStartedSpeakingFrame,
     BotStoppedSpeakingFrame,
@@ -32,32 +31,19 @@ from ico3d.chat.timing import PARTS, TurnObserver
 from ico3d.errors import SettingsError
 
 
-class SetClock(BaseClock):
-    """Shows what it was set to, ms."""
-
-    def __init__(self):
-        self.now = 0
-
-    def get_time(self):
-        return self.now * 1_000_000
-
-    def start(self):
-        pass
-
-
 class Watched:
     """An observer with everything it said."""
 
     def __init__(self):
-        self.clock = SetClock()
+        self.now = 0  # ms
         self.told, self.turns, self.failures = [], [], []
         self.observer = TurnObserver(
-            self.clock, self.told.append, self.turns.append, self.failures.append
+            lambda: self.now / 1000, self.told.append, self.turns.append, self.failures.append
         )
 
     async def see(self, at, *frames, source=None):
         """Frames pushed at a time, ms."""
-        self.clock.now = at
+        self.now = at
         for frame in frames:
             await self.observer.on_push_frame(
                 FramePushed(source, None, frame, FrameDirection.DOWNSTREAM, at * 1_000_000)
@@ -74,7 +60,7 @@ class Watched:
         """From the model's start at `at` to its first sound 100 ms later."""
         await self.see(at, LLMFullResponseStartFrame())
         await self.see(at + 20, LLMTextFrame("I "))
-        self.clock.now = at + 50
+        self.now = at + 50
         self.observer.clause()
         await self.see(at + 80, TTSAudioRawFrame(b"", 24000, 1))
         await self.see(at + 95, speech(utterance))
@@ -97,7 +83,7 @@ async def test_the_parts_of_a_turn_add_up(watched):
     values |= {"send": 5, "total": 560, "recognition": 80}
     assert watched.told == [Metrics("turn", pytest.approx(values))]
     assert sum(values[part] for part in PARTS) == values["total"]
-    watched.clock.now = 1900
+    watched.now = 1900
     watched.observer.heard(0, 0.0)  # nothing yet
     watched.observer.heard(3, 0.25)  # of another one
     watched.observer.heard(0, 0.25)
@@ -185,7 +171,7 @@ async def test_turns_become_figures_and_lines(watched, tmp_path):
     first, second = monitor.visitor(), monitor.visitor()
     await watched.ask(1000)
     await watched.answer(1460)
-    watched.clock.now = 1860
+    watched.now = 1860
     watched.observer.heard(0, 0.2)
     await watched.see(2000, InterruptionFrame(), BotStoppedSpeakingFrame())
     second.turn(watched.turns[0])

@@ -1,6 +1,5 @@
 """Whether anybody is still there."""
 
-import time
 from collections.abc import Callable
 
 from pipecat.frames.frames import (
@@ -26,7 +25,7 @@ class Activity(BaseObserver):
     visitor whom nothing was ever said to would stay forever.
     """
 
-    def __init__(self, now: Callable[[], float] = time.monotonic):
+    def __init__(self, now: Callable[[], float]):
         """Active now; reads the clock `now`, in seconds."""
         super().__init__(observe_every_push=False)
         self._now = now

@@ -7,7 +7,6 @@ from pipecat.audio.turn.smart_turn.base_smart_turn import SmartTurnParams
 from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
 from pipecat.audio.vad.silero import SileroVADAnalyzer
 from pipecat.audio.vad.vad_analyzer import VADAnalyzer, VADParams
-from pipecat.clocks.system_clock import SystemClock
 from pipecat.pipeline.pipeline import Pipeline
 from pipecat.pipeline.worker import PipelineParams, PipelineWorker
 from pipecat.processors.aggregators.llm_context import LLMContext
@@ -25,6 +24,7 @@ from pipecat.workers.runner import WorkerRunner
 
 from ico3d.bundle.animation import Animation
 from ico3d.bundle.manifest import HeadInfo, Persona
+from ico3d.chat import protocol
 from ico3d.chat.activity import Activity
 from ico3d.chat.expression import ExpressionProcessor
 from ico3d.chat.face import Face
@@ -33,12 +33,12 @@ from ico3d.chat.gestures import Gestures
 from ico3d.chat.listener import Captions, PageInput
 from ico3d.chat.monitor import Visitor
 from ico3d.chat.page import Page
-from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Clock
+from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE
 from ico3d.chat.services import Chosen
 from ico3d.chat.services.provider import Context
 from ico3d.chat.settings import ChatSettings, Turns
 from ico3d.chat.speaker import Speaker
-from ico3d.chat.timing import TurnObserver
+from ico3d.chat.timing import Clock, TurnObserver
 from ico3d.speech.runtime import SpeechModel
 
 QUIETEST = 0.4  # smoothed volume of speech; it rises over 0.2 s, so more would notice it later
@@ -83,16 +83,17 @@ class Conversation:
     def __init__(self, avatar: Avatar, page: Page, visitor: Visitor):
         """A conversation that has not started."""
         self._avatar = avatar
-        self.activity = Activity()
-        self._clock = SystemClock()
-        self._timing = TurnObserver(self._clock, page.send, visitor.turn, visitor.failed)
+        now = asyncio.get_running_loop().time  # one clock for all that waits and measures
+        self.activity = Activity(now)
+        self._clock = Clock(now)
+        self._timing = TurnObserver(now, page.send, visitor.turn, visitor.failed)
         self._utterances = Utterances()
         self._input = PageInput()
         self._captions = Captions(page)
         gestures = avatar.animation and Gestures(
             avatar.animation, page, self._utterances, avatar.settings.gestures
         )
-        self._speaker = Speaker(page, self._utterances, gestures)
+        self._speaker = Speaker(page, self._utterances, gestures, now)
         self._worker: PipelineWorker | None = None
         self._task: asyncio.Task | None = None
 
@@ -142,7 +143,7 @@ class Conversation:
         if utterance is None or self._speaker.is_speaking(utterance):
             await self._input.broadcast_interruption()
 
-    def clock(self, message: Clock) -> None:
+    def clock(self, message: protocol.Clock) -> None:
         """Where the page is."""
         self.activity.touch()  # it comes only while something plays
         self._speaker.clock(message)

@@ -4,11 +4,12 @@ import asyncio
 import secrets
 
 from ico3d.chat.conversation import Avatar, Conversation
+from ico3d.chat.memory import give_back
 from ico3d.chat.monitor import Monitor, Visitor
 from ico3d.chat.page import Outbox, Page
 from ico3d.chat.protocol import RESUME_SECONDS, Error, Hello
 
-IDLE = "Nothing was said for {:g} minutes, so this conversation has ended: reload the page."
+IDLE = "Nothing was said for {:g} min, so this conversation has ended: reload the page."
 
 
 class FullError(Exception):
@@ -120,7 +121,7 @@ class Sessions:
         self._cancel_expiry(session)
         if session.idle_check is not None:
             session.idle_check.cancel()
-        task = asyncio.create_task(session.conversation.close())
+        task = asyncio.create_task(dismantle(session.conversation))
         self._closing.add(task)
         task.add_done_callback(self._closing.discard)
 
@@ -129,3 +130,10 @@ class Sessions:
         if session.expiry is not None:
             session.expiry.cancel()
             session.expiry = None
+
+
+async def dismantle(conversation: Conversation) -> None:
+    """Ends a conversation and frees its memory."""
+    await conversation.close()
+    del conversation
+    await give_back()

@@ -71,6 +71,21 @@ class Turn:
         return None if self.heard is None else 1000 * (self.heard - self.asked)
 
 
+class Clock(BaseClock):
+    """Lets a pipeline stamp its frames by any clock."""
+
+    def __init__(self, now: Callable[[], float]):
+        """Shows the seconds that `now` says."""
+        self._now = now
+
+    def get_time(self) -> int:
+        """Nanoseconds."""
+        return int(self._now() * 1e9)
+
+    def start(self):
+        """It runs already."""
+
+
 class TurnObserver(BaseObserver):
     """Takes the time from the end of the visitor's words to the first sound of the answer.
 
@@ -83,7 +98,7 @@ class TurnObserver(BaseObserver):
 
     def __init__(
         self,
-        clock: BaseClock,
+        now: Callable[[], float],
         report: Callable[[Metrics], None],
         done: Callable[[Turn], None],
         failed: Callable[[str], None],
@@ -91,13 +106,13 @@ class TurnObserver(BaseObserver):
         """An observer for one session.
 
         Args:
-            clock: The pipeline's.
+            now: The pipeline's clock, in seconds.
             report: Takes what the page shall know.
             done: Takes every turn whose answer is over.
             failed: Takes the part that reported an error.
         """
         super().__init__(observe_every_push=False)
-        self._clock, self._report, self._done, self._failed = clock, report, done, failed
+        self._now, self._report, self._done, self._failed = now, report, done, failed
         self._silence: tuple[float, float] | None = None  # s: last word, and when it was noticed
         self._words: float | None = None  # s: the last transcript
         self._asked: Turn | None = None  # waits for its first sound
@@ -115,13 +130,13 @@ class TurnObserver(BaseObserver):
 
     def clause(self) -> None:
         """The voice is asked for something now."""
-        self._mark("clause", self._clock.get_time() / 1e9)
+        self._mark("clause", self._now())
 
     def heard(self, utterance: int, position: float) -> None:
         """The page says that it has played so many seconds of an utterance."""
         turn = self._turn
         if turn and turn.utterance == utterance and turn.heard is None and position > 0:
-            turn.heard = self._clock.get_time() / 1e9 - position
+            turn.heard = self._now() - position
             self._report(Metrics("played", {"voice_to_voice": 1000 * (turn.heard - turn.asked)}))
 
     def _look(self, frame: Frame, at: float) -> None:
