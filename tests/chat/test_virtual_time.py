@@ -20,7 +20,7 @@ from .guests import Guest, open_sessions
 from .virtual_time import run
 
 SHARE = 0.060  # s that a server may add to what its services take
-TURNS = Turns(pause=0.2, end_silence=0.6)
+TURNS = Turns(pause=0.2, end_silence=0.6, speculate=False)
 QUICK = Script(0.0, 0.0, 0.0)
 
 
@@ -46,11 +46,14 @@ def test_the_server_waits_for_nothing_but_its_services(bundle, question, monkeyp
     assert max(shares) <= SHARE
 
 
-def test_the_turn_is_timed_as_it_was(bundle, question, monkeypatch):
+@pytest.mark.parametrize(("speculate", "token"), [(False, 400), (True, 300)])
+def test_the_turn_is_timed_as_it_was(bundle, question, monkeypatch, speculate, token):
+    """The turn is over 400 ms after silence was noticed; an early answer begins 100 ms before."""
     script = Script(recognition=0.3, language=0.4, voice=0.2)
+    turns = replace(TURNS, speculate=speculate)
 
     async def talk():
-        async with open_sessions(bundle, script.services(), ChatSettings(turns=TURNS)) as sessions:
+        async with open_sessions(bundle, script.services(), ChatSettings(turns=turns)) as sessions:
             guest = await Guest.enter(sessions)
             await asyncio.sleep(3)
             said = await guest.say(question, silence=4.0)
@@ -62,7 +65,8 @@ def test_the_turn_is_timed_as_it_was(bundle, question, monkeypatch):
     took, parts, heard = run(monkeypatch, talk())
     assert parts["vad"] == pytest.approx(200, abs=1)
     assert parts["recognition"] == pytest.approx(300, abs=1)
-    assert parts["token"] == pytest.approx(400, abs=1)
+    assert parts["turn"] == pytest.approx(400, abs=40)  # a chunk
+    assert parts["turn"] + parts["token"] == pytest.approx(400 + token, abs=40)
     assert parts["voice"] == pytest.approx(200, abs=1)
     assert parts["clause"] + parts["expression"] + parts["send"] < 1
     assert parts["total"] == pytest.approx(1000 * took, abs=60)  # chunks of 40, frames of 32 ms

@@ -17,6 +17,7 @@ from ico3d.chat.protocol import (
     Error,
     Hello,
     Interrupt,
+    Talk,
     Text,
     Welcome,
 )
@@ -141,6 +142,8 @@ class Connection:
             if not message.text.strip():
                 raise ProtocolError("text: is empty.")
             await conversation.ask(message.text.strip())
+        elif isinstance(message, Talk):
+            await conversation.talk(message.pressed)
         elif isinstance(message, Interrupt):
             await conversation.interrupt(message.utterance)
         else:

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 
 from pipecat.audio.turn.smart_turn.base_smart_turn import SmartTurnParams
 from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
-from pipecat.audio.vad.silero import SileroVADAnalyzer
-from pipecat.audio.vad.vad_analyzer import VADAnalyzer, VADParams
 from pipecat.pipeline.pipeline import Pipeline
 from pipecat.pipeline.worker import PipelineParams, PipelineWorker
 from pipecat.processors.aggregators.llm_context import LLMContext
@@ -14,11 +12,8 @@ from pipecat.processors.aggregators.llm_response_universal import (
     LLMContextAggregatorPair,
     LLMUserAggregatorParams,
 )
-from pipecat.processors.audio.vad_processor import VADProcessor
 from pipecat.processors.frame_processor import FrameProcessor
 from pipecat.services.tts_service import TTSService
-from pipecat.turns.user_start import VADUserTurnStartStrategy
-from pipecat.turns.user_stop import TurnAnalyzerUserTurnStopStrategy
 from pipecat.turns.user_turn_strategies import UserTurnStrategies
 from pipecat.workers.runner import WorkerRunner
 
@@ -39,9 +34,10 @@ from ico3d.chat.services.provider import Context
 from ico3d.chat.settings import ChatSettings, Turns
 from ico3d.chat.speaker import Speaker
 from ico3d.chat.timing import Clock, TurnObserver
+from ico3d.chat.turns.detector import Ear, VoiceDetector
+from ico3d.chat.turns.strategies import strategies
 from ico3d.speech.runtime import SpeechModel
 
-QUIETEST = 0.4  # smoothed volume of speech; it rises over 0.2 s, so more would notice it later
 NOTHING_HEARD = 1.5  # s without words after which a turn that was only noise is over
 
 
@@ -70,7 +66,7 @@ class Avatar:
 class Parts:
     """What takes a while to make; made in a thread."""
 
-    vad: VADAnalyzer
+    ear: Ear
     turn: LocalSmartTurnAnalyzerV3
     recognition: FrameProcessor
     language: FrameProcessor
@@ -83,7 +79,7 @@ class Conversation:
     def __init__(self, avatar: Avatar, page: Page, visitor: Visitor):
         """A conversation that has not started."""
         self._avatar = avatar
-        now = asyncio.get_running_loop().time  # one clock for all that waits and measures
+        self._now = now = asyncio.get_running_loop().time  # for all that waits and measures
         self.activity = Activity(now)
         self._clock = Clock(now)
         self._timing = TurnObserver(now, page.send, visitor.turn, visitor.failed)
@@ -137,6 +133,11 @@ class Conversation:
         self.activity.touch()
         await self._input.ask(text)
 
+    async def talk(self, pressed: bool) -> None:
+        """The button of push to talk."""
+        self.activity.touch()
+        await self._input.talk(pressed)
+
     async def interrupt(self, utterance: int | None) -> None:
         """Silence, if that utterance (any, for null) is being said or prepared."""
         self.activity.touch()
@@ -158,12 +159,15 @@ class Conversation:
         self._speaker.release()
 
     def _pipeline(self, parts: Parts) -> Pipeline:
-        user, assistant = aggregators(parts.turn, self._avatar.settings.turns)
+        turns = self._avatar.settings.turns
+        trusted = not self._avatar.services.recognition.provider.stand_in
+        chosen = strategies(parts.turn, turns, trusted, self._speaker.hush, self._now)
+        user, assistant = aggregators(chosen, turns)
         face = Face(self._avatar.head, self._avatar.speech)
         return Pipeline(
             [
                 self._input,
-                VADProcessor(vad_analyzer=parts.vad),
+                VoiceDetector(parts.ear),
                 parts.recognition,
                 self._captions,
                 user,
@@ -190,10 +194,7 @@ def make_parts(avatar: Avatar) -> Parts:
     turns, services = avatar.settings.turns, avatar.services
     context = Context(avatar.persona, avatar.head, avatar.animation)
     return Parts(
-        SileroVADAnalyzer(
-            sample_rate=MICROPHONE_RATE,
-            params=VADParams(stop_secs=turns.pause, min_volume=QUIETEST),
-        ),
+        Ear(turns.pause),
         LocalSmartTurnAnalyzerV3(params=SmartTurnParams(stop_secs=turns.end_silence - turns.pause)),
         services.recognition.make(context),
         services.language.make(context),
@@ -201,12 +202,8 @@ def make_parts(avatar: Avatar) -> Parts:
     )
 
 
-def aggregators(turn: LocalSmartTurnAnalyzerV3, turns: Turns) -> LLMContextAggregatorPair:
+def aggregators(strategies: UserTurnStrategies, turns: Turns) -> LLMContextAggregatorPair:
     """The two halves that keep the conversation's context and decide on turns."""
-    strategies = UserTurnStrategies(
-        start=[VADUserTurnStartStrategy()],
-        stop=[TurnAnalyzerUserTurnStopStrategy(turn_analyzer=turn)],
-    )
     params = LLMUserAggregatorParams(
         user_turn_strategies=strategies,
         user_turn_stop_timeout=max(NOTHING_HEARD, 2 * turns.end_silence),

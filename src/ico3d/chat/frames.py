@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from pipecat.frames.frames import DataFrame
+from pipecat.frames.frames import DataFrame, SystemFrame
 
 from ico3d.chat.protocol import SPEECH_RATE
 
@@ -40,6 +40,30 @@ class UtteranceEndFrame(DataFrame):
 
     utterance: int
     samples: int
+
+
+@dataclass
+class VoiceFrame(SystemFrame):
+    """What the last 20-100 ms from the microphone were; long before the VAD is sure.
+
+    Parameters:
+        voiced: Whether there is a voice in them.
+        plain: Whether all of the voice so far was one and the same vowel or hum.
+    """
+
+    voiced: bool = False
+    plain: bool = False
+
+
+@dataclass
+class TalkFrame(SystemFrame):
+    """Push to talk: the visitor holds the button or has let it go.
+
+    Parameters:
+        pressed: True when it goes down.
+    """
+
+    pressed: bool = False
 
 
 class Utterances:

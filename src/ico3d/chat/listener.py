@@ -11,9 +11,11 @@ from pipecat.frames.frames import (
     TranscriptionFrame,
     UserStartedSpeakingFrame,
     UserStoppedSpeakingFrame,
+    VADUserStartedSpeakingFrame,
 )
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
+from ico3d.chat.frames import TalkFrame
 from ico3d.chat.page import Page
 from ico3d.chat.protocol import MICROPHONE_RATE, Transcript
 
@@ -30,6 +32,10 @@ class PageInput(FrameProcessor):
         """Sound from the microphone, PCM16 mono 16 kHz."""
         await self.push_frame(InputAudioRawFrame(pcm, MICROPHONE_RATE, 1))
 
+    async def talk(self, pressed: bool) -> None:
+        """The button of push to talk."""
+        await self.push_frame(TalkFrame(pressed))
+
     async def ask(self, text: str) -> None:
         """A typed question: whatever is being said stops, then it is answered."""
         await self.broadcast_interruption()
@@ -43,29 +49,50 @@ class PageInput(FrameProcessor):
 
 
 class Captions(FrameProcessor):
-    """Sends transcripts and the listening state to the page; stands behind the recogniser."""
+    """Sends transcripts and the listening state to the page; stands behind the recogniser.
+
+    What is said over the avatar's voice is shown once it has become a turn.
+    """
 
     def __init__(self, page: Page):
         """Captions for one session."""
         super().__init__()
         self._page = page
         self._words = ""  # of the pieces of this turn that are final
-        self._listening = False
+        self._in_turn = False
+        self._early: Transcript | None = None  # of a voice that may become a turn
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
         """Looks at what passes; the aggregator's frames come from the other side."""
         await super().process_frame(frame, direction)
         if isinstance(frame, InterimTranscriptionFrame):
-            self._page.send(Transcript(self._joined(frame.text), final=False))
+            self._show(Transcript(self._joined(frame.text), final=False))
         elif isinstance(frame, TranscriptionFrame):
-            self._words = self._joined(frame.text)
-            self._page.send(Transcript(self._words, final=True))
+            self._show(Transcript(self._joined(frame.text), final=True))
+        elif isinstance(frame, VADUserStartedSpeakingFrame) and not self._in_turn:
+            self._words, self._early = "", None
         elif isinstance(frame, UserStartedSpeakingFrame):
-            self._page.show("listening")
-            self._words = ""
+            self._begin()
         elif isinstance(frame, UserStoppedSpeakingFrame):
+            self._in_turn = False
             self._page.show("thinking" if self._words else "idle")
+            self._words = ""
         await self.push_frame(frame, direction)
+
+    def _begin(self) -> None:
+        self._in_turn = True
+        self._page.show("listening")
+        if self._early is not None:
+            early, self._early = self._early, None
+            self._show(early)
+
+    def _show(self, transcript: Transcript) -> None:
+        if not self._in_turn:
+            self._early = transcript
+            return
+        if transcript.final:
+            self._words = transcript.text
+        self._page.send(transcript)
 
     def _joined(self, text: str) -> str:
         return f"{self._words} {text}".strip()[:4000]

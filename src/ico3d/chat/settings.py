@@ -31,15 +31,22 @@ class Choice:
 
 @dataclass(frozen=True)
 class Turns:
-    """When the visitor has finished: the table `[turns]`.
+    """Who speaks when: the table `[turns]`.
 
     Attributes:
         pause: Seconds of silence after which the end of a turn is considered.
         end_silence: Seconds of silence that end a turn even if it sounded unfinished.
+        speculate: Whether an answer is prepared as soon as the turn may be over; it is heard only
+            if it was. Costs a request for each pause within a turn.
+        interrupt_after: Seconds that a voice must last to interrupt the avatar.
+        longest_backchannel: Seconds after which even "uh-huh" and humming interrupt it.
     """
 
     pause: float = 0.2
     end_silence: float = 0.6
+    speculate: bool = True
+    interrupt_after: float = 0.45
+    longest_backchannel: float = 1.0
 
     def __post_init__(self):
         """Checks ranges.
@@ -51,6 +58,11 @@ class Turns:
             raise SettingsError(
                 "chat settings: 0.1 <= pause <= end_silence <= 10 seconds must hold."
             )
+        if not 0.1 <= self.interrupt_after <= self.longest_backchannel <= 10:
+            raise SettingsError(
+                "chat settings: 0.1 <= interrupt_after <= longest_backchannel <= 10 seconds "
+                "must hold."
+            )
 
 
 @dataclass(frozen=True)
@@ -61,7 +73,7 @@ class ChatSettings:
         recognition: Speech to text.
         language: Question to answer.
         voice: Text to speech.
-        turns: When the visitor has finished.
+        turns: Who speaks when.
         max_sessions: How many visitors at once, those included whose connection dropped.
         idle_minutes: A session ends when for so long nobody spoke or typed and nothing was played;
             0 for never.

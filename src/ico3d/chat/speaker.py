@@ -23,7 +23,7 @@ from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame, Utterances
 from ico3d.chat.gestures import Gestures
 from ico3d.chat.page import Page
 from ico3d.chat.playback import Playback
-from ico3d.chat.protocol import Answer, Clock, End, Stop
+from ico3d.chat.protocol import Answer, Clock, End, Pause, Resume, Stop
 
 SOONEST = 0.005  # s between two looks at the clock
 
@@ -45,6 +45,7 @@ class Speaker(FrameProcessor):
         self._playback = Playback()
         self._moved = asyncio.Event()  # the page's clock or connection changed
         self._speaking: int | None = None
+        self._paused = False
 
     def clock(self, message: Clock) -> None:
         """The page says how far it has played."""
@@ -59,7 +60,22 @@ class Speaker(FrameProcessor):
 
     def release(self) -> None:
         """The page is back."""
-        self._playback.release(self._now())
+        self._go_on()
+
+    def hush(self, silent: bool) -> None:
+        """Pauses what is heard, or goes on with it; nothing of it is lost."""
+        if self._speaking is None or silent == self._paused:
+            return
+        self._paused = silent
+        self._page.send(Pause(self._speaking) if silent else Resume(self._speaking))
+        if silent:
+            self._playback.hold(self._now())
+        else:
+            self._go_on()
+
+    def _go_on(self) -> None:
+        if self._page.is_attached and not self._paused:
+            self._playback.release(self._now())
         self._moved.set()
 
     def is_speaking(self, utterance: int | None) -> bool:
@@ -98,7 +114,7 @@ class Speaker(FrameProcessor):
         self._playback.sent(end, self._now())
 
     async def _begin(self, utterance: int) -> None:
-        self._speaking = utterance
+        self._speaking, self._paused = utterance, False
         self._playback.begin(utterance)
         self._page.show("speaking")
         await self.broadcast_frame(BotStartedSpeakingFrame)
@@ -120,6 +136,8 @@ class Speaker(FrameProcessor):
         if self._gestures is not None:
             self._gestures.stop()
         if utterance is not None:
+            self._paused = False
+            self._go_on()
             self._page.send(Stop(utterance))
             await self.broadcast_frame(BotStoppedSpeakingFrame)
 

@@ -21,7 +21,8 @@ from pipecat.frames.frames import (
     VADUserStoppedSpeakingFrame,
 )
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
-from pipecat.services.settings import STTSettings, TTSSettings
+from pipecat.services.llm_service import LLMService
+from pipecat.services.settings import LLMSettings, STTSettings, TTSSettings
 from pipecat.services.stt_service import STTService
 from pipecat.services.tts_service import TTSService
 from pipecat.utils.time import time_now_iso8601
@@ -89,12 +90,12 @@ class Recognition(STTService):
         await self.push_frame(words)
 
 
-class Language(FrameProcessor):
+class Language(LLMService):
     """Gives every question the same answer, word by word."""
 
     def __init__(self, script: Script):
         """A model for one session."""
-        super().__init__()
+        super().__init__(settings=LLMSettings(model="scripted"))
         self._script = script
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
