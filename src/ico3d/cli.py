@@ -41,7 +41,7 @@ VERBS: dict[str, Verb] = {
     "serve": Verb("ico3d.chat.commands", "Serve", "serve a bundle and talk with it"),
     "bench body": Verb("ico3d.measure.commands", "BenchBody", "compare methods for bodies"),
     "bench raster": Verb("ico3d.measure.commands", "BenchRaster", "time the rasteriser"),
-    "bench talk": Verb("ico3d.measure.commands", "BenchTalk", "time question to answer"),
+    "bench chat": Verb("ico3d.measure.commands", "BenchChat", "time answers and interruptions"),
 }
 
 
