@@ -11,6 +11,7 @@ import numpy as np
 from rich.table import Table
 
 from ico3d.chat.settings import Turns
+from ico3d.errors import Ico3dError
 from ico3d.measure import chat
 from ico3d.measure.commands import Kind
 from ico3d.measure.questions import Sayings
@@ -59,7 +60,27 @@ def measure(
         kinds: Which trials.
         turns: How many of each kind.
         told: Called after each.
+
+    Raises:
+        Ico3dError: If a server does not answer.
     """
+    try:
+        return _measure(bundle, settings, said, kinds, turns, told)
+    except TimeoutError as error:
+        raise Ico3dError(
+            "the avatar did not answer for 20 s: the machine is too busy, or a service fails "
+            "(ico3d serve --verbose tells which)."
+        ) from error
+
+
+def _measure(
+    bundle: Path,
+    settings: Path | None,
+    said: Sayings,
+    kinds: Sequence[Kind],
+    turns: int,
+    told: Told,
+) -> Results:
     results = Results()
     real: list[Kind] = [kind for kind in kinds if kind != "share"]
     if real:

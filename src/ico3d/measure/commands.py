@@ -195,8 +195,11 @@ class BenchChat:
         from rich.console import Console
         from rich.progress import Progress
 
+        from ico3d.chat.commands import set_up_log
         from ico3d.common.files import write_atomic
         from ico3d.errors import SettingsError
+
+        set_up_log(verbose=False)
         from ico3d.measure import chat_bench
         from ico3d.measure.questions import sayings
 
