@@ -35,6 +35,8 @@ from ico3d.chat.settings import ChatSettings, Turns
 from ico3d.chat.speaker import Speaker
 from ico3d.chat.timing import Clock, TurnObserver
 from ico3d.chat.turns.detector import Ear, VoiceDetector
+from ico3d.chat.turns.echo import EchoGuard
+from ico3d.chat.turns.echo_filter import EchoFilter
 from ico3d.chat.turns.strategies import strategies
 from ico3d.speech.runtime import SpeechModel
 
@@ -89,7 +91,8 @@ class Conversation:
         gestures = avatar.animation and Gestures(
             avatar.animation, page, self._utterances, avatar.settings.gestures
         )
-        self._speaker = Speaker(page, self._utterances, gestures, now)
+        self._echo = EchoGuard()
+        self._speaker = Speaker(page, self._utterances, self._echo.sent, gestures, now)
         self._worker: PipelineWorker | None = None
         self._task: asyncio.Task | None = None
 
@@ -167,6 +170,7 @@ class Conversation:
         return Pipeline(
             [
                 self._input,
+                EchoFilter(self._echo, self._speaker.heard, self._now),
                 VoiceDetector(parts.ear),
                 parts.recognition,
                 self._captions,

@@ -47,12 +47,18 @@ class VoiceFrame(SystemFrame):
     """What the last 20-100 ms from the microphone were; long before the VAD is sure.
 
     Parameters:
+        at: Seconds that the microphone had sent before.
+        seconds: How long this is.
         voiced: Whether there is a voice in them.
         plain: Whether all of the voice so far was one and the same vowel or hum.
+        fading: Whether it is much quieter than it was, as at the end of a word.
     """
 
+    at: float = 0.0
+    seconds: float = 0.0
     voiced: bool = False
     plain: bool = False
+    fading: bool = False
 
 
 @dataclass

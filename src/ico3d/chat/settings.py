@@ -45,7 +45,7 @@ class Turns:
     pause: float = 0.2
     end_silence: float = 0.6
     speculate: bool = True
-    interrupt_after: float = 0.45
+    interrupt_after: float = 0.4
     longest_backchannel: float = 1.0
 
     def __post_init__(self):

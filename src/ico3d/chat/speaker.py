@@ -24,6 +24,7 @@ from ico3d.chat.gestures import Gestures
 from ico3d.chat.page import Page
 from ico3d.chat.playback import Playback
 from ico3d.chat.protocol import Answer, Clock, End, Pause, Resume, Stop
+from ico3d.chat.turns.echo import SentSound
 
 SOONEST = 0.005  # s between two looks at the clock
 
@@ -35,12 +36,21 @@ class Speaker(FrameProcessor):
         self,
         page: Page,
         utterances: Utterances,
+        sent: SentSound,
         gestures: Gestures | None = None,
         now: Callable[[], float] = time.monotonic,
     ):
-        """A speaker for one session; `gestures` move its body, if it has one."""
+        """A speaker for one session.
+
+        Args:
+            page: Who hears it.
+            utterances: Which answers were stopped.
+            sent: Is told what the page can play, and may come back as echo.
+            gestures: Move the avatar's body, if it has one.
+            now: The clock, seconds.
+        """
         super().__init__()
-        self._page, self._utterances, self._now = page, utterances, now
+        self._page, self._utterances, self._sent, self._now = page, utterances, sent, now
         self._gestures = gestures
         self._playback = Playback()
         self._moved = asyncio.Event()  # the page's clock or connection changed
@@ -61,6 +71,12 @@ class Speaker(FrameProcessor):
     def release(self) -> None:
         """The page is back."""
         self._go_on()
+
+    def heard(self) -> float | None:
+        """Seconds of the utterance that sound at the page now; None while it is silent."""
+        if self._speaking is None or self._paused:
+            return None
+        return self._playback.position(self._now())
 
     def hush(self, silent: bool) -> None:
         """Pauses what is heard, or goes on with it; nothing of it is lost."""
@@ -111,6 +127,7 @@ class Speaker(FrameProcessor):
         if frame.text is not None:
             self._page.send(Answer(frame.utterance, frame.first_sample, frame.text))
         self._page.send_speech(frame)
+        self._sent.add(frame.utterance, frame.pcm)
         self._playback.sent(end, self._now())
 
     async def _begin(self, utterance: int) -> None:

@@ -14,6 +14,7 @@ export interface Gestures {
 }
 
 const CLOCK_PERIOD = 200; // ms between reports of what has been heard
+const KEPT_OPEN = 20_000; // ms after talking by the button: opening a microphone costs the first words
 
 /** What the page shows of a conversation. */
 export interface ConversationView {
@@ -23,6 +24,7 @@ export interface ConversationView {
   services(services: Services): void;
   notice(sentence: string): void;
   microphone(open: boolean): void;
+  talking(held: boolean): void;
   latency(milliseconds: number): void;
   metrics(name: string, values: Record<string, number>): void;
   failed(error: PageError): void;
@@ -40,6 +42,9 @@ export class Conversation {
   private readonly meter = new VoiceMeter();
   private readonly timer = new TurnTimer();
   private sample = 0; // of the microphone
+  private open = false; // what the microphone hears is sent
+  private held = false; // the button to talk is
+  private closing: ReturnType<typeof setTimeout> | undefined;
 
   constructor(url: string, view: ConversationView) {
     this.view = view;
@@ -52,6 +57,8 @@ export class Conversation {
     this.microphone = new Microphone(
       (pcm) => this.hear(pcm),
       (error) => {
+        this.open = false;
+        this.release();
         view.microphone(false);
         view.notice(error.message);
       },
@@ -86,21 +93,43 @@ export class Conversation {
 
   /** Opens or closes the microphone; what hinders it is shown as a notice. */
   async toggleMicrophone(): Promise<void> {
-    if (this.microphone.open) {
-      this.microphone.stop();
-      this.view.microphone(false);
-      return;
-    }
+    this.open = !this.open && (await this.startMicrophone());
+    if (!this.open) this.microphone.stop();
+    this.view.microphone(this.open);
+  }
+
+  /** Push to talk: from here to `release` all that the microphone hears is one turn. */
+  async press(): Promise<void> {
+    if (this.held) return;
+    this.held = true;
+    clearTimeout(this.closing);
+    const started = await this.startMicrophone();
+    if (!this.held) return; // let go while the browser asked for the microphone
+    this.held = started && this.connection.send({ type: 'talk', pressed: true });
+    this.view.talking(this.held);
+  }
+
+  release(): void {
+    if (!this.held) return;
+    this.held = false;
+    this.connection.send({ type: 'talk', pressed: false });
+    this.view.talking(false);
+    this.closing = setTimeout(() => this.open || this.microphone.stop(), KEPT_OPEN);
+  }
+
+  private async startMicrophone(): Promise<boolean> {
+    if (this.microphone.open) return true;
     try {
       this.sample = 0;
       await this.microphone.start();
     } catch (error) {
       this.view.notice((error as Error).message);
     }
-    this.view.microphone(this.microphone.open);
+    return this.microphone.open;
   }
 
   private hear(pcm: Int16Array): void {
+    if (!this.open && !this.held) return;
     this.meter.hear(pcm, performance.now());
     this.connection.send({ type: 'audio', sample: this.sample, pcm });
     this.sample += pcm.length;
@@ -132,6 +161,11 @@ export class Conversation {
         return this.player.end(message.utterance, message.samples);
       case 'stop':
         return this.player.stop(message.utterance);
+      case 'pause':
+        this.player.pause(message.utterance);
+        return this.reportHeard();
+      case 'resume':
+        return this.player.resume(message.utterance);
       case 'metrics':
         return this.view.metrics(message.name, message.values);
       case 'error':

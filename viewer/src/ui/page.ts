@@ -39,6 +39,7 @@ export function makePage(overlay: Overlay, frames: () => number): Page {
     services: showStandIns,
     notice: showNotice,
     microphone: (open) => controls.setMicrophone(open),
+    talking: (held) => controls.setTalking(held),
     latency: (milliseconds) => panel.latency(milliseconds),
     metrics: (name, values) => panel.metrics(name, values),
     failed: (error) => overlay.fail(error.message),

@@ -20,6 +20,8 @@ QUIETEST = 0.4  # smoothed volume of speech; it rises over 0.2 s, so more would 
 HINT = 0.5  # Silero's confidence that makes a first hint
 AUDIBLE = 0.01  # RMS of a voice that is near, full scale = 1
 PLAIN = 2.6  # dB; "uh-huh" and "aha" of 6 voices: up to 2.0, speech and "yeah": from 3.4
+FADED = 0.03  # of its loudest power: 15 dB down
+KEPT = 100  # frames of a voice that are compared: 2 s
 AFTERGLOW = 1.0  # s of silence behind a voice that are told of, too
 
 
@@ -71,12 +73,19 @@ class Timbre:
         whole = len(samples) - len(samples) % self._bands.length
         self._rest = samples[whole:]
         fresh = self._bands.energies(samples[:whole])  # (frames, bands)
-        self._energies = np.concatenate([self._energies.reshape(-1, fresh.shape[1]), fresh])
+        known = self._energies[-KEPT:].reshape(-1, fresh.shape[1])
+        self._energies = np.concatenate([known, fresh])
 
     @property
     def is_plain(self) -> bool:
         """Whether the spectrum's shape has stayed the same."""
         return bool(self.spread < PLAIN)
+
+    @property
+    def is_fading(self) -> bool:
+        """Whether its last frames are much quieter than its loudest."""
+        total = self._energies.sum(axis=1)
+        return bool(total[-2:].mean() < FADED * total.max()) if len(total) else False
 
     @property
     def spread(self) -> float:
@@ -97,6 +106,7 @@ class VoiceDetector(VADProcessor):
         super().__init__(vad_analyzer=ear)
         self._ear = ear
         self._timbre = Timbre()
+        self._heard = 0.0  # s
         self._silence = AFTERGLOW  # s since a voice
         self._held = False
 
@@ -113,13 +123,15 @@ class VoiceDetector(VADProcessor):
             await self._hold()
 
     async def _tell(self, samples: np.ndarray) -> None:
-        voiced = self._ear.voiced
-        self._silence = 0.0 if voiced else self._silence + len(samples) / MICROPHONE_RATE
+        seconds, voiced = len(samples) / MICROPHONE_RATE, self._ear.voiced
+        at, self._heard = self._heard, self._heard + seconds
+        self._silence = 0.0 if voiced else self._silence + seconds
         if self._silence >= AFTERGLOW:
             self._timbre.forget()
             return
         self._timbre.hear(samples)
-        await self.push_frame(VoiceFrame(voiced, self._timbre.is_plain))
+        plain, fading = self._timbre.is_plain, self._timbre.is_fading
+        await self.push_frame(VoiceFrame(at, seconds, voiced, plain, fading))
 
     async def _hold(self) -> None:
         if self._held:

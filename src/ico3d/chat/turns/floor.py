@@ -2,16 +2,19 @@
 
 The avatar falls silent at the first sign of a voice, which costs nothing: its sound waits. What
 follows decides: a voice that goes on takes the floor, and so do words; "uh-huh" and a cough give
-it back. Everything is decided from what was heard and the time, so that it runs on any clock.
+it back. Voices are measured by the microphone's samples: sound that a busy machine takes late is
+no longer for it.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
+from ico3d.chat.frames import VoiceFrame
 from ico3d.chat.settings import Turns
 from ico3d.chat.turns.phrases import Phrases
 
+LAST_SOUND = 0.16  # s; a voice that fades is given time to end: "okay" is over, a question goes on
 GONE = 0.2  # s of silence after which what never became a voice is over
 UNDERSTOOD = 0.6  # s of silence within which a recogniser tells what a short voice said
 BRIEF = 0.2  # s; no recogniser is asked about less
@@ -31,7 +34,7 @@ class Voice:
     """A voice that began while the avatar spoke.
 
     Attributes:
-        since: When it began.
+        since: When it began, seconds of microphone.
         last: When it was last heard.
         words: What the recogniser has understood so far.
         paused: Whether the avatar is silent for it.
@@ -59,6 +62,7 @@ class Floor:
         self._settings, self._phrases, self._trusted, self._now = settings, phrases, trusted, now
         self._speaking = False
         self._voice: Voice | None = None
+        self._behind = 0.0  # clock less seconds of microphone
 
     @property
     def is_paused(self) -> bool:
@@ -68,7 +72,7 @@ class Floor:
     @property
     def is_disputed(self) -> bool:
         """Whether words that come now may be those of a voice over the avatar's."""
-        return self._voice is not None and self._now() - self._voice.last <= LATE
+        return self._voice is not None and self._time() - self._voice.last <= LATE
 
     @property
     def is_speaking(self) -> bool:
@@ -81,24 +85,20 @@ class Floor:
         if not speaking and self.is_paused:
             self._voice = None
 
-    def hear(self, voiced: bool, plain: bool = False) -> Verdict | None:
-        """The next 20-100 ms from the microphone.
-
-        Args:
-            voiced: Whether there is a voice in it.
-            plain: Whether all of the voice so far was one and the same vowel or hum.
-        """
-        now = self._now()
-        if voiced and self._speaking and not self.is_paused:
-            self._voice = Voice(now, now)
+    def hear(self, sound: VoiceFrame) -> Verdict | None:
+        """The next piece from the microphone."""
+        end = sound.at + sound.seconds
+        self._behind = self._now() - end
+        if sound.voiced and self._speaking and not self.is_paused:
+            self._voice = Voice(sound.at, end)
             return Verdict.PAUSE
         if self._voice is None or not self._voice.paused:
             return None
-        if voiced:
-            self._voice.last = now
-            lasting = now - self._voice.since >= self._needed(self._voice, plain)
-            return self._yield() if lasting else None
-        return self.wait()
+        if not sound.voiced:
+            return self.wait()
+        self._voice.last = end
+        lasts = round(end - self._voice.since, 3) >= self._needed(self._voice, sound)
+        return self._yield() if lasts else None
 
     def wait(self) -> Verdict | None:
         """Time passes."""
@@ -106,7 +106,7 @@ class Floor:
         if voice is None or not voice.paused:
             return None
         brief = voice.last - voice.since < BRIEF
-        if self._now() - voice.last < (GONE if brief else UNDERSTOOD):
+        if round(self._time() - voice.last, 3) < (GONE if brief else UNDERSTOOD):
             return None
         voice.paused = False
         return Verdict.RESUME
@@ -124,15 +124,21 @@ class Floor:
         paused, self._voice = voice.paused, None
         return Verdict.RESUME if paused else None
 
+    def _time(self) -> float:
+        """Seconds of microphone, gone on by the clock since it was heard last."""
+        return self._now() - self._behind
+
     def _is_turn(self, text: str, final: bool) -> bool:
         if not self._trusted:
             return final and self._phrases.is_command(text)
         return bool(text.strip()) and not self._phrases.are_backchannels(text)
 
-    def _needed(self, voice: Voice, plain: bool) -> float:
-        known = self._trusted and self._phrases.are_backchannels(voice.words)
+    def _needed(self, voice: Voice, sound: VoiceFrame) -> float:
+        """Seconds that a voice must last."""
         settings = self._settings
-        return settings.longest_backchannel if known or plain else settings.interrupt_after
+        if sound.plain or (self._trusted and self._phrases.are_backchannels(voice.words)):
+            return settings.longest_backchannel
+        return settings.interrupt_after + (LAST_SOUND if sound.fading else 0.0)
 
     def _yield(self) -> Verdict:
         self._voice = None

@@ -56,7 +56,7 @@ class FloorTurnStart(BaseUserTurnStartStrategy):
         elif isinstance(frame, BotStoppedSpeakingFrame):
             await self._fall_silent()
         elif isinstance(frame, VoiceFrame):
-            await self._follow(self._floor.hear(frame.voiced, frame.plain))
+            await self._follow(self._floor.hear(frame))
         elif isinstance(frame, TalkFrame):
             if frame.pressed:
                 await self.trigger_user_turn_started()
