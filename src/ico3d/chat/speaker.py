@@ -88,7 +88,7 @@ class Speaker(FrameProcessor):
         """Seconds of the utterance that sound at the page now; None while it is silent."""
         if self._speaking is None or self._paused:
             return None
-        return self._playback.position(self._now())
+        return self._playback.heard(self._now())
 
     def hush(self, silent: bool) -> None:
         """Pauses what is heard, or goes on with it; nothing of it is lost."""

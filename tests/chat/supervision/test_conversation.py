@@ -8,7 +8,6 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 from pipecat.services.openai.stt import OpenAISTTService
-from pipecat.services.openai.tts import OpenAITTSService
 from starlette.responses import JSONResponse, PlainTextResponse
 
 from ico3d.chat.protocol import Answer, End, Error, Speech, State, Text
@@ -62,17 +61,12 @@ class Url:
 
 @pytest.fixture(autouse=True)
 def providers(monkeypatch):
-    """pipecat's own services as providers."""
-
-    def voice(options, context):
-        del context
-        return OpenAITTSService(api_key="none", base_url=options.url)
+    """pipecat's own recogniser as a provider."""
 
     def recognition(options, context):
         del context
         return OpenAISTTService(api_key="none", base_url=options.url)
 
-    monkeypatch.setitem(TABLES["voice"], "a-server", Provider("a server", Url, voice))
     monkeypatch.setitem(TABLES["recognition"], "a-server", Provider("a server", Url, recognition))
 
 
@@ -103,7 +97,7 @@ def language_at(url):
 
 
 def voice_at(url):
-    return Choice("a-server", {"url": url})
+    return Choice("openai", {"url": url})
 
 
 async def test_a_language_model_that_fails_is_apologised_for(bundle):
