@@ -45,7 +45,7 @@ test('what the browser understood is answered, and the page says who hears it', 
           says('Who are you?', true);
         }, 20);
       }
-      abort(): void {
+      stop(): void {
         this.onend!();
       }
     }

@@ -103,7 +103,8 @@ export class Conversation {
   /** Opens or closes the microphone; what hinders it is shown as a notice. */
   async toggleMicrophone(): Promise<void> {
     this.open = !this.open && (await this.startMicrophone());
-    if (!this.open) this.stopMicrophone();
+    this.dictate();
+    if (!this.open) this.microphone.stop();
     this.view.microphone(this.open);
   }
 
@@ -116,6 +117,7 @@ export class Conversation {
     if (!this.held) return; // let go while the browser asked for the microphone
     this.held = started && this.connection.send({ type: 'talk', pressed: true });
     this.view.talking(this.held);
+    this.dictate();
   }
 
   release(): void {
@@ -123,27 +125,26 @@ export class Conversation {
     this.held = false;
     this.connection.send({ type: 'talk', pressed: false });
     this.view.talking(false);
-    if (this.open) return;
-    this.listening.close();
+    this.dictate();
     this.closing = setTimeout(() => this.open || this.microphone.stop(), KEPT_OPEN);
   }
 
-  private stopMicrophone(): void {
-    this.listening.close();
-    this.microphone.stop();
+  private async startMicrophone(): Promise<boolean> {
+    if (this.microphone.open) return true;
+    try {
+      this.sample = 0;
+      await this.microphone.start();
+    } catch (error) {
+      this.view.notice((error as Error).message);
+    }
+    return this.microphone.open;
   }
 
-  private async startMicrophone(): Promise<boolean> {
-    if (!this.microphone.open) {
-      try {
-        this.sample = 0;
-        await this.microphone.start();
-      } catch (error) {
-        this.view.notice((error as Error).message);
-      }
-    }
-    if (this.microphone.open) this.listening.open(this.microphone.track!);
-    return this.microphone.open;
+  /** The browser recognises speech, where it is asked to, while the server hears it too. */
+  private dictate(): void {
+    const track = this.open || this.held ? this.microphone.track : null;
+    if (track) this.listening.open(track);
+    else this.listening.close();
   }
 
   private hear(pcm: Int16Array): void {

@@ -8,6 +8,8 @@ export interface Recognition extends EventTarget {
   onend: (() => void) | null;
   /** Older browsers ignore the track and take the microphone as it is, without echo cancellation. */
   start(track?: MediaStreamTrack): void;
+  /** No more is recorded; results of what was recorded come still. */
+  stop(): void;
   abort(): void;
 }
 
@@ -36,7 +38,7 @@ export class Dictation {
   private readonly heard: (result: number, text: string, final: boolean) => void;
   private readonly failed: (reason: string) => void;
   private track: MediaStreamTrack | null = null; // null: not to listen
-  private running = false; // stays so for a moment after `abort`
+  private running = false; // stays so after `stop` until the last words have come
   private first = 0; // number of the first result since the last start
   private next = 0;
   private started = 0;
@@ -74,12 +76,14 @@ export class Dictation {
   }
 
   stop(): void {
+    if (!this.track) return;
     this.track = null;
     clearTimeout(this.restart);
-    this.recognition.abort();
+    this.recognition.stop();
   }
 
   private begin(): void {
+    clearTimeout(this.restart);
     this.first = this.next;
     this.started = performance.now();
     try {
@@ -91,7 +95,6 @@ export class Dictation {
   }
 
   private take({ resultIndex, results }: RecognitionResults): void {
-    if (!this.track) return;
     this.vain = 0;
     for (let index = resultIndex; index < results.length; index++) {
       const result = results[index]!;
@@ -112,7 +115,8 @@ export class Dictation {
 
   private fail(reason: string): void {
     if (!this.track) return;
-    this.stop();
+    this.track = null;
+    this.recognition.abort();
     this.failed(reason);
   }
 }
