@@ -78,12 +78,17 @@ def free_port():
 
 
 @contextlib.asynccontextmanager
-async def serving(bundle, settings=None, resume_seconds=30.0, persona=None):
-    """Yields the URL and the sessions of a running server; by default the offline one."""
+async def serving(
+    bundle, settings=None, resume_seconds=30.0, persona=None, adapt=lambda avatar: avatar
+):
+    """Yields the URL and the sessions of a running server; by default the offline one.
+
+    `adapt` changes what its sessions share.
+    """
     listener = server.bind("127.0.0.1", 0)
     avatar, sessions = None, None
     if bundle.manifest.head:
-        avatar = server.open_avatar(bundle, settings or OFFLINE, persona)
+        avatar = adapt(server.open_avatar(bundle, settings or OFFLINE, persona))
         sessions = Sessions(avatar, resume_seconds)
     running = server.make_server(server.make_app(bundle, avatar, "127.0.0.1", sessions))
     task = asyncio.create_task(running.serve(sockets=[listener]))

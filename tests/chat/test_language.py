@@ -222,7 +222,7 @@ async def test_the_server_of_this_machine_is_the_best(monkeypatch):
         assert described.name == "a server on this machine (tiny)" and not described.stand_in
         made = await asyncio.to_thread(service.make, Context(ADA, None, None))
         assert made._settings.model == "tiny"
-    assert not local.works(local.Settings())
+    assert "start Ollama" in local.hindrance(local.Settings())
     with pytest.raises(SettingsError, match="no OpenAI-compatible server"):
         service.make(Context(ADA, None, None))
 

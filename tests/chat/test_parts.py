@@ -36,6 +36,17 @@ def test_playback_follows_the_pages_clock():
     assert playback.position(12.0) == 3.0 and playback.remaining(12.0) == 0.0
 
 
+def test_late_reports_do_not_make_the_page_seem_behind():
+    playback = Playback()
+    playback.begin(0)
+    playback.sent(72_000, now=10.0)
+    for now, position in [(10.3, 0.25), (10.5, 0.45), (10.8, 0.5)]:  # the last was on its way long
+        playback.clock(0, position, now)
+    assert playback.position(11.0) == pytest.approx(0.7)
+    assert playback.heard(11.0) == pytest.approx(0.95)
+    assert playback.heard(20.0) == 3.0
+
+
 def test_playback_stands_still_while_the_page_is_away():
     playback = Playback()
     playback.begin(0)
@@ -227,12 +238,12 @@ def test_wrong_settings_are_one_sentence(tmp_path, text):
     assert "\n" not in str(error.value)
 
 
-def provider(works: bool) -> Provider:
-    return Provider(f"works: {works}", Turns, lambda *_: None, lambda options: works)
+def provider(hindrance: str) -> Provider:
+    return Provider("a provider", Turns, lambda *_: None, lambda options: hindrance)
 
 
 def test_the_best_is_the_first_that_works():
-    table = {"a": provider(False), "b": provider(True), "c": provider(True)}
+    table = {"a": provider("its weights are missing."), "b": provider(""), "c": provider("")}
     assert chosen(table, Choice(), "voice").provider is table["b"]
     assert chosen(table, Choice("a"), "voice").provider is table["a"], "asked for is not asked"
 

@@ -121,10 +121,10 @@ def test_it_is_the_best_only_where_its_weights_are(folder, tmp_path, monkeypatch
     import huggingface_hub.constants
 
     monkeypatch.setattr(huggingface_hub.constants, "HF_HUB_CACHE", str(tmp_path / "hub"))
-    assert qwen.works(qwen.Settings(str(folder)))
-    assert not qwen.works(qwen.Settings())
+    assert qwen.hindrance(qwen.Settings(str(folder))) == ""
+    assert "weights" in qwen.hindrance(qwen.Settings())
     (tmp_path / "config.json").write_text("{}")
-    assert not qwen.works(qwen.Settings(str(tmp_path))), "a configuration is no model"
+    assert qwen.hindrance(qwen.Settings(str(tmp_path))), "a configuration is no model"
     with pytest.raises(MissingModelError, match="ico3d weights fetch qwen2-0.5b"):
         choose(ChatSettings(language=Choice("qwen"))).language.make(CONTEXT)
     kept = tmp_path / "hub" / "models--Qwen--Qwen2-0.5B-Instruct"
@@ -132,6 +132,6 @@ def test_it_is_the_best_only_where_its_weights_are(folder, tmp_path, monkeypatch
     (kept / "refs").mkdir()
     (kept / "refs" / "main").write_text("abc")
     (kept / "snapshots" / "abc").symlink_to(folder)
-    assert qwen.works(qwen.Settings())
+    assert qwen.hindrance(qwen.Settings()) == ""
     only = {name: PROVIDERS[name] for name in ("qwen", "persona-notes")}
     assert chosen(only, Choice(), "language").provider.title == "a model in this process"

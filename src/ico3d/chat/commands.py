@@ -1,5 +1,6 @@
 """The verbs `serve` and `demo`."""
 
+import itertools
 import sys
 import webbrowser
 from dataclasses import dataclass
@@ -44,6 +45,7 @@ class Serve:
         from ico3d.bundle.format import Bundle
         from ico3d.bundle.persona import read_persona
         from ico3d.chat import server
+        from ico3d.chat.services import offers
         from ico3d.chat.settings import read_settings
 
         settings = read_settings(self.settings)
@@ -54,7 +56,7 @@ class Serve:
         app = server.make_app(bundle, avatar, self.host)
         url = server.address(listener)
         print(f"{(persona or bundle.manifest.persona).name} is at {url} (Ctrl+C ends)")
-        for line in described(avatar.services.described()) if avatar else []:
+        for line in described(avatar.services.described(), offers(settings)) if avatar else []:
             print(line)
         if not (server.STATIC / "index.html").is_file():
             print("The page is not built: run `make viewer`.", file=sys.stderr)
@@ -96,11 +98,20 @@ class Demo:
         ).run()
 
 
-def described(services) -> list[str]:
-    """One line for each service, and one that says it if they are only stand-ins."""
-    parts = {"listens": services.recognition, "thinks": services.language, "speaks": services.voice}
-    lines = [f"  {verb} with {service.name}" for verb, service in parts.items()]
-    if any(service.stand_in for service in parts.values()):
+def described(services, offers) -> list[str]:
+    """What serves, one line each; and what would be better, with what it needs."""
+    verbs = {"recognition": "listens", "language": "thinks", "voice": "speaks"}
+    lines, stand_ins = [], False
+    for kind, verb in verbs.items():
+        service = getattr(services, kind)
+        lines.append(f"  {verb} with {service.name}")
+        stand_ins = stand_ins or service.stand_in
+        better = itertools.takewhile(
+            lambda offer, name=service.name: offer.name != name,
+            (offer for offer in offers if offer.kind == kind),
+        )
+        lines += [f"    better: {o.name}; {o.hindrance}" for o in better if o.hindrance]
+    if stand_ins:
         lines.append("  (small offline stand-ins; choose others with --settings)")
     return lines
 

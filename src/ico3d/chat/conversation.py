@@ -4,11 +4,10 @@ import asyncio
 import time
 from dataclasses import dataclass
 
+from loguru import logger
 from pipecat.adapters.llm.schemas.tools_schema import ToolsSchema
 from pipecat.audio.turn.smart_turn.base_smart_turn import SmartTurnParams
 from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
-from pipecat.audio.vad.silero import SileroVADAnalyzer
-from pipecat.audio.vad.vad_analyzer import VADAnalyzer, VADParams
 from pipecat.pipeline.pipeline import Pipeline
 from pipecat.pipeline.worker import PipelineParams, PipelineWorker
 from pipecat.processors.aggregators.llm_context import LLMContext, NotGiven
@@ -16,11 +15,8 @@ from pipecat.processors.aggregators.llm_response_universal import (
     LLMContextAggregatorPair,
     LLMUserAggregatorParams,
 )
-from pipecat.processors.audio.vad_processor import VADProcessor
 from pipecat.processors.frame_processor import FrameProcessor
 from pipecat.services.tts_service import TTSService
-from pipecat.turns.user_start import VADUserTurnStartStrategy
-from pipecat.turns.user_stop import TurnAnalyzerUserTurnStopStrategy
 from pipecat.turns.user_turn_strategies import UserTurnStrategies
 from pipecat.workers.runner import WorkerRunner
 
@@ -32,17 +28,25 @@ from ico3d.chat.frames import Utterances
 from ico3d.chat.gestures import Gestures
 from ico3d.chat.listener import Captions, PageInput
 from ico3d.chat.memory import remembering
+from ico3d.chat.modules.mouth import RemoteMouth
 from ico3d.chat.page import Page
-from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Clock
+from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Clock, Error, Heard
 from ico3d.chat.services import Chosen
 from ico3d.chat.services.provider import Context
+from ico3d.chat.services.voice.clauses import ClauseProcessor
+from ico3d.chat.services.voice.markup import speakable
 from ico3d.chat.settings import ChatSettings
 from ico3d.chat.speaker import Speaker
+from ico3d.chat.supervision.language import AnswerGuard
+from ico3d.chat.supervision.voice import endure
 from ico3d.chat.timing import TurnTimer
 from ico3d.chat.tools import functions
+from ico3d.chat.turns.detector import Ear, VoiceDetector
+from ico3d.chat.turns.echo import EchoGuard
+from ico3d.chat.turns.echo_filter import EchoFilter
+from ico3d.chat.turns.strategies import strategies
 from ico3d.speech.runtime import SpeechModel
 
-QUIETEST = 0.4  # smoothed volume of speech; it rises over 0.2 s, so more would notice it later
 NOTHING_HEARD = 1.5  # s without words after which a turn that was only noise is over
 
 
@@ -57,6 +61,7 @@ class Avatar:
         services: Who listens, thinks and speaks.
         settings: Services and timing.
         animation: How its body moves; None for a head alone.
+        speech_sha256: Of the file of `speech`, by which a remote module knows that it is its own.
     """
 
     head: HeadInfo
@@ -65,13 +70,14 @@ class Avatar:
     services: Chosen
     settings: ChatSettings
     animation: Animation | None
+    speech_sha256: str = ""
 
 
 @dataclass(frozen=True)
 class Parts:
     """What takes a while to make; made in a thread."""
 
-    vad: VADAnalyzer
+    ear: Ear
     turn: LocalSmartTurnAnalyzerV3
     recognition: FrameProcessor
     language: FrameProcessor
@@ -83,7 +89,7 @@ class Conversation:
 
     def __init__(self, avatar: Avatar, page: Page):
         """A conversation that has not started."""
-        self._avatar = avatar
+        self._avatar, self._page = avatar, page
         self._timer = TurnTimer(time.monotonic)
         self._utterances = Utterances()
         self._input = PageInput()
@@ -91,15 +97,15 @@ class Conversation:
         gestures = avatar.animation and Gestures(
             avatar.animation, page, self._utterances, avatar.settings.gestures
         )
-        self._gestures = gestures
-        self._speaker = Speaker(page, self._utterances, self._timer, gestures)
+        self._echo, self._gestures = EchoGuard(), gestures
+        self._speaker = Speaker(page, self._utterances, self._timer, self._echo.sent, gestures)
         self._worker: PipelineWorker | None = None
         self._task: asyncio.Task | None = None
 
     async def start(self) -> None:
         """Builds and starts the pipeline (about 0.5 s, most of it in a thread)."""
         parts = await asyncio.to_thread(make_parts, self._avatar)
-        self._watch_voice(parts.voice)
+        self._prepare_voice(parts.voice)
         self._worker = PipelineWorker(
             self._pipeline(parts),
             params=PipelineParams(
@@ -134,6 +140,19 @@ class Conversation:
         self._timer.start()
         await self._input.ask(text)
 
+    async def talk(self, pressed: bool) -> None:
+        """The button of push to talk."""
+        await self._input.talk(pressed)
+
+    async def heard(self, message: Heard) -> None:
+        """What the browser's recogniser understood."""
+        await self._input.heard(message.result, message.text, message.final)
+
+    async def deaf(self, reason: str) -> None:
+        """The browser cannot recognise speech."""
+        logger.info(f"the browser does not recognise speech: {reason!r}")
+        await self._input.deaf()
+
     async def interrupt(self, utterance: int | None) -> None:
         """Silence, if that utterance (any, for null) is being said or prepared."""
         if utterance is None or self._speaker.is_speaking(utterance):
@@ -152,17 +171,25 @@ class Conversation:
         self._speaker.release()
 
     def _pipeline(self, parts: Parts) -> Pipeline:
-        face = Face(self._avatar.head, self._avatar.speech)
+        settings, face = self._avatar.settings, make_face(self._avatar)
+        turns, patience = settings.turns, settings.patience
+        trusted = not self._avatar.services.recognition.provider.stand_in
+        chosen = strategies(parts.turn, turns, trusted, self._speaker.hush)
         context = LLMContext(tools=self._functions(parts.language, face))
-        user, assistant = aggregators(parts.turn, self._avatar.settings, parts.language, context)
+        user, assistant = aggregators(chosen, settings, parts.language, context)
         return Pipeline(
             [
                 self._input,
-                VADProcessor(vad_analyzer=parts.vad),
+                EchoFilter(self._echo, self._speaker.heard),
+                VoiceDetector(parts.ear),
                 parts.recognition,
                 self._captions,
                 user,
                 parts.language,
+                AnswerGuard(
+                    parts.recognition, parts.language, patience.language, patience.apologies
+                ),
+                ClauseProcessor(),
                 parts.voice,
                 ExpressionProcessor(face, self._utterances, self._timer),
                 self._speaker,
@@ -170,14 +197,20 @@ class Conversation:
             ]
         )
 
+    def _complain(self, sentence: str) -> None:
+        self._page.send(Error(sentence, fatal=False))
+
     def _functions(self, language: FrameProcessor, face: Face) -> ToolsSchema | NotGiven:
         settings = self._avatar.settings
         moods = face.moods if self._avatar.head.eye_offset is not None else None
         return functions(language, self._gestures, moods, settings.tools, settings.allow)
 
-    def _watch_voice(self, voice: FrameProcessor) -> None:
-        """Takes the time at which the first sentence reaches the voice."""
+    def _prepare_voice(self, voice: FrameProcessor) -> None:
+        """Keeps markup and failures from it, and takes the time at which a piece reaches it."""
         if isinstance(voice, TTSService):
+            patience = self._avatar.settings.patience
+            endure(voice, patience.voice, patience.apologies, self._complain)
+            voice.add_text_transformer(speakable)
 
             async def requested(*_):
                 self._timer.mark("language")
@@ -185,15 +218,20 @@ class Conversation:
             voice.add_event_handler("on_tts_request", requested)
 
 
+def make_face(avatar: Avatar) -> Face:
+    """The face of one session, whose mouth another machine may move."""
+    settings, remote = avatar.settings.expression, None
+    if settings.use == "remote" and avatar.speech is not None:
+        remote = RemoteMouth(settings, avatar.speech, avatar.speech_sha256)
+    return Face(avatar.head, avatar.speech, remote=remote)
+
+
 def make_parts(avatar: Avatar) -> Parts:
     """Loads the models of one session."""
     turns, services = avatar.settings.turns, avatar.services
     context = Context(avatar.persona, avatar.head, avatar.animation)
     return Parts(
-        SileroVADAnalyzer(
-            sample_rate=MICROPHONE_RATE,
-            params=VADParams(stop_secs=turns.pause, min_volume=QUIETEST),
-        ),
+        Ear(turns.pause),
         LocalSmartTurnAnalyzerV3(params=SmartTurnParams(stop_secs=turns.end_silence - turns.pause)),
         services.recognition.make(context),
         services.language.make(context),
@@ -202,20 +240,15 @@ def make_parts(avatar: Avatar) -> Parts:
 
 
 def aggregators(
-    turn: LocalSmartTurnAnalyzerV3,
+    strategies: UserTurnStrategies,
     settings: ChatSettings,
     language: FrameProcessor,
     context: LLMContext,
 ) -> LLMContextAggregatorPair:
     """The two halves that keep the conversation's context and decide on turns."""
-    turns = settings.turns
-    strategies = UserTurnStrategies(
-        start=[VADUserTurnStartStrategy()],
-        stop=[TurnAnalyzerUserTurnStopStrategy(turn_analyzer=turn)],
-    )
     params = LLMUserAggregatorParams(
         user_turn_strategies=strategies,
-        user_turn_stop_timeout=max(NOTHING_HEARD, 2 * turns.end_silence),
+        user_turn_stop_timeout=max(NOTHING_HEARD, 2 * settings.turns.end_silence),
     )
     return LLMContextAggregatorPair(
         context, user_params=params, assistant_params=remembering(settings.memory, language)

@@ -45,6 +45,11 @@ class ExpressionProcessor(FrameProcessor):
         self._next_row = 0
         self._start = 0.0
 
+    async def cleanup(self):
+        """Lets the face go."""
+        await super().cleanup()
+        await asyncio.to_thread(self._face.close)
+
     async def process_frame(self, frame: Frame, direction: FrameDirection):
         """Replaces audio, watches where sentences and answers begin and end, passes the rest."""
         await super().process_frame(frame, direction)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from pipecat.frames.frames import DataFrame
+from pipecat.frames.frames import DataFrame, SystemFrame
 
 from ico3d.chat.protocol import SPEECH_RATE
 
@@ -40,6 +40,56 @@ class UtteranceEndFrame(DataFrame):
 
     utterance: int
     samples: int
+
+
+@dataclass
+class VoiceFrame(SystemFrame):
+    """What the last 20-100 ms from the microphone were; long before the VAD is sure.
+
+    Parameters:
+        at: Seconds that the microphone had sent before.
+        seconds: How long this is.
+        voiced: Whether there is a voice in them.
+        plain: Whether all of the voice so far was one and the same vowel or hum.
+        fading: Whether it is much quieter than it was, as at the end of a word.
+    """
+
+    at: float = 0.0
+    seconds: float = 0.0
+    voiced: bool = False
+    plain: bool = False
+    fading: bool = False
+
+
+@dataclass
+class TalkFrame(SystemFrame):
+    """Push to talk: the visitor holds the button or has let it go.
+
+    Parameters:
+        pressed: True when it goes down.
+    """
+
+    pressed: bool = False
+
+
+@dataclass
+class HeardFrame(SystemFrame):
+    """What the browser's recogniser understood.
+
+    Parameters:
+        result: Number of the result.
+        text: Its words so far.
+        final: Whether they stay as they are.
+    """
+
+    result: int = 0
+    text: str = ""
+    final: bool = False
+
+
+@dataclass
+class DeafFrame(SystemFrame):
+    """The browser's recogniser does not work."""
 
 
 class Utterances:

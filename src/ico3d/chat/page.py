@@ -12,6 +12,8 @@ from ico3d.chat.frames import SpeechFrame
 from ico3d.chat.protocol import (
     Answer,
     End,
+    Pause,
+    Resume,
     ServerMessage,
     Speech,
     State,
@@ -107,7 +109,7 @@ class Page:
         if isinstance(message, Stop):
             self._forget(message.utterance)
         final = isinstance(message, Transcript) and message.final
-        if final or isinstance(message, Answer | Speech | Timeline | End | Stop):
+        if final or isinstance(message, Answer | Speech | Timeline | End | Stop | Pause | Resume):
             self._log.append(message)
         self._put(message)
 

@@ -12,16 +12,16 @@ from fastapi import FastAPI, Request, Response, WebSocket
 from fastapi.responses import JSONResponse, PlainTextResponse
 from fastapi.staticfiles import StaticFiles
 
-from ico3d.bundle.format import Bundle
+from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.bundle.manifest import MANIFEST
 from ico3d.bundle.persona import Persona
 from ico3d.chat import protocol
 from ico3d.chat.connection import Connection
 from ico3d.chat.conversation import Avatar
 from ico3d.chat.face import open_face
-from ico3d.chat.guard import Guard
+from ico3d.chat.guard import LOOPBACK, Guard
 from ico3d.chat.protocol import Welcome
-from ico3d.chat.services import choose
+from ico3d.chat.services import choose, offers
 from ico3d.chat.sessions import Sessions
 from ico3d.chat.settings import ChatSettings
 from ico3d.errors import BundleError, SettingsError
@@ -49,7 +49,8 @@ def open_avatar(bundle: Bundle, settings: ChatSettings, persona: Persona | None 
     head, speech = open_face(bundle)
     persona = persona or bundle.manifest.persona
     services = choose(settings, persona.voice)
-    return Avatar(head, speech, persona, services, settings, bundle.animation)
+    sha256 = bundle.manifest.files[SPEECH].sha256 if speech else ""
+    return Avatar(head, speech, persona, services, settings, bundle.animation, sha256)
 
 
 def make_app(
@@ -63,8 +64,10 @@ def make_app(
         host: The address that the server is bound to.
         sessions: Where sessions live; a new place by default.
     """
-    if avatar is not None and sessions is None:
-        sessions = Sessions(avatar)
+    if avatar is not None:
+        sessions = Sessions(avatar) if sessions is None else sessions
+        if host in LOOPBACK:  # the visitor is at home: it may cost money, and tells of the machine
+            sessions.offers = offers(avatar.settings)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -93,8 +96,7 @@ def make_app(
 def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
     """The WebSocket."""
     notices = [] if avatar.speech else [STILL]
-    described = avatar.services.described()
-    welcome = Welcome(protocol.VERSION, "-", False, described, notices)
+    welcome = Welcome(protocol.VERSION, "-", False, avatar.services.described(), notices, None)
 
     @app.websocket("/ws")
     async def conversation(socket: WebSocket) -> None:

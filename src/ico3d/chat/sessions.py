@@ -2,10 +2,12 @@
 
 import asyncio
 import secrets
+from dataclasses import replace
 
 from ico3d.chat.conversation import Avatar, Conversation
 from ico3d.chat.page import Outbox, Page
-from ico3d.chat.protocol import RESUME_SECONDS, Hello
+from ico3d.chat.protocol import RESUME_SECONDS, Hello, Offer
+from ico3d.chat.services import wished
 
 
 class FullError(Exception):
@@ -18,6 +20,7 @@ class Session:
     def __init__(self, avatar: Avatar):
         """A session whose conversation has not started."""
         self.id = secrets.token_urlsafe(16)
+        self.services = avatar.services
         self.page = Page()
         self.conversation = Conversation(avatar, self.page)
         self.expiry: asyncio.TimerHandle | None = None
@@ -28,6 +31,8 @@ class Sessions:
 
     def __init__(self, avatar: Avatar, resume_seconds: float = RESUME_SECONDS):
         """No visitors yet."""
+        self.offers: list[Offer] = []
+        """What visitors may choose from."""
         self._avatar = avatar
         self._resume_seconds = resume_seconds
         self._open: dict[str, Session] = {}
@@ -53,7 +58,7 @@ class Sessions:
             session.conversation.release()
             return session, True
         self._make_room()
-        session = Session(self._avatar)
+        session = Session(self._wished(hello))
         self._open[session.id] = session
         session.page.attach(outbox)
         try:
@@ -75,6 +80,11 @@ class Sessions:
         for session in list(self._open.values()):
             self._close_soon(session)
         await asyncio.gather(*self._closing, return_exceptions=True)
+
+    def _wished(self, hello: Hello) -> Avatar:
+        avatar = self._avatar
+        services = wished(avatar.services, avatar.settings, hello.wishes, self.offers)
+        return replace(avatar, services=services)
 
     def _make_room(self) -> None:
         if len(self._open) < self._avatar.settings.max_sessions:

@@ -31,15 +31,22 @@ class Choice:
 
 @dataclass(frozen=True)
 class Turns:
-    """When the visitor has finished: the table `[turns]`.
+    """Who speaks when: the table `[turns]`.
 
     Attributes:
         pause: Seconds of silence after which the end of a turn is considered.
         end_silence: Seconds of silence that end a turn even if it sounded unfinished.
+        speculate: Whether an answer is prepared as soon as the turn may be over; it is heard only
+            if it was. Costs a request for each pause within a turn.
+        interrupt_after: Seconds that a voice must last to interrupt the avatar.
+        longest_backchannel: Seconds after which even "uh-huh" and humming interrupt it.
     """
 
     pause: float = 0.2
     end_silence: float = 0.6
+    speculate: bool = True
+    interrupt_after: float = 0.4
+    longest_backchannel: float = 1.0
 
     def __post_init__(self):
         """Checks ranges.
@@ -51,6 +58,65 @@ class Turns:
             raise SettingsError(
                 "chat settings: 0.1 <= pause <= end_silence <= 10 seconds must hold."
             )
+        if not 0.1 <= self.interrupt_after <= self.longest_backchannel <= 10:
+            raise SettingsError(
+                "chat settings: 0.1 <= interrupt_after <= longest_backchannel <= 10 seconds "
+                "must hold."
+            )
+
+
+@dataclass(frozen=True)
+class Patience:
+    """How long services may take before the avatar apologises: the table `[patience]`.
+
+    Attributes:
+        language: Seconds until the first words of an answer, and between two pieces of it.
+        voice: Seconds until the first sound of a sentence, and between two pieces of it.
+        apologies: Language that the avatar apologises in, such as `de`; English where it is none
+            of those known.
+    """
+
+    language: float = 12.0
+    voice: float = 8.0
+    apologies: str = "en"
+
+    def __post_init__(self):
+        """Checks ranges.
+
+        Raises:
+            SettingsError: If there is no patience at all.
+        """
+        if min(self.language, self.voice) < 0.1:
+            raise SettingsError("chat settings: [patience] needs at least 0.1 seconds for each.")
+
+
+@dataclass(frozen=True)
+class Expression:
+    """Where sound becomes a moving face: the table `[expression]`.
+
+    Attributes:
+        use: `own` for the avatar's speech model in this process; `remote` for the same one on
+            another machine, and in this process whenever that fails.
+        url: Of `ico3d serve-module expression`, such as `http://192.168.1.5:8766`.
+        key_variable: Environment variable that holds its key, if it wants one.
+        timeout: Seconds that a piece of sound may take before the face goes on here.
+    """
+
+    use: str = "own"
+    url: str = ""
+    key_variable: str = ""
+    timeout: float = 0.5
+
+    def __post_init__(self):
+        """Checks that they fit together.
+
+        Raises:
+            SettingsError: If they do not.
+        """
+        if self.use not in ("own", "remote"):
+            raise SettingsError(f"chat settings: expression '{self.use}': use own or remote.")
+        if self.use == "remote" and not self.url.startswith(("http://", "https://")):
+            raise SettingsError("chat settings: [expression] needs the url of the remote module.")
 
 
 @dataclass(frozen=True)
@@ -82,7 +148,9 @@ class ChatSettings:
         recognition: Speech to text.
         language: Question to answer.
         voice: Text to speech.
-        turns: When the visitor has finished.
+        turns: Who speaks when.
+        patience: How long services may take.
+        expression: Where sound becomes a moving face.
         max_sessions: How many visitors at once, those included whose connection dropped.
         gestures: Whether a body gestures while it speaks; otherwise it is held at rest.
         memory: What is still known of the conversation.
@@ -95,6 +163,8 @@ class ChatSettings:
     language: Choice = Choice()
     voice: Choice = Choice()
     turns: Turns = Turns()
+    patience: Patience = Patience()
+    expression: Expression = Expression()
     max_sessions: int = 4
     gestures: bool = True
     memory: Memory = Memory()

@@ -26,8 +26,9 @@ from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame, Utterances
 from ico3d.chat.gestures import Gestures
 from ico3d.chat.page import Page
 from ico3d.chat.playback import Playback
-from ico3d.chat.protocol import Answer, Clock, End, Metrics, Stop
+from ico3d.chat.protocol import Answer, Clock, End, Metrics, Pause, Resume, Stop
 from ico3d.chat.timing import TurnTimer
+from ico3d.chat.turns.echo import SentSound
 
 SOONEST = 0.005  # s between two looks at the clock
 
@@ -40,16 +41,28 @@ class Speaker(FrameProcessor):
         page: Page,
         utterances: Utterances,
         timer: TurnTimer,
+        sent: SentSound,
         gestures: Gestures | None = None,
         now: Callable[[], float] = time.monotonic,
     ):
-        """A speaker for one session; `gestures` move its body, if it has one."""
+        """A speaker for one session.
+
+        Args:
+            page: Who hears it.
+            utterances: Which answers were stopped.
+            timer: Of the turn.
+            sent: Is told what the page can play, and may come back as echo.
+            gestures: Move the avatar's body, if it has one.
+            now: The clock, seconds.
+        """
         super().__init__()
+        self._sent = sent
         self._page, self._utterances, self._timer, self._now = page, utterances, timer, now
         self._gestures = gestures
         self._playback = Playback()
         self._moved = asyncio.Event()  # the page's clock or connection changed
         self._speaking: int | None = None
+        self._paused = False
         self._turn_start: float | None = None  # of the turn that `played` is to be told of
         self._calls: set[str] = set()  # functions that the language model waits for
 
@@ -73,7 +86,28 @@ class Speaker(FrameProcessor):
 
     def release(self) -> None:
         """The page is back."""
-        self._playback.release(self._now())
+        self._go_on()
+
+    def heard(self) -> float | None:
+        """Seconds of the utterance that sound at the page now; None while it is silent."""
+        if self._speaking is None or self._paused:
+            return None
+        return self._playback.heard(self._now())
+
+    def hush(self, silent: bool) -> None:
+        """Pauses what is heard, or goes on with it; nothing of it is lost."""
+        if self._speaking is None or silent == self._paused:
+            return
+        self._paused = silent
+        self._page.send(Pause(self._speaking) if silent else Resume(self._speaking))
+        if silent:
+            self._playback.hold(self._now())
+        else:
+            self._go_on()
+
+    def _go_on(self) -> None:
+        if self._page.is_attached and not self._paused:
+            self._playback.release(self._now())
         self._moved.set()
 
     def is_speaking(self, utterance: int | None) -> bool:
@@ -123,12 +157,13 @@ class Speaker(FrameProcessor):
         if frame.text is not None:
             self._page.send(Answer(frame.utterance, frame.first_sample, frame.text))
         self._page.send_speech(frame)
+        self._sent.add(frame.utterance, frame.pcm)
         self._playback.sent(end, self._now())
         if self._timer.is_running():
             self._report()
 
     async def _begin(self, utterance: int) -> None:
-        self._speaking = utterance
+        self._speaking, self._paused = utterance, False
         self._playback.begin(utterance)
         self._page.show("speaking")
         await self.broadcast_frame(BotStartedSpeakingFrame)
@@ -157,6 +192,8 @@ class Speaker(FrameProcessor):
         if self._gestures is not None:
             self._gestures.stop()
         if utterance is not None:
+            self._paused = False
+            self._go_on()
             self._page.send(Stop(utterance))
             await self.broadcast_frame(BotStoppedSpeakingFrame)
 

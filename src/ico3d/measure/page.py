@@ -18,6 +18,8 @@ from ico3d.chat.protocol import (
     Clock,
     End,
     Hello,
+    Pause,
+    Resume,
     ServerMessage,
     Speech,
     Stop,
@@ -40,20 +42,28 @@ class Player:
         self.started = 0.0  # monotonic s of sample 0
         self.received = 0.0  # s of sound
         self._ended = True
+        self._paused: float | None = None  # position at which it waits
 
     def take(self, message: ServerMessage, now: float) -> None:
         """Follows what arrives."""
         if isinstance(message, Speech):
             if message.utterance != self.utterance:
                 self.utterance, self.started = message.utterance, now + SCHEDULING
-                self._ended = False
+                self._ended, self._paused = False, None
             last = message.first_sample + len(message.pcm)
             self.received = last / protocol.SPEECH_RATE
-        elif isinstance(message, Stop) and message.utterance == self.utterance:
-            self._ended = True
+        elif isinstance(message, Stop | Pause | Resume) and message.utterance == self.utterance:
+            if isinstance(message, Stop):
+                self._ended = True
+            elif isinstance(message, Pause):
+                self._paused = self.position(now)
+            elif self._paused is not None:
+                self.started, self._paused = now - self._paused, None
 
     def position(self, now: float) -> float:
         """Seconds of the utterance heard."""
+        if self._paused is not None:
+            return self._paused
         return float(np.clip(now - self.started, 0, self.received))
 
     def clock(self, now: float) -> Clock | None:
@@ -61,7 +71,7 @@ class Player:
         if self._ended:
             return None
         position = self.position(now)
-        self._ended = position >= self.received
+        self._ended = self._paused is None and position >= self.received
         return Clock(self.utterance, position, 0.0)
 
 

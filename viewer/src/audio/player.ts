@@ -1,24 +1,9 @@
-import { EXPRESSION_FPS, SPEECH_RATE, type SpeechMessage } from '../protocol.ts';
-import { ExpressionTrack } from '../face/track.ts';
+import { SPEECH_RATE } from '../protocol.ts';
 import type { Heard } from '../face/face.ts';
 import { heardTime } from './clock.ts';
-import { Schedule } from './schedule.ts';
+import { FADE, Voice, type Piece, type Sink } from './voice.ts';
 
 const GUARD = 0.02; // s: a start nearer than this may miss the block that is being rendered
-const LEAD = 0.05; // s more for a first piece: room for the next one to be late
-const FADE = 0.02; // s to silence when stopped
-
-/** 100–200 ms of an utterance: sound and face. */
-export type Piece = Omit<SpeechMessage, 'type' | 'index'>;
-
-interface Voice {
-  utterance: number;
-  schedule: Schedule;
-  track: ExpressionTrack;
-  gain: GainNode;
-  sources: Set<AudioBufferSourceNode>;
-  samples: number | null; // in all, once the server has said it
-}
 
 /** Plays utterances gaplessly on the AudioContext clock and says what is heard. */
 export class Player {
@@ -40,14 +25,10 @@ export class Player {
   play(piece: Piece): void {
     if (piece.utterance <= this.lastDropped) return;
     const voice = this.voices.find((v) => v.utterance === piece.utterance) ?? this.open(piece.utterance);
-    voice.track.add(piece.first_expression, piece.expressions);
-    if (piece.pcm.length === 0) return;
     const previous = this.voices[this.voices.indexOf(voice) - 1];
-    const now = Math.ceil((this.context.currentTime + GUARD) * SPEECH_RATE);
-    const first = voice.schedule.end === 0;
-    const start = voice.schedule.place(piece.first_sample, piece.pcm.length, now, previous?.schedule.end);
-    this.sound(voice, piece.pcm, start);
-    if (first) this.onStart(piece.utterance, start / SPEECH_RATE - this.heardNow());
+    const first = voice.schedule.end === 0 && !voice.paused;
+    voice.add(piece, previous?.schedule.end);
+    if (first && voice.schedule.end > 0) this.onStart(piece.utterance, voice.schedule.start / SPEECH_RATE - this.heardNow());
   }
 
   /** The server has sent all of an utterance. */
@@ -56,16 +37,25 @@ export class Player {
     if (voice) voice.samples = samples;
   }
 
+  /** An utterance falls silent at once, but goes on where it stopped when it is resumed. */
+  pause(utterance: number): void {
+    this.voices.find((v) => v.utterance === utterance)?.pause();
+  }
+
+  resume(utterance: number): void {
+    this.voices.find((v) => v.utterance === utterance)?.resume();
+  }
+
   /** Fades an utterance out at once and drops all that belongs to it, also what is yet to come. */
   stop(utterance: number): void {
     this.lastDropped = Math.max(this.lastDropped, utterance);
-    for (const voice of this.voices.filter((v) => v.utterance <= utterance)) this.silence(voice);
+    for (const voice of this.voices.filter((v) => v.utterance <= utterance)) voice.silence();
     this.voices = this.voices.filter((v) => v.utterance > utterance);
   }
 
   /** A new session counts its utterances from the start. */
   reset(): void {
-    for (const voice of this.voices) this.silence(voice);
+    for (const voice of this.voices) voice.silence();
     this.voices = [];
     this.lastDropped = -1;
   }
@@ -77,7 +67,7 @@ export class Player {
     const voice = this.voices.findLast((v) => v.schedule.start <= frame);
     if (!voice || voice.track.empty) return null;
     const seconds = voice.schedule.positionAt(frame) / SPEECH_RATE;
-    return { utterance: voice.utterance, seconds, track: voice.track };
+    return { utterance: voice.utterance, seconds, track: voice.track, paused: voice.paused };
   }
 
   /** The newest utterance that has not ended or been stopped. */
@@ -95,34 +85,31 @@ export class Player {
   }
 
   private open(utterance: number): Voice {
-    const gain = new GainNode(this.context);
-    gain.connect(this.output);
-    const voice: Voice = {
-      utterance,
-      schedule: new Schedule(Math.round(LEAD * SPEECH_RATE)),
-      track: new ExpressionTrack(EXPRESSION_FPS),
-      gain,
-      sources: new Set(),
-      samples: null,
-    };
+    const voice = new Voice(utterance, this.sink());
     this.voices.push(voice);
     return voice;
   }
 
-  private sound(voice: Voice, pcm: Int16Array, start: number): void {
-    const buffer = new AudioBuffer({ length: pcm.length, sampleRate: SPEECH_RATE, numberOfChannels: 1 });
-    buffer.copyToChannel(Float32Array.from(pcm, (value) => value / 0x8000), 0);
-    const source = new AudioBufferSourceNode(this.context, { buffer });
-    source.connect(voice.gain);
-    source.start(start / SPEECH_RATE);
-    voice.sources.add(source);
-    source.onended = () => voice.sources.delete(source);
-  }
-
-  private silence(voice: Voice): void {
-    const now = this.context.currentTime;
-    voice.gain.gain.setValueAtTime(1, now).linearRampToValueAtTime(0, now + FADE);
-    for (const source of voice.sources) source.stop(now + FADE);
+  /** A way into the loudspeaker with a volume of its own. */
+  private sink(): Sink {
+    const { context } = this;
+    const node = new GainNode(context);
+    node.connect(this.output);
+    return {
+      now: () => Math.ceil((context.currentTime + GUARD) * SPEECH_RATE),
+      play: (pcm, start) => {
+        const buffer = new AudioBuffer({ length: pcm.length, sampleRate: SPEECH_RATE, numberOfChannels: 1 });
+        buffer.copyToChannel(Float32Array.from(pcm, (value) => value / 0x8000), 0);
+        const source = new AudioBufferSourceNode(context, { buffer });
+        source.connect(node);
+        source.start(start / SPEECH_RATE);
+        return (end) => source.stop(end / SPEECH_RATE);
+      },
+      fade: (from, to, start) => {
+        node.gain.setValueAtTime(from, start / SPEECH_RATE);
+        node.gain.linearRampToValueAtTime(to, (start + FADE) / SPEECH_RATE);
+      },
+    };
   }
 
   /** Forgets utterances that were heard to their end. */

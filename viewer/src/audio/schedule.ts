@@ -17,6 +17,7 @@ export class Schedule {
   private readonly segments: Segment[] = [];
   private readonly lead: number;
   private offset = 0;
+  private broken = true; // the next piece has nothing to follow
 
   /** @param lead frames between now and the start of a piece that has nothing to follow */
   constructor(lead: number) {
@@ -33,14 +34,25 @@ export class Schedule {
   place(first: number, count: number, now: number, earliest = 0): number {
     const fresh = this.segments.length === 0;
     let start = first + this.offset;
-    if (fresh || start < now) {
+    if (this.broken || start < now) {
       const next = Math.max(now + this.lead, fresh ? earliest : 0);
-      if (!fresh) this.shifted += next - start;
+      if (!this.broken) this.shifted += next - start;
       this.offset = next - first;
+      this.broken = false;
       start = next;
     }
     this.segments.push({ first, count, start });
     return start;
+  }
+
+  /** Takes back what is due from `frame` on; gives the sample that was due there. */
+  cut(frame: number): number {
+    const next = Math.max(0, this.positionAt(frame));
+    while (this.segments.length > 0 && this.segments.at(-1)!.start >= frame) this.segments.pop();
+    const last = this.segments.at(-1);
+    if (last) last.count = Math.min(last.count, frame - last.start);
+    this.broken = true;
+    return next;
   }
 
   /** The frame on which the utterance's first piece starts. */

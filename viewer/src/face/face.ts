@@ -11,6 +11,7 @@ export interface Heard {
   utterance: number;
   seconds: number; // of its sound, as it leaves the loudspeaker
   track: ExpressionTrack;
+  paused?: boolean; // silent for a moment; it may go on
 }
 
 /** The face's one decision: speech while sound is heard, rest otherwise, eased between. */
@@ -40,7 +41,8 @@ export class Face implements Director {
 
   expression(out: Float32Array): boolean {
     const now = this.clock();
-    const heard = this.heard();
+    const speech = this.heard();
+    const heard = speech?.paused ? null : speech; // whoever falls silent closes the mouth
     const source = heard ? heard.utterance : -1;
     if (source !== this.source) {
       this.source = source;

@@ -8,6 +8,7 @@ import { SpeechPath } from './path.ts';
 export interface Spoken {
   utterance: number;
   seconds: number; // of its sound, as it leaves the loudspeaker
+  paused?: boolean; // silent for a moment; it may go on
 }
 
 /**
@@ -84,7 +85,7 @@ export class MotionDirector implements Motion {
     if (this.speaking?.utterance !== spoken.utterance) this.begin(spoken.utterance);
     this.speaking = spoken;
     const { time, pace } = path.at(spoken.seconds);
-    this.glide.follow(time, pace, this.limit, step);
+    this.glide.follow(time, spoken.paused ? 0 : pace, this.limit, step);
   }
 
   /** What was planned before an utterance will not be heard any more. */

@@ -2,15 +2,17 @@ import type { Conversation } from '../talk/conversation.ts';
 import { byId } from './elements.ts';
 import { icon } from './icons.ts';
 
-/** Text box, microphone, send and stop: what the visitor does. */
+/** Text box, microphone, button to talk, send and stop: what the visitor does. */
 export class Controls {
   private readonly form = byId<HTMLFormElement>('composer');
   private readonly input = byId<HTMLInputElement>('text');
   private readonly microphone = byId<HTMLButtonElement>('microphone');
+  private readonly talk = byId<HTMLButtonElement>('talk');
   private readonly stop = byId<HTMLButtonElement>('stop');
 
   constructor() {
     this.microphone.append(icon('microphone'));
+    this.talk.append(icon('talk'));
     this.stop.prepend(icon('stop'));
     byId('send').append(icon('send'));
     byId('panel-button').append(icon('chart'));
@@ -27,6 +29,7 @@ export class Controls {
     };
     this.microphone.onclick = () => void conversation.toggleMicrophone();
     this.stop.onclick = () => conversation.interrupt();
+    this.bindTalk(conversation);
     document.addEventListener('keydown', (event) => {
       if (event.key === 'Escape') conversation.interrupt();
       if (event.key === '/' && document.activeElement !== this.input) {
@@ -34,6 +37,34 @@ export class Controls {
         this.input.focus();
       }
     });
+  }
+
+  /** The button is held with a pointer, or with the space bar wherever that types nothing. */
+  private bindTalk(conversation: Conversation): void {
+    const press = () => void conversation.press();
+    const release = () => conversation.release();
+    this.talk.onpointerdown = (event) => {
+      this.talk.setPointerCapture(event.pointerId);
+      press();
+    };
+    this.talk.onlostpointercapture = release;
+    this.talk.oncontextmenu = (event) => event.preventDefault(); // a long touch
+    document.addEventListener('keydown', (event) => {
+      if (event.key !== ' ' || !this.takesSpace(event.target)) return;
+      event.preventDefault();
+      if (!event.repeat) press();
+    });
+    document.addEventListener('keyup', (event) => event.key === ' ' && release());
+    addEventListener('blur', release);
+  }
+
+  private takesSpace(target: EventTarget | null): boolean {
+    if (target === this.input) return this.input.value === '';
+    return target === this.talk || !(target as Element).closest('button, input, select, textarea, a');
+  }
+
+  setTalking(held: boolean): void {
+    this.talk.setAttribute('aria-pressed', String(held));
   }
 
   setMicrophone(open: boolean): void {

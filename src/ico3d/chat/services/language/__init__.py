@@ -5,10 +5,14 @@ from ico3d.chat.services.provider import Provider, Table
 
 PROVIDERS: Table = {
     "local": Provider(
-        "a server on this machine", local.Settings, local.make, local.works, detail=local.detail
+        "a server on this machine",
+        local.Settings,
+        local.make,
+        local.hindrance,
+        detail=local.detail,
     ),
     "qwen": Provider(
-        "a model in this process", qwen.Settings, qwen.make, qwen.works, detail=qwen.detail
+        "a model in this process", qwen.Settings, qwen.make, qwen.hindrance, detail=qwen.detail
     ),
     "persona-notes": Provider("persona notes", persona.Settings, persona.make, stand_in=True),
     # never the best by itself: it may cost money, and takes what is said out of the house

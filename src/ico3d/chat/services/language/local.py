@@ -34,9 +34,11 @@ def find(settings: Settings, seconds: float) -> tuple[str, str] | None:
     return found and (found[0], settings.model or found[1])
 
 
-def works(settings: Settings) -> bool:
-    """Whether one answers now."""
-    return find(settings, QUICK) is not None
+def hindrance(settings: Settings) -> str:
+    """That none answers now, if so."""
+    if find(settings, QUICK) is not None:
+        return ""
+    return f"none answers on the ports {', '.join(map(str, PORTS))}: start Ollama, for example."
 
 
 def detail(settings: Settings) -> str:

@@ -12,6 +12,7 @@ from pipecat.frames.frames import (
 )
 from pipecat.processors.aggregators.llm_context import LLMContext
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
+from pipecat.turns.speculation_gate import SpeculationGate
 
 from ico3d.chat.services.language.notes import Notes
 from ico3d.chat.services.provider import Context
@@ -24,6 +25,7 @@ class PersonaModel(FrameProcessor):
         """A model for one session."""
         super().__init__()
         self._notes = notes
+        self._gate = SpeculationGate()
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
         """Answers contexts, passes everything else."""
@@ -31,10 +33,16 @@ class PersonaModel(FrameProcessor):
         if not isinstance(frame, LLMContextFrame):
             await self.push_frame(frame, direction)
             return
+        self._gate.begin_speculation(frame.speculation)
         await self.push_frame(LLMFullResponseStartFrame())
         for sentence in sentences(self._answer(frame.context)):
             await self.push_frame(LLMTextFrame(sentence + " "))
         await self.push_frame(LLMFullResponseEndFrame())
+
+    async def push_frame(self, frame: Frame, direction: FrameDirection = FrameDirection.DOWNSTREAM):
+        """Holds an answer until the turn that it answers has ended, as pipecat's services do."""
+        for released in self._gate.process(frame, direction):
+            await super().push_frame(*released)
 
     def _answer(self, context: LLMContext) -> str:
         last = context.get_messages()[-1] if context.get_messages() else None

@@ -7,11 +7,13 @@ from pathlib import Path
 from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.chat.services.language.instruction import instruction
-from ico3d.chat.services.provider import Context
+from ico3d.chat.services.provider import Context, lacks_package
 from ico3d.errors import MissingExtraError, MissingModelError
 
 PLAIN = "Qwen/Qwen2-0.5B-Instruct"
 QUANTISED = "Qwen/Qwen2-0.5B-Instruct-AWQ"
+WEIGHTS_NAME = "qwen2"
+"""Of `PLAIN` in the table of weights."""
 PACKAGES = ("transformers", "torch")
 KERNELS = "gptqmodel"
 """What transformers runs AWQ weights with."""
@@ -32,9 +34,12 @@ class Settings:
     max_tokens: int = 200
 
 
-def works(settings: Settings) -> bool:
-    """Whether packages and weights are here."""
-    return all(find_spec(name) for name in PACKAGES) and source(settings, cuda=False) is not None
+def hindrance(settings: Settings) -> str:
+    """What is missing: a package, or the weights."""
+    missing = next(filter(None, (lacks_package(name, "qwen") for name in PACKAGES)), "")
+    if missing or source(settings, cuda=False) is not None:
+        return missing
+    return f"its weights are not here: ico3d weights fetch {WEIGHTS_NAME}."
 
 
 def detail(settings: Settings) -> str:
@@ -58,7 +63,7 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
     if where is None:
         raise MissingModelError(
             f"the language model {settings.model or PLAIN} is not on this machine: fetch it with "
-            "`ico3d weights fetch qwen2-0.5b`, or give its folder as 'model'."
+            f"`ico3d weights fetch {WEIGHTS_NAME}`, or give its folder as 'model'."
         )
     return InProcessModel(load(where), instruction(context.persona), settings.max_tokens)
 

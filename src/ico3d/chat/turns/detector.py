@@ -1,0 +1,143 @@
+"""Hears voices: Silero's verdict for turns, and its first hint for falling silent early."""
+
+import numpy as np
+from pipecat.audio.vad.silero import SileroVADAnalyzer
+from pipecat.audio.vad.vad_analyzer import VADParams, VADState
+from pipecat.frames.frames import (
+    Frame,
+    InputAudioRawFrame,
+    VADUserStartedSpeakingFrame,
+    VADUserStoppedSpeakingFrame,
+)
+from pipecat.processors.audio.vad_processor import VADProcessor
+from pipecat.processors.frame_processor import FrameDirection
+
+from ico3d.chat.frames import TalkFrame, VoiceFrame
+from ico3d.chat.protocol import MICROPHONE_RATE
+from ico3d.chat.turns.bands import Bands
+
+QUIETEST = 0.4  # smoothed volume of speech; it rises over 0.2 s, so more would notice it later
+HINT = 0.5  # Silero's confidence that makes a first hint
+AUDIBLE = 0.01  # RMS of a voice that is near, full scale = 1
+PLAIN = 2.6  # dB; "uh-huh" and "aha" of 6 voices: up to 2.0, speech and "yeah": from 3.4
+TRAIL = 0.2  # s of silence behind what was said with the button
+FADED = 0.03  # of its loudest power: 15 dB down
+KEPT = 100  # frames of a voice that are compared: 2 s
+AFTERGLOW = 1.0  # s of silence behind a voice that are told of, too
+
+
+class Ear(SileroVADAnalyzer):
+    """Silero, which also tells what it hears before it is sure."""
+
+    def __init__(self, pause: float):
+        """Takes the seconds of silence after which a voice is over."""
+        super().__init__(
+            sample_rate=MICROPHONE_RATE, params=VADParams(stop_secs=pause, min_volume=QUIETEST)
+        )
+        self._hint = False
+
+    async def analyze_audio(self, buffer: bytes) -> VADState:
+        """Silero's verdict; `voiced` tells of this very sound."""
+        self._hint = False
+        state = await super().analyze_audio(buffer)
+        self.voiced = self._hint or state in (VADState.STARTING, VADState.SPEAKING)
+        return state
+
+    def voice_confidence(self, buffer: bytes) -> float:
+        """Silero's confidence for 32 ms; runs in a thread."""
+        confidence = super().voice_confidence(buffer)
+        if confidence >= HINT:
+            samples = np.frombuffer(buffer, np.int16) / 32768
+            self._hint = self._hint or bool(np.sqrt(np.mean(samples**2)) >= AUDIBLE)
+        return confidence
+
+
+class Timbre:
+    """Whether a voice has been one and the same sound so far: "uh-huh", "aha", a hum.
+
+    Such sounds differ only in loudness; words change their spectrum from sound to sound.
+    """
+
+    def __init__(self):
+        """No voice yet."""
+        self._bands = Bands(MICROPHONE_RATE)
+        self.forget()
+
+    def forget(self) -> None:
+        """The voice is over."""
+        self._energies = np.zeros((0, 0))
+        self._rest = np.zeros(0)
+
+    def hear(self, samples: np.ndarray) -> None:
+        """More of a voice: (S,) in [-1, 1] at 16 kHz."""
+        samples = np.concatenate([self._rest, samples])
+        whole = len(samples) - len(samples) % self._bands.length
+        self._rest = samples[whole:]
+        fresh = self._bands.energies(samples[:whole])  # (frames, bands)
+        known = self._energies[-KEPT:].reshape(-1, fresh.shape[1])
+        self._energies = np.concatenate([known, fresh])
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the spectrum's shape has stayed the same."""
+        return bool(self.spread < PLAIN)
+
+    @property
+    def is_fading(self) -> bool:
+        """Whether its last frames are much quieter than its loudest."""
+        total = self._energies.sum(axis=1)
+        return bool(total[-2:].mean() < FADED * total.max()) if len(total) else False
+
+    @property
+    def spread(self) -> float:
+        """How much the spectrum's shape varies, dB (mean over bands of their deviations)."""
+        total = self._energies.sum(axis=1)
+        if not total.any():
+            return 0.0
+        loud = self._energies[total > total.max() / 30]  # (frames, bands)
+        level = 10 * np.log10(loud + total.max() * 1e-5)
+        return float((level - level.mean(axis=1, keepdims=True)).std(axis=0).mean())
+
+
+class VoiceDetector(VADProcessor):
+    """Tells when voices begin and end; while the button is held, that alone says so."""
+
+    def __init__(self, ear: Ear):
+        """A detector for one session."""
+        super().__init__(vad_analyzer=ear)
+        self._ear = ear
+        self._timbre = Timbre()
+        self._heard = 0.0  # s
+        self._silence = AFTERGLOW  # s since a voice
+        self._held = False
+
+    async def process_frame(self, frame: Frame, direction: FrameDirection):
+        """Passes everything on, and what it heard."""
+        if isinstance(frame, InputAudioRawFrame) and self._held:
+            await self.push_frame(frame, direction)
+            return
+        await super().process_frame(frame, direction)
+        if isinstance(frame, InputAudioRawFrame):
+            await self._tell(np.frombuffer(frame.audio, np.int16) / 32768)
+        elif isinstance(frame, TalkFrame) and frame.pressed != self._held:
+            self._held = frame.pressed
+            await self._hold()
+
+    async def _tell(self, samples: np.ndarray) -> None:
+        seconds, voiced = len(samples) / MICROPHONE_RATE, self._ear.voiced
+        at, self._heard = self._heard, self._heard + seconds
+        self._silence = 0.0 if voiced else self._silence + seconds
+        if self._silence >= AFTERGLOW:
+            self._timbre.forget()
+            return
+        self._timbre.hear(samples)
+        plain, fading = self._timbre.is_plain, self._timbre.is_fading
+        await self.push_frame(VoiceFrame(at, seconds, voiced, plain, fading))
+
+    async def _hold(self) -> None:
+        if self._held:
+            await self.broadcast_frame(VADUserStartedSpeakingFrame, start_secs=0.0)
+        else:  # recognisers take the last word for cut off without a little silence
+            silence = bytes(2 * int(TRAIL * MICROPHONE_RATE))
+            await self.push_frame(InputAudioRawFrame(silence, MICROPHONE_RATE, 1))
+            await self.broadcast_frame(VADUserStoppedSpeakingFrame, stop_secs=0.0)

@@ -1,0 +1,156 @@
+"""Tells the avatar's own sound, come back through the microphone, from a visitor's voice.
+
+Browsers cancel echo themselves; this is for what they leave, and for loudspeakers that they cannot
+know of. It compares energies in bands: they survive a room, a codec and two unsynchronised clocks,
+which samples do not. What was heard at the page at each moment is known from its `clock`; how much
+later and how loud it comes back is learnt from the sound itself.
+"""
+
+import numpy as np
+
+from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE
+from ico3d.chat.turns.bands import COUNT, FRAME, Bands
+
+HISTORY = 100  # frames that are compared: 2 s
+LATEST = 35  # frames within which an echo comes, those of AHEAD included
+AHEAD = 0.1  # s that the page may be further than it is known to be
+FIRST_GAIN = 1.0  # power of an echo nothing is known of: as loud as what was sent
+ENOUGH = 20  # frames of sound without which nothing can be learnt
+ALIKE = 0.55  # correlation from which the microphone hears the avatar
+MARGIN = 4.0  # how much stronger than its echo a voice must be in a band: 6 dB
+LOOSE = 3  # frames by which the page's clock may be wrong for a moment
+DECAY = 0.6  # of a room's reverberation per frame: 60 dB in 0.54 s
+SHARE = 0.4  # of the energy that must be no echo in a voice
+VOICED = 3  # such frames among the last 5 make a voice
+AFTER = 15  # frames for which a voice goes on after the last such frame
+LEARN_EVERY = 10  # frames
+SILENT = 1e-9  # mean square
+ROOM = 3e-7  # mean square of a band; noise of a quiet room
+
+
+class SentSound:
+    """Band energies of what the avatar says, by utterance and time."""
+
+    def __init__(self):
+        """Nothing was said."""
+        self._bands = Bands(SPEECH_RATE)
+        self._utterance = -1
+        self._rows = np.zeros((0, COUNT))
+        self._rest = np.zeros(0)
+
+    def add(self, utterance: int, pcm: np.ndarray) -> None:
+        """The next (n,) int16 samples at 24 kHz of an utterance."""
+        if utterance != self._utterance:
+            self._utterance = utterance
+            self._rows, self._rest = np.zeros((0, COUNT)), np.zeros(0)
+        samples = np.concatenate([self._rest, pcm / 32768])
+        whole = len(samples) - len(samples) % self._bands.length
+        self._rest = samples[whole:]
+        self._rows = np.concatenate([self._rows, self._bands.energies(samples[:whole])])
+
+    def at(self, seconds: float | None) -> np.ndarray:
+        """(COUNT,) energies around a time of the utterance; zero in silence (None)."""
+        row = -1 if seconds is None else int(seconds / FRAME)
+        return self._rows[row] if 0 <= row < len(self._rows) else np.zeros(COUNT)
+
+
+class EchoGuard:
+    """Decides for each piece of microphone sound whether it is nothing but echo."""
+
+    def __init__(self):
+        """Nothing is known of the room."""
+        self.sent = SentSound()
+        self._bands = Bands(MICROPHONE_RATE)
+        self._rest = np.zeros(0)
+        self._far = np.zeros((HISTORY + LATEST, COUNT))  # of the avatar, newest last
+        self._near = np.zeros((HISTORY, COUNT))  # of the microphone
+        self._gains = np.full(COUNT, FIRST_GAIN)
+        self._lag: int | None = None  # frames
+        self._fresh = 0  # frames since it last learnt
+        self._marks = np.zeros(5, bool)  # which of the last frames were more than echo
+        self._since_voice = AFTER
+
+    @property
+    def lag(self) -> float | None:
+        """Seconds after which the echo comes; None if there is none."""
+        return None if self._lag is None else self._lag * FRAME - AHEAD
+
+    @property
+    def gain(self) -> float:
+        """Of the echo, dB: microphone against what was sent, at most."""
+        return float(10 * np.log10(self._gains.max() + 1e-12))
+
+    def is_echo(self, pcm: np.ndarray, position: float | None) -> bool:
+        """Whether a piece of microphone sound holds no voice but the avatar's.
+
+        Args:
+            pcm: (n,) int16 at 16 kHz.
+            position: Seconds of the utterance that are heard when the piece ends; None while
+                nothing is.
+        """
+        samples = np.concatenate([self._rest, pcm / 32768])
+        count = len(samples) // self._bands.length
+        self._rest = samples[count * self._bands.length :]
+        rows = self._bands.energies(samples[: count * self._bands.length])
+        for index, row in enumerate(rows):
+            early = AHEAD - (count - index) * FRAME
+            at = None if position is None else position + early
+            self._hear(row, self.sent.at(at))
+        return self._speaks() and self._since_voice >= AFTER
+
+    def _hear(self, near: np.ndarray, far: np.ndarray) -> None:
+        self._near = np.concatenate([self._near[1:], near[None]])
+        self._far = np.concatenate([self._far[1:], far[None]])
+        self._fresh += 1
+        if self._fresh >= LEARN_EVERY:
+            self._fresh = 0
+            self._learn()
+        excess = np.clip(near - MARGIN * self._expected() - ROOM, 0, None).sum()
+        self._marks = np.append(self._marks[1:], excess > SHARE * near.sum() + SILENT)
+        voiced = self._marks.sum() >= VOICED
+        self._since_voice = 0 if voiced else self._since_voice + 1
+
+    def _speaks(self) -> bool:
+        """Whether something of the avatar's may still be in the air."""
+        return bool((self._far[-LATEST:].sum(axis=1) > SILENT).any())
+
+    def _expected(self) -> np.ndarray:
+        """(COUNT,) the most that an echo can be in the newest frame."""
+        if self._lag is None:
+            return self._gains * self._far[-LATEST:].max(axis=0)
+        last = len(self._far) - 1 - self._lag
+        around = self._far[last - 8 : last + 1 + LOOSE]
+        reach = DECAY ** np.clip(np.arange(len(around))[::-1] - 2 * LOOSE, 0, None)
+        return self._gains * (around * reach[:, None]).max(axis=0)
+
+    def _learn(self) -> None:
+        """Finds the lag at which the microphone resembles the avatar, and how loud it is."""
+        lag, alike = self._best_lag()
+        echoes = alike >= ALIKE
+        if echoes:
+            self._lag = lag
+        far = self._lagged(LATEST if self._lag is None else self._lag)
+        if (far.sum(axis=1) > SILENT).sum() < ENOUGH:
+            return
+        loud = np.pad(far > 0.05 * far.max(axis=0), ((1, 1), (0, 0)))
+        loud = loud[:-2] | loud[1:-1] | loud[2:]  # (HISTORY, COUNT); the clocks are not exact
+        ratio = (self._near * loud).sum(axis=0) / ((far * loud).sum(axis=0) + SILENT)
+        learnt = np.maximum(ratio if echoes else np.minimum(ratio, self._gains), self._gains / 2)
+        self._gains = np.where(loud.sum(axis=0) >= ENOUGH / 2, learnt, self._gains)
+
+    def _best_lag(self) -> tuple[int, float]:
+        levels = np.sqrt(self._near)
+        scores = [similarity(np.sqrt(self._lagged(lag)), levels) for lag in range(LATEST)]
+        best = int(np.argmax(scores))
+        return best, scores[best]
+
+    def _lagged(self, lag: int) -> np.ndarray:
+        """(HISTORY, COUNT) what was said `lag` frames before what the microphone heard."""
+        return self._far[LATEST - lag :][:HISTORY]
+
+
+def similarity(a: np.ndarray, b: np.ndarray) -> float:
+    """Normalised correlation of two (frames, COUNT) envelopes, each band about its own mean."""
+    a, b = a - a.mean(axis=0), b - b.mean(axis=0)
+    product = np.sqrt((a**2).sum() * (b**2).sum())
+    return float((a * b).sum() / product) if product > 0 else 0.0
