@@ -139,20 +139,22 @@ class Speaker(FrameProcessor):
         if self._utterances.is_stopped(frame.utterance):
             return  # it was on its way when the interruption overtook it
         end = frame.first_sample + len(frame.pcm)
-        if frame.utterance != self._speaking:
-            await self._begin(frame.utterance)
+        first = frame.utterance != self._speaking
+        if first:
+            self._begin(frame.utterance)
         await self._wait(lambda: self._playback.wait_to_send(end, self._now()))
         if frame.text is not None:
             self._page.send(Answer(frame.utterance, frame.first_sample, frame.text))
         self._page.send_speech(frame)
         self._sent.add(frame.utterance, frame.pcm)
         self._playback.sent(end, self._now())
+        if first:
+            await self.broadcast_frame(BotStartedSpeakingFrame)
 
-    async def _begin(self, utterance: int) -> None:
+    def _begin(self, utterance: int) -> None:
         self._speaking, self._paused = utterance, False
         self._playback.begin(utterance)
         self._page.show("speaking")
-        await self.broadcast_frame(BotStartedSpeakingFrame)
 
     async def _end(self, frame: UtteranceEndFrame) -> None:
         if self._utterances.is_stopped(frame.utterance):
