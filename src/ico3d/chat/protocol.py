@@ -57,7 +57,8 @@ class Tensor:
 Count = Annotated[int, Range(0, MAX_EXACT)]
 Seconds = Annotated[float, Range(0, 1e7)]
 Sentence = Annotated[str, Length(0, 4000)]
-Name = Annotated[str, Length(1, 200)]
+LONGEST_NAME = 200
+Name = Annotated[str, Length(1, LONGEST_NAME)]
 Milliseconds = Annotated[float, Range(-1e7, 1e7)]
 
 
@@ -143,6 +144,33 @@ class Talk:
 
 
 @dataclass(frozen=True)
+class Heard:
+    """What the browser's recogniser understood, where `welcome` asked for it.
+
+    Attributes:
+        result: Counts up by one behind each final text; as long as it stays, a text replaces the
+            one before.
+        text: All words of this result so far.
+        final: Whether they stay as they are.
+    """
+
+    result: Count
+    text: Sentence
+    final: bool
+
+
+@dataclass(frozen=True)
+class Deaf:
+    """The browser cannot recognise speech after all: the server is to do it.
+
+    Attributes:
+        reason: What the browser says about it, for the server's log.
+    """
+
+    reason: Annotated[str, Length(0, 200)]
+
+
+@dataclass(frozen=True)
 class Service:
     """One of the three services that make the conversation.
 
@@ -188,6 +216,19 @@ class Offer:
 
 
 @dataclass(frozen=True)
+class Dictation:
+    """The visitor's browser is to recognise speech, besides sending it.
+
+    Attributes:
+        language: BCP 47 tag of what is spoken; empty for the browser's own language.
+        fallback: Who listens where the browser cannot, for the visitor's eyes; null for nobody.
+    """
+
+    language: Annotated[str, Length(0, 35)]
+    fallback: Name | None
+
+
+@dataclass(frozen=True)
 class Welcome:
     """Answer to `hello`.
 
@@ -197,6 +238,7 @@ class Welcome:
         resumed: True if this goes on with the session that `hello` named.
         services: Who listens, thinks and speaks.
         notices: Sentences the page shows once (what this avatar cannot do).
+        dictation: How the browser is to recognise speech; null where the server does.
         offers: Services to choose from; none where strangers may be talking.
     """
 
@@ -205,6 +247,7 @@ class Welcome:
     resumed: bool
     services: Services
     notices: Annotated[list[Sentence], Length(0, 8)]
+    dictation: Dictation | None
     offers: Annotated[list[Offer], Length(0, 64)] = field(default_factory=list)
 
 
@@ -361,7 +404,7 @@ class Error:
     fatal: bool
 
 
-CLIENT_MESSAGES = (Hello, Audio, Text, Interrupt, Clock, Talk)
+CLIENT_MESSAGES = (Hello, Audio, Text, Interrupt, Clock, Talk, Heard, Deaf)
 SERVER_MESSAGES = (
     Welcome,
     State,
@@ -376,7 +419,7 @@ SERVER_MESSAGES = (
     Metrics,
     Error,
 )
-ClientMessage = Hello | Audio | Text | Interrupt | Clock | Talk
+ClientMessage = Hello | Audio | Text | Interrupt | Clock | Talk | Heard | Deaf
 ServerMessage = (
     Welcome
     | State

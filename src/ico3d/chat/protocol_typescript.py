@@ -29,7 +29,7 @@ CONSTANTS = {
     "MAX_AHEAD_SECONDS": "",
 }
 
-NESTED = (protocol.Service, protocol.Services, protocol.Offer)
+NESTED = (protocol.Service, protocol.Services, protocol.Dictation, protocol.Offer)
 """Parts of messages."""
 
 HEAD = """\

@@ -177,6 +177,22 @@ TABLE: dict[str, Weights] = {
             repository="Systran/faster-distil-whisper-large-v3",
             wanted=("model.bin", "*.json"),
         ),
+        *(
+            Weights(
+                f"whisper-{model}",
+                f"recognition, 99 languages, {remark}",
+                size * _MB,
+                "MIT",
+                repository=f"{owner}/faster-whisper-{model}",
+                wanted=("model.bin", "*.json", "vocabulary.*"),
+            )
+            for model, remark, size, owner in (
+                ("large-v3-turbo", "faster", 1620, "mobiuslabsgmbh"),
+                ("small", "smaller", 484, "Systran"),
+                ("base", "for a CPU", 145, "Systran"),
+                ("tiny", "for a slow CPU", 76, "Systran"),
+            )
+        ),
         Weights(
             "qwen2",
             "language model in process, CPU",

@@ -44,6 +44,7 @@ export function makePage(overlay: Overlay, frames: () => number): Page {
       sheet.show(services, offers);
     },
     notice: showNotice,
+    sharesVoice: (shared) => (byId('shared-voice').hidden = !shared),
     microphone: (open) => controls.setMicrophone(open),
     talking: (held) => controls.setTalking(held),
     latency: (milliseconds) => panel.latency(milliseconds),

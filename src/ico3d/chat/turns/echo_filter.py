@@ -9,7 +9,6 @@ from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
 from ico3d.chat.turns.echo import EchoGuard
 
-
 STALLED = 0.5  # s by which sound may come later than before; more is a microphone that was off
 DRIFT = 0.001  # by which clocks may differ
 

@@ -197,3 +197,23 @@ async def test_nobody_there_is_an_error(say):
 def test_settings_are_checked():
     with pytest.raises(SettingsError, match="rate must be 8000"):
         openai.Settings(rate=1)
+
+
+async def test_an_interrupted_piece_leaves_no_trace_in_the_next(speech):
+    pcm = tone(3 * PIECE)
+
+    async def respond():
+        return StreamingResponse(speech.streamed(pcm.tobytes()), media_type="audio/pcm")
+
+    speech.respond = respond
+    own = voice(speech, rate=48000)
+    own._sample_rate = SPEECH_RATE  # as its pipeline would
+    interrupted = own.run_tts("Hello", "1")
+    assert isinstance(await anext(interrupted), TTSAudioRawFrame)
+    await interrupted.aclose()
+    heard = b"".join([frame.audio async for frame in own.run_tts("Hello", "2")])
+    samples = np.frombuffer(heard, np.int16)
+    assert len(samples) == pytest.approx(len(pcm) / 2, abs=2)
+    ideal = 20_000 * np.sin(2 * TONE * np.arange(len(samples)))
+    np.testing.assert_allclose(samples[150:-150], ideal[150:-150], atol=300)
+    await own.cleanup()

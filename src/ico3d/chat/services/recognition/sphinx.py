@@ -23,6 +23,7 @@ from pipecat.utils.time import time_now_iso8601
 
 from ico3d.chat.protocol import MICROPHONE_RATE
 from ico3d.chat.services.provider import Context, lacks_package
+from ico3d.chat.services.recognition.segments import blank
 from ico3d.errors import MissingExtraError
 
 LEAD_IN = 0.7  # s of sound before the VAD noticed speech: it needs 0.2 s to be sure
@@ -146,10 +147,9 @@ class SphinxRecognition(STTService):
             self._sound.task_done()
 
     async def _tell(self, text: str, final: bool) -> None:
-        if not text:
-            return
         if final:
-            await self.push_frame(TranscriptionFrame(text, "", time_now_iso8601(), finalized=True))
+            said = TranscriptionFrame(text, "", time_now_iso8601(), finalized=True)
+            await self.push_frame(said if text else blank())
         else:
             await self.push_frame(InterimTranscriptionFrame(text, "", time_now_iso8601()))
 
