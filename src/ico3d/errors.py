@@ -38,6 +38,10 @@ class ProtocolError(Ico3dError):
     """A message on the wire is malformed or over its limits."""
 
 
+class ServiceError(Ico3dError):
+    """A service of the conversation failed at its job."""
+
+
 class MissingExtraError(Ico3dError):
     """An optional package is needed and not installed."""
 
@@ -51,3 +55,7 @@ class MissingExtraError(Ico3dError):
 
 class MissingModelError(Ico3dError):
     """A model file (weights) is needed and not there."""
+
+
+class DownloadError(Ico3dError):
+    """A download failed, or is not what it should be."""

@@ -244,7 +244,7 @@ def test_fine_tuning_removes_too(capture):
     """What moves the Gaussians stays frozen through it; the companion is in both pictures."""
     ball, after = Ball(), Window(4, 8)
     models = [trainer_of(capture, ball).model for _ in range(2)]
-    settings = replace(settings_for("cpu", "swings++"), **SMALL, finetune_steps=200)
+    settings = replace(settings_for("cpu", "swings++"), **SMALL, finetune_steps=2 * PRUNE_EVERY)
     views, cameras = BodyViews(capture, after.frames, 0.1), list(capture.cameras)
     tuner = FineTuner(models[1], models[0], after, views, cameras, settings, 0.7, 0, ball)
     goal = tuner._goal.means[-40:]
@@ -254,6 +254,7 @@ def test_fine_tuning_removes_too(capture):
     count = len(models[1])
     tuner.step(PRUNE_EVERY)
     assert len(models[1]) <= count - 3
+    assert len(tuner.tensors()["moments.means.mean"]) == len(models[1]), "means are removed, too"
     assert not Pruning(ball, after).trespassing(models[1]).any()
     assert models[1].gaussians["means"].requires_grad
     assert not models[1].gaussians["alpha"].requires_grad

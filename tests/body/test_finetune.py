@@ -37,10 +37,11 @@ def models(capture):
     return trained
 
 
-def tuner_of(capture, models, consistency):
+def tuner_of(capture, models, consistency, **changes):
     """Fine-tuning of the second of two windows."""
     settings = replace(settings_for("cpu", "swings++"), **SMALL)
     settings = replace(settings, finetune_steps=60, finetune_rate=3.0, consistency=consistency)
+    settings = replace(settings, **changes)
     cameras = [c for i, c in enumerate(capture.cameras) if i not in capture.split.test_cameras]
     pictures = BodyViews(capture, AFTER.frames, 0.1)
     return FineTuner(models[1], models[0], AFTER, pictures, cameras, settings, 0.7, 0)
@@ -76,6 +77,25 @@ def test_windows_grow_together(capture, models):
     assert difference(capture, models) < 0.7 * before
     agreeing = np.mean(["difference" in kind for kind in kinds])
     assert agreeing == pytest.approx(0.75, abs=0.15)
+
+
+def test_it_ends_with_a_running_mean(capture, models):
+    """Of the second half of the steps, as a loop over their Gaussians has it."""
+    start = {n: v.detach().clone() for n, v in models[1].gaussians.items()}
+    plain = tuner_of(capture, models, 0.75, finetune_average=0.0)
+    mean = None
+    for index in range(60):
+        plain.step(index)
+        if index >= 30:
+            now = models[1].gaussians["means"].detach().clone()
+            mean = now if mean is None else 0.9 * mean + 0.1 * now
+    models[1].gaussians = start
+    averaged = tuner_of(capture, models, 0.75, finetune_average=0.9)
+    for index in range(60):
+        averaged.step(index)
+    found = models[1].gaussians["means"].detach()
+    assert torch.allclose(found, mean, rtol=0, atol=1e-6)
+    assert (found - now).abs().max() > 1e-4
 
 
 def test_resuming_repeats_the_uninterrupted_run(capture, models):

@@ -114,7 +114,7 @@ def random_manifest(head: BakedHead) -> Manifest:
             idle_expression=(0.0,) * EXPRESSION_SIZE,
         ),
         body=None,
-        speech=SpeechInfo(encoder="random", sha256="0" * 64, fps=25.0, input="mel"),
+        speech=SpeechInfo(encoder="builtin", sha256="0" * 64, fps=25.0, input="mel"),
         camera=CameraInfo((0.0, 0.0, 0.8), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 24.0),
         background=(0.85, 0.87, 0.9),
         persona=Persona(

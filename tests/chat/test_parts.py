@@ -17,6 +17,8 @@ from ico3d.chat.settings import ChatSettings, Choice, Turns, read_settings
 from ico3d.errors import SettingsError
 from ico3d.speech.runtime import SpeechModel
 
+from .conftest import OFFLINE
+
 
 def test_playback_follows_the_pages_clock():
     playback = Playback()
@@ -31,6 +33,17 @@ def test_playback_follows_the_pages_clock():
     assert playback.wait_to_send(96_000, now=11.5) == pytest.approx(4 - 2 - 0.7)
     playback.clock(4, 99.0, now=12.0)  # it cannot have heard what was not sent
     assert playback.position(12.0) == 3.0 and playback.remaining(12.0) == 0.0
+
+
+def test_late_reports_do_not_make_the_page_seem_behind():
+    playback = Playback()
+    playback.begin(0)
+    playback.sent(72_000, now=10.0)
+    for now, position in [(10.3, 0.25), (10.5, 0.45), (10.8, 0.5)]:  # the last was on its way long
+        playback.clock(0, position, now)
+    assert playback.position(11.0) == pytest.approx(0.7)
+    assert playback.heard(11.0) == pytest.approx(0.95)
+    assert playback.heard(20.0) == 3.0
 
 
 def test_playback_stands_still_while_the_page_is_away():
@@ -196,12 +209,12 @@ def test_wrong_settings_are_one_sentence(tmp_path, text):
     assert "\n" not in str(error.value)
 
 
-def provider(works: bool) -> Provider:
-    return Provider(f"works: {works}", Turns, lambda *_: None, lambda options: works)
+def provider(hindrance: str) -> Provider:
+    return Provider("a provider", Turns, lambda *_: None, lambda options: hindrance)
 
 
 def test_the_best_is_the_first_that_works():
-    table = {"a": provider(False), "b": provider(True), "c": provider(True)}
+    table = {"a": provider("its weights are missing."), "b": provider(""), "c": provider("")}
     assert chosen(table, Choice(), "voice").provider is table["b"]
     assert chosen(table, Choice("a"), "voice").provider is table["a"], "asked for is not asked"
 
@@ -212,6 +225,18 @@ def test_the_openai_service_is_pipecats_own():
     from ico3d.bundle.manifest import Persona
 
     persona = Persona("Ada", "Hello.", ("who are you => I am Ada.",))
-    settings = ChatSettings(language=Choice("openai", {"url": "http://127.0.0.1:9/v1"}))
+    settings = ChatSettings(
+        language=Choice("openai", {"url": "http://127.0.0.1:9/v1", "model": "tiny"})
+    )
     made = choose(settings).language.make(Context(persona, None, None))
     assert isinstance(made, OpenAILLMService)
+
+
+def test_the_personas_voice_speaks_unless_the_settings_name_one():
+    voices = {"espeak-ng": "de+f2", "nobody": "x"}
+    assert choose(OFFLINE, voices).voice.options.voice == "de+f2"
+    named = ChatSettings(
+        OFFLINE.recognition, OFFLINE.language, Choice("espeak-ng", {"voice": "fr"})
+    )
+    assert choose(named, voices).voice.options.voice == "fr"
+    assert choose(OFFLINE, {"nobody": "x"}).voice.options == choose(OFFLINE).voice.options

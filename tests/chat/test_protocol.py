@@ -41,7 +41,8 @@ def values(annotation):
     if origin is tuple:
         return st.tuples(*map(values, arguments))
     if origin is dict:
-        return st.dictionaries(characters(1, 8), values(arguments[1]), max_size=8)
+        size = min(marks[0].high, 8)
+        return st.dictionaries(characters(1, 8), values(arguments[1]), max_size=size)
     if is_dataclass(bare):
         return messages(bare)
     if arguments:  # T | None

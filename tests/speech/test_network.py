@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 import torch
+from users_weights import write_ave
 
 from ico3d.errors import MissingModelError, ModelError, SettingsError
 from ico3d.speech.encoder import load_ave, load_builtin, load_encoder
@@ -17,17 +18,6 @@ from ico3d.speech.network import (
 def sound(seconds=1.5, seed=0):
     samples = np.random.default_rng(seed).normal(0, 0.1, int(16000 * seconds))
     return samples.astype(np.float32)
-
-
-def ave_file(path, prefix=""):
-    torch.manual_seed(1)
-    encoder = AudioEncoder()
-    for module in encoder.modules():
-        if isinstance(module, torch.nn.BatchNorm2d):
-            torch.nn.init.uniform_(module.running_var, 0.5, 2)
-            torch.nn.init.normal_(module.running_mean)
-    torch.save({prefix + key: value for key, value in encoder.state_dict().items()}, path)
-    return encoder.eval()
 
 
 def test_ave_has_the_published_keys_and_shapes():
@@ -52,7 +42,7 @@ def test_ave_shrinks_the_window_as_published():
 
 @pytest.mark.parametrize("prefix", ["", "audio_encoder."])
 def test_ave_is_loaded_from_the_users_file(tmp_path, monkeypatch, prefix):
-    expected = ave_file(tmp_path / "audio_visual_encoder.pth", prefix)
+    expected = write_ave(tmp_path, prefix)
     monkeypatch.setenv("ICO3D_MODELS", str(tmp_path))
     with pytest.warns(UserWarning, match=r"CC BY-NC 4\.0"):
         encoder = load_encoder("ave")

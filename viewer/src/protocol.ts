@@ -29,6 +29,26 @@ export interface Services {
   voice: Service;
 }
 
+/** The visitor's browser is to recognise speech, besides sending it. */
+export interface Dictation {
+  /** BCP 47 tag of what is spoken; empty for the browser's own language. */
+  language: string;
+  /** Who listens where the browser cannot, for the visitor's eyes; null for nobody. */
+  fallback: string | null;
+}
+
+/** A service that could do one of the three jobs; the best ones come first. */
+export interface Offer {
+  /** Which job. */
+  kind: "recognition" | "language" | "voice";
+  /** Its name in settings and wishes. */
+  key: string;
+  /** For the visitor's eyes, as in `services`. */
+  name: string;
+  /** What keeps it from working and what would mend it; empty if it works. */
+  hindrance: string;
+}
+
 /** First message of every connection. */
 export interface HelloMessage {
   type: "hello";
@@ -38,6 +58,8 @@ export interface HelloMessage {
   session: string | null;
   /** `index` of the last speech message that arrived; -1 when new. */
   last_index: number;
+  /** Keys of offers by kind that a new session is to use; heeded where `welcome` offers. */
+  wishes: Record<string, string>;
 }
 
 /** Sound from the microphone (binary). */
@@ -81,6 +103,24 @@ export interface TalkMessage {
   pressed: boolean;
 }
 
+/** What the browser's recogniser understood, where `welcome` asked for it. */
+export interface HeardMessage {
+  type: "heard";
+  /** Counts up by one behind each final text; as long as it stays, a text replaces the one before. */
+  result: number;
+  /** All words of this result so far. */
+  text: string;
+  /** Whether they stay as they are. */
+  final: boolean;
+}
+
+/** The browser cannot recognise speech after all: the server is to do it. */
+export interface DeafMessage {
+  type: "deaf";
+  /** What the browser says about it, for the server's log. */
+  reason: string;
+}
+
 /** Answer to `hello`. */
 export interface WelcomeMessage {
   type: "welcome";
@@ -94,6 +134,10 @@ export interface WelcomeMessage {
   services: Services;
   /** Sentences the page shows once (what this avatar cannot do). */
   notices: string[];
+  /** How the browser is to recognise speech; null where the server does. */
+  dictation: Dictation | null;
+  /** Services to choose from; none where strangers may be talking. */
+  offers: Offer[];
 }
 
 /** What the avatar does now. */
@@ -203,7 +247,9 @@ export type ClientMessage =
   | TextMessage
   | InterruptMessage
   | ClockMessage
-  | TalkMessage;
+  | TalkMessage
+  | HeardMessage
+  | DeafMessage;
 
 export type ServerMessage =
   | WelcomeMessage

@@ -14,8 +14,9 @@ export class ChatServer {
     this.url = url;
   }
 
-  static async start(bundle: string, port = 0): Promise<ChatServer> {
-    const args = ['-m', 'ico3d.cli', 'serve', bundle, '--port', String(port)];
+  /** @param more arguments of `ico3d serve` */
+  static async start(bundle: string, port = 0, ...more: string[]): Promise<ChatServer> {
+    const args = ['-m', 'ico3d.cli', 'serve', bundle, '--port', String(port), ...more];
     const child = spawn(PYTHON, args, { cwd: REPOSITORY, stdio: ['ignore', 'pipe', 'inherit'] });
     return new ChatServer(child, await readUrl(child));
   }

@@ -12,7 +12,18 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.chat.codec import decode_client, encode
-from ico3d.chat.protocol import End, Service, Services, Speech, State, Welcome
+from ico3d.chat.protocol import (
+    Dictation,
+    End,
+    Offer,
+    Service,
+    Services,
+    Speech,
+    State,
+    Welcome,
+)
+
+NOTICE = "No speech in this avatar, sagt sie – schade."
 
 
 def server_messages() -> list:
@@ -22,7 +33,15 @@ def server_messages() -> list:
     pcm = np.arange(-1200, 1200, dtype=np.int16)  # 100 ms
     expressions = (np.arange(3 * 39).reshape(3, 39) / 64 - 1).astype(np.float16)
     return [
-        Welcome(1, "session", False, services, ["No speech in this avatar, sagt sie – schade."]),
+        Welcome(
+            1,
+            "session",
+            False,
+            services,
+            [NOTICE],
+            Dictation("de-DE", None),
+            [Offer("voice", "a", "A", "install it.")],
+        ),
         State("thinking"),
         Speech(3, 7, 4800, 5, pcm, expressions),
         End(3, 7200),

@@ -19,6 +19,8 @@ test('frames of the server mean here what they meant there', () => {
     resumed: false,
     services: { recognition: service, language: service, voice: { name: 'cloud', stand_in: false } },
     notices: ['No speech in this avatar, sagt sie – schade.'],
+    dictation: { language: 'de-DE', fallback: null },
+    offers: [{ kind: 'voice', key: 'a', name: 'A', hindrance: 'install it.' }],
   });
   expect(text('1.json')).toEqual({ type: 'state', state: 'thinking' });
   const speech = decode(arrayBuffer(readFileSync(join(folder, '2.bin')))) as SpeechMessage;
@@ -32,7 +34,7 @@ test('frames of the server mean here what they meant there', () => {
 test('frames of the page mean there what they mean here', () => {
   const folder = scratchFolder();
   const messages = [
-    { type: 'hello', version: 1, session: null, last_index: -1 },
+    { type: 'hello', version: 1, session: null, last_index: -1, wishes: { voice: 'a' } },
     { type: 'audio', sample: 640, pcm: Int16Array.from({ length: 640 }, (_, i) => 100 * (i - 320)) },
     { type: 'text', text: 'Wie spät ist es? 🙂' },
     { type: 'clock', utterance: 2, position: 0.5, body_time: 0 },

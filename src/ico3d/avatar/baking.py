@@ -25,7 +25,7 @@ from ico3d.errors import BundleError
 from ico3d.head.expressions import FEATURE_RATE
 from ico3d.head.trained import TrainedHead
 from ico3d.speech.encoder import load_encoder
-from ico3d.speech.export import export_speech
+from ico3d.speech.export import export_speech, make_servable
 from ico3d.speech.network import SpeechAdaptor
 
 RANKS = (16, 20, 24, 28, MAX_RANK)
@@ -180,7 +180,10 @@ def _open_eyes(recorded: np.ndarray) -> np.ndarray:
 def speech_file(adaptor: SpeechAdaptor, encoder_name: str) -> tuple[bytes, SpeechInfo]:
     """`speech.onnx` and what the manifest says about it."""
     encoder = load_encoder(encoder_name)
-    kind = "mel" if encoder.name == "builtin" else "features"
+    kind = "mel"
+    if encoder.name != "builtin":  # the user's own: it stays on this machine
+        kind = "features"
+        make_servable(encoder)
     info = SpeechInfo(encoder.name, encoder.sha256, FEATURE_RATE, kind)
     return export_speech(adaptor, encoder), info
 

@@ -19,6 +19,8 @@ from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.losses import l1
 from ico3d.splat.render import render
 
+AVERAGED = 0.5
+"""Part of the steps after which the running mean begins."""
 STILL_SEEN = 0.05
 """Opacity from which a Gaussian counts for where the person is in a picture."""
 
@@ -75,6 +77,7 @@ class FineTuner:
         else:
             values = self._remember(index)
         self._learner.update(index / self._settings.finetune_steps, self._settings.finetune_rate)
+        self._average(index)
         self._learner.prune(index, self._settings.finetune_steps)
         return values
 
@@ -90,6 +93,14 @@ class FineTuner:
         """Takes back what `tensors` gave."""
         del state
         self._learner.restore(tensors)
+
+    def _average(self, index: int) -> None:
+        """Ends with a mean over many steps: single ones look at one moment, from one side."""
+        steps, past = self._settings.finetune_steps, self._settings.finetune_average
+        if past and index >= AVERAGED * steps:
+            self._learner.keep_mean(past)
+            if index == steps - 1:
+                self._learner.take_mean()
 
     def _agree(self, index: int) -> Mapping[str, float]:
         """A step on L_consistency."""

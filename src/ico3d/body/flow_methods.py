@@ -1,5 +1,6 @@
 """Optical flow between two pictures: RAFT where it is installed, else OpenCV's DIS."""
 
+import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,12 +9,13 @@ from typing import Any, Protocol
 import numpy as np
 
 from ico3d.capture import extras
+from ico3d.common.weights import model_folders
 
 RAFT_CHECKPOINTS = {
     "raft_large": "raft_large_C_T_SKHT_V2-ff5fadd5.pth",
     "raft_small": "raft_small_C_T_V2-01064c6d.pth",
 }
-"""torchvision's weights, best first: builder and file in the cache of torch.hub."""
+"""torchvision's weights, best first: builder and file among ours or in the cache of torch.hub."""
 RAFT_SMALLEST = 128
 """Pixels of a side that RAFT wants at least."""
 
@@ -124,8 +126,9 @@ def _raft() -> tuple[str, Path] | None:
         import torchvision  # noqa: F401
     except ImportError:
         return None
-    folder = Path(torch.hub.get_dir()) / "checkpoints"
-    files = ((builder, folder / name) for builder, name in RAFT_CHECKPOINTS.items())
+    folders = (*model_folders(), Path(torch.hub.get_dir()) / "checkpoints")
+    choices = itertools.product(RAFT_CHECKPOINTS.items(), folders)
+    files = ((builder, folder / name) for (builder, name), folder in choices)
     return next(((builder, file) for builder, file in files if file.is_file()), None)
 
 

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from ico3d.body.companion import Companion, Pruning
 from ico3d.body.deformation import GRID, MLP
-from ico3d.body.model import WindowModel
+from ico3d.body.model import CANONICAL, WindowModel
 from ico3d.body.settings import BodySettings
 from ico3d.body.views import BodyViews, Example
 from ico3d.body.windows import Window
@@ -135,6 +135,21 @@ class Learner:
                 rate *= self._extent
             self.optimiser.update(name, tensor, tensor.grad, rate)
             tensor.grad = None
+
+    @torch.no_grad()
+    def keep_mean(self, past: float) -> None:
+        """Keeps a running mean of the canonical Gaussians, where `past` is the share of the old."""
+        moments = self.optimiser.moments
+        for name in CANONICAL:
+            value = self.model.gaussians[name].detach()
+            mean = moments.setdefault(f"{name}.mean", value.clone())
+            mean.lerp_(value, 1.0 - past)
+
+    @torch.no_grad()
+    def take_mean(self) -> None:
+        """Puts that mean in the place of the Gaussians."""
+        for name in CANONICAL:
+            self.model.gaussians[name].copy_(self.optimiser.moments[f"{name}.mean"])
 
     def tensors(self) -> dict[str, Tensor]:
         """Parameters and moments."""

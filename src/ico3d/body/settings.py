@@ -67,6 +67,8 @@ class BodySettings:
         finetune_steps: Steps of temporal fine-tuning per window; 0 for none.
         consistency: Part of those steps that compare with the window before.
         finetune_rate: Factor of the learning rates in fine-tuning.
+        finetune_average: Share of the past in the running mean of the Gaussians that fine-tuning
+            ends with; 0 for the last step's Gaussians as they are.
         checkpoint_every: Steps between checkpoints.
         cache_gib: Pictures kept in memory, in GiB; further ones are read again at each use.
     """
@@ -117,6 +119,7 @@ class BodySettings:
     finetune_steps: int = 20_000
     consistency: float = 0.75
     finetune_rate: float = 1.0
+    finetune_average: float = 0.0
     checkpoint_every: int = 1_000
     cache_gib: float = 2.0
 
@@ -146,7 +149,7 @@ CPU = BodySettings(
     max_gaussians=7_000,
     initial_opacity=0.3,
     steps_per_frame=150,
-    warmup_steps=200,
+    warmup_steps=20,
     grid_space=32,
     grid_scales=2,
     position_rate=1e-3,
@@ -165,6 +168,7 @@ CPU = BodySettings(
     absgrad=True,
     finetune_steps=3_500,
     finetune_rate=0.5,
+    finetune_average=0.995,
     checkpoint_every=500,
 )
 

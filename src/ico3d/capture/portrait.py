@@ -36,7 +36,7 @@ from ico3d.capture.portrait_files import (
 from ico3d.capture.surface import face_points, silhouette_points
 from ico3d.capture.video import Video, open_video, read_sound
 from ico3d.common.camera import Camera
-from ico3d.common.files import model_file
+from ico3d.common.weights import model_file
 from ico3d.errors import CaptureError
 
 FPS = 25.0

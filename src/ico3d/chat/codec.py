@@ -181,6 +181,8 @@ def plain(value: Any) -> Any:
 def rebuilt(value: Any, annotation: Any) -> Any:
     """Checked JSON as the dataclasses and tuples that the annotation names."""
     annotation, _ = split_annotation(annotation)
+    if typing.get_origin(annotation) in (types.UnionType, typing.Union):  # T | None
+        return None if value is None else rebuilt(value, typing.get_args(annotation)[0])
     if isinstance(annotation, type) and is_dataclass(annotation):
         kinds = field_types(annotation)
         return annotation(**{name: rebuilt(value[name], kinds[name]) for name in kinds})

@@ -1,5 +1,6 @@
 """The verbs `serve` and `demo`."""
 
+import itertools
 import sys
 import webbrowser
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ class Serve:
         host: Address to listen on; other machines reach it only if it is not 127.0.0.1.
         port: Port to listen on; 0 takes any that is free.
         settings: TOML or JSON file that chooses services and timing.
+        persona: TOML or JSON file that says who the avatar is; by default as its bundle says.
         open: Open the page in a browser.
         log: File that gets a line of JSON for each turn: times and counts, no words.
         verbose: Print what happens inside.
@@ -30,6 +32,7 @@ class Serve:
     host: str = "127.0.0.1"
     port: int = 8765
     settings: Path | None = None
+    persona: Path | None = None
     open: bool = False
     log: Path | None = None
     verbose: bool = False
@@ -42,21 +45,24 @@ class Serve:
         """
         set_up_log(self.verbose)
         from ico3d.bundle.format import Bundle
+        from ico3d.bundle.persona import read_persona
         from ico3d.chat import server
         from ico3d.chat.monitor import Monitor, TurnLog
+        from ico3d.chat.services import offers
         from ico3d.chat.sessions import Sessions
         from ico3d.chat.settings import read_settings
 
         settings = read_settings(self.settings)
+        persona = read_persona(self.persona) if self.persona else None
         monitor = Monitor(TurnLog.open(self.log) if self.log else None)
         listener = server.bind(self.host, self.port)
         bundle = Bundle.open(self.bundle)
-        avatar = server.open_avatar(bundle, settings) if bundle.manifest.head else None
+        avatar = server.open_avatar(bundle, settings, persona) if bundle.manifest.head else None
         sessions = Sessions(avatar, monitor=monitor) if avatar else None
         app = server.make_app(bundle, avatar, self.host, sessions)
         url = server.address(listener)
-        print(f"{bundle.manifest.persona.name} is at {url} (Ctrl+C ends)")
-        for line in described(avatar.services.described()) if avatar else []:
+        print(f"{(persona or bundle.manifest.persona).name} is at {url} (Ctrl+C ends)")
+        for line in described(avatar.services.described(), offers(settings)) if avatar else []:
             print(line)
         if not (server.STATIC / "index.html").is_file():
             print("The page is not built: run `make viewer`.", file=sys.stderr)
@@ -74,6 +80,7 @@ class Demo:
         host: Address to listen on.
         port: Port to listen on; 0 takes any that is free.
         settings: TOML or JSON file that chooses services and timing.
+        persona: TOML or JSON file that says who the avatar is; by default as its bundle says.
         open: Open the page in a browser.
         verbose: Print what happens inside.
     """
@@ -81,6 +88,7 @@ class Demo:
     host: str = "127.0.0.1"
     port: int = 8765
     settings: Path | None = None
+    persona: Path | None = None
     open: bool = True
     verbose: bool = False
 
@@ -91,14 +99,24 @@ class Demo:
             BundleError: If the package came without it.
         """
         demo = Path(packaged.NAME)
-        Serve(demo, self.host, self.port, self.settings, open=self.open, verbose=self.verbose).run()
+        where = (self.host, self.port, self.settings, self.persona)
+        Serve(demo, *where, open=self.open, verbose=self.verbose).run()
 
 
-def described(services) -> list[str]:
-    """One line for each service, and one that says it if they are only stand-ins."""
-    parts = {"listens": services.recognition, "thinks": services.language, "speaks": services.voice}
-    lines = [f"  {verb} with {service.name}" for verb, service in parts.items()]
-    if any(service.stand_in for service in parts.values()):
+def described(services, offers) -> list[str]:
+    """What serves, one line each; and what would be better, with what it needs."""
+    verbs = {"recognition": "listens", "language": "thinks", "voice": "speaks"}
+    lines, stand_ins = [], False
+    for kind, verb in verbs.items():
+        service = getattr(services, kind)
+        lines.append(f"  {verb} with {service.name}")
+        stand_ins = stand_ins or service.stand_in
+        better = itertools.takewhile(
+            lambda offer, name=service.name: offer.name != name,
+            (offer for offer in offers if offer.kind == kind),
+        )
+        lines += [f"    better: {o.name}; {o.hindrance}" for o in better if o.hindrance]
+    if stand_ins:
         lines.append("  (small offline stand-ins; choose others with --settings)")
     return lines
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+from dataclasses import replace
 
 from fastapi import WebSocket, WebSocketDisconnect
 from loguru import logger
@@ -14,7 +15,9 @@ from ico3d.chat.protocol import (
     Audio,
     ClientMessage,
     Clock,
+    Deaf,
     Error,
+    Heard,
     Hello,
     Interrupt,
     Talk,
@@ -46,7 +49,7 @@ class Connection:
         Args:
             socket: An accepted WebSocket.
             sessions: Where its session comes from.
-            welcome: What every page is told; its session and `resumed` are filled in.
+            welcome: What every page is told; what belongs to a session is filled in.
         """
         self._socket, self._sessions, self._welcome = socket, sessions, welcome
         self._limits = Limits()
@@ -103,8 +106,14 @@ class Connection:
         return message
 
     async def _greet(self, session: Session, resumed: bool) -> None:
-        known = self._welcome
-        welcome = Welcome(known.version, session.id, resumed, known.services, known.notices)
+        welcome = replace(
+            self._welcome,
+            session=session.id,
+            resumed=resumed,
+            services=session.services.described(),
+            dictation=session.services.dictation(),
+            offers=self._sessions.offers,
+        )
         await self._socket.send_text(str(encode(welcome)))
         if not resumed:
             await session.conversation.greet()
@@ -142,6 +151,12 @@ class Connection:
             if not message.text.strip():
                 raise ProtocolError("text: is empty.")
             await conversation.ask(message.text.strip())
+        elif isinstance(message, Heard | Deaf) and session.services.dictation() is None:
+            raise ProtocolError("this server listens itself.")
+        elif isinstance(message, Heard):
+            await conversation.heard(message)
+        elif isinstance(message, Deaf):
+            await conversation.deaf(message.reason)
         elif isinstance(message, Talk):
             await conversation.talk(message.pressed)
         elif isinstance(message, Interrupt):

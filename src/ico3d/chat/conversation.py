@@ -3,11 +3,13 @@
 import asyncio
 from dataclasses import dataclass
 
+from loguru import logger
+from pipecat.adapters.llm.schemas.tools_schema import ToolsSchema
 from pipecat.audio.turn.smart_turn.base_smart_turn import SmartTurnParams
 from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
 from pipecat.pipeline.pipeline import Pipeline
 from pipecat.pipeline.worker import PipelineParams, PipelineWorker
-from pipecat.processors.aggregators.llm_context import LLMContext
+from pipecat.processors.aggregators.llm_context import LLMContext, NotGiven
 from pipecat.processors.aggregators.llm_response_universal import (
     LLMContextAggregatorPair,
     LLMUserAggregatorParams,
@@ -26,14 +28,21 @@ from ico3d.chat.face import Face
 from ico3d.chat.frames import Utterances
 from ico3d.chat.gestures import Gestures
 from ico3d.chat.listener import Captions, PageInput
+from ico3d.chat.memory import remembering
+from ico3d.chat.modules.mouth import RemoteMouth
 from ico3d.chat.monitor import Visitor
 from ico3d.chat.page import Page
-from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE
+from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Error, Heard
 from ico3d.chat.services import Chosen
 from ico3d.chat.services.provider import Context
-from ico3d.chat.settings import ChatSettings, Turns
+from ico3d.chat.services.voice.clauses import ClauseProcessor
+from ico3d.chat.services.voice.markup import speakable
+from ico3d.chat.settings import ChatSettings
 from ico3d.chat.speaker import Speaker
+from ico3d.chat.supervision.language import AnswerGuard
+from ico3d.chat.supervision.voice import endure
 from ico3d.chat.timing import Clock, TurnObserver
+from ico3d.chat.tools import functions
 from ico3d.chat.turns.detector import Ear, VoiceDetector
 from ico3d.chat.turns.echo import EchoGuard
 from ico3d.chat.turns.echo_filter import EchoFilter
@@ -54,6 +63,7 @@ class Avatar:
         services: Who listens, thinks and speaks.
         settings: Services and timing.
         animation: How its body moves; None for a head alone.
+        speech_sha256: Of the file of `speech`, by which a remote module knows that it is its own.
     """
 
     head: HeadInfo
@@ -62,6 +72,7 @@ class Avatar:
     services: Chosen
     settings: ChatSettings
     animation: Animation | None
+    speech_sha256: str = ""
 
 
 @dataclass(frozen=True)
@@ -80,7 +91,7 @@ class Conversation:
 
     def __init__(self, avatar: Avatar, page: Page, visitor: Visitor):
         """A conversation that has not started."""
-        self._avatar = avatar
+        self._avatar, self._page = avatar, page
         self._now = now = asyncio.get_running_loop().time  # for all that waits and measures
         self.activity = Activity(now)
         self._clock = Clock(now)
@@ -91,7 +102,7 @@ class Conversation:
         gestures = avatar.animation and Gestures(
             avatar.animation, page, self._utterances, avatar.settings.gestures
         )
-        self._echo = EchoGuard()
+        self._echo, self._gestures = EchoGuard(), gestures
         self._speaker = Speaker(page, self._utterances, self._echo.sent, gestures, now)
         self._worker: PipelineWorker | None = None
         self._task: asyncio.Task | None = None
@@ -99,7 +110,7 @@ class Conversation:
     async def start(self) -> None:
         """Builds and starts the pipeline (about 0.5 s, most of it in a thread)."""
         parts = await asyncio.to_thread(make_parts, self._avatar)
-        self._watch_voice(parts.voice)
+        self._prepare_voice(parts.voice)
         self._worker = PipelineWorker(
             self._pipeline(parts),
             params=PipelineParams(
@@ -141,6 +152,15 @@ class Conversation:
         self.activity.touch()
         await self._input.talk(pressed)
 
+    async def heard(self, message: Heard) -> None:
+        """What the browser's recogniser understood."""
+        await self._input.heard(message.result, message.text, message.final)
+
+    async def deaf(self, reason: str) -> None:
+        """The browser cannot recognise speech."""
+        logger.info(f"the browser does not recognise speech: {reason!r}")
+        await self._input.deaf()
+
     async def interrupt(self, utterance: int | None) -> None:
         """Silence, if that utterance (any, for null) is being said or prepared."""
         self.activity.touch()
@@ -162,11 +182,12 @@ class Conversation:
         self._speaker.release()
 
     def _pipeline(self, parts: Parts) -> Pipeline:
-        turns = self._avatar.settings.turns
+        settings, face = self._avatar.settings, make_face(self._avatar)
+        turns, patience = settings.turns, settings.patience
         trusted = not self._avatar.services.recognition.provider.stand_in
         chosen = strategies(parts.turn, turns, trusted, self._speaker.hush, self._now)
-        user, assistant = aggregators(chosen, turns)
-        face = Face(self._avatar.head, self._avatar.speech)
+        context = LLMContext(tools=self._functions(parts.language, face))
+        user, assistant = aggregators(chosen, settings, parts.language, context)
         return Pipeline(
             [
                 self._input,
@@ -176,6 +197,10 @@ class Conversation:
                 self._captions,
                 user,
                 parts.language,
+                AnswerGuard(
+                    parts.recognition, parts.language, patience.language, patience.apologies
+                ),
+                ClauseProcessor(),
                 parts.voice,
                 ExpressionProcessor(face, self._utterances),
                 self._speaker,
@@ -183,14 +208,33 @@ class Conversation:
             ]
         )
 
-    def _watch_voice(self, voice: FrameProcessor) -> None:
-        """Takes the time at which the first clause reaches the voice."""
+    def _complain(self, sentence: str) -> None:
+        self._page.send(Error(sentence, fatal=False))
+
+    def _functions(self, language: FrameProcessor, face: Face) -> ToolsSchema | NotGiven:
+        settings = self._avatar.settings
+        moods = face.moods if self._avatar.head.eye_offset is not None else None
+        return functions(language, self._gestures, moods, settings.tools, settings.allow)
+
+    def _prepare_voice(self, voice: FrameProcessor) -> None:
+        """Keeps markup and failures from it, and takes the time at which a piece reaches it."""
         if isinstance(voice, TTSService):
+            patience = self._avatar.settings.patience
+            endure(voice, patience.voice, patience.apologies, self._complain)
+            voice.add_text_transformer(speakable)
 
             async def requested(*_):
                 self._timing.clause()
 
             voice.add_event_handler("on_tts_request", requested)
+
+
+def make_face(avatar: Avatar) -> Face:
+    """The face of one session, whose mouth another machine may move."""
+    settings, remote = avatar.settings.expression, None
+    if settings.use == "remote" and avatar.speech is not None:
+        remote = RemoteMouth(settings, avatar.speech, avatar.speech_sha256)
+    return Face(avatar.head, avatar.speech, remote=remote)
 
 
 def make_parts(avatar: Avatar) -> Parts:
@@ -206,10 +250,17 @@ def make_parts(avatar: Avatar) -> Parts:
     )
 
 
-def aggregators(strategies: UserTurnStrategies, turns: Turns) -> LLMContextAggregatorPair:
+def aggregators(
+    strategies: UserTurnStrategies,
+    settings: ChatSettings,
+    language: FrameProcessor,
+    context: LLMContext,
+) -> LLMContextAggregatorPair:
     """The two halves that keep the conversation's context and decide on turns."""
     params = LLMUserAggregatorParams(
         user_turn_strategies=strategies,
-        user_turn_stop_timeout=max(NOTHING_HEARD, 2 * turns.end_silence),
+        user_turn_stop_timeout=max(NOTHING_HEARD, 2 * settings.turns.end_silence),
     )
-    return LLMContextAggregatorPair(LLMContext(), user_params=params)
+    return LLMContextAggregatorPair(
+        context, user_params=params, assistant_params=remembering(settings.memory, language)
+    )

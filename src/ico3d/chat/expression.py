@@ -44,6 +44,11 @@ class ExpressionProcessor(FrameProcessor):
         self._next_row = 0
         self._start = 0.0
 
+    async def cleanup(self):
+        """Lets the face go."""
+        await super().cleanup()
+        await asyncio.to_thread(self._face.close)
+
     async def process_frame(self, frame: Frame, direction: FrameDirection):
         """Replaces audio, watches where sentences and answers begin and end, passes the rest."""
         await super().process_frame(frame, direction)
@@ -52,6 +57,7 @@ class ExpressionProcessor(FrameProcessor):
             return
         if isinstance(frame, InterruptionFrame):
             self._in_answer = False
+            self._face.moods.end()
             self._reset()
         elif isinstance(frame, LLMFullResponseStartFrame):
             self._in_answer = True
@@ -92,6 +98,7 @@ class ExpressionProcessor(FrameProcessor):
         if self._utterance is not None:
             samples = self._next_row * ROW
             self._utterances.made(self._utterance, samples, complete=True)
+            self._face.moods.end()
             await self.push_frame(UtteranceEndFrame(self._utterance, samples))
         self._reset()
 

@@ -7,11 +7,13 @@ import numpy as np
 
 from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.bundle.manifest import HeadInfo
+from ico3d.chat.modules.mouth import RemoteMouth
+from ico3d.chat.moods import Moods
 from ico3d.chat.protocol import EXPRESSION_FPS, SPEECH_RATE
 from ico3d.common.expression import expression_rows
 from ico3d.errors import BundleError
 from ico3d.speech.eyes import EyeBehaviour
-from ico3d.speech.runtime import SpeechModel, StreamingExpressions
+from ico3d.speech.runtime import SpeechModel, StreamingExpressions, open_speech
 
 ROW = SPEECH_RATE // EXPRESSION_FPS  # samples of one row
 MOST, LEAST = 5, 3  # rows of a piece: 200 and 120 ms
@@ -32,17 +34,38 @@ class Lips(Protocol):
 class Face:
     """What all sentences of one session share: the model, and eyes that live on."""
 
-    def __init__(self, info: HeadInfo, model: SpeechModel | None, seed: int = 0):
-        """A face; without a model (heads driven by blendshapes) only the eyes move."""
+    def __init__(
+        self,
+        info: HeadInfo,
+        model: SpeechModel | None,
+        seed: int = 0,
+        remote: RemoteMouth | None = None,
+    ):
+        """A face.
+
+        Args:
+            info: What the head can do.
+            model: Sound to mouth; without one (heads driven by blendshapes) only the eyes move.
+            seed: Of the eyes' behaviour.
+            remote: Moves the mouth instead of the model.
+        """
+        self.moods = Moods()
         self._info = info
-        self._model = model
+        self._model, self._remote = model, remote
         self._eyes = EyeBehaviour(seed)
 
     def lips(self) -> Lips:
         """The mouth for a new sentence."""
+        if self._remote is not None:
+            return self._remote.lips()
         if self._model is not None:
             return StreamingExpressions(self._model, SPEECH_RATE)
         return StillLips()
+
+    def close(self) -> None:
+        """Nothing more will be said."""
+        if self._remote is not None:
+            self._remote.close()
 
     def rows(self, lips: np.ndarray, start: float) -> np.ndarray:
         """Whole expression rows.
@@ -56,7 +79,8 @@ class Face:
         """
         times = start + np.arange(len(lips)) / EXPRESSION_FPS
         idle, at = np.array(self._info.idle_expression), self._info.eye_offset
-        return expression_rows(idle, lips, self._eyes.values(times), at)
+        eyes = np.clip(self._eyes.values(times) + self.moods.values(times), 0, 1)
+        return expression_rows(idle, lips, eyes, at)
 
 
 class StillLips:
@@ -84,13 +108,14 @@ def open_face(bundle: Bundle) -> tuple[HeadInfo, SpeechModel | None]:
 
     Raises:
         BundleError: If the bundle has no head.
+        MissingModelError: If it needs a speech encoder that is not on this machine.
         ModelError: If the bundle's speech model cannot be used.
     """
     info = bundle.manifest.head
     if info is None:
         raise BundleError(f"the bundle of '{bundle.manifest.name}' has no head to talk with.")
-    model = SpeechModel(bundle.read(SPEECH)) if bundle.manifest.speech else None
-    return info, model
+    speech = bundle.manifest.speech
+    return info, open_speech(bundle.read(SPEECH), speech.encoder, speech.sha256) if speech else None
 
 
 @dataclass(frozen=True)

@@ -72,6 +72,26 @@ class TalkFrame(SystemFrame):
     pressed: bool = False
 
 
+@dataclass
+class HeardFrame(SystemFrame):
+    """What the browser's recogniser understood.
+
+    Parameters:
+        result: Number of the result.
+        text: Its words so far.
+        final: Whether they stay as they are.
+    """
+
+    result: int = 0
+    text: str = ""
+    final: bool = False
+
+
+@dataclass
+class DeafFrame(SystemFrame):
+    """The browser's recogniser does not work."""
+
+
 class Utterances:
     """Numbers the answers of a session; knows how long they are and which were stopped."""
 

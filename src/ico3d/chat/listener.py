@@ -15,7 +15,7 @@ from pipecat.frames.frames import (
 )
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
-from ico3d.chat.frames import TalkFrame
+from ico3d.chat.frames import DeafFrame, HeardFrame, TalkFrame
 from ico3d.chat.page import Page
 from ico3d.chat.protocol import MICROPHONE_RATE, Transcript
 
@@ -35,6 +35,14 @@ class PageInput(FrameProcessor):
     async def talk(self, pressed: bool) -> None:
         """The button of push to talk."""
         await self.push_frame(TalkFrame(pressed))
+
+    async def heard(self, result: int, text: str, final: bool) -> None:
+        """What the browser's recogniser understood."""
+        await self.push_frame(HeardFrame(result, text, final))
+
+    async def deaf(self) -> None:
+        """The browser cannot recognise speech."""
+        await self.push_frame(DeafFrame())
 
     async def ask(self, text: str) -> None:
         """A typed question: whatever is being said stops, then it is answered."""
@@ -65,10 +73,8 @@ class Captions(FrameProcessor):
     async def process_frame(self, frame: Frame, direction: FrameDirection):
         """Looks at what passes; the aggregator's frames come from the other side."""
         await super().process_frame(frame, direction)
-        if isinstance(frame, InterimTranscriptionFrame):
-            self._show(Transcript(self._joined(frame.text), final=False))
-        elif isinstance(frame, TranscriptionFrame):
-            self._show(Transcript(self._joined(frame.text), final=True))
+        if isinstance(frame, InterimTranscriptionFrame | TranscriptionFrame):
+            self._transcribed(frame.text, isinstance(frame, TranscriptionFrame))
         elif isinstance(frame, VADUserStartedSpeakingFrame) and not self._in_turn:
             self._words, self._early = "", None
         elif isinstance(frame, UserStartedSpeakingFrame):
@@ -85,6 +91,11 @@ class Captions(FrameProcessor):
         if self._early is not None:
             early, self._early = self._early, None
             self._show(early)
+
+    def _transcribed(self, text: str, final: bool) -> None:
+        """Takes a transcript, which may hold no words: they tell only that it was listened."""
+        if text.strip():
+            self._show(Transcript(self._joined(text), final))
 
     def _show(self, transcript: Transcript) -> None:
         if not self._in_turn:

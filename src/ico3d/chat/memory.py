@@ -1,23 +1,47 @@
-"""Gives the memory of ended sessions back at once."""
+"""What a language model still knows of a long conversation: its end, and a summary of the rest."""
 
-import asyncio
-import ctypes
-import gc
+from pipecat.processors.aggregators.llm_response_universal import LLMAssistantAggregatorParams
+from pipecat.processors.frame_processor import FrameProcessor
+from pipecat.services.llm_service import LLMService
+from pipecat.utils.context.llm_context_summarization import (
+    LLMAutoContextSummarizationConfig,
+    LLMContextSummaryConfig,
+)
+
+from ico3d.chat.settings import Memory
+
+KEPT = 4  # latest messages, word by word
+SHARE = 4  # of the budget, one part in so many is the summary's
+SLOWEST = 60.0  # s for a summary, which is made beside the conversation
+PROMPT = (
+    "Summarise this conversation between a visitor and yourself for your own memory. Keep every "
+    "fact that the visitor told: names, places, numbers, wishes, plans, likes and dislikes; keep "
+    "what was promised and what is still open, and everything that an earlier summary says. Leave "
+    "out greetings. Write short plain sentences in the language of the conversation, and nothing "
+    "but the summary."
+)
+REMINDER = "(What we talked about before, in short: {summary})"
 
 
-async def give_back() -> None:
-    """Frees what only circles of objects still hold, and returns it to the system.
+def remembering(memory: Memory, language: FrameProcessor) -> LLMAssistantAggregatorParams:
+    """When pipecat is to summarise, and how.
 
-    A pipeline refers to itself in circles. Python's collector sees its few small objects, but not
-    the models behind them, and comes too late; glibc keeps what threads freed. Over 30 sessions
-    with the offline services a server held 1,027 MB without this and 283 MB with it.
+    Args:
+        memory: How much may be kept.
+        language: The model; the offline one cannot summarise and needs nothing that was said.
     """
-    gc.collect()
-    await asyncio.to_thread(_trim)
-
-
-def _trim() -> None:
-    try:
-        ctypes.CDLL(None).malloc_trim(0)
-    except (AttributeError, OSError, TypeError):
-        return  # not glibc: its allocator does as it likes
+    summary = LLMContextSummaryConfig(
+        target_context_tokens=memory.tokens // SHARE,
+        min_messages_after_summary=KEPT,
+        summarization_prompt=PROMPT,
+        summary_message_template=REMINDER,
+        summarization_timeout=SLOWEST,
+    )
+    return LLMAssistantAggregatorParams(
+        enable_auto_context_summarization=isinstance(language, LLMService),
+        auto_context_summarization_config=LLMAutoContextSummarizationConfig(
+            max_context_tokens=memory.tokens,
+            max_unsummarized_messages=None,
+            summary_config=summary,
+        ),
+    )

@@ -4,7 +4,7 @@ This file is the one source: `codec.py` reads the annotations to encode, decode 
 `python -m ico3d.chat.protocol_typescript` writes `viewer/src/protocol.ts` from them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import numpy as np
@@ -57,7 +57,8 @@ class Tensor:
 Count = Annotated[int, Range(0, MAX_EXACT)]
 Seconds = Annotated[float, Range(0, 1e7)]
 Sentence = Annotated[str, Length(0, 4000)]
-Name = Annotated[str, Length(1, 200)]
+LONGEST_NAME = 200
+Name = Annotated[str, Length(1, LONGEST_NAME)]
 Milliseconds = Annotated[float, Range(-1e7, 1e7)]
 
 
@@ -69,11 +70,13 @@ class Hello:
         version: Protocol version of the page.
         session: The session to go on with after a dropped connection; null for a new one.
         last_index: `index` of the last speech message that arrived; -1 when new.
+        wishes: Keys of offers by kind that a new session is to use; heeded where `welcome` offers.
     """
 
     version: Count
     session: Annotated[str, Length(1, 64)] | None
     last_index: Annotated[int, Range(-1, MAX_EXACT)]
+    wishes: Annotated[dict[str, Name], Length(0, 3)] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +144,33 @@ class Talk:
 
 
 @dataclass(frozen=True)
+class Heard:
+    """What the browser's recogniser understood, where `welcome` asked for it.
+
+    Attributes:
+        result: Counts up by one behind each final text; as long as it stays, a text replaces the
+            one before.
+        text: All words of this result so far.
+        final: Whether they stay as they are.
+    """
+
+    result: Count
+    text: Sentence
+    final: bool
+
+
+@dataclass(frozen=True)
+class Deaf:
+    """The browser cannot recognise speech after all: the server is to do it.
+
+    Attributes:
+        reason: What the browser says about it, for the server's log.
+    """
+
+    reason: Annotated[str, Length(0, 200)]
+
+
+@dataclass(frozen=True)
 class Service:
     """One of the three services that make the conversation.
 
@@ -169,6 +199,36 @@ class Services:
 
 
 @dataclass(frozen=True)
+class Offer:
+    """A service that could do one of the three jobs; the best ones come first.
+
+    Attributes:
+        kind: Which job.
+        key: Its name in settings and wishes.
+        name: For the visitor's eyes, as in `services`.
+        hindrance: What keeps it from working and what would mend it; empty if it works.
+    """
+
+    kind: Literal["recognition", "language", "voice"]
+    key: Name
+    name: Name
+    hindrance: Sentence
+
+
+@dataclass(frozen=True)
+class Dictation:
+    """The visitor's browser is to recognise speech, besides sending it.
+
+    Attributes:
+        language: BCP 47 tag of what is spoken; empty for the browser's own language.
+        fallback: Who listens where the browser cannot, for the visitor's eyes; null for nobody.
+    """
+
+    language: Annotated[str, Length(0, 35)]
+    fallback: Name | None
+
+
+@dataclass(frozen=True)
 class Welcome:
     """Answer to `hello`.
 
@@ -178,6 +238,8 @@ class Welcome:
         resumed: True if this goes on with the session that `hello` named.
         services: Who listens, thinks and speaks.
         notices: Sentences the page shows once (what this avatar cannot do).
+        dictation: How the browser is to recognise speech; null where the server does.
+        offers: Services to choose from; none where strangers may be talking.
     """
 
     version: Count
@@ -185,6 +247,8 @@ class Welcome:
     resumed: bool
     services: Services
     notices: Annotated[list[Sentence], Length(0, 8)]
+    dictation: Dictation | None
+    offers: Annotated[list[Offer], Length(0, 64)] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -340,7 +404,7 @@ class Error:
     fatal: bool
 
 
-CLIENT_MESSAGES = (Hello, Audio, Text, Interrupt, Clock, Talk)
+CLIENT_MESSAGES = (Hello, Audio, Text, Interrupt, Clock, Talk, Heard, Deaf)
 SERVER_MESSAGES = (
     Welcome,
     State,
@@ -355,7 +419,7 @@ SERVER_MESSAGES = (
     Metrics,
     Error,
 )
-ClientMessage = Hello | Audio | Text | Interrupt | Clock | Talk
+ClientMessage = Hello | Audio | Text | Interrupt | Clock | Talk | Heard | Deaf
 ServerMessage = (
     Welcome
     | State

@@ -29,6 +29,9 @@ CONSTANTS = {
     "MAX_AHEAD_SECONDS": "",
 }
 
+NESTED = (protocol.Service, protocol.Services, protocol.Dictation, protocol.Offer)
+"""Parts of messages."""
+
 HEAD = """\
 // Written by `python -m ico3d.chat.protocol_typescript` from src/ico3d/chat/protocol.py: edit that.
 """
@@ -115,12 +118,11 @@ def typescript() -> str:
         f"export const {name} = {getattr(protocol, name):g};" + (f" // {unit}" if unit else "")
         for name, unit in CONSTANTS.items()
     ]
-    nested = [protocol.Service, protocol.Services]
     messages = [*protocol.CLIENT_MESSAGES, *protocol.SERVER_MESSAGES]
     blocks = [
         HEAD,
         "\n".join(constants) + "\n",
-        *(interface(kind, named=False) for kind in nested),
+        *(interface(kind, named=False) for kind in NESTED),
         *(interface(kind, named=True) for kind in messages),
         union("ClientMessage", protocol.CLIENT_MESSAGES),
         union("ServerMessage", protocol.SERVER_MESSAGES),
@@ -145,7 +147,7 @@ def interface(kind: type, named: bool) -> str:
 
 def exported(kind: type) -> str:
     """`Text` and `Error` are names that browsers use already."""
-    return kind.__name__ + ("" if kind in (protocol.Service, protocol.Services) else "Message")
+    return kind.__name__ + ("" if kind in NESTED else "Message")
 
 
 def documentation(kind: type) -> tuple[str, dict[str, str]]:

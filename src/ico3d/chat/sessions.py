@@ -2,12 +2,14 @@
 
 import asyncio
 import secrets
+from dataclasses import replace
 
 from ico3d.chat.conversation import Avatar, Conversation
-from ico3d.chat.memory import give_back
+from ico3d.chat.freeing import give_back
 from ico3d.chat.monitor import Monitor, Visitor
 from ico3d.chat.page import Outbox, Page
-from ico3d.chat.protocol import RESUME_SECONDS, Error, Hello
+from ico3d.chat.protocol import RESUME_SECONDS, Error, Hello, Offer
+from ico3d.chat.services import wished
 
 IDLE = "Nothing was said for {:g} min, so this conversation has ended: reload the page."
 
@@ -22,6 +24,7 @@ class Session:
     def __init__(self, avatar: Avatar, visitor: Visitor):
         """A session whose conversation has not started."""
         self.id = secrets.token_urlsafe(16)
+        self.services = avatar.services
         self.page = Page()
         self.conversation = Conversation(avatar, self.page, visitor)
         self.expiry: asyncio.TimerHandle | None = None  # while its page is away
@@ -38,6 +41,8 @@ class Sessions:
         monitor: Monitor | None = None,
     ):
         """No visitors yet; `monitor` counts them."""
+        self.offers: list[Offer] = []
+        """What visitors may choose from."""
         self._avatar = avatar
         self._resume_seconds = resume_seconds
         self.monitor = monitor or Monitor()
@@ -65,7 +70,7 @@ class Sessions:
             session.conversation.release()
             return session, True
         self._make_room()
-        session = Session(self._avatar, self.monitor.visitor())
+        session = Session(self._wished(hello), self.monitor.visitor())
         self._open[session.id] = session
         session.page.attach(outbox)
         try:
@@ -91,6 +96,11 @@ class Sessions:
         for session in list(self._open.values()):
             self._close_soon(session, "server")
         await asyncio.gather(*self._closing, return_exceptions=True)
+
+    def _wished(self, hello: Hello) -> Avatar:
+        avatar = self._avatar
+        services = wished(avatar.services, avatar.settings, hello.wishes, self.offers)
+        return replace(avatar, services=services)
 
     def _make_room(self) -> None:
         if len(self._open) < self._avatar.settings.max_sessions:

@@ -13,6 +13,9 @@ from pipecat.frames.frames import (
     BotStartedSpeakingFrame,
     BotStoppedSpeakingFrame,
     Frame,
+    FunctionCallCancelFrame,
+    FunctionCallResultFrame,
+    FunctionCallsStartedFrame,
     InterruptionFrame,
     LLMFullResponseEndFrame,
     LLMFullResponseStartFrame,
@@ -56,6 +59,7 @@ class Speaker(FrameProcessor):
         self._moved = asyncio.Event()  # the page's clock or connection changed
         self._speaking: int | None = None
         self._paused = False
+        self._calls: set[str] = set()  # functions that the language model waits for
 
     def clock(self, message: Clock) -> None:
         """The page says how far it has played."""
@@ -76,7 +80,7 @@ class Speaker(FrameProcessor):
         """Seconds of the utterance that sound at the page now; None while it is silent."""
         if self._speaking is None or self._paused:
             return None
-        return self._playback.position(self._now())
+        return self._playback.heard(self._now())
 
     def hush(self, silent: bool) -> None:
         """Pauses what is heard, or goes on with it; nothing of it is lost."""
@@ -114,8 +118,22 @@ class Speaker(FrameProcessor):
         elif isinstance(frame, LLMFullResponseStartFrame):
             self._page.show("thinking")
         elif isinstance(frame, LLMFullResponseEndFrame):
-            self._page.show("idle")
+            self._page.show("thinking" if self._calls else "idle")
+        elif isinstance(frame, FunctionCallsStartedFrame):
+            self._calls.update(call.tool_call_id for call in frame.function_calls)
+        elif isinstance(frame, FunctionCallResultFrame | FunctionCallCancelFrame):
+            self._called(frame)
         await self.push_frame(frame, direction)
+
+    def _called(self, frame: FunctionCallResultFrame | FunctionCallCancelFrame) -> None:
+        """A function has ended; the language model goes on unless it has said all already."""
+        self._calls.discard(frame.tool_call_id)
+        properties = getattr(frame, "properties", None)
+        is_over = isinstance(frame, FunctionCallCancelFrame) or (
+            properties is not None and properties.run_llm is False and not self._calls
+        )
+        if is_over and self._page.state == "thinking":
+            self._page.show("idle")
 
     async def _send(self, frame: SpeechFrame) -> None:
         if self._utterances.is_stopped(frame.utterance):
@@ -149,6 +167,7 @@ class Speaker(FrameProcessor):
 
     async def _stop(self) -> None:
         self._utterances.stop_all()
+        self._calls.clear()
         utterance, self._speaking = self._speaking, None
         if self._page.state != "listening":
             self._page.show("idle")

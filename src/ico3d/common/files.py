@@ -1,12 +1,10 @@
-"""Writing files so that a crash never leaves half of one, and finding model files."""
+"""Writing files so that a crash never leaves half of one."""
 
 import os
 import re
 import secrets
 from collections.abc import Callable
 from pathlib import Path
-
-from ico3d.errors import MissingModelError
 
 _TEMPORARY = re.compile(r"\..+\.[0-9a-f]{16}(\.[^.]+)?")
 """Names that `write_atomic` gives to unfinished files."""
@@ -52,20 +50,3 @@ def _sync_folder(folder: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
-
-
-def model_file(name: str, purpose: str) -> Path:
-    """Finds a model file in `$ICO3D_MODELS` or the user's cache (`~/.cache/ico3d/models`).
-
-    Raises:
-        MissingModelError: If it lies in neither; the sentence says where to put it.
-    """
-    folders = [Path(p) for p in (os.environ.get("ICO3D_MODELS"),) if p]
-    folders.append(Path.home() / ".cache" / "ico3d" / "models")
-    for folder in folders:
-        if (folder / name).is_file():
-            return folder / name
-    raise MissingModelError(
-        f"{purpose} needs the model file '{name}': put it into {folders[-1]} "
-        "or name its folder in the environment variable ICO3D_MODELS."
-    )

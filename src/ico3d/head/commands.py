@@ -19,7 +19,7 @@ class TrainHead:
             directly, the expression fed to the MLP instead of blended, no expression at all.
         preset: Settings of the paper, or sized for two CPU cores.
         set: Changes to the preset, as name=value (names: ico3d.head.settings.HeadSettings).
-        encoder: Speech encoder for speech-driven heads.
+        encoder: Speech encoder for speech-driven heads: builtin, ave (SyncTalk's) or hubert.
         seed: All randomness follows from it.
         watch: Shows the training in the browser while it lasts.
         watch_port: Where, on this machine only; the next free port where it is taken.

@@ -111,5 +111,5 @@ def _inputs(
         return track, None, ("", "")
     encoder = load_encoder(job.encoder)
     features = speech_features(capture, encoder)  # (T, D)
-    adaptor = SpeechAdaptor(encoder.size)
+    adaptor = SpeechAdaptor(encoder.size, encoder.vectors)
     return SpeechTrack(capture, features, adaptor), adaptor, (encoder.name, encoder.sha256)

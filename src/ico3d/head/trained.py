@@ -79,8 +79,8 @@ class TrainedHead:
         """Writes `model.safetensors`, `adaptor.safetensors` and `head.json` into a folder."""
         self.model.save(folder / "model.safetensors")
         if self.adaptor is not None:
-            size = {"features": self.adaptor.adaptor[0].in_features}
-            save_tensors(folder / "adaptor.safetensors", dict(self.adaptor.state_dict()), size)
+            shape = {"features": self.adaptor.size, "vectors": self.adaptor.vectors}
+            save_tensors(folder / "adaptor.safetensors", dict(self.adaptor.state_dict()), shape)
         about = {
             "inputs": self.inputs,
             "blendshape_names": list(self.blendshape_names),
@@ -130,7 +130,7 @@ def _landmarks(values: list | None) -> np.ndarray | None:
 def _load_adaptor(path: Path) -> SpeechAdaptor:
     tensors, state = load_tensors(path)
     try:
-        adaptor = SpeechAdaptor(int(state["features"]))
+        adaptor = SpeechAdaptor(int(state["features"]), int(state.get("vectors", 1)))
         adaptor.load_state_dict(tensors)
     except (KeyError, RuntimeError) as error:
         raise ModelError(f"{path} does not hold a speech adaptor ({error}).") from error

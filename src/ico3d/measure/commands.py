@@ -223,6 +223,61 @@ class BenchChat:
             Console().print(table)
 
 
+@dataclass(frozen=True)
+class BenchExpression:
+    """Measures the mouth: speed, streaming, silence, and lips against recordings of people.
+
+    For the avatar's speech model and every encoder whose weights are here.
+
+    Attributes:
+        speech: Folder with WAV files and a README.md whose table has their names and words.
+        bundle: An avatar driven by speech, `demo` for that of the package.
+        random: Encoders to time with random weights where theirs are not here.
+        json: File for the figures.
+    """
+
+    speech: Path
+    bundle: Path = Path("demo")
+    random: tuple[Literal["ave", "hubert"], ...] = ("ave",)
+    json: Path | None = None
+
+    def run(self) -> None:
+        """Prints the table, writes the figures."""
+        import json
+
+        from rich.console import Console
+        from rich.table import Table
+
+        from ico3d.bundle.format import Bundle
+        from ico3d.bundle.packaged import bundle_path
+        from ico3d.common.files import write_atomic
+        from ico3d.measure.expression import bench
+
+        figures = bench(self.speech, Bundle.open(bundle_path(self.bundle)), self.random)
+        if self.json is not None:
+            write_atomic(self.json, json.dumps(figures, indent=1).encode())
+        columns = ("x real time", "160 ms", "differs", "silence", "lips: r", "lag (ms)")
+        table = Table("", *columns, box=None)
+        table.columns[0].no_wrap = True
+        for name, found in figures.items():
+            lips = [
+                " ".join(f"{value:.{digits}f}" for value in (found[key] or {}).values())
+                for key, digits in (("lip_correlation", 2), ("lip_lag_ms", 0))
+            ]
+            still = max(found["silence_opening"].values())
+            speeds = (found[f"real_time_factor{which}"] for which in ("", "_slices"))
+            difference = f"{found['streaming_difference']:.0e}"
+            figures_of = (*(f"{speed:.3g}" for speed in speeds), difference, f"{still:.3f}")
+            table.add_row(name, *figures_of, *lips)
+        console = Console()
+        console.print(table)
+        console.print(
+            "x real time: seconds of sound per second of one core, in steps of 600 and of 160 ms; "
+            "differs: slices from the whole; silence: the mouth from rest, of its way in speech; "
+            "r and lag for each recording."
+        )
+
+
 Method = Literal["swings++", "swings", "4dgs", "spacetime", "freetime", "static"]
 
 

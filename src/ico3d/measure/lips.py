@@ -73,7 +73,7 @@ class LandmarkReader:
             MissingModelError: If the model file is not there.
         """
         from ico3d.capture.face import FaceReader
-        from ico3d.common.files import model_file
+        from ico3d.common.weights import model_file
 
         model = model_file("face_landmarker.task", "measuring lips")
         self._reader = FaceReader(model)

@@ -9,7 +9,7 @@ import torch
 from safetensors.torch import load_file
 from torch import Tensor, nn
 
-from ico3d.common.files import model_file
+from ico3d.common.weights import model_file
 from ico3d.errors import MissingModelError, ModelError
 from ico3d.head.perceptual import DEVIATION, MEAN, WEIGHTS, vgg_layers
 

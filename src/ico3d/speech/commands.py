@@ -3,7 +3,7 @@
 import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TextIO
+from typing import Literal, TextIO
 
 import tyro
 
@@ -91,3 +91,26 @@ class TrainSpeech:
                 **measured,
             },
         }
+
+
+@dataclass(frozen=True)
+class ExportEncoder:
+    """Makes a speech encoder usable where avatars are served, which needs no torch.
+
+    Baking a head does so, too. A server elsewhere needs a copy of the file.
+
+    Attributes:
+        name: ave or hubert; its weights must be here (ico3d weights fetch).
+    """
+
+    name: tyro.conf.Positional[Literal["ave", "hubert"]]
+
+    def run(self) -> None:
+        """Writes the ONNX file, says where it is."""
+        from rich.console import Console
+
+        from ico3d.speech.encoder import load_encoder
+        from ico3d.speech.export import make_servable
+
+        path = make_servable(load_encoder(self.name))
+        Console().print(f"{self.name} is servable here: {path}", soft_wrap=True)

@@ -63,7 +63,7 @@ def make_batch(random: np.random.Generator, size: int, seconds: float, held_out:
     Raises:
         MissingExtraError: If espeak-ng or soxr is not installed.
     """
-    spoken = [_utterance(random, seconds, held_out) for _ in range(size)]
+    spoken = [utterance(random, seconds, held_out) for _ in range(size)]
     mels, shapes, values = [], [], []
     for index, (sound, phonemes) in enumerate(spoken):
         heard = recorded(sound, spoken[index - 1][0], random)
@@ -75,7 +75,7 @@ def make_batch(random: np.random.Generator, size: int, seconds: float, held_out:
     return Batch(np.stack(mels), np.stack(shapes), np.stack(values))
 
 
-def _utterance(
+def utterance(
     random: np.random.Generator, seconds: float, held_out: bool
 ) -> tuple[np.ndarray, tuple[Phoneme, ...]]:
     """Clean speech at 16 kHz of a given length, with its phonemes."""

@@ -3,6 +3,7 @@
 import hashlib
 import warnings
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
@@ -10,21 +11,20 @@ import numpy as np
 import torch
 from torch import nn
 
-from ico3d.common.files import model_file
+from ico3d.common.fetching import sha256
+from ico3d.common.weights import TABLE, model_file, model_of
 from ico3d.errors import ModelError, SettingsError
+from ico3d.speech.blocks import sound_blocks
+from ico3d.speech.hubert import VECTORS, load_network, weight_file
 from ico3d.speech.mel import mel_windows
 from ico3d.speech.network import AudioEncoder, BuiltinEncoder
 
-EncoderName = Literal["builtin", "ave"]
+EncoderName = Literal["builtin", "ave", "hubert"]
 
 BUILTIN_FILE = Path(__file__).parent / "data" / "encoder.safetensors"
-AVE_FILE = "audio_visual_encoder.pth"
-AVE_LICENCE = (
-    "SyncTalk's audio-visual encoder is licensed CC BY-NC 4.0: "
-    "avatars that use it are for non-commercial purposes."
-)
+AVE_FILE = TABLE["ave"].files[0].name
 
-_BATCH = 256  # windows at once
+_BATCH = {"mel": 256, "sound": 8}  # windows at once
 
 
 @dataclass(frozen=True)
@@ -32,16 +32,20 @@ class FrozenEncoder:
     """An encoder whose weights stay as they are.
 
     Attributes:
-        name: `builtin` or `ave`.
+        name: `builtin`, `ave` or `hubert`.
         size: D, the number of features per row.
         sha256: Of the file that holds the weights.
-        network: (b, 1, 80, 16) mel windows to (b, D).
+        network: (b, 1, 80, 16) mel windows to (b, D), or (b, SIZE) windows of sound to (b, 5, D).
+        input: What it looks at: `mel` or `sound` (see `blocks`).
+        vectors: How many vectors, one after the other, the D features of a row are.
     """
 
     name: str
     size: int
     sha256: str
     network: nn.Module
+    input: Literal["mel", "sound"] = "mel"
+    vectors: int = 1
 
     @torch.no_grad()
     def features(self, samples: np.ndarray, rate: int) -> np.ndarray:
@@ -54,28 +58,40 @@ class FrozenEncoder:
         Returns:
             (T, D) float32; row i belongs to time i/25 s, T ≥ ⌊25·seconds⌋ + 1.
         """
-        windows = torch.from_numpy(mel_windows(samples, rate)).unsqueeze(1)  # (T, 1, 80, 16)
-        rows = [self.network(batch) for batch in windows.split(_BATCH)]
-        return torch.cat(rows).numpy()
+        if self.input == "mel":
+            return self._run(mel_windows(samples, rate)[:, None])
+        blocks, count = sound_blocks(samples, rate)
+        return self._run(blocks).reshape(-1, self.size)[:count]
+
+    def _run(self, windows: np.ndarray) -> np.ndarray:
+        """What the network says about windows (n, …)."""
+        device = next(self.network.parameters()).device
+        batches = torch.from_numpy(windows).split(_BATCH[self.input])
+        return torch.cat([self.network(batch.to(device)).cpu() for batch in batches]).numpy()
 
 
 def load_encoder(name: str = "builtin") -> FrozenEncoder:
     """Loads an encoder by its name.
 
     Args:
-        name: `builtin` (comes with the package) or `ave` (SyncTalk's; the user's own copy of its
-            file is found by `model_file`).
+        name: `builtin` (comes with the package), `ave` (SyncTalk's) or `hubert`; the last two are
+            looked for by `ico3d.common.weights`.
 
     Raises:
         SettingsError: If there is no such encoder.
-        MissingModelError: If the user's file is not there.
-        ModelError: If the file does not hold this encoder.
+        MissingModelError: If its weights are not there.
+        MissingExtraError: If HuBERT is wanted and transformers is not installed.
+        ModelError: If they are another encoder's.
     """
     if name == "builtin":
         return load_builtin(BUILTIN_FILE)
     if name == "ave":
         return load_ave(model_file(AVE_FILE, "SyncTalk's audio-visual encoder"))
-    raise SettingsError(f"there is no speech encoder '{name}': choose 'builtin' or 'ave'.")
+    if name == "hubert":
+        return load_hubert(model_of("hubert"))
+    raise SettingsError(
+        f"there is no speech encoder '{name}': choose 'builtin', 'ave' or 'hubert'."
+    )
 
 
 def load_builtin(path: Path) -> FrozenEncoder:
@@ -89,7 +105,7 @@ def load_builtin(path: Path) -> FrozenEncoder:
 
 def load_ave(path: Path) -> FrozenEncoder:
     """Loads SyncTalk's encoder from its published file; its licence is told as a warning."""
-    warnings.warn(AVE_LICENCE, stacklevel=2)
+    warnings.warn(TABLE["ave"].notice, stacklevel=2)
     data = _read(path)
     try:
         state = torch.load(path, map_location="cpu", weights_only=True)
@@ -98,6 +114,19 @@ def load_ave(path: Path) -> FrozenEncoder:
     prefix = "audio_encoder."
     state = {key.removeprefix(prefix): value for key, value in state.items()}
     return _frozen("ave", AudioEncoder(), state, data, path)
+
+
+def load_hubert(folder: Path) -> FrozenEncoder:
+    """Loads HuBERT from a folder as transformers writes it; a second call is quick."""
+    path = weight_file(folder)
+    return _hubert(path, path.stat().st_mtime_ns)
+
+
+@lru_cache(1)
+def _hubert(path: Path, written: int) -> FrozenEncoder:
+    """HuBERT with weights that were written at some time: they take seconds to load."""
+    network = load_network(path.parent).eval().requires_grad_(False)
+    return FrozenEncoder("hubert", network.size, sha256(path), network, "sound", VECTORS)
 
 
 def _read(path: Path) -> bytes:

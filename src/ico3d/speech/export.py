@@ -1,11 +1,16 @@
 """Speech networks as ONNX graphs, for servers that have no torch."""
 
+from pathlib import Path
+
 import numpy as np
 import torch
 from torch import nn
 
+from ico3d.common.files import write_atomic
+from ico3d.common.weights import find_model, model_folders
 from ico3d.errors import MissingExtraError
 from ico3d.speech.encoder import FrozenEncoder
+from ico3d.speech.hubert import Hubert, export_hubert
 from ico3d.speech.mel import MELS, WINDOW
 from ico3d.speech.network import (
     AFTER,
@@ -16,8 +21,10 @@ from ico3d.speech.network import (
     AudioEncoder,
     BuiltinEncoder,
     ConvBlock,
+    SequenceAdaptor,
     SpeechAdaptor,
 )
+from ico3d.speech.runtime import served_name
 
 _OPSET = 17
 _IR_VERSION = 8
@@ -45,10 +52,27 @@ def export_speech(adaptor: SpeechAdaptor, encoder: FrozenEncoder) -> bytes:
 
 
 def export_encoder(encoder: FrozenEncoder) -> bytes:
-    """An encoder alone: a model from `mel` (T, 80, 16) to `features` (T, D)."""
+    """An encoder alone: from `mel` (T, 80, 16) or `sound` (1, SIZE) to `features` (T, D)."""
+    if isinstance(encoder.network, Hubert):
+        return export_hubert(encoder.network)
     graph = _Graph()
     mel = graph.input("mel", [_ROWS, MELS, WINDOW])
     return graph.model(_encoder(graph, encoder.network, mel), "features", encoder.size)
+
+
+def make_servable(encoder: FrozenEncoder) -> Path:
+    """Writes an encoder where servers of this machine find it (`served_encoder`), unless it is.
+
+    Returns:
+        The file; other machines need a copy of it in their folder of weights.
+    """
+    name = served_name(encoder.name, encoder.sha256)
+    found = find_model(name)
+    if found is not None:
+        return found
+    path = model_folders()[-1] / name
+    write_atomic(path, export_encoder(encoder))
+    return path
 
 
 class _Graph:
@@ -106,9 +130,11 @@ class _Graph:
             elif isinstance(layer, nn.Conv1d):
                 assert layer.bias is not None
                 weight, bias = self.weight(layer.weight), self.weight(layer.bias)
-                x = self.add("Conv", x, weight, bias, pads=[1, 1])
+                x = self.add("Conv", x, weight, bias, pads=[1, 1], strides=list(layer.stride))
             elif isinstance(layer, nn.LeakyReLU):
                 x = self.add("LeakyRelu", x, alpha=layer.negative_slope)
+            elif isinstance(layer, nn.Flatten):
+                x = self.add("Flatten", x)
         return x
 
     def block(self, block: ConvBlock, x: str) -> str:
@@ -163,6 +189,8 @@ def _encoder(graph: _Graph, network: nn.Module, mel: str) -> str:
 def _adaptor(graph: _Graph, network: SpeechAdaptor, features: str) -> str:
     """Features (T, D) to expressions (T, 32)."""
     padded = graph.add("Pad", features, graph.ints(BEFORE, 0, AFTER, 0))  # (T + 7, D)
+    if isinstance(network.adaptor, SequenceAdaptor):
+        padded = _vectors(graph, padded, network.size, network.vectors)  # (T + 7, D / v, v)
     adapted = graph.sequence(network.adaptor, padded)  # (T + 7, 32)
     shifted = []
     for offset in range(ATTENTION_WINDOW):
@@ -172,6 +200,16 @@ def _adaptor(graph: _Graph, network: SpeechAdaptor, features: str) -> str:
         shifted.append(graph.add("Unsqueeze", row, graph.ints(2)))  # (T, 32, 1)
     windows = graph.add("Concat", *shifted, axis=2)  # (T, 32, 8)
     return _attention(graph, network.attention, windows)
+
+
+def _vectors(graph: _Graph, features: str, size: int, vectors: int) -> str:
+    """Features (T, D), one vector after the other, to (T, D / vectors, vectors)."""
+    parts, step = [], size // vectors
+    for first in range(0, size, step):
+        bounds = graph.ints(first), graph.ints(first + step), graph.ints(1)
+        part = graph.add("Slice", features, *bounds)  # (T, D / v)
+        parts.append(graph.add("Unsqueeze", part, graph.ints(2)))
+    return graph.add("Concat", *parts, axis=2)
 
 
 def _attention(graph: _Graph, network: AudioAttNet, windows: str) -> str:

@@ -1,6 +1,7 @@
 """Sound to mel windows, as SyncTalk's audio-visual encoder expects them; numpy only."""
 
 import functools
+from collections.abc import Callable
 from types import ModuleType
 from typing import TypeVar
 
@@ -103,6 +104,22 @@ def resampled(samples: np.ndarray, rate: int) -> np.ndarray:
     if rate == RATE:
         return samples
     return soxr().resample(samples, rate, RATE)
+
+
+def resampling_stream(rate: int) -> Callable[[np.ndarray, bool], np.ndarray]:
+    """Brings pieces of one sound to 16 kHz.
+
+    Returns:
+        A function of the next samples (S,) and of whether they are the last; what it returns may
+        lag behind until then.
+
+    Raises:
+        MissingExtraError: If the rate is another one and soxr is not installed.
+    """
+    if rate == RATE:
+        return lambda samples, last: np.asarray(samples, np.float32)
+    stream = soxr().ResampleStream(rate, RATE, 1, dtype="float32")
+    return lambda samples, last: stream.resample_chunk(np.asarray(samples, np.float32), last=last)
 
 
 def soxr() -> ModuleType:

@@ -138,6 +138,37 @@ class Adaptor(nn.Sequential):
         )
 
 
+class SequenceAdaptor(nn.Sequential):
+    """The per-subject network for encoders with several vectors per row (HuBERT: 2), as SyncTalk's.
+
+    Attributes:
+        vectors: How many.
+    """
+
+    def __init__(self, size: int, vectors: int):
+        """Takes the encoder's feature size D, all vectors of a row together, and their number."""
+        super().__init__(
+            nn.Conv1d(size // vectors, 32, 3, stride=2, padding=1),
+            nn.LeakyReLU(_SLOPE),
+            nn.Conv1d(32, 32, 3, stride=2, padding=1),
+            nn.LeakyReLU(_SLOPE),
+            nn.Conv1d(32, 64, 3, stride=2, padding=1),
+            nn.LeakyReLU(_SLOPE),
+            nn.Conv1d(64, 64, 3, stride=2, padding=1),
+            nn.LeakyReLU(_SLOPE),
+            nn.Flatten(),
+            nn.Linear(64, 64),
+            nn.LeakyReLU(_SLOPE),
+            nn.Linear(64, SPEECH_SIZE),
+        )
+        self.vectors = vectors
+
+    def forward(self, input: torch.Tensor) -> torch.Tensor:
+        """Rows (…, D), one vector after the other, to (…, 32)."""
+        rows = input.reshape(-1, self.vectors, input.shape[-1] // self.vectors)  # (n, v, D / v)
+        return super().forward(rows.transpose(1, 2)).unflatten(0, input.shape[:-1])
+
+
 class AudioAttNet(nn.Module):
     """Smooths over time: a learnt weighted mean of the eight rows around each.
 
@@ -169,14 +200,17 @@ class SpeechAdaptor(nn.Module):
     Train it jointly with the head; row i of features and expressions is at i/25 s.
 
     Attributes:
+        size: D.
+        vectors: Vectors of a row, of D / vectors values each.
         adaptor: Applied to each row.
         attention: Applied to rows [i − 4, i + 4) of the adapted features.
     """
 
-    def __init__(self, size: int):
-        """Takes the encoder's feature size D."""
+    def __init__(self, size: int, vectors: int = 1):
+        """Takes the encoder's feature size D, and how many vectors a row has."""
         super().__init__()
-        self.adaptor = Adaptor(size)
+        self.size, self.vectors = size, vectors
+        self.adaptor = Adaptor(size) if vectors == 1 else SequenceAdaptor(size, vectors)
         self.attention = AudioAttNet()
 
     def forward(self, windows: torch.Tensor) -> torch.Tensor:

@@ -1,28 +1,47 @@
 """Sound to expression values where an avatar is served: numpy and onnxruntime, no torch."""
 
+import warnings
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from ico3d.common.expression import SPEECH_SIZE
-from ico3d.errors import MissingExtraError, ModelError
-from ico3d.speech.mel import mel_windows
+from ico3d.common.weights import TABLE, find_model, model_folders
+from ico3d.errors import MissingExtraError, MissingModelError, ModelError
+from ico3d.speech.blocks import BlockStream
+from ico3d.speech.mel import RATE
+from ico3d.speech.silence import SilenceGate
 from ico3d.speech.stream import WindowStream
+
+_LARGE = 10**8  # bytes
 
 BEFORE, AFTER = 4, 3  # rows that the attention sees around each: [i − 4, i + 4)
 
 
+class RowStream(Protocol):
+    """A sound that arrives in pieces, as rows that a network takes."""
+
+    def push(self, samples: np.ndarray) -> np.ndarray:
+        """Takes the next samples (S,) in [-1, 1]; returns the rows that are now known."""
+        ...
+
+    def finish(self) -> np.ndarray:
+        """Ends the sound; returns the remaining rows."""
+        ...
+
+
 class SpeechModel:
-    """The `speech.onnx` of a bundle (docs/bundle.md)."""
+    """The `speech.onnx` of a bundle (docs/bundle.md), with the encoder that it needs."""
 
     def __init__(self, model: bytes | Path | str, encoder: bytes | Path | str | None = None):
         """Opens a model.
 
         Args:
             model: `speech.onnx` or its bytes.
-            encoder: Encoder from mel windows to features (`export_encoder` writes it), needed
-                where the model's input is `features`.
+            encoder: Encoder from mel windows or sound to features (`export_encoder` writes it),
+                needed where the model's input is `features`.
 
         Raises:
             MissingExtraError: If onnxruntime is not installed.
@@ -38,15 +57,18 @@ class SpeechModel:
                 raise ModelError(
                     "this avatar's speech encoder is not in the bundle: name the encoder's file."
                 )
-            self._encoder = _session(encoder, "the speech encoder")
-            size, wanted = self._encoder.get_outputs()[0].shape[1], self._width()
+            self._encoder = _Encoder(encoder)
+            size, wanted = self._encoder.size, self._model.get_inputs()[0].shape[1]
             if size != wanted:
                 raise ModelError(
                     f"the speech encoder gives {size} features, this avatar needs {wanted}."
                 )
+        self.silent_input = self._silence()
+        silent = np.repeat(self.silent_input[None], BEFORE + 1 + AFTER, axis=0)
+        self.silent_expression = self.run(silent)[BEFORE]  # (32,)
 
     def expressions(self, samples: np.ndarray, rate: int) -> np.ndarray:
-        """Expression values of a whole sound.
+        """Expression values of a whole sound, with silence around it.
 
         Args:
             samples: (S,) in [-1, 1].
@@ -55,25 +77,89 @@ class SpeechModel:
         Returns:
             (T, 32) float32; row i belongs to time i/25 s, T ≥ ⌊25·seconds⌋ + 1.
         """
-        return self.run(mel_windows(samples, rate))
+        stream = StreamingExpressions(self, rate)
+        return np.concatenate([stream.push(samples), stream.finish()])
 
-    def run(self, windows: np.ndarray) -> np.ndarray:
-        """Mel windows (T, 80, 16) of a whole sound to its expressions (T, 32)."""
-        inputs = windows
-        if self._encoder is not None:
-            inputs = self._encoder.run(None, {"mel": windows})[0]  # (T, D)
-        return self._model.run(None, {self._input: inputs})[0]
+    def stream(self, rate: int) -> RowStream:
+        """Turns a new sound into the rows that `run` takes."""
+        return WindowStream(rate) if self._encoder is None else self._encoder.stream(rate)
 
-    def _width(self) -> int:
-        """D, the number of features that the model takes."""
-        return self._model.get_inputs()[0].shape[1]
+    def run(self, rows: np.ndarray) -> np.ndarray:
+        """Mel windows (T, 80, 16) or features (T, D) to expressions (T, 32)."""
+        return self._model.run(None, {self._input: rows})[0]
+
+    def _silence(self) -> np.ndarray:
+        """The row that is amid long silence."""
+        stream = self.stream(RATE)
+        rows = np.concatenate([stream.push(np.zeros(2 * RATE, np.float32)), stream.finish()])
+        return rows[len(rows) // 2]
+
+
+class _Encoder:
+    """An encoder that lies outside of the bundle."""
+
+    def __init__(self, file: bytes | Path | str):
+        self._session = _session(file, "the speech encoder", heavy=_is_large(file))
+        self.input = self._session.get_inputs()[0].name
+        if self.input not in ("mel", "sound"):
+            raise ModelError(f"the speech encoder has the unknown input '{self.input}'.")
+        self.size: int = self._session.get_outputs()[0].shape[1]
+
+    def stream(self, rate: int) -> RowStream:
+        """Turns a new sound into features (n, D)."""
+        if self.input == "sound":
+            return _BlockFeatures(self.run, rate, self.size)
+        return _WindowFeatures(self.run, rate)
+
+    def run(self, inputs: np.ndarray) -> np.ndarray:
+        """Mel windows (n, 80, 16), or one window of sound (1, S), to features (n', D)."""
+        return self._session.run(None, {self.input: inputs})[0]
+
+
+class _WindowFeatures:
+    """Features of encoders that look at mel windows."""
+
+    def __init__(self, run: Callable[[np.ndarray], np.ndarray], rate: int):
+        self._run, self._windows = run, WindowStream(rate)
+
+    def push(self, samples: np.ndarray) -> np.ndarray:
+        """(n, D) that are now known."""
+        return self._run(self._windows.push(samples))
+
+    def finish(self) -> np.ndarray:
+        """The remaining (n, D)."""
+        return self._run(self._windows.finish())
+
+
+class _BlockFeatures:
+    """Features of encoders that look at the sound itself."""
+
+    def __init__(self, run: Callable[[np.ndarray], np.ndarray], rate: int, size: int):
+        self._run, self._blocks, self._size = run, BlockStream(rate), size
+        self._given = 0
+
+    def push(self, samples: np.ndarray) -> np.ndarray:
+        """(n, D) that are now known."""
+        return self._features(self._blocks.push(samples))
+
+    def finish(self) -> np.ndarray:
+        """The remaining (n, D): the last window may reach beyond the sound."""
+        rows = self._features(self._blocks.finish())
+        return rows[: len(rows) - self._given + self._blocks.num_rows]
+
+    def _features(self, windows: np.ndarray) -> np.ndarray:
+        rows = [self._run(window[None]) for window in windows]
+        self._given += sum(map(len, rows))
+        return np.concatenate([np.zeros((0, self._size), np.float32), *rows])
 
 
 class StreamingExpressions:
     """Expression values of a sound that arrives in pieces.
 
-    The rows are those of `SpeechModel.expressions` on the whole sound; row i comes as soon as the
-    sound is there that it depends on, until about (i/25 + 0.26) s.
+    The rows are those of `SpeechModel.expressions` on the whole sound. Row i comes as soon as the
+    sound is there that it depends on: until about (i/25 + 0.26) s for encoders of mel windows,
+    (i/25 + 0.53) s for those that look at the sound itself. Where the sound is silent (see
+    `silence`), rows are those of silence: the mouth at rest.
     """
 
     def __init__(self, model: SpeechModel, rate: int):
@@ -83,45 +169,108 @@ class StreamingExpressions:
             model: What turns it into expressions.
             rate: Samples per second of the pieces.
         """
-        self._run = model.run
-        self._stream = WindowStream(rate)
-        self._windows = np.zeros((0, 80, 16), np.float32)  # from row `_first` on
-        self._first = 0
+        self._model = model
+        self._stream = model.stream(rate)
+        self._gate = SilenceGate(rate)
+        self._rows = self._silence(BEFORE)  # inputs of the graph from row `_next` − BEFORE on
         self._next = 0  # the row that is returned next
 
     def push(self, samples: np.ndarray) -> np.ndarray:
         """Takes the next samples (S,); returns the rows (n, 32) that are now known."""
-        return self._advance(self._stream.push(samples), AFTER)
+        self._gate.push(samples)
+        return self._advance(self._stream.push(samples))
 
     def finish(self) -> np.ndarray:
         """Ends the sound; returns the remaining rows (n, 32)."""
-        return self._advance(self._stream.finish(), 0)
+        self._gate.finish()
+        return self._advance(np.concatenate([self._stream.finish(), self._silence(AFTER)]))
 
-    def _advance(self, windows: np.ndarray, held_back: int) -> np.ndarray:
-        """Adds windows; runs the rows that need none of those still to come."""
-        self._windows = np.concatenate([self._windows, windows])
-        ready = self._first + len(self._windows) - held_back
-        if ready <= self._next:
+    def _silence(self, count: int) -> np.ndarray:
+        """What surrounds the sound; the graph would take zeros, which sound like no silence."""
+        return np.repeat(self._model.silent_input[None], count, axis=0)
+
+    def _advance(self, inputs: np.ndarray) -> np.ndarray:
+        """Adds inputs; runs the rows that need none of those still to come."""
+        self._rows = np.concatenate([self._rows, inputs])
+        ready = len(self._rows) - BEFORE - AFTER
+        if ready <= 0:
             return np.zeros((0, SPEECH_SIZE), np.float32)
-        rows = self._run(self._windows)[self._next - self._first : ready - self._first]
-        self._next = ready
-        keep = max(0, ready - BEFORE)  # rows before it are zero for the graph, so keep context
-        self._windows = self._windows[keep - self._first :]
-        self._first = keep
-        return rows
+        rows = self._model.run(self._rows)[BEFORE : BEFORE + ready]  # (ready, 32)
+        gains = self._gate.gains(self._next, ready)[:, None]  # (ready, 1)
+        self._rows = self._rows[ready:]
+        self._next += ready
+        silent = self._model.silent_expression
+        return silent + gains * (rows - silent)
 
 
-def _session(model: bytes | Path | str, what: str) -> Any:
-    """An onnxruntime session on one CPU thread: a row takes less than a hand-over to others."""
+def open_speech(model: bytes, encoder: str, sha256: str) -> SpeechModel:
+    """Opens a bundle's speech model with the encoder that it needs from this machine.
+
+    Args:
+        model: `speech.onnx`.
+        encoder: The encoder's name.
+        sha256: Of the encoder's weights.
+
+    Raises:
+        MissingModelError: If the encoder is not in the bundle and not on this machine.
+        ModelError: If a model cannot be used.
+    """
+    if encoder == "builtin":  # it is inside
+        return SpeechModel(model)
+    weights = TABLE.get(encoder)
+    if weights is not None and weights.notice:
+        warnings.warn(weights.notice, stacklevel=2)
+    return SpeechModel(model, served_encoder(encoder, sha256))
+
+
+def served_encoder(name: str, sha256: str) -> Path:
+    """The exported encoder that has these weights.
+
+    Raises:
+        MissingModelError: If it is not here; the sentence says how to make it.
+    """
+    file = served_name(name, sha256)
+    found = find_model(file)
+    if found is None:
+        raise MissingModelError(
+            f"this avatar listens with the speech encoder '{name}', which is not here as '{file}': "
+            f"make it with ico3d weights onnx {name} where torch is installed, "
+            f"and put it into {model_folders()[-1]}."
+        )
+    return found
+
+
+def served_name(name: str, sha256: str) -> str:
+    """What the file of an exported encoder is called."""
+    return f"{name}-{sha256[:12]}.onnx"
+
+
+def _is_large(file: bytes | Path | str) -> bool:
+    """Whether an encoder is of HuBERT's kind: hundreds of megabytes."""
+    size = len(file) if isinstance(file, bytes) else Path(file).stat().st_size
+    return size > _LARGE
+
+
+def _session(model: bytes | Path | str, what: str, heavy: bool = False) -> Any:
+    """An onnxruntime session.
+
+    Args:
+        model: The file or its bytes.
+        what: What errors call it.
+        heavy: Whether other threads or a GPU are worth a hand-over; a row of a light model takes
+            less than that.
+    """
     try:
         import onnxruntime
     except ImportError:
         raise MissingExtraError("onnxruntime", "chat", "speech-driven expressions") from None
     options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1
+    options.intra_op_num_threads = 0 if heavy else 1
     options.log_severity_level = 3
     source = model if isinstance(model, bytes) else str(model)
+    wanted = ("CUDAExecutionProvider", "CPUExecutionProvider")[0 if heavy else 1 :]
+    providers = [name for name in wanted if name in onnxruntime.get_available_providers()]
     try:
-        return onnxruntime.InferenceSession(source, options, providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(source, options, providers=providers)
     except Exception as error:
         raise ModelError(f"{what} is no usable ONNX model: {error}") from None

@@ -7,11 +7,10 @@ from ico3d.speech.mel import (
     HOP,
     LEAD,
     MELS,
-    RATE,
     WINDOW,
     mel_rows,
     pre_emphasis,
-    soxr,
+    resampling_stream,
     window_count,
     window_start,
 )
@@ -28,9 +27,7 @@ class WindowStream:
         Args:
             rate: Samples per second of the pieces; other than 16 kHz needs the package soxr.
         """
-        self._resampler = None
-        if rate != RATE:
-            self._resampler = soxr().ResampleStream(rate, RATE, 1, dtype="float32")
+        self._resample = resampling_stream(rate)
         self._sound = np.zeros(0)  # (S,) pre-emphasised, padded, from the next mel row on
         self._last = 0.0  # the sample before, for the pre-emphasis
         self._num_samples = 0
@@ -40,12 +37,12 @@ class WindowStream:
 
     def push(self, samples: np.ndarray) -> np.ndarray:
         """Takes the next samples (S,) in [-1, 1]; returns the windows (n, 80, 16) now complete."""
-        self._take(self._at_mel_rate(samples, last=False))
+        self._take(self._resample(samples, False))
         return self._windows(self._complete())
 
     def finish(self) -> np.ndarray:
         """Ends the sound; returns the windows (n, 80, 16) that remain."""
-        self._take(self._at_mel_rate(np.zeros(0, np.float32), last=True))
+        self._take(self._resample(np.zeros(0, np.float32), True))
         missing = (WINDOW - 1) * HOP - self._num_samples
         if missing > 0:
             self._take(np.zeros(missing, np.float32))
@@ -55,13 +52,6 @@ class WindowStream:
         windows = self._windows(window_count(total))
         last = self._window(window_count(total) - 1)[None]  # (1, 80, 16)
         return np.concatenate([windows, *[last] * LEAD])
-
-    def _at_mel_rate(self, samples: np.ndarray, last: bool) -> np.ndarray:
-        """The samples at 16 kHz; the resampler holds some back until the end."""
-        samples = np.asarray(samples, np.float32)
-        if self._resampler is None:
-            return samples
-        return self._resampler.resample_chunk(samples, last=last)
 
     def _take(self, samples: np.ndarray) -> None:
         """Adds 16-kHz samples and computes the mel rows that they complete."""

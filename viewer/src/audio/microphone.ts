@@ -18,6 +18,11 @@ export class Microphone {
     return this.stream !== null;
   }
 
+  /** What it records; null while it is closed. */
+  get track(): MediaStreamTrack | null {
+    return this.stream?.getAudioTracks()[0] ?? null;
+  }
+
   /**
    * Asks for the microphone and starts it.
    *

@@ -10,6 +10,8 @@ import type { BakedWindow } from './window.ts';
 
 const SLOTS = [0, 1] as const;
 const POLL = 10; // ms
+const WAKE = 0.25; // s at least before a window may be seen
+const MARGIN = 3; // sorts for which there is time then: a busy device takes longer now and then
 
 /** What the body needs of the page around it. */
 export interface BodyPorts {
@@ -39,7 +41,7 @@ export class Body implements Actor {
     this.slots = new Slots(this.timeline, {
       load: async (window) => pack(await ports.load(window), capacity),
       put: (slot, content) => this.put(slot, content),
-      settled: (slot) => this.watches[slot].settled(),
+      settled: (slot) => this.objects[slot].awake && this.watches[slot].settled(),
       failed: (error) => {
         this.failure = error;
         ports.failed(error);
@@ -81,17 +83,25 @@ export class Body implements Actor {
     await this.ready();
   }
 
+  /** How long before a window may be seen it has to be sorted, s. */
+  private get soon(): number {
+    const sorts = Math.max(...this.watches.map(({ took }) => took));
+    return Math.max(WAKE, (MARGIN * sorts) / 1000);
+  }
+
   private put(slot: Slot, content: PackedWindow): void {
     this.objects[slot].hold(content);
-    this.watches[slot].changed();
   }
 
   /** The slot that is not seen waits where it will appear: at its end next to the present. */
   private pose(slot: Slot): boolean {
     const window = this.slots.windowIn(slot);
     if (window === null) return false;
+    const object = this.objects[slot];
+    const seen = this.shown?.slot === slot;
     const time = this.timeline.clamp(window, this.motion.time);
-    const tau = this.timeline.tau(window, this.shown?.slot === slot ? this.shown.time : time);
-    return this.objects[slot].pose(tau, this.shown?.slot === slot);
+    if (!seen && Math.abs(this.motion.time - time) > this.soon) return object.sleep();
+    if (!object.awake) this.watches[slot].changed();
+    return object.pose(this.timeline.tau(window, seen ? this.shown!.time : time), seen);
   }
 }

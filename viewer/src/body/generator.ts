@@ -1,6 +1,6 @@
 import { dyno, SplatGenerator, SplatTransformer } from '@sparkjsdev/spark';
 import * as THREE from 'three';
-import { coefficientPlaces, type Capacity, type PackedWindow } from './packed.ts';
+import { coefficientPlaces, coefficientTexels, type Capacity, type PackedWindow } from './packed.ts';
 import { coefficientsAt } from './window.ts';
 
 const LEAST_SCALE = '1e-6'; // metres
@@ -8,14 +8,16 @@ const LEAST_SCALE = '1e-6'; // metres
 /**
  * One slot as a Spark generator: a shader that moves the Gaussians of the window it holds.
  *
- * Its capacity never changes, and a window that is not to be seen yet is drawn with opacity 0 but
- * takes part in sorting, so that it can appear from one picture to the next.
+ * Its capacity never changes. A window that will be seen soon is awake: it is drawn with opacity 0
+ * and takes part in sorting, so that it can appear from one picture to the next. One that will not
+ * is asleep and costs next to nothing.
  */
 export class WindowGenerator extends SplatGenerator {
   private readonly capacity: Capacity;
   private readonly uniforms: Uniforms;
   private readonly found: Float32Array; // coefficients of the window
   private content: PackedWindow | null = null;
+  private active = false;
   private places: number[] = [];
 
   constructor(capacity: Capacity) {
@@ -34,11 +36,17 @@ export class WindowGenerator extends SplatGenerator {
     this.found = new Float32Array(this.coefficients.length);
   }
 
-  /** Takes a window in. */
+  /** Whether the window takes part in sorting. */
+  get awake(): boolean {
+    return this.active;
+  }
+
+  /** Takes a window in; it is asleep. */
   hold(content: PackedWindow): void {
     this.content = content;
     this.places = coefficientPlaces(content.window, this.capacity);
-    this.uniforms.bodyCount.value = content.window.num_gaussians;
+    this.active = false;
+    this.uniforms.bodyCount.value = 0;
     this.coefficients.fill(0);
     replace(this.uniforms.bodyRest.value, content.rest);
     replace(this.uniforms.bodyColours.value, content.colours);
@@ -53,10 +61,12 @@ export class WindowGenerator extends SplatGenerator {
    */
   pose(tau: number, visible: boolean): boolean {
     if (!this.content) return false;
-    const { coefficients, uniforms: { bodyCoefficients, bodyGate } } = this;
+    const { coefficients, uniforms: { bodyCoefficients, bodyCount, bodyGate } } = this;
     coefficientsAt(this.content.curve, tau, this.found);
     const gate = visible ? 1 : 0;
-    let changed = gate !== bodyGate.value;
+    let changed = gate !== bodyGate.value || !this.active;
+    this.active = true;
+    bodyCount.value = this.content.window.num_gaussians;
     bodyGate.value = gate;
     this.places.forEach((place, k) => {
       if (coefficients[place] !== this.found[k]) changed = true;
@@ -64,6 +74,19 @@ export class WindowGenerator extends SplatGenerator {
     });
     if (!changed) return false;
     bodyCoefficients.value.needsUpdate = true;
+    this.updateVersion();
+    return true;
+  }
+
+  /**
+   * Takes the window out of pictures and sorting.
+   *
+   * @returns whether anything changed
+   */
+  sleep(): boolean {
+    if (!this.active) return false;
+    this.active = false;
+    this.uniforms.bodyCount.value = 0;
     this.updateVersion();
     return true;
   }
@@ -97,7 +120,8 @@ function makeUniforms({ width, rows, clusters, ranks }: Capacity): Uniforms {
   basis.format = THREE.RGBAIntegerFormat;
   basis.type = THREE.ShortType;
   basis.internalFormat = 'RGBA16I';
-  const curves = new THREE.DataTexture(new Float32Array(clusters * size), size, clusters, THREE.RedFormat, THREE.FloatType);
+  const across = coefficientTexels(ranks);
+  const curves = new THREE.DataTexture(new Float32Array(4 * across * clusters), across, clusters, THREE.RGBAFormat, THREE.FloatType);
   for (const texture of [rest, colours, basis, curves]) texture.needsUpdate = true;
   return {
     bodyRest: { value: rest },
@@ -123,7 +147,7 @@ function makeGenerator(capacity: Capacity, uniforms: Uniforms, transformer: Spla
       outTypes: { gsplat: dyno.Gsplat },
       inputs: { index },
       generate: ({ inputs, outputs }) => ({
-        globals: [dyno.defineGsplat, declarations()],
+        globals: [dyno.defineGsplat, DECLARATIONS],
         statements: statements(capacity, inputs.index!, outputs.gsplat!),
         uniforms,
       }),
@@ -132,39 +156,47 @@ function makeGenerator(capacity: Capacity, uniforms: Uniforms, transformer: Spla
   });
 }
 
-function declarations(): string {
-  return dyno.unindent(`
-    uniform sampler2DArray bodyRest;
-    uniform sampler2DArray bodyColours;
-    uniform isampler2DArray bodyBasis;
-    uniform sampler2D bodyCoefficients;
-    uniform int bodyCount;
-    uniform float bodyGate;
-    vec4 bodyBlend(ivec2 texel, int cluster, int begin, int end) {
-      vec4 sum = vec4(0.0);
-      for (int k = begin; k < end; k++) {
-        float coefficient = texelFetch(bodyCoefficients, ivec2(k, cluster), 0).x;
-        sum += coefficient * vec4(texelFetch(bodyBasis, ivec3(texel, 1 + k), 0));
-      }
-      return sum;
-    }
-  `);
+const DECLARATIONS = dyno.unindent(`
+  uniform sampler2DArray bodyRest;
+  uniform sampler2DArray bodyColours;
+  uniform isampler2DArray bodyBasis;
+  uniform sampler2D bodyCoefficients;
+  uniform int bodyCount;
+  uniform float bodyGate;
+`);
+
+/** Σ c·basis over some of the layers. */
+function blend(begin: number, end: number): string {
+  const terms = Array.from({ length: end - begin }, (_, i) => {
+    const k = begin + i;
+    return `c${k >> 2}.${'xyzw'[k & 3]} * vec4(texelFetch(bodyBasis, ivec3(texel, ${1 + k}), 0))`;
+  });
+  return terms.join(' + ') || 'vec4(0.0)';
 }
 
 /** Everything is its mean plus Σ c·basis; quaternions are kept as wxyz and Spark wants xyzw. */
-function statements({ width, ranks: [p, r, l] }: Capacity, index: string, gsplat: string): string[] {
+function statements({ width, ranks }: Capacity, index: string, gsplat: string): string[] {
+  const [p, r, l] = ranks;
+  const coefficients = Array.from(
+    { length: coefficientTexels(ranks) },
+    (_, i) => `vec4 c${i} = texelFetch(bodyCoefficients, ivec2(${i}, cluster), 0);`,
+  );
   return dyno.unindentLines(`
-    ivec2 texel = ivec2(${index} % ${width}, ${index} / ${width});
-    vec4 rest = texelFetch(bodyRest, ivec3(texel, 0), 0);
-    int cluster = int(rest.w);
-    vec4 rotation = vec4(texelFetch(bodyBasis, ivec3(texel, 0), 0)) / 32767.0;
-    rotation += bodyBlend(texel, cluster, ${p}, ${p + r});
-    vec4 growth = bodyBlend(texel, cluster, ${p + r}, ${p + r + l});
-    ${gsplat}.flags = ${index} < bodyCount ? GSPLAT_FLAG_ACTIVE : 0u;
+    ${gsplat}.flags = 0u;
     ${gsplat}.index = ${index};
-    ${gsplat}.center = rest.xyz + bodyBlend(texel, cluster, 0, ${p}).xyz;
-    ${gsplat}.quaternion = rotation.yzwx * inversesqrt(max(dot(rotation, rotation), 1e-12));
-    ${gsplat}.scales = max(texelFetch(bodyRest, ivec3(texel, 1), 0).xyz + growth.xyz, ${LEAST_SCALE});
-    ${gsplat}.rgba = texelFetch(bodyColours, ivec3(texel, 0), 0) * vec4(1.0, 1.0, 1.0, bodyGate);
+    if (${index} < bodyCount) {
+      ivec2 texel = ivec2(${index} % ${width}, ${index} / ${width});
+      vec4 rest = texelFetch(bodyRest, ivec3(texel, 0), 0);
+      int cluster = int(rest.w);
+      ${coefficients.join(' ')}
+      vec4 rotation = vec4(texelFetch(bodyBasis, ivec3(texel, 0), 0)) / 32767.0;
+      rotation += ${blend(p, p + r)};
+      vec4 growth = ${blend(p + r, p + r + l)};
+      ${gsplat}.flags = GSPLAT_FLAG_ACTIVE;
+      ${gsplat}.center = rest.xyz + (${blend(0, p)}).xyz;
+      ${gsplat}.quaternion = rotation.yzwx * inversesqrt(max(dot(rotation, rotation), 1e-12));
+      ${gsplat}.scales = max(texelFetch(bodyRest, ivec3(texel, 1), 0).xyz + growth.xyz, ${LEAST_SCALE});
+      ${gsplat}.rgba = texelFetch(bodyColours, ivec3(texel, 0), 0) * vec4(1.0, 1.0, 1.0, bodyGate);
+    }
   `);
 }

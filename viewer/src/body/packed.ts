@@ -68,10 +68,15 @@ function spread<T extends Float32Array | Int16Array>(values: T, size: number, te
   }
 }
 
+/** Texels that a cluster's coefficients take, four in each. */
+export function coefficientTexels(ranks: Capacity['ranks']): number {
+  return Math.ceil((ranks[0] + ranks[1] + ranks[2]) / 4);
+}
+
 /** Where each of a window's (C, P + R + L) coefficients goes among those of the capacity. */
 export function coefficientPlaces(window: BakedWindow['info'], { ranks }: Capacity): number[] {
   const begins = [0, ranks[0], ranks[0] + ranks[1]];
   const row = window.ranks.flatMap((rank, part) => Array.from({ length: rank }, (_, k) => begins[part]! + k));
-  const width = ranks[0] + ranks[1] + ranks[2];
+  const width = 4 * coefficientTexels(ranks);
   return Array.from({ length: window.num_clusters }, (_, c) => row.map((k) => c * width + k)).flat();
 }

@@ -4,18 +4,24 @@ export interface Sorter {
   readonly lastSortTime: number;
 }
 
+const FORGETS = 0.8; // of how long a sort took, with every later one
+
 /**
  * Tells when what was changed has been sorted: a sort must begin with or after the first picture
  * that is drawn since, and end.
  */
 export class SortWatch {
+  /** ms that it took lately from the first picture of a change until it was sorted. */
+  took = Infinity;
   private readonly sorter: Sorter;
+  private readonly now: () => number;
   private drawnAt: number | null = null;
   private sortedFrom: number | null = null;
   private done = true;
 
-  constructor(sorter: Sorter) {
+  constructor(sorter: Sorter, now = () => performance.now()) {
     this.sorter = sorter;
+    this.now = now;
   }
 
   /** Something was changed. */
@@ -36,6 +42,7 @@ export class SortWatch {
     const { sorting, lastSortTime } = this.sorter;
     if (this.sortedFrom === null && lastSortTime >= this.drawnAt) this.sortedFrom = lastSortTime;
     this.done = this.sortedFrom !== null && (!sorting || lastSortTime > this.sortedFrom);
+    if (this.done) this.took = Math.max(this.now() - this.drawnAt, this.took < Infinity ? FORGETS * this.took : 0);
     return this.done;
   }
 }

@@ -5,6 +5,7 @@ import { coefficients } from './coefficients.ts';
 
 const WIDTH = 1024; // texels per row: one texel is one Gaussian
 const REST_LAYERS = 4; // centre + basis scale, quaternion, scales, mean logits
+const PACKED = 4; // basis vectors in a texel: a fetch costs far more than taking them apart
 
 /**
  * The head as a Spark generator: a shader that makes Gaussian i from textures and K coefficients.
@@ -69,20 +70,29 @@ function makeGenerator(head: BakedHead, values: Float32Array, transformer: Splat
 function declarations(rank: number): string {
   return dyno.unindent(`
     uniform sampler2DArray headRest;
-    uniform isampler2DArray headBasis;
+    uniform usampler2DArray headBasis;
     uniform float headCoefficients[${rank}];
+    vec4 headVector(uvec4 four, int left) {
+      return vec4(ivec4(four << left) >> 24);
+    }
   `);
 }
 
 /** logits = mean + scale · Σ c·U; rgb, opacity = sigmoid(logits). */
 function statements(rank: number, index: string, gsplat: string): string[] {
+  const fetches = Array.from(
+    { length: Math.ceil(rank / PACKED) },
+    (_, i) => `uvec4 u${i} = texelFetch(headBasis, ivec3(texel, ${i}), 0);`,
+  );
+  const terms = Array.from(
+    { length: rank },
+    (_, k) => `headCoefficients[${k}] * headVector(u${Math.floor(k / PACKED)}, ${24 - 8 * (k % PACKED)})`,
+  );
   return dyno.unindentLines(`
     ivec2 texel = ivec2(${index} % ${WIDTH}, ${index} / ${WIDTH});
     vec4 centreAndScale = texelFetch(headRest, ivec3(texel, 0), 0);
-    vec4 blend = vec4(0.0);
-    for (int k = 0; k < ${rank}; k++) {
-      blend += headCoefficients[k] * vec4(texelFetch(headBasis, ivec3(texel, k), 0));
-    }
+    ${fetches.join(' ')}
+    vec4 blend = ${terms.join(' + ')};
     vec4 logits = texelFetch(headRest, ivec3(texel, 3), 0) + centreAndScale.w * blend;
     ${gsplat}.flags = GSPLAT_FLAG_ACTIVE;
     ${gsplat}.index = ${index};
@@ -118,16 +128,22 @@ function normalised(...q: [number, number, number, number]): number[] {
   return q.map((value) => value / length);
 }
 
+/** Layers of texels (r, g, b, opacity), each number with a byte of four basis vectors. */
 function basisTexture(head: BakedHead): THREE.DataArrayTexture {
   const { count: n, rank, basis } = head;
   const rows = Math.ceil(n / WIDTH);
   const layer = 4 * WIDTH * rows;
-  const texels = new Int8Array(rank * layer);
-  for (let k = 0; k < rank; k++) texels.set(basis.subarray(4 * n * k, 4 * n * (k + 1)), k * layer);
-  const texture = new THREE.DataArrayTexture(texels, WIDTH, rows, rank);
+  const layers = Math.ceil(rank / PACKED);
+  const texels = new Uint32Array(layers * layer);
+  const bytes = new Int8Array(texels.buffer); // little-endian, as every device with WebGL is
+  for (let k = 0; k < rank; k++) {
+    const begin = PACKED * Math.floor(k / PACKED) * layer + (k % PACKED);
+    for (let i = 0; i < 4 * n; i++) bytes[begin + PACKED * i] = basis[4 * n * k + i]!;
+  }
+  const texture = new THREE.DataArrayTexture(texels, WIDTH, rows, layers);
   texture.format = THREE.RGBAIntegerFormat;
-  texture.type = THREE.ByteType;
-  texture.internalFormat = 'RGBA8I';
+  texture.type = THREE.UnsignedIntType;
+  texture.internalFormat = 'RGBA32UI';
   texture.needsUpdate = true;
   return texture;
 }

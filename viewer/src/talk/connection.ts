@@ -27,6 +27,7 @@ export class Connection {
   private socket: WebSocket | null = null;
   private session: string | null = null;
   private lastIndex = -1;
+  private wishes: Record<string, string> = {};
   private retry = FIRST_RETRY;
   private welcomed = false;
   private readonly url: string;
@@ -41,8 +42,8 @@ export class Connection {
     const socket = new WebSocket(this.url);
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => {
-      const { session, lastIndex: last_index } = this;
-      socket.send(encode({ type: 'hello', version: VERSION, session, last_index }));
+      const { session, lastIndex: last_index, wishes } = this;
+      socket.send(encode({ type: 'hello', version: VERSION, session, last_index, wishes }));
     };
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(event.data);
     socket.onclose = () => this.closed();
@@ -54,6 +55,14 @@ export class Connection {
     if (!this.welcomed) return false;
     this.socket!.send(encode(message));
     return true;
+  }
+
+  /** Leaves the session for a new one with other services, by kind. */
+  restart(wishes: Record<string, string>): void {
+    Object.assign(this.wishes, wishes);
+    this.session = null;
+    this.lastIndex = -1;
+    this.socket?.close();
   }
 
   private receive(frame: string | ArrayBuffer): void {

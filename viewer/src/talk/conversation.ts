@@ -1,9 +1,10 @@
 import { Microphone } from '../audio/microphone.ts';
 import { Player } from '../audio/player.ts';
 import type { PageError } from '../errors.ts';
-import type { ServerMessage, Services, StateMessage, WelcomeMessage } from '../protocol.ts';
+import type { Offer, ServerMessage, Services, StateMessage, WelcomeMessage } from '../protocol.ts';
 import { Connection } from './connection.ts';
 import { TurnTimer, VoiceMeter } from './latency.ts';
+import { Listening, type ListeningView } from './listening.ts';
 
 /** Who moves the body while it speaks. */
 export interface Gestures {
@@ -17,12 +18,11 @@ const CLOCK_PERIOD = 200; // ms between reports of what has been heard
 const KEPT_OPEN = 20_000; // ms after talking by the button: opening a microphone costs the first words
 
 /** What the page shows of a conversation. */
-export interface ConversationView {
+export interface ConversationView extends ListeningView {
   state(state: StateMessage['state'] | 'connecting'): void;
   question(text: string, final: boolean): void;
   answer(sentence: string): void;
-  services(services: Services): void;
-  notice(sentence: string): void;
+  services(services: Services, offers: readonly Offer[]): void;
   microphone(open: boolean): void;
   talking(held: boolean): void;
   latency(milliseconds: number): void;
@@ -39,6 +39,7 @@ export class Conversation {
   private readonly view: ConversationView;
   private readonly connection: Connection;
   private readonly microphone: Microphone;
+  private readonly listening: Listening;
   private readonly meter = new VoiceMeter();
   private readonly timer = new TurnTimer();
   private sample = 0; // of the microphone
@@ -54,11 +55,13 @@ export class Conversation {
       lost: () => view.state('connecting'),
       failed: (error) => view.failed(error),
     });
+    this.listening = new Listening((message) => this.connection.send(message), view);
     this.microphone = new Microphone(
       (pcm) => this.hear(pcm),
       (error) => {
         this.open = false;
         this.release();
+        this.listening.close();
         view.microphone(false);
         view.notice(error.message);
       },
@@ -84,6 +87,12 @@ export class Conversation {
     return sent;
   }
 
+  /** Starts anew with another service. */
+  choose(offer: Offer): void {
+    this.player.reset();
+    this.connection.restart({ [offer.kind]: offer.key });
+  }
+
   /** Silences the avatar at once. */
   interrupt(): void {
     const utterance = this.player.current;
@@ -94,6 +103,7 @@ export class Conversation {
   /** Opens or closes the microphone; what hinders it is shown as a notice. */
   async toggleMicrophone(): Promise<void> {
     this.open = !this.open && (await this.startMicrophone());
+    this.dictate();
     if (!this.open) this.microphone.stop();
     this.view.microphone(this.open);
   }
@@ -107,6 +117,7 @@ export class Conversation {
     if (!this.held) return; // let go while the browser asked for the microphone
     this.held = started && this.connection.send({ type: 'talk', pressed: true });
     this.view.talking(this.held);
+    this.dictate();
   }
 
   release(): void {
@@ -114,6 +125,7 @@ export class Conversation {
     this.held = false;
     this.connection.send({ type: 'talk', pressed: false });
     this.view.talking(false);
+    this.dictate();
     this.closing = setTimeout(() => this.open || this.microphone.stop(), KEPT_OPEN);
   }
 
@@ -128,6 +140,13 @@ export class Conversation {
     return this.microphone.open;
   }
 
+  /** The browser recognises speech, where it is asked to, while the server hears it too. */
+  private dictate(): void {
+    const track = this.open || this.held ? this.microphone.track : null;
+    if (track) this.listening.open(track);
+    else this.listening.close();
+  }
+
   private hear(pcm: Int16Array): void {
     if (!this.open && !this.held) return;
     this.meter.hear(pcm, performance.now());
@@ -140,7 +159,8 @@ export class Conversation {
       this.player.reset();
       this.gestures?.reset();
     }
-    this.view.services(message.services);
+    this.listening.welcome(message);
+    this.view.services(message.services, message.offers);
     this.view.state('idle');
     for (const notice of message.notices) this.view.notice(notice);
   }

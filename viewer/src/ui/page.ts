@@ -1,10 +1,11 @@
-import type { Services } from '../protocol.ts';
+import type { Offer, Services } from '../protocol.ts';
 import type { Conversation, ConversationView } from '../talk/conversation.ts';
 import { Captions } from './captions.ts';
 import { Controls } from './controls.ts';
 import { byId } from './elements.ts';
 import { Overlay } from './overlay.ts';
 import { Panel } from './panel.ts';
+import { ServiceSheet } from './sheet.ts';
 
 const NOTICE_TIME = 9000; // ms
 
@@ -28,6 +29,8 @@ export function makePage(overlay: Overlay, frames: () => number): Page {
   const captions = new Captions();
   const controls = new Controls();
   const panel = new Panel(frames);
+  let choose: (offer: Offer) => void = () => {};
+  const sheet = new ServiceSheet((offer) => choose(offer));
   const view: ConversationView = {
     state(state) {
       document.body.dataset.state = state;
@@ -36,8 +39,12 @@ export function makePage(overlay: Overlay, frames: () => number): Page {
     },
     question: (text, final) => captions.question(text, final),
     answer: (sentence) => captions.answer(sentence),
-    services: showStandIns,
+    services(services, offers) {
+      showStandIns(services);
+      sheet.show(services, offers);
+    },
     notice: showNotice,
+    sharesVoice: (shared) => (byId('shared-voice').hidden = !shared),
     microphone: (open) => controls.setMicrophone(open),
     talking: (held) => controls.setTalking(held),
     latency: (milliseconds) => panel.latency(milliseconds),
@@ -47,6 +54,7 @@ export function makePage(overlay: Overlay, frames: () => number): Page {
   const talk = (conversation: Conversation) => {
     byId('state-line').hidden = false;
     controls.bind(conversation);
+    choose = (offer) => conversation.choose(offer);
     conversation.start();
   };
   return { view, talk };

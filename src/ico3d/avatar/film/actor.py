@@ -23,7 +23,7 @@ from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.bundle.manifest import CameraInfo
 from ico3d.capture.capture import Capture
 from ico3d.common.expression import SPEECH_SIZE
-from ico3d.speech.runtime import SpeechModel
+from ico3d.speech.runtime import open_speech
 from ico3d.splat.gaussians import Gaussians
 
 Draw = Callable[[float, np.ndarray], Gaussians]
@@ -72,11 +72,14 @@ def bundle_actor(bundle: Bundle) -> Actor:
     """The baked person of a bundle.
 
     Raises:
+        MissingModelError: If it needs a speech encoder that is not on this machine.
         ModelError: If its speech model cannot be used.
     """
     manifest = bundle.manifest
     head, body = manifest.head, manifest.body
-    lips = SpeechModel(bundle.read(SPEECH)).expressions if manifest.speech else None
+    lips = None
+    if speech := manifest.speech:
+        lips = open_speech(bundle.read(SPEECH), speech.encoder, speech.sha256).expressions
     idle = np.array(head.idle_expression if head else (), np.float32)
     portrait = manifest.camera
     if bundle.manifest.is_whole:

@@ -15,7 +15,7 @@ from ico3d.capture.headtrack.smoothing import filled, filled_poses, smoothed_pos
 from ico3d.capture.headtrack.track_file import HeadTrack
 from ico3d.capture.multipie import MULTI_PIE
 from ico3d.capture.multiview.writing import shown
-from ico3d.common.files import model_file
+from ico3d.common.weights import model_file
 from ico3d.errors import CaptureError
 
 PURPOSE = "tracking a head"

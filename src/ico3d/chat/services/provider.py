@@ -1,13 +1,18 @@
 """What a provider of recognition, language or voice is."""
 
+import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.bundle.animation import Animation
-from ico3d.bundle.manifest import HeadInfo, Persona
+from ico3d.bundle.manifest import HeadInfo
+from ico3d.bundle.persona import Persona
+from ico3d.common.weights import TABLE, cached
+from ico3d.errors import MissingModelError
 
 
 @dataclass(frozen=True)
@@ -25,10 +30,43 @@ class Context:
     animation: Animation | None
 
 
-def always(settings: Any) -> bool:
-    """For providers that need nothing beyond their package."""
+def unhindered(settings: Any) -> str:
+    """For providers that need nothing beyond what `make` says is missing."""
     del settings
-    return True
+    return ""
+
+
+def lacks_package(package: str, extra: str) -> str:
+    """What hinders a provider that needs a package: nothing, or that it is not installed."""
+    if importlib.util.find_spec(package) is not None:
+        return ""
+    return f"{package} is not installed: pip install 'ico3d[{extra}]'."
+
+
+def lacks_weights(name: str) -> str:
+    """What hinders a provider that needs weights: nothing, or that they are not here."""
+    if cached(name) is not None:
+        return ""
+    licence = TABLE[name].licence
+    return f"the weights '{name}' are not here: ico3d weights fetch {name} ({licence})."
+
+
+def weights_folder(name: str) -> Path:
+    """Where the files of some weights lie; nothing is downloaded while somebody waits.
+
+    Raises:
+        MissingModelError: If they are not here.
+    """
+    folder = cached(name)
+    if folder is None:
+        raise MissingModelError(lacks_weights(name))
+    return folder
+
+
+def nothing(settings: Any) -> str:
+    """For providers whose title says all."""
+    del settings
+    return ""
 
 
 @dataclass(frozen=True)
@@ -40,16 +78,19 @@ class Provider:
         settings: Dataclass of its options.
         make: Makes the processor of one session from options and context; may take a while, runs
             in a thread. What is heavy and read only is shared between sessions.
-        works: Whether it would work here as these options say: packages installed, weights
-            there, server answering. Quick; asked where the best is wanted.
+        hindrance: What keeps it from working here as these options say (packages, weights, a
+            server that answers) and what would mend it, in one sentence for people; empty if
+            nothing does. Quick, and never raises: asked where the best is wanted.
         stand_in: True for the offline three.
+        detail: Which model these options mean, for the visitor's eyes.
     """
 
     title: str
     settings: type
     make: Callable[[Any, Context], FrameProcessor]
-    works: Callable[[Any], bool] = always
+    hindrance: Callable[[Any], str] = unhindered
     stand_in: bool = False
+    detail: Callable[[Any], str] = nothing
 
 
 Table = dict[str, Provider]

@@ -20,6 +20,7 @@ QUIETEST = 0.4  # smoothed volume of speech; it rises over 0.2 s, so more would 
 HINT = 0.5  # Silero's confidence that makes a first hint
 AUDIBLE = 0.01  # RMS of a voice that is near, full scale = 1
 PLAIN = 2.6  # dB; "uh-huh" and "aha" of 6 voices: up to 2.0, speech and "yeah": from 3.4
+TRAIL = 0.2  # s of silence behind what was said with the button
 FADED = 0.03  # of its loudest power: 15 dB down
 KEPT = 100  # frames of a voice that are compared: 2 s
 AFTERGLOW = 1.0  # s of silence behind a voice that are told of, too
@@ -136,5 +137,7 @@ class VoiceDetector(VADProcessor):
     async def _hold(self) -> None:
         if self._held:
             await self.broadcast_frame(VADUserStartedSpeakingFrame, start_secs=0.0)
-        else:
+        else:  # recognisers take the last word for cut off without a little silence
+            silence = bytes(2 * int(TRAIL * MICROPHONE_RATE))
+            await self.push_frame(InputAudioRawFrame(silence, MICROPHONE_RATE, 1))
             await self.broadcast_frame(VADUserStoppedSpeakingFrame, stop_secs=0.0)

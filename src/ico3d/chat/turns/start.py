@@ -81,7 +81,8 @@ class FloorTurnStart(BaseUserTurnStartStrategy):
         if self._in_turn:
             return
         final = isinstance(frame, TranscriptionFrame)
-        if final and not self._floor.is_disputed and not self._floor.is_speaking:
+        late = final and bool(frame.text.strip())  # a blank one says that there are no words
+        if late and not self._floor.is_disputed and not self._floor.is_speaking:
             await self.trigger_user_turn_started()  # a recogniser slower than the watchdog
             return
         verdict = self._floor.understand(frame.text, final)

@@ -91,7 +91,8 @@ class Population:
             `log_scales` (N, 3), for strategies also `opacity_logits` (N,), and whatever else a
             model hangs on its Gaussians (HeadGaS++: the basis F).
         moments: An optimiser's running values; what belongs to NAME is called NAME.first and
-            NAME.second (`training.optimiser.Optimiser.moments`).
+            NAME.second (`training.optimiser.Optimiser.moments`), and NAME.mean where a mean is
+            kept of a model that nothing is added to any more.
         axes: Where the Gaussians of a parameter lie along another axis than the first.
     """
 
@@ -148,5 +149,5 @@ class Population:
 
     def _moments_of(self, name: str) -> list[str]:
         """Names of the running values that exist per Gaussian."""
-        kinds = (f"{name}.first", f"{name}.second")
+        kinds = (f"{name}.first", f"{name}.second", f"{name}.mean")
         return [kind for kind in kinds if kind in self.moments]

@@ -1,8 +1,14 @@
 """Speech to text."""
 
 from ico3d.chat.services.provider import Provider, Table
-from ico3d.chat.services.recognition import sphinx
+from ico3d.chat.services.recognition import browser, openai, sphinx, whisper
 
 PROVIDERS: Table = {
-    "pocketsphinx": Provider("pocketsphinx", sphinx.Settings, sphinx.make, stand_in=True),
+    "whisper": Provider("Whisper", whisper.Settings, whisper.make, whisper.hindrance),
+    "pocketsphinx": Provider(
+        "pocketsphinx", sphinx.Settings, sphinx.make, sphinx.hindrance, stand_in=True
+    ),
+    # never the best by themselves: they may take what is said out of the house
+    "openai": Provider("OpenAI-compatible server", openai.Settings, openai.make, openai.hindrance),
+    "browser": Provider("the visitor's browser", browser.Settings, browser.make, browser.hindrance),
 }

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from pipecat.frames.frames import (
+    EndFrame,
     Frame,
     InterimTranscriptionFrame,
     StartFrame,
@@ -21,7 +22,8 @@ from pipecat.services.stt_service import STTService
 from pipecat.utils.time import time_now_iso8601
 
 from ico3d.chat.protocol import MICROPHONE_RATE
-from ico3d.chat.services.provider import Context
+from ico3d.chat.services.provider import Context, lacks_package
+from ico3d.chat.services.recognition.segments import blank
 from ico3d.errors import MissingExtraError
 
 LEAD_IN = 0.7  # s of sound before the VAD noticed speech: it needs 0.2 s to be sure
@@ -84,6 +86,11 @@ class SphinxRecognition(STTService):
         await super().start(frame)
         self._task = self._task or self.create_task(self._decode_all())
 
+    async def stop(self, frame: EndFrame):
+        """Finishes what was said before the end."""
+        await self._sound.join()
+        await super().stop(frame)
+
     async def cleanup(self):
         """Ends the task and the thread."""
         await super().cleanup()
@@ -131,18 +138,18 @@ class SphinxRecognition(STTService):
                 text = await loop.run_in_executor(self._thread, self._finish)
                 await self._tell(text, final=True)
                 shown, fresh = "", 0
-                continue
-            text = await loop.run_in_executor(self._thread, self._decode, audio)
-            fresh += len(audio)
-            if fresh >= PARTIAL_EVERY * MICROPHONE_RATE * 2 and text and text != shown:
-                await self._tell(text, final=False)
-                shown, fresh = text, 0
+            else:
+                text = await loop.run_in_executor(self._thread, self._decode, audio)
+                fresh += len(audio)
+                if fresh >= PARTIAL_EVERY * MICROPHONE_RATE * 2 and text and text != shown:
+                    await self._tell(text, final=False)
+                    shown, fresh = text, 0
+            self._sound.task_done()
 
     async def _tell(self, text: str, final: bool) -> None:
-        if not text:
-            return
         if final:
-            await self.push_frame(TranscriptionFrame(text, "", time_now_iso8601(), finalized=True))
+            said = TranscriptionFrame(text, "", time_now_iso8601(), finalized=True)
+            await self.push_frame(said if text else blank())
         else:
             await self.push_frame(InterimTranscriptionFrame(text, "", time_now_iso8601()))
 
@@ -168,6 +175,11 @@ class SphinxRecognition(STTService):
 @dataclass(frozen=True)
 class Settings:
     """It has none."""
+
+
+def hindrance(settings: Settings) -> str:
+    """Its package."""
+    return lacks_package("pocketsphinx", "chat")
 
 
 def make(settings: Settings, context: Context) -> SphinxRecognition:

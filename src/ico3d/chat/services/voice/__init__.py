@@ -1,8 +1,15 @@
 """Text to speech."""
 
 from ico3d.chat.services.provider import Provider, Table
-from ico3d.chat.services.voice import espeak
+from ico3d.chat.services.voice import espeak, kokoro, openai, openvoice, piper
 
 PROVIDERS: Table = {
-    "espeak-ng": Provider("espeak-ng", espeak.Settings, espeak.make, stand_in=True),
+    "openvoice": Provider("OpenVoice V2", openvoice.Settings, openvoice.make, openvoice.hindrance),
+    "kokoro": Provider("Kokoro", kokoro.Settings, kokoro.make, kokoro.hindrance),
+    "piper": Provider("Piper", piper.Settings, piper.make, piper.hindrance),
+    "espeak-ng": Provider(
+        "espeak-ng", espeak.Settings, espeak.make, espeak.hindrance, stand_in=True
+    ),
+    # never the best by itself: it may cost money, and takes what is said out of the house
+    "openai": Provider("OpenAI-compatible server", openai.Settings, openai.make),
 }

@@ -1,20 +1,43 @@
 """The voice of espeak-ng: offline, its library and voices are inside a package."""
 
-import asyncio
-from collections.abc import AsyncGenerator
+import unicodedata
+from collections import Counter
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from pipecat.frames.frames import Frame, TTSAudioRawFrame
-from pipecat.services.settings import TTSSettings
-from pipecat.services.tts_service import TTSService
 
-from ico3d.chat.protocol import SPEECH_RATE
-from ico3d.chat.services.provider import Context
+from ico3d.chat.services.provider import Context, lacks_package
+from ico3d.chat.services.voice.pieces import PieceVoice, at_speech_rate
 from ico3d.common.espeak import synthesize
-from ico3d.errors import MissingExtraError
 
-STARVED = 60.0  # s that a sentence may take on a machine that is busy with other things
+SCRIPTS = {
+    "ARABIC": "ar fa ur ku sd ug",
+    "ARMENIAN": "hy hyw",
+    "BENGALI": "bn as",
+    "CJK": "cmn yue hak ja",
+    "CYRILLIC": "ru uk be bg mk sr ba cv kk ky tt",
+    "DEVANAGARI": "hi mr ne kok",
+    "ETHIOPIC": "am ti",
+    "GEORGIAN": "ka",
+    "GREEK": "el grc",
+    "GUJARATI": "gu",
+    "GURMUKHI": "pa",
+    "HANGUL": "ko",
+    "HEBREW": "he",
+    "HIRAGANA": "ja",
+    "KANNADA": "kn",
+    "KATAKANA": "ja",
+    "MALAYALAM": "ml",
+    "MYANMAR": "my shn",
+    "ORIYA": "or",
+    "SINHALA": "si",
+    "TAMIL": "ta",
+    "TELUGU": "te",
+    "THAI": "th",
+}
+"""espeak-ng's languages by script, the first where nothing else is known. Scripts are named by
+the first word of their letters' Unicode names."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +45,8 @@ class Settings:
     """Which voice.
 
     Attributes:
-        voice: espeak-ng's language and variant.
+        voice: espeak-ng's language and variant, such as `de+f3`. What is written in another
+            script is spoken by that script's language, with the same variant.
         rate: Words per minute.
     """
 
@@ -30,43 +54,33 @@ class Settings:
     rate: int = 165
 
 
-class EspeakVoice(TTSService):
-    """Speaks a sentence in about 20 ms."""
-
-    def __init__(self, voice: str, rate: int):
-        """A voice such as `en-us+f3` at `rate` words per minute."""
-        super().__init__(
-            push_start_frame=True,
-            push_stop_frames=True,
-            stop_frame_timeout_s=STARVED,
-            sample_rate=SPEECH_RATE,
-            settings=TTSSettings(model=None, voice=voice, language=None),
-        )
-        self._voice, self._rate = voice, rate
-
-    async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame | None, None]:
-        """Yields the sentence's sound in one frame."""
-        pcm = await asyncio.to_thread(spoken, text, self._voice, self._rate)
-        yield TTSAudioRawFrame(pcm.tobytes(), SPEECH_RATE, 1, context_id=context_id)
+def voice_for(text: str, voice: str) -> str:
+    """The voice for a text: the given one, or that of the script in which most of it is written."""
+    names = Counter(unicodedata.name(c, "").partition(" ")[0] for c in text if c.isalpha())
+    kana = names["HIRAGANA"] + names["KATAKANA"]  # Japanese has more Chinese characters than these
+    script = "HIRAGANA" if kana else max(names, key=lambda name: names[name], default="")
+    language, plus, variant = voice.partition("+")
+    languages = SCRIPTS.get(script, language).split()
+    return voice if language in languages else languages[0] + plus + variant
 
 
 def spoken(text: str, voice: str, rate: int) -> np.ndarray:
     """A text as (S,) int16 samples at 24 kHz."""
-    try:
-        import soxr
-    except ImportError:
-        raise MissingExtraError("soxr", "chat", "the espeak-ng voice") from None
-    speech = synthesize(text, voice, rate)
-    samples = soxr.resample(speech.samples, speech.rate, SPEECH_RATE)  # (S,)
-    return (np.clip(samples, -1, 1) * 32767).astype(np.int16)
+    speech = synthesize(text, voice_for(text, voice), rate)
+    return at_speech_rate(speech.samples, speech.rate)
 
 
-def make(settings: Settings, context: Context) -> EspeakVoice:
-    """A voice for one session.
+def hindrance(settings: Settings) -> str:
+    """Its packages."""
+    return lacks_package("espeakng_loader", "voice") or lacks_package("soxr", "chat")
+
+
+def make(settings: Settings, context: Context) -> PieceVoice:
+    """A voice for one session; it speaks a sentence in about 20 ms.
 
     Raises:
         MissingExtraError: If espeakng-loader or soxr is not installed.
         SettingsError: If there is no such voice.
     """
     spoken("a", settings.voice, settings.rate)  # fails now rather than in mid-talk
-    return EspeakVoice(settings.voice, settings.rate)
+    return PieceVoice(settings.voice, partial(spoken, voice=settings.voice, rate=settings.rate))

@@ -1,0 +1,1 @@
+"""Recognition, language, voice and expression on another machine: servers, and their clients."""

@@ -1,0 +1,162 @@
+"""Speech recognition by the visitor's browser (Web Speech API): the page sends the words.
+
+The sound comes to the server too: it alone tells when somebody speaks, and when he has finished.
+"""
+
+import asyncio
+from collections.abc import AsyncGenerator
+from dataclasses import dataclass
+
+from pipecat.frames.frames import (
+    Frame,
+    InterimTranscriptionFrame,
+    ManuallySwitchServiceFrame,
+    TranscriptionFrame,
+    VADUserStartedSpeakingFrame,
+    VADUserStoppedSpeakingFrame,
+)
+from pipecat.pipeline.service_switcher import ServiceSwitcher
+from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
+from pipecat.services.settings import STTSettings
+from pipecat.services.stt_service import STTService
+from pipecat.utils.time import time_now_iso8601
+
+from ico3d.chat.frames import DeafFrame, HeardFrame
+from ico3d.chat.services.provider import Context
+from ico3d.chat.services.recognition.segments import blank
+from ico3d.chat.settings import BEST
+
+SETTLED = 0.5  # s without news in silence after which partial words are taken for final ones
+SLOWEST = 1.5  # s that a browser may take for its first words
+LATE = 3.0  # s after a voice in which its words may still come
+
+
+@dataclass(frozen=True)
+class Settings:
+    """In which language, and who listens where the browser cannot.
+
+    Attributes:
+        language: BCP 47 tag of what is spoken, such as `de-DE`; empty for the browser's language.
+        fallback: Name of another provider of recognition, with its default options; `best`; or
+            empty for nobody.
+    """
+
+    language: str = ""
+    fallback: str = BEST
+
+
+class BrowserRecognition(STTService):
+    """Turns the page's words into transcripts.
+
+    Words that come while nobody speaks are dropped: browsers' recognisers hear the avatar too.
+    """
+
+    def __init__(self):
+        """A recogniser for one session."""
+        settings = STTSettings(model="browser", language=None)
+        super().__init__(ttfs_p99_latency=SLOWEST, settings=settings)
+        self._partial: HeardFrame | None = None
+        self._taken = -1  # the last result whose words are final here
+        self._understood = False  # whether there were final words since the voice began
+        self._voice_until = -LATE  # the event loop's clock
+        self._timer: asyncio.Task | None = None
+
+    async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame | None, None]:
+        """The sound is for others."""
+        yield None
+
+    async def cleanup(self):
+        """Ends the timer."""
+        await super().cleanup()
+        await self._stop_timer()
+
+    async def process_frame(self, frame: Frame, direction: FrameDirection):
+        """Takes what comes from the page, passes everything else."""
+        if isinstance(frame, HeardFrame):
+            await self._hear(frame)
+            return
+        await super().process_frame(frame, direction)
+        if isinstance(frame, VADUserStoppedSpeakingFrame):
+            self._voice_until = self._now()
+            await self._restart_timer()
+
+    async def _handle_vad_user_started_speaking(self, frame: VADUserStartedSpeakingFrame):
+        await super()._handle_vad_user_started_speaking(frame)
+        self._understood = False
+        await self._stop_timer()
+
+    async def _hear(self, heard: HeardFrame) -> None:
+        belongs = self._user_speaking or self._now() - self._voice_until < LATE
+        if heard.result <= self._taken or not belongs or not heard.text.strip():
+            return
+        if heard.final:
+            await self._take(heard)
+            return
+        self._partial = heard
+        await self.push_frame(InterimTranscriptionFrame(heard.text, "", time_now_iso8601()))
+        if not self._user_speaking:
+            await self._restart_timer()
+
+    async def _take(self, heard: HeardFrame) -> None:
+        self._taken, self._partial, self._understood = heard.result, None, True
+        words = TranscriptionFrame(heard.text.strip(), "", time_now_iso8601())
+        words.finalized = not self._user_speaking
+        if words.finalized:
+            await self._stop_timer()
+        await self.push_frame(words)
+
+    async def _settle(self) -> None:
+        await asyncio.sleep(SETTLED)
+        self._timer = None
+        if self._partial is not None:
+            await self._take(self._partial)
+        elif self._understood:  # while he still spoke: nothing more is on its way
+            await self.push_frame(blank())
+
+    async def _restart_timer(self) -> None:
+        await self._stop_timer()
+        self._timer = self.create_task(self._settle(), "settle")
+
+    async def _stop_timer(self) -> None:
+        if self._timer is not None:
+            timer, self._timer = self._timer, None
+            await self.cancel_task(timer)
+
+    @staticmethod
+    def _now() -> float:
+        return asyncio.get_running_loop().time()
+
+
+class BrowserOrServer(ServiceSwitcher):
+    """The browser's recogniser until the page says that there is none."""
+
+    def __init__(self, server: FrameProcessor):
+        """Takes the recogniser of the server."""
+        super().__init__([BrowserRecognition(), server])
+        self._server = server
+
+    async def process_frame(self, frame: Frame, direction: FrameDirection):
+        """Switches when it must."""
+        if isinstance(frame, DeafFrame):
+            frame = ManuallySwitchServiceFrame(service=self._server)
+        await super().process_frame(frame, direction)
+
+
+def hindrance(settings: Settings) -> str:
+    """It is never chosen by itself."""
+    return (
+        "the browser's maker may receive the sound: "
+        'set [recognition] use = "browser" if that is wanted.'
+    )
+
+
+def make(settings: Settings, context: Context) -> FrameProcessor:
+    """A recogniser for one session, with the server's own behind it.
+
+    Raises:
+        SettingsError: If there is no such fallback.
+    """
+    from ico3d.chat.services import fallback
+
+    listener = fallback(settings)
+    return BrowserOrServer(listener.make(context)) if listener else BrowserRecognition()

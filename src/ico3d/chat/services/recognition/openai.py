@@ -1,0 +1,50 @@
+"""Speech recognition by an OpenAI-compatible server, through pipecat's own service."""
+
+import socket
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+from pipecat.processors.frame_processor import FrameProcessor
+
+from ico3d.chat.services.provider import Context
+
+KNOCK = 0.3  # s that a server may take to accept a connection
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which server.
+
+    Attributes:
+        url: Its address, such as `http://localhost:8000/v1`; empty for OpenAI's own.
+        model: Name of its model.
+        key_variable: Environment variable that holds the key.
+        language: Code of the language that is spoken, such as `de`; empty: the server tells.
+        timeout: Seconds after which a transcript is given up, one retry included.
+    """
+
+    url: str = ""
+    model: str = "whisper-1"
+    key_variable: str = "OPENAI_API_KEY"
+    language: str = ""
+    timeout: float = 8.0
+
+
+def hindrance(settings: Settings) -> str:
+    """No server, or one that is not there."""
+    if not settings.url:
+        return 'no server is chosen: set [recognition] use = "openai" and url.'
+    try:
+        address = urlsplit(settings.url)
+        port = address.port or (443 if address.scheme == "https" else 80)
+        socket.create_connection((address.hostname or "", port), KNOCK).close()
+    except (OSError, ValueError):
+        return f"no server answers at {settings.url}: start it, or set [recognition] url."
+    return ""
+
+
+def make(settings: Settings, context: Context) -> FrameProcessor:
+    """A recogniser for one session."""
+    from ico3d.chat.services.recognition.openai_service import OpenAIRecognition
+
+    return OpenAIRecognition(settings)

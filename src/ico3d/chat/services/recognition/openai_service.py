@@ -1,0 +1,62 @@
+"""pipecat's OpenAI service with any language and an end to waiting; slow to import."""
+
+import asyncio
+import os
+from collections.abc import AsyncGenerator
+from typing import Any
+
+from openai import OpenAIError
+from pipecat.frames.frames import Frame, TranscriptionFrame
+from pipecat.services.openai.stt import OpenAISTTService
+from pipecat.utils.time import time_now_iso8601
+
+from ico3d.chat.services.recognition.openai import Settings
+from ico3d.chat.services.recognition.segments import Segments
+
+
+class Transcriptions(OpenAISTTService):
+    """Asks for transcripts as our settings say.
+
+    pipecat's own way insists on a language, and lets the client wait for ten minutes, thrice.
+    """
+
+    def __init__(self, options: Settings, **rest):
+        """A client of the server that the settings name."""
+        super().__init__(
+            api_key=os.environ.get(options.key_variable, "none"),
+            base_url=options.url or None,
+            settings=OpenAISTTService.Settings(model=options.model),
+            **rest,
+        )
+        self._options = options
+        self._client = self._client.with_options(max_retries=1)
+
+    async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame, None]:
+        """Transcribes a WAV file.
+
+        Raises:
+            ConnectionError: If no transcript came, or not in time.
+        """
+        options = self._options
+        place = options.url or "OpenAI's server"
+        wanted: dict[str, Any] = {"language": options.language} if options.language else {}
+        file = ("speech.wav", audio, "audio/wav")
+        try:
+            async with asyncio.timeout(options.timeout):
+                answer = await self._client.audio.transcriptions.create(
+                    file=file, model=options.model, **wanted
+                )
+        except TimeoutError:
+            sentence = f"{place} gave no transcript within {options.timeout:g} s."
+            raise ConnectionError(sentence) from None
+        except OpenAIError as error:
+            raise ConnectionError(f"{place} gave no transcript: {error}") from error
+        yield TranscriptionFrame(answer.text, "", time_now_iso8601(), result=answer)
+
+
+class OpenAIRecognition(Segments, Transcriptions):
+    """A server's recogniser for one session."""
+
+    def __init__(self, options: Settings):
+        """A recogniser as the settings say."""
+        super().__init__(options.timeout, options=options)

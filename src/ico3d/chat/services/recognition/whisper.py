@@ -1,0 +1,167 @@
+"""Speech recognition with Whisper on this machine, through faster-whisper."""
+
+import functools
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pipecat.processors.frame_processor import FrameProcessor
+
+from ico3d.chat.services.provider import Context, lacks_package
+from ico3d.common.weights import TABLE, cached
+from ico3d.errors import MissingExtraError, MissingModelError, SettingsError
+
+AUTO = "auto"
+ON_CUDA = ("large-v3", "large-v3-turbo", "small", "base", "tiny")
+ON_CPU = ("base", "tiny")  # what is larger takes seconds longer than a visitor waits
+ENGLISH = ("distil-large-v3",)  # knows no other language
+NEEDED = ("model.bin", "tokenizer.json")  # what is missing would be downloaded in mid-talk
+_loading = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which Whisper, and where it computes.
+
+    Attributes:
+        model: Name of a model whose weights are here, such as `large-v3` or `distil-large-v3`;
+            a folder with one that was converted for CTranslate2; or `auto`: the best that is
+            here and keeps up on this machine.
+        language: Code of the language that is spoken, such as `de`; empty if it is to be told
+            from each stretch of speech.
+        device: `cuda`, `cpu`, or `auto`: CUDA where there is a device.
+        precision: CTranslate2's type of computation, such as `int8`; `auto` takes `float16` on
+            CUDA and `int8` on a CPU.
+    """
+
+    model: str = AUTO
+    language: str = ""
+    device: str = AUTO
+    precision: str = AUTO
+
+
+def hindrance(settings: Settings) -> str:
+    """A package or weights that are not here."""
+    missing = lacks_package("faster_whisper", "whisper")
+    if missing:
+        return missing
+    try:
+        find(settings)
+    except (MissingModelError, SettingsError) as error:
+        return str(error)
+    return ""
+
+
+def make(settings: Settings, context: Context) -> FrameProcessor:
+    """A recogniser for one session; the model is loaded by the first and shared by all.
+
+    Raises:
+        MissingExtraError: If faster-whisper is not installed.
+        MissingModelError: If the weights are not here.
+        SettingsError: If the model cannot be loaded so, or does not know the language.
+    """
+    if lacks_package("faster_whisper", "whisper"):
+        raise MissingExtraError("faster-whisper", "whisper", "Whisper")
+    from ico3d.chat.services.recognition.whisper_service import WhisperRecognition
+
+    folder = find(settings)
+    device = computes_on(settings)
+    precision = settings.precision
+    if precision == AUTO:
+        precision = "float16" if device == "cuda" else "int8"
+    with _loading:
+        model = load(folder, device, precision)
+    language = settings.language or ("en" if settings.model in ENGLISH else None)
+    if language is not None and language not in model.supported_languages:
+        raise SettingsError(f"Whisper '{folder.name}' does not know the language '{language}'.")
+    return WhisperRecognition(model, language)
+
+
+def find(settings: Settings) -> Path:
+    """The folder of the model that the settings choose.
+
+    Raises:
+        MissingModelError: If none is here; the sentence says how to get one.
+        SettingsError: If there is no such model.
+    """
+    if Path(settings.model).is_dir():
+        return complete(Path(settings.model))
+    names = candidates(settings)
+    for name in names:
+        folder = cached(weights_name(name))
+        if folder is not None:
+            return complete(folder)
+    wanted = TABLE[weights_name(names[0])]
+    raise MissingModelError(
+        f"the weights of Whisper {names[0]} are not here: ico3d weights fetch {wanted.name} "
+        f"({wanted.size / 1e6:.0f} MB, {wanted.licence})."
+    )
+
+
+def candidates(settings: Settings) -> tuple[str, ...]:
+    """Names of models, the best first.
+
+    Raises:
+        SettingsError: If the settings name one that is unknown.
+    """
+    known = (*ON_CUDA, *ENGLISH)
+    if settings.model != AUTO:
+        if settings.model not in known:
+            names = " or ".join((AUTO, *known))
+            raise SettingsError(
+                f"Whisper '{settings.model}' is unknown, use {names}, or the folder of a model."
+            )
+        return (settings.model,)
+    if computes_on(settings) != "cuda":
+        return ON_CPU
+    return (*ENGLISH, *ON_CUDA) if settings.language == "en" else ON_CUDA
+
+
+def weights_name(model: str) -> str:
+    """What `ico3d weights` calls a model."""
+    return model if model in ENGLISH else f"whisper-{model}"
+
+
+def complete(folder: Path) -> Path:
+    """The folder, if it holds all that is needed.
+
+    Raises:
+        MissingModelError: If it does not.
+    """
+    for name in NEEDED:
+        if not (folder / name).is_file():
+            raise MissingModelError(f"the Whisper model in {folder} has no {name}: fetch it again.")
+    return folder
+
+
+def computes_on(settings: Settings) -> str:
+    """`cuda` or `cpu`."""
+    if settings.device == AUTO:
+        return "cuda" if cuda_devices() else "cpu"
+    return settings.device
+
+
+@functools.cache
+def cuda_devices() -> int:
+    """How many of them CTranslate2 can use."""
+    from ctranslate2 import get_cuda_device_count
+
+    return get_cuda_device_count()
+
+
+@functools.cache
+def load(folder: Path, device: str, precision: str) -> Any:
+    """A `faster_whisper.WhisperModel`, once per process.
+
+    Raises:
+        SettingsError: If it cannot be loaded so.
+    """
+    from faster_whisper import WhisperModel
+
+    try:
+        return WhisperModel(str(folder), device, compute_type=precision, local_files_only=True)
+    except (RuntimeError, ValueError) as error:
+        raise SettingsError(
+            f"Whisper in {folder} cannot be used on {device} with {precision}: {error}."
+        ) from error

@@ -1,0 +1,157 @@
+"""Cuts an answer, while it is being written, into the pieces that are spoken one by one.
+
+pipecat's sentence rules (sentencex) find the ends of sentences: abbreviations, numbers, times,
+addresses and initials do not end one. Here, beyond that, the first piece of an answer may end at
+a clause, so that the voice can begin sooner, and a line ends a piece.
+"""
+
+import re
+from collections.abc import AsyncIterator
+
+from pipecat.frames.frames import Frame, LLMFullResponseStartFrame
+from pipecat.processors.aggregators.llm_text_processor import LLMTextProcessor
+from pipecat.processors.frame_processor import FrameDirection
+from pipecat.utils.string import SENTENCE_ENDING_PUNCTUATION
+from pipecat.utils.text.base_text_aggregator import Aggregation, TextType
+from pipecat.utils.text.simple_text_aggregator import SimpleTextAggregator
+
+from ico3d.chat.services.voice.markup import EMOJI
+
+LEAST_WORDS = 2  # of a clause: a single word sounds torn off, and is over before more has come
+LEAST_LETTERS = 4  # the same for scripts without spaces
+MOST_WORDS = 12  # after which the first piece ends between two words, clause or not
+UNMARKED_LETTERS = 40  # after which a space ends a sentence of a script that has no full stop
+
+_CLOSER = r"[\"'”’»)\]*_`」』）】]"
+_CLAUSE = re.compile(
+    # a mark before white space: no decimal comma, no time of day, no address
+    rf"[,;:،؛]{_CLOSER}*(?=\s)"
+    rf"|[，、；：]{_CLOSER}*"
+    r"|(?<=[^\W\d])\s?—|(?<=[^\W\d]) [–-](?=\s)"
+)
+_WIDE = re.compile(r"[\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff\u2e80-\u9fff\uf900-\ufaff]")
+_UNMARKED = re.compile(r"(?<=[\u0e00-\u0eff\u1000-\u109f\u1780-\u17ff])\s+")  # Thai to Khmer
+_LISTED = re.compile(r"\s*[\W_]*\d{1,3}[.)]\s*\S?")  # the number of a list's entry, and no more
+_EMOJI = re.compile(rf"{EMOJI}|[\u200d\ufe0f]")
+_TRAILING = re.compile(rf"\s*{EMOJI}(\s|{_EMOJI.pattern})*")
+
+
+class Clauses(SimpleTextAggregator):
+    """Yields the first clause of an answer as soon as it is there, then sentence by sentence.
+
+    What it yields, put together, is the answer but for white space at the joints.
+    """
+
+    def __init__(self, language: str | None = None):
+        """For answers in a language (a code such as `de`; English where not given)."""
+        super().__init__(language=language)
+        self._first = True
+
+    async def begin(self) -> None:
+        """A new answer."""
+        await self.reset()
+        self._first = True
+
+    async def aggregate(self, text: str) -> AsyncIterator[Aggregation]:
+        """Takes some more of the answer; yields the pieces that are complete."""
+        for char in text:
+            piece = await self._add(char)
+            if piece is not None and piece.strip():
+                self._first = False
+                yield Aggregation(piece.strip(), TextType.SENTENCE)
+
+    async def flush(self) -> Aggregation | None:
+        """The rest of the answer, if there is one."""
+        rest = self._text.strip()
+        await self.begin()
+        return Aggregation(rest, TextType.SENTENCE) if rest else None
+
+    async def handle_interruption(self) -> None:
+        """The answer is over."""
+        await self.begin()
+
+    async def _add(self, char: str) -> str | None:
+        """The piece that a further character shows to be complete."""
+        if char == "\n":
+            self._text += char
+            return await self._cut(len(self._text))
+        self._text += char
+        text = self._text
+        if _EMOJI.fullmatch(char) or not await self._is_worth_a_look():
+            return None
+        sentence = await self._check_sentence_with_lookahead(char)
+        if sentence is not None:
+            return await self._with_trailing(text)
+        end = self._clause_end(char) if self._first else 0
+        end = end or self._unmarked_end()
+        return await self._cut(end) if end else None
+
+    async def _is_worth_a_look(self) -> bool:
+        """Not while there is only the number of a list's entry: it belongs to what follows."""
+        if not _LISTED.fullmatch(self._text):
+            return True
+        await self._restart(self._text)
+        return False
+
+    async def _with_trailing(self, text: str) -> str:
+        """The sentence that has just been cut off the front of `text`, and emoji behind it."""
+        rest = self._text
+        trailing = _TRAILING.match(rest)
+        if trailing:
+            rest = rest[trailing.end() :]
+            await self._restart(rest)
+        return text[: len(text) - len(rest)]
+
+    def _clause_end(self, char: str) -> int:
+        """Where the first clause ends; 0 if it is not complete. It is when something follows."""
+        if char.isspace() or char in SENTENCE_ENDING_PUNCTUATION or re.fullmatch(_CLOSER, char):
+            return 0
+        for mark in _CLAUSE.finditer(self._text[:-1]):
+            if _is_long_enough(self._text[: mark.end()]):
+                return mark.end()
+        words = list(re.finditer(r"\S+", self._text[:-1]))
+        is_new_word = self._text[-2:-1].isspace()
+        return words[-1].end() if is_new_word and len(words) >= MOST_WORDS else 0
+
+    def _unmarked_end(self) -> int:
+        """Where a sentence ends whose script marks ends by spaces; 0 if it does not yet."""
+        least = LEAST_LETTERS if self._first else UNMARKED_LETTERS
+        for space in _UNMARKED.finditer(self._text[:-1]):
+            if _letters(self._text[: space.start()]) >= least:
+                return space.start()
+        return 0
+
+    async def _cut(self, end: int) -> str:
+        piece, rest = self._text[:end], self._text[end:]
+        await self._restart(rest)
+        return piece
+
+    async def _restart(self, text: str) -> None:
+        """Forgets what it was waiting for."""
+        await self.reset()
+        self._text = text
+
+
+class ClauseProcessor(LLMTextProcessor):
+    """Stands between language model and voice: turns streamed text into pieces to speak."""
+
+    def __init__(self, language: str | None = None):
+        """For one session."""
+        self._clauses = Clauses(language)
+        super().__init__(text_aggregator=self._clauses)
+
+    async def process_frame(self, frame: Frame, direction: FrameDirection) -> None:
+        """Replaces the model's text by pieces, passes everything else."""
+        if isinstance(frame, LLMFullResponseStartFrame):
+            await self._clauses.begin()
+        await super().process_frame(frame, direction)
+
+
+def _letters(text: str) -> int:
+    return sum(char.isalnum() for char in text)
+
+
+def _is_long_enough(clause: str) -> bool:
+    if _WIDE.search(clause):
+        return _letters(clause) >= LEAST_LETTERS
+    return sum(any(map(str.isalnum, word)) for word in clause.split()) >= LEAST_WORDS

@@ -1,0 +1,100 @@
+"""The colour of a person's voice, taken from a recording only with that person's consent."""
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from ico3d.common.files import write_atomic
+from ico3d.errors import SettingsError
+
+KEY = "embedding"
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recorded voice that may be used.
+
+    Attributes:
+        path: The WAV file.
+        digest: Its sha256, under which its consent and its embedding are kept.
+    """
+
+    path: Path
+    digest: str
+
+    def kept(self, suffix: str) -> Path:
+        """The file that is kept of it."""
+        return Path.home() / ".cache" / "ico3d" / "voices" / f"{self.digest}{suffix}"
+
+    def embedding(self, extract: Callable[[str], np.ndarray]) -> np.ndarray:
+        """What `extract` makes of the file, float32; computed once."""
+        cached = self.kept(".safetensors")
+        try:
+            return load(cached.read_bytes())[KEY]
+        except (OSError, SafetensorError, KeyError):
+            embedding = np.ascontiguousarray(extract(str(self.path)), np.float32)
+        write_atomic(cached, save({KEY: embedding}))
+        return embedding
+
+
+def permitted_recording(path: Path, consent: str, consent_by: str) -> Recording:
+    """A recorded voice whose owner has consented.
+
+    Args:
+        path: WAV file of the voice.
+        consent: The owner's statement; may be empty where one is kept for this very recording.
+        consent_by: The owner's name.
+
+    Raises:
+        SettingsError: If the recording cannot be read, or nobody has consented.
+    """
+    try:
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise SettingsError(f"{path}: cannot be read ({error.strerror}).") from error
+    recording = Recording(path, digest)
+    record_consent(recording, consent.strip(), consent_by.strip())
+    return recording
+
+
+def record_consent(recording: Recording, statement: str, by: str) -> None:
+    """Keeps a consent: who stated what, when, on which recording.
+
+    Raises:
+        SettingsError: If there is none, neither given nor kept.
+    """
+    record = recording.kept(".json")
+    kept = read_consent(record)
+    if kept and (not statement or (statement, by) == (kept["statement"], kept["by"])):
+        return
+    if not (statement and by):
+        raise SettingsError(
+            f"{recording.path}: cloning a voice needs the consent of its owner: state it in the "
+            'settings file under [voice] as consent = "…" and the name as consent_by = "…".'
+        )
+    values = {
+        "statement": statement,
+        "by": by,
+        "at": datetime.now(UTC).isoformat(timespec="seconds"),
+        "recording": recording.path.name,
+        "sha256": recording.digest,
+    }
+    text = json.dumps(values, ensure_ascii=False, indent=2) + "\n"
+    write_atomic(record, text.encode())
+
+
+def read_consent(record: Path) -> dict[str, str] | None:
+    """A kept consent; null where there is none that can be read."""
+    try:
+        values = json.loads(record.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    known = isinstance(values, dict) and values.get("statement") and values.get("by")
+    return values if known else None

@@ -1,0 +1,104 @@
+"""Kokoro through pipecat's own service: 82 million parameters, on the CPU, nine languages."""
+
+import functools
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pipecat.audio.utils import create_stream_resampler
+from pipecat.services.tts_service import TTSService
+
+from ico3d.chat.services.provider import Context, lacks_package, lacks_weights, weights_folder
+from ico3d.chat.services.voice.pieces import LOADING, OPTIONS, SYNCHRONOUS, Prompt
+from ico3d.errors import MissingExtraError, SettingsError
+
+LANGUAGES = {
+    "a": "en-us",
+    "b": "en-gb",
+    "e": "es",
+    "f": "fr-fr",
+    "h": "hi",
+    "i": "it",
+    "j": "ja",
+    "p": "pt-br",
+    "z": "cmn",
+}
+"""espeak-ng's names, which Kokoro's words go through, by the first letter of a voice."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which of Kokoro's voices.
+
+    Attributes:
+        voice: Its name; the first letter is its language: `af_heart` American, `bf_emma` British,
+            `ef_dora` Spanish, `ff_siwis` French, `hf_alpha` Hindi, `if_sara` Italian, `jf_alpha`
+            Japanese, `pf_dora` Portuguese, `zf_xiaobei` Chinese.
+        language: What it speaks, such as `en-us`; empty for its own language.
+        speed: 1 is its own pace; 0.5 to 2.
+    """
+
+    voice: str = "af_heart"
+    language: str = ""
+    speed: float = 1.0
+
+    def __post_init__(self):
+        """Checks the speed.
+
+        Raises:
+            SettingsError: If Kokoro cannot speak at it.
+        """
+        if not 0.5 <= self.speed <= 2:
+            raise SettingsError("chat settings: voice 'kokoro': speed must be 0.5 to 2.")
+
+
+def language(settings: Settings) -> str:
+    """What the voice speaks, in espeak-ng's name."""
+    return settings.language or LANGUAGES.get(settings.voice[:1], "en-us")
+
+
+def hindrance(settings: Settings) -> str:
+    """Its package and its weights."""
+    return lacks_package("kokoro_onnx", "kokoro") or lacks_weights("kokoro")
+
+
+def make(settings: Settings, context: Context) -> TTSService:
+    """A voice for one session; all share one model.
+
+    Raises:
+        MissingExtraError: If kokoro-onnx is not installed.
+        MissingModelError: If its files are not there.
+        SettingsError: If there is no such voice.
+    """
+    try:
+        from pipecat.services.kokoro.tts import KokoroTTSService
+    except ImportError:
+        raise MissingExtraError("kokoro-onnx", "kokoro", "the Kokoro voice") from None
+
+    class KokoroVoice(Prompt, KokoroTTSService):
+        """pipecat's, with a model that is there: its own constructor loads or downloads one."""
+
+        def __init__(self, model: Any):
+            own = KokoroTTSService.Settings(
+                model=None,
+                voice=settings.voice,
+                language=language(settings),
+                speed=settings.speed,
+            )
+            TTSService.__init__(self, settings=own, **SYNCHRONOUS, **OPTIONS)
+            self._kokoro, self._resampler = model, create_stream_resampler()
+
+    with LOADING:
+        model = engine(weights_folder("kokoro"))
+    if settings.voice not in model.voices:
+        names = " or ".join(model.get_voices())
+        raise SettingsError(f"chat settings: voice 'kokoro': voice must be {names}.")
+    return KokoroVoice(model)
+
+
+@functools.cache
+def engine(folder: Path) -> Any:
+    """The model, loaded once."""
+    from kokoro_onnx import Kokoro
+
+    return Kokoro(str(folder / "kokoro-v1.0.onnx"), str(folder / "voices-v1.0.bin"))

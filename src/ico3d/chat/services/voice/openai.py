@@ -1,0 +1,105 @@
+"""Any voice behind an OpenAI-compatible server."""
+
+import os
+from collections.abc import AsyncGenerator
+from dataclasses import dataclass
+
+from pipecat.audio.utils import create_stream_resampler
+from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
+from pipecat.services.openai.tts import OpenAITTSService
+
+from ico3d.chat.protocol import SPEECH_RATE
+from ico3d.chat.services.provider import Context
+from ico3d.chat.services.voice.pieces import OPTIONS, STARVED, Prompt
+from ico3d.errors import SettingsError
+
+CHUNK = 4800  # bytes that are passed on at once: 0.1 s
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which server.
+
+    Attributes:
+        url: Its address, such as `http://localhost:8880/v1`; empty for the provider's own.
+        model: Name of its model.
+        voice: Name of its voice.
+        key_variable: Environment variable that holds the key.
+        rate: Samples per second of its sound; a WAV file says so itself.
+        timeout: Seconds to wait for an answer, or for more of it.
+    """
+
+    url: str = ""
+    model: str = "gpt-4o-mini-tts"
+    voice: str = "alloy"
+    key_variable: str = "OPENAI_API_KEY"
+    rate: int = SPEECH_RATE
+    timeout: float = 10.0
+
+    def __post_init__(self):
+        """Checks ranges.
+
+        Raises:
+            SettingsError: If rate or time-out make no sense.
+        """
+        if not (8000 <= self.rate <= 48000 and 0 < self.timeout < STARVED):
+            raise SettingsError(
+                "chat settings: voice 'openai': rate must be 8000 to 48000 samples per second "
+                f"and timeout less than {STARVED:.0f} seconds."
+            )
+
+
+class ServerVoice(Prompt, OpenAITTSService):
+    """pipecat's service for voices of any name and sound of any rate, with short first pieces."""
+
+    def __init__(self, settings: Settings):
+        """For one session."""
+        from openai import DefaultAsyncHttpxClient
+
+        super().__init__(
+            api_key=os.environ.get(settings.key_variable, "none"),
+            base_url=settings.url or None,
+            http_client=DefaultAsyncHttpxClient(timeout=settings.timeout),
+            settings=OpenAITTSService.Settings(model=settings.model, voice=settings.voice),
+            **OPTIONS,
+        )
+        self._client.max_retries = 1
+        self._options = settings
+        # pipecat's forgets the sound before a pause of 0.2 s, which a server makes
+        self._resampler = create_stream_resampler(clear_after_secs=None)
+
+    async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame, None]:
+        """Yields the sound as it comes, or the error that the server met."""
+        await self._resampler.reset()  # the piece before may have been interrupted
+        options = self._options
+        request = self._client.audio.speech.with_streaming_response.create(
+            input=text, model=options.model, voice=options.voice, response_format="pcm"
+        )
+        try:
+            async with request as response:
+                async for frame in self._stream_audio_frames_from_iterator(
+                    response.iter_bytes(CHUNK),
+                    strip_wav_header=True,
+                    in_sample_rate=self._rate_of(response.headers.get("content-type", "")),
+                    context_id=context_id,
+                ):
+                    yield frame
+        except Exception as error:
+            where = self._client.base_url
+            yield ErrorFrame(f"the voice server {where} did not speak '{text}': {error}")
+        if rest := await self._resampler.flush():
+            yield TTSAudioRawFrame(rest, SPEECH_RATE, 1, context_id=context_id)
+
+    async def cleanup(self) -> None:
+        """Closes the connections."""
+        await super().cleanup()
+        await self._client.close()
+
+    def _rate_of(self, content_type: str) -> int | None:
+        """Null for sound whose header tells it."""
+        return None if "wav" in content_type else self._options.rate
+
+
+def make(settings: Settings, context: Context) -> ServerVoice:
+    """A voice for one session."""
+    return ServerVoice(settings)

@@ -1,0 +1,112 @@
+"""Piper through pipecat's own service: small voices for some forty languages, on the CPU.
+
+The package piper-tts is GPL-3.0: an extra that is loaded at run time.
+"""
+
+import functools
+import json
+from collections.abc import AsyncGenerator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pipecat.audio.utils import create_stream_resampler
+from pipecat.frames.frames import Frame, TTSAudioRawFrame
+from pipecat.services.tts_service import TTSService
+
+from ico3d.chat.protocol import SPEECH_RATE
+from ico3d.chat.services.provider import Context, lacks_package
+from ico3d.chat.services.voice.pieces import LOADING, OPTIONS, SYNCHRONOUS, Prompt
+from ico3d.common.weights import model_folders
+from ico3d.errors import MissingExtraError, MissingModelError, SettingsError
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which of Piper's voices.
+
+    Attributes:
+        voice: Its name, such as `en_US-ljspeech-high` or `de_DE-thorsten-medium`; each has its own
+            licence.
+        cuda: Run on an NVIDIA GPU; needs onnxruntime-gpu.
+    """
+
+    voice: str = "en_US-ljspeech-high"
+    cuda: bool = False
+
+
+def find_voice(settings: Settings) -> Path:
+    """The voice's model; its description lies beside it.
+
+    Raises:
+        MissingModelError: If it is not here.
+    """
+    names = f"{settings.voice}.onnx", f"{settings.voice}.onnx.json"
+    for folder in model_folders():
+        if all((folder / name).is_file() for name in names):
+            return folder / names[0]
+    fetch = f"python -m piper.download_voices --download-dir {model_folders()[-1]}"
+    raise MissingModelError(
+        f"the Piper voice '{settings.voice}' is not here: fetch it with {fetch} {settings.voice}."
+    )
+
+
+def hindrance(settings: Settings) -> str:
+    """Its package and the voice's files."""
+    try:
+        find_voice(settings)
+    except MissingModelError as error:
+        return lacks_package("piper", "piper") or str(error)
+    return lacks_package("piper", "piper")
+
+
+def make(settings: Settings, context: Context) -> TTSService:
+    """A voice for one session; all share one model.
+
+    Raises:
+        MissingExtraError: If piper-tts is not installed.
+        MissingModelError: If the voice's files are not there.
+        SettingsError: If the voice would have to download more.
+    """
+    try:
+        from pipecat.services.piper.tts import PiperTTSService
+    except ImportError:
+        raise MissingExtraError("piper-tts", "piper", "the Piper voice") from None
+
+    class PiperVoice(Prompt, PiperTTSService):
+        """pipecat's, with a model that is there: its own constructor loads or downloads one."""
+
+        def __init__(self, model: Any):
+            own = PiperTTSService.Settings(model=None, voice=settings.voice, language=None)
+            TTSService.__init__(self, settings=own, **SYNCHRONOUS, **OPTIONS)
+            self._voice = model
+            # its own forgets the sound before a pause of 0.2 s, which a slow machine makes
+            self._resampler = create_stream_resampler(clear_after_secs=None)
+
+        async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame, None]:
+            """Yields the sound, and what its resampler would keep for the next piece: 20 ms."""
+            await self._resampler.reset()  # the piece before may have been interrupted
+            async for frame in super().run_tts(text, context_id):
+                yield frame
+            if rest := await self._resampler.flush():
+                yield TTSAudioRawFrame(rest, SPEECH_RATE, 1, context_id=context_id)
+
+    with LOADING:
+        return PiperVoice(engine(find_voice(settings), settings.cuda))
+
+
+@functools.cache
+def engine(model: Path, cuda: bool) -> Any:
+    """The model, loaded once.
+
+    Raises:
+        SettingsError: If the voice would have to download more.
+    """
+    from piper import PiperVoice
+
+    if json.loads(Path(f"{model}.json").read_bytes()).get("phoneme_type") == "pinyin":
+        raise SettingsError(
+            f"{model}: Piper's Chinese voices would download a dictionary in mid-talk: "
+            "use kokoro or openvoice."
+        )
+    return PiperVoice.load(model, use_cuda=cuda)

@@ -1,0 +1,1 @@
+"""What happens when a service fails: the avatar apologises, the turn ends, the next one works."""

@@ -1,0 +1,88 @@
+"""What the avatar says when one of its services failed."""
+
+from typing import Literal
+
+Failed = Literal["recognition", "language", "voice"]
+
+APOLOGIES: dict[str, dict[Failed, str]] = {
+    "en": {
+        "recognition": "Sorry, I could not hear you properly. Please say it again.",
+        "language": "Sorry, I cannot think of an answer right now. Please ask me again.",
+        "voice": "Sorry, my voice fails me. Please read my answer.",
+    },
+    "de": {
+        "recognition": "Entschuldigung, ich habe Sie nicht verstanden. Bitte noch einmal.",
+        "language": "Entschuldigung, mir fällt gerade keine Antwort ein. Bitte noch einmal.",
+        "voice": "Entschuldigung, meine Stimme versagt. Bitte lesen Sie meine Antwort.",
+    },
+    "fr": {
+        "recognition": "Pardon, je n'ai pas bien entendu. Pouvez-vous répéter ?",
+        "language": "Pardon, je ne trouve pas de réponse. Pouvez-vous redemander ?",
+        "voice": "Pardon, ma voix me lâche. Veuillez lire ma réponse.",
+    },
+    "es": {
+        "recognition": "Perdón, no le he oído bien. ¿Puede repetirlo?",
+        "language": "Perdón, ahora no encuentro una respuesta. ¿Puede volver a preguntar?",
+        "voice": "Perdón, me falla la voz. Lea mi respuesta, por favor.",
+    },
+    "it": {
+        "recognition": "Scusi, non ho sentito bene. Può ripetere?",
+        "language": "Scusi, ora non trovo una risposta. Può chiedere di nuovo?",
+        "voice": "Scusi, mi manca la voce. Legga la mia risposta, per favore.",
+    },
+    "pt": {
+        "recognition": "Desculpe, não ouvi bem. Pode repetir?",
+        "language": "Desculpe, agora não encontro uma resposta. Pode perguntar de novo?",
+        "voice": "Desculpe, a minha voz falhou. Leia a minha resposta, por favor.",
+    },
+    "ru": {
+        "recognition": "Извините, я не расслышала. Повторите, пожалуйста.",
+        "language": "Извините, сейчас я не нахожу ответа. Спросите ещё раз.",
+        "voice": "Извините, голос меня подвёл. Пожалуйста, прочтите мой ответ.",
+    },
+    "zh": {
+        "recognition": "抱歉,我没有听清楚。请再说一遍。",
+        "language": "抱歉,我现在想不出答案。请再问一次。",
+        "voice": "抱歉,我的声音出了问题。请阅读我的回答。",
+    },
+    "ja": {
+        "recognition": "すみません、よく聞こえませんでした。もう一度お願いします。",
+        "language": "すみません、今は答えが思いつきません。もう一度聞いてください。",
+        "voice": "すみません、声が出ません。答えを読んでください。",
+    },
+    "ko": {
+        "recognition": "죄송합니다, 잘 듣지 못했어요. 다시 말씀해 주세요.",
+        "language": "죄송합니다, 지금은 답이 떠오르지 않아요. 다시 물어봐 주세요.",
+        "voice": "죄송합니다, 목소리가 나오지 않아요. 제 대답을 읽어 주세요.",
+    },
+    "ar": {
+        "recognition": "عذرًا، لم أسمعك جيدًا. من فضلك أعد ما قلت.",
+        "language": "عذرًا، لا أجد جوابًا الآن. من فضلك اسأل مرة أخرى.",
+        "voice": "عذرًا، صوتي لا يعمل. من فضلك اقرأ جوابي.",
+    },
+}
+"""By language (ISO 639-1), then by what failed."""
+
+VOICES = {"zh": "cmn", "en": "en-us"}
+"""espeak-ng's names of languages where they are not the codes."""
+
+
+def apology(failed: Failed, language: str) -> str:
+    """One sentence, in English where the language has none.
+
+    Args:
+        failed: Which service.
+        language: A code such as `de` or `pt-BR`.
+    """
+    return APOLOGIES.get(base(language), APOLOGIES["en"])[failed]
+
+
+def espeak_voice(language: str) -> str:
+    """The voice of espeak-ng that says it."""
+    code = base(language)
+    return VOICES.get(code, code) if code in APOLOGIES else VOICES["en"]
+
+
+def base(language: str) -> str:
+    """`pt` of `pt-BR`."""
+    return language.split("-")[0].lower()

@@ -1,0 +1,132 @@
+"""Stands behind the language model: an answer that does not come becomes an apology."""
+
+import asyncio
+
+from loguru import logger
+from pipecat.frames.frames import (
+    ErrorFrame,
+    Frame,
+    FunctionCallsStartedFrame,
+    InterruptionFrame,
+    LLMContextFrame,
+    LLMFullResponseEndFrame,
+    LLMFullResponseStartFrame,
+    LLMTextFrame,
+)
+from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
+
+from ico3d.chat.supervision.apologies import Failed, apology
+
+
+class AnswerGuard(FrameProcessor):
+    """Watches answers on their way from the language model to the voice.
+
+    The visitor hears one sentence instead of silence when the model gives no words, breaks off,
+    or takes longer than `patience`; and when the recogniser failed. All else passes unchanged.
+    """
+
+    def __init__(
+        self, recognition: FrameProcessor, language: FrameProcessor, patience: float, tongue: str
+    ):
+        """A guard for one session.
+
+        Args:
+            recognition: Whose errors are apologised for.
+            language: Whose answers are watched.
+            patience: Seconds until the first words of an answer, and between two pieces of it.
+            tongue: Language of the apologies.
+        """
+        super().__init__()
+        self._patience, self._tongue = patience, tongue
+        self._answering = False  # between the start of an answer and its end
+        self._spoken = self._called = self._broken = False  # this answer has words, calls, an error
+        self._timer: asyncio.TimerHandle | None = None
+        language.add_event_handler("on_before_process_frame", self._asked)
+        language.add_event_handler("on_error", self._language_failed)
+        recognition.add_event_handler("on_error", self._recognition_failed)
+
+    async def process_frame(self, frame: Frame, direction: FrameDirection):
+        """Follows the answer; replaces its end where there was none of it."""
+        await super().process_frame(frame, direction)
+        if isinstance(frame, InterruptionFrame):
+            self._stop_timer()
+            self._answering = False
+        elif direction == FrameDirection.DOWNSTREAM:
+            if isinstance(frame, LLMFullResponseStartFrame):
+                self._begin()
+            elif isinstance(frame, LLMTextFrame) and frame.text.strip():
+                self._spoken = True
+                self._start_timer()
+            elif isinstance(frame, FunctionCallsStartedFrame):
+                self._called = True
+                self._stop_timer()
+            elif isinstance(frame, LLMFullResponseEndFrame):
+                await self._end(frame)
+                return
+        await self.push_frame(frame, direction)
+
+    async def cleanup(self):
+        """Ends the timer."""
+        await super().cleanup()
+        self._stop_timer()
+
+    def _begin(self) -> None:
+        self._answering = True
+        self._spoken = self._called = self._broken = False
+        self._start_timer()
+
+    async def _end(self, frame: LLMFullResponseEndFrame) -> None:
+        self._stop_timer()
+        if not self._answering:
+            return  # it was given up before, and has its end
+        self._answering = False
+        if self._broken or not (self._spoken or self._called):
+            await self._apologise("language")
+        await self.push_frame(frame)
+
+    async def _asked(self, _: FrameProcessor, frame: Frame) -> None:
+        """The model takes a question; one that may yet change is not waited for."""
+        if isinstance(frame, LLMContextFrame) and not frame.speculation:
+            self._start_timer()
+
+    async def _language_failed(self, _: FrameProcessor, error: ErrorFrame) -> None:
+        logger.error(f"language failed: {error.error}")
+        self._broken = True
+
+    async def _recognition_failed(self, _: FrameProcessor, error: ErrorFrame) -> None:
+        logger.error(f"recognition failed: {error.error}")
+        if not self._answering:
+            await self._say("recognition")
+
+    async def _give_up(self) -> None:
+        """Stops the model where it stands, and ends its answer."""
+        logger.error(f"language gave nothing for {self._patience:g} s")
+        await self.push_frame(InterruptionFrame(), FrameDirection.UPSTREAM)
+        if not self._answering:
+            await self._say("language")
+            return
+        self._answering = False
+        await self._apologise("language")
+        await self.push_frame(LLMFullResponseEndFrame())
+
+    async def _say(self, failed: Failed) -> None:
+        """An apology as an answer of its own."""
+        self._spoken = False
+        await self.push_frame(LLMFullResponseStartFrame())
+        await self._apologise(failed)
+        await self.push_frame(LLMFullResponseEndFrame())
+
+    async def _apologise(self, failed: Failed) -> None:
+        gap = " " if self._spoken else ""
+        await self.push_frame(LLMTextFrame(gap + apology(failed, self._tongue)))
+
+    def _start_timer(self) -> None:
+        self._stop_timer()
+        loop = asyncio.get_running_loop()
+        self._timer = loop.call_later(
+            self._patience, lambda: self.create_task(self._give_up(), "give up")
+        )
+
+    def _stop_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()

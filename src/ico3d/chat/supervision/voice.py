@@ -1,0 +1,118 @@
+"""A voice that never leaves an answer without sound.
+
+It waits no longer than told, tries twice, then apologises with another voice and lets the captions
+speak.
+"""
+
+import asyncio
+import contextlib
+from collections.abc import AsyncGenerator, Callable
+
+import numpy as np
+from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
+from pipecat.services.tts_service import TTSService
+
+from ico3d.chat.protocol import SPEECH_RATE
+from ico3d.chat.services.voice import espeak
+from ico3d.chat.supervision.apologies import apology, espeak_voice
+from ico3d.errors import Ico3dError, ServiceError
+
+TRIES = 2
+RATE = espeak.Settings().rate
+READING = 15.0  # letters per second that a reader takes in
+SHORTEST, LONGEST = 1.0, 12.0  # s that a caption without a voice stays
+
+Speak = Callable[[str, str], AsyncGenerator[Frame | None, None]]
+
+
+class EnduringVoice:
+    """Stands around a voice's `run_tts`, which pipecat calls for every sentence."""
+
+    def __init__(
+        self, speak: Speak, patience: float, language: str, complain: Callable[[str], None]
+    ):
+        """For one session.
+
+        Args:
+            speak: The voice's own `run_tts`.
+            patience: Seconds until a sentence's first sound, and between two pieces of it.
+            language: Of the apology.
+            complain: Takes a sentence for the page where not even the apology can be spoken.
+        """
+        self._speak, self._patience = speak, patience
+        self._language, self._complain = language, complain
+        self._lost = ""  # the answer whose apology has been said
+
+    async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame | None, None]:
+        """Yields a sentence's sound: the voice's, or what stands in for it."""
+        if context_id == self._lost:
+            yield _sound(silence(text), context_id)
+            return
+        heard, reason = False, ""
+        for _ in range(TRIES):
+            try:
+                async with contextlib.aclosing(self._patient(text, context_id)) as sound:
+                    async for frame in sound:
+                        heard = heard or isinstance(frame, TTSAudioRawFrame)
+                        yield frame
+                return
+            except Exception as error:
+                reason = str(error)
+                if heard or isinstance(error, TimeoutError):
+                    break  # half a sentence is not said twice, and nobody waits twice
+        self._lost = context_id
+        yield ErrorFrame(f"the voice failed: {reason}")
+        yield _sound(await asyncio.to_thread(self._apology, text), context_id)
+
+    async def _patient(self, text: str, context_id: str) -> AsyncGenerator[Frame | None, None]:
+        """The voice's frames.
+
+        Raises:
+            ServiceError: If the voice reports an error or gives no sound.
+            TimeoutError: If it takes too long.
+        """
+        silent = True
+        async with contextlib.aclosing(self._speak(text, context_id)) as sound:
+            while True:
+                try:
+                    async with asyncio.timeout(self._patience):
+                        frame = await anext(sound)
+                except StopAsyncIteration:
+                    break
+                except TimeoutError:
+                    raise TimeoutError(f"it gave no sound for {self._patience:g} s") from None
+                if isinstance(frame, ErrorFrame):
+                    raise ServiceError(frame.error)
+                # without a frame, the sound comes later and by another way
+                silent = silent and frame is not None and not isinstance(frame, TTSAudioRawFrame)
+                yield frame
+        if silent:
+            raise ServiceError("it gave no sound")
+
+    def _apology(self, text: str) -> np.ndarray:
+        try:
+            words = apology("voice", self._language)
+            spoken = espeak.spoken(words, espeak_voice(self._language), RATE)
+        except Ico3dError as error:
+            self._complain(f"The avatar has lost its voice; its captions go on. ({error})"[:4000])
+            return silence(text)
+        missing = len(silence(text)) - len(spoken)
+        return np.pad(spoken, (0, max(0, missing)))  # the caption stays until it is read
+
+
+def endure(
+    voice: TTSService, patience: float, language: str, complain: Callable[[str], None]
+) -> None:
+    """Puts an `EnduringVoice` around a voice; pipecat has no place for one, so it is set here."""
+    enduring = EnduringVoice(voice.run_tts, patience, language, complain)
+    setattr(voice, "run_tts", enduring.run_tts)  # noqa: B010
+
+
+def silence(text: str) -> np.ndarray:
+    """(S,) int16 samples at 24 kHz: as long as a text takes to read."""
+    seconds = float(np.clip(len(text) / READING, SHORTEST, LONGEST))
+    return np.zeros(int(seconds * SPEECH_RATE), np.int16)
+
+
+def _sound(pcm: np.ndarray, context_id: str) -> TTSAudioRawFrame:
+    return TTSAudioRawFrame(pcm.tobytes(), SPEECH_RATE, 1, context_id=context_id)

@@ -1,0 +1,98 @@
+"""HuBERT (Hsu et al. 2021) as a speech encoder, through transformers (torch)."""
+
+import io
+import warnings
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import nn
+
+from ico3d.errors import MissingExtraError, ModelError
+from ico3d.speech.blocks import PAST, ROWS, SIZE
+
+VECTORS = 2
+"""HuBERT's 50 vectors per second make two per row, one after the other, as in SyncTalk."""
+
+WEIGHTS = ("model.safetensors", "pytorch_model.bin")
+"""What holds them in a folder of transformers, the better one first."""
+
+
+class Hubert(nn.Module):
+    """Windows of sound (b, SIZE) to the features (b, 5, 2·H) of their inner rows.
+
+    Attributes:
+        size: 2·H, H being the model's hidden size.
+        model: HuBERT.
+    """
+
+    def __init__(self, model: nn.Module):
+        """Takes a `transformers.HubertModel`."""
+        super().__init__()
+        self.size = VECTORS * int(model.config.hidden_size)  # type: ignore[union-attr]
+        self.model = model
+
+    def forward(self, sound: torch.Tensor) -> torch.Tensor:
+        """(b, SIZE) to (b, 5, 2·H)."""
+        vectors = self.model(sound).last_hidden_state  # (b, 60, H)
+        return vectors.unflatten(1, (-1, VECTORS)).flatten(2)[:, PAST : PAST + ROWS]
+
+
+def load_network(folder: Path) -> Hubert:
+    """Loads a folder as transformers writes it: `config.json` and weights.
+
+    Raises:
+        MissingExtraError: If transformers is not installed.
+        ModelError: If the folder does not hold HuBERT.
+    """
+    try:
+        from transformers import HubertModel
+    except ImportError:
+        raise MissingExtraError("transformers", "hubert", "the speech encoder 'hubert'") from None
+    try:
+        loaded: Any = HubertModel.from_pretrained(
+            folder, local_files_only=True, output_loading_info=True, weights_only=True
+        )
+    except Exception as error:  # of many kinds, from several packages
+        reason = str(error).strip().split("\n")[0]
+        raise ModelError(f"{folder} does not hold HuBERT: {reason}") from None
+    model, about = loaded
+    missing = sorted(about["missing_keys"])
+    if missing:  # they would be random
+        raise ModelError(f"{folder} does not hold HuBERT: it lacks {missing[0]}.")
+    if model.config.conv_stride[0] != 5 or model.config.num_feat_extract_layers != 7:
+        raise ModelError(f"{folder} holds a HuBERT that does not give 50 vectors per second.")
+    network = Hubert(model)
+    return network.to("cuda" if torch.cuda.is_available() else "cpu")
+
+
+def weight_file(folder: Path) -> Path:
+    """The file that holds the weights.
+
+    Raises:
+        ModelError: If the folder has none.
+    """
+    found = next((folder / name for name in WEIGHTS if (folder / name).is_file()), None)
+    if found is None:
+        raise ModelError(f"{folder} holds no weights: neither {WEIGHTS[0]} nor {WEIGHTS[1]}.")
+    return found
+
+
+def export_hubert(network: Hubert) -> bytes:
+    """An ONNX model from `sound` (1, SIZE) to `features` (5, 2·H)."""
+    device = next(network.parameters()).device
+    file = io.BytesIO()
+    with warnings.catch_warnings():
+        # The newer exporter needs a further package and takes 15 times as long for the same graph.
+        warnings.simplefilter("ignore")
+        torch.onnx.export(
+            nn.Sequential(network.cpu(), nn.Flatten(0, 1)).eval(),
+            (torch.zeros(1, SIZE),),
+            file,  # type: ignore[arg-type]
+            dynamo=False,
+            opset_version=17,
+            input_names=["sound"],
+            output_names=["features"],
+        )
+    network.to(device)
+    return file.getvalue()

@@ -1,0 +1,38 @@
+"""Modules as real HTTP servers in the test's own event loop."""
+
+import asyncio
+import contextlib
+
+from ico3d.bundle.format import SPEECH
+from ico3d.chat import server
+from ico3d.chat.modules.app import make_expression_app, make_service_app
+from ico3d.chat.modules.limits import Limits
+from ico3d.speech.runtime import SpeechModel
+
+HOST = "127.0.0.1"
+
+
+@contextlib.asynccontextmanager
+async def serving(app, port=0):
+    """Yields the URL of a running server of any ASGI application."""
+    listener = server.bind(HOST, port)
+    running = server.make_server(app)
+    task = asyncio.create_task(running.serve(sockets=[listener]))
+    while not running.started:
+        await asyncio.sleep(0.01)
+    try:
+        yield server.address(listener)
+    finally:
+        running.should_exit = True
+        await task
+
+
+def service_app(kind, make, limits=None, key=""):
+    """One provider as a module; `make` makes its processor."""
+    return make_service_app(kind, kind, make, HOST, limits or Limits(), key)
+
+
+def expression_app(bundle, limits=None, key=""):
+    """The speech model of a bundle as a module."""
+    model, sha256 = SpeechModel(bundle.read(SPEECH)), bundle.manifest.files[SPEECH].sha256
+    return make_expression_app(model, sha256, HOST, limits or Limits(), key)

@@ -1,0 +1,224 @@
+"""The OpenAI SDK talks to our modules, which are the real offline three over real HTTP."""
+
+import asyncio
+import io
+import json
+import wave
+
+import httpx
+import numpy as np
+import openai
+import pytest
+from pipecat.frames.frames import ErrorFrame, LLMContextFrame, LLMTextFrame
+from pipecat.processors.frame_processor import FrameProcessor
+
+from ico3d.bundle.manifest import Persona
+from ico3d.chat.modules.limits import Limits
+from ico3d.chat.modules.recognition import read_wav
+from ico3d.chat.services.language import persona
+from ico3d.chat.services.provider import Context
+from ico3d.chat.services.recognition import sphinx
+from ico3d.chat.services.voice import espeak
+from ico3d.errors import ProtocolError
+
+from .serving import service_app, serving
+
+ADA = Persona("Ada", "Hello.", ("who are you => I am Ada. I live in a box. Grüße, 你好!",))
+CONTEXT = Context(ADA, None, None)
+TEXT = "I am Ada. I live in a box."
+
+
+def client(url, **more):
+    return openai.AsyncOpenAI(base_url=f"{url}v1", api_key="none", max_retries=0, **more)
+
+
+def make_voice():
+    return espeak.make(espeak.Settings(), CONTEXT)
+
+
+def make_language():
+    return persona.make(persona.Settings(), CONTEXT)
+
+
+def make_recognition():
+    return sphinx.make(sphinx.Settings(), CONTEXT)
+
+
+def wav(pcm, rate=16_000, channels=1, width=2):
+    file = io.BytesIO()
+    with wave.open(file, "wb") as out:
+        out.setnchannels(channels)
+        out.setsampwidth(width)
+        out.setframerate(rate)
+        out.writeframes(pcm.tobytes())
+    return file.getvalue()
+
+
+async def test_the_sdk_hears_our_voice():
+    async with serving(service_app("voice", make_voice)) as url:
+        sdk, ask = client(url), {"model": "any", "voice": "alloy", "input": TEXT}
+        async with sdk.audio.speech.with_streaming_response.create(
+            **ask, response_format="pcm"
+        ) as response:
+            pieces = [piece async for piece in response.iter_bytes()]
+        pcm = np.frombuffer(b"".join(pieces), np.int16)
+        local = [espeak.spoken(s, "en-us+f3", 165) for s in ("I am Ada.", "I live in a box.")]
+        np.testing.assert_array_equal(pcm, np.concatenate(local))
+        answer = await sdk.audio.speech.create(**ask, response_format="wav")
+        with wave.open(io.BytesIO(answer.content)) as file:
+            assert (file.getframerate(), file.getnchannels(), file.getsampwidth()) == (24_000, 1, 2)
+            assert file.readframes(10**7) == pcm.tobytes()
+        with pytest.raises(openai.BadRequestError, match="response_format"):
+            await sdk.audio.speech.create(**ask, response_format="mp3")
+        assert [model.id async for model in sdk.models.list()] == ["voice"]
+
+
+async def test_the_sdk_converses_with_our_language():
+    async with serving(service_app("language", make_language)) as url:
+        sdk = client(url)
+        messages = [
+            {"role": "system", "content": "Be."},
+            {"role": "user", "content": "who are you"},
+        ]
+        whole = await sdk.chat.completions.create(model="any", messages=messages)
+        assert whole.choices[0].message.content.strip() == "I am Ada. I live in a box. Grüße, 你好!"
+        assert whole.choices[0].finish_reason == "stop"
+        stream = await sdk.chat.completions.create(model="any", messages=messages, stream=True)
+        deltas = [chunk.choices[0].delta.content async for chunk in stream]
+        assert deltas == ["I am Ada. ", "I live in a box. ", "Grüße, 你好! ", None]
+        with pytest.raises(openai.BadRequestError, match="messages"):
+            await sdk.chat.completions.create(model="any", messages=[])
+
+
+async def test_the_sdk_is_understood_by_our_recognition(question):
+    async with serving(service_app("recognition", make_recognition)) as url:
+        sdk, file = client(url), ("q.wav", wav(question), "audio/wav")
+        create = sdk.audio.transcriptions.create
+        assert await create(model="any", file=file, response_format="text") == "what is your name\n"
+        verbose = await create(model="any", file=file, response_format="verbose_json")
+        assert verbose.text == "what is your name"
+        assert verbose.duration == pytest.approx(len(question) / 16_000)
+        silence = ("q.wav", wav(np.zeros(8000, np.int16)), "audio/wav")
+        assert (await create(model="any", file=silence)).text == ""
+        with pytest.raises(openai.BadRequestError, match="no WAV file"):
+            await create(model="any", file=("q.mp3", b"ID3 garbage" * 99, "audio/mpeg"))
+
+
+@pytest.mark.parametrize(
+    ("rate", "channels", "width"), [(16_000, 1, 2), (48_000, 2, 2), (8000, 1, 4)]
+)
+def test_wav_files_of_any_kind_are_read(rate, channels, width):
+    times = np.arange(rate) / rate
+    tone = 0.5 * np.sin(2 * np.pi * 300 * times)
+    samples = np.repeat((tone * (2 ** (8 * width - 1) - 1))[:, None], channels, axis=1)
+    pcm = read_wav(wav(samples.astype(f"<i{width}"), rate, channels, width))
+    expected = 0.5 * np.sin(2 * np.pi * 300 * np.arange(16_000) / 16_000) * 32767
+    assert len(pcm) == 16_000
+    assert np.abs(pcm[400:-400] - expected[400:-400]).max() < 40
+
+
+@pytest.mark.parametrize("data", [b"", b"RIFF", wav(np.zeros(0, np.int16)), b"RIFF" + b"x" * 99])
+def test_what_is_no_sound_is_one_sentence(data):
+    with pytest.raises(ProtocolError, match=r"WAV file"):
+        read_wav(data)
+
+
+async def test_a_door_with_a_key_and_limits():
+    app = service_app("voice", make_voice, Limits(megabytes=0.001), key="sesame")
+    async with serving(app) as url, httpx.AsyncClient(base_url=url) as plain:
+        assert (await plain.get("/health")).json() == {
+            "ok": True,
+            "kind": "voice",
+            "model": "voice",
+        }
+        assert (await plain.get("/v1/models")).status_code == 401
+        with pytest.raises(openai.AuthenticationError, match="key is missing or wrong"):
+            await client(url).models.list()
+        sdk = openai.AsyncOpenAI(base_url=f"{url}v1", api_key="sesame", max_retries=0)
+        assert (await sdk.models.list()).data[0].owned_by == "ico3d"
+        with pytest.raises(openai.APIStatusError, match="larger than") as refused:
+            await sdk.audio.speech.create(model="a", voice="a", input="a" * 2000)
+        assert refused.value.status_code == 413
+        key = {"Authorization": "Bearer sesame"}
+        for foreign in ({"Host": "evil.example"}, {"Origin": "http://evil.example"}):
+            assert (await plain.get("/v1/models", headers=key | foreign)).status_code == 403
+
+
+async def endless():
+    """A body that tells no length."""
+    for _ in range(100):
+        yield b'{"input": "' + b"a" * 1000
+
+
+async def test_a_body_without_a_length_is_limited_too():
+    app = service_app("voice", make_voice, Limits(megabytes=0.01))
+    async with serving(app) as url, httpx.AsyncClient(base_url=url) as plain:
+        kind = {"Content-Type": "application/json"}
+        answer = await plain.post("/v1/audio/speech", content=endless(), headers=kind)
+        assert answer.status_code == 400
+        assert (await plain.get("/health")).is_success
+
+
+class Odd(FrameProcessor):
+    """A language model that goes wrong in some way."""
+
+    def __init__(self, way):
+        super().__init__()
+        self.way = way
+
+    async def process_frame(self, frame, direction):
+        await super().process_frame(frame, direction)
+        if not isinstance(frame, LLMContextFrame):
+            await self.push_frame(frame, direction)
+        elif self.way == "error":
+            await self.push_error_frame(ErrorFrame("its tongue is tied."))
+        elif self.way == "raise":
+            raise RuntimeError("oops")
+        elif self.way == "hang":
+            await asyncio.sleep(60)
+        elif self.way == "half":
+            await self.push_frame(LLMTextFrame("Half"))
+            await asyncio.sleep(0.2)
+            await self.push_error_frame(ErrorFrame("its tongue is tied."))
+
+
+@pytest.mark.parametrize(
+    ("way", "status", "sentence"),
+    [
+        ("error", 502, "its tongue is tied."),
+        ("raise", 502, "Error processing frame: oops"),
+        ("silence", 502, "the model gave no answer."),
+        ("hang", 504, "it took too long."),
+    ],
+)
+async def test_what_goes_wrong_inside_is_an_answer(way, status, sentence):
+    app = service_app("language", lambda: Odd(way), Limits(seconds=0.5 if status == 504 else 20))
+    async with serving(app) as url, httpx.AsyncClient(base_url=url) as plain:
+        body = {"model": "any", "messages": [{"role": "user", "content": "hi"}]}
+        for stream in (False, True):
+            answer = await plain.post("/v1/chat/completions", json=body | {"stream": stream})
+            assert (answer.status_code, answer.json()["error"]["message"]) == (status, sentence)
+
+
+async def test_a_stream_that_breaks_is_not_taken_for_whole():
+    async with serving(service_app("language", lambda: Odd("half"))) as url:
+        stream = await client(url).chat.completions.create(
+            model="any", messages=[{"role": "user", "content": "hi"}], stream=True
+        )
+        heard = []
+        with pytest.raises(openai.APIConnectionError):
+            async for chunk in stream:
+                heard.append(chunk.choices[0].delta.content)
+        assert heard == ["Half"]
+
+
+async def test_more_requests_than_allowed_are_told_to_wait():
+    app = service_app("language", lambda: Odd("hang"), Limits(requests=1, seconds=2.0))
+    async with serving(app) as url, httpx.AsyncClient(base_url=url) as plain:
+        body = {"model": "any", "messages": [{"role": "user", "content": "hi"}]}
+        first = asyncio.create_task(plain.post("/v1/chat/completions", json=body))
+        await asyncio.sleep(0.3)
+        second = await plain.post("/v1/chat/completions", json=body)
+        assert second.status_code == 429 and second.headers["retry-after"] == "1"
+        assert (await first).status_code == 504
+        assert json.loads((await plain.get("/health")).text)["ok"]

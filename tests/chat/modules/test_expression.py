@@ -1,0 +1,198 @@
+"""The remote face is the local one, and goes on as the local one when its server fails."""
+
+import asyncio
+import contextlib
+import json
+
+import numpy as np
+import pytest
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from ico3d.bundle.format import SPEECH
+from ico3d.chat.modules.limits import Limits
+from ico3d.chat.modules.mouth import AVOIDED, RemoteMouth
+from ico3d.chat.protocol import End, Speech, Text
+from ico3d.chat.settings import ChatSettings, Expression
+from ico3d.measure.page import open_page
+from ico3d.speech.runtime import SpeechModel, StreamingExpressions
+
+from ..conftest import serving as serving_avatar
+from .serving import expression_app, serving
+
+RATE = 24_000
+SHORT = 0.3
+
+
+@pytest.fixture(scope="module")
+def model(bundle):
+    return SpeechModel(bundle.read(SPEECH))
+
+
+@pytest.fixture(scope="module")
+def sha256(bundle):
+    return bundle.manifest.files[SPEECH].sha256
+
+
+@pytest.fixture(scope="module")
+def sound():
+    """2.5 s of int16 at 24 kHz, in pieces of all sizes."""
+    rng = np.random.default_rng(0)
+    pcm = np.clip(rng.normal(0, 5000, 60_000), -32768, 32767).astype(np.int16)
+    return np.split(pcm, [700, 8000, 8001, 22_400, 30_000, 44_000])
+
+
+def floats(pcm):
+    return pcm.astype(np.float32) / 32768
+
+
+def local(model, sound):
+    stream = StreamingExpressions(model, RATE)
+    return np.concatenate([*(stream.push(floats(piece)) for piece in sound), stream.finish()])
+
+
+def mouth(url, model, sha256, **more):
+    return RemoteMouth(Expression("remote", url, timeout=SHORT), model, sha256, **more)
+
+
+def remote(made, sound, between=None):
+    """Rows of a sound; `between` is called before its fourth piece."""
+    lips, rows = made.lips(), []
+    for index, piece in enumerate(sound):
+        if index == 3 and between:
+            between()
+        rows.append(lips.push(floats(piece)))
+    return np.concatenate([*rows, lips.finish()]), lips
+
+
+async def test_the_remote_face_is_the_local_one(bundle, model, sha256, sound):
+    async with serving(expression_app(bundle)) as url:
+        made = mouth(url, model, sha256)
+        for said in (sound, sound[::-1]):  # sentences follow each other on one connection
+            rows, lips = await asyncio.to_thread(remote, made, said)
+            assert lips._own is None
+            np.testing.assert_allclose(rows, local(model, said), atol=1e-5)
+        made.close()
+
+
+async def test_a_server_that_dies_in_mid_sentence_leaves_no_jump(bundle, model, sha256, sound):
+    async with serving(expression_app(bundle)) as url:
+        made = mouth(url, model, sha256)
+        rows, lips = await asyncio.to_thread(
+            remote, made, sound, lambda: made._socket.socket.shutdown(2)
+        )
+    assert lips._own is not None
+    np.testing.assert_allclose(rows, local(model, sound), atol=1e-5)
+
+
+async def test_a_server_that_failed_is_left_alone_for_a_while(bundle, model, sha256, sound):
+    now = 0.0
+    made = mouth("http://127.0.0.1:9", model, sha256, now=lambda: now)
+    rows, lips = await asyncio.to_thread(remote, made, sound)
+    assert lips._own is not None
+    np.testing.assert_allclose(rows, local(model, sound), atol=1e-5)
+    async with serving(expression_app(bundle)) as url:
+        object.__setattr__(made._settings, "url", url)
+        _, lips = await asyncio.to_thread(remote, made, sound)
+        assert lips._own is not None
+        now = AVOIDED
+        rows, lips = await asyncio.to_thread(remote, made, sound)
+        assert lips._own is None
+        np.testing.assert_allclose(rows, local(model, sound), atol=1e-5)
+        made.close()
+
+
+async def test_an_interrupted_sentence_does_not_disturb_the_next(bundle, model, sha256, sound):
+    async with serving(expression_app(bundle)) as url:
+        made = mouth(url, model, sha256)
+        old = made.lips()
+        await asyncio.to_thread(old.push, floats(sound[3]))
+        new = made.lips()
+        rows = [await asyncio.to_thread(new.push, floats(piece)) for piece in sound[:4]]
+        assert len(await asyncio.to_thread(old.push, floats(sound[4]))) == 0
+        rows += [await asyncio.to_thread(new.push, floats(piece)) for piece in sound[4:]]
+        rows.append(await asyncio.to_thread(new.finish))
+        np.testing.assert_allclose(np.concatenate(rows), local(model, sound), atol=1e-5)
+        made.close()
+
+
+class Odd:
+    """A WebSocket server of something else."""
+
+    def __init__(self, hello, answer):
+        self.hello, self.answer = hello, answer
+
+    async def __call__(self, scope, receive, send):
+        if scope["type"] != "websocket":
+            return
+        await send({"type": "websocket.accept"})
+        await send({"type": "websocket.send", "text": self.hello})
+        while (await receive())["type"] != "websocket.disconnect":
+            if self.answer is not None:
+                await send({"type": "websocket.send", "bytes": self.answer})
+
+
+NAN = np.full((1, 32), np.nan, np.float32).tobytes()
+
+
+@pytest.mark.parametrize("answer", [None, b"x", NAN, b"x" * 128 * 3 + b"y"])
+@pytest.mark.parametrize("knows", [True, False])
+async def test_any_nonsense_is_answered_by_the_own_model(model, sha256, sound, knows, answer):
+    own = {"model": sha256 if knows else "0" * 64, "rate": RATE, "fps": 25, "size": 32}
+    async with serving(Odd(json.dumps(own), answer)) as url:
+        rows, lips = await asyncio.to_thread(remote, mouth(url, model, sha256), sound)
+    assert lips._own is not None
+    np.testing.assert_allclose(rows, local(model, sound), atol=1e-5)
+
+
+async def test_the_socket_is_guarded(bundle):
+    app = expression_app(bundle, Limits(requests=1), key="sesame")
+    async with serving(app) as url:
+        address = url.replace("http", "ws") + "v1/expressions"
+        key = {"Authorization": "Bearer sesame"}
+        for headers in ({}, {"Authorization": "Bearer x"}, key | {"Origin": "http://evil.example"}):
+            with pytest.raises(InvalidStatus):
+                await connect(address, additional_headers=headers)
+        async with connect(address, additional_headers=key) as socket:
+            assert json.loads(await socket.recv())["fps"] == 25
+            with pytest.raises(InvalidStatus):  # one place only
+                await connect(address, additional_headers=key)
+            await socket.send(b"odd")
+            with pytest.raises(ConnectionClosed) as closed:
+                await socket.recv()
+            assert closed.value.rcvd.code == 1008
+
+
+class Counted:
+    """Counts the connections to an application."""
+
+    def __init__(self, app):
+        self.app, self.sockets = app, 0
+
+    async def __call__(self, scope, receive, send):
+        self.sockets += scope["type"] == "websocket"
+        await self.app(scope, receive, send)
+
+
+def movement(page, utterance):
+    """How far the mouth's values spread in an utterance."""
+    rows = [m.expressions for m in page.messages(Speech) if m.utterance == utterance]
+    return np.concatenate(rows).astype(np.float32)[:, :32].std(axis=0).max()
+
+
+async def test_a_talk_goes_on_when_its_face_server_dies(bundle):
+    app = Counted(expression_app(bundle))
+    async with contextlib.AsyncExitStack() as stack:
+        face = await stack.enter_async_context(contextlib.AsyncExitStack())
+        settings = ChatSettings(
+            expression=Expression("remote", await face.enter_async_context(serving(app)))
+        )
+        url, _ = await stack.enter_async_context(serving_avatar(bundle, settings))
+        page, _ = await open_page(url, microphone=False)
+        await page.wait(End)
+        assert app.sockets == 1
+        await face.aclose()
+        await page.send(Text("Who are you?"))
+        await page.wait(End, where=lambda m: m.utterance == 1)
+        assert movement(page, 0) > 0.01 and movement(page, 1) > 0.01
+        await page.close()

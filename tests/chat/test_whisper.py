@@ -1,0 +1,130 @@
+"""Whisper: a real model file through faster-whisper and pipecat, with random weights."""
+
+import numpy as np
+import pytest
+
+from ico3d.chat.services.recognition import PROVIDERS, whisper
+from ico3d.chat.services.recognition.segments import BLANK
+from ico3d.chat.services.recognition.whisper import Settings, find, hindrance, make
+from ico3d.errors import MissingModelError, SettingsError
+
+from .listening import NOBODY, listen, noise
+
+pytest.importorskip("faster_whisper")
+pytest.importorskip("transformers")
+pytest.importorskip("torch")
+
+SENTENCE = "Wie heißt du? 你好 1,5 %"
+
+
+@pytest.fixture(scope="module")
+def german(tmp_path_factory):
+    from .tiny_whisper import write_whisper
+
+    return write_whisper(tmp_path_factory.mktemp("german"), SENTENCE, "de")
+
+
+@pytest.fixture(scope="module")
+def random(tmp_path_factory):
+    from .tiny_whisper import write_whisper
+
+    return write_whisper(tmp_path_factory.mktemp("random"))
+
+
+@pytest.fixture
+def models(tmp_path, monkeypatch):
+    """An empty folder of weights and nothing else on this machine."""
+    monkeypatch.setenv("ICO3D_MODELS", str(tmp_path))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("HF_HUB_OFFLINE", "1")
+    monkeypatch.setattr(whisper, "cuda_devices", lambda: 0)
+    monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
+    return tmp_path
+
+
+async def test_every_script_comes_through(german):
+    service = make(Settings(model=str(german)), NOBODY)
+    frames, errors = await listen(service, noise(), noise(2.0))
+    assert not errors
+    assert [(frame.text, frame.finalized) for frame in frames] == [
+        (SENTENCE, False),  # the other one is still to come
+        (SENTENCE, True),
+    ]
+
+
+async def test_the_sound_reaches_the_model_as_it_is(random):
+    pcm = noise()
+    service = make(Settings(model=str(random), language="en"), NOBODY)
+    listener, heard = service._model, []
+
+    class Watched:
+        def transcribe(self, audio, **options):
+            heard.append(audio)
+            return listener.transcribe(audio, **options)
+
+    service._model = Watched()
+    (frame,), _ = await listen(service, pcm)
+    np.testing.assert_array_equal(heard[0][: len(pcm)], pcm.astype(np.float32) / 32768)
+    expected, _ = listener.transcribe(heard[0], language="en")
+    sure = [segment.text for segment in expected if segment.no_speech_prob < 0.4]
+    assert frame.text == (" ".join(sure).strip() or BLANK)
+
+
+def test_the_model_is_shared_by_sessions(german):
+    services = [make(Settings(model=str(german)), NOBODY) for _ in range(2)]
+    assert services[0]._shared is services[1]._shared
+    assert services[0]._shared.model.device == "cpu"
+    assert services[0]._shared.model.compute_type.startswith("int8")
+
+
+def test_it_speaks_the_language_that_is_set(german):
+    assert make(Settings(str(german), language="yue"), NOBODY)._settings.language == "yue"
+    assert make(Settings(str(german)), NOBODY)._settings.language is None
+    with pytest.raises(SettingsError, match="does not know the language 'xx'"):
+        make(Settings(str(german), language="xx"), NOBODY)
+
+
+def install(folder, name, source):
+    """Puts a model where fetched weights lie."""
+    (folder / name).symlink_to(source)
+
+
+def test_without_weights_it_says_what_to_do(models):
+    assert hindrance(Settings()) == (
+        "the weights of Whisper base are not here: ico3d weights fetch whisper-base (145 MB, MIT)."
+    )
+    assert "ico3d weights fetch distil-large-v3 (" in hindrance(Settings("distil-large-v3"))
+    assert "unknown, use auto or large-v3" in hindrance(Settings("huge"))
+    with pytest.raises(MissingModelError, match="fetch whisper-large-v3"):
+        make(Settings("large-v3"), NOBODY)
+
+
+def test_the_best_model_that_keeps_up_is_taken(models, german, monkeypatch):
+    install(models, "faster-whisper-large-v3", german)
+    assert hindrance(Settings()), "a CPU would not keep up"
+    assert hindrance(Settings("large-v3")) == ""
+    install(models, "faster-whisper-tiny", german)
+    assert find(Settings()).name == "faster-whisper-tiny"
+    install(models, "faster-whisper-base", german)
+    assert find(Settings()).name == "faster-whisper-base"
+    assert PROVIDERS["whisper"].hindrance(Settings()) == ""
+    monkeypatch.setattr(whisper, "cuda_devices", lambda: 1)
+    assert find(Settings()).name == "faster-whisper-large-v3"
+    assert find(Settings(device="cpu")).name == "faster-whisper-base"
+    install(models, "faster-distil-whisper-large-v3", german)
+    assert find(Settings(language="en")).name == "faster-distil-whisper-large-v3"
+    assert find(Settings(language="de")).name == "faster-whisper-large-v3"
+
+
+def test_an_incomplete_model_is_not_completed_by_a_download(models, german):
+    folder = models / "faster-whisper-base"
+    folder.mkdir()
+    (folder / "model.bin").symlink_to(german / "model.bin")
+    assert "has no tokenizer.json" in hindrance(Settings())
+
+
+def test_a_device_that_is_not_there_is_one_sentence(german):
+    settings = Settings(str(german), precision="int4")
+    with pytest.raises(SettingsError, match="cannot be used on cpu with int4") as error:
+        make(settings, NOBODY)
+    assert "\n" not in str(error.value)
