@@ -26,9 +26,9 @@ from prometheus_client.parser import text_string_to_metric_families
 from ico3d.chat.frames import SpeechFrame
 from ico3d.chat.monitor import Monitor, TurnLog
 from ico3d.chat.protocol import Metrics
-from ico3d.chat.services.voice.espeak import EspeakVoice
 from ico3d.chat.timing import PARTS, TurnObserver
 from ico3d.errors import SettingsError
+from ico3d.measure.scripted import Script, Voice
 
 
 class Watched:
@@ -149,7 +149,7 @@ async def test_an_interruption_ends_a_turn(watched):
 
 
 async def test_errors_are_counted_by_who_had_them(watched):
-    await watched.see(0, ErrorFrame("x"), source=EspeakVoice("en", 160))
+    await watched.see(0, ErrorFrame("x"), source=Voice(Script()))
     await watched.see(0, ErrorFrame("x"), source=FrameProcessor())
     assert watched.failures == ["voice", "pipeline"]
 
