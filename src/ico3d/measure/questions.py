@@ -12,9 +12,10 @@ from ico3d.errors import CaptureError
 
 QUESTIONS = ("Who are you?", "What can you do?", "Tell me about yourself.", "How do you work?")
 OBJECTIONS = ("Stop it, I want to ask something else.", "Wait, that is not what I meant at all.")
-ASSENT = ("Uh-huh.", "Mhm.")
+ASSENT = ("Uh-huh.", "Aha.")
 VOICES = ("en-us", "en-us+f3", "en-us+m3", "en-us+m7")
-QUIET = 0.02  # of the peak: quieter than this, speech has not begun or is over
+QUIET = 0.05  # of the loudest moment: quieter than this, speech has not begun or is over
+MOMENT = 320  # samples: 20 ms
 OBJECTION = 2.0  # s of a recording that interrupt
 SLOW = 150  # words per minute
 
@@ -73,10 +74,11 @@ def read_recording(path: Path) -> np.ndarray:
 
 
 def audible(samples: np.ndarray) -> np.ndarray:
-    """(S,) without the silence before and after: it begins and ends where speech does."""
-    level = np.abs(samples.astype(np.float32))
+    """(S,) without what is quiet before and after: it begins and ends where speech does."""
+    padded = np.pad(samples.astype(np.float32), (0, -len(samples) % MOMENT))
+    level = np.sqrt((padded.reshape(-1, MOMENT) ** 2).mean(axis=1))  # RMS by moment
     loud = np.nonzero(level > QUIET * level.max())[0]
-    return samples[loud[0] : loud[-1] + 1]
+    return samples[MOMENT * loud[0] : MOMENT * (loud[-1] + 1)]
 
 
 def spoken(text: str, voice: str) -> np.ndarray:
