@@ -95,7 +95,8 @@ class Captions(FrameProcessor):
         elif isinstance(frame, UserStoppedSpeakingFrame):
             self._in_turn = False
             self._timer.mark("turn")
-            self._page.show("thinking" if self._words else "idle")
+            if self._page.state == "listening":  # else an apology has begun meanwhile
+                self._page.show("thinking" if self._words else "idle")
             self._words = ""
         await self.push_frame(frame, direction)
 

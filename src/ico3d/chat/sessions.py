@@ -7,7 +7,7 @@ from dataclasses import replace
 from ico3d.chat.conversation import Avatar, Conversation
 from ico3d.chat.page import Outbox, Page
 from ico3d.chat.protocol import RESUME_SECONDS, Hello, Offer
-from ico3d.chat.services import wished
+from ico3d.chat.services.offers import wished
 
 
 class FullError(Exception):
@@ -83,7 +83,8 @@ class Sessions:
 
     def _wished(self, hello: Hello) -> Avatar:
         avatar = self._avatar
-        services = wished(avatar.services, avatar.settings, hello.wishes, self.offers)
+        voices = avatar.persona.voice
+        services = wished(avatar.services, avatar.settings, voices, hello.wishes, self.offers)
         return replace(avatar, services=services)
 
     def _make_room(self) -> None:
