@@ -14,7 +14,6 @@ from ico3d.chat.services import choose, chosen
 from ico3d.chat.services.provider import Context, Provider
 from ico3d.chat.services.recognition.sphinx import LOUDNESS, NOISE, Leveller
 from ico3d.chat.settings import ChatSettings, Choice, Turns, read_settings
-from ico3d.chat.timing import TurnTimer
 from ico3d.errors import SettingsError
 from ico3d.speech.runtime import SpeechModel
 
@@ -155,34 +154,6 @@ def test_utterances_count_up_and_stay_stopped():
     assert [utterances.begin(), utterances.begin()] == [0, 1]
     utterances.stop_all()
     assert utterances.is_stopped(1) and not utterances.is_stopped(utterances.begin())
-
-
-def test_the_parts_of_a_turn_add_up():
-    now = 10.0
-    timer = TurnTimer(lambda: now)
-    timer.mark("voice")  # outside of a turn: nothing
-    timer.start(ago=0.25)
-    timer.mark("vad")
-    for step, part in [(0.1, "recognition"), (0.1, "turn"), (0.02, "language"), (0.03, "voice")]:
-        now += step
-        timer.mark(part)
-    now += 0.05
-    timer.mark("voice")  # only its first time counts
-    timer.mark("send")
-    values = timer.finish()
-    assert values == pytest.approx(
-        {
-            "vad": 250,
-            "turn": 200,
-            "language": 20,
-            "voice": 30,
-            "expression": 0,
-            "send": 50,
-            "total": 550,
-            "recognition": 100,
-        }
-    )
-    assert timer.finish() == {}
 
 
 @pytest.mark.parametrize("level", [200, 3000, 12000])

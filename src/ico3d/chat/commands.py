@@ -24,6 +24,7 @@ class Serve:
         settings: TOML or JSON file that chooses services and timing.
         persona: TOML or JSON file that says who the avatar is; by default as its bundle says.
         open: Open the page in a browser.
+        log: File that gets a line of JSON for each turn: times and counts, no words.
         verbose: Print what happens inside.
     """
 
@@ -33,6 +34,7 @@ class Serve:
     settings: Path | None = None
     persona: Path | None = None
     open: bool = False
+    log: Path | None = None
     verbose: bool = False
 
     def run(self) -> None:
@@ -45,15 +47,19 @@ class Serve:
         from ico3d.bundle.format import Bundle
         from ico3d.bundle.persona import read_persona
         from ico3d.chat import server
+        from ico3d.chat.monitor import Monitor, TurnLog
         from ico3d.chat.services.offers import offers
+        from ico3d.chat.sessions import Sessions
         from ico3d.chat.settings import read_settings
 
         settings = read_settings(self.settings)
         persona = read_persona(self.persona) if self.persona else None
+        monitor = Monitor(TurnLog.open(self.log) if self.log else None)
         listener = server.bind(self.host, self.port)
         bundle = Bundle.open(self.bundle)
         avatar = server.open_avatar(bundle, settings, persona) if bundle.manifest.head else None
-        app = server.make_app(bundle, avatar, self.host)
+        sessions = Sessions(avatar, monitor=monitor) if avatar else None
+        app = server.make_app(bundle, avatar, self.host, sessions)
         url = server.address(listener)
         print(f"{(persona or bundle.manifest.persona).name} is at {url} (Ctrl+C ends)")
         if avatar:
@@ -95,7 +101,13 @@ class Demo:
         """
         demo = Path(packaged.NAME)
         Serve(
-            demo, self.host, self.port, self.settings, self.persona, self.open, self.verbose
+            demo,
+            self.host,
+            self.port,
+            self.settings,
+            self.persona,
+            open=self.open,
+            verbose=self.verbose,
         ).run()
 
 

@@ -19,7 +19,6 @@ from pipecat.utils.text.base_text_aggregator import TextType
 
 from ico3d.chat.face import MOST, ROW, Face, Piece, Sentence
 from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame, Utterances
-from ico3d.chat.timing import TurnTimer
 
 STEP = 3 * MOST * ROW  # samples that go through the model at once: the first face comes early
 
@@ -30,10 +29,10 @@ class ExpressionProcessor(FrameProcessor):
     An utterance is one answer of the language model, or one text spoken outside of an answer.
     """
 
-    def __init__(self, face: Face, utterances: Utterances, timer: TurnTimer):
+    def __init__(self, face: Face, utterances: Utterances):
         """A processor for one session."""
         super().__init__()
-        self._face, self._utterances, self._timer = face, utterances, timer
+        self._face, self._utterances = face, utterances
         self._in_answer = False
         self._utterance: int | None = None
         self._reset()
@@ -78,7 +77,6 @@ class ExpressionProcessor(FrameProcessor):
         await self.push_frame(frame, direction)
 
     async def _speak(self, frame: TTSAudioRawFrame) -> None:
-        self._timer.mark("voice")
         if self._utterance is None:
             self._utterance = self._utterances.begin()
             self._start = time.monotonic()
@@ -106,7 +104,6 @@ class ExpressionProcessor(FrameProcessor):
 
     async def _push(self, pieces: list[Piece]) -> None:
         for piece in pieces:
-            self._timer.mark("expression")
             text, self._text = self._text, None
             row = piece.first_row
             assert self._utterance is not None

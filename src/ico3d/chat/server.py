@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import gc
 import socket
 from collections.abc import AsyncIterator
 from dataclasses import replace
@@ -20,6 +21,7 @@ from ico3d.chat.connection import Connection
 from ico3d.chat.conversation import Avatar
 from ico3d.chat.face import open_face
 from ico3d.chat.guard import LOOPBACK, Guard
+from ico3d.chat.monitor import CONTENT_TYPE
 from ico3d.chat.protocol import Welcome
 from ico3d.chat.services import choose
 from ico3d.chat.services.offers import offers
@@ -72,6 +74,7 @@ def make_app(
 
     @contextlib.asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        gc.freeze()  # what stays need not be looked at when a session's memory is freed
         yield
         if sessions is not None:
             await sessions.close_all()
@@ -95,7 +98,7 @@ def make_app(
 
 
 def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
-    """The WebSocket."""
+    """The WebSocket, and figures of what happens on it."""
     notices = [] if avatar.speech else [STILL]
     welcome = Welcome(protocol.VERSION, "-", False, avatar.services.described(), notices, None)
 
@@ -103,6 +106,10 @@ def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
     async def conversation(socket: WebSocket) -> None:
         await socket.accept()
         await Connection(socket, sessions, welcome).run()
+
+    @app.get("/metrics")
+    async def metrics() -> Response:
+        return Response(sessions.monitor.exposition(), headers={"Content-Type": CONTENT_TYPE})
 
 
 def shown_manifest(bundle: Bundle, persona: Persona) -> bytes:

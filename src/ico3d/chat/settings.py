@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -152,6 +153,8 @@ class ChatSettings:
         patience: How long services may take.
         expression: Where sound becomes a moving face.
         max_sessions: How many visitors at once, those included whose connection dropped.
+        idle_minutes: A session ends when for so long nobody spoke or typed and nothing was played;
+            0 for never.
         gestures: Whether a body gestures while it speaks; otherwise it is held at rest.
         memory: What is still known of the conversation.
         tools: Functions over HTTP that the language model may call.
@@ -166,6 +169,7 @@ class ChatSettings:
     patience: Patience = Patience()
     expression: Expression = Expression()
     max_sessions: int = 4
+    idle_minutes: float = 10.0
     gestures: bool = True
     memory: Memory = Memory()
     tools: tuple[Tool, ...] = ()
@@ -175,10 +179,12 @@ class ChatSettings:
         """Checks ranges.
 
         Raises:
-            SettingsError: If the number of sessions makes no sense, or a tool does not.
+            SettingsError: If the limits of sessions make no sense, or a tool does not.
         """
         if self.max_sessions < 1:
             raise SettingsError("chat settings: max_sessions must be at least 1.")
+        if not 0 <= self.idle_minutes < math.inf:
+            raise SettingsError("chat settings: idle_minutes must be 0 (never) or more.")
         check_tools(self.tools, self.allow)
 
 
