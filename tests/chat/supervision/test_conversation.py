@@ -53,7 +53,7 @@ async def talking(bundle, microphone=False, **services):
     settings = ChatSettings(patience=QUICK, **services)
     async with serving_avatar(bundle, settings) as (url, _):
         page, _ = await open_page(url, microphone=microphone)
-        await page.wait(Speech)
+        await page.wait(Speech, timeout=60)
         try:
             yield page
         finally:
