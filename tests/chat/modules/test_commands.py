@@ -39,7 +39,7 @@ def test_a_module_is_a_process_that_the_sdk_talks_to(bundle_path, settings):
     with closing(process.stdout), closing(process.stderr):
         line = process.stdout.readline()
         assert line.startswith("voice with espeak-ng is at http://127.0.0.1:")
-        with openai.OpenAI(base_url=line.split()[4], api_key="open", max_retries=5) as sdk:
+        with openai.OpenAI(base_url=line.split()[5], api_key="open", max_retries=5) as sdk:
             sound = sdk.audio.speech.create(
                 model="any", voice="any", input="Hello.", response_format="pcm"
             )
