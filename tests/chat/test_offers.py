@@ -9,7 +9,8 @@ from ico3d.chat import server
 from ico3d.chat.codec import decode_server, encode
 from ico3d.chat.commands import described
 from ico3d.chat.protocol import VERSION, Hello, Offer, Welcome
-from ico3d.chat.services import TABLES, choose, offers, wished
+from ico3d.chat.services import TABLES, choose
+from ico3d.chat.services.offers import offers, wished
 from ico3d.chat.services.provider import Provider
 from ico3d.chat.services.voice import espeak
 from ico3d.chat.sessions import Sessions
@@ -32,7 +33,7 @@ def voices(monkeypatch):
     best = replace(spare, title="Best", hindrance=lambda options: MISSING)
     espeak_ng = TABLES["voice"]["espeak-ng"]
     table = {"best-one": best, "espeak-ng": espeak_ng, "spare": spare}
-    monkeypatch.setattr("ico3d.chat.services.TABLES", {**TABLES, "voice": table})
+    monkeypatch.setattr("ico3d.chat.services.offers.TABLES", {**TABLES, "voice": table})
 
 
 def voices_of(found):
@@ -40,7 +41,7 @@ def voices_of(found):
 
 
 def test_all_services_are_listed_with_what_hinders_them():
-    assert voices_of(offers(OFFLINE)) == [
+    assert voices_of(offers(OFFLINE, {})) == [
         Offer("voice", "best-one", "Best", MISSING),
         Offer("voice", "espeak-ng", "espeak-ng", ""),
         Offer("voice", "spare", "Spare", ""),
@@ -48,7 +49,7 @@ def test_all_services_are_listed_with_what_hinders_them():
 
 
 def test_the_start_says_what_serves_and_what_would_be_better():
-    lines = described(choose(OFFLINE).described(), voices_of(offers(OFFLINE)))
+    lines = described(choose(OFFLINE).described(), voices_of(offers(OFFLINE, {})))
     assert lines == [
         "  listens with pocketsphinx",
         "  thinks with persona notes",
@@ -62,14 +63,14 @@ def test_the_start_says_what_serves_and_what_would_be_better():
     ("wish", "title"), [("spare", "Spare"), ("best-one", "espeak-ng"), ("no-such", "espeak-ng")]
 )
 def test_wishes_are_heeded_where_they_work(wish, title):
-    services = wished(choose(OFFLINE), OFFLINE, {"voice": wish}, offers(OFFLINE))
+    services = wished(choose(OFFLINE), OFFLINE, {}, {"voice": wish}, offers(OFFLINE, {}))
     assert services.voice.provider.title == title
     assert services.recognition.provider.title == "pocketsphinx"
 
 
 def test_a_wish_for_what_the_settings_describe_keeps_their_options():
-    spared = wished(choose(OFFLINE), OFFLINE, {"voice": "spare"}, offers(OFFLINE))
-    again = wished(spared, OFFLINE, {"voice": "espeak-ng"}, offers(OFFLINE))
+    spared = wished(choose(OFFLINE), OFFLINE, {}, {"voice": "spare"}, offers(OFFLINE, {}))
+    again = wished(spared, OFFLINE, {}, {"voice": "espeak-ng"}, offers(OFFLINE, {}))
     assert again.voice.options.rate == 150 and spared.voice.options.rate == 165
 
 

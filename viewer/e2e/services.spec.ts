@@ -26,6 +26,7 @@ test('the sheet shows who serves, and choosing starts anew', async () => {
   const { page } = browser;
   await until(browser, finished(0), 60_000); // the greeting
   await page.click('#services-button');
+  await page.setViewportSize({ width: 420, height: 560 });
   const picture = join(folder, 'services.png');
   await page.screenshot({ path: picture });
   console.log(`see ${picture}`);

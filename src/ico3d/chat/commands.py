@@ -48,7 +48,7 @@ class Serve:
         from ico3d.bundle.persona import read_persona
         from ico3d.chat import server
         from ico3d.chat.monitor import Monitor, TurnLog
-        from ico3d.chat.services import offers
+        from ico3d.chat.services.offers import offers
         from ico3d.chat.sessions import Sessions
         from ico3d.chat.settings import read_settings
 
@@ -62,8 +62,9 @@ class Serve:
         app = server.make_app(bundle, avatar, self.host, sessions)
         url = server.address(listener)
         print(f"{(persona or bundle.manifest.persona).name} is at {url} (Ctrl+C ends)")
-        for line in described(avatar.services.described(), offers(settings)) if avatar else []:
-            print(line)
+        if avatar:
+            offered = offers(settings, avatar.persona.voice)
+            print("\n".join(described(avatar.services.described(), offered)))
         if not (server.STATIC / "index.html").is_file():
             print("The page is not built: run `make viewer`.", file=sys.stderr)
         sys.stdout.flush()

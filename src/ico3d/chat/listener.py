@@ -81,7 +81,8 @@ class Captions(FrameProcessor):
             self._begin()
         elif isinstance(frame, UserStoppedSpeakingFrame):
             self._in_turn = False
-            self._page.show("thinking" if self._words else "idle")
+            if self._page.state == "listening":  # else an apology has begun meanwhile
+                self._page.show("thinking" if self._words else "idle")
             self._words = ""
         await self.push_frame(frame, direction)
 

@@ -23,7 +23,8 @@ from ico3d.chat.face import open_face
 from ico3d.chat.guard import LOOPBACK, Guard
 from ico3d.chat.monitor import CONTENT_TYPE
 from ico3d.chat.protocol import Welcome
-from ico3d.chat.services import choose, offers
+from ico3d.chat.services import choose
+from ico3d.chat.services.offers import offers
 from ico3d.chat.sessions import Sessions
 from ico3d.chat.settings import ChatSettings
 from ico3d.errors import BundleError, SettingsError
@@ -69,7 +70,7 @@ def make_app(
     if avatar is not None:
         sessions = Sessions(avatar) if sessions is None else sessions
         if host in LOOPBACK:  # the visitor is at home: it may cost money, and tells of the machine
-            sessions.offers = offers(avatar.settings)
+            sessions.offers = offers(avatar.settings, avatar.persona.voice)
 
     @contextlib.asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:

@@ -9,7 +9,7 @@ from ico3d.chat.freeing import give_back
 from ico3d.chat.monitor import Monitor, Visitor
 from ico3d.chat.page import Outbox, Page
 from ico3d.chat.protocol import RESUME_SECONDS, Error, Hello, Offer
-from ico3d.chat.services import wished
+from ico3d.chat.services.offers import wished
 
 IDLE = "Nothing was said for {:g} min, so this conversation has ended: reload the page."
 
@@ -99,7 +99,8 @@ class Sessions:
 
     def _wished(self, hello: Hello) -> Avatar:
         avatar = self._avatar
-        services = wished(avatar.services, avatar.settings, hello.wishes, self.offers)
+        voices = avatar.persona.voice
+        services = wished(avatar.services, avatar.settings, voices, hello.wishes, self.offers)
         return replace(avatar, services=services)
 
     def _make_room(self) -> None:

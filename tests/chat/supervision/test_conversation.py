@@ -53,7 +53,7 @@ async def talking(bundle, microphone=False, **services):
     settings = ChatSettings(patience=QUICK, **services)
     async with serving_avatar(bundle, settings) as (url, _):
         page, _ = await open_page(url, microphone=microphone)
-        await page.wait(Speech)
+        await page.wait(Speech, timeout=60)
         try:
             yield page
         finally:
@@ -133,7 +133,12 @@ async def test_a_recogniser_that_fails_is_apologised_for(bundle, question):
     async with serving(app) as url:
         choice = Choice("openai", {"url": f"{url}v1"})
         async with talking(bundle, microphone=True, recognition=choice) as page:
+            await page.heard(0)
+            await page.wait(State, where=lambda m: m.state == "idle")
             since = len(page.log)
             page.say(question)
             _, answer = await page.wait(Answer, since)
             assert answer.text == SORRY["recognition"]
+            await page.wait(End, since)
+            states = [m.state for m in page.messages(State, since)]
+            assert states == ["listening", "thinking", "speaking"]

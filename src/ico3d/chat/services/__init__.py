@@ -5,7 +5,7 @@ which need no download, and what is too small to be elsewhere. A new one is a mo
 `Settings` and one entry in the table of its kind.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,7 +24,6 @@ TABLES: Mapping[str, Table] = {
     "voice": voice.PROVIDERS,
 }
 """Providers by kind and name."""
-LONGEST_HINDRANCE = 400  # characters: all offers go into one message
 
 
 @dataclass(frozen=True)
@@ -146,38 +145,3 @@ def best(table: Table, kind: str) -> Service:
         if not hindrance:
             return Service(provider, options)
     raise SettingsError(f"no {kind} works here; the last one needs this: {hindrance}")
-
-
-def offers(settings: ChatSettings) -> list[protocol.Offer]:
-    """All services with what hinders them, as the page is told; asks each, so it may take 1 s."""
-    found = []
-    for kind, table in TABLES.items():
-        for key in table:
-            service = named(settings, kind, key)
-            hindrance = service.provider.hindrance(service.options)[:LONGEST_HINDRANCE]
-            found.append(protocol.Offer(kind, key, service.described().name, hindrance))  # type: ignore[arg-type]
-    return found
-
-
-def named(settings: ChatSettings, kind: str, key: str) -> Service:
-    """A service of a table, as the settings describe it where they do.
-
-    Raises:
-        SettingsError: If its options are wrong.
-    """
-    choice: Choice = getattr(settings, kind)
-    return chosen(TABLES[kind], choice if choice.use == key else Choice(key), kind)
-
-
-def wished(
-    services: Chosen,
-    settings: ChatSettings,
-    wishes: Mapping[str, str],
-    offered: Sequence[protocol.Offer],
-) -> Chosen:
-    """The services with a visitor's wishes, where they are offered and work."""
-    working = {(offer.kind, offer.key) for offer in offered if not offer.hindrance}
-    granted = {
-        kind: named(settings, kind, key) for kind, key in wishes.items() if (kind, key) in working
-    }
-    return replace(services, **granted)

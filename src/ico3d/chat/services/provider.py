@@ -1,6 +1,7 @@
 """What a provider of recognition, language or voice is."""
 
 import importlib.util
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -55,6 +56,13 @@ def nothing(settings: Any) -> str:
     """For providers whose title says all."""
     del settings
     return ""
+
+
+def lacks_server(url: str, key_variable: str, kind: str) -> str:
+    """What hinders a provider that asks a server: none is named, and no key for OpenAI's is set."""
+    if url or os.environ.get(key_variable):
+        return ""
+    return f'no server is chosen: set [{kind}] use = "openai" and url.'
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,10 @@ PROVIDERS: Table = {
     "persona-notes": Provider("persona notes", persona.Settings, persona.make, stand_in=True),
     # never the best by itself: it may cost money, and takes what is said out of the house
     "openai": Provider(
-        "OpenAI-compatible server", openai.Settings, openai.make, detail=openai.detail
+        "OpenAI-compatible server",
+        openai.Settings,
+        openai.make,
+        openai.hindrance,
+        detail=openai.detail,
     ),
 }

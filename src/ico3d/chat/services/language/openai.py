@@ -7,7 +7,7 @@ from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.chat.services.language.instruction import instruction
 from ico3d.chat.services.language.servers import language_models
-from ico3d.chat.services.provider import Context
+from ico3d.chat.services.provider import Context, lacks_server
 from ico3d.errors import SettingsError
 
 OWN_KEY = "OPENAI_API_KEY"
@@ -48,6 +48,11 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
         instruction(context.persona),
         settings.functions,
     )
+
+
+def hindrance(settings: Settings) -> str:
+    """Whether a server is chosen."""
+    return lacks_server(settings.url, settings.key_variable or OWN_KEY, "language")
 
 
 def detail(settings: Settings) -> str:

@@ -11,5 +11,5 @@ PROVIDERS: Table = {
         "espeak-ng", espeak.Settings, espeak.make, espeak.hindrance, stand_in=True
     ),
     # never the best by itself: it may cost money, and takes what is said out of the house
-    "openai": Provider("OpenAI-compatible server", openai.Settings, openai.make),
+    "openai": Provider("OpenAI-compatible server", openai.Settings, openai.make, openai.hindrance),
 }

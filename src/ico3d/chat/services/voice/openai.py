@@ -9,7 +9,7 @@ from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
 from pipecat.services.openai.tts import OpenAITTSService
 
 from ico3d.chat.protocol import SPEECH_RATE
-from ico3d.chat.services.provider import Context
+from ico3d.chat.services.provider import Context, lacks_server
 from ico3d.chat.services.voice.pieces import OPTIONS, STARVED, Prompt
 from ico3d.errors import SettingsError
 
@@ -98,6 +98,11 @@ class ServerVoice(Prompt, OpenAITTSService):
     def _rate_of(self, content_type: str) -> int | None:
         """Null for sound whose header tells it."""
         return None if "wav" in content_type else self._options.rate
+
+
+def hindrance(settings: Settings) -> str:
+    """Whether a server is chosen."""
+    return lacks_server(settings.url, settings.key_variable, "voice")
 
 
 def make(settings: Settings, context: Context) -> ServerVoice:

@@ -1,0 +1,67 @@
+"""What visitors may choose from, and their choices."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from ico3d.chat import protocol
+from ico3d.chat.services import TABLES, Chosen, Service, chosen, with_voice
+from ico3d.chat.settings import ChatSettings, Choice
+
+LONGEST_HINDRANCE = 400  # characters: all offers go into one message
+
+
+def offers(settings: ChatSettings, voices: Mapping[str, str]) -> list[protocol.Offer]:
+    """All services with what hinders them, as the page is told; asks each, so it may take 1 s.
+
+    Args:
+        settings: Which services, and their options.
+        voices: The persona's voice for each provider of voices.
+
+    Raises:
+        SettingsError: If options are wrong.
+    """
+    found = []
+    for kind, table in TABLES.items():
+        for key in table:
+            service = named(settings, voices, kind, key)
+            hindrance = service.provider.hindrance(service.options)[:LONGEST_HINDRANCE]
+            name = service.described().name
+            found.append(protocol.Offer(kind, key, name, hindrance))  # type: ignore[arg-type]
+    return found
+
+
+def named(settings: ChatSettings, voices: Mapping[str, str], kind: str, key: str) -> Service:
+    """A service of a table, as the settings and the persona describe it where they do.
+
+    Raises:
+        SettingsError: If its options are wrong.
+    """
+    set_choice: Choice = getattr(settings, kind)
+    choice = set_choice if set_choice.use == key else Choice(key)
+    service = chosen(TABLES[kind], choice, kind)
+    return with_voice(service, choice, voices) if kind == "voice" else service
+
+
+def wished(
+    services: Chosen,
+    settings: ChatSettings,
+    voices: Mapping[str, str],
+    wishes: Mapping[str, str],
+    offered: Sequence[protocol.Offer],
+) -> Chosen:
+    """The services with a visitor's wishes, where they are offered and work.
+
+    Args:
+        services: Those of visitors without wishes.
+        settings: Their options, and those of others.
+        voices: The persona's voice for each provider of voices.
+        wishes: Keys of offers by kind.
+        offered: What may be wished for.
+    """
+    working = {(offer.kind, offer.key) for offer in offered if not offer.hindrance}
+    granted = {
+        kind: named(settings, voices, kind, key)
+        for kind, key in wishes.items()
+        if (kind, key) in working
+    }
+    return replace(services, **granted)
