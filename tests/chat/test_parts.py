@@ -18,6 +18,8 @@ from ico3d.chat.timing import TurnTimer
 from ico3d.errors import SettingsError
 from ico3d.speech.runtime import SpeechModel
 
+from .conftest import OFFLINE
+
 
 def test_playback_follows_the_pages_clock():
     playback = Playback()
@@ -252,6 +254,18 @@ def test_the_openai_service_is_pipecats_own():
     from ico3d.bundle.manifest import Persona
 
     persona = Persona("Ada", "Hello.", ("who are you => I am Ada.",))
-    settings = ChatSettings(language=Choice("openai", {"url": "http://127.0.0.1:9/v1"}))
+    settings = ChatSettings(
+        language=Choice("openai", {"url": "http://127.0.0.1:9/v1", "model": "tiny"})
+    )
     made = choose(settings).language.make(Context(persona, None, None))
     assert isinstance(made, OpenAILLMService)
+
+
+def test_the_personas_voice_speaks_unless_the_settings_name_one():
+    voices = {"espeak-ng": "de+f2", "nobody": "x"}
+    assert choose(OFFLINE, voices).voice.options.voice == "de+f2"
+    named = ChatSettings(
+        OFFLINE.recognition, OFFLINE.language, Choice("espeak-ng", {"voice": "fr"})
+    )
+    assert choose(named, voices).voice.options.voice == "fr"
+    assert choose(OFFLINE, {"nobody": "x"}).voice.options == choose(OFFLINE).voice.options

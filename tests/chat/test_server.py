@@ -13,6 +13,7 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from ico3d.bundle.persona import Persona
 from ico3d.chat.codec import decode_server, encode
 from ico3d.chat.face import open_face
 from ico3d.chat.guard import is_own
@@ -74,6 +75,15 @@ async def test_http_serves_the_bundle_and_nothing_else(served, bundle):
         assert (await client.get("/health", headers={"Host": "evil.example"})).status_code == 403
         foreign = await client.get("/health", headers={"Origin": "http://evil.example"})
         assert foreign.status_code == 403
+
+
+async def test_a_personas_file_shows_its_name_and_keeps_its_notes(bundle):
+    ada = Persona("Ada", "Hello.", ("secret => The safe is open.",), "Sly.", forbidden=("keys",))
+    async with serving(bundle, persona=ada) as (url, _), httpx.AsyncClient(base_url=url) as client:
+        shown = (await client.get("/bundle/manifest.json")).json()
+    assert shown["persona"] == {"name": "Ada", "greeting": "Hello.", "notes": []}
+    own = json.loads(bundle.read("manifest.json"))
+    assert shown == own | {"persona": shown["persona"]}
 
 
 async def test_a_body_alone_is_served_without_a_conversation(body):

@@ -5,11 +5,12 @@ import time
 from dataclasses import dataclass
 
 from loguru import logger
+from pipecat.adapters.llm.schemas.tools_schema import ToolsSchema
 from pipecat.audio.turn.smart_turn.base_smart_turn import SmartTurnParams
 from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
 from pipecat.pipeline.pipeline import Pipeline
 from pipecat.pipeline.worker import PipelineParams, PipelineWorker
-from pipecat.processors.aggregators.llm_context import LLMContext
+from pipecat.processors.aggregators.llm_context import LLMContext, NotGiven
 from pipecat.processors.aggregators.llm_response_universal import (
     LLMContextAggregatorPair,
     LLMUserAggregatorParams,
@@ -26,6 +27,7 @@ from ico3d.chat.face import Face
 from ico3d.chat.frames import Utterances
 from ico3d.chat.gestures import Gestures
 from ico3d.chat.listener import Captions, PageInput
+from ico3d.chat.memory import remembering
 from ico3d.chat.modules.mouth import RemoteMouth
 from ico3d.chat.page import Page
 from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Clock, Error, Heard
@@ -33,11 +35,12 @@ from ico3d.chat.services import Chosen
 from ico3d.chat.services.provider import Context
 from ico3d.chat.services.voice.clauses import ClauseProcessor
 from ico3d.chat.services.voice.markup import speakable
-from ico3d.chat.settings import ChatSettings, Turns
+from ico3d.chat.settings import ChatSettings
 from ico3d.chat.speaker import Speaker
 from ico3d.chat.supervision.language import AnswerGuard
 from ico3d.chat.supervision.voice import endure
 from ico3d.chat.timing import TurnTimer
+from ico3d.chat.tools import functions
 from ico3d.chat.turns.detector import Ear, VoiceDetector
 from ico3d.chat.turns.echo import EchoGuard
 from ico3d.chat.turns.echo_filter import EchoFilter
@@ -94,7 +97,7 @@ class Conversation:
         gestures = avatar.animation and Gestures(
             avatar.animation, page, self._utterances, avatar.settings.gestures
         )
-        self._echo = EchoGuard()
+        self._echo, self._gestures = EchoGuard(), gestures
         self._speaker = Speaker(page, self._utterances, self._timer, self._echo.sent, gestures)
         self._worker: PipelineWorker | None = None
         self._task: asyncio.Task | None = None
@@ -168,11 +171,12 @@ class Conversation:
         self._speaker.release()
 
     def _pipeline(self, parts: Parts) -> Pipeline:
-        turns, patience = self._avatar.settings.turns, self._avatar.settings.patience
+        settings, face = self._avatar.settings, make_face(self._avatar)
+        turns, patience = settings.turns, settings.patience
         trusted = not self._avatar.services.recognition.provider.stand_in
         chosen = strategies(parts.turn, turns, trusted, self._speaker.hush)
-        user, assistant = aggregators(chosen, turns)
-        face = make_face(self._avatar)
+        context = LLMContext(tools=self._functions(parts.language, face))
+        user, assistant = aggregators(chosen, settings, parts.language, context)
         return Pipeline(
             [
                 self._input,
@@ -185,7 +189,7 @@ class Conversation:
                 AnswerGuard(
                     parts.recognition, parts.language, patience.language, patience.apologies
                 ),
-                ClauseProcessor(),
+                ClauseProcessor(next(iter(self._avatar.persona.languages), None)),
                 parts.voice,
                 ExpressionProcessor(face, self._utterances, self._timer),
                 self._speaker,
@@ -195,6 +199,11 @@ class Conversation:
 
     def _complain(self, sentence: str) -> None:
         self._page.send(Error(sentence, fatal=False))
+
+    def _functions(self, language: FrameProcessor, face: Face) -> ToolsSchema | NotGiven:
+        settings = self._avatar.settings
+        moods = face.moods if self._avatar.head.eye_offset is not None else None
+        return functions(language, self._gestures, moods, settings.tools, settings.allow)
 
     def _prepare_voice(self, voice: FrameProcessor) -> None:
         """Keeps markup and failures from it, and takes the time at which a piece reaches it."""
@@ -230,10 +239,17 @@ def make_parts(avatar: Avatar) -> Parts:
     )
 
 
-def aggregators(strategies: UserTurnStrategies, turns: Turns) -> LLMContextAggregatorPair:
+def aggregators(
+    strategies: UserTurnStrategies,
+    settings: ChatSettings,
+    language: FrameProcessor,
+    context: LLMContext,
+) -> LLMContextAggregatorPair:
     """The two halves that keep the conversation's context and decide on turns."""
     params = LLMUserAggregatorParams(
         user_turn_strategies=strategies,
-        user_turn_stop_timeout=max(NOTHING_HEARD, 2 * turns.end_silence),
+        user_turn_stop_timeout=max(NOTHING_HEARD, 2 * settings.turns.end_silence),
     )
-    return LLMContextAggregatorPair(LLMContext(), user_params=params)
+    return LLMContextAggregatorPair(
+        context, user_params=params, assistant_params=remembering(settings.memory, language)
+    )

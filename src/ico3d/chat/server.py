@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import socket
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from pathlib import Path
 
 import uvicorn
@@ -12,6 +13,8 @@ from fastapi.responses import JSONResponse, PlainTextResponse
 from fastapi.staticfiles import StaticFiles
 
 from ico3d.bundle.format import SPEECH, Bundle
+from ico3d.bundle.manifest import MANIFEST
+from ico3d.bundle.persona import Persona
 from ico3d.chat import protocol
 from ico3d.chat.connection import Connection
 from ico3d.chat.conversation import Avatar
@@ -24,12 +27,19 @@ from ico3d.chat.settings import ChatSettings
 from ico3d.errors import BundleError, SettingsError
 
 STATIC = Path(__file__).parent / "static"
-TYPES = {".json": "application/json", ".png": "image/png", ".txt": "text/plain; charset=utf-8"}
+JSON = "application/json"
+TYPES = {".json": JSON, ".png": "image/png", ".txt": "text/plain; charset=utf-8"}
+FRESH = {"Cache-Control": "no-cache"}
 STILL = "This avatar is driven by blendshapes, not by sound: its lips do not move while it speaks."
 
 
-def open_avatar(bundle: Bundle, settings: ChatSettings) -> Avatar:
+def open_avatar(bundle: Bundle, settings: ChatSettings, persona: Persona | None = None) -> Avatar:
     """What the sessions share.
+
+    Args:
+        bundle: The avatar.
+        settings: Services and timing.
+        persona: Who it is; the bundle's by default.
 
     Raises:
         BundleError: If the bundle has no head.
@@ -37,7 +47,8 @@ def open_avatar(bundle: Bundle, settings: ChatSettings) -> Avatar:
         ModelError: If the bundle's speech model cannot be used.
     """
     head, speech = open_face(bundle)
-    persona, services = bundle.manifest.persona, choose(settings)
+    persona = persona or bundle.manifest.persona
+    services = choose(settings, persona.voice)
     sha256 = bundle.manifest.files[SPEECH].sha256 if speech else ""
     return Avatar(head, speech, persona, services, settings, bundle.animation, sha256)
 
@@ -72,6 +83,8 @@ def make_app(
 
     @app.get("/bundle/{name:path}")
     async def bundle_file(name: str, request: Request) -> Response:
+        if name == MANIFEST and avatar is not None:
+            return Response(shown_manifest(bundle, avatar.persona), headers=FRESH, media_type=JSON)
         return await asyncio.to_thread(serve_file, bundle, name, request)
 
     if avatar is not None and sessions is not None:
@@ -91,12 +104,19 @@ def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
         await Connection(socket, sessions, welcome).run()
 
 
+def shown_manifest(bundle: Bundle, persona: Persona) -> bytes:
+    """The manifest with the name of who is there; what a persona's file knows stays here."""
+    if persona is bundle.manifest.persona:
+        return bundle.read(MANIFEST)
+    return replace(bundle.manifest, persona=Persona(persona.name, persona.greeting)).to_json()
+
+
 def serve_file(bundle: Bundle, name: str, request: Request) -> Response:
     """One file of the bundle; browsers keep it as long as its hash stays the same."""
     if name not in bundle.names:
         return PlainTextResponse(f"The bundle has no file {name[:80]!r}.\n", 404)
     entry = bundle.manifest.files.get(name)
-    headers = {"Cache-Control": "no-cache"}
+    headers = dict(FRESH)
     if entry is not None:
         headers["ETag"] = f'"{entry.sha256}"'
         if request.headers.get("if-none-match") == headers["ETag"]:

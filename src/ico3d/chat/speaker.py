@@ -13,6 +13,9 @@ from pipecat.frames.frames import (
     BotStartedSpeakingFrame,
     BotStoppedSpeakingFrame,
     Frame,
+    FunctionCallCancelFrame,
+    FunctionCallResultFrame,
+    FunctionCallsStartedFrame,
     InterruptionFrame,
     LLMFullResponseEndFrame,
     LLMFullResponseStartFrame,
@@ -61,6 +64,7 @@ class Speaker(FrameProcessor):
         self._speaking: int | None = None
         self._paused = False
         self._turn_start: float | None = None  # of the turn that `played` is to be told of
+        self._calls: set[str] = set()  # functions that the language model waits for
 
     def clock(self, message: Clock) -> None:
         """The page says how far it has played."""
@@ -126,8 +130,22 @@ class Speaker(FrameProcessor):
         elif isinstance(frame, LLMFullResponseStartFrame):
             self._page.show("thinking")
         elif isinstance(frame, LLMFullResponseEndFrame):
-            self._page.show("idle")
+            self._page.show("thinking" if self._calls else "idle")
+        elif isinstance(frame, FunctionCallsStartedFrame):
+            self._calls.update(call.tool_call_id for call in frame.function_calls)
+        elif isinstance(frame, FunctionCallResultFrame | FunctionCallCancelFrame):
+            self._called(frame)
         await self.push_frame(frame, direction)
+
+    def _called(self, frame: FunctionCallResultFrame | FunctionCallCancelFrame) -> None:
+        """A function has ended; the language model goes on unless it has said all already."""
+        self._calls.discard(frame.tool_call_id)
+        properties = getattr(frame, "properties", None)
+        is_over = isinstance(frame, FunctionCallCancelFrame) or (
+            properties is not None and properties.run_llm is False and not self._calls
+        )
+        if is_over and self._page.state == "thinking":
+            self._page.show("idle")
 
     async def _send(self, frame: SpeechFrame) -> None:
         if self._utterances.is_stopped(frame.utterance):
@@ -167,6 +185,7 @@ class Speaker(FrameProcessor):
 
     async def _stop(self) -> None:
         self._utterances.stop_all()
+        self._calls.clear()
         utterance, self._speaking, self._turn_start = self._speaking, None, None
         if self._page.state != "listening":
             self._page.show("idle")

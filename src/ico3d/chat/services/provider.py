@@ -8,7 +8,8 @@ from typing import Any
 from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.bundle.animation import Animation
-from ico3d.bundle.manifest import HeadInfo, Persona
+from ico3d.bundle.manifest import HeadInfo
+from ico3d.bundle.persona import Persona
 from ico3d.common.weights import model_of
 from ico3d.errors import MissingModelError
 
@@ -50,6 +51,12 @@ def lacks_weights(name: str) -> str:
     return ""
 
 
+def nothing(settings: Any) -> str:
+    """For providers whose title says all."""
+    del settings
+    return ""
+
+
 @dataclass(frozen=True)
 class Provider:
     """One way to do a job; an entry in the table of its kind.
@@ -63,6 +70,7 @@ class Provider:
             server that answers) and what would mend it, in one sentence for people; empty if
             nothing does. Quick, and never raises: asked where the best is wanted.
         stand_in: True for the offline three.
+        detail: Which model these options mean, for the visitor's eyes.
     """
 
     title: str
@@ -70,6 +78,7 @@ class Provider:
     make: Callable[[Any, Context], FrameProcessor]
     hindrance: Callable[[Any], str] = unhindered
     stand_in: bool = False
+    detail: Callable[[Any], str] = nothing
 
 
 Table = dict[str, Provider]
