@@ -200,7 +200,7 @@ class Conversation:
                 AnswerGuard(
                     parts.recognition, parts.language, patience.language, patience.apologies
                 ),
-                ClauseProcessor(),
+                ClauseProcessor(next(iter(self._avatar.persona.languages), None)),
                 parts.voice,
                 ExpressionProcessor(face, self._utterances),
                 self._speaker,

@@ -2,6 +2,8 @@
 
 from typing import Literal
 
+from ico3d.chat.services.voice import espeak
+
 Failed = Literal["recognition", "language", "voice"]
 
 APOLOGIES: dict[str, dict[Failed, str]] = {
@@ -63,9 +65,6 @@ APOLOGIES: dict[str, dict[Failed, str]] = {
 }
 """By language (ISO 639-1), then by what failed."""
 
-VOICES = {"zh": "cmn", "en": "en-us"}
-"""espeak-ng's names of languages where they are not the codes."""
-
 
 def apology(failed: Failed, language: str) -> str:
     """One sentence, in English where the language has none.
@@ -80,7 +79,7 @@ def apology(failed: Failed, language: str) -> str:
 def espeak_voice(language: str) -> str:
     """The voice of espeak-ng that says it."""
     code = base(language)
-    return VOICES.get(code, code) if code in APOLOGIES else VOICES["en"]
+    return espeak.voice_of(code if code in APOLOGIES else "en")
 
 
 def base(language: str) -> str:

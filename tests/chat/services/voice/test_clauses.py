@@ -15,6 +15,8 @@ from pipecat.pipeline.pipeline import Pipeline
 from pipecat.tests.utils import run_test
 from pipecat.utils.text.simple_text_aggregator import SimpleTextAggregator
 
+from ico3d.bundle.persona import Persona
+from ico3d.chat.services.provider import Context
 from ico3d.chat.services.voice import espeak
 from ico3d.chat.services.voice.clauses import ClauseProcessor, Clauses
 from ico3d.chat.services.voice.markup import speakable
@@ -130,7 +132,7 @@ ANSWER = (
 
 
 async def test_captions_show_what_was_written_and_the_voice_says_its_words():
-    voice = espeak.make(espeak.Settings("de"), None)
+    voice = espeak.make(espeak.Settings("de"), Context(Persona("Ann"), None, None))
     voice.add_text_transformer(speakable)
     requests = []
 

@@ -6,8 +6,10 @@ import time
 import numpy as np
 import pytest
 
+from ico3d.bundle.persona import Persona
 from ico3d.chat.protocol import SPEECH_RATE
 from ico3d.chat.services import chosen
+from ico3d.chat.services.provider import Context
 from ico3d.chat.services.voice import PROVIDERS, espeak, kokoro, piper
 from ico3d.chat.services.voice.pieces import STARVED
 from ico3d.chat.settings import Choice
@@ -15,6 +17,10 @@ from ico3d.common.espeak import synthesize
 from ico3d.errors import MissingModelError, SettingsError
 
 onnx = pytest.importorskip("onnx")
+
+
+def context(*languages):
+    return Context(Persona("Ann", languages=languages), None, None)
 
 
 @pytest.mark.parametrize(
@@ -45,16 +51,30 @@ def test_espeak_has_those_languages(languages):
         synthesize("a", language)  # raises if there is none
 
 
+@pytest.mark.parametrize(
+    ("languages", "own", "voice"),
+    [
+        ((), "", "en-us+f3"),
+        (("de-AT", "en"), "", "de+f3"),
+        (("zh",), "", "cmn+f3"),
+        (("de",), "fr+m1", "fr+m1"),
+    ],
+)
+def test_espeak_speaks_the_personas_language(languages, own, voice):
+    made = espeak.make(espeak.Settings(own), context(*languages))
+    assert made._settings.voice == voice
+
+
 async def test_espeak_speaks_what_models_write(say):
-    voice = espeak.make(espeak.Settings(), None)
+    voice = espeak.make(espeak.Settings(), context())
     for text in ("Hello, 3.5 m.", "你好，我是小明。", "Grüße, 10:30 Uhr!", "print('x')"):
         pcm, errors = await say(voice, text)
         assert not errors and len(pcm) > SPEECH_RATE / 3 and np.abs(pcm).max() > 3000
-        voice = espeak.make(espeak.Settings(), None)
+        voice = espeak.make(espeak.Settings(), context())
 
 
 async def test_a_text_that_cannot_be_spoken_is_an_error_and_not_the_end(say):
-    voice = espeak.make(espeak.Settings(), None)
+    voice = espeak.make(espeak.Settings(), context())
     speak = voice._speak
 
     def sometimes(text):

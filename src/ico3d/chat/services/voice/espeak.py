@@ -11,6 +11,9 @@ from ico3d.chat.services.provider import Context, lacks_package
 from ico3d.chat.services.voice.pieces import PieceVoice, at_speech_rate
 from ico3d.common.espeak import synthesize
 
+VARIANT = "+f3"
+NAMES = {"en": "en-us", "zh": "cmn"}
+"""espeak-ng's names of languages where they are not the codes."""
 SCRIPTS = {
     "ARABIC": "ar fa ur ku sd ug",
     "ARMENIAN": "hy hyw",
@@ -45,13 +48,20 @@ class Settings:
     """Which voice.
 
     Attributes:
-        voice: espeak-ng's language and variant, such as `de+f3`. What is written in another
-            script is spoken by that script's language, with the same variant.
+        voice: espeak-ng's language and variant, such as `de+f3`; empty for the persona's first
+            language, English where it has none. What is written in another script is spoken by
+            that script's language, with the same variant.
         rate: Words per minute.
     """
 
-    voice: str = "en-us+f3"
+    voice: str = ""
     rate: int = 165
+
+
+def voice_of(language: str) -> str:
+    """The voice for a language, given by its code such as `de` or `pt-BR`."""
+    code = language.partition("-")[0].lower()
+    return NAMES.get(code, code)
 
 
 def voice_for(text: str, voice: str) -> str:
@@ -82,5 +92,7 @@ def make(settings: Settings, context: Context) -> PieceVoice:
         MissingExtraError: If espeakng-loader or soxr is not installed.
         SettingsError: If there is no such voice.
     """
-    spoken("a", settings.voice, settings.rate)  # fails now rather than in mid-talk
-    return PieceVoice(settings.voice, partial(spoken, voice=settings.voice, rate=settings.rate))
+    languages = context.persona.languages or ("en",)
+    voice = settings.voice or voice_of(languages[0]) + VARIANT
+    spoken("a", voice, settings.rate)  # fails now rather than in mid-talk
+    return PieceVoice(voice, partial(spoken, voice=voice, rate=settings.rate))
