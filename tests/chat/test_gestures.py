@@ -120,12 +120,12 @@ def test_a_requested_gesture_comes_first(direction):
         assert places[away + np.flatnonzero(~rising)[0]] == pytest.approx(50 / 15, abs=0.05)
 
 
-def test_a_stop_forgets_what_was_requested():
+def test_what_was_requested_can_be_forgotten():
     page, utterances = Recorder(), Utterances()
     gestures, same = Gestures(ANIMATION, page, utterances), Gestures(ANIMATION, page, utterances)
     assert gestures.names == ["gesture-1", "gesture-2", "gesture-3"]
     gestures.request("gesture-3")
-    gestures.stop()
+    gestures.forget()
     utterances.made(utterances.begin(), 20 * SPEECH_RATE, complete=True)
     sent = []
     for each in (gestures, same):

@@ -32,7 +32,7 @@ def test_it_ends_with_the_utterance_and_eases_to_another_before():
     values = moods.values(rows(25, 1.0))
     assert values[0] == pytest.approx(brows("surprised")) and not values[-1].any()
     moods.set("happy")
-    moods.end()
+    moods.forget()
     assert not moods.values(rows(25, 2.0)).any()
 
 

@@ -57,7 +57,6 @@ class ExpressionProcessor(FrameProcessor):
             return
         if isinstance(frame, InterruptionFrame):
             self._in_answer = False
-            self._face.moods.end()
             self._reset()
         elif isinstance(frame, LLMFullResponseStartFrame):
             self._in_answer = True
@@ -98,7 +97,7 @@ class ExpressionProcessor(FrameProcessor):
         if self._utterance is not None:
             samples = self._next_row * ROW
             self._utterances.made(self._utterance, samples, complete=True)
-            self._face.moods.end()
+            self._face.moods.forget()
             await self.push_frame(UtteranceEndFrame(self._utterance, samples))
         self._reset()
 

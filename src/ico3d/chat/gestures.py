@@ -46,12 +46,15 @@ class Gestures:
         """
         self._animation, self._page, self._utterances = animation, page, utterances
         self._moving, self._seed = moving, seed
+        self._wanted: float | None = None  # body time of the action that was asked for
         self.stop()
 
     def stop(self) -> None:
         """Nothing is spoken any more: the page's body finds its way to rest by itself."""
-        self._wanted: float | None = None  # body time of the action that was asked for
-        self._forget()
+        self._utterance: int | None = None
+        self._first: tuple[float, float] | None = None  # position and body time
+        self._planner: Planner | None = None
+        self._planned = 0.0  # s of the utterance for which the page has motion
 
     @property
     def names(self) -> list[str]:
@@ -64,16 +67,15 @@ class Gestures:
         if self._planner is not None:
             self._hand_over(self._planner)
 
+    def forget(self) -> None:
+        """What was asked for is not to be made any more, and what it was for is over."""
+        self._wanted = None
+        self.stop()
+
     def _hand_over(self, planner: Planner) -> None:
         if self._wanted is not None:
             planner.visit(self._wanted)
             self._wanted = None
-
-    def _forget(self) -> None:
-        self._utterance: int | None = None
-        self._first: tuple[float, float] | None = None  # position and body time
-        self._planner: Planner | None = None
-        self._planned = 0.0  # s of the utterance for which the page has motion
 
     def clock(self, message: Clock, position: float) -> None:
         """The page says where it is.
@@ -83,7 +85,7 @@ class Gestures:
             position: Seconds of it that can have been heard.
         """
         if message.utterance != self._utterance:
-            self._forget()
+            self.stop()
             self._utterance = message.utterance
         if self._planner is None:
             self._planner = self._begin(position, message.body_time)

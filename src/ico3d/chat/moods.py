@@ -30,7 +30,7 @@ class Moods:
         """The mood from the next row on that is made."""
         self._wanted = brows(name)
 
-    def end(self) -> None:
+    def forget(self) -> None:
         """The utterance is over: the page eases the face to rest, the next one begins neutral."""
         self._from = self._to = self._wanted = brows(NEUTRAL)
 

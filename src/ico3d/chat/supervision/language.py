@@ -91,7 +91,8 @@ class AnswerGuard(FrameProcessor):
 
     async def _language_failed(self, _: FrameProcessor, error: ErrorFrame) -> None:
         logger.error(f"language failed: {error.error}")
-        self._broken = True
+        # a summary is made beside the answer, which does without it
+        self._broken = self._broken or "summar" not in error.error
 
     async def _recognition_failed(self, _: FrameProcessor, error: ErrorFrame) -> None:
         logger.error(f"recognition failed: {error.error}")

@@ -27,7 +27,7 @@ def functions(
         tools: The user's.
         allow: Hosts that those may call.
     """
-    said = Said()
+    said = Said([moved.forget for moved in (moods, gestures) if moved is not None])
     said.watch(language)
     found = [http_function(tool, allow) for tool in tools]
     if moods is not None:

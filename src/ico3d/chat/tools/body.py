@@ -1,5 +1,6 @@
 """Functions that move the avatar itself: gestures of its body, moods of its brows."""
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from pipecat.adapters.llm.schemas.function_schema import FunctionSchema
@@ -7,6 +8,7 @@ from pipecat.frames.frames import (
     Frame,
     FunctionCallResultProperties,
     FunctionCallsStartedFrame,
+    InterruptionFrame,
     LLMFullResponseStartFrame,
     LLMTextFrame,
 )
@@ -24,12 +26,15 @@ BESIDE = "Call it in the same message as the words that it goes with; never spea
 class Said:
     """Whether a response of the model has words beside its function calls.
 
-    Then it is not asked to go on after a gesture: it would say everything again.
+    Then it is not asked to go on after a gesture: it would say everything again. What it asked
+    for before an interruption is forgotten as that passes the model: further down the line it
+    may pass after what the model asks for next.
     """
 
-    def __init__(self):
-        """No response yet."""
+    def __init__(self, forget: Sequence[Callable[[], None]]):
+        """No response yet; `forget` are called at an interruption."""
         self._words = self._others = False
+        self._forget = forget
 
     def watch(self, language: FrameProcessor) -> None:
         """Follows what a language model sends."""
@@ -40,6 +45,9 @@ class Said:
             self._words = self._others = False
         elif isinstance(frame, LLMTextFrame):
             self._words = self._words or bool(frame.text.strip())
+        elif isinstance(frame, InterruptionFrame):
+            for forget in self._forget:
+                forget()
         elif isinstance(frame, FunctionCallsStartedFrame):
             self._others = any(call.function_name not in OWN for call in frame.function_calls)
 
