@@ -59,5 +59,5 @@ if command -v dpkg >/dev/null; then
 fi
 # First and alone: a CPU build where no CUDA is wanted, and nothing later may replace it.
 $pip install torch==2.13.0
-$pip install -e ".[train,watch,face,body,cluster,synthetic,chat,voice,dev]"
+$pip install -e ".[train,watch,face,body,cluster,synthetic,chat,voice,qwen,dev]"
 touch "$venv/.serve" "$venv/.develop"

@@ -48,7 +48,7 @@ VERBS: dict[str, Verb] = {
     "bench body": Verb("ico3d.measure.commands", "BenchBody", "compare methods for bodies"),
     "bench expression": Verb("ico3d.measure.commands", "BenchExpression", "measure the mouth"),
     "bench raster": Verb("ico3d.measure.commands", "BenchRaster", "time the rasteriser"),
-    "bench talk": Verb("ico3d.measure.commands", "BenchTalk", "time question to answer"),
+    "bench chat": Verb("ico3d.measure.commands", "BenchChat", "time answers and interruptions"),
 }
 
 

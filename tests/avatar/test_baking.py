@@ -159,7 +159,7 @@ def test_personas(tmp_path):
     persona = load_persona(None)
     assert persona.name and persona.greeting and len(persona.notes) >= 25
     path = tmp_path / "persona.json"
-    path.write_text('{"name": "A", "greeting": "B", "notes": ["no arrow"]}')
+    path.write_text('{"name": "A", "greeting": "B", "notes": ["a question => "]}')
     with pytest.raises(BundleError, match="note 1"):
         load_persona(path)
     with pytest.raises(BundleError, match=r"nothing\.json"):

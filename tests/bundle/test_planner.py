@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ico3d.bundle.animation import Action, Animation, Rest
-from ico3d.bundle.planner import EASE, Planner, Start, leg, plan, speed_for, travel
+from ico3d.bundle.planner import EASE, SHORTEST, Planner, Start, leg, plan, speed_for, travel
 
 CLOSE = 1e-6
 
@@ -202,3 +202,31 @@ def test_the_speed_for_a_time_takes_that_time(way, speed):
         times, places = np.array(leg(way, speed, moving)).T
         assert places[-1] == way and times[-1] == pytest.approx(travel(way, speed, 2 - moving))
         assert (np.diff(times) > 0).all() and (np.diff(places) > -CLOSE).all()
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.data())
+def test_a_wanted_action_is_the_next_that_is_visited(data):
+    animation = data.draw(animations().filter(lambda a: a.actions))
+    start = data.draw(starts(animation))
+    place = data.draw(st.sampled_from(animation.actions)).frame / animation.fps
+    planner = Planner(animation, start, np.random.default_rng(data.draw(st.integers(0, 9))))
+    planner.visit(place)
+    planner.end(300.0)  # time enough for any way there and back
+    points = planner.points()
+    check(animation, start, points)
+    places = np.array(points)[:, 1]
+    if start.velocity == 0 and abs(place - start.body_time) < SHORTEST:
+        return  # it is there already
+    reached = np.flatnonzero(np.abs(places - place) < CLOSE)[0]
+    ways = np.sign(np.diff(places[: reached + 1]))
+    ways = ways[ways != 0]
+    assert (np.diff(ways) != 0).sum() <= (0 if start.velocity == 0 else 1)
+
+
+def test_what_is_no_action_is_not_visited():
+    animation = Animation(15.0, 60, Rest(0, 20), (Action(40, 1.0),))
+    planner = Planner(animation, Start(1.0), np.random.default_rng(0), gestures=False)
+    planner.visit(40 / 15)
+    planner.end(30.0)
+    assert max(place for _, place in planner.points()) <= 20 / 15 + CLOSE

@@ -16,9 +16,10 @@ logger.remove()  # before pipecat is imported: it logs its start
 from ico3d.bundle.format import Bundle  # noqa: E402
 from ico3d.chat import server  # noqa: E402
 from ico3d.chat.sessions import Sessions  # noqa: E402
-from ico3d.chat.settings import ChatSettings  # noqa: E402
+from ico3d.chat.settings import ChatSettings, Choice  # noqa: E402
 from ico3d.common.espeak import synthesize  # noqa: E402
 
+OFFLINE = ChatSettings(language=Choice("persona-notes"))
 RANDOM_BUNDLE = Path(__file__).parents[1] / "bundle" / "random_bundle.py"
 
 
@@ -70,13 +71,24 @@ def question():
     return (samples[loud[0] : loud[-1]] * 32767).astype(np.int16)
 
 
+def free_port():
+    """A port that nobody listens on."""
+    with server.bind("127.0.0.1", 0) as listener:
+        return listener.getsockname()[1]
+
+
 @contextlib.asynccontextmanager
-async def serving(bundle, settings=None, resume_seconds=30.0, adapt=lambda avatar: avatar):
-    """Yields the URL and the sessions of a running server; `adapt` changes what they share."""
+async def serving(
+    bundle, settings=None, resume_seconds=30.0, persona=None, adapt=lambda avatar: avatar
+):
+    """Yields the URL and the sessions of a running server; by default the offline one.
+
+    `adapt` changes what its sessions share.
+    """
     listener = server.bind("127.0.0.1", 0)
     avatar, sessions = None, None
     if bundle.manifest.head:
-        avatar = adapt(server.open_avatar(bundle, settings or ChatSettings()))
+        avatar = adapt(server.open_avatar(bundle, settings or OFFLINE, persona))
         sessions = Sessions(avatar, resume_seconds)
     running = server.make_server(server.make_app(bundle, avatar, "127.0.0.1", sessions))
     task = asyncio.create_task(running.serve(sockets=[listener]))

@@ -23,6 +23,7 @@ from ico3d.chat.protocol import (
     Timeline,
     Transcript,
 )
+from ico3d.chat.timing import PARTS
 from ico3d.measure.page import open_page
 
 STARS = Path(__file__).parents[3] / "shared" / "speech" / "new-home-in-the-stars-16k.wav"
@@ -77,7 +78,7 @@ async def test_spoken_question_is_understood_and_answered(served, question):
     assert rows.shape[1] == 39 and np.isfinite(rows).all()
     assert rows[:, :32].std(axis=0).max() > 0.01  # the mouth moves
     turn, played = page.messages(Metrics, since)[:2]
-    parts = ("vad", "turn", "language", "voice", "expression", "send")
+    parts = PARTS
     assert sum(turn.values[p] for p in parts) == pytest.approx(turn.values["total"], abs=0.01)
     assert turn.values["vad"] >= 200
     assert played.values["voice_to_voice"] >= turn.values["total"]

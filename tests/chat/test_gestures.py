@@ -60,7 +60,7 @@ class Recorder(Page):
         self.sent.append(message)
 
 
-def played(seconds, sentences, moving=True, seed=0, body=None, stop=None):
+def played(seconds, sentences, moving=True, seed=0, body=None, stop=None, wish=None):
     """Plays an utterance whose sentences are made when the others are nearly heard.
 
     Returns:
@@ -69,6 +69,8 @@ def played(seconds, sentences, moving=True, seed=0, body=None, stop=None):
     page, utterances, body = Recorder(), Utterances(), body or Body()
     gestures = Gestures(ANIMATION, page, utterances, moving, seed)
     utterance = utterances.begin()
+    if wish is not None:
+        gestures.request(wish)
     ends = np.cumsum(np.full(sentences, seconds / sentences))
     places, position = [], 0.0
     while position < (stop or seconds) + 1e-9:
@@ -106,6 +108,36 @@ def test_the_body_gestures_without_a_jump_and_is_back_when_the_speech_ends(sente
 def test_the_same_seed_and_reports_give_the_same_motion():
     one, same, other = (played(9.0, 2, seed=seed)[0].points for seed in (3, 3, 4))
     assert one == same and one != other
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_requested_gesture_comes_first(direction):
+    for seed in range(5):
+        wish = {"wish": "gesture-3", "seed": seed}
+        _, places = played(14.0, 1, body=Body(0.5, direction), **wish)
+        away = np.flatnonzero(places > HOME + 0.05)[0]
+        rising = np.diff(places[away:]) > 0
+        assert places[away + np.flatnonzero(~rising)[0]] == pytest.approx(50 / 15, abs=0.05)
+
+
+def test_a_stop_forgets_what_was_requested():
+    page, utterances = Recorder(), Utterances()
+    gestures, same = Gestures(ANIMATION, page, utterances), Gestures(ANIMATION, page, utterances)
+    assert gestures.names == ["gesture-1", "gesture-2", "gesture-3"]
+    gestures.request("gesture-3")
+    gestures.stop()
+    utterances.made(utterances.begin(), 20 * SPEECH_RATE, complete=True)
+    sent = []
+    for each in (gestures, same):
+        for position in (0.1, 0.3, 0.5, 2.0, 4.0):
+            each.clock(Clock(0, position, 1.0), position)
+        sent.append([message.points for message in page.sent])
+        page.sent.clear()
+    assert sent[0] == sent[1]
+
+
+def test_a_held_body_has_no_gestures():
+    assert Gestures(ANIMATION, Recorder(), Utterances(), moving=False).names == []
 
 
 def test_without_gestures_the_body_is_held_at_rest():
@@ -197,5 +229,5 @@ def test_the_settings_can_hold_the_body(tmp_path):
     path.write_text("gestures = false")
     assert read_settings(path) == ChatSettings(gestures=False)
     path.write_text("gestures = 1")
-    with pytest.raises(SettingsError, match="must be of type bool"):
+    with pytest.raises(SettingsError, match="must be true or false"):
         read_settings(path)

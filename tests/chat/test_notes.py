@@ -3,6 +3,7 @@
 import pytest
 
 from ico3d.bundle.manifest import Persona
+from ico3d.chat.services.language.instruction import SPOKEN, instruction
 from ico3d.chat.services.language.notes import Notes, cosine, parse_note, plain, stem
 from ico3d.chat.services.language.persona import sentences
 
@@ -83,3 +84,39 @@ def test_answers_are_cut_into_sentences():
         "Three?",
         "3.5 is a number",
     ]
+
+
+@pytest.mark.parametrize(
+    ("question", "declined"),
+    [
+        ("What do you think of the elections?", True),
+        ("what are your POLITICAL views", True),
+        ("Do you like polite people?", False),
+        ("how old are you", False),
+        ("how old is the war, and who fought it?", True),
+        ("is war bad", False),
+        ("was denkst du über 政治问题", True),
+        ("who are you", False),
+    ],
+)
+def test_forbidden_topics_are_declined_politely(question, declined):
+    topics = ("politics | elections | 政治", "old war")
+    ada = Notes(Persona("Ada", notes=("who are you => I am Ada.",), forbidden=topics))
+    assert (ada.answer(question) == ada.refusal()) == declined
+
+
+def test_a_language_model_is_told_who_it_is():
+    told = instruction(
+        Persona(
+            "Ada",
+            manner="Warm and brief.",
+            notes=("who are you => I am Ada.", "The museum closes at six."),
+            languages=("en", "de"),
+            forbidden=("politics | elections", "age"),
+        )
+    )
+    assert told.startswith("You are Ada,") and "Warm and brief." in told and SPOKEN in told
+    assert "if it is one of en, de; otherwise in en." in told
+    assert "Never talk about these topics: politics or elections; age." in told
+    assert told.endswith("who are you => I am Ada.\nThe museum closes at six.")
+    assert "topics" not in instruction(Persona("Ada")) and "know" not in instruction(Persona("Ada"))

@@ -14,9 +14,10 @@ from ico3d.chat.services import choose, chosen
 from ico3d.chat.services.provider import Context, Provider
 from ico3d.chat.services.recognition.sphinx import LOUDNESS, NOISE, Leveller
 from ico3d.chat.settings import ChatSettings, Choice, Turns, read_settings
-from ico3d.chat.timing import TurnTimer
 from ico3d.errors import SettingsError
 from ico3d.speech.runtime import SpeechModel
+
+from .conftest import OFFLINE
 
 
 def test_playback_follows_the_pages_clock():
@@ -155,34 +156,6 @@ def test_utterances_count_up_and_stay_stopped():
     assert utterances.is_stopped(1) and not utterances.is_stopped(utterances.begin())
 
 
-def test_the_parts_of_a_turn_add_up():
-    now = 10.0
-    timer = TurnTimer(lambda: now)
-    timer.mark("voice")  # outside of a turn: nothing
-    timer.start(ago=0.25)
-    timer.mark("vad")
-    for step, part in [(0.1, "recognition"), (0.1, "turn"), (0.02, "language"), (0.03, "voice")]:
-        now += step
-        timer.mark(part)
-    now += 0.05
-    timer.mark("voice")  # only its first time counts
-    timer.mark("send")
-    values = timer.finish()
-    assert values == pytest.approx(
-        {
-            "vad": 250,
-            "turn": 200,
-            "language": 20,
-            "voice": 30,
-            "expression": 0,
-            "send": 50,
-            "total": 550,
-            "recognition": 100,
-        }
-    )
-    assert timer.finish() == {}
-
-
 @pytest.mark.parametrize("level", [200, 3000, 12000])
 def test_speech_is_levelled(level):
     rng = np.random.default_rng(0)
@@ -252,6 +225,18 @@ def test_the_openai_service_is_pipecats_own():
     from ico3d.bundle.manifest import Persona
 
     persona = Persona("Ada", "Hello.", ("who are you => I am Ada.",))
-    settings = ChatSettings(language=Choice("openai", {"url": "http://127.0.0.1:9/v1"}))
+    settings = ChatSettings(
+        language=Choice("openai", {"url": "http://127.0.0.1:9/v1", "model": "tiny"})
+    )
     made = choose(settings).language.make(Context(persona, None, None))
     assert isinstance(made, OpenAILLMService)
+
+
+def test_the_personas_voice_speaks_unless_the_settings_name_one():
+    voices = {"espeak-ng": "de+f2", "nobody": "x"}
+    assert choose(OFFLINE, voices).voice.options.voice == "de+f2"
+    named = ChatSettings(
+        OFFLINE.recognition, OFFLINE.language, Choice("espeak-ng", {"voice": "fr"})
+    )
+    assert choose(named, voices).voice.options.voice == "fr"
+    assert choose(OFFLINE, {"nobody": "x"}).voice.options == choose(OFFLINE).voice.options

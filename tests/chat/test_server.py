@@ -13,6 +13,7 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from ico3d.bundle.persona import Persona
 from ico3d.chat.codec import decode_server, encode
 from ico3d.chat.face import open_face
 from ico3d.chat.guard import is_own
@@ -74,6 +75,35 @@ async def test_http_serves_the_bundle_and_nothing_else(served, bundle):
         assert (await client.get("/health", headers={"Host": "evil.example"})).status_code == 403
         foreign = await client.get("/health", headers={"Origin": "http://evil.example"})
         assert foreign.status_code == 403
+
+
+async def test_a_personas_file_shows_its_name_and_keeps_its_notes(bundle):
+    ada = Persona("Ada", "Hello.", ("secret => The safe is open.",), "Sly.", forbidden=("keys",))
+    async with serving(bundle, persona=ada) as (url, _), httpx.AsyncClient(base_url=url) as client:
+        shown = (await client.get("/bundle/manifest.json")).json()
+    assert shown["persona"] == {"name": "Ada", "greeting": "Hello.", "notes": []}
+    own = json.loads(bundle.read("manifest.json"))
+    assert shown == own | {"persona": shown["persona"]}
+
+
+async def test_figures_are_for_those_who_may_see_the_page(served):
+    url, _ = served
+    page, welcome = await open_page(url, microphone=False)
+    async with httpx.AsyncClient(base_url=url) as client:
+        figures = await client.get("/metrics")
+        assert figures.headers["content-type"].startswith("text/plain; version=")
+        lines = figures.text.splitlines()
+        assert "ico3d_sessions 1.0" in lines and "ico3d_connections 1.0" in lines
+        assert welcome.session not in figures.text
+        for foreign in ({"Host": "evil.example"}, {"Origin": "http://evil.example"}):
+            assert (await client.get("/metrics", headers=foreign)).status_code == 403
+        await page.send_frame("garbage")
+        await page.wait(Error)
+        await page.close()
+        while "ico3d_connections 0.0" not in lines:
+            lines = (await client.get("/metrics")).text.splitlines()
+    assert "ico3d_sessions 1.0" in lines  # it may come back
+    assert 'ico3d_errors_total{where="protocol"} 1.0' in lines
 
 
 async def test_a_body_alone_is_served_without_a_conversation(body):
@@ -201,8 +231,9 @@ def test_more_sound_than_a_microphone_makes_is_refused():
         limits.check_message(second)
 
 
-def test_serve_prints_where_it_is_and_ends_on_interrupt(bundle_path):
+def test_serve_prints_where_it_is_and_ends_on_interrupt(bundle_path, tmp_path):
     command = [sys.executable, "-m", "ico3d.cli", "serve", str(bundle_path), "--port", "0"]
+    command += ["--log", str(tmp_path / "turns.jsonl")]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     with closing(process.stdout), closing(process.stderr):
         line = process.stdout.readline()
@@ -219,6 +250,7 @@ def test_serve_prints_where_it_is_and_ends_on_interrupt(bundle_path):
         assert process.wait(10) in (0, 130, -signal.SIGINT)
         assert "stand-ins" in process.stdout.read()
         assert "Traceback" not in process.stderr.read()
+        assert (tmp_path / "turns.jsonl").read_text() == ""  # nobody has asked
 
 
 def test_a_taken_port_is_one_sentence():

@@ -43,6 +43,11 @@ describe('a typed question', () => {
     expect(await page.locator('#question').textContent()).toBe('Who are you?');
     expect(await page.locator('#answer').textContent()).toBe('I am Stella.');
     expect(Math.max(...record.loudness.map(({ level }) => level))).toBeGreaterThan(0.01);
+    await page.click('#panel-button');
+    const rows = await page.locator('#latencies tbody tr').allTextContents();
+    expect(rows).toHaveLength(8); // seven parts, and when it was heard
+    expect(rows.at(-1)).toMatch(/^heard[1-9]\d*$/);
+    await page.click('#panel-button');
 
     await page.waitForTimeout(500);
     type Face = { speaking: boolean; expression: number[] };

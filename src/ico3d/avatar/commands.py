@@ -32,7 +32,7 @@ class Bake:
             exact model, at most 1.7 MB per 10,000 Gaussians. Bodies: at most 0.1 dB lost, at most
             110 bytes per Gaussian and window. Whole persons: besides, at most 0.3 dB lost.
         name: The avatar's name; by default the persona's, of bodies the bundle's.
-        persona: JSON file with name, greeting and notes; for heads, by default that of the package.
+        persona: TOML or JSON file that says who it is; for heads, by default that of the package.
         licences: Text files with notices that the sources ask for; they go into LICENSES.txt.
         background: Splats that stand behind the person, in the same world: .spz or .ply.
         strip: Also write a picture here: recorded | exact | baked.

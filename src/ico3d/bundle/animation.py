@@ -18,6 +18,9 @@ MAX_FRAMES = 1_000_000
 FASTEST = 4.0
 """Captured seconds per second that `max_speed` may be."""
 
+MOST_NAMED = 8
+"""Actions that can be asked for by name."""
+
 
 @dataclass(frozen=True)
 class Rest:
@@ -115,6 +118,13 @@ class Animation:
         _require(self.fps == body.fps, "fps", f"be the body's, {body.fps:g}")
         frames = body.windows[-1].last + 1
         _require(self.num_frames == frames, "num_frames", f"be the body's, {frames}")
+
+    @property
+    def gestures(self) -> dict[str, float]:
+        """Seconds of body time of the best actions by name: `gesture-1` is the very best."""
+        ranked = sorted(self.actions, key=lambda action: (-action.score, action.frame))
+        best = enumerate(ranked[:MOST_NAMED], 1)
+        return {f"gesture-{rank}": action.frame / self.fps for rank, action in best}
 
     @property
     def seconds(self) -> float:

@@ -6,6 +6,7 @@ from typing import Any
 
 from ico3d.bundle import limits
 from ico3d.bundle.decode import decode, encode, parse_json
+from ico3d.bundle.persona import Persona, check_persona, with_defaults, without_defaults
 from ico3d.errors import BundleError
 
 FORMAT = "ico3d-bundle"
@@ -130,21 +131,6 @@ class CameraInfo:
 
 
 @dataclass(frozen=True)
-class Persona:
-    """Who the avatar is: its name, what it says first, and notes to answer from.
-
-    Attributes:
-        name: How it calls itself.
-        greeting: Its first words.
-        notes: Each "question | question => answer".
-    """
-
-    name: str
-    greeting: str
-    notes: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class Loss:
     """What baking costs on held-out pictures, dB of PSNR; null where not measured.
 
@@ -195,7 +181,8 @@ class Manifest:
 
     def to_json(self) -> bytes:
         """UTF-8 JSON, the same bytes for the same manifest."""
-        return (json.dumps(encode(self), indent=1, ensure_ascii=False) + "\n").encode()
+        value = {**encode(self), "persona": without_defaults(self.persona)}
+        return (json.dumps(value, indent=1, ensure_ascii=False) + "\n").encode()
 
     @staticmethod
     def from_json(data: bytes) -> "Manifest":
@@ -210,6 +197,8 @@ class Manifest:
         _check_version(value)
         if value["version"] == HEADS_ONLY and "body" not in value:
             value = {**value, "version": VERSION, "body": None}
+        if "persona" in value:
+            value = {**value, "persona": with_defaults(value["persona"])}
         manifest = decode(Manifest, value, MANIFEST)
         check_manifest(manifest)
         return manifest
@@ -242,7 +231,7 @@ def check_manifest(manifest: Manifest) -> None:
     _check_speech(manifest)
     _check_camera(manifest.camera)
     _require(all(0 <= c <= 1 for c in manifest.background), "background", "lie between 0 and 1")
-    _require(len(manifest.persona.notes) <= limits.MAX_NOTES, "persona.notes", "be fewer")
+    check_persona(manifest.persona, MANIFEST)
     for name, entry in manifest.files.items():
         _check_file(name, entry)
 

@@ -114,6 +114,7 @@ class Planner:
         self._velocity = start.velocity
         self._time = self._known = at
         self._end: float | None = None
+        self._wanted: float | None = None  # the action to visit next
         self._decided: deque[Point] = deque([(at, self._place)])  # and not yet handed out
 
     def know(self, seconds: float) -> None:
@@ -123,6 +124,11 @@ class Planner:
     def end(self, seconds: float) -> None:
         """The speech lasts just so long."""
         self._known = self._end = seconds
+
+    def visit(self, place: float) -> None:
+        """The action at these seconds of body time comes next, as soon as there is time for it."""
+        if place in self._actions:
+            self._wanted = place
 
     @property
     def is_over(self) -> bool:
@@ -153,6 +159,9 @@ class Planner:
     def _is_at(self, place: float) -> bool:
         return abs(self._place - place) <= SAME and self._velocity == 0
 
+    def _is_near(self, place: float) -> bool:
+        return abs(place - self._place) < SHORTEST
+
     @property
     def _left(self) -> float:
         """Seconds until the body must be back."""
@@ -178,6 +187,13 @@ class Planner:
 
     def _pick(self, speed: float) -> float | None:
         """Where to go: an action from which the rest can be reached in time; else the rest loop."""
+        if self._wanted is not None and not self._velocity and self._is_near(self._wanted):
+            self._wanted = None
+        if self._wanted is not None and self._fits(self._wanted, speed):
+            place, self._wanted = self._wanted, None
+            return place
+        if self._wanted is not None and self._velocity * (self._wanted - self._place) < 0:
+            return None  # it lies behind: turn at the next place where that may be
         places = [place for place in self._actions if self._fits(place, speed)]
         if places:
             weights = np.array([self._weight(place) for place in places])
@@ -192,7 +208,7 @@ class Planner:
 
     def _fits(self, place: float, speed: float) -> bool:
         way = place - self._place
-        if abs(way) < SHORTEST or self._velocity * way < 0:
+        if self._is_near(place) or self._velocity * way < 0:
             return False
         there = travel(abs(way), self._first_speed or speed, 1 if self._velocity else 2)
         return there + travel(abs(self._home - place), self._cruise) <= self._left

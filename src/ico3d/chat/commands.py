@@ -22,7 +22,9 @@ class Serve:
         host: Address to listen on; other machines reach it only if it is not 127.0.0.1.
         port: Port to listen on; 0 takes any that is free.
         settings: TOML or JSON file that chooses services and timing.
+        persona: TOML or JSON file that says who the avatar is; by default as its bundle says.
         open: Open the page in a browser.
+        log: File that gets a line of JSON for each turn: times and counts, no words.
         verbose: Print what happens inside.
     """
 
@@ -30,7 +32,9 @@ class Serve:
     host: str = "127.0.0.1"
     port: int = 8765
     settings: Path | None = None
+    persona: Path | None = None
     open: bool = False
+    log: Path | None = None
     verbose: bool = False
 
     def run(self) -> None:
@@ -41,17 +45,23 @@ class Serve:
         """
         set_up_log(self.verbose)
         from ico3d.bundle.format import Bundle
+        from ico3d.bundle.persona import read_persona
         from ico3d.chat import server
+        from ico3d.chat.monitor import Monitor, TurnLog
         from ico3d.chat.services import offers
+        from ico3d.chat.sessions import Sessions
         from ico3d.chat.settings import read_settings
 
         settings = read_settings(self.settings)
+        persona = read_persona(self.persona) if self.persona else None
+        monitor = Monitor(TurnLog.open(self.log) if self.log else None)
         listener = server.bind(self.host, self.port)
         bundle = Bundle.open(self.bundle)
-        avatar = server.open_avatar(bundle, settings) if bundle.manifest.head else None
-        app = server.make_app(bundle, avatar, self.host)
+        avatar = server.open_avatar(bundle, settings, persona) if bundle.manifest.head else None
+        sessions = Sessions(avatar, monitor=monitor) if avatar else None
+        app = server.make_app(bundle, avatar, self.host, sessions)
         url = server.address(listener)
-        print(f"{bundle.manifest.persona.name} is at {url} (Ctrl+C ends)")
+        print(f"{(persona or bundle.manifest.persona).name} is at {url} (Ctrl+C ends)")
         for line in described(avatar.services.described(), offers(settings)) if avatar else []:
             print(line)
         if not (server.STATIC / "index.html").is_file():
@@ -70,6 +80,7 @@ class Demo:
         host: Address to listen on.
         port: Port to listen on; 0 takes any that is free.
         settings: TOML or JSON file that chooses services and timing.
+        persona: TOML or JSON file that says who the avatar is; by default as its bundle says.
         open: Open the page in a browser.
         verbose: Print what happens inside.
     """
@@ -77,6 +88,7 @@ class Demo:
     host: str = "127.0.0.1"
     port: int = 8765
     settings: Path | None = None
+    persona: Path | None = None
     open: bool = True
     verbose: bool = False
 
@@ -87,7 +99,15 @@ class Demo:
             BundleError: If the package came without it.
         """
         demo = Path(packaged.NAME)
-        Serve(demo, self.host, self.port, self.settings, self.open, self.verbose).run()
+        Serve(
+            demo,
+            self.host,
+            self.port,
+            self.settings,
+            self.persona,
+            open=self.open,
+            verbose=self.verbose,
+        ).run()
 
 
 def described(services, offers) -> list[str]:

@@ -57,19 +57,25 @@ class Connection:
 
     async def run(self) -> None:
         """Talks until one of both sides ends it."""
+        with self._sessions.monitor.connections.track_inprogress():
+            await self._run()
+
+    async def _run(self) -> None:
         writer: asyncio.Task | None = None
         session: Session | None = None
         try:
             hello = await self._hello()
             session, resumed = await self._sessions.enter(hello, self._outbox)
-            await self._greet(session, resumed, hello.last_index)
+            await self._greet(session, resumed)
             writer = asyncio.create_task(self._write())
             await self._read(session)
         except Hangup as hangup:
             await self._hang_up(hangup.code, str(hangup))
         except FullError:
+            self._sessions.monitor.failed("full")
             await self._hang_up(BUSY, "all places are taken: try again in a minute.")
         except Ico3dError as error:
+            self._sessions.monitor.failed("start")
             await self._hang_up(1011, str(error))
         except WebSocketDisconnect:
             pass
@@ -99,7 +105,7 @@ class Connection:
             )
         return message
 
-    async def _greet(self, session: Session, resumed: bool, last_index: int) -> None:
+    async def _greet(self, session: Session, resumed: bool) -> None:
         welcome = replace(
             self._welcome,
             session=session.id,
@@ -109,9 +115,7 @@ class Connection:
             offers=self._sessions.offers,
         )
         await self._socket.send_text(str(encode(welcome)))
-        if resumed:
-            session.page.replay(last_index)
-        else:
+        if not resumed:
             await session.conversation.greet()
 
     async def _read(self, session: Session) -> None:
@@ -125,6 +129,7 @@ class Connection:
             except OversizedError as error:
                 raise Hangup(TOO_BIG, str(error)) from error
             except ProtocolError as error:
+                self._sessions.monitor.failed("protocol")
                 if not self._limits.forgive():
                     raise Hangup(BROKEN, str(error)) from error
                 self._outbox.put(Error(str(error), fatal=False))

@@ -1,15 +1,15 @@
 """One conversation: the pipecat pipeline between a page's messages and the page."""
 
 import asyncio
-import time
 from dataclasses import dataclass
 
 from loguru import logger
+from pipecat.adapters.llm.schemas.tools_schema import ToolsSchema
 from pipecat.audio.turn.smart_turn.base_smart_turn import SmartTurnParams
 from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
 from pipecat.pipeline.pipeline import Pipeline
 from pipecat.pipeline.worker import PipelineParams, PipelineWorker
-from pipecat.processors.aggregators.llm_context import LLMContext
+from pipecat.processors.aggregators.llm_context import LLMContext, NotGiven
 from pipecat.processors.aggregators.llm_response_universal import (
     LLMContextAggregatorPair,
     LLMUserAggregatorParams,
@@ -21,23 +21,28 @@ from pipecat.workers.runner import WorkerRunner
 
 from ico3d.bundle.animation import Animation
 from ico3d.bundle.manifest import HeadInfo, Persona
+from ico3d.chat import protocol
+from ico3d.chat.activity import Activity
 from ico3d.chat.expression import ExpressionProcessor
 from ico3d.chat.face import Face
 from ico3d.chat.frames import Utterances
 from ico3d.chat.gestures import Gestures
 from ico3d.chat.listener import Captions, PageInput
+from ico3d.chat.memory import remembering
 from ico3d.chat.modules.mouth import RemoteMouth
+from ico3d.chat.monitor import Visitor
 from ico3d.chat.page import Page
-from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Clock, Error, Heard
+from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Error, Heard
 from ico3d.chat.services import Chosen
 from ico3d.chat.services.provider import Context
 from ico3d.chat.services.voice.clauses import ClauseProcessor
 from ico3d.chat.services.voice.markup import speakable
-from ico3d.chat.settings import ChatSettings, Turns
+from ico3d.chat.settings import ChatSettings
 from ico3d.chat.speaker import Speaker
 from ico3d.chat.supervision.language import AnswerGuard
 from ico3d.chat.supervision.voice import endure
-from ico3d.chat.timing import TurnTimer
+from ico3d.chat.timing import Clock, TurnObserver
+from ico3d.chat.tools import functions
 from ico3d.chat.turns.detector import Ear, VoiceDetector
 from ico3d.chat.turns.echo import EchoGuard
 from ico3d.chat.turns.echo_filter import EchoFilter
@@ -84,18 +89,21 @@ class Parts:
 class Conversation:
     """A running pipeline. What the page says goes in here; what it shall hear goes to `Page`."""
 
-    def __init__(self, avatar: Avatar, page: Page):
+    def __init__(self, avatar: Avatar, page: Page, visitor: Visitor):
         """A conversation that has not started."""
         self._avatar, self._page = avatar, page
-        self._timer = TurnTimer(time.monotonic)
+        self._now = now = asyncio.get_running_loop().time  # for all that waits and measures
+        self.activity = Activity(now)
+        self._clock = Clock(now)
+        self._timing = TurnObserver(now, page.send, visitor.turn, visitor.failed)
         self._utterances = Utterances()
         self._input = PageInput()
-        self._captions = Captions(page, self._timer)
+        self._captions = Captions(page)
         gestures = avatar.animation and Gestures(
             avatar.animation, page, self._utterances, avatar.settings.gestures
         )
-        self._echo = EchoGuard()
-        self._speaker = Speaker(page, self._utterances, self._timer, self._echo.sent, gestures)
+        self._echo, self._gestures = EchoGuard(), gestures
+        self._speaker = Speaker(page, self._utterances, self._echo.sent, gestures, now)
         self._worker: PipelineWorker | None = None
         self._task: asyncio.Task | None = None
 
@@ -108,6 +116,8 @@ class Conversation:
             params=PipelineParams(
                 audio_in_sample_rate=MICROPHONE_RATE, audio_out_sample_rate=SPEECH_RATE
             ),
+            clock=self._clock,
+            observers=[self._timing, self.activity],
             enable_rtvi=False,
             enable_turn_tracking=False,
             idle_timeout_secs=None,
@@ -134,11 +144,12 @@ class Conversation:
 
     async def ask(self, text: str) -> None:
         """A typed question."""
-        self._timer.start()
+        self.activity.touch()
         await self._input.ask(text)
 
     async def talk(self, pressed: bool) -> None:
         """The button of push to talk."""
+        self.activity.touch()
         await self._input.talk(pressed)
 
     async def heard(self, message: Heard) -> None:
@@ -152,12 +163,15 @@ class Conversation:
 
     async def interrupt(self, utterance: int | None) -> None:
         """Silence, if that utterance (any, for null) is being said or prepared."""
+        self.activity.touch()
         if utterance is None or self._speaker.is_speaking(utterance):
             await self._input.broadcast_interruption()
 
-    def clock(self, message: Clock) -> None:
+    def clock(self, message: protocol.Clock) -> None:
         """Where the page is."""
+        self.activity.touch()  # it comes only while something plays
         self._speaker.clock(message)
+        self._timing.heard(message.utterance, message.position)
 
     def hold(self) -> None:
         """The connection dropped."""
@@ -168,15 +182,16 @@ class Conversation:
         self._speaker.release()
 
     def _pipeline(self, parts: Parts) -> Pipeline:
-        turns, patience = self._avatar.settings.turns, self._avatar.settings.patience
+        settings, face = self._avatar.settings, make_face(self._avatar)
+        turns, patience = settings.turns, settings.patience
         trusted = not self._avatar.services.recognition.provider.stand_in
-        chosen = strategies(parts.turn, turns, trusted, self._speaker.hush)
-        user, assistant = aggregators(chosen, turns)
-        face = make_face(self._avatar)
+        chosen = strategies(parts.turn, turns, trusted, self._speaker.hush, self._now)
+        context = LLMContext(tools=self._functions(parts.language, face))
+        user, assistant = aggregators(chosen, settings, parts.language, context)
         return Pipeline(
             [
                 self._input,
-                EchoFilter(self._echo, self._speaker.heard),
+                EchoFilter(self._echo, self._speaker.heard, self._now),
                 VoiceDetector(parts.ear),
                 parts.recognition,
                 self._captions,
@@ -187,7 +202,7 @@ class Conversation:
                 ),
                 ClauseProcessor(),
                 parts.voice,
-                ExpressionProcessor(face, self._utterances, self._timer),
+                ExpressionProcessor(face, self._utterances),
                 self._speaker,
                 assistant,
             ]
@@ -195,6 +210,11 @@ class Conversation:
 
     def _complain(self, sentence: str) -> None:
         self._page.send(Error(sentence, fatal=False))
+
+    def _functions(self, language: FrameProcessor, face: Face) -> ToolsSchema | NotGiven:
+        settings = self._avatar.settings
+        moods = face.moods if self._avatar.head.eye_offset is not None else None
+        return functions(language, self._gestures, moods, settings.tools, settings.allow)
 
     def _prepare_voice(self, voice: FrameProcessor) -> None:
         """Keeps markup and failures from it, and takes the time at which a piece reaches it."""
@@ -204,7 +224,7 @@ class Conversation:
             voice.add_text_transformer(speakable)
 
             async def requested(*_):
-                self._timer.mark("language")
+                self._timing.clause()
 
             voice.add_event_handler("on_tts_request", requested)
 
@@ -230,10 +250,17 @@ def make_parts(avatar: Avatar) -> Parts:
     )
 
 
-def aggregators(strategies: UserTurnStrategies, turns: Turns) -> LLMContextAggregatorPair:
+def aggregators(
+    strategies: UserTurnStrategies,
+    settings: ChatSettings,
+    language: FrameProcessor,
+    context: LLMContext,
+) -> LLMContextAggregatorPair:
     """The two halves that keep the conversation's context and decide on turns."""
     params = LLMUserAggregatorParams(
         user_turn_strategies=strategies,
-        user_turn_stop_timeout=max(NOTHING_HEARD, 2 * turns.end_silence),
+        user_turn_stop_timeout=max(NOTHING_HEARD, 2 * settings.turns.end_silence),
     )
-    return LLMContextAggregatorPair(LLMContext(), user_params=params)
+    return LLMContextAggregatorPair(
+        context, user_params=params, assistant_params=remembering(settings.memory, language)
+    )

@@ -19,7 +19,6 @@ from pipecat.utils.text.base_text_aggregator import TextType
 
 from ico3d.chat.face import MOST, ROW, Face, Piece, Sentence
 from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame, Utterances
-from ico3d.chat.timing import TurnTimer
 
 STEP = 3 * MOST * ROW  # samples that go through the model at once: the first face comes early
 
@@ -30,10 +29,10 @@ class ExpressionProcessor(FrameProcessor):
     An utterance is one answer of the language model, or one text spoken outside of an answer.
     """
 
-    def __init__(self, face: Face, utterances: Utterances, timer: TurnTimer):
+    def __init__(self, face: Face, utterances: Utterances):
         """A processor for one session."""
         super().__init__()
-        self._face, self._utterances, self._timer = face, utterances, timer
+        self._face, self._utterances = face, utterances
         self._in_answer = False
         self._utterance: int | None = None
         self._reset()
@@ -58,6 +57,7 @@ class ExpressionProcessor(FrameProcessor):
             return
         if isinstance(frame, InterruptionFrame):
             self._in_answer = False
+            self._face.moods.end()
             self._reset()
         elif isinstance(frame, LLMFullResponseStartFrame):
             self._in_answer = True
@@ -77,7 +77,6 @@ class ExpressionProcessor(FrameProcessor):
         await self.push_frame(frame, direction)
 
     async def _speak(self, frame: TTSAudioRawFrame) -> None:
-        self._timer.mark("voice")
         if self._utterance is None:
             self._utterance = self._utterances.begin()
             self._start = time.monotonic()
@@ -99,12 +98,12 @@ class ExpressionProcessor(FrameProcessor):
         if self._utterance is not None:
             samples = self._next_row * ROW
             self._utterances.made(self._utterance, samples, complete=True)
+            self._face.moods.end()
             await self.push_frame(UtteranceEndFrame(self._utterance, samples))
         self._reset()
 
     async def _push(self, pieces: list[Piece]) -> None:
         for piece in pieces:
-            self._timer.mark("expression")
             text, self._text = self._text, None
             row = piece.first_row
             assert self._utterance is not None

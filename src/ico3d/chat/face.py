@@ -8,6 +8,7 @@ import numpy as np
 from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.bundle.manifest import HeadInfo
 from ico3d.chat.modules.mouth import RemoteMouth
+from ico3d.chat.moods import Moods
 from ico3d.chat.protocol import EXPRESSION_FPS, SPEECH_RATE
 from ico3d.common.expression import expression_rows
 from ico3d.errors import BundleError
@@ -48,6 +49,7 @@ class Face:
             seed: Of the eyes' behaviour.
             remote: Moves the mouth instead of the model.
         """
+        self.moods = Moods()
         self._info = info
         self._model, self._remote = model, remote
         self._eyes = EyeBehaviour(seed)
@@ -77,7 +79,8 @@ class Face:
         """
         times = start + np.arange(len(lips)) / EXPRESSION_FPS
         idle, at = np.array(self._info.idle_expression), self._info.eye_offset
-        return expression_rows(idle, lips, self._eyes.values(times), at)
+        eyes = np.clip(self._eyes.values(times) + self.moods.values(times), 0, 1)
+        return expression_rows(idle, lips, eyes, at)
 
 
 class StillLips:

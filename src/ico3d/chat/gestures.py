@@ -50,6 +50,26 @@ class Gestures:
 
     def stop(self) -> None:
         """Nothing is spoken any more: the page's body finds its way to rest by itself."""
+        self._wanted: float | None = None  # body time of the action that was asked for
+        self._forget()
+
+    @property
+    def names(self) -> list[str]:
+        """Gestures that can be asked for."""
+        return list(self._animation.gestures) if self._moving else []
+
+    def request(self, name: str) -> None:
+        """A gesture to make next, in what is spoken now or in the utterance that follows."""
+        self._wanted = self._animation.gestures[name]
+        if self._planner is not None:
+            self._hand_over(self._planner)
+
+    def _hand_over(self, planner: Planner) -> None:
+        if self._wanted is not None:
+            planner.visit(self._wanted)
+            self._wanted = None
+
+    def _forget(self) -> None:
         self._utterance: int | None = None
         self._first: tuple[float, float] | None = None  # position and body time
         self._planner: Planner | None = None
@@ -63,11 +83,12 @@ class Gestures:
             position: Seconds of it that can have been heard.
         """
         if message.utterance != self._utterance:
-            self.stop()
+            self._forget()
             self._utterance = message.utterance
         if self._planner is None:
             self._planner = self._begin(position, message.body_time)
         if self._planner is not None:
+            self._hand_over(self._planner)
             self._go_on(self._planner, message.utterance, position)
 
     def _begin(self, position: float, body_time: float) -> Planner | None:

@@ -86,6 +86,12 @@ class Page:
             self._outbox = None
         return self._outbox is None
 
+    def end(self, last: ServerMessage) -> None:
+        """Sends a last message and ends the connection, if there is one."""
+        self._put(last)
+        if self._outbox is not None:
+            self._outbox.close()
+
     @property
     def is_attached(self) -> bool:
         """Whether a connection is open."""

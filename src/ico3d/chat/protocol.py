@@ -57,7 +57,8 @@ class Tensor:
 Count = Annotated[int, Range(0, MAX_EXACT)]
 Seconds = Annotated[float, Range(0, 1e7)]
 Sentence = Annotated[str, Length(0, 4000)]
-Name = Annotated[str, Length(1, 200)]
+LONGEST_NAME = 200
+Name = Annotated[str, Length(1, LONGEST_NAME)]
 Milliseconds = Annotated[float, Range(-1e7, 1e7)]
 
 

@@ -2,8 +2,10 @@
 
 import asyncio
 import contextlib
+import gc
 import socket
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from pathlib import Path
 
 import uvicorn
@@ -12,11 +14,14 @@ from fastapi.responses import JSONResponse, PlainTextResponse
 from fastapi.staticfiles import StaticFiles
 
 from ico3d.bundle.format import SPEECH, Bundle
+from ico3d.bundle.manifest import MANIFEST
+from ico3d.bundle.persona import Persona
 from ico3d.chat import protocol
 from ico3d.chat.connection import Connection
 from ico3d.chat.conversation import Avatar
 from ico3d.chat.face import open_face
 from ico3d.chat.guard import LOOPBACK, Guard
+from ico3d.chat.monitor import CONTENT_TYPE
 from ico3d.chat.protocol import Welcome
 from ico3d.chat.services import choose, offers
 from ico3d.chat.sessions import Sessions
@@ -24,12 +29,19 @@ from ico3d.chat.settings import ChatSettings
 from ico3d.errors import BundleError, SettingsError
 
 STATIC = Path(__file__).parent / "static"
-TYPES = {".json": "application/json", ".png": "image/png", ".txt": "text/plain; charset=utf-8"}
+JSON = "application/json"
+TYPES = {".json": JSON, ".png": "image/png", ".txt": "text/plain; charset=utf-8"}
+FRESH = {"Cache-Control": "no-cache"}
 STILL = "This avatar is driven by blendshapes, not by sound: its lips do not move while it speaks."
 
 
-def open_avatar(bundle: Bundle, settings: ChatSettings) -> Avatar:
+def open_avatar(bundle: Bundle, settings: ChatSettings, persona: Persona | None = None) -> Avatar:
     """What the sessions share.
+
+    Args:
+        bundle: The avatar.
+        settings: Services and timing.
+        persona: Who it is; the bundle's by default.
 
     Raises:
         BundleError: If the bundle has no head.
@@ -37,7 +49,8 @@ def open_avatar(bundle: Bundle, settings: ChatSettings) -> Avatar:
         ModelError: If the bundle's speech model cannot be used.
     """
     head, speech = open_face(bundle)
-    persona, services = bundle.manifest.persona, choose(settings)
+    persona = persona or bundle.manifest.persona
+    services = choose(settings, persona.voice)
     sha256 = bundle.manifest.files[SPEECH].sha256 if speech else ""
     return Avatar(head, speech, persona, services, settings, bundle.animation, sha256)
 
@@ -60,6 +73,7 @@ def make_app(
 
     @contextlib.asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        gc.freeze()  # what stays need not be looked at when a session's memory is freed
         yield
         if sessions is not None:
             await sessions.close_all()
@@ -72,6 +86,8 @@ def make_app(
 
     @app.get("/bundle/{name:path}")
     async def bundle_file(name: str, request: Request) -> Response:
+        if name == MANIFEST and avatar is not None:
+            return Response(shown_manifest(bundle, avatar.persona), headers=FRESH, media_type=JSON)
         return await asyncio.to_thread(serve_file, bundle, name, request)
 
     if avatar is not None and sessions is not None:
@@ -81,7 +97,7 @@ def make_app(
 
 
 def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
-    """The WebSocket."""
+    """The WebSocket, and figures of what happens on it."""
     notices = [] if avatar.speech else [STILL]
     welcome = Welcome(protocol.VERSION, "-", False, avatar.services.described(), notices, None)
 
@@ -90,13 +106,24 @@ def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
         await socket.accept()
         await Connection(socket, sessions, welcome).run()
 
+    @app.get("/metrics")
+    async def metrics() -> Response:
+        return Response(sessions.monitor.exposition(), headers={"Content-Type": CONTENT_TYPE})
+
+
+def shown_manifest(bundle: Bundle, persona: Persona) -> bytes:
+    """The manifest with the name of who is there; what a persona's file knows stays here."""
+    if persona is bundle.manifest.persona:
+        return bundle.read(MANIFEST)
+    return replace(bundle.manifest, persona=Persona(persona.name, persona.greeting)).to_json()
+
 
 def serve_file(bundle: Bundle, name: str, request: Request) -> Response:
     """One file of the bundle; browsers keep it as long as its hash stays the same."""
     if name not in bundle.names:
         return PlainTextResponse(f"The bundle has no file {name[:80]!r}.\n", 404)
     entry = bundle.manifest.files.get(name)
-    headers = {"Cache-Control": "no-cache"}
+    headers = dict(FRESH)
     if entry is not None:
         headers["ETag"] = f'"{entry.sha256}"'
         if request.headers.get("if-none-match") == headers["ETag"]:

@@ -5,9 +5,13 @@ import secrets
 from dataclasses import replace
 
 from ico3d.chat.conversation import Avatar, Conversation
+from ico3d.chat.heap import give_back
+from ico3d.chat.monitor import Monitor, Visitor
 from ico3d.chat.page import Outbox, Page
-from ico3d.chat.protocol import RESUME_SECONDS, Hello, Offer
+from ico3d.chat.protocol import RESUME_SECONDS, Error, Hello, Offer
 from ico3d.chat.services import wished
+
+IDLE = "Nothing was said for {:g} min, so this conversation has ended: reload the page."
 
 
 class FullError(Exception):
@@ -17,24 +21,31 @@ class FullError(Exception):
 class Session:
     """One visitor: a page, a conversation, and nothing that another one could see."""
 
-    def __init__(self, avatar: Avatar):
+    def __init__(self, avatar: Avatar, visitor: Visitor):
         """A session whose conversation has not started."""
         self.id = secrets.token_urlsafe(16)
         self.services = avatar.services
         self.page = Page()
-        self.conversation = Conversation(avatar, self.page)
-        self.expiry: asyncio.TimerHandle | None = None
+        self.conversation = Conversation(avatar, self.page, visitor)
+        self.expiry: asyncio.TimerHandle | None = None  # while its page is away
+        self.idle_check: asyncio.TimerHandle | None = None
 
 
 class Sessions:
     """Opens, keeps and closes sessions."""
 
-    def __init__(self, avatar: Avatar, resume_seconds: float = RESUME_SECONDS):
-        """No visitors yet."""
+    def __init__(
+        self,
+        avatar: Avatar,
+        resume_seconds: float = RESUME_SECONDS,
+        monitor: Monitor | None = None,
+    ):
+        """No visitors yet; `monitor` counts them."""
         self.offers: list[Offer] = []
         """What visitors may choose from."""
         self._avatar = avatar
         self._resume_seconds = resume_seconds
+        self.monitor = monitor or Monitor()
         self._open: dict[str, Session] = {}
         self._closing: set[asyncio.Task] = set()
 
@@ -55,17 +66,20 @@ class Sessions:
         if session is not None:
             self._cancel_expiry(session)
             session.page.attach(outbox)
+            session.page.replay(hello.last_index)  # before anything new can get in between
             session.conversation.release()
             return session, True
         self._make_room()
-        session = Session(self._wished(hello))
+        session = Session(self._wished(hello), self.monitor.visitor())
         self._open[session.id] = session
         session.page.attach(outbox)
         try:
             await session.conversation.start()
         except BaseException:
             del self._open[session.id]
+            self.monitor.left("error")
             raise
+        self._check_idle(session)
         return session, False
 
     def leave(self, session: Session, outbox: Outbox) -> None:
@@ -73,12 +87,14 @@ class Sessions:
         if session.id in self._open and session.page.detach(outbox):
             session.conversation.hold()
             loop = asyncio.get_running_loop()
-            session.expiry = loop.call_later(self._resume_seconds, self._close_soon, session)
+            session.expiry = loop.call_later(
+                self._resume_seconds, self._close_soon, session, "left"
+            )
 
     async def close_all(self) -> None:
         """Ends every conversation."""
         for session in list(self._open.values()):
-            self._close_soon(session)
+            self._close_soon(session, "server")
         await asyncio.gather(*self._closing, return_exceptions=True)
 
     def _wished(self, hello: Hello) -> Avatar:
@@ -91,15 +107,31 @@ class Sessions:
             return
         for session in self._open.values():
             if not session.page.is_attached:
-                self._close_soon(session)
+                self._close_soon(session, "room")
                 return
         raise FullError
 
-    def _close_soon(self, session: Session) -> None:
+    def _check_idle(self, session: Session) -> None:
+        """Ends a session in which nothing happens; looks again when that may be so."""
+        minutes = self._avatar.settings.idle_minutes
+        if minutes == 0 or session.id not in self._open:
+            return
+        left = 60 * minutes - session.conversation.activity.idle_seconds()
+        if left > 0:
+            loop = asyncio.get_running_loop()
+            session.idle_check = loop.call_later(left, self._check_idle, session)
+            return
+        session.page.end(Error(IDLE.format(minutes), fatal=True))
+        self._close_soon(session, "idle")
+
+    def _close_soon(self, session: Session, why: str) -> None:
         if self._open.pop(session.id, None) is None:
             return
+        self.monitor.left(why)
         self._cancel_expiry(session)
-        task = asyncio.create_task(session.conversation.close())
+        if session.idle_check is not None:
+            session.idle_check.cancel()
+        task = asyncio.create_task(dismantle(session.conversation))
         self._closing.add(task)
         task.add_done_callback(self._closing.discard)
 
@@ -108,3 +140,10 @@ class Sessions:
         if session.expiry is not None:
             session.expiry.cancel()
             session.expiry = None
+
+
+async def dismantle(conversation: Conversation) -> None:
+    """Ends a conversation and frees its memory."""
+    await conversation.close()
+    del conversation
+    await give_back()

@@ -2,12 +2,14 @@
 
 import dataclasses
 import json
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args, get_origin
 
+from ico3d.chat.tool_settings import Tool, check_tools
 from ico3d.errors import SettingsError
 
 BEST = "best"
@@ -119,6 +121,27 @@ class Expression:
 
 
 @dataclass(frozen=True)
+class Memory:
+    """What a language model still knows of the conversation: the table `[memory]`.
+
+    Attributes:
+        tokens: About how long the conversation may get before all but its latest words is
+            summarised, the system instruction not counted.
+    """
+
+    tokens: int = 4000
+
+    def __post_init__(self):
+        """Checks ranges.
+
+        Raises:
+            SettingsError: If nothing could be remembered.
+        """
+        if self.tokens < 200:
+            raise SettingsError("chat settings: [memory] needs at least 200 tokens.")
+
+
+@dataclass(frozen=True)
 class ChatSettings:
     """Services and timing of a conversation; the file may be TOML or JSON.
 
@@ -130,7 +153,13 @@ class ChatSettings:
         patience: How long services may take.
         expression: Where sound becomes a moving face.
         max_sessions: How many visitors at once, those included whose connection dropped.
+        idle_minutes: A session ends when for so long nobody spoke or typed and nothing was played;
+            0 for never.
         gestures: Whether a body gestures while it speaks; otherwise it is held at rest.
+        memory: What is still known of the conversation.
+        tools: Functions over HTTP that the language model may call.
+        allow: Hosts that those may call, such as `api.example.org` or `127.0.0.1:9000`; private
+            addresses must be listed themselves.
     """
 
     recognition: Choice = Choice()
@@ -140,16 +169,23 @@ class ChatSettings:
     patience: Patience = Patience()
     expression: Expression = Expression()
     max_sessions: int = 4
+    idle_minutes: float = 10.0
     gestures: bool = True
+    memory: Memory = Memory()
+    tools: tuple[Tool, ...] = ()
+    allow: tuple[str, ...] = ()
 
     def __post_init__(self):
         """Checks ranges.
 
         Raises:
-            SettingsError: If the number of sessions makes no sense.
+            SettingsError: If the limits of sessions make no sense, or a tool does not.
         """
         if self.max_sessions < 1:
             raise SettingsError("chat settings: max_sessions must be at least 1.")
+        if not 0 <= self.idle_minutes < math.inf:
+            raise SettingsError("chat settings: idle_minutes must be 0 (never) or more.")
+        check_tools(self.tools, self.allow)
 
 
 def read_settings(path: Path | None) -> ChatSettings:
@@ -165,7 +201,8 @@ def filled(kind: type[T], values: Mapping[str, Any], where: str) -> T:
     """A dataclass of settings with some values set.
 
     Args:
-        kind: Its fields are numbers, words, truth values, lists of words, or such dataclasses.
+        kind: Its fields are numbers, words, truth values, lists of words, tables of anything, such
+            dataclasses or lists of them.
         values: By name of the field, as TOML and JSON give them.
         where: What an error names as the place.
 
@@ -176,6 +213,9 @@ def filled(kind: type[T], values: Mapping[str, Any], where: str) -> T:
     for name in values:
         if name not in fields:
             raise SettingsError(f"{where}: there is no setting '{name}', use {_any_of(fields)}.")
+    for name in _required(kind):
+        if name not in values:
+            raise SettingsError(f"{where}: '{name}' is missing.")
     return kind(**{name: _value(fields[name], v, where, name) for name, v in values.items()})
 
 
@@ -184,14 +224,32 @@ def _value(kind: Any, value: Any, where: str, name: str) -> Any:
         return _choice(value, where, name)
     if dataclasses.is_dataclass(kind) and isinstance(value, dict):
         return filled(kind, value, f"{where} [{name}]")  # type: ignore[arg-type]
-    if kind == tuple[str, ...] and isinstance(value, list):
+    entry_kind = _entry_kind(kind)
+    if entry_kind is not None and isinstance(value, list):
+        if all(isinstance(entry, dict) for entry in value):
+            return tuple(filled(entry_kind, entry, f"{where} [[{name}]]") for entry in value)
+    elif kind == tuple[str, ...] and isinstance(value, list):
         if all(isinstance(entry, str) for entry in value):
             return tuple(value)
+    elif get_origin(kind) is Mapping and isinstance(value, dict):
+        return value
     elif kind is float and type(value) is int:
         return float(value)
     elif type(value) is kind:
         return value
     raise SettingsError(f"{where}: '{name}' must be {_described(kind)}.")
+
+
+def _entry_kind(kind: Any) -> Any:
+    """The dataclass of which a setting is a list, if it is one."""
+    entry = get_args(kind)[0] if get_origin(kind) is tuple else None
+    return entry if dataclasses.is_dataclass(entry) else None
+
+
+def _required(kind: Any) -> list[str]:
+    missing = dataclasses.MISSING
+    fields = dataclasses.fields(kind)
+    return [f.name for f in fields if f.default is missing and f.default_factory is missing]
 
 
 def _choice(value: Any, where: str, name: str) -> Choice:
@@ -206,6 +264,8 @@ def _choice(value: Any, where: str, name: str) -> Choice:
 def _described(kind: Any) -> str:
     if kind == tuple[str, ...]:
         return "a list of texts"
+    if _entry_kind(kind) is not None:
+        return "a list of tables"
     names = {str: "a text", int: "a whole number", float: "a number", bool: "true or false"}
     return names.get(kind, "a table")
 

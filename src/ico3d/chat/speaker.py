@@ -13,6 +13,9 @@ from pipecat.frames.frames import (
     BotStartedSpeakingFrame,
     BotStoppedSpeakingFrame,
     Frame,
+    FunctionCallCancelFrame,
+    FunctionCallResultFrame,
+    FunctionCallsStartedFrame,
     InterruptionFrame,
     LLMFullResponseEndFrame,
     LLMFullResponseStartFrame,
@@ -23,8 +26,7 @@ from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame, Utterances
 from ico3d.chat.gestures import Gestures
 from ico3d.chat.page import Page
 from ico3d.chat.playback import Playback
-from ico3d.chat.protocol import Answer, Clock, End, Metrics, Pause, Resume, Stop
-from ico3d.chat.timing import TurnTimer
+from ico3d.chat.protocol import Answer, Clock, End, Pause, Resume, Stop
 from ico3d.chat.turns.echo import SentSound
 
 SOONEST = 0.005  # s between two looks at the clock
@@ -37,7 +39,6 @@ class Speaker(FrameProcessor):
         self,
         page: Page,
         utterances: Utterances,
-        timer: TurnTimer,
         sent: SentSound,
         gestures: Gestures | None = None,
         now: Callable[[], float] = time.monotonic,
@@ -47,34 +48,25 @@ class Speaker(FrameProcessor):
         Args:
             page: Who hears it.
             utterances: Which answers were stopped.
-            timer: Of the turn.
             sent: Is told what the page can play, and may come back as echo.
             gestures: Move the avatar's body, if it has one.
             now: The clock, seconds.
         """
         super().__init__()
-        self._sent = sent
-        self._page, self._utterances, self._timer, self._now = page, utterances, timer, now
+        self._page, self._utterances, self._sent, self._now = page, utterances, sent, now
         self._gestures = gestures
         self._playback = Playback()
         self._moved = asyncio.Event()  # the page's clock or connection changed
         self._speaking: int | None = None
         self._paused = False
-        self._turn_start: float | None = None  # of the turn that `played` is to be told of
+        self._calls: set[str] = set()  # functions that the language model waits for
 
     def clock(self, message: Clock) -> None:
         """The page says how far it has played."""
         self._playback.clock(message.utterance, message.position, self._now())
         self._moved.set()
-        if message.utterance != self._speaking:
-            return
-        if self._gestures is not None:
+        if message.utterance == self._speaking and self._gestures is not None:
             self._gestures.clock(message, self._playback.position(self._now()))
-        if message.position > 0 and self._turn_start:
-            first_sample = self._now() - message.position
-            values = {"voice_to_voice": 1000 * (first_sample - self._turn_start)}
-            self._page.send(Metrics("played", values))
-            self._turn_start = None
 
     def hold(self) -> None:
         """The connection dropped: send nothing that nobody plays."""
@@ -126,48 +118,57 @@ class Speaker(FrameProcessor):
         elif isinstance(frame, LLMFullResponseStartFrame):
             self._page.show("thinking")
         elif isinstance(frame, LLMFullResponseEndFrame):
-            self._page.show("idle")
+            self._page.show("thinking" if self._calls else "idle")
+        elif isinstance(frame, FunctionCallsStartedFrame):
+            self._calls.update(call.tool_call_id for call in frame.function_calls)
+        elif isinstance(frame, FunctionCallResultFrame | FunctionCallCancelFrame):
+            self._called(frame)
         await self.push_frame(frame, direction)
+
+    def _called(self, frame: FunctionCallResultFrame | FunctionCallCancelFrame) -> None:
+        """A function has ended; the language model goes on unless it has said all already."""
+        self._calls.discard(frame.tool_call_id)
+        properties = getattr(frame, "properties", None)
+        is_over = isinstance(frame, FunctionCallCancelFrame) or (
+            properties is not None and properties.run_llm is False and not self._calls
+        )
+        if is_over and self._page.state == "thinking":
+            self._page.show("idle")
 
     async def _send(self, frame: SpeechFrame) -> None:
         if self._utterances.is_stopped(frame.utterance):
             return  # it was on its way when the interruption overtook it
         end = frame.first_sample + len(frame.pcm)
-        if frame.utterance != self._speaking:
-            await self._begin(frame.utterance)
+        first = frame.utterance != self._speaking
+        if first:
+            self._begin(frame.utterance)
         await self._wait(lambda: self._playback.wait_to_send(end, self._now()))
         if frame.text is not None:
             self._page.send(Answer(frame.utterance, frame.first_sample, frame.text))
         self._page.send_speech(frame)
         self._sent.add(frame.utterance, frame.pcm)
         self._playback.sent(end, self._now())
-        if self._timer.is_running():
-            self._report()
+        if first:
+            await self.broadcast_frame(BotStartedSpeakingFrame)
 
-    async def _begin(self, utterance: int) -> None:
+    def _begin(self, utterance: int) -> None:
         self._speaking, self._paused = utterance, False
         self._playback.begin(utterance)
         self._page.show("speaking")
-        await self.broadcast_frame(BotStartedSpeakingFrame)
-
-    def _report(self) -> None:
-        self._timer.mark("send")
-        values = self._timer.finish()
-        self._turn_start = self._now() - values["total"] / 1000
-        self._page.send(Metrics("turn", values))
 
     async def _end(self, frame: UtteranceEndFrame) -> None:
         if self._utterances.is_stopped(frame.utterance):
             return
         self._page.send(End(frame.utterance, frame.samples))
         await self._wait(lambda: self._playback.remaining(self._now()))
-        self._speaking = self._turn_start = None
+        self._speaking = None
         self._page.show("idle")
         await self.broadcast_frame(BotStoppedSpeakingFrame)
 
     async def _stop(self) -> None:
         self._utterances.stop_all()
-        utterance, self._speaking, self._turn_start = self._speaking, None, None
+        self._calls.clear()
+        utterance, self._speaking = self._speaking, None
         if self._page.state != "listening":
             self._page.show("idle")
         if self._gestures is not None:

@@ -22,6 +22,7 @@ from ico3d.chat.protocol import (
     Resume,
     ServerMessage,
     Speech,
+    State,
     Stop,
     Welcome,
 )
@@ -133,8 +134,22 @@ class Page:
     async def heard(self, utterance: int) -> None:
         """Waits until an utterance has been played to its end."""
         _, end = await self.wait(End, where=lambda message: message.utterance == utterance)
-        left = self.player.started + end.samples / protocol.SPEECH_RATE - time.monotonic()
-        await asyncio.sleep(max(0.0, left))
+        while (left := end.samples / protocol.SPEECH_RATE - self._position()) > 0:
+            await asyncio.sleep(left)
+
+    def has_heard(self, utterance: int) -> bool:
+        """Whether an utterance has been played to its end."""
+        ends = [end.samples for end in self.messages(End) if end.utterance == utterance]
+        return bool(ends) and self._position() >= ends[0] / protocol.SPEECH_RATE
+
+    @property
+    def state(self) -> str:
+        """What the avatar does."""
+        states = (m.state for _, m in reversed(self.log) if isinstance(m, State))
+        return next(states, "idle")
+
+    def _position(self) -> float:
+        return self.player.position(time.monotonic())
 
     async def close(self) -> tuple[int | None, str]:
         """Ends the connection; returns the close code and reason."""

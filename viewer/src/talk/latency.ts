@@ -33,3 +33,39 @@ export class TurnTimer {
     return asked === null ? null : at - asked;
   }
 }
+
+const KEPT = 50; // turns that the figures look back on
+
+/** Median and 95th percentile, ms. */
+export interface Spread {
+  p50: number;
+  p95: number;
+}
+
+/** What lies between a question's end and its answer, in the order in which it happens. */
+export const PARTS = ['vad', 'turn', 'token', 'clause', 'voice', 'expression', 'send'] as const;
+
+/** Times of the last turns, by part. */
+export class Latencies {
+  private readonly values = new Map<string, number[]>();
+
+  add(part: string, milliseconds: number): void {
+    const values = this.values.get(part) ?? [];
+    values.push(milliseconds);
+    this.values.set(part, values.slice(-KEPT));
+  }
+
+  spread(part: string): Spread | null {
+    const values = this.values.get(part);
+    if (!values) return null;
+    const sorted = values.toSorted((a, b) => a - b);
+    return { p50: quantile(sorted, 0.5), p95: quantile(sorted, 0.95) };
+  }
+}
+
+/** @param sorted ascending; straight between neighbours */
+function quantile(sorted: readonly number[], share: number): number {
+  const at = share * (sorted.length - 1);
+  const [low, high] = [sorted[Math.floor(at)]!, sorted[Math.ceil(at)]!];
+  return low + (high - low) * (at - Math.floor(at));
+}

@@ -45,7 +45,9 @@ class Service:
 
     def described(self) -> protocol.Service:
         """As the page is told."""
-        return protocol.Service(self.provider.title, self.provider.stand_in)
+        title, detail = self.provider.title, self.provider.detail(self.options)
+        name = f"{title} ({detail})" if detail else title
+        return protocol.Service(name[: protocol.LONGEST_NAME], self.provider.stand_in)
 
 
 @dataclass(frozen=True)
@@ -70,15 +72,30 @@ class Chosen:
         return protocol.Dictation(options.language, listener and listener.provider.title)
 
 
-def choose(settings: ChatSettings) -> Chosen:
+def choose(settings: ChatSettings, voices: Mapping[str, str] | None = None) -> Chosen:
     """Finds the services that the settings name.
+
+    Args:
+        settings: Which services.
+        voices: The persona's voice for each provider of voices; settings that name one win.
 
     Raises:
         SettingsError: If one is unknown, or its options are wrong.
     """
     return Chosen(
-        **{kind: chosen(table, getattr(settings, kind), kind) for kind, table in TABLES.items()}
+        chosen(recognition.PROVIDERS, settings.recognition, "recognition"),
+        chosen(language.PROVIDERS, settings.language, "language"),
+        with_voice(chosen(voice.PROVIDERS, settings.voice, "voice"), settings.voice, voices or {}),
     )
+
+
+def with_voice(service: Service, choice: Choice, voices: Mapping[str, str]) -> Service:
+    """A service that speaks with the persona's voice, unless the settings name another."""
+    names = [n for n, provider in voice.PROVIDERS.items() if provider is service.provider]
+    own = next((voices[name] for name in names if name in voices), None)
+    if own is None or "voice" in choice.options or not hasattr(service.options, "voice"):
+        return service
+    return replace(service, options=replace(service.options, voice=own))
 
 
 def chosen(table: Table, choice: Choice, kind: str) -> Service:

@@ -3,14 +3,14 @@
 import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.bundle.animation import Animation
-from ico3d.bundle.manifest import HeadInfo, Persona
-from ico3d.common.weights import TABLE, cached
+from ico3d.bundle.manifest import HeadInfo
+from ico3d.bundle.persona import Persona
+from ico3d.common.weights import model_of
 from ico3d.errors import MissingModelError
 
 
@@ -44,22 +44,17 @@ def lacks_package(package: str, extra: str) -> str:
 
 def lacks_weights(name: str) -> str:
     """What hinders a provider that needs weights: nothing, or that they are not here."""
-    if cached(name) is not None:
-        return ""
-    licence = TABLE[name].licence
-    return f"the weights '{name}' are not here: ico3d weights fetch {name} ({licence})."
+    try:
+        model_of(name)
+    except MissingModelError as error:
+        return str(error)
+    return ""
 
 
-def weights_folder(name: str) -> Path:
-    """Where the files of some weights lie; nothing is downloaded while somebody waits.
-
-    Raises:
-        MissingModelError: If they are not here.
-    """
-    folder = cached(name)
-    if folder is None:
-        raise MissingModelError(lacks_weights(name))
-    return folder
+def nothing(settings: Any) -> str:
+    """For providers whose title says all."""
+    del settings
+    return ""
 
 
 @dataclass(frozen=True)
@@ -75,6 +70,7 @@ class Provider:
             server that answers) and what would mend it, in one sentence for people; empty if
             nothing does. Quick, and never raises: asked where the best is wanted.
         stand_in: True for the offline three.
+        detail: Which model these options mean, for the visitor's eyes.
     """
 
     title: str
@@ -82,6 +78,7 @@ class Provider:
     make: Callable[[Any, Context], FrameProcessor]
     hindrance: Callable[[Any], str] = unhindered
     stand_in: bool = False
+    detail: Callable[[Any], str] = nothing
 
 
 Table = dict[str, Provider]

@@ -6,7 +6,7 @@ import unicodedata
 from collections import Counter
 from dataclasses import dataclass
 
-from ico3d.bundle.manifest import Persona
+from ico3d.bundle.persona import Persona
 
 CONFIDENT = 0.42  # score from which a note is taken as the answer
 WORDS, LETTERS = 0.7, 0.3  # weights of whole words and of letter triples
@@ -32,6 +32,7 @@ COMMON = frozenset(
 )
 COMMON_WEIGHT = 0.25  # of words that every question has, against the others
 UNKNOWN_WEIGHT = 0.5  # of words that no note has, against the rarest that one has
+SHORTEST_ROOT = 4  # letters of a word's stem by which its other forms are known
 HELLO = frozenset(["hello", "hi", "hey", "greetings", "howdy"])
 THANKS = frozenset(["thank", "thanks", "thx", "cheers"])
 GOODBYE = frozenset(["bye", "goodbye", "farewell"])
@@ -64,6 +65,8 @@ class Notes:
 
     def answer(self, question: str) -> str:
         """The best answer there is to a question in natural language."""
+        if any(concerns(question, topic) for topic in self._persona.forbidden):
+            return self.refusal()
         best, score = self.best(question)
         if best is not None and score >= CONFIDENT:
             return best.answer
@@ -86,6 +89,10 @@ class Notes:
         examples = [f"“{note.questions[0]}”" for note in self.notes[:EXAMPLES]]
         listed = ", or ".join(examples)
         return f"I do not know that. You can ask me, for example: {listed}."
+
+    def refusal(self) -> str:
+        """What is said to a question about a forbidden topic."""
+        return "I would rather not talk about that. Is there something else you would like to know?"
 
     def not_understood(self) -> str:
         """What is said when nothing was understood."""
@@ -118,6 +125,26 @@ def parse_note(text: str) -> Note | None:
     if not arrow or not questions or not answer.strip():
         return None
     return Note(questions, answer.strip())
+
+
+def concerns(question: str, topic: str) -> bool:
+    """Whether a question has all words of one of a topic's names, in any form.
+
+    Args:
+        question: As the visitor said it.
+        topic: "word | other word".
+    """
+    said = plain(question).split()
+    names = [plain(name).split() for name in topic.split("|")]
+    return any(name and all(any(_is_form(w, t) for w in said) for t in name) for name in names)
+
+
+def _is_form(word: str, topic: str) -> bool:
+    """`political` is a form of `politics`; scripts without spaces have it inside."""
+    root = stem(topic)
+    if not root.isascii():
+        return topic in word
+    return word.startswith(root) if len(root) >= SHORTEST_ROOT else word == topic
 
 
 def plain(text: str) -> str:

@@ -1,0 +1,126 @@
+"""Who an avatar is: part of its bundle, or a file of its own (docs/conversation.md)."""
+
+import re
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ico3d.bundle.decode import decode, encode, parse_json
+from ico3d.bundle.limits import MAX_MANIFEST_BYTES, MAX_NOTES
+from ico3d.errors import BundleError
+
+LANGUAGE = re.compile(r"[a-z]{2,3}(-[A-Za-z0-9]{2,8})*")
+MOST_LETTERS = 4000  # of a text
+MOST_ENTRIES = 100  # of a list that is no list of notes
+
+
+@dataclass(frozen=True)
+class Persona:
+    """Who the avatar is, what it knows and how it talks.
+
+    Attributes:
+        name: How it calls itself.
+        greeting: Its first words.
+        notes: What it knows: "question | question => answer", or a fact as a plain sentence, which
+            only language models can use.
+        manner: How it behaves and talks, in a sentence or two.
+        languages: Codes such as `en` or `pt-BR` of the languages it answers in, its own one first;
+            empty for any.
+        voice: Name of its voice for each provider of voices, such as {"espeak-ng": "en-gb+f2"}.
+        forbidden: Topics it declines to talk about, each "word | other word".
+    """
+
+    name: str
+    greeting: str = ""
+    notes: tuple[str, ...] = ()
+    manner: str = ""
+    languages: tuple[str, ...] = ()
+    voice: dict[str, str] = field(default_factory=dict)
+    forbidden: tuple[str, ...] = ()
+
+
+REQUIRED = ("name", "greeting", "notes")
+"""Entries that a bundle must have; the others came later and are written where they say more."""
+
+
+def without_defaults(persona: Persona) -> dict[str, Any]:
+    """A persona as a bundle holds it: readable for programs that know the required ones only."""
+    plain, empty = encode(persona), encode(Persona(""))
+    return {key: v for key, v in plain.items() if key in REQUIRED or v != empty[key]}
+
+
+def with_defaults(value: Any, required: tuple[str, ...] = REQUIRED) -> Any:
+    """Parsed JSON or TOML of a persona with the entries it may lack."""
+    if not isinstance(value, dict):
+        return value
+    known = encode(Persona(""))
+    return {key: v for key, v in known.items() if key not in required} | value
+
+
+def read_persona(path: Path) -> Persona:
+    """Reads a persona's own file: TOML, or JSON if its name ends so; only `name` must be there.
+
+    Raises:
+        BundleError: In one sentence, if it cannot be read or an entry makes no sense.
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(MAX_MANIFEST_BYTES + 1)
+    except OSError as error:
+        raise BundleError(f"{path}: cannot be read ({error.strerror}).") from error
+    if len(data) > MAX_MANIFEST_BYTES:
+        raise BundleError(f"{path}: is larger than {MAX_MANIFEST_BYTES} bytes.")
+    value = parse_json(data, str(path)) if path.suffix == ".json" else _parse_toml(data, path)
+    persona = decode(Persona, with_defaults(value, ("name",)), str(path))
+    check_persona(persona, str(path))
+    _require(bool(persona.name.strip()), str(path), "name", "not be empty")
+    for number, note in enumerate(persona.notes, 1):
+        _check_note(note, number, path)
+    return persona
+
+
+def check_persona(persona: Persona, where: str) -> None:
+    """Checks lengths and forms.
+
+    Args:
+        persona: Of a bundle or a file.
+        where: What an error names as the place.
+
+    Raises:
+        BundleError: Naming the first entry that makes no sense.
+    """
+    for entry in ("name", "greeting", "manner"):
+        short = len(getattr(persona, entry)) <= MOST_LETTERS
+        _require(short, where, entry, f"have at most {MOST_LETTERS} characters")
+    _require(len(persona.notes) <= MAX_NOTES, where, "notes", f"be at most {MAX_NOTES}")
+    for entry in ("languages", "voice", "forbidden"):
+        few = len(getattr(persona, entry)) <= MOST_ENTRIES
+        _require(few, where, entry, f"be at most {MOST_ENTRIES}")
+    for code in persona.languages:
+        known = LANGUAGE.fullmatch(code) is not None
+        _require(known, where, "languages", f"be codes such as 'en' or 'pt-BR', not {code[:40]!r}")
+    for topic in persona.forbidden:
+        named = all(word.strip() for word in topic.split("|"))
+        _require(named, where, "forbidden", "hold topics such as 'politics | elections'")
+
+
+def _check_note(note: str, number: int, path: Path) -> None:
+    questions, arrow, answer = note.partition("=>")
+    asked = all(question.strip() for question in questions.split("|"))
+    if not note.strip() or (arrow and not (answer.strip() and asked)):
+        raise BundleError(
+            f"{path}: note {number} is neither 'question | question => answer' nor a sentence."
+        )
+
+
+def _parse_toml(data: bytes, path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(data.decode())
+    except ValueError as error:
+        raise BundleError(f"{path}: is not valid TOML ({error}).") from error
+
+
+def _require(holds: bool, where: str, entry: str, what: str) -> None:
+    if not holds:
+        raise BundleError(f"{where}: persona.{entry} must {what}.")

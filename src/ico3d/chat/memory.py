@@ -1,0 +1,47 @@
+"""What a language model still knows of a long conversation: its end, and a summary of the rest."""
+
+from pipecat.processors.aggregators.llm_response_universal import LLMAssistantAggregatorParams
+from pipecat.processors.frame_processor import FrameProcessor
+from pipecat.services.llm_service import LLMService
+from pipecat.utils.context.llm_context_summarization import (
+    LLMAutoContextSummarizationConfig,
+    LLMContextSummaryConfig,
+)
+
+from ico3d.chat.settings import Memory
+
+KEPT = 4  # latest messages, word by word
+SHARE = 4  # of the budget, one part in so many is the summary's
+SLOWEST = 60.0  # s for a summary, which is made beside the conversation
+PROMPT = (
+    "Summarise this conversation between a visitor and yourself for your own memory. Keep every "
+    "fact that the visitor told: names, places, numbers, wishes, plans, likes and dislikes; keep "
+    "what was promised and what is still open, and everything that an earlier summary says. Leave "
+    "out greetings. Write short plain sentences in the language of the conversation, and nothing "
+    "but the summary."
+)
+REMINDER = "(What we talked about before, in short: {summary})"
+
+
+def remembering(memory: Memory, language: FrameProcessor) -> LLMAssistantAggregatorParams:
+    """When pipecat is to summarise, and how.
+
+    Args:
+        memory: How much may be kept.
+        language: The model; the offline one cannot summarise and needs nothing that was said.
+    """
+    summary = LLMContextSummaryConfig(
+        target_context_tokens=memory.tokens // SHARE,
+        min_messages_after_summary=KEPT,
+        summarization_prompt=PROMPT,
+        summary_message_template=REMINDER,
+        summarization_timeout=SLOWEST,
+    )
+    return LLMAssistantAggregatorParams(
+        enable_auto_context_summarization=isinstance(language, LLMService),
+        auto_context_summarization_config=LLMAutoContextSummarizationConfig(
+            max_context_tokens=memory.tokens,
+            max_unsummarized_messages=None,
+            summary_config=summary,
+        ),
+    )

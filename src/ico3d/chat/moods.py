@@ -1,0 +1,60 @@
+"""What the brows do beyond their small steady motion: a mood, for the length of an utterance."""
+
+import numpy as np
+
+from ico3d.common.expression import EYE_NAMES
+
+NEUTRAL = "neutral"
+EASE = 0.4
+"""Seconds from one mood to the next."""
+BROWS: dict[str, dict[str, float]] = {
+    NEUTRAL: {},
+    "happy": {"browInnerUp": 0.15, "browOuterUpLeft": 0.3, "browOuterUpRight": 0.3},
+    "surprised": {"browInnerUp": 0.6, "browOuterUpLeft": 0.6, "browOuterUpRight": 0.6},
+    "serious": {"browDownLeft": 0.35, "browDownRight": 0.35},
+    "worried": {"browInnerUp": 0.6, "browDownLeft": 0.15, "browDownRight": 0.15},
+    "doubtful": {"browDownLeft": 0.3, "browOuterUpRight": 0.5},
+}
+"""What each mood adds to the brow values."""
+
+
+class Moods:
+    """The brows of one session: eased from mood to mood along the rows that are made."""
+
+    def __init__(self):
+        """Neutral."""
+        self._from = self._to = self._wanted = brows(NEUTRAL)
+        self._since = -np.inf  # s, time of the first row of this mood
+
+    def set(self, name: str) -> None:
+        """The mood from the next row on that is made."""
+        self._wanted = brows(name)
+
+    def end(self) -> None:
+        """The utterance is over: the page eases the face to rest, the next one begins neutral."""
+        self._from = self._to = self._wanted = brows(NEUTRAL)
+
+    def values(self, times: np.ndarray) -> np.ndarray:
+        """What to add to the eye and brow values.
+
+        Args:
+            times: (n,) seconds of the rows, ascending from call to call within an utterance.
+
+        Returns:
+            (n, 7) float32.
+        """
+        if len(times) and self._to is not self._wanted:
+            self._from = self._at(times[:1])[0]
+            self._to, self._since = self._wanted, float(times[0])
+        return self._at(times)
+
+    def _at(self, times: np.ndarray) -> np.ndarray:
+        part = np.clip((times - self._since) / EASE, 0, 1)[:, None]  # (n, 1)
+        eased = part * part * (3 - 2 * part)
+        return (self._from + (self._to - self._from) * eased).astype(np.float32)
+
+
+def brows(mood: str) -> np.ndarray:
+    """(7,) float32 what a mood adds."""
+    raised = BROWS[mood]
+    return np.array([raised.get(name, 0.0) for name in EYE_NAMES], np.float32)

@@ -1,0 +1,198 @@
+"""A causal language model of transformers as a service of the pipeline.
+
+torch is imported inside transformers only, so that what serves needs none as long as nobody asks
+for this.
+"""
+
+import asyncio
+import threading
+from collections.abc import AsyncGenerator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import aclosing
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+from pipecat.frames.frames import (
+    Frame,
+    LLMContextFrame,
+    LLMFullResponseEndFrame,
+    LLMFullResponseStartFrame,
+)
+from pipecat.processors.aggregators.llm_context import LLMContext
+from pipecat.processors.frame_processor import FrameDirection
+from pipecat.services.llm_service import LLMService
+from pipecat.services.settings import LLMSettings
+from pipecat.utils.types import assert_given
+from transformers import (
+    AsyncTextIteratorStreamer,
+    AutoModelForCausalLM,
+    AutoTokenizer,
+    StoppingCriteria,
+    StoppingCriteriaList,
+)
+from transformers.utils.import_utils import is_torch_cuda_available
+
+AT_ONCE = 2  # answers generated side by side; further ones wait
+_loading = threading.Lock()
+
+
+class Stop(StoppingCriteria):
+    """Ends a generation from outside, after the token that is being made."""
+
+    def __init__(self):
+        """Goes on until it is set."""
+        self._event = threading.Event()
+
+    def set(self) -> None:
+        """No more tokens."""
+        self._event.set()
+
+    def __call__(self, input_ids: Any, scores: Any, **kwargs: Any) -> Any:
+        """Whether to stop; transformers takes one answer for the whole batch too."""
+        return self._event.is_set()
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A model that all sessions share.
+
+    Attributes:
+        name: Where it came from.
+        model: transformers' causal language model.
+        tokenizer: Its tokenizer, with a chat template.
+        threads: Where it generates.
+    """
+
+    name: str
+    model: Any
+    tokenizer: Any
+    threads: ThreadPoolExecutor = field(
+        default_factory=lambda: ThreadPoolExecutor(AT_ONCE, "language")
+    )
+
+    async def stream(self, messages: list[dict[str, Any]], most: int) -> AsyncGenerator[str, None]:
+        """An answer, piece by piece; generation stops when the caller does.
+
+        Args:
+            messages: Roles and contents, the system instruction first.
+            most: Tokens at most.
+        """
+        streamer = AsyncTextIteratorStreamer(
+            self.tokenizer, skip_prompt=True, skip_special_tokens=True
+        )
+        stop = Stop()
+        run = asyncio.get_running_loop().run_in_executor
+        generated = run(self.threads, self._generate, messages, most, streamer, stop)
+        try:
+            async for text in streamer:
+                if text:
+                    yield text
+            await generated
+        finally:
+            stop.set()
+            generated.cancel()  # if it still waits for a thread
+
+    def _generate(
+        self, messages: list[dict[str, Any]], most: int, streamer: Any, stop: Stop
+    ) -> None:
+        try:
+            prompt = self.tokenizer.apply_chat_template(
+                messages, add_generation_prompt=True, return_tensors="pt", return_dict=True
+            ).to(self.model.device)
+            criteria = StoppingCriteriaList([stop])
+            self.model.generate(
+                **prompt, max_new_tokens=most, streamer=streamer, stopping_criteria=criteria
+            )
+        except BaseException:
+            streamer.on_finalized_text("", stream_end=True)  # or its reader waits for ever
+            raise
+
+
+def on_cuda() -> bool:
+    """Whether models run on a GPU."""
+    return is_torch_cuda_available()
+
+
+def load(name: str) -> Loaded:
+    """The model of a folder or of the Hugging Face cache, loaded at its first use."""
+    with _loading:
+        return _load(name)
+
+
+@cache
+def _load(name: str) -> Loaded:
+    """Weights come from safetensors only, and no code from their folder is run."""
+    kept: dict[str, Any] = {"local_files_only": True, "trust_remote_code": False}
+    how = {"device_map": "cuda", "dtype": "auto"} if on_cuda() else {"dtype": "float32"}
+    model = AutoModelForCausalLM.from_pretrained(name, use_safetensors=True, **how, **kept)
+    return Loaded(name, model.eval(), AutoTokenizer.from_pretrained(name, **kept))
+
+
+class InProcessModel(LLMService):
+    """Streams its answers; calls no functions."""
+
+    def __init__(self, loaded: Loaded, instruction: str, max_tokens: int):
+        """A model for one session.
+
+        Args:
+            loaded: Shared by all.
+            instruction: Who it is.
+            max_tokens: Longest answer.
+        """
+        super().__init__(
+            settings=LLMSettings(
+                model=loaded.name,
+                system_instruction=instruction,
+                temperature=None,  # how to sample is in the model's own generation_config.json
+                max_tokens=max_tokens,
+                top_p=None,
+                top_k=None,
+                frequency_penalty=None,
+                presence_penalty=None,
+                seed=None,
+                filter_incomplete_user_turns=False,
+                user_turn_completion_config=None,
+            )
+        )
+        self._loaded, self._max_tokens = loaded, max_tokens
+
+    async def process_frame(self, frame: Frame, direction: FrameDirection):
+        """Answers contexts, passes everything else."""
+        await super().process_frame(frame, direction)
+        if not isinstance(frame, LLMContextFrame):
+            await self.push_frame(frame, direction)
+            return
+        await self.push_frame(LLMFullResponseStartFrame())
+        try:
+            await self.start_ttfb_metrics()
+            messages = await self._messages(frame.context, None)
+            async with aclosing(self._loaded.stream(messages, self._max_tokens)) as texts:
+                async for text in texts:
+                    await self.stop_ttfb_metrics()
+                    await self._push_llm_text(text)
+        except Exception as error:
+            await self.push_error(f"The language model failed: {error}", exception=error)
+        finally:
+            await self.push_frame(LLMFullResponseEndFrame())
+
+    async def run_inference(
+        self,
+        context: LLMContext,
+        max_tokens: int | None = None,
+        system_instruction: str | None = None,
+        response_schema: dict[str, Any] | None = None,
+    ) -> str | None:
+        """A whole answer beside the conversation, such as a summary of it."""
+        self._check_response_schema(response_schema)
+        messages = await self._messages(context, system_instruction)
+        async with aclosing(self._loaded.stream(messages, max_tokens or self._max_tokens)) as texts:
+            return "".join([text async for text in texts])
+
+    async def _messages(self, context: LLMContext, instruction: str | None) -> list[Any]:
+        request = await self.get_llm_adapter().get_llm_invocation_params(
+            context,
+            system_instruction=instruction or assert_given(self._settings.system_instruction),
+            convert_developer_to_user=True,  # chat templates do not know that role
+        )
+        return request["messages"]

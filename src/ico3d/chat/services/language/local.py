@@ -1,0 +1,64 @@
+"""An OpenAI-compatible server on this machine: Ollama, vLLM, llama.cpp, `transformers serve`."""
+
+from dataclasses import dataclass
+
+from pipecat.processors.frame_processor import FrameProcessor
+
+from ico3d.chat.services.language import openai
+from ico3d.chat.services.language.servers import first_server
+from ico3d.chat.services.provider import Context
+from ico3d.errors import SettingsError
+
+PORTS = (11434, 8000, 8080)
+"""Where such servers are as a rule: Ollama; vLLM and `transformers serve`; llama.cpp."""
+QUICK = 0.25  # s until one answers that is to be the best by itself
+PATIENT = 2.0  # s until one answers that was chosen
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which of its models.
+
+    Attributes:
+        model: Name of the model; empty for the first that the server offers.
+        functions: Whether the model may call functions (gestures, moods, tools).
+    """
+
+    model: str = ""
+    functions: bool = True
+
+
+def find(settings: Settings, seconds: float) -> tuple[str, str] | None:
+    """Address and model of the first server that answers within some seconds."""
+    found = first_server([f"http://127.0.0.1:{port}/v1" for port in PORTS], seconds)
+    return found and (found[0], settings.model or found[1])
+
+
+def hindrance(settings: Settings) -> str:
+    """That none answers now, if so."""
+    if find(settings, QUICK) is not None:
+        return ""
+    return f"none answers on the ports {', '.join(map(str, PORTS))}: start Ollama, for example."
+
+
+def detail(settings: Settings) -> str:
+    """For the visitor's eyes: which model."""
+    found = find(settings, PATIENT)
+    return found[1] if found else settings.model
+
+
+def make(settings: Settings, context: Context) -> FrameProcessor:
+    """A language model for one session.
+
+    Raises:
+        SettingsError: If none answers any more.
+    """
+    found = find(settings, PATIENT)
+    if found is None:
+        ports = ", ".join(map(str, PORTS))
+        raise SettingsError(
+            f"chat settings: no OpenAI-compatible server with a language model answers on this "
+            f"machine's ports {ports}: start one, or choose another language."
+        )
+    url, model = found
+    return openai.make(openai.Settings(url, model, functions=settings.functions), context)

@@ -1,0 +1,93 @@
+"""Qwen2-0.5B-Instruct in this process, through transformers."""
+
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+from pipecat.processors.frame_processor import FrameProcessor
+
+from ico3d.chat.services.language.instruction import instruction
+from ico3d.chat.services.provider import Context, lacks_package
+from ico3d.errors import MissingExtraError, MissingModelError
+
+PLAIN = "Qwen/Qwen2-0.5B-Instruct"
+QUANTISED = "Qwen/Qwen2-0.5B-Instruct-AWQ"
+WEIGHTS_NAME = "qwen2"
+"""Of `PLAIN` in the table of weights."""
+PACKAGES = ("transformers", "torch")
+KERNELS = "gptqmodel"
+"""What transformers runs AWQ weights with."""
+WEIGHTS = ("model.safetensors", "model.safetensors.index.json")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which weights.
+
+    Attributes:
+        model: A folder, or a name on the Hugging Face hub whose files are in its cache; empty for
+            Qwen2-0.5B-Instruct, on CUDA its AWQ form if that is there.
+        max_tokens: Longest answer.
+    """
+
+    model: str = ""
+    max_tokens: int = 200
+
+
+def hindrance(settings: Settings) -> str:
+    """What is missing: a package, or the weights."""
+    missing = next(filter(None, (lacks_package(name, "qwen") for name in PACKAGES)), "")
+    if missing or source(settings, cuda=False) is not None:
+        return missing
+    return f"its weights are not here: ico3d weights fetch {WEIGHTS_NAME}."
+
+
+def detail(settings: Settings) -> str:
+    """For the visitor's eyes: which model."""
+    return Path(settings.model).name or Path(PLAIN).name
+
+
+def make(settings: Settings, context: Context) -> FrameProcessor:
+    """A language model for one session; the weights are loaded once for all (some seconds).
+
+    Raises:
+        MissingExtraError: If transformers or torch is not installed.
+        MissingModelError: If the weights are not on this machine.
+    """
+    for name in PACKAGES:
+        if find_spec(name) is None:
+            raise MissingExtraError(name, "qwen", "the language model in this process")
+    from ico3d.chat.services.language.in_process import InProcessModel, load, on_cuda
+
+    where = source(settings, on_cuda())
+    if where is None:
+        raise MissingModelError(
+            f"the language model {settings.model or PLAIN} is not on this machine: fetch it with "
+            f"`ico3d weights fetch {WEIGHTS_NAME}`, or give its folder as 'model'."
+        )
+    return InProcessModel(load(where), instruction(context.persona), settings.max_tokens)
+
+
+def source(settings: Settings, cuda: bool) -> str | None:
+    """The folder or hub name to load, None where the files are not here."""
+    quantised = [QUANTISED] if cuda and find_spec(KERNELS) else []
+    names = [settings.model] if settings.model else [*quantised, PLAIN]
+    return next((name for name in names if is_here(name)), None)
+
+
+def is_here(model: str) -> bool:
+    """Whether a model's files are in its folder or in the Hugging Face cache."""
+    if Path(model).is_dir():
+        return _is_whole({name.name for name in Path(model).iterdir()})
+    from huggingface_hub import try_to_load_from_cache
+    from huggingface_hub.errors import HFValidationError
+
+    names = ("config.json", *WEIGHTS)
+    try:
+        return _is_whole({n for n in names if isinstance(try_to_load_from_cache(model, n), str)})
+    except HFValidationError:  # a path that is no folder
+        return False
+
+
+def _is_whole(names: set[str]) -> bool:
+    return "config.json" in names and not names.isdisjoint(WEIGHTS)

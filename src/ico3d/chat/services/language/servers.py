@@ -1,0 +1,68 @@
+"""Which models OpenAI-compatible servers offer, asked without waiting long."""
+
+import json
+import re
+import time
+from concurrent.futures import ThreadPoolExecutor, wait
+from typing import Any
+
+import httpx
+
+OTHERS = re.compile(r"embed|rerank|whisper|speech|tts|kokoro|piper|transcri", re.IGNORECASE)
+"""In the names of models that are no language models."""
+MOST_BYTES = 1 << 20  # of a list of models
+
+
+def language_models(url: str, key: str, seconds: float) -> list[str]:
+    """Names of the language models that a server offers; none if it does not answer as one.
+
+    Args:
+        url: Its address, ending in `/v1` as a rule.
+        key: Sent as the bearer's.
+        seconds: How long all of it may take.
+    """
+    try:
+        listed = json.loads(_read(url.rstrip("/") + "/models", key, seconds))
+    except (httpx.HTTPError, httpx.InvalidURL, TimeoutError, ValueError):
+        return []
+    entries = listed.get("data") if isinstance(listed, dict) else None
+    names = [_name(entry) for entry in entries] if isinstance(entries, list) else []
+    return [name for name in names if name and not OTHERS.search(name)]
+
+
+def first_server(urls: list[str], seconds: float) -> tuple[str, str] | None:
+    """The first of some servers that offers a language model, and its first model.
+
+    Args:
+        urls: Asked at the same time, the best first.
+        seconds: How long all of it may take.
+    """
+    pool = ThreadPoolExecutor(len(urls), "language")
+    asked = [pool.submit(language_models, url, "none", seconds) for url in urls]
+    wait(asked, timeout=seconds)
+    pool.shutdown(wait=False)
+    for url, names in zip(urls, asked, strict=True):
+        if names.done() and names.result():
+            return url, names.result()[0]
+    return None
+
+
+def _read(url: str, key: str, seconds: float) -> bytes:
+    """An answer, read until it is too long or too slow; nothing leads elsewhere."""
+    until = time.monotonic() + seconds
+    data = b""
+    headers = {"Authorization": f"Bearer {key}"}
+    secure = url.startswith("https:")  # else certificates would be read for nothing, which is slow
+    options: dict[str, Any] = {"timeout": seconds, "trust_env": False, "headers": headers}
+    with httpx.stream("GET", url, verify=secure, **options) as response:
+        response.raise_for_status()
+        for part in response.iter_bytes():
+            data += part
+            if len(data) > MOST_BYTES or time.monotonic() > until:
+                raise TimeoutError
+    return data
+
+
+def _name(entry: Any) -> str:
+    name = entry.get("id") if isinstance(entry, dict) else None
+    return name if isinstance(name, str) else ""

@@ -1,0 +1,37 @@
+"""What a language model can do besides talking: move the avatar, call users' tools."""
+
+from pipecat.adapters.llm.schemas.tools_schema import ToolsSchema
+from pipecat.processors.aggregators.llm_context import NOT_GIVEN, NotGiven
+from pipecat.processors.frame_processor import FrameProcessor
+
+from ico3d.chat.gestures import Gestures
+from ico3d.chat.moods import Moods
+from ico3d.chat.tool_settings import Tool
+from ico3d.chat.tools.body import Said, gesture_function, mood_function
+from ico3d.chat.tools.http import http_function
+
+
+def functions(
+    language: FrameProcessor,
+    gestures: Gestures | None,
+    moods: Moods | None,
+    tools: tuple[Tool, ...],
+    allow: tuple[str, ...],
+) -> ToolsSchema | NotGiven:
+    """The functions of one session.
+
+    Args:
+        language: The model that calls them.
+        gestures: Of its body; None without one.
+        moods: Of its brows; None where the head has no inputs for them.
+        tools: The user's.
+        allow: Hosts that those may call.
+    """
+    said = Said()
+    said.watch(language)
+    found = [http_function(tool, allow) for tool in tools]
+    if moods is not None:
+        found.append(mood_function(moods, said))
+    if gestures is not None and gestures.names:
+        found.append(gesture_function(gestures, said))
+    return ToolsSchema(found) if found else NOT_GIVEN

@@ -1,0 +1,85 @@
+"""Functions that move the avatar itself: gestures of its body, moods of its brows."""
+
+from typing import Any
+
+from pipecat.adapters.llm.schemas.function_schema import FunctionSchema
+from pipecat.frames.frames import (
+    Frame,
+    FunctionCallResultProperties,
+    FunctionCallsStartedFrame,
+    LLMFullResponseStartFrame,
+    LLMTextFrame,
+)
+from pipecat.processors.frame_processor import FrameProcessor
+from pipecat.services.llm_service import FunctionCallParams
+
+from ico3d.chat.gestures import Gestures
+from ico3d.chat.moods import BROWS, Moods
+from ico3d.chat.tool_settings import OWN
+
+GESTURE, MOOD = OWN
+BESIDE = "Call it in the same message as the words that it goes with; never speak of it."
+
+
+class Said:
+    """Whether a response of the model has words beside its function calls.
+
+    Then it is not asked to go on after a gesture: it would say everything again.
+    """
+
+    def __init__(self):
+        """No response yet."""
+        self._words = self._others = False
+
+    def watch(self, language: FrameProcessor) -> None:
+        """Follows what a language model sends."""
+        language.add_event_handler("on_before_push_frame", self._see)
+
+    async def _see(self, _: FrameProcessor, frame: Frame) -> None:
+        if isinstance(frame, LLMFullResponseStartFrame):
+            self._words = self._others = False
+        elif isinstance(frame, LLMTextFrame):
+            self._words = self._words or bool(frame.text.strip())
+        elif isinstance(frame, FunctionCallsStartedFrame):
+            self._others = any(call.function_name not in OWN for call in frame.function_calls)
+
+    def properties(self) -> FunctionCallResultProperties | None:
+        """What to do after a gesture: nothing where all has been said, else the usual."""
+        if self._words and not self._others:
+            return FunctionCallResultProperties(run_llm=False)
+        return None
+
+
+def gesture_function(gestures: Gestures, said: Said) -> FunctionSchema:
+    """`gesture(name)`."""
+
+    async def call(params: FunctionCallParams) -> None:
+        await _try(params, gestures.names, gestures.request, said)
+
+    what = f"Makes a gesture with the hands while the next words are spoken. {BESIDE}"
+    return _with_name(GESTURE, what, gestures.names, call)
+
+
+def mood_function(moods: Moods, said: Said) -> FunctionSchema:
+    """`mood(name)`."""
+
+    async def call(params: FunctionCallParams) -> None:
+        await _try(params, list(BROWS), moods.set, said)
+
+    what = f"Shows a mood on the face until the answer ends. {BESIDE}"
+    return _with_name(MOOD, what, list(BROWS), call)
+
+
+def _with_name(function: str, what: str, names: list[str], call: Any) -> FunctionSchema:
+    properties = {"name": {"type": "string", "enum": names}}
+    return FunctionSchema(function, what, properties, ["name"], call)
+
+
+async def _try(params: FunctionCallParams, names: list[str], do: Any, said: Said) -> None:
+    name = params.arguments.get("name")
+    if name in names:
+        do(name)
+        result = {"done": name}
+    else:
+        result = {"error": f"There is no such {params.function_name}, only {', '.join(names)}."}
+    await params.result_callback(result, properties=said.properties())

@@ -1,0 +1,173 @@
+"""Functions over HTTP, for which a language model may not go anywhere it likes.
+
+Only listed hosts are called, under addresses that are public or listed themselves; redirects stay
+on their host; time and size are limited.
+"""
+
+import contextlib
+import ipaddress
+import json
+import socket
+from collections.abc import Mapping
+from typing import Any
+from urllib.parse import SplitResult, quote, urljoin, urlsplit
+
+import aiohttp
+from aiohttp.abc import AbstractResolver, ResolveResult
+from aiohttp.resolver import DefaultResolver
+from pipecat.adapters.llm.schemas.function_schema import FunctionSchema
+from pipecat.services.llm_service import FunctionCallParams
+
+from ico3d.chat.tool_settings import PORTS, Tool, host_of
+
+MOST_BYTES = 16 * 1024  # of an answer: the model has to read it
+MOST_REDIRECTS = 3
+REDIRECTS = (301, 302, 303, 307, 308)
+
+
+class Refused(OSError):
+    """A call that is not made."""
+
+
+class CheckedResolver(AbstractResolver):
+    """Finds addresses, and refuses those that lead into the house."""
+
+    def __init__(self, allow: tuple[str, ...]):
+        """Addresses in `allow` are no matter where they lead."""
+        self._allow = allow
+        self._resolver = DefaultResolver()
+
+    async def resolve(
+        self, host: str, port: int = 0, family: socket.AddressFamily = socket.AF_INET
+    ) -> list[ResolveResult]:
+        """Addresses of a host, of which every one must be permitted."""
+        found = await self._resolver.resolve(host, port, family)
+        for entry in found:
+            check_address(entry["host"], host, port, self._allow)
+        return found
+
+    async def close(self) -> None:
+        """Ends the resolver underneath."""
+        await self._resolver.close()
+
+
+def check_address(address: str, host: str, port: int, allow: tuple[str, ...]) -> None:
+    """Refuses addresses of this machine and its networks unless they are listed.
+
+    Args:
+        address: Of the machine that would be called.
+        host: The name under which it was found; `localhost` stands for its addresses.
+        port: Of the call.
+        allow: Hosts that are listed, with their port if it is not the usual one.
+
+    Raises:
+        Refused: If it may not be called.
+    """
+    ip = ipaddress.ip_address(address.partition("%")[0])
+    if isinstance(ip, ipaddress.IPv6Address) and ip.ipv4_mapped:
+        ip = ip.ipv4_mapped
+    if ip.is_global and not ip.is_multicast:
+        return
+    shown = f"[{ip}]" if ip.version == 6 else str(ip)
+    names = [shown, "localhost"] if ip.is_loopback and host == "localhost" else [shown]
+    ends = ["", f":{port}"] if port in PORTS.values() else [f":{port}"]
+    if not any(name + end in allow for name in names for end in ends):
+        raise Refused(f"{host} is at the private address {ip}, which is not in 'allow'")
+
+
+def http_function(tool: Tool, allow: tuple[str, ...]) -> FunctionSchema:
+    """A user's tool as a function of the language model."""
+
+    async def call(params: FunctionCallParams) -> None:
+        await params.result_callback(await answer(tool, params.arguments, allow))
+
+    return FunctionSchema(tool.name, tool.description, tool.properties, tool.required, call)
+
+
+async def answer(
+    tool: Tool, arguments: Mapping[str, Any], allow: tuple[str, ...]
+) -> dict[str, Any]:
+    """What a tool answers: `status` and `body`, or `error` in one sentence for the model."""
+    try:
+        return await _fetch(tool, _request(tool, arguments), allow)
+    except TimeoutError:
+        return {"error": f"{tool.name} did not answer within {tool.seconds:g} seconds."}
+    except aiohttp.ClientConnectorError as error:
+        return {"error": f"{tool.name} cannot be reached: {error.os_error}."}
+    except (Refused, aiohttp.ClientError, ValueError) as error:
+        return {"error": f"{tool.name} failed: {error or type(error).__name__}."}
+
+
+def _request(tool: Tool, arguments: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
+    """URL and further options of the request."""
+    unknown = [name for name in arguments if name not in tool.properties]
+    missing = [name for name in tool.required if name not in arguments]
+    if unknown or missing:
+        raise Refused(f"it takes {list(tool.properties)} and needs {tool.required}")
+    inside = {name: _quoted(arguments[name]) for name in tool.placeholders}
+    url = tool.url.format_map(inside)
+    rest = {name: value for name, value in arguments.items() if name not in inside}
+    if tool.method == "POST":
+        return url, {"json": rest}
+    return url, {"params": {name: _text(value) for name, value in rest.items()}}
+
+
+def _quoted(value: Any) -> str:
+    text = _text(value)
+    if text.strip(".") == "":
+        raise Refused("a part of its address would be empty or lead elsewhere")
+    return quote(text, safe="")
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+
+
+async def _fetch(
+    tool: Tool, request: tuple[str, dict[str, Any]], allow: tuple[str, ...]
+) -> dict[str, Any]:
+    url, options = request
+    home = urlsplit(tool.url)
+    connector = aiohttp.TCPConnector(resolver=CheckedResolver(allow))
+    limit = aiohttp.ClientTimeout(total=tool.seconds)
+    cookies = aiohttp.DummyCookieJar()
+    async with aiohttp.ClientSession(
+        connector=connector, timeout=limit, cookie_jar=cookies
+    ) as session:
+        for _ in range(MOST_REDIRECTS + 1):
+            _check(urlsplit(url), home, allow)
+            async with session.request(
+                tool.method, url, allow_redirects=False, **options
+            ) as response:
+                if response.status not in REDIRECTS:
+                    return {"status": response.status, "body": await _body(response)}
+                url, options = _next(tool, response), {}
+    raise Refused("it redirects too often")
+
+
+def _check(url: SplitResult, home: SplitResult, allow: tuple[str, ...]) -> None:
+    """It is the tool's host; an address in place of a name is never looked up, so checked here."""
+    if host_of(url) != host_of(home) or url.scheme not in (home.scheme, "https"):
+        raise Refused(f"it leads elsewhere, to {url.scheme}://{host_of(url)}")
+    host = url.hostname or ""
+    with contextlib.suppress(ValueError):
+        check_address(str(ipaddress.ip_address(host)), host, url.port or PORTS[url.scheme], allow)
+
+
+def _next(tool: Tool, response: aiohttp.ClientResponse) -> str:
+    if tool.method != "GET":
+        raise Refused("it redirects what is sent to it")
+    return urljoin(str(response.url), response.headers.get("Location", ""))
+
+
+async def _body(response: aiohttp.ClientResponse) -> Any:
+    data = b""
+    async for part in response.content.iter_chunked(MOST_BYTES):
+        data += part
+        if len(data) > MOST_BYTES:
+            raise Refused(f"its answer has more than {MOST_BYTES} bytes")
+    text = data.decode("utf-8", "replace")
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text

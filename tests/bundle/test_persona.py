@@ -1,0 +1,100 @@
+"""Personas: in bundles old and new, and in files of their own."""
+
+import json
+
+import pytest
+
+from ico3d.bundle.manifest import Manifest
+from ico3d.bundle.persona import Persona, read_persona
+from ico3d.errors import BundleError
+
+FILE = """
+name = "Ada"
+greeting = "Good evening."
+manner = "Warm, with dry humour."
+languages = ["en", "pt-BR"]
+forbidden = ["politics | elections", "my age"]
+notes = ["who are you => I am Ada.", "The museum closes at six."]
+[voice]
+"espeak-ng" = "en-gb+f2"
+"""
+ADA = Persona(
+    "Ada",
+    "Good evening.",
+    ("who are you => I am Ada.", "The museum closes at six."),
+    "Warm, with dry humour.",
+    ("en", "pt-BR"),
+    {"espeak-ng": "en-gb+f2"},
+    ("politics | elections", "my age"),
+)
+
+
+def test_a_file_may_say_all_or_only_the_name(tmp_path):
+    path = tmp_path / "ada.toml"
+    path.write_text(FILE)
+    assert read_persona(path) == ADA
+    path.write_text('name = "Ada"')
+    assert read_persona(path) == Persona("Ada")
+    path = tmp_path / "ada.json"
+    path.write_text('{"name": "Ada", "notes": ["a => b"]}')
+    assert read_persona(path) == Persona("Ada", notes=("a => b",))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('name = "Ada"', "", "lacks 'name'"),
+        ('name = "Ada"', 'name = " "', "name must not be empty"),
+        ('name = "Ada"', "name = 3", "name must be a text"),
+        ('name = "Ada"', 'name = "Ada"\nage = 36', "unknown key 'age'"),
+        ('"pt-BR"', '"Portuguese"', "not 'Portuguese'"),
+        ('"my age"', '"my age | "', "topics such as"),
+        ("=> I am Ada.", "=> ", "note 1 is neither"),
+        ("who are you =>", "=>", "note 1 is neither"),
+        ('"The museum closes at six."', '""', "note 2 is neither"),
+        ('"en-gb+f2"', "2", "must be a text"),
+        ("Good evening.", "x" * 4001, "greeting must have at most 4000"),
+        ("[voice]", "[voice", "not valid TOML"),
+    ],
+)
+def test_what_makes_no_sense_is_one_sentence(tmp_path, old, new, message):
+    path = tmp_path / "ada.toml"
+    assert old in FILE
+    path.write_text(FILE.replace(old, new, 1))
+    with pytest.raises(BundleError) as error:
+        read_persona(path)
+    assert message in str(error.value) and "\n" not in str(error.value)
+    assert str(path) in str(error.value)
+
+
+def test_a_missing_or_huge_file_is_one_sentence(tmp_path):
+    with pytest.raises(BundleError, match="cannot be read"):
+        read_persona(tmp_path / "nobody.toml")
+    path = tmp_path / "huge.toml"
+    path.write_text("#" * (2 << 20))
+    with pytest.raises(BundleError, match="larger than"):
+        read_persona(path)
+
+
+def test_bundles_hold_what_a_persona_says_and_old_ones_stay_readable(packed):
+    value = json.loads(packed)
+    assert set(value["persona"]) == {"name", "greeting", "notes"}, "as programs before wrote it"
+    assert Manifest.from_json(packed).to_json() == packed
+    value["persona"] |= {"manner": "Warm.", "voice": {"kokoro": "af_heart"}}
+    manifest = Manifest.from_json(json.dumps(value).encode())
+    assert manifest.persona.manner == "Warm." and manifest.persona.forbidden == ()
+    assert json.loads(manifest.to_json())["persona"] == value["persona"]
+    for key, entry in [("languages", ["Klingon"]), ("forbidden", ["|"]), ("mood", "happy")]:
+        wrong = value | {"persona": value["persona"] | {key: entry}}
+        with pytest.raises(BundleError, match=r"manifest\.json"):
+            Manifest.from_json(json.dumps(wrong).encode())
+
+
+@pytest.fixture
+def packed(tmp_path):
+    from ico3d.bundle.format import Bundle
+
+    from .random_bundle import write_random_bundle
+
+    write_random_bundle(tmp_path / "a.ico3d")
+    return Bundle.open(tmp_path / "a.ico3d").manifest.to_json()

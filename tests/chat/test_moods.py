@@ -1,0 +1,54 @@
+"""Brows that follow a mood."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ico3d.chat.moods import BROWS, EASE, Moods, brows
+from ico3d.common.expression import EYE_NAMES
+
+
+def rows(count, start=0.0):
+    return start + np.arange(count) / 25
+
+
+def test_a_mood_eases_in_from_the_next_row_and_stays():
+    moods = Moods()
+    assert not moods.values(rows(50)).any()
+    moods.set("serious")
+    values = moods.values(rows(25, 2.0))
+    assert values.shape == (25, len(EYE_NAMES)) and not values[0].any()
+    assert values[round(EASE * 25) :] == pytest.approx(np.tile(brows("serious"), (15, 1)))
+    assert (np.diff(values[:11, 0]) > 0).all()
+    assert moods.values(rows(5, 3.0)) == pytest.approx(np.tile(brows("serious"), (5, 1)))
+
+
+def test_it_ends_with_the_utterance_and_eases_to_another_before():
+    moods = Moods()
+    moods.set("surprised")
+    moods.values(rows(25))
+    moods.set("neutral")
+    values = moods.values(rows(25, 1.0))
+    assert values[0] == pytest.approx(brows("surprised")) and not values[-1].any()
+    moods.set("happy")
+    moods.end()
+    assert not moods.values(rows(25, 2.0)).any()
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(st.tuples(st.sampled_from(list(BROWS)), st.integers(0, 20)), max_size=12))
+def test_moods_never_jump_however_they_are_cut(changes):
+    moods, made, at = Moods(), [np.zeros((1, 7))], 0
+    for name, count in changes:
+        moods.set(name)
+        made.append(moods.values(rows(count, at / 25)))
+        at += count
+    values = np.concatenate(made)
+    assert np.abs(np.diff(values, axis=0)).max(initial=0) <= 0.6 * 1.5 / (EASE * 25) + 1e-6
+    assert values.min() >= 0 and values.max() <= 0.6 + 1e-6
+
+
+def test_only_brows_move():
+    lids = [EYE_NAMES.index(name) for name in ("eyeBlinkLeft", "eyeBlinkRight")]
+    assert all(not brows(name)[lids].any() for name in BROWS) and not brows("neutral").any()

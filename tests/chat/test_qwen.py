@@ -1,0 +1,137 @@
+"""The language model in process: a real Qwen2, tiny, through transformers' own API."""
+
+import asyncio
+import time
+
+import pytest
+from pipecat.processors.aggregators.llm_context import LLMContext
+
+from ico3d.bundle.persona import Persona
+from ico3d.chat.protocol import Answer, Interrupt, Speech, Stop, Text
+from ico3d.chat.services import choose, chosen
+from ico3d.chat.services.language import PROVIDERS, qwen
+from ico3d.chat.services.provider import Context
+from ico3d.chat.settings import ChatSettings, Choice
+from ico3d.errors import MissingModelError
+from ico3d.measure.page import open_page
+
+from .conftest import serving
+
+pytest.importorskip("transformers")
+from .tiny_qwen import write_tiny_qwen
+
+ANSWER = "My name is Ada. Nice to meet you, dear visitor!"
+CONTEXT = Context(Persona("Ada"), None, None)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("tiny")
+    write_tiny_qwen(path, ANSWER)
+    return path
+
+
+@pytest.fixture(scope="module")
+def endless(tmp_path_factory):
+    path = tmp_path_factory.mktemp("endless")
+    write_tiny_qwen(path, " one, two; three. Then", for_ever=True)
+    return path
+
+
+def settings_of(folder, **options):
+    return ChatSettings(language=Choice("qwen", {"model": str(folder), **options}))
+
+
+async def test_it_answers_aloud_and_is_loaded_once_for_all(bundle, folder):
+    from ico3d.chat.services.language.in_process import load
+
+    async with serving(bundle, settings_of(folder)) as (url, _):
+        page, welcome = await open_page(url, microphone=False)
+        assert welcome.services.language.name == f"a model in this process ({folder.name})"
+        assert not welcome.services.language.stand_in
+        await page.heard(0)
+        await page.send(Text("who are you?"))
+        await page.heard(1)
+        said = [m.text for m in page.messages(Answer) if m.utterance == 1]
+        assert said == ["My name is Ada.", "Nice to meet you, dear visitor!"]
+        await page.close()
+    assert load(str(folder)) is load(str(folder))
+
+
+async def test_an_interruption_stops_the_generation(bundle, endless):
+    from ico3d.chat.services.language.in_process import load
+
+    model = load(str(endless)).model
+    async with serving(bundle, settings_of(endless, max_tokens=3000)) as (url, _):
+        page, _ = await open_page(url, microphone=False)
+        await page.heard(0)
+        made = counted(model)
+        await page.send(Text("count"))
+        await page.wait(Speech, where=lambda m: m.utterance == 1)
+        await page.send(Interrupt(None))
+        await page.wait(Stop, where=lambda m: m.utterance == 1)
+        await asyncio.sleep(0.3)
+        then = len(made)
+        await asyncio.sleep(0.5)
+        assert 0 < then < 3000 and len(made) == then
+        await page.close()
+
+
+def counted(model):
+    """Grows by one with each token that a model makes."""
+    made = []
+    model.register_forward_hook(lambda *_: made.append(time.monotonic()))
+    return made
+
+
+async def test_tokens_stream_and_stop_when_nobody_reads_on(endless):
+    from ico3d.chat.services.language.in_process import load
+
+    loaded = load(str(endless))
+    stream = loaded.stream([{"role": "user", "content": "count"}], 2000)
+    first = [await anext(stream) for _ in range(4)]
+    assert "".join(first).replace(" ", "").startswith("one,two;")
+    made = counted(loaded.model)
+    await stream.aclose()
+    await asyncio.sleep(0.2)
+    then = len(made)
+    await asyncio.sleep(0.3)
+    assert len(made) == then < 2000
+
+
+async def test_summaries_are_inferred_beside_the_conversation(folder):
+    made = choose(settings_of(folder)).language.make(CONTEXT)
+    context = LLMContext([{"role": "user", "content": "Conversation history: …"}])
+    assert await made.run_inference(context, 100, "Summarise.") == ANSWER
+    assert await made.run_inference(context, 3, "Summarise.") != ANSWER
+
+
+def test_a_failed_generation_ends_its_stream(folder):
+    from ico3d.chat.services.language.in_process import load
+
+    async def broken():
+        async for _ in load(str(folder)).stream([{"role": "user"}], 10):  # no content
+            pass
+
+    with pytest.raises(Exception, match="content"):
+        asyncio.run(asyncio.wait_for(broken(), 5))
+
+
+def test_it_is_the_best_only_where_its_weights_are(folder, tmp_path, monkeypatch):
+    import huggingface_hub.constants
+
+    monkeypatch.setattr(huggingface_hub.constants, "HF_HUB_CACHE", str(tmp_path / "hub"))
+    assert qwen.hindrance(qwen.Settings(str(folder))) == ""
+    assert "weights" in qwen.hindrance(qwen.Settings())
+    (tmp_path / "config.json").write_text("{}")
+    assert qwen.hindrance(qwen.Settings(str(tmp_path))), "a configuration is no model"
+    with pytest.raises(MissingModelError, match="ico3d weights fetch qwen2"):
+        choose(ChatSettings(language=Choice("qwen"))).language.make(CONTEXT)
+    kept = tmp_path / "hub" / "models--Qwen--Qwen2-0.5B-Instruct"
+    (kept / "snapshots").mkdir(parents=True)
+    (kept / "refs").mkdir()
+    (kept / "refs" / "main").write_text("abc")
+    (kept / "snapshots" / "abc").symlink_to(folder)
+    assert qwen.hindrance(qwen.Settings()) == ""
+    only = {name: PROVIDERS[name] for name in ("qwen", "persona-notes")}
+    assert chosen(only, Choice(), "language").provider.title == "a model in this process"

@@ -1,0 +1,212 @@
+"""Users' tools: what settings may say, and where calls may not go."""
+
+import asyncio
+import contextlib
+
+import pytest
+from fastapi import FastAPI, Request
+from fastapi.responses import RedirectResponse, Response
+
+from ico3d.chat.settings import Memory, read_settings
+from ico3d.chat.tool_settings import Tool
+from ico3d.chat.tools.http import MOST_BYTES, Refused, answer, check_address
+from ico3d.errors import SettingsError
+
+from .scripted_server import running
+
+FILE = """
+allow = ["api.example.org", "127.0.0.1:9000"]
+[memory]
+tokens = 2000
+[[tools]]
+name = "weather"
+description = "The weather of a city."
+url = "https://api.example.org/{city}"
+[tools.parameters]
+type = "object"
+required = ["city"]
+properties = { city = { type = "string" }, days = { type = "integer" } }
+[[tools]]
+name = "light"
+description = "Switches the light."
+url = "http://127.0.0.1:9000/light"
+method = "POST"
+seconds = 2
+"""
+
+
+def test_a_settings_file_holds_tools_and_memory(tmp_path):
+    path = tmp_path / "chat.toml"
+    path.write_text(FILE)
+    settings = read_settings(path)
+    weather, light = settings.tools
+    assert weather.properties == {"city": {"type": "string"}, "days": {"type": "integer"}}
+    assert weather.required == weather.placeholders == ["city"] and weather.method == "GET"
+    assert light == Tool(
+        "light", "Switches the light.", "http://127.0.0.1:9000/light", "POST", seconds=2.0
+    )
+    assert settings.memory == Memory(2000)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"api.example.org", ', "", "api.example.org, which is not in 'allow'"),
+        ('"127.0.0.1:9000"', '"127.0.0.1"', "127.0.0.1:9000, which is not in 'allow'"),
+        ('"light"', '"weather"', "is there twice"),
+        ('"light"', '"mood"', "needs another name"),
+        ('"light"', '"switch it"', "needs another name"),
+        ('"POST"', '"DELETE"', "GET or POST"),
+        ("seconds = 2", "seconds = 0", "seconds"),
+        ('"http://127.0.0.1:9000/light"', '"file:///etc/passwd"', "http or https"),
+        ('"http://127.0.0.1:9000/light"', '"http://me:pw@127.0.0.1:9000/"', "http or https"),
+        ("https://api.example.org/{city}", "https://{city}/", "variable host"),
+        ('required = ["city"]', "", "must require every parameter"),
+        ('type = "object"', 'type = "array"', "JSON schema"),
+        ('name = "light"', "", "'name' is missing"),
+        ("seconds = 2", "retries = 2", "no setting 'retries'"),
+        ("[[tools]]", "[tools]", "."),
+        ("tokens = 2000", "tokens = 3", "at least 200"),
+    ],
+)
+def test_wrong_tools_are_one_sentence(tmp_path, old, new, message):
+    path = tmp_path / "chat.toml"
+    assert old in FILE
+    path.write_text(FILE.replace(old, new))
+    with pytest.raises(SettingsError) as error:
+        read_settings(path)
+    assert message in str(error.value) and "\n" not in str(error.value)
+
+
+class House:
+    """A server with rooms, and what was asked of it."""
+
+    def __init__(self):
+        self.seen, self.other = [], 0
+
+    def app(self):
+        app = FastAPI()
+
+        @app.api_route("/echo/{rest:path}", methods=["GET", "POST"])
+        async def echo(request: Request):
+            body = await request.json() if request.method == "POST" else None
+            self.seen.append((request.scope["raw_path"].decode(), dict(request.query_params), body))
+            return {"ok": True}
+
+        @app.api_route("/go/{where}", methods=["GET", "POST"])
+        async def go(where: str, request: Request):
+            self.seen.append(("/go", dict(request.query_params), None))
+            home = request.url.netloc
+            places = {
+                "home": "/echo/again",
+                "round": "/go/round",
+                "localhost": f"http://localhost:{request.url.port}/echo/",
+                "port": f"http://127.0.0.1:{self.other}/echo/",
+                "file": "file:///etc/passwd",
+                "odd": f"ftp://{home}/",
+            }
+            return RedirectResponse(places[where])
+
+        @app.get("/big")
+        async def big(size: int):
+            return Response("x" * size, media_type="text/plain")
+
+        @app.get("/slow")
+        async def slow():
+            await asyncio.sleep(5)
+
+        @app.get("/none")
+        async def none():
+            return Response("No such page.", 404)
+
+        return app
+
+
+@contextlib.asynccontextmanager
+async def house():
+    """Yields it, and a function that calls a tool at one of its places."""
+    rooms = House()
+    async with running(rooms.app()) as port:
+        allow = (f"127.0.0.1:{port}",)
+
+        async def call(place, arguments=None, method="GET", seconds=5.0, allow=allow):
+            names = {name: {} for name in (arguments or {})}
+            required = [name for name in names if f"{{{name}}}" in place]
+            schema = {"properties": names, "required": required}
+            url = f"http://127.0.0.1:{port}{place}"
+            tool = Tool("t", "Test.", url, method, schema, seconds)
+            return await answer(tool, arguments or {}, allow)
+
+        yield rooms, call
+
+
+async def test_parameters_go_into_path_query_or_body():
+    async with house() as (rooms, call):
+        values = {"a": "São Paulo/../x?y=1#z", "b": 2, "c": [True, "ü"]}
+        assert await call("/echo/{a}", values) == {"status": 200, "body": {"ok": True}}
+        await call("/echo/", values, "POST")
+        await call("/echo/?q={q}", {"q": "a&b=c+d %20#ü"})
+    path, query, _ = rooms.seen[0]
+    assert path == "/echo/S%C3%A3o%20Paulo%2F..%2Fx%3Fy=1%23z", "all of it is one part"
+    assert query == {"b": "2", "c": '[true, "ü"]'}
+    assert rooms.seen[1] == ("/echo/", {}, values)
+    assert rooms.seen[2][1] == {"q": "a&b=c+d %20#ü"}
+
+
+async def test_arguments_that_do_not_fit_are_not_sent():
+    tool = Tool("t", "Test.", "http://127.0.0.1:1/{a}", parameters=SCHEMA)
+    for arguments in ({}, {"a": "x", "b": 1}, {"a": ".."}, {"a": ""}):
+        result = await answer(tool, arguments, ("127.0.0.1:1",))
+        assert set(result) == {"error"} and "reached" not in result["error"]
+
+
+SCHEMA = {"properties": {"a": {"type": "string"}}, "required": ["a"]}
+
+
+async def test_redirects_stay_on_their_host():
+    async with house() as (rooms, call), running(House().app()) as other:
+        rooms.other = other
+        assert (await call("/go/home"))["body"] == {"ok": True}
+        for where in ("localhost", "port", "file", "odd"):
+            assert "leads elsewhere" in (await call(f"/go/{where}"))["error"]
+        assert "redirects too often" in (await call("/go/round"))["error"]
+        assert "redirects what is sent" in (await call("/go/home", {"a": 1}, "POST"))["error"]
+
+
+async def test_time_and_size_are_limited():
+    async with house() as (_, call):
+        assert (await call(f"/big?size={MOST_BYTES}"))["body"] == "x" * MOST_BYTES
+        assert "more than" in (await call(f"/big?size={MOST_BYTES + 1}"))["error"]
+        assert await call("/slow", seconds=0.2) == {"error": "t did not answer within 0.2 seconds."}
+        assert await call("/none") == {"status": 404, "body": "No such page."}
+
+
+async def test_private_addresses_must_be_listed_themselves():
+    async with house() as (rooms, call):
+        assert "private address 127.0.0.1" in (await call("/echo/", allow=()))["error"]
+        assert not rooms.seen
+    async with running(House().app()) as port:
+        tool = Tool("t", "Test.", f"http://localhost:{port}/echo/")
+        refused = await answer(tool, {}, ())
+        assert refused["error"].startswith("t cannot be reached: localhost is at the private")
+        assert (await answer(tool, {}, (f"localhost:{port}",)))["status"] == 200
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["127.0.0.1", "10.1.2.3", "192.168.0.1", "169.254.169.254", "::1", "fe80::1%eth0",
+     "::ffff:127.0.0.1", "0.0.0.0", "224.0.0.1", "fd00::1", "100.64.0.1"],
+)  # fmt: skip
+def test_addresses_that_lead_into_the_house(address):
+    with pytest.raises(Refused):
+        check_address(address, "api.example.org", 443, ("api.example.org", "localhost"))
+
+
+def test_listed_addresses_are_called_at_their_port_only():
+    check_address("93.184.215.14", "example.org", 443, ())
+    check_address("192.168.0.5", "nas.local", 80, ("nas.local", "192.168.0.5"))
+    check_address("::1", "localhost", 9000, ("localhost:9000",))
+    check_address("fd00::5", "nas.local", 8000, ("[fd00::5]:8000",))
+    for port, allow in [(9000, ("127.0.0.1",)), (80, ("127.0.0.1:9000",))]:
+        with pytest.raises(Refused):
+            check_address("127.0.0.1", "127.0.0.1", port, allow)
