@@ -14,6 +14,7 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from ico3d.bundle.persona import Persona
+from ico3d.chat import protocol
 from ico3d.chat.codec import decode_server, encode
 from ico3d.chat.face import open_face
 from ico3d.chat.guard import is_own
@@ -158,7 +159,12 @@ async def farewell(socket):
         (b"\xff\xff\xff\xff", 1008),
         (json.dumps({"type": "text", "text": "a"}), 1008),
         (json.dumps({"type": "hello", "version": 99, "session": None, "last_index": -1}), 1008),
-        (json.dumps({"type": "hello", "version": 1, "session": 5, "last_index": -1}), 1008),
+        (
+            json.dumps(
+                {"type": "hello", "version": protocol.VERSION, "session": 5, "last_index": -1}
+            ),
+            1008,
+        ),
         ("x" * 20_000, 1009),
         (b"x" * 70_000, 1009),
     ],

@@ -1,6 +1,6 @@
 // Written by `python -m ico3d.chat.protocol_typescript` from src/ico3d/chat/protocol.py: edit that.
 
-export const VERSION = 1;
+export const VERSION = 2;
 export const MICROPHONE_RATE = 16000; // Hz
 export const SPEECH_RATE = 24000; // Hz
 export const EXPRESSION_FPS = 25; // rows per second

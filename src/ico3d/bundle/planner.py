@@ -246,7 +246,7 @@ class Planner:
         )
         spare = self._left - travel(way, self._cruise)
         if spare > LINGER:
-            self._go(self._home, speed)
+            self._go(self._home, speed if travel(way, speed) <= self._left else self._cruise)
         elif self._end is None and spare > SAME:
             self._hold(min(until - self._time, spare))
         else:

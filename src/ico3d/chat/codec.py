@@ -12,7 +12,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from ico3d.chat import protocol
-from ico3d.chat.protocol import ClientMessage, Length, Range, ServerMessage, Tensor
+from ico3d.chat.marks import Length, Range, Tensor
+from ico3d.chat.protocol import ClientMessage, ServerMessage
 from ico3d.errors import ProtocolError
 
 HEADER_LENGTH = struct.Struct("<I")

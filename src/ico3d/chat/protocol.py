@@ -5,11 +5,23 @@ This file is the one source: `codec.py` reads the annotations to encode, decode 
 """
 
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 
-VERSION = 1
+from ico3d.chat.marks import (
+    MAX_EXACT,
+    Count,
+    Length,
+    Milliseconds,
+    Name,
+    Range,
+    Seconds,
+    Sentence,
+    Tensor,
+)
+
+VERSION = 2
 MICROPHONE_RATE = 16_000  # Hz, PCM16 mono from the page
 SPEECH_RATE = 24_000  # Hz, PCM16 mono to the page
 EXPRESSION_FPS = 25  # rows per second of an utterance's sound
@@ -20,46 +32,6 @@ MAX_BURST = 200  # messages it may send at once
 RESUME_SECONDS = 30  # how long a session waits for its page to come back
 MAX_AHEAD_SECONDS = 2.0  # how far speech may run ahead of its playback
 MAX_POINTS = 500  # of a timeline in one message
-MAX_EXACT = 2**53  # largest whole number JavaScript holds
-
-
-@dataclass(frozen=True)
-class Range:
-    """Bounds of a number, both included."""
-
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class Length:
-    """Bounds of a text's characters or a list's items, both included."""
-
-    low: int
-    high: int
-
-
-@dataclass(frozen=True)
-class Tensor:
-    """An array in the payload of a binary message; its header field holds the shape.
-
-    Attributes:
-        dtype: numpy name, little-endian: `<i2` or `<f2`.
-        dims: Number of dimensions.
-        max_size: Most elements.
-    """
-
-    dtype: str
-    dims: int
-    max_size: int
-
-
-Count = Annotated[int, Range(0, MAX_EXACT)]
-Seconds = Annotated[float, Range(0, 1e7)]
-Sentence = Annotated[str, Length(0, 4000)]
-LONGEST_NAME = 200
-Name = Annotated[str, Length(1, LONGEST_NAME)]
-Milliseconds = Annotated[float, Range(-1e7, 1e7)]
 
 
 @dataclass(frozen=True)
@@ -404,21 +376,6 @@ class Error:
     fatal: bool
 
 
-CLIENT_MESSAGES = (Hello, Audio, Text, Interrupt, Clock, Talk, Heard, Deaf)
-SERVER_MESSAGES = (
-    Welcome,
-    State,
-    Transcript,
-    Answer,
-    Speech,
-    Timeline,
-    End,
-    Stop,
-    Pause,
-    Resume,
-    Metrics,
-    Error,
-)
 ClientMessage = Hello | Audio | Text | Interrupt | Clock | Talk | Heard | Deaf
 ServerMessage = (
     Welcome
@@ -434,3 +391,5 @@ ServerMessage = (
     | Metrics
     | Error
 )
+CLIENT_MESSAGES = get_args(ClientMessage)
+SERVER_MESSAGES = get_args(ServerMessage)

@@ -12,6 +12,7 @@ from typing import Any
 from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.chat import protocol
+from ico3d.chat.marks import LONGEST_NAME
 from ico3d.chat.services import language, recognition, voice
 from ico3d.chat.services.provider import Context, Provider, Table
 from ico3d.chat.services.recognition import browser
@@ -46,7 +47,7 @@ class Service:
         """As the page is told."""
         title, detail = self.provider.title, self.provider.detail(self.options)
         name = f"{title} ({detail})" if detail else title
-        return protocol.Service(name[: protocol.LONGEST_NAME], self.provider.stand_in)
+        return protocol.Service(name[:LONGEST_NAME], self.provider.stand_in)
 
 
 @dataclass(frozen=True)
