@@ -98,11 +98,12 @@ async def test_a_turn_without_words_ends_when_that_is_known(bundle, question, gi
         page.say(question)
         await states(page, "listening", "idle")
         assert not given_up
-        assert not page.messages(Transcript) and not page.messages(Speech)
+        assert not page.messages(Transcript)
+        assert bool(page.messages(Speech)) == (words == "fails")  # it apologises
         await page.close()
 
 
-async def test_two_stretches_in_the_works_make_one_question(bundle, question, given_up):
+async def test_two_stretches_in_the_works_make_one_question(bundle, question):
     adapt = scripted(1.0, "What is", "your name?")
     async with serving(bundle, adapt=adapt) as (url, _):
         page, _ = await open_page(url)
@@ -114,5 +115,4 @@ async def test_two_stretches_in_the_works_make_one_question(bundle, question, gi
         assert answer.text == "I am Random."
         await asyncio.sleep(0.5)
         assert [m.text for m in page.messages(Answer)] == ["I am Random."]
-        assert not given_up
         await page.close()
