@@ -99,7 +99,8 @@ async def test_a_turn_without_words_ends_when_that_is_known(bundle, question, gi
         await states(page, "listening", "idle")
         assert not given_up
         assert not page.messages(Transcript)
-        assert bool(page.messages(Speech)) == (words == "fails")  # it apologises
+        if words == "fails":
+            await page.wait(Speech)  # an apology
         await page.close()
 
 
