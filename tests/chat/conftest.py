@@ -105,3 +105,18 @@ async def serving(
 async def served(bundle):
     async with serving(bundle) as (url, sessions):
         yield url, sessions
+
+
+@pytest.fixture
+def given_up(monkeypatch):
+    """The turns that pipecat ended because nothing was heard of them any more."""
+    from pipecat.processors.aggregators.llm_response_universal import LLMUserAggregator
+
+    turns, told = [], LLMUserAggregator._on_user_turn_stop_timeout
+
+    async def give_up(self, controller):
+        turns.append(controller)
+        await told(self, controller)
+
+    monkeypatch.setattr(LLMUserAggregator, "_on_user_turn_stop_timeout", give_up)
+    return turns

@@ -60,6 +60,15 @@ async def test_partial_words_are_taken_when_no_more_come(bundle, question):
         await page.close()
 
 
+async def test_a_voice_without_words_ends_its_turn(bundle, question, given_up):
+    async with serving(bundle, BROWSER, adapt=silent) as (url, _):
+        page, _ = await open_page(url)
+        await spoken(page, question)
+        await page.wait(State, where=lambda m: m.state == "idle")
+        assert not given_up and not page.messages(Transcript)
+        await page.close()
+
+
 async def test_words_without_a_voice_are_the_avatars_own(bundle):
     async with serving(bundle, BROWSER, adapt=silent) as (url, _):
         page, _ = await open_page(url)

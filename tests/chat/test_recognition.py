@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from pipecat.frames.frames import TranscriptionFrame
-from pipecat.processors.aggregators.llm_response_universal import LLMUserAggregator
 from pipecat.services.stt_service import SegmentedSTTService
 from pipecat.utils.time import time_now_iso8601
 
@@ -66,19 +65,6 @@ def scripted(delay, *words):
     return adapt
 
 
-@pytest.fixture
-def given_up(monkeypatch):
-    """The turns that pipecat ended because nothing was heard of them any more."""
-    turns, told = [], LLMUserAggregator._on_user_turn_stop_timeout
-
-    async def give_up(self, controller):
-        turns.append(controller)
-        await told(self, controller)
-
-    monkeypatch.setattr(LLMUserAggregator, "_on_user_turn_stop_timeout", give_up)
-    return turns
-
-
 async def states(page, *wanted):
     """When the page was told each of some states in turn."""
     times, since = [], 0
@@ -89,7 +75,7 @@ async def states(page, *wanted):
     return times
 
 
-@pytest.mark.parametrize("delay", [1.0, 2.6])
+@pytest.mark.parametrize("delay", [1.0, 4.0])
 async def test_the_turn_ends_with_its_transcript(bundle, question, given_up, delay):
     async with serving(bundle, adapt=scripted(delay, "What is your name?")) as (url, _):
         page, _ = await open_page(url)
@@ -98,7 +84,8 @@ async def test_the_turn_ends_with_its_transcript(bundle, question, given_up, del
         assert transcript.text == "What is your name?"
         _, thinking = await states(page, "listening", "thinking")
         assert at - said >= delay
-        assert thinking - at < 0.1 * slowness() and not given_up
+        assert thinking - at < 0.1 * slowness()
+        assert not given_up
         _, answer = await page.wait(Answer)
         assert answer.text == "I am Random."
         await page.close()
@@ -111,11 +98,13 @@ async def test_a_turn_without_words_ends_when_that_is_known(bundle, question, gi
         page.say(question)
         await states(page, "listening", "idle")
         assert not given_up
-        assert not page.messages(Transcript) and not page.messages(Speech)
+        assert not page.messages(Transcript)
+        if words == "fails":
+            await page.wait(Speech)  # an apology
         await page.close()
 
 
-async def test_two_stretches_in_the_works_make_one_question(bundle, question, given_up):
+async def test_two_stretches_in_the_works_make_one_question(bundle, question):
     adapt = scripted(1.0, "What is", "your name?")
     async with serving(bundle, adapt=adapt) as (url, _):
         page, _ = await open_page(url)
@@ -127,5 +116,4 @@ async def test_two_stretches_in_the_works_make_one_question(bundle, question, gi
         assert answer.text == "I am Random."
         await asyncio.sleep(0.5)
         assert [m.text for m in page.messages(Answer)] == ["I am Random."]
-        assert not given_up
         await page.close()

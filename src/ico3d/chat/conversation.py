@@ -49,7 +49,7 @@ from ico3d.chat.turns.echo_filter import EchoFilter
 from ico3d.chat.turns.strategies import strategies
 from ico3d.speech.runtime import SpeechModel
 
-NOTHING_HEARD = 1.5  # s without words after which a turn that was only noise is over
+NOTHING_HEARD = 3.0  # s without a sign of the recogniser after which a turn is given up
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from collections.abc import AsyncGenerator
 from dataclasses import dataclass
 
 from pipecat.frames.frames import (
+    ErrorFrame,
     Frame,
     InterimTranscriptionFrame,
     ManuallySwitchServiceFrame,
@@ -107,11 +108,13 @@ class BrowserRecognition(STTService):
 
     async def _settle(self) -> None:
         await asyncio.sleep(SETTLED)
-        self._timer = None
         if self._partial is not None:
+            self._timer = None  # it shall not stop itself
             await self._take(self._partial)
-        elif self._understood:  # while he still spoke: nothing more is on its way
-            await self.push_frame(blank())
+            return
+        if not self._understood:
+            await asyncio.sleep(SLOWEST - SETTLED)
+        await self.push_frame(blank())  # nothing more is on its way
 
     async def _restart_timer(self) -> None:
         await self._stop_timer()
@@ -134,6 +137,11 @@ class BrowserOrServer(ServiceSwitcher):
         """Takes the recogniser of the server."""
         super().__init__([BrowserRecognition(), server])
         self._server = server
+        server.add_event_handler("on_error", self._failed)
+
+    async def _failed(self, _: FrameProcessor, error: ErrorFrame) -> None:
+        """Whoever listens for errors knows this processor only."""
+        await self._call_event_handler("on_error", error)
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
         """Switches when it must."""

@@ -17,7 +17,7 @@ from pipecat.utils.time import time_now_iso8601
 
 BLANK = " "
 """Final transcript of speech without words: it ends a turn and adds nothing to the question."""
-SIGN_OF_LIFE = 0.5  # s; pipecat gives up a turn of which nothing is heard for three times as long
+SIGN_OF_LIFE = 0.5  # s; pipecat gives up a turn of which nothing is heard for much longer
 
 
 def blank() -> TranscriptionFrame:
