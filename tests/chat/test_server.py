@@ -183,7 +183,7 @@ async def test_garbage_and_floods_end_their_connection_only(served):
     url, _ = served
     good, _ = await open_page(url, microphone=False)
     await good.wait(Speech)
-    hello = encode(Hello(1, None, -1))
+    hello = encode(Hello(protocol.VERSION, None, -1))
     text = encode(Text("who are you"))
     frames = ["[" * 9999, "null", b"", b"\x02\0\0\0{}", encode(Error("mine", fatal=True)), hello]
     for flood in (frames, [text] * 600):
