@@ -25,7 +25,7 @@ pytestmark = [
     ),
 ]
 ANSWER = "My name is Ada. Nice to meet you, dear visitor!"
-STARTING = 120  # s that it may take: it imports torch
+STARTING = 300  # s that it may take on a busy machine: it imports torch
 
 
 @pytest.fixture(scope="module")
