@@ -16,6 +16,7 @@ from ico3d.chat.moods import BROWS, EASE
 from ico3d.chat.protocol import Answer, End, Interrupt, Speech, State, Stop, Text, Timeline
 from ico3d.chat.services import choose, chosen
 from ico3d.chat.services.language import PROVIDERS, local, openai
+from ico3d.chat.services.language.compatible import MOST_ROUNDS
 from ico3d.chat.services.language.instruction import instruction
 from ico3d.chat.services.provider import Context
 from ico3d.chat.settings import ChatSettings, Choice, Memory
@@ -171,6 +172,16 @@ async def test_a_server_that_knows_no_functions_is_asked_without(bundle):
     assert ["tools" in body for body in script.requests] == [True, False, False]
 
 
+async def test_a_model_that_only_calls_functions_is_made_to_speak(bundle):
+    mood = Call("mood", {"name": "happy"})
+    script = Script(lambda body: [mood] if "tools" in body else ["At last."])
+    async with talking(bundle, script) as page:
+        assert await ask(page, "hi", 0) == ["At last."]
+        assert await ask(page, "hi", 1) == ["At last."]
+    offered = ["tools" in body for body in script.requests]
+    assert offered == 2 * [*[True] * MOST_ROUNDS, False], "each turn anew"
+
+
 async def test_a_users_tool_is_called_and_its_answer_spoken(bundle):
     tools, asked = FastAPI(), []
 
@@ -204,7 +215,7 @@ async def test_the_server_of_this_machine_is_the_best(monkeypatch):
     script = Script(models=("nomic-embed-text", "tiny"))
     async with running(script.app()) as port:
         monkeypatch.setattr(local, "PORTS", (1, port))
-        monkeypatch.setattr(local, "SLOWEST", 5.0)  # this machine may be busy
+        monkeypatch.setattr(local, "QUICK", 5.0)  # this machine may be busy
         service = await asyncio.to_thread(chosen, PROVIDERS, Choice(), "language")
         assert service.provider is PROVIDERS["local"]
         described = await asyncio.to_thread(service.described)

@@ -125,7 +125,7 @@ def test_it_is_the_best_only_where_its_weights_are(folder, tmp_path, monkeypatch
     assert "weights" in qwen.hindrance(qwen.Settings())
     (tmp_path / "config.json").write_text("{}")
     assert qwen.hindrance(qwen.Settings(str(tmp_path))), "a configuration is no model"
-    with pytest.raises(MissingModelError, match="ico3d weights fetch qwen2-0.5b"):
+    with pytest.raises(MissingModelError, match="ico3d weights fetch qwen2"):
         choose(ChatSettings(language=Choice("qwen"))).language.make(CONTEXT)
     kept = tmp_path / "hub" / "models--Qwen--Qwen2-0.5B-Instruct"
     (kept / "snapshots").mkdir(parents=True)

@@ -77,6 +77,15 @@ async def test_http_serves_the_bundle_and_nothing_else(served, bundle):
         assert foreign.status_code == 403
 
 
+async def test_a_personas_file_shows_its_name_and_keeps_its_notes(bundle):
+    ada = Persona("Ada", "Hello.", ("secret => The safe is open.",), "Sly.", forbidden=("keys",))
+    async with serving(bundle, persona=ada) as (url, _), httpx.AsyncClient(base_url=url) as client:
+        shown = (await client.get("/bundle/manifest.json")).json()
+    assert shown["persona"] == {"name": "Ada", "greeting": "Hello.", "notes": []}
+    own = json.loads(bundle.read("manifest.json"))
+    assert shown == own | {"persona": shown["persona"]}
+
+
 async def test_figures_are_for_those_who_may_see_the_page(served):
     url, _ = served
     page, welcome = await open_page(url, microphone=False)
@@ -95,15 +104,6 @@ async def test_figures_are_for_those_who_may_see_the_page(served):
             lines = (await client.get("/metrics")).text.splitlines()
     assert "ico3d_sessions 1.0" in lines  # it may come back
     assert 'ico3d_errors_total{where="protocol"} 1.0' in lines
-
-
-async def test_a_personas_file_shows_its_name_and_keeps_its_notes(bundle):
-    ada = Persona("Ada", "Hello.", ("secret => The safe is open.",), "Sly.", forbidden=("keys",))
-    async with serving(bundle, persona=ada) as (url, _), httpx.AsyncClient(base_url=url) as client:
-        shown = (await client.get("/bundle/manifest.json")).json()
-    assert shown["persona"] == {"name": "Ada", "greeting": "Hello.", "notes": []}
-    own = json.loads(bundle.read("manifest.json"))
-    assert shown == own | {"persona": shown["persona"]}
 
 
 async def test_a_body_alone_is_served_without_a_conversation(body):

@@ -23,12 +23,14 @@ from pipecat.observers.base_observer import FramePushed
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 from prometheus_client.parser import text_string_to_metric_families
 
+from ico3d.bundle.persona import Persona
 from ico3d.chat.frames import SpeechFrame
 from ico3d.chat.monitor import Monitor, TurnLog
 from ico3d.chat.protocol import Metrics
+from ico3d.chat.services.provider import Context
+from ico3d.chat.services.voice import espeak
 from ico3d.chat.timing import PARTS, TurnObserver
 from ico3d.errors import SettingsError
-from ico3d.measure.scripted import Script, Voice
 
 
 class Watched:
@@ -149,7 +151,8 @@ async def test_an_interruption_ends_a_turn(watched):
 
 
 async def test_errors_are_counted_by_who_had_them(watched):
-    await watched.see(0, ErrorFrame("x"), source=Voice(Script()))
+    voice = espeak.make(espeak.Settings(), Context(Persona("Ada"), None, None))
+    await watched.see(0, ErrorFrame("x"), source=voice)
     await watched.see(0, ErrorFrame("x"), source=FrameProcessor())
     assert watched.failures == ["voice", "pipeline"]
 

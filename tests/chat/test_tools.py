@@ -145,10 +145,12 @@ async def test_parameters_go_into_path_query_or_body():
         values = {"a": "São Paulo/../x?y=1#z", "b": 2, "c": [True, "ü"]}
         assert await call("/echo/{a}", values) == {"status": 200, "body": {"ok": True}}
         await call("/echo/", values, "POST")
+        await call("/echo/?q={q}", {"q": "a&b=c+d %20#ü"})
     path, query, _ = rooms.seen[0]
     assert path == "/echo/S%C3%A3o%20Paulo%2F..%2Fx%3Fy=1%23z", "all of it is one part"
     assert query == {"b": "2", "c": '[true, "ü"]'}
     assert rooms.seen[1] == ("/echo/", {}, values)
+    assert rooms.seen[2][1] == {"q": "a&b=c+d %20#ü"}
 
 
 async def test_arguments_that_do_not_fit_are_not_sent():

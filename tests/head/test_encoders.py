@@ -49,7 +49,7 @@ def test_a_head_learns_from_them_and_is_served_as_it_was_trained(tiny, tmp_path,
     assert loaded.encoder == encoder and loaded.encoder_sha256 == frozen.sha256
     graph = export_speech(loaded.adaptor, frozen)
     make_servable(frozen)
-    model = open_speech(graph, encoder, frozen.sha256)
+    model = open_speech(graph, encoder, frozen.sha256, "features")
     np.testing.assert_allclose(model.silent_expression, loaded.neutral()[:32], atol=1e-5)
     sound = tiny.audio()
     rows = model.expressions(sound.samples, sound.rate)

@@ -148,7 +148,7 @@ def served(at_home):
         encoder = load_encoder("ave")
         make_servable(encoder)
         graph = export_speech(adaptor, encoder)
-        return open_speech(graph, "ave", encoder.sha256), graph, encoder
+        return open_speech(graph, "ave", encoder.sha256, "features"), graph, encoder
 
 
 def test_all_of_it_is_what_a_slow_reading_says(at_home, served):
@@ -194,7 +194,7 @@ def test_a_server_needs_no_torch_and_tells_the_licence_once(served, at_home, tmp
         "from ico3d.speech.runtime import open_speech\n"
         "for _ in range(2):\n"
         f"    model = open_speech(Path({str(tmp_path / 'speech.onnx')!r}).read_bytes(),\n"
-        f"        'ave', {served[2].sha256!r})\n"
+        f"        'ave', {served[2].sha256!r}, 'features')\n"
         "print(model.expressions(np.zeros(16000, np.float32), 16000).shape)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -208,7 +208,7 @@ def test_an_encoder_that_is_not_here_is_one_sentence(served, tmp_path, monkeypat
     _, graph, encoder = served
     with warnings.catch_warnings(), pytest.raises(MissingModelError) as caught:
         warnings.simplefilter("ignore")
-        open_speech(graph, "ave", encoder.sha256)
+        open_speech(graph, "ave", encoder.sha256, "features")
     assert str(caught.value) == (
         f"this avatar listens with the speech encoder 'ave', which is not here as "
         f"'ave-{encoder.sha256[:12]}.onnx': make it with ico3d weights onnx ave where torch is "

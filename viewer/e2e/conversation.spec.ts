@@ -60,6 +60,29 @@ describe('a typed question', () => {
     expect(spread(faces.slice(-8))).toBeLessThan(1e-6); // at rest again
   });
 
+  test('falls silent while somebody may be speaking, and goes on where it stopped', async () => {
+    const { page } = browser;
+    await page.fill('#text', SENTENCE);
+    await page.keyboard.press('Enter');
+    const heard = ({ loudness }: { loudness: { level: number }[] }) =>
+      loudness.slice(-20).every(({ level }) => level > SILENCE);
+    await until(browser, heard, 30_000);
+    const [pause, resume] = (['pause', 'resume'] as const).map((what) => () => page.evaluate((what) => {
+      const { player } = window.ico3d!.conversation!;
+      player[what](player.current!);
+      return { at: performance.now(), seconds: player.heard()!.seconds };
+    }, what));
+    const before = await pause!();
+    await page.waitForTimeout(1500);
+    const after = await resume!();
+    expect(after.seconds - before.seconds).toBeLessThan(0.4); // what was on its way to the ear, no more
+    const { loudness } = await until(browser, heard, 30_000);
+    const meanwhile = loudness.filter(({ at }) => at > before.at + 250 && at < after.at);
+    expect(meanwhile.length).toBeGreaterThan(10);
+    expect(Math.max(...meanwhile.map(({ level }) => level))).toBeLessThan(SILENCE);
+    await page.keyboard.press('Escape');
+  });
+
   test('can be cut short with Escape', async () => {
     const { page } = browser;
     await page.fill('#text', SENTENCE);

@@ -99,8 +99,15 @@ class Demo:
             BundleError: If the package came without it.
         """
         demo = Path(packaged.NAME)
-        where = (self.host, self.port, self.settings, self.persona)
-        Serve(demo, *where, open=self.open, verbose=self.verbose).run()
+        Serve(
+            demo,
+            self.host,
+            self.port,
+            self.settings,
+            self.persona,
+            open=self.open,
+            verbose=self.verbose,
+        ).run()
 
 
 def described(services, offers) -> list[str]:

@@ -115,7 +115,10 @@ def open_face(bundle: Bundle) -> tuple[HeadInfo, SpeechModel | None]:
     if info is None:
         raise BundleError(f"the bundle of '{bundle.manifest.name}' has no head to talk with.")
     speech = bundle.manifest.speech
-    return info, open_speech(bundle.read(SPEECH), speech.encoder, speech.sha256) if speech else None
+    if speech is None:
+        return info, None
+    about = speech.encoder, speech.sha256, speech.input
+    return info, open_speech(bundle.read(SPEECH), *about)
 
 
 @dataclass(frozen=True)

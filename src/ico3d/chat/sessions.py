@@ -5,7 +5,7 @@ import secrets
 from dataclasses import replace
 
 from ico3d.chat.conversation import Avatar, Conversation
-from ico3d.chat.freeing import give_back
+from ico3d.chat.heap import give_back
 from ico3d.chat.monitor import Monitor, Visitor
 from ico3d.chat.page import Outbox, Page
 from ico3d.chat.protocol import RESUME_SECONDS, Error, Hello, Offer

@@ -109,7 +109,7 @@ def _avatar(bundle: Bundle) -> Subject:
     speech = bundle.manifest.speech
     if speech is None:
         raise SettingsError(f"the head of '{bundle.manifest.name}' is not driven by speech.")
-    model = open_speech(bundle.read(SPEECH), speech.encoder, speech.sha256)
+    model = open_speech(bundle.read(SPEECH), speech.encoder, speech.sha256, speech.input)
     return Subject(model, model.expressions)
 
 

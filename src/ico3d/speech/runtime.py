@@ -203,19 +203,20 @@ class StreamingExpressions:
         return silent + gains * (rows - silent)
 
 
-def open_speech(model: bytes, encoder: str, sha256: str) -> SpeechModel:
+def open_speech(model: bytes, encoder: str, sha256: str, takes: str) -> SpeechModel:
     """Opens a bundle's speech model with the encoder that it needs from this machine.
 
     Args:
         model: `speech.onnx`.
         encoder: The encoder's name.
         sha256: Of the encoder's weights.
+        takes: What the model takes: `mel`, the encoder being inside, or `features`.
 
     Raises:
         MissingModelError: If the encoder is not in the bundle and not on this machine.
         ModelError: If a model cannot be used.
     """
-    if encoder == "builtin":  # it is inside
+    if takes == "mel":
         return SpeechModel(model)
     weights = TABLE.get(encoder)
     if weights is not None and weights.notice:

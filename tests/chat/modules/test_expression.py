@@ -21,7 +21,7 @@ from ..conftest import serving as serving_avatar
 from .serving import expression_app, serving
 
 RATE = 24_000
-SHORT = 0.3
+LONG, SHORT = 5.0, 0.3  # s to wait for a server that answers, and for one that does not
 
 
 @pytest.fixture(scope="module")
@@ -51,8 +51,8 @@ def local(model, sound):
     return np.concatenate([*(stream.push(floats(piece)) for piece in sound), stream.finish()])
 
 
-def mouth(url, model, sha256, **more):
-    return RemoteMouth(Expression("remote", url, timeout=SHORT), model, sha256, **more)
+def mouth(url, model, sha256, timeout=LONG, **more):
+    return RemoteMouth(Expression("remote", url, timeout=timeout), model, sha256, **more)
 
 
 def remote(made, sound, between=None):
@@ -140,7 +140,8 @@ NAN = np.full((1, 32), np.nan, np.float32).tobytes()
 async def test_any_nonsense_is_answered_by_the_own_model(model, sha256, sound, knows, answer):
     own = {"model": sha256 if knows else "0" * 64, "rate": RATE, "fps": 25, "size": 32}
     async with serving(Odd(json.dumps(own), answer)) as url:
-        rows, lips = await asyncio.to_thread(remote, mouth(url, model, sha256), sound)
+        made = mouth(url, model, sha256, SHORT if answer is None else LONG)
+        rows, lips = await asyncio.to_thread(remote, made, sound)
     assert lips._own is not None
     np.testing.assert_allclose(rows, local(model, sound), atol=1e-5)
 

@@ -79,7 +79,8 @@ def bundle_actor(bundle: Bundle) -> Actor:
     head, body = manifest.head, manifest.body
     lips = None
     if speech := manifest.speech:
-        lips = open_speech(bundle.read(SPEECH), speech.encoder, speech.sha256).expressions
+        about = speech.encoder, speech.sha256, speech.input
+        lips = open_speech(bundle.read(SPEECH), *about).expressions
     idle = np.array(head.idle_expression if head else (), np.float32)
     portrait = manifest.camera
     if bundle.manifest.is_whole:

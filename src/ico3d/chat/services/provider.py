@@ -3,7 +3,6 @@
 import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from pipecat.processors.frame_processor import FrameProcessor
@@ -11,7 +10,7 @@ from pipecat.processors.frame_processor import FrameProcessor
 from ico3d.bundle.animation import Animation
 from ico3d.bundle.manifest import HeadInfo
 from ico3d.bundle.persona import Persona
-from ico3d.common.weights import TABLE, cached
+from ico3d.common.weights import model_of
 from ico3d.errors import MissingModelError
 
 
@@ -45,22 +44,11 @@ def lacks_package(package: str, extra: str) -> str:
 
 def lacks_weights(name: str) -> str:
     """What hinders a provider that needs weights: nothing, or that they are not here."""
-    if cached(name) is not None:
-        return ""
-    licence = TABLE[name].licence
-    return f"the weights '{name}' are not here: ico3d weights fetch {name} ({licence})."
-
-
-def weights_folder(name: str) -> Path:
-    """Where the files of some weights lie; nothing is downloaded while somebody waits.
-
-    Raises:
-        MissingModelError: If they are not here.
-    """
-    folder = cached(name)
-    if folder is None:
-        raise MissingModelError(lacks_weights(name))
-    return folder
+    try:
+        model_of(name)
+    except MissingModelError as error:
+        return str(error)
+    return ""
 
 
 def nothing(settings: Any) -> str:

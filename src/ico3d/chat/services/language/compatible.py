@@ -9,6 +9,9 @@ from pipecat.adapters.llm.services.open_ai_adapter import OpenAILLMInvocationPar
 from pipecat.processors.aggregators.llm_context import LLMContext
 from pipecat.services.openai.llm import OpenAILLMService
 
+MOST_ROUNDS = 4
+"""How often in a turn a model may call functions before it must speak."""
+
 
 class CompatibleModel(OpenAILLMService):
     """A language model that goes without functions where its server cannot call any."""
@@ -37,7 +40,7 @@ class CompatibleModel(OpenAILLMService):
     ) -> dict[str, Any]:
         """The request, without functions where there are none."""
         params = super().build_chat_completion_params(params_from_context)
-        if not self._functions_allowed:
+        if not self._functions_allowed or rounds(params["messages"]) >= MOST_ROUNDS:
             for name in ("tools", "tool_choice"):
                 params.pop(name, None)
         return params
@@ -52,3 +55,13 @@ class CompatibleModel(OpenAILLMService):
             logger.warning(f"{self}: goes on without functions, the server refuses them: {error}")
             self._functions_allowed = False
             return await super().get_chat_completions(context)
+
+
+def rounds(messages: list[dict[str, Any]]) -> int:
+    """How often functions were called since the visitor spoke."""
+    count = 0
+    for message in reversed(messages):
+        if message["role"] == "user":
+            break
+        count += "tool_calls" in message
+    return count

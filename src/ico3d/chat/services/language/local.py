@@ -11,7 +11,8 @@ from ico3d.errors import SettingsError
 
 PORTS = (11434, 8000, 8080)
 """Where such servers are as a rule: Ollama; vLLM and `transformers serve`; llama.cpp."""
-SLOWEST = 0.25  # s until one of them answers
+QUICK = 0.25  # s until one answers that is to be the best by itself
+PATIENT = 2.0  # s until one answers that was chosen
 
 
 @dataclass(frozen=True)
@@ -27,22 +28,22 @@ class Settings:
     functions: bool = True
 
 
-def find(settings: Settings) -> tuple[str, str] | None:
-    """Address and model of the first server that answers."""
-    found = first_server([f"http://127.0.0.1:{port}/v1" for port in PORTS], SLOWEST)
+def find(settings: Settings, seconds: float) -> tuple[str, str] | None:
+    """Address and model of the first server that answers within some seconds."""
+    found = first_server([f"http://127.0.0.1:{port}/v1" for port in PORTS], seconds)
     return found and (found[0], settings.model or found[1])
 
 
 def hindrance(settings: Settings) -> str:
     """That none answers now, if so."""
-    if find(settings) is not None:
+    if find(settings, QUICK) is not None:
         return ""
     return f"none answers on the ports {', '.join(map(str, PORTS))}: start Ollama, for example."
 
 
 def detail(settings: Settings) -> str:
     """For the visitor's eyes: which model."""
-    found = find(settings)
+    found = find(settings, PATIENT)
     return found[1] if found else settings.model
 
 
@@ -52,7 +53,7 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
     Raises:
         SettingsError: If none answers any more.
     """
-    found = find(settings)
+    found = find(settings, PATIENT)
     if found is None:
         ports = ", ".join(map(str, PORTS))
         raise SettingsError(

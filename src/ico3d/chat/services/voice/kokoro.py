@@ -8,8 +8,9 @@ from typing import Any
 from pipecat.audio.utils import create_stream_resampler
 from pipecat.services.tts_service import TTSService
 
-from ico3d.chat.services.provider import Context, lacks_package, lacks_weights, weights_folder
+from ico3d.chat.services.provider import Context, lacks_package, lacks_weights
 from ico3d.chat.services.voice.pieces import LOADING, OPTIONS, SYNCHRONOUS, Prompt
+from ico3d.common.weights import model_of
 from ico3d.errors import MissingExtraError, SettingsError
 
 LANGUAGES = {
@@ -89,7 +90,7 @@ def make(settings: Settings, context: Context) -> TTSService:
             self._kokoro, self._resampler = model, create_stream_resampler()
 
     with LOADING:
-        model = engine(weights_folder("kokoro"))
+        model = engine(model_of("kokoro"))
     if settings.voice not in model.voices:
         names = " or ".join(model.get_voices())
         raise SettingsError(f"chat settings: voice 'kokoro': voice must be {names}.")

@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from ico3d.chat.services.provider import Context, lacks_weights, weights_folder
+from ico3d.chat.services.provider import Context, lacks_weights
 from ico3d.chat.services.voice.cloning import Recording, permitted_recording
 from ico3d.chat.services.voice.pieces import LOADING, PieceVoice, at_speech_rate
+from ico3d.common.weights import model_of
 from ico3d.errors import MissingModelError, SettingsError
 
 LANGUAGES = {
@@ -115,7 +116,7 @@ class Engine:
         return at_speech_rate(samples, rate)
 
     def _load_base(self) -> Any:
-        folder = weights_folder(self._settings.weights)
+        folder = model_of(self._settings.weights)
         from melo.api import TTS
 
         return TTS(
@@ -133,7 +134,7 @@ class Engine:
         return speakers[self._settings.voice]
 
     def _load_converter(self, recording: Recording) -> Any:
-        folder = weights_folder("openvoice")
+        folder = model_of("openvoice")
         import torch
         from openvoice.api import ToneColorConverter
 
