@@ -22,6 +22,7 @@ LOOSE = 3  # frames by which the page's clock may be wrong for a moment
 DECAY = 0.6  # of a room's reverberation per frame: 60 dB in 0.54 s
 SHARE = 0.4  # of the energy that must be no echo in a voice
 VOICED = 3  # such frames among the last 5 make a voice
+CLEAR = 30.0  # how much stronger than its echo and the room a voice is beyond doubt: 15 dB
 AFTER = 15  # frames for which a voice goes on after the last such frame
 LEARN_EVERY = 10  # frames
 SILENT = 1e-9  # mean square
@@ -105,9 +106,12 @@ class EchoGuard:
         if self._fresh >= LEARN_EVERY:
             self._fresh = 0
             self._learn()
-        excess = np.clip(near - MARGIN * self._expected() - ROOM, 0, None).sum()
+        expected = self._expected()
+        excess = np.clip(near - MARGIN * expected - ROOM, 0, None).sum()
         self._marks = np.append(self._marks[1:], excess > SHARE * near.sum() + SILENT)
-        voiced = self._marks.sum() >= VOICED
+        # One frame is enough where hardly any echo is left: words begin with it.
+        clear = near.sum() > CLEAR * (expected + ROOM).sum()
+        voiced = clear or self._marks.sum() >= VOICED
         self._since_voice = 0 if voiced else self._since_voice + 1
 
     def _speaks(self) -> bool:
