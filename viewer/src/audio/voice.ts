@@ -4,7 +4,7 @@ import { Schedule } from './schedule.ts';
 
 const LEAD = Math.round(0.05 * SPEECH_RATE); // more for a first piece: room for the next one to be late
 /** Frames from full sound to silence and back. */
-export const FADE = Math.round(0.02 * SPEECH_RATE);
+export const FADE = Math.round(0.008 * SPEECH_RATE); // with the guard before it, silence comes within 30 ms
 
 /** 100–200 ms of an utterance: sound and face. */
 export type Piece = Omit<SpeechMessage, 'type' | 'index'>;
