@@ -8,7 +8,7 @@ import numpy as np
 
 from ico3d.chat import server
 from ico3d.chat.page import Outbox
-from ico3d.chat.protocol import MICROPHONE_RATE, VERSION, Hello, Speech
+from ico3d.chat.protocol import MICROPHONE_RATE, VERSION, Audio, Hello, Speech
 from ico3d.chat.sessions import Sessions
 from ico3d.chat.settings import ChatSettings
 from ico3d.measure.page import CHUNK, CLOCK_EVERY, Player
@@ -37,7 +37,7 @@ class Guest:
         sound = np.concatenate([pcm, np.zeros(int(silence * MICROPHONE_RATE), np.int16)])
         for at in range(0, len(sound) - CHUNK, CHUNK):
             await asyncio.sleep(CHUNK / MICROPHONE_RATE)
-            await self.session.conversation.hear(sound[at : at + CHUNK].tobytes())
+            await self.session.conversation.hear(Audio(at, sound[at : at + CHUNK]))
         return end
 
     def speech(self):

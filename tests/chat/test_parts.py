@@ -35,17 +35,6 @@ def test_playback_follows_the_pages_clock():
     assert playback.position(12.0) == 3.0 and playback.remaining(12.0) == 0.0
 
 
-def test_late_reports_do_not_make_the_page_seem_behind():
-    playback = Playback()
-    playback.begin(0)
-    playback.sent(72_000, now=10.0)
-    for now, position in [(10.3, 0.25), (10.5, 0.45), (10.8, 0.5)]:  # the last was on its way long
-        playback.clock(0, position, now)
-    assert playback.position(11.0) == pytest.approx(0.7)
-    assert playback.heard(11.0) == pytest.approx(0.95)
-    assert playback.heard(20.0) == 3.0
-
-
 def test_playback_stands_still_while_the_page_is_away():
     playback = Playback()
     playback.begin(0)

@@ -1,6 +1,6 @@
 // Written by `python -m ico3d.chat.protocol_typescript` from src/ico3d/chat/protocol.py: edit that.
 
-export const VERSION = 2;
+export const VERSION = 3;
 export const MICROPHONE_RATE = 16000; // Hz
 export const SPEECH_RATE = 24000; // Hz
 export const EXPRESSION_FPS = 25; // rows per second
@@ -69,6 +69,10 @@ export interface AudioMessage {
   sample: number;
   /** (n,) int16 at 16 kHz, at most 1 s. */
   pcm: Int16Array;
+  /** The utterance that left the loudspeaker when the last sample was recorded; null in silence. */
+  playing: number | null;
+  /** Seconds of it that had been heard by then; 0 in silence. */
+  position: number;
 }
 
 /** A typed question. */

@@ -35,7 +35,7 @@ test('frames of the page mean there what they mean here', () => {
   const folder = scratchFolder();
   const messages = [
     { type: 'hello', version: 1, session: null, last_index: -1, wishes: { voice: 'a' } },
-    { type: 'audio', sample: 640, pcm: Int16Array.from({ length: 640 }, (_, i) => 100 * (i - 320)) },
+    { type: 'audio', sample: 640, pcm: Int16Array.from({ length: 640 }, (_, i) => 100 * (i - 320)), playing: 3, position: 1.25 },
     { type: 'text', text: 'Wie spät ist es? 🙂' },
     { type: 'clock', utterance: 2, position: 0.5, body_time: 0 },
   ] as const;

@@ -144,7 +144,7 @@ class Connection:
     async def _handle(self, session: Session, message: ClientMessage) -> None:
         conversation = session.conversation
         if isinstance(message, Audio):
-            await conversation.hear(message.pcm.tobytes())
+            await conversation.hear(message)
         elif isinstance(message, Clock):
             conversation.clock(message)
         elif isinstance(message, Text):

@@ -138,9 +138,9 @@ class Conversation:
         if self._avatar.persona.greeting.strip():
             await self._input.say(self._avatar.persona.greeting)
 
-    async def hear(self, pcm: bytes) -> None:
+    async def hear(self, sound: protocol.Audio) -> None:
         """Sound from the microphone."""
-        await self._input.hear(pcm)
+        await self._input.hear(sound)
 
     async def ask(self, text: str) -> None:
         """A typed question."""
@@ -191,7 +191,7 @@ class Conversation:
         return Pipeline(
             [
                 self._input,
-                EchoFilter(self._echo, self._speaker.heard, self._now),
+                EchoFilter(self._echo),
                 VoiceDetector(parts.ear),
                 parts.recognition,
                 self._captions,

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from pipecat.frames.frames import DataFrame, SystemFrame
+from pipecat.frames.frames import DataFrame, InputAudioRawFrame, SystemFrame
 
 from ico3d.chat.protocol import SPEECH_RATE
 
@@ -40,6 +40,19 @@ class UtteranceEndFrame(DataFrame):
 
     utterance: int
     samples: int
+
+
+@dataclass
+class MicrophoneFrame(InputAudioRawFrame):
+    """Sound from the microphone, and what the page played when its last sample was recorded.
+
+    Parameters:
+        playing: The utterance; None in silence.
+        position: Seconds of it that had been heard.
+    """
+
+    playing: int | None = None
+    position: float = 0.0
 
 
 @dataclass

@@ -2,7 +2,6 @@
 
 from pipecat.frames.frames import (
     Frame,
-    InputAudioRawFrame,
     InterimTranscriptionFrame,
     LLMFullResponseEndFrame,
     LLMFullResponseStartFrame,
@@ -15,9 +14,9 @@ from pipecat.frames.frames import (
 )
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
-from ico3d.chat.frames import DeafFrame, HeardFrame, TalkFrame
+from ico3d.chat.frames import DeafFrame, HeardFrame, MicrophoneFrame, TalkFrame
 from ico3d.chat.page import Page
-from ico3d.chat.protocol import MICROPHONE_RATE, Transcript
+from ico3d.chat.protocol import MICROPHONE_RATE, Audio, Transcript
 
 
 class PageInput(FrameProcessor):
@@ -28,9 +27,11 @@ class PageInput(FrameProcessor):
         await super().process_frame(frame, direction)
         await self.push_frame(frame, direction)
 
-    async def hear(self, pcm: bytes) -> None:
-        """Sound from the microphone, PCM16 mono 16 kHz."""
-        await self.push_frame(InputAudioRawFrame(pcm, MICROPHONE_RATE, 1))
+    async def hear(self, sound: Audio) -> None:
+        """Sound from the microphone."""
+        pcm = sound.pcm.tobytes()
+        frame = MicrophoneFrame(pcm, MICROPHONE_RATE, 1, sound.playing, sound.position)
+        await self.push_frame(frame)
 
     async def talk(self, pressed: bool) -> None:
         """The button of push to talk."""

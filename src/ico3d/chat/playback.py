@@ -1,10 +1,6 @@
 """How far the page has played an utterance, and how long speech must wait."""
 
-from collections import deque
-
 from ico3d.chat.protocol import MAX_AHEAD_SECONDS, SPEECH_RATE
-
-REPORTS = 6  # of the page that tell together where it is: about 1 s
 
 
 class Playback:
@@ -20,12 +16,10 @@ class Playback:
         self._position = 0.0  # s, where it was at `_at`
         self._at: float | None = None
         self._held = False
-        self._leads: deque[float] = deque(maxlen=REPORTS)  # s of position over clock
 
     def begin(self, utterance: int) -> None:
         """A new utterance; it starts to play with its first piece."""
         self.utterance, self._sent, self._position, self._at = utterance, 0.0, 0.0, None
-        self._leads.clear()
 
     def sent(self, end_sample: int, now: float) -> None:
         """The page has the sound up to `end_sample`."""
@@ -37,7 +31,6 @@ class Playback:
         """The page says where it is; positions it cannot have reached are cut off."""
         if utterance == self.utterance and self._at is not None:
             self._position, self._at = min(position, self._sent), now
-            self._leads.append(self._position - now)
 
     def hold(self, now: float) -> None:
         """The connection dropped: count no further until the page reports again."""
@@ -47,7 +40,6 @@ class Playback:
     def release(self, now: float) -> None:
         """The page is back."""
         self._held = False
-        self._leads.clear()
         if self._at is not None:
             self._at = now
 
@@ -56,12 +48,6 @@ class Playback:
         if self._at is None or self._held:
             return self._position
         return min(self._sent, self._position + max(0.0, now - self._at))
-
-    def heard(self, now: float) -> float:
-        """The same by the report that was the least time on its way: for what must fit exactly."""
-        if self._held or not self._leads:
-            return self.position(now)
-        return min(self._sent, now + max(self._leads))
 
     def wait_to_send(self, end_sample: int, now: float) -> float:
         """Seconds until a piece that ends at `end_sample` may go out."""

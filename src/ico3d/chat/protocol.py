@@ -21,7 +21,7 @@ from ico3d.chat.marks import (
     Tensor,
 )
 
-VERSION = 2
+VERSION = 3
 MICROPHONE_RATE = 16_000  # Hz, PCM16 mono from the page
 SPEECH_RATE = 24_000  # Hz, PCM16 mono to the page
 EXPRESSION_FPS = 25  # rows per second of an utterance's sound
@@ -58,10 +58,15 @@ class Audio:
     Attributes:
         sample: Index of the first sample since the microphone opened.
         pcm: (n,) int16 at 16 kHz, at most 1 s.
+        playing: The utterance that left the loudspeaker when the last sample was recorded; null
+            in silence.
+        position: Seconds of it that had been heard by then; 0 in silence.
     """
 
     sample: Count
     pcm: Annotated[np.ndarray, Tensor("<i2", 1, MICROPHONE_RATE)]
+    playing: Count | None = None
+    position: Seconds = 0.0
 
 
 @dataclass(frozen=True)

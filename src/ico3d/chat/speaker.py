@@ -76,12 +76,6 @@ class Speaker(FrameProcessor):
         """The page is back."""
         self._go_on()
 
-    def heard(self) -> float | None:
-        """Seconds of the utterance that sound at the page now; None while it is silent."""
-        if self._speaking is None or self._paused:
-            return None
-        return self._playback.heard(self._now())
-
     def hush(self, silent: bool) -> None:
         """Pauses what is heard, or goes on with it; nothing of it is lost."""
         if self._speaking is None or silent == self._paused:

@@ -67,6 +67,11 @@ class Player:
             return self._paused
         return float(np.clip(now - self.started, 0, self.received))
 
+    def playing(self, now: float) -> int | None:
+        """The utterance that sounds; None in silence."""
+        sounds = self.started <= now < self.started + self.received
+        return self.utterance if sounds and not self._ended and self._paused is None else None
+
     def clock(self, now: float) -> Clock | None:
         """What the page reports now; the last report is that of the end."""
         if self._ended:
@@ -142,6 +147,12 @@ class Page:
         ends = [end.samples for end in self.messages(End) if end.utterance == utterance]
         return bool(ends) and self._position() >= ends[0] / protocol.SPEECH_RATE
 
+    def recorded(self, pcm: np.ndarray, end: float) -> Audio:
+        """What the microphone sends: (CHUNK,) int16 whose last sample was recorded at `end`."""
+        playing = self.player.playing(end)
+        position = 0.0 if playing is None else self.player.position(end)
+        return Audio(self._sample, pcm, playing, position)
+
     @property
     def state(self) -> str:
         """What the avatar does."""
@@ -190,7 +201,7 @@ class Page:
                 chunk = np.zeros(CHUNK, np.int16)
                 said, self._sound = self._sound[:CHUNK], self._sound[CHUNK:]
                 chunk[: len(said)] = said
-                await self.send(Audio(self._sample, chunk))
+                await self.send(self.recorded(chunk, end))
                 self._sample += CHUNK
 
 

@@ -68,8 +68,8 @@ def guarded(microphone, jitter=0.03):
         if at % (5 * PIECE) == 0:
             wrong = random.uniform(-jitter, jitter)
         heard = (at + PIECE) / NEAR - LEAD
-        position = heard + wrong if 0 <= heard < len(AVATAR) / FAR else None
-        if guard.is_echo(microphone[at : at + PIECE], position):
+        playing = 0 if 0 <= heard < len(AVATAR) / FAR else None
+        if guard.is_echo(microphone[at : at + PIECE], playing, heard + wrong):
             left[at : at + PIECE] = 0
     return left, guard
 
@@ -117,14 +117,14 @@ async def test_in_silence_nothing_is_changed():
     guard.sent.add(0, (AVATAR * 32767).astype(np.int16))
     microphone = mixed(2.0, (0.5, QUESTION))
     pieces = [microphone[at : at + PIECE] for at in range(0, len(microphone) - PIECE, PIECE)]
-    assert not any(guard.is_echo(piece, None) for piece in pieces)
+    assert not any(guard.is_echo(piece, None, 0.0) for piece in pieces)
 
 
 def test_pieces_of_any_size_are_taken():
     guard = EchoGuard()
     guard.sent.add(0, (AVATAR * 32767).astype(np.int16))
     for count in (1, 7, 320, 1600, 16_000):
-        assert guard.is_echo(np.zeros(count, np.int16), 1.0) in (True, False)
+        assert guard.is_echo(np.zeros(count, np.int16), 0, 1.0) in (True, False)
 
 
 def test_similarity_is_one_for_the_same_and_small_for_others():

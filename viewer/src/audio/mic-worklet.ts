@@ -3,12 +3,19 @@ import { Resampler, toPcm16 } from './resampler.ts';
 
 // The scope that audio worklets run in; TypeScript's DOM library does not know it.
 declare const sampleRate: number;
+declare const currentTime: number;
 declare class AudioWorkletProcessor {
   readonly port: MessagePort;
 }
 declare function registerProcessor(name: string, processor: unknown): void;
 
 const CHUNK = MICROPHONE_RATE / 25; // 40 ms
+
+/** What is posted: PCM16, and the context time at which its last block came. */
+export interface Chunk {
+  pcm: Int16Array;
+  end: number;
+}
 
 /** Resamples the microphone and posts it as PCM16 in 40-ms chunks. */
 class MicrophoneProcessor extends AudioWorkletProcessor {
@@ -28,7 +35,8 @@ class MicrophoneProcessor extends AudioWorkletProcessor {
 
   private flush(): void {
     const pcm = toPcm16(this.chunk);
-    this.port.postMessage(pcm, [pcm.buffer as ArrayBuffer]);
+    const chunk: Chunk = { pcm, end: currentTime };
+    this.port.postMessage(chunk, [pcm.buffer as ArrayBuffer]);
     this.filled = 0;
   }
 }

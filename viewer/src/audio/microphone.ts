@@ -1,15 +1,19 @@
 import { PageError } from '../errors.ts';
+import type { Chunk } from './mic-worklet.ts';
 import workletUrl from './mic-worklet.ts?worker&url';
+
+/** Takes a chunk and when its last sample was recorded, ms on the performance clock. */
+type OnChunk = (pcm: Int16Array, end: number) => void;
 
 /** The visitor's microphone as PCM16 at 16 kHz in 40-ms chunks. */
 export class Microphone {
   private context: AudioContext | null = null;
   private stream: MediaStream | null = null;
-  private readonly onChunk: (pcm: Int16Array) => void;
+  private readonly onChunk: OnChunk;
   private readonly onLost: (error: PageError) => void;
 
   /** @param onLost the device went away */
-  constructor(onChunk: (pcm: Int16Array) => void, onLost: (error: PageError) => void) {
+  constructor(onChunk: OnChunk, onLost: (error: PageError) => void) {
     this.onChunk = onChunk;
     this.onLost = onLost;
   }
@@ -35,17 +39,21 @@ export class Microphone {
       this.onLost(new PageError('The microphone was disconnected; you can type instead.'));
     };
     // Its own context: some browsers refuse a source whose rate differs from the context's.
-    this.context = new AudioContext();
-    await this.context.audioWorklet.addModule(workletUrl);
-    const source = new MediaStreamAudioSourceNode(this.context, { mediaStream: this.stream });
-    const node = new AudioWorkletNode(this.context, 'microphone', {
+    const context = new AudioContext();
+    this.context = context;
+    await context.audioWorklet.addModule(workletUrl);
+    const source = new MediaStreamAudioSourceNode(context, { mediaStream: this.stream });
+    const node = new AudioWorkletNode(context, 'microphone', {
       channelCount: 1,
       channelCountMode: 'explicit',
     });
-    node.port.onmessage = (event: MessageEvent<Int16Array>) => this.onChunk(event.data);
+    node.port.onmessage = ({ data }: MessageEvent<Chunk>) => {
+      const age = Math.max(0, context.currentTime - data.end); // while this thread was busy
+      this.onChunk(data.pcm, performance.now() - 1000 * age);
+    };
     // It outputs silence; Chromium leaves out blocks of a node that leads nowhere when it is busy.
-    source.connect(node).connect(this.context.destination);
-    await this.context.resume();
+    source.connect(node).connect(context.destination);
+    await context.resume();
   }
 
   stop(): void {

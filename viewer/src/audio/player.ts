@@ -28,7 +28,7 @@ export class Player {
     const previous = this.voices[this.voices.indexOf(voice) - 1];
     const first = voice.schedule.end === 0 && !voice.paused;
     voice.add(piece, previous?.schedule.end);
-    if (first && voice.schedule.end > 0) this.onStart(piece.utterance, voice.schedule.start / SPEECH_RATE - this.heardNow());
+    if (first && voice.schedule.end > 0) this.onStart(piece.utterance, voice.schedule.start / SPEECH_RATE - heardTime(this.context, performance.now()));
   }
 
   /** The server has sent all of an utterance. */
@@ -60,9 +60,13 @@ export class Player {
     this.lastDropped = -1;
   }
 
-  /** The utterance that leaves the loudspeaker now and how far it has come. */
-  heard(): Heard | null {
-    const frame = this.heardNow() * SPEECH_RATE;
+  /**
+   * The utterance that leaves the loudspeaker and how far it has come.
+   *
+   * @param at performance.now() of the moment in question, in ms; at most a second ago
+   */
+  heard(at = performance.now()): Heard | null {
+    const frame = heardTime(this.context, at) * SPEECH_RATE;
     this.retire(frame);
     const voice = this.voices.findLast((v) => v.schedule.start <= frame);
     if (!voice || voice.track.empty) return null;
@@ -78,10 +82,6 @@ export class Player {
   /** Seconds of silence that late pieces have put into the current utterance. */
   get underrun(): number {
     return (this.voices.at(-1)?.schedule.shifted ?? 0) / SPEECH_RATE;
-  }
-
-  private heardNow(): number {
-    return heardTime(this.context, performance.now());
   }
 
   private open(utterance: number): Voice {

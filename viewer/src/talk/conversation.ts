@@ -57,7 +57,7 @@ export class Conversation {
     });
     this.listening = new Listening((message) => this.connection.send(message), view);
     this.microphone = new Microphone(
-      (pcm) => this.hear(pcm),
+      (pcm, end) => this.hear(pcm, end),
       (error) => {
         this.open = false;
         this.release();
@@ -147,10 +147,18 @@ export class Conversation {
     else this.listening.close();
   }
 
-  private hear(pcm: Int16Array): void {
+  private hear(pcm: Int16Array, end: number): void {
     if (!this.open && !this.held) return;
-    this.meter.hear(pcm, performance.now());
-    this.connection.send({ type: 'audio', sample: this.sample, pcm });
+    this.meter.hear(pcm, end);
+    const heard = this.player.heard(end);
+    const sounds = heard !== null && !heard.paused;
+    this.connection.send({
+      type: 'audio',
+      sample: this.sample,
+      pcm,
+      playing: sounds ? heard.utterance : null,
+      position: sounds ? Math.max(0, heard.seconds) : 0,
+    });
     this.sample += pcm.length;
   }
 

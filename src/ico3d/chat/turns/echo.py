@@ -2,8 +2,9 @@
 
 Browsers cancel echo themselves; this is for what they leave, and for loudspeakers that they cannot
 know of. It compares energies in bands: they survive a room, a codec and two unsynchronised clocks,
-which samples do not. What was heard at the page at each moment is known from its `clock`; how much
-later and how loud it comes back is learnt from the sound itself.
+which samples do not. What the loudspeaker played when a sound was recorded the page says with that
+sound, so that nothing depends on how long messages travel; how much later and how loud it comes
+back is learnt from the sound itself.
 """
 
 import numpy as np
@@ -12,13 +13,12 @@ from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE
 from ico3d.chat.turns.bands import COUNT, FRAME, Bands
 
 HISTORY = 100  # frames that are compared: 2 s
-LATEST = 35  # frames within which an echo comes, those of AHEAD included
-AHEAD = 0.1  # s that the page may be further than it is known to be
+LATEST = 30  # frames within which an echo comes
 FIRST_GAIN = 1.0  # power of an echo nothing is known of: as loud as what was sent
 ENOUGH = 20  # frames of sound without which nothing can be learnt
 ALIKE = 0.55  # correlation from which the microphone hears the avatar
 MARGIN = 4.0  # how much stronger than its echo a voice must be in a band: 6 dB
-LOOSE = 3  # frames by which the page's clock may be wrong for a moment
+LOOSE = 3  # frames by which the page may be wrong about that for a moment
 DECAY = 0.6  # of a room's reverberation per frame: 60 dB in 0.54 s
 SHARE = 0.4  # of the energy that must be no echo in a voice
 VOICED = 3  # such frames among the last 5 make a voice
@@ -49,9 +49,9 @@ class SentSound:
         self._rest = samples[whole:]
         self._rows = np.concatenate([self._rows, self._bands.energies(samples[:whole])])
 
-    def at(self, seconds: float | None) -> np.ndarray:
-        """(COUNT,) energies around a time of the utterance; zero in silence (None)."""
-        row = -1 if seconds is None else int(seconds / FRAME)
+    def at(self, utterance: int | None, seconds: float) -> np.ndarray:
+        """(COUNT,) energies around a time of an utterance; zero in silence (None)."""
+        row = int(seconds / FRAME) if utterance == self._utterance else -1
         return self._rows[row] if 0 <= row < len(self._rows) else np.zeros(COUNT)
 
 
@@ -70,33 +70,35 @@ class EchoGuard:
         self._fresh = 0  # frames since it last learnt
         self._marks = np.zeros(5, bool)  # which of the last frames were more than echo
         self._since_voice = AFTER
+        self._before: tuple[int | None, float] = None, 0.0  # what was heard before this piece
 
     @property
     def lag(self) -> float | None:
         """Seconds after which the echo comes; None if there is none."""
-        return None if self._lag is None else self._lag * FRAME - AHEAD
+        return None if self._lag is None else self._lag * FRAME
 
     @property
     def gain(self) -> float:
         """Of the echo, dB: microphone against what was sent, at most."""
         return float(10 * np.log10(self._gains.max() + 1e-12))
 
-    def is_echo(self, pcm: np.ndarray, position: float | None) -> bool:
+    def is_echo(self, pcm: np.ndarray, playing: int | None, position: float) -> bool:
         """Whether a piece of microphone sound holds no voice but the avatar's.
 
         Args:
             pcm: (n,) int16 at 16 kHz.
-            position: Seconds of the utterance that are heard when the piece ends; None while
-                nothing is.
+            playing: The utterance that is heard when the piece ends; None in silence.
+            position: Seconds of it that have been heard by then.
         """
         samples = np.concatenate([self._rest, pcm / 32768])
         count = len(samples) // self._bands.length
         self._rest = samples[count * self._bands.length :]
         rows = self._bands.energies(samples[: count * self._bands.length])
+        before, self._before = self._before, (playing, position)
+        if playing is None:  # it may have fallen silent at any moment of this piece
+            playing, position = before[0], before[1] + len(pcm) / MICROPHONE_RATE
         for index, row in enumerate(rows):
-            early = AHEAD - (count - index) * FRAME
-            at = None if position is None else position + early
-            self._hear(row, self.sent.at(at))
+            self._hear(row, self.sent.at(playing, position - (count - index) * FRAME))
         return self._speaks() and self._since_voice >= AFTER
 
     def _hear(self, near: np.ndarray, far: np.ndarray) -> None:
