@@ -3,9 +3,7 @@
 import asyncio
 from collections import deque
 from collections.abc import AsyncGenerator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from pipecat.frames.frames import (
@@ -24,10 +22,10 @@ from pipecat.utils.time import time_now_iso8601
 from ico3d.chat.protocol import MICROPHONE_RATE
 from ico3d.chat.services.provider import Context, lacks_package
 from ico3d.chat.services.recognition.segments import blank
+from ico3d.common.sphinx import DecoderLostError, SphinxProcess
 from ico3d.errors import MissingExtraError
 
 LEAD_IN = 0.7  # s of sound before the VAD noticed speech: it needs 0.2 s to be sure
-STEP = 2 * 640  # bytes decoded at once: the decoder holds the interpreter's lock meanwhile
 PARTIAL_EVERY = 0.25  # s of sound between partial transcripts
 LOUDNESS = 1500.0  # RMS of the loudest 0.2 s: what the acoustic model hears best
 MOST_GAIN = 10.0
@@ -67,23 +65,23 @@ class Leveller:
 class SphinxRecognition(STTService):
     """Decodes while the visitor speaks; a transcript is final when the VAD says he paused."""
 
-    def __init__(self, decoder: Any):
-        """Takes a `pocketsphinx.Decoder` of its own."""
+    def __init__(self):
+        """A recogniser with a decoder of its own."""
         settings = STTSettings(model="en-us", language=None)
         super().__init__(ttfs_p99_latency=SLOWEST, settings=settings)
-        self._decoder = decoder
+        self._decoder = SphinxProcess()
         self._leveller = Leveller()
-        self._thread = ThreadPoolExecutor(1, "recognition")
         self._sound: asyncio.Queue[bytes | None] = asyncio.Queue()  # None: speech has ended
         self._before: deque[bytes] = deque()
         self._before_bytes = 0
         self._hearing = False
-        self._decoding = False  # between start_utt and end_utt
+        self._lost = False  # the decoder, in this utterance
         self._task: asyncio.Task | None = None
 
     async def start(self, frame: StartFrame):
-        """Starts the task that decodes."""
+        """Starts the decoder, and the task that feeds it."""
         await super().start(frame)
+        await self._decoder.start()
         self._task = self._task or self.create_task(self._decode_all())
 
     async def stop(self, frame: EndFrame):
@@ -92,12 +90,12 @@ class SphinxRecognition(STTService):
         await super().stop(frame)
 
     async def cleanup(self):
-        """Ends the task and the thread."""
+        """Ends the task and the decoder."""
         await super().cleanup()
         if self._task:
             await self.cancel_task(self._task)
             self._task = None
-        self._thread.shutdown(wait=False, cancel_futures=True)
+        await self._decoder.close()
 
     async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame | None, None]:
         """Queues sound; transcripts come from the task that decodes it."""
@@ -118,8 +116,7 @@ class SphinxRecognition(STTService):
         self._hearing = True
         lead_in = b"".join(self._before)
         self._leveller.measure(lead_in)
-        for at in range(0, len(lead_in), STEP):
-            self._sound.put_nowait(lead_in[at : at + STEP])
+        self._sound.put_nowait(lead_in)
         self._before.clear()
         self._before_bytes = 0
 
@@ -130,21 +127,32 @@ class SphinxRecognition(STTService):
             self._sound.put_nowait(None)
 
     async def _decode_all(self) -> None:
-        loop = asyncio.get_running_loop()
         shown, fresh = "", 0
         while True:
             audio = await self._sound.get()
+            text = await self._decode(audio)
             if audio is None:
-                text = await loop.run_in_executor(self._thread, self._finish)
                 await self._tell(text, final=True)
-                shown, fresh = "", 0
+                shown, fresh, self._lost = "", 0, False
             else:
-                text = await loop.run_in_executor(self._thread, self._decode, audio)
                 fresh += len(audio)
                 if fresh >= PARTIAL_EVERY * MICROPHONE_RATE * 2 and text and text != shown:
                     await self._tell(text, final=False)
                     shown, fresh = text, 0
             self._sound.task_done()
+
+    async def _decode(self, audio: bytes | None) -> str:
+        """The words so far; none of an utterance in which the decoder was lost."""
+        if self._lost:
+            return ""
+        try:
+            if audio is None:
+                return await self._decoder.finish()
+            return await self._decoder.decode(self._leveller.apply(audio))
+        except DecoderLostError as error:
+            self._lost = audio is not None  # at an end the next utterance begins anew anyway
+            await self.push_error(f"the visitor's speech was not recognised: {error}.")
+            return ""
 
     async def _tell(self, text: str, final: bool) -> None:
         if final:
@@ -152,24 +160,6 @@ class SphinxRecognition(STTService):
             await self.push_frame(said if text else blank())
         else:
             await self.push_frame(InterimTranscriptionFrame(text, "", time_now_iso8601()))
-
-    def _decode(self, audio: bytes) -> str:
-        if not self._decoding:
-            self._decoder.start_utt()
-            self._decoding = True
-        self._decoder.process_raw(self._leveller.apply(audio), False, False)
-        return self._words()
-
-    def _finish(self) -> str:
-        if not self._decoding:
-            return ""
-        self._decoder.end_utt()
-        self._decoding = False
-        return self._words()
-
-    def _words(self) -> str:
-        hypothesis = self._decoder.hyp()
-        return hypothesis.hypstr if hypothesis else ""
 
 
 @dataclass(frozen=True)
@@ -183,14 +173,11 @@ def hindrance(settings: Settings) -> str:
 
 
 def make(settings: Settings, context: Context) -> SphinxRecognition:
-    """A recogniser for one session (about 90 MB and 0.3 s).
+    """A recogniser for one session.
 
     Raises:
         MissingExtraError: If pocketsphinx is not installed.
     """
-    try:
-        from pocketsphinx import Decoder
-    except ImportError:
-        raise MissingExtraError("pocketsphinx", "chat", "offline speech recognition") from None
-    # without the flat second pass the last words come 5 times sooner and no worse
-    return SphinxRecognition(Decoder(samprate=MICROPHONE_RATE, loglevel="FATAL", fwdflat=False))
+    if hindrance(settings):
+        raise MissingExtraError("pocketsphinx", "chat", "offline speech recognition")
+    return SphinxRecognition()

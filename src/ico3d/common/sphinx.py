@@ -1,0 +1,108 @@
+"""pocketsphinx in a process of its own.
+
+Its decoder holds the interpreter's lock while it works. In a thread it would delay all that a
+server does meanwhile: in the first moments of a sentence, with 0.7 s of sound to catch up on, by
+some 0.2 s.
+"""
+
+import asyncio
+import signal
+import struct
+import sys
+from typing import BinaryIO
+
+_LENGTH = struct.Struct("<i")
+_FINISH = -1  # in the place of a length
+_RATE = 16_000  # Hz
+
+
+class DecoderLostError(Exception):
+    """The process has ended; the next sound starts another."""
+
+
+class SphinxProcess:
+    """A decoder of one's own (about 120 MB; its first words take 0.5 s longer)."""
+
+    def __init__(self):
+        """No process yet: the first call starts it."""
+        self._process: asyncio.subprocess.Process | None = None
+
+    async def start(self) -> None:
+        """Starts the process, unless it runs."""
+        if self._process is None:
+            self._process = await asyncio.create_subprocess_exec(
+                *(sys.executable, "-m", __name__),
+                stdin=asyncio.subprocess.PIPE,
+                stdout=asyncio.subprocess.PIPE,
+            )
+
+    async def decode(self, pcm: bytes) -> str:
+        """The words so far, with more sound: PCM16 mono 16 kHz.
+
+        Raises:
+            DecoderLostError: If the process has ended.
+        """
+        return await self._ask(len(pcm), pcm)
+
+    async def finish(self) -> str:
+        """The words of all the sound since the last call.
+
+        Raises:
+            DecoderLostError: If the process has ended.
+        """
+        return await self._ask(_FINISH, b"")
+
+    async def close(self) -> None:
+        """Ends the process."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        assert process.stdin is not None
+        process.stdin.close()  # it ends with its input, in the midst of nothing
+        try:
+            await asyncio.wait_for(process.wait(), 1.0)
+        except TimeoutError:
+            process.kill()
+            await process.wait()
+
+    async def _ask(self, number: int, sound: bytes) -> str:
+        await self.start()
+        assert self._process is not None
+        to, back = self._process.stdin, self._process.stdout
+        assert to is not None and back is not None
+        try:
+            to.write(_LENGTH.pack(number) + sound)
+            await to.drain()
+            (length,) = _LENGTH.unpack(await back.readexactly(_LENGTH.size))
+            return (await back.readexactly(length)).decode()
+        except (ConnectionError, asyncio.IncompleteReadError):
+            await self.close()
+            raise DecoderLostError("the decoder's process has ended") from None
+
+
+def serve(asked: BinaryIO, told: BinaryIO) -> None:
+    """Decodes what comes in until it ends."""
+    from pocketsphinx import Decoder
+
+    # without the flat second pass the last words come 5 times sooner and no worse
+    decoder = Decoder(samprate=_RATE, loglevel="FATAL", fwdflat=False)
+    speaking = False
+    while header := asked.read(_LENGTH.size):
+        (number,) = _LENGTH.unpack(header)
+        known = speaking or number != _FINISH  # else there is nothing to finish
+        if number == _FINISH and speaking:
+            decoder.end_utt()
+        elif number != _FINISH:
+            if not speaking:
+                decoder.start_utt()
+            decoder.process_raw(asked.read(number), False, False)
+        speaking = number != _FINISH
+        hypothesis = decoder.hyp() if known else None
+        words = (hypothesis.hypstr if hypothesis else "").encode()
+        told.write(_LENGTH.pack(len(words)) + words)
+        told.flush()
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started it ends it
+    serve(sys.stdin.buffer, sys.stdout.buffer)
