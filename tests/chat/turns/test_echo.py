@@ -133,3 +133,10 @@ def test_similarity_is_one_for_the_same_and_small_for_others():
     assert similarity(a, 3 * a) == pytest.approx(1.0)
     assert abs(similarity(a, b)) < 0.1
     assert similarity(a, np.zeros_like(a)) == 0.0
+
+
+async def test_where_no_echo_comes_back_that_is_learnt_within_a_second():
+    begin = LEAD + 1.1
+    left, _ = guarded(mixed(4.5, (begin, QUESTION / 2)))
+    hints, _ = await voices(left)
+    assert hints[0] < begin + np.nonzero(np.abs(QUESTION) > 0.02)[0][0] / NEAR + 0.15

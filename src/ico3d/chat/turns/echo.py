@@ -15,7 +15,8 @@ from ico3d.chat.turns.bands import COUNT, FRAME, Bands
 HISTORY = 100  # frames that are compared: 2 s
 LATEST = 30  # frames within which an echo comes
 FIRST_GAIN = 1.0  # power of an echo nothing is known of: as loud as what was sent
-ENOUGH = 20  # frames of sound without which nothing can be learnt
+ENOUGH = 10  # frames of sound without which nothing can be learnt
+FALL = 8.0  # the most by which a gain becomes smaller at once
 ALIKE = 0.55  # correlation from which the microphone hears the avatar
 MARGIN = 4.0  # how much stronger than its echo a voice must be in a band: 6 dB
 LOOSE = 3  # frames by which the page may be wrong about that for a moment
@@ -141,7 +142,7 @@ class EchoGuard:
         loud = np.pad(far > 0.05 * far.max(axis=0), ((1, 1), (0, 0)))
         loud = loud[:-2] | loud[1:-1] | loud[2:]  # (HISTORY, COUNT); the clocks are not exact
         ratio = (self._near * loud).sum(axis=0) / ((far * loud).sum(axis=0) + SILENT)
-        learnt = np.maximum(ratio if echoes else np.minimum(ratio, self._gains), self._gains / 2)
+        learnt = np.maximum(ratio if echoes else np.minimum(ratio, self._gains), self._gains / FALL)
         self._gains = np.where(loud.sum(axis=0) >= ENOUGH / 2, learnt, self._gains)
 
     def _best_lag(self) -> tuple[int, float]:
