@@ -116,7 +116,8 @@ class SphinxRecognition(STTService):
         self._hearing = True
         lead_in = b"".join(self._before)
         self._leveller.measure(lead_in)
-        self._sound.put_nowait(lead_in)
+        if lead_in:
+            self._sound.put_nowait(lead_in)
         self._before.clear()
         self._before_bytes = 0
 
