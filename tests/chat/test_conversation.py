@@ -16,7 +16,6 @@ from ico3d.chat.protocol import (
     End,
     Interrupt,
     Metrics,
-    Pause,
     Speech,
     State,
     Stop,
@@ -92,15 +91,13 @@ async def test_real_speech_is_transcribed_and_silences_the_avatar(served):
     with wave.open(str(STARS)) as file:
         pcm = np.frombuffer(file.readframes(file.getnframes()), np.int16)
     page, _ = await open_page(url)
-    await greeted(page)  # the guard has learnt that nothing of the avatar comes back
+    await page.wait(Speech)
     await page.send(Text("nothing you know of, but a long answer"))
     _, second = await page.wait(Speech, where=lambda m: m.utterance == 1)
     first_sound = np.nonzero(np.abs(pcm) > 0.05 * np.abs(pcm).max())[0][0] / 16000
     spoken_at = page.say(pcm) - len(pcm) / 16000 + first_sound
-    quiet_at, _ = await page.wait(Pause, where=lambda m: m.utterance == second.utterance)
-    assert quiet_at - spoken_at < 0.6 * slowness()
     at, _ = await page.wait(Stop, where=lambda m: m.utterance == second.utterance)
-    assert at - spoken_at < 1.2 * slowness()  # it is silent meanwhile
+    assert at - spoken_at < 0.6 * slowness()
     _, transcript = await page.wait(Transcript, where=lambda m: m.final)
     assert "find a new home" in transcript.text
     await page.wait(Speech, where=lambda m: m.utterance == 2)
