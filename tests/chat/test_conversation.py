@@ -3,7 +3,6 @@
 import asyncio
 import os
 import time
-import wave
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +24,7 @@ from ico3d.chat.protocol import (
 )
 from ico3d.chat.timing import PARTS
 from ico3d.measure.page import open_page
+from ico3d.measure.questions import read_recording
 
 STARS = Path(__file__).parents[3] / "shared" / "speech" / "new-home-in-the-stars-16k.wav"
 
@@ -88,16 +88,14 @@ async def test_spoken_question_is_understood_and_answered(served, question):
 @pytest.mark.skipif(not STARS.is_file(), reason="needs ../shared/speech")
 async def test_real_speech_is_transcribed_and_silences_the_avatar(served):
     url, _ = served
-    with wave.open(str(STARS)) as file:
-        pcm = np.frombuffer(file.readframes(file.getnframes()), np.int16)
+    pcm = read_recording(STARS)
     page, _ = await open_page(url)
-    await page.wait(Speech)
+    await greeted(page)  # the guard has learnt that nothing of the avatar comes back
     await page.send(Text("nothing you know of, but a long answer"))
     _, second = await page.wait(Speech, where=lambda m: m.utterance == 1)
-    first_sound = np.nonzero(np.abs(pcm) > 0.05 * np.abs(pcm).max())[0][0] / 16000
-    spoken_at = page.say(pcm) - len(pcm) / 16000 + first_sound
+    spoken_at = page.say(pcm) - len(pcm) / 16000
     at, _ = await page.wait(Stop, where=lambda m: m.utterance == second.utterance)
-    assert at - spoken_at < 0.6 * slowness()
+    assert at - spoken_at < 0.65 * slowness()  # page and server share this process
     _, transcript = await page.wait(Transcript, where=lambda m: m.final)
     assert "find a new home" in transcript.text
     await page.wait(Speech, where=lambda m: m.utterance == 2)
