@@ -183,7 +183,7 @@ class Conversation:
 
     def _pipeline(self, parts: Parts) -> Pipeline:
         settings, face = self._avatar.settings, make_face(self._avatar)
-        turns, patience = settings.turns, settings.patience
+        turns = settings.turns
         trusted = not self._avatar.services.recognition.provider.stand_in
         chosen = strategies(parts.turn, turns, trusted, self._speaker.hush, self._now)
         context = LLMContext(tools=self._functions(parts.language, face))
@@ -198,7 +198,7 @@ class Conversation:
                 user,
                 parts.language,
                 AnswerGuard(
-                    parts.recognition, parts.language, patience.language, patience.apologies
+                    parts.recognition, parts.language, settings.patience.language, self._tongue()
                 ),
                 ClauseProcessor(next(iter(self._avatar.persona.languages), None)),
                 parts.voice,
@@ -207,6 +207,11 @@ class Conversation:
                 assistant,
             ]
         )
+
+    def _tongue(self) -> str:
+        """Language of apologies."""
+        named = self._avatar.settings.patience.apologies
+        return named or next(iter(self._avatar.persona.languages), "en")
 
     def _complain(self, sentence: str) -> None:
         self._page.send(Error(sentence, fatal=False))
@@ -220,7 +225,7 @@ class Conversation:
         """Keeps markup and failures from it, and takes the time at which a piece reaches it."""
         if isinstance(voice, TTSService):
             patience = self._avatar.settings.patience
-            endure(voice, patience.voice, patience.apologies, self._complain)
+            endure(voice, patience.voice, self._tongue(), self._complain)
             voice.add_text_transformer(speakable)
 
             async def requested(*_):

@@ -73,13 +73,13 @@ class Patience:
     Attributes:
         language: Seconds until the first words of an answer, and between two pieces of it.
         voice: Seconds until the first sound of a sentence, and between two pieces of it.
-        apologies: Language that the avatar apologises in, such as `de`; English where it is none
-            of those known.
+        apologies: Language that the avatar apologises in, such as `de`; empty for the persona's
+            first. English where it is none of those known.
     """
 
     language: float = 12.0
     voice: float = 8.0
-    apologies: str = "en"
+    apologies: str = ""
 
     def __post_init__(self):
         """Checks ranges.

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+from dataclasses import replace
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -142,3 +143,17 @@ async def test_a_recogniser_that_fails_is_apologised_for(bundle, question):
             await page.wait(End, since)
             states = [m.state for m in page.messages(State, since)]
             assert states == ["listening", "thinking", "speaking"]
+
+
+async def test_it_apologises_in_the_personas_language(bundle):
+    def german(avatar):
+        persona = replace(avatar.persona, languages=("de",))
+        return replace(avatar, persona=persona)
+
+    settings = ChatSettings(patience=QUICK, language=language_at(NOBODY))
+    async with serving_avatar(bundle, settings, adapt=german) as (url, _):
+        page, _ = await open_page(url, microphone=False)
+        await page.wait(Speech, timeout=60)
+        caption, _ = await asked(page)
+        assert APOLOGIES["de"]["language"].startswith(caption)
+        await page.close()
