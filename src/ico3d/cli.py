@@ -48,7 +48,12 @@ VERBS: dict[str, Verb] = {
     "bench body": Verb("ico3d.measure.commands", "BenchBody", "compare methods for bodies"),
     "bench expression": Verb("ico3d.measure.commands", "BenchExpression", "measure the mouth"),
     "bench raster": Verb("ico3d.measure.commands", "BenchRaster", "time the rasteriser"),
-    "bench chat": Verb("ico3d.measure.commands", "BenchChat", "time answers and interruptions"),
+    "bench chat": Verb(
+        "ico3d.measure.chat_commands", "BenchChat", "time answers and interruptions"
+    ),
+    "bench sessions": Verb(
+        "ico3d.measure.chat_commands", "BenchSessions", "let many visitors talk at once"
+    ),
 }
 
 

@@ -1,7 +1,6 @@
 """Conversations on a clock that jumps: what the server waits for, to the millisecond."""
 
 import asyncio
-import itertools
 import math
 import threading
 from dataclasses import replace
@@ -12,11 +11,9 @@ import pytest
 
 from ico3d.chat.monitor import Monitor
 from ico3d.chat.protocol import VERSION, Error, Hello, Metrics, Speech
-from ico3d.chat.services import Service
-from ico3d.chat.services.provider import Provider
 from ico3d.chat.settings import ChatSettings, Turns
 from ico3d.errors import SettingsError
-from ico3d.measure.scripted import Script, Voice
+from ico3d.measure.scripted import Script
 
 from .guests import Guest, open_sessions
 from .virtual_time import run
@@ -171,13 +168,7 @@ def test_a_session_waits_for_30_seconds(bundle, monkeypatch):
 
 
 def test_nobody_hears_another_ones_answer(bundle, monkeypatch):
-    pitches = itertools.count(200, 100)
-    services = QUICK.services()
-
-    def own_voice(script, context):
-        return Voice(replace(script, pitch=float(next(pitches))))
-
-    services = replace(services, voice=Service(Provider("tones", Script, own_voice), QUICK))
+    services = replace(QUICK, pitch=200.0, apart=100.0).services()
 
     async def talk():
         settings = ChatSettings(max_sessions=3)

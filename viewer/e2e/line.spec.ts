@@ -2,6 +2,7 @@ import { join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import type { Browser } from '../support/browser.ts';
 import { hasClip, makePortrait, makeStandIn } from '../support/line.ts';
+import { MICROPHONE_RATE } from '../src/protocol.ts';
 import { readMouth, watchMouth } from '../support/mouth.ts';
 import type { Loudness, Record } from '../support/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
@@ -59,6 +60,18 @@ describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a tal
     const silent = record.loudness.findLast(({ at, level }) => at < stop.at + 290 && level > SILENCE)!;
     console.log(`silent ${Math.round(silent.at - onset)} ms after the first sound of the second question`);
     expect(silent.at - onset).toBeLessThan(600);
+  });
+
+  test('the microphone says what the loudspeaker played, however busy the page was', () => {
+    const during = record.microphone.filter(({ playing }) => playing !== null);
+    expect(during.length).toBeGreaterThan(LONG_ENOUGH / 40);
+    const { utterance } = record.received.find(({ type }) => type === 'stop')!;
+    const answer = during.filter(({ playing, position }) => playing === utterance && position > 0);
+    // One constant, for both run in real time; not even late messages change it.
+    const offsets = answer.map(({ sample, position }) => position - sample / MICROPHONE_RATE);
+    const spread = quantile(offsets, 0.9) - quantile(offsets, 0.1);
+    console.log(`position against sample: ${(1000 * spread).toFixed(1)} ms apart in ${answer.length} chunks`);
+    expect(spread).toBeLessThan(0.06); // what the server's echo guard forgives
   });
 
   test('the mouth moves with the sound, and only then', async () => {

@@ -5,6 +5,8 @@ export interface Heard {
   sample: number;
   at: number; // ms, when it was sent
   level: number; // root mean square, full scale = 1
+  playing: number | null;
+  position: number; // s
 }
 
 /** A message of the server as it reached the page. */
@@ -49,7 +51,8 @@ export async function recordWire(context: BrowserContext): Promise<void> {
         const { length, fields } = header(data);
         const pcm = new Int16Array(data.slice(4 + length));
         const power = pcm.reduce((sum, value) => sum + (value / 0x8000) ** 2, 0) / pcm.length;
-        record.microphone.push({ sample: fields.sample, at: performance.now(), level: Math.sqrt(power) });
+        const { sample, playing, position } = fields;
+        record.microphone.push({ sample, at: performance.now(), level: Math.sqrt(power), playing, position });
       }
       send.call(this, data);
     };

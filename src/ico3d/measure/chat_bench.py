@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from ico3d.chat.settings import Turns
+from ico3d.chat.settings import ChatSettings, Turns
 from ico3d.errors import Ico3dError
 from ico3d.measure import chat
-from ico3d.measure.commands import Kind
+from ico3d.measure.chat_commands import Kind
 from ico3d.measure.questions import Sayings
 from ico3d.measure.scripted import Script
 from ico3d.measure.serving import serving, serving_script
@@ -87,7 +87,7 @@ def _measure(
         with serving(bundle, settings) as url:
             asyncio.run(_talk(url, said, real, turns, results, told))
     if "share" in kinds:
-        with serving_script(bundle, SCRIPT, TURNS) as url:
+        with serving_script(bundle, SCRIPT, ChatSettings(turns=TURNS)) as url:
             asyncio.run(_shares(url, said, turns, results, told))
     return results
 

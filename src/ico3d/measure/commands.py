@@ -6,9 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-Kind = Literal["questions", "interruptions", "assent", "share"]
-"""Trials of `ico3d bench chat`."""
-
 if TYPE_CHECKING:
     from ico3d.capture.capture import Capture
 
@@ -156,71 +153,6 @@ class BenchRaster:
             f"{max(r.image_difference for r in results):.1e}, of the gradients "
             f"{max(r.gradient_difference for r in results):.1e} (relative)."
         )
-
-
-@dataclass(frozen=True)
-class BenchChat:
-    """Talks with a served bundle by the clock: how soon it answers, and how soon it falls silent.
-
-    Questions are timed from their end to the first sample of the answer that a page would play,
-    with the services that the settings name. Interruptions are timed from the visitor's first
-    audible sample; "uh-huh" must not stop an answer. The server's own share is measured on a
-    second server, whose services have set delays.
-
-    Attributes:
-        bundle: The avatar to serve; servers run as processes of their own.
-        speech: Folder of recorded questions (WAV, PCM16 mono 16 kHz); synthetic voices ask by
-            default.
-        turns: How many trials of each kind.
-        kinds: Which trials.
-        settings: TOML or JSON file that chooses services and timing.
-        json: File for the figures.
-    """
-
-    bundle: tyro.conf.Positional[Path] = Path("demo")
-    speech: Path | None = None
-    turns: int = 50
-    kinds: tuple[Kind, ...] = ("questions", "interruptions", "assent", "share")
-    settings: Path | None = None
-    json: Path | None = None
-
-    def run(self) -> None:
-        """Prints median and 95th percentile, writes the figures.
-
-        Raises:
-            SettingsError: If there are to be no trials.
-        """
-        import json
-
-        from rich.console import Console
-        from rich.progress import Progress
-
-        from ico3d.chat.commands import set_up_log
-        from ico3d.common.files import write_atomic
-        from ico3d.errors import SettingsError
-
-        set_up_log(verbose=False)
-        from ico3d.measure import chat_bench
-        from ico3d.measure.questions import sayings
-
-        if self.turns < 1:
-            raise SettingsError("--turns must be at least 1.")
-        said = sayings(self.speech)
-        with Progress() as progress:
-            bars = {kind: progress.add_task(kind, total=self.turns) for kind in self.kinds}
-            results = chat_bench.measure(
-                self.bundle,
-                self.settings,
-                said,
-                self.kinds,
-                self.turns,
-                lambda kind: progress.advance(bars[kind]),
-            )
-        figures = chat_bench.figures(results)
-        if self.json is not None:
-            write_atomic(self.json, json.dumps(figures, indent=1).encode())
-        for table in chat_bench.tables(figures):
-            Console().print(table)
 
 
 @dataclass(frozen=True)

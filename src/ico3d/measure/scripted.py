@@ -5,8 +5,9 @@ where the real services are slow or absent.
 """
 
 import asyncio
+import itertools
 from collections.abc import AsyncGenerator, Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -46,6 +47,7 @@ class Script:
         answer: What is said to it.
         seconds: How long the sound of a clause is.
         pitch: Its tone, Hz.
+        apart: Hz by which the tone of each further session is higher.
     """
 
     recognition: float = 0.1
@@ -55,6 +57,7 @@ class Script:
     answer: str = "This answer is as good as any other."
     seconds: float = 2.0
     pitch: float = 220.0
+    apart: float = 0.0
 
     def delay(self) -> float:
         """Seconds that all of them take, one after the other."""
@@ -62,9 +65,13 @@ class Script:
 
     def services(self) -> Chosen:
         """The three, as a conversation takes them."""
-        kinds = (Recognition, Language, Voice)
-        providers = (Provider("scripted", Script, partial(made, kind)) for kind in kinds)
-        return Chosen(*(Service(provider, self) for provider in providers))
+        pitches = itertools.count(self.pitch, self.apart)
+
+        def voice(script: Script, _: Context) -> FrameProcessor:
+            return Voice(replace(script, pitch=next(pitches)))
+
+        makes = (partial(made, Recognition), partial(made, Language), voice)
+        return Chosen(*(Service(Provider("scripted", Script, make), self) for make in makes))
 
 
 class Recognition(STTService):

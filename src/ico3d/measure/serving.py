@@ -29,14 +29,19 @@ def serving(bundle: Path, settings: Path | None = None) -> Iterator[str]:
 
 
 @contextmanager
-def serving_script(bundle: Path, script: Script, turns: Turns) -> Iterator[str]:
+def serving_script(bundle: Path, script: Script, settings: ChatSettings) -> Iterator[str]:
     """Runs a server whose services have set delays; yields its URL.
+
+    Args:
+        bundle: The avatar.
+        script: What the services do.
+        settings: Its turns, and how many sessions it takes.
 
     Raises:
         BundleError: If it does not start.
     """
-    told = [json.dumps(dataclasses.asdict(options)) for options in (script, turns)]
-    with _running(["-m", __name__, str(bundle), *told]) as url:
+    told = [json.dumps(dataclasses.asdict(options)) for options in (script, settings.turns)]
+    with _running(["-m", __name__, str(bundle), *told, str(settings.max_sessions)]) as url:
         yield url
 
 
@@ -73,7 +78,7 @@ def _wait_until_ready(url: str) -> None:
             time.sleep(0.05)
 
 
-def main(bundle: str, script: str, turns: str) -> None:
+def main(bundle: str, script: str, turns: str, sessions: str) -> None:
     """Serves with services of set delays until it is ended."""
     from ico3d.bundle.format import Bundle
     from ico3d.chat import server
@@ -81,7 +86,8 @@ def main(bundle: str, script: str, turns: str) -> None:
 
     set_up_log(verbose=False)
     opened = Bundle.open(Path(bundle))
-    avatar = server.open_avatar(opened, ChatSettings(turns=Turns(**json.loads(turns))))
+    settings = ChatSettings(turns=Turns(**json.loads(turns)), max_sessions=int(sessions))
+    avatar = server.open_avatar(opened, settings)
     avatar = dataclasses.replace(avatar, services=Script(**json.loads(script)).services())
     listener = server.bind("127.0.0.1", 0)
     app = server.make_app(opened, avatar, "127.0.0.1")
