@@ -14,7 +14,7 @@ from ico3d.errors import CaptureError
 from ico3d.measure.chat import Assent, Interruption, Question, sound_of
 from ico3d.measure.chat_bench import SCRIPT, TURNS, Results, figures, share
 from ico3d.measure.page import Player
-from ico3d.measure.questions import audible, sayings
+from ico3d.measure.questions import audible, broken_off, sayings
 
 SPEECH = Path(__file__).parents[3] / "shared" / "speech"
 
@@ -101,6 +101,14 @@ def test_speech_is_cut_where_it_is_audible():
     said = sayings(None)
     assert len(said.questions) == 4 and len(said.objections) == 8 and len(said.assent) == 8
     assert all(s.dtype == np.int16 and s.any() for s in said.questions + said.assent)
+
+
+def test_a_question_breaks_off_where_it_is_loudest():
+    sound = np.full(24_000, 100, np.int16)
+    sound[3200:3520] = 9000  # within the first half second
+    sound[12_800:13_120] = -5000
+    assert len(broken_off(sound)) == 13_120
+    assert len(broken_off(sound[:12_700])) == 8_320  # all alike: the first
 
 
 @pytest.mark.skipif(not SPEECH.is_dir(), reason="needs ../shared/speech")

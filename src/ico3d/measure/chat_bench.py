@@ -14,7 +14,7 @@ from ico3d.chat.settings import ChatSettings, Turns
 from ico3d.errors import Ico3dError
 from ico3d.measure import chat
 from ico3d.measure.chat_commands import Kind
-from ico3d.measure.questions import Sayings
+from ico3d.measure.questions import Sayings, broken_off
 from ico3d.measure.scripted import Script
 from ico3d.measure.serving import serving, serving_script
 
@@ -115,7 +115,7 @@ async def _talk(
 async def _shares(url: str, said: Sayings, turns: int, results: Results, told: Told) -> None:
     async with chat.visit(url) as page:
         for number in range(turns):
-            question = await chat.ask(page, nth(said.questions, number))
+            question = await chat.ask(page, broken_off(nth(said.questions, number)))
             results.shares.append(question and share(question))
             await chat.peace(page)
             told("share")

@@ -17,7 +17,7 @@ class BenchChat:
     Questions are timed from their end to the first sample of the answer that a page would play,
     with the services that the settings name. Interruptions are timed from the visitor's first
     audible sample; "uh-huh" must not stop an answer. The server's own share is measured on a
-    second server, whose services have set delays.
+    second server, whose services have set delays, from questions that break off amid a sound.
 
     Attributes:
         bundle: The avatar to serve; servers run as processes of their own.

@@ -81,6 +81,17 @@ def audible(samples: np.ndarray) -> np.ndarray:
     return samples[MOMENT * loud[0] : MOMENT * (loud[-1] + 1)]
 
 
+def broken_off(samples: np.ndarray) -> np.ndarray:
+    """(S,) up to the end of its loudest moment after the first half second.
+
+    Where a voice fades, and a room with it, its end is a matter of opinion; here it is not.
+    """
+    begin = MICROPHONE_RATE // 2 // MOMENT
+    whole = samples[: len(samples) // MOMENT * MOMENT].astype(np.float32)
+    power = (whole.reshape(-1, MOMENT) ** 2).mean(axis=1)  # by moment
+    return samples[: MOMENT * (begin + int(power[begin:].argmax()) + 1)]
+
+
 def spoken(text: str, voice: str) -> np.ndarray:
     """A text in a synthetic voice, (S,) int16."""
     import soxr
