@@ -38,17 +38,17 @@ def _module(name):
 
 
 guide, SMALL = _module("guide"), _module("small").SMALL
-PERSONAS = ("ada.toml",)
 STAND_INS = 'recognition = "pocketsphinx"\nlanguage = "persona-notes"\nvoice = "espeak-ng"\n'
 OUTSIDE = """
 import os, sys
 def told(event, values):
-    address = values[-1] if event == "socket.connect" else values[:1]
-    host = address[0] if isinstance(address, tuple) else None  # else a socket in the file system
-    if event in ("socket.connect", "socket.getaddrinfo"):
-        if isinstance(host, str) and host not in ("127.0.0.1", "localhost", "::1", "0.0.0.0"):
-            with open(os.environ["OUTSIDE"], "a") as file:
-                print(event, address, file=file)
+    address = {"socket.connect": values[1:], "socket.getaddrinfo": (values,)}.get(event)
+    if not address or not isinstance(address[0], tuple):
+        return  # something else, or a socket of the file system
+    host = str(address[0][0])
+    if host not in ("127.0.0.1", "localhost", "::1", "0.0.0.0", "None"):
+        with open(os.environ["OUTSIDE"], "a") as file:
+            print(event, host, file=file)
 sys.addaudithook(told)
 """
 
@@ -150,20 +150,14 @@ def test_a_persona_that_makes_no_sense_is_the_guides_sentence():
 
 
 def test_own_voice(visited):
-    files = guide.write_files("own-voice.md")
+    voices = ["espeak.toml", "kokoro.toml", "piper.toml", "server.toml", "clone.toml"]
+    assert guide.write_files("own-voice.md") == [*voices, "ada.toml"]
     _follow("own-voice.md", visited)
     *pages, module, _ = visited.said
     speaks = [_services(said)[2] for said in pages]
     server = "OpenAI-compatible server"
     assert speaks == ["espeak-ng", "Kokoro", "Piper", server, "OpenVoice V2"]
     assert module.startswith("voice with espeak-ng is at ")
-    assert [f for f in files if f not in PERSONAS] == [
-        "espeak.toml",
-        "kokoro.toml",
-        "piper.toml",
-        "server.toml",
-        "clone.toml",
-    ]
     for line in guide.other_commands("own-voice.md"):
         if line.startswith("ico3d"):
             assert guide.parsed(line.partition("#")[0].split())
@@ -180,8 +174,7 @@ def test_a_voice_is_cloned_with_the_guides_consent_only():
 
 
 def test_gpu_server(visited):
-    files = guide.write_files("gpu-server.md")
-    assert files == ["gpu.toml", "talk.toml", "face.toml"]
+    assert guide.write_files("gpu-server.md") == ["gpu.toml", "talk.toml", "face.toml"]
     Path("stand-ins.toml").write_text(STAND_INS)
 
     def module(words):
