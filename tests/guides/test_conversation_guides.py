@@ -100,7 +100,7 @@ def _visit(running):
 
 def _follow(name, visited, **instead):
     verbs = ("serve", "serve-module", "demo")
-    known = {"weights fetch": _fetches, "weights list": guide.parsed, "bake": guide.parsed}
+    known = {"weights fetch": _fetches, "bake": guide.parsed}
     guide.follow(name, SMALL, {verb: visited for verb in verbs} | known | instead)
 
 
