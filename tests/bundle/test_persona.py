@@ -16,7 +16,7 @@ languages = ["en", "pt-BR"]
 forbidden = ["politics | elections", "my age"]
 notes = ["who are you => I am Ada.", "The museum closes at six."]
 [voice]
-"espeak-ng" = "en-gb+f2"
+"espeak-ng" = "en+f2"
 """
 ADA = Persona(
     "Ada",
@@ -24,7 +24,7 @@ ADA = Persona(
     ("who are you => I am Ada.", "The museum closes at six."),
     "Warm, with dry humour.",
     ("en", "pt-BR"),
-    {"espeak-ng": "en-gb+f2"},
+    {"espeak-ng": "en+f2"},
     ("politics | elections", "my age"),
 )
 
@@ -52,7 +52,7 @@ def test_a_file_may_say_all_or_only_the_name(tmp_path):
         ("=> I am Ada.", "=> ", "note 1 is neither"),
         ("who are you =>", "=>", "note 1 is neither"),
         ('"The museum closes at six."', '""', "note 2 is neither"),
-        ('"en-gb+f2"', "2", "must be a text"),
+        ('"en+f2"', "2", "must be a text"),
         ("Good evening.", "x" * 4001, "greeting must have at most 4000"),
         ("[voice]", "[voice", "not valid TOML"),
     ],

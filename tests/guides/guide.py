@@ -1,5 +1,6 @@
 """Reads the commands of a guide and runs them."""
 
+import importlib
 import re
 import shlex
 import subprocess
@@ -9,6 +10,9 @@ import urllib.error
 import urllib.request
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+import tyro
 
 from ico3d.cli import VERBS, main
 
@@ -16,6 +20,8 @@ GUIDES = Path(__file__).parents[2] / "docs" / "guides"
 PATIENCE = 60
 """Seconds until a server must answer."""
 BLOCK = re.compile(r"^```bash\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FILE = re.compile(r"^```toml\n(# (\S+)\n.*?)^```$", re.MULTILINE | re.DOTALL)
+OTHERS = re.compile(r"^```sh\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def commands(name: str) -> list[list[str]]:
@@ -23,6 +29,32 @@ def commands(name: str) -> list[list[str]]:
     text = (GUIDES / name).read_text("utf-8")
     lines = "".join(BLOCK.findall(text)).replace("\\\n", " ").splitlines()
     return [words for line in lines if (words := shlex.split(line, comments=True))]
+
+
+def write_files(name: str) -> list[str]:
+    """Writes the files that a guide shows into the current folder; their names in order.
+
+    The first line of each is its name.
+    """
+    text = (GUIDES / name).read_text("utf-8")
+    shown = FILE.findall(text)
+    assert len(shown) == text.count("```toml"), f"{name} shows a file without a name"
+    for content, file in shown:
+        Path(file).write_text(content, "utf-8")
+    return [file for _, file in shown]
+
+
+def other_commands(name: str) -> list[str]:
+    """The lines of a guide's sh blocks: programs besides ico3d, and what needs a network."""
+    return "".join(OTHERS.findall((GUIDES / name).read_text("utf-8"))).splitlines()
+
+
+def parsed(words: list[str]) -> Any:
+    """The settings that a command's words mean; nothing is run."""
+    verb = verb_of(words)
+    entry = VERBS[verb]
+    kind = getattr(importlib.import_module(entry.module), entry.name)
+    return tyro.cli(kind, args=words[1 + len(verb.split()) :])
 
 
 def verb_of(words: list[str]) -> str:

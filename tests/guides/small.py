@@ -12,4 +12,6 @@ SMALL = {
     "bake": "--force",  # what has hardly been trained breaks the bounds of quality
     "render": "--size 64 --fps 5",
     "serve": "--port 0 --no-open",
+    "demo": "--port 0 --no-open",
+    "serve-module": "--port 0 --host 127.0.0.1",
 }

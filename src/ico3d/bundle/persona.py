@@ -27,7 +27,7 @@ class Persona:
         manner: How it behaves and talks, in a sentence or two.
         languages: Codes such as `en` or `pt-BR` of the languages it answers in, its own one first;
             empty for any.
-        voice: Name of its voice for each provider of voices, such as {"espeak-ng": "en-gb+f2"}.
+        voice: Name of its voice for each provider of voices, such as {"espeak-ng": "en+f2"}.
         forbidden: Topics it declines to talk about, each "word | other word".
     """
 

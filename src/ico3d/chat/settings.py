@@ -158,7 +158,7 @@ class ChatSettings:
         gestures: Whether a body gestures while it speaks; otherwise it is held at rest.
         memory: What is still known of the conversation.
         tools: Functions over HTTP that the language model may call.
-        allow: Hosts that those may call, such as `api.example.org` or `127.0.0.1:9000`; private
+        allow: Hosts that tools may call, such as `api.example.org` or `127.0.0.1:9000`; private
             addresses must be listed themselves.
     """
 
@@ -224,7 +224,7 @@ def _value(kind: Any, value: Any, where: str, name: str) -> Any:
         return _choice(value, where, name)
     if dataclasses.is_dataclass(kind) and isinstance(value, dict):
         return filled(kind, value, f"{where} [{name}]")  # type: ignore[arg-type]
-    entry_kind = _entry_kind(kind)
+    entry_kind = entry_kind_of(kind)
     if entry_kind is not None and isinstance(value, list):
         if all(isinstance(entry, dict) for entry in value):
             return tuple(filled(entry_kind, entry, f"{where} [[{name}]]") for entry in value)
@@ -237,10 +237,10 @@ def _value(kind: Any, value: Any, where: str, name: str) -> Any:
         return float(value)
     elif type(value) is kind:
         return value
-    raise SettingsError(f"{where}: '{name}' must be {_described(kind)}.")
+    raise SettingsError(f"{where}: '{name}' must be {described(kind)}.")
 
 
-def _entry_kind(kind: Any) -> Any:
+def entry_kind_of(kind: Any) -> Any:
     """The dataclass of which a setting is a list, if it is one."""
     entry = get_args(kind)[0] if get_origin(kind) is tuple else None
     return entry if dataclasses.is_dataclass(entry) else None
@@ -256,15 +256,18 @@ def _choice(value: Any, where: str, name: str) -> Choice:
     if isinstance(value, str):
         return Choice(value)
     if not isinstance(value, dict) or not isinstance(value.get("use", BEST), str):
-        raise SettingsError(f"{where}: '{name}' must be a provider's name or a table with 'use'.")
+        raise SettingsError(f"{where}: '{name}' must be {described(Choice)}.")
     options = {key: entry for key, entry in value.items() if key != "use"}
     return Choice(value.get("use", BEST), options)
 
 
-def _described(kind: Any) -> str:
+def described(kind: Any) -> str:
+    """The type of a setting, for people."""
+    if kind is Choice:
+        return "a provider's name or a table with 'use'"
     if kind == tuple[str, ...]:
         return "a list of texts"
-    if _entry_kind(kind) is not None:
+    if entry_kind_of(kind) is not None:
         return "a list of tables"
     names = {str: "a text", int: "a whole number", float: "a number", bool: "true or false"}
     return names.get(kind, "a table")

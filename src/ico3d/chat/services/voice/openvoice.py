@@ -42,7 +42,7 @@ class Settings:
     Attributes:
         voice: MeloTTS's speaker, who decides on the language: EN-US, EN-BR, EN_INDIA, EN-AU,
             EN-Default, ES, FR, ZH, JP or KR.
-        speed: 1 is its own pace.
+        speed: 1 is its own pace; 0.25 to 4.
         reference: WAV file of the voice to speak with; empty for the speaker's own voice.
         consent: What the owner of that voice has agreed to, in one sentence; kept on this machine.
         consent_by: The owner's name.
