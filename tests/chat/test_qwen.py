@@ -127,6 +127,13 @@ def test_it_is_the_best_only_where_its_weights_are(folder, tmp_path, monkeypatch
     assert qwen.hindrance(qwen.Settings(str(tmp_path))), "a configuration is no model"
     with pytest.raises(MissingModelError, match="ico3d weights fetch qwen2`"):
         choose(ChatSettings(language=Choice("qwen"))).language.make(CONTEXT)
+    own = tmp_path / "own"
+    own.mkdir()
+    (own / "Qwen2-0.5B-Instruct").symlink_to(folder)
+    with monkeypatch.context() as patched:
+        patched.setenv("ICO3D_MODELS", str(own))
+        assert qwen.hindrance(qwen.Settings()) == ""
+    assert "weights" in qwen.hindrance(qwen.Settings())
     kept = tmp_path / "hub" / "models--Qwen--Qwen2-0.5B-Instruct"
     (kept / "snapshots").mkdir(parents=True)
     (kept / "refs").mkdir()

@@ -8,12 +8,11 @@ from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.chat.services.language.instruction import instruction
 from ico3d.chat.services.provider import Context, lacks_package
+from ico3d.common.weights import cached, weights_named
 from ico3d.errors import MissingExtraError, MissingModelError
 
-PLAIN = "Qwen/Qwen2-0.5B-Instruct"
-QUANTISED = "Qwen/Qwen2-0.5B-Instruct-AWQ"
-WEIGHTS_NAME = "qwen2"
-"""Of `PLAIN` in the table of weights."""
+PLAIN, QUANTISED = "qwen2", "qwen2-awq"
+"""Names in the table of weights."""
 PACKAGES = ("transformers", "torch")
 KERNELS = "gptqmodel"
 """What transformers runs AWQ weights with."""
@@ -39,12 +38,12 @@ def hindrance(settings: Settings) -> str:
     missing = next(filter(None, (lacks_package(name, "qwen") for name in PACKAGES)), "")
     if missing or source(settings, cuda=False) is not None:
         return missing
-    return f"its weights are not here: ico3d weights fetch {WEIGHTS_NAME}."
+    return f"its weights are not here: ico3d weights fetch {PLAIN}."
 
 
 def detail(settings: Settings) -> str:
     """For the visitor's eyes: which model."""
-    return Path(settings.model).name or Path(PLAIN).name
+    return Path(settings.model or weights_named(PLAIN).repository).name
 
 
 def make(settings: Settings, context: Context) -> FrameProcessor:
@@ -62,17 +61,20 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
     where = source(settings, on_cuda())
     if where is None:
         raise MissingModelError(
-            f"the language model {settings.model or PLAIN} is not on this machine: fetch it with "
-            f"`ico3d weights fetch {WEIGHTS_NAME}`, or give its folder as 'model'."
+            f"the language model {settings.model or weights_named(PLAIN).repository} is not on "
+            f"this machine: fetch it with `ico3d weights fetch {PLAIN}`, or give its folder as "
+            "'model'."
         )
     return InProcessModel(load(where), instruction(context.persona), settings.max_tokens)
 
 
 def source(settings: Settings, cuda: bool) -> str | None:
     """The folder or hub name to load, None where the files are not here."""
+    if settings.model:
+        return settings.model if is_here(settings.model) else None
     quantised = [QUANTISED] if cuda and find_spec(KERNELS) else []
-    names = [settings.model] if settings.model else [*quantised, PLAIN]
-    return next((name for name in names if is_here(name)), None)
+    folders = [cached(name) for name in (*quantised, PLAIN)]
+    return next((str(folder) for folder in folders if folder and is_here(str(folder))), None)
 
 
 def is_here(model: str) -> bool:
