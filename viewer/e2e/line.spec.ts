@@ -64,7 +64,7 @@ describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a tal
 
   test('the microphone says what the loudspeaker played, however busy the page was', () => {
     const during = record.microphone.filter(({ playing }) => playing !== null);
-    expect(during.length).toBeGreaterThan(LONG_ENOUGH / 20 / 2);
+    expect(during.length).toBeGreaterThan(LONG_ENOUGH / 40 / 2);
     const { utterance } = record.received.find(({ type }) => type === 'stop')!;
     const answer = during.filter(({ playing, position }) => playing === utterance && position > 0);
     // One constant, for both run in real time; not even late messages change it.

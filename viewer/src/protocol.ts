@@ -7,7 +7,7 @@ export const EXPRESSION_FPS = 25; // rows per second
 export const MAX_TEXT_FRAME = 16384; // bytes
 export const MAX_BINARY_FRAME = 65536; // bytes
 export const MAX_RATE = 100; // messages per second
-export const MAX_BURST = 400; // messages
+export const MAX_BURST = 200; // messages
 export const RESUME_SECONDS = 30;
 export const MAX_AHEAD_SECONDS = 2;
 

@@ -58,7 +58,8 @@ async def _visit(url: str, visitors: int) -> list[Visit]:
 
 
 async def _ask(page: Page, utterance: int) -> None:
-    """The first question cuts the greeting short."""
+    """The first question cuts the greeting short, which is number 0 once it is heard."""
+    await page.wait(Speech, timeout=PATIENCE)
     await page.send(Text("What shall I ask?"))
     await page.wait(End, timeout=PATIENCE, where=lambda m: m.utterance == utterance)
     await page.heard(utterance)

@@ -27,7 +27,7 @@ from ico3d.chat.protocol import (
     Welcome,
 )
 
-CHUNK = 320  # samples: 20 ms, as the page sends them
+CHUNK = 640  # samples: 40 ms, as the page sends them
 SCHEDULING = 0.05  # s from the arrival of the first piece to its first sample
 CLOCK_EVERY = 0.15  # s
 

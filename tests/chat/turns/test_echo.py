@@ -129,10 +129,12 @@ def test_pieces_of_any_size_are_taken():
 
 def test_similarity_is_one_for_the_same_and_small_for_others():
     random = np.random.default_rng(0)
-    a, b = random.random((100, 16)), random.random((100, 16))
+    a, b = random.random((16, 100)), random.random((16, 100))
     assert similarity(a, 3 * a) == pytest.approx(1.0)
     assert abs(similarity(a, b)) < 0.1
     assert similarity(a, np.zeros_like(a)) == 0.0
+    many = random.random((5, 16, 100))
+    assert similarity(many, b) == pytest.approx([similarity(one, b) for one in many])
 
 
 async def test_where_no_echo_comes_back_that_is_learnt_within_a_second():

@@ -9,7 +9,7 @@ declare class AudioWorkletProcessor {
 }
 declare function registerProcessor(name: string, processor: unknown): void;
 
-const CHUNK = MICROPHONE_RATE / 50; // 20 ms: the server hears a voice, and its end, that much sooner than with 40
+const CHUNK = MICROPHONE_RATE / 25; // 40 ms: with 20 the server works twice as much and hears no sooner
 
 /** What is posted: PCM16, and the context time at which its last block came. */
 export interface Chunk {
@@ -17,7 +17,7 @@ export interface Chunk {
   end: number;
 }
 
-/** Resamples the microphone and posts it as PCM16 in 20-ms chunks. */
+/** Resamples the microphone and posts it as PCM16 in 40-ms chunks. */
 class MicrophoneProcessor extends AudioWorkletProcessor {
   private readonly resampler = new Resampler(sampleRate, MICROPHONE_RATE);
   private readonly chunk = new Float32Array(CHUNK);

@@ -20,8 +20,8 @@ from ico3d.chat.modules.headless import Spares, run
 from ico3d.chat.protocol import MICROPHONE_RATE
 from ico3d.errors import MissingExtraError, ProtocolError
 
-CHUNK = MICROPHONE_RATE // 50  # samples: 20 ms, as a page sends them
-LEAD_IN = 24  # chunks before speech is announced: a VAD is that late too
+CHUNK = MICROPHONE_RATE // 25  # samples: 40 ms, as a page sends them
+LEAD_IN = 12  # chunks before speech is announced: a VAD is that late too
 QUIET = np.zeros(MICROPHONE_RATE * 3 // 10, np.int16)  # around speech, as recognisers expect it
 DTYPES = {1: np.uint8, 2: np.dtype("<i2"), 4: np.dtype("<i4")}  # by bytes of a WAV's samples
 

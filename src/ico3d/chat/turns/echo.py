@@ -8,6 +8,7 @@ back is learnt from the sound itself.
 """
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE
 from ico3d.chat.turns.bands import COUNT, FRAME, Bands
@@ -132,6 +133,8 @@ class EchoGuard:
 
     def _learn(self) -> None:
         """Finds the lag at which the microphone resembles the avatar, and how loud it is."""
+        if not (self._far > SILENT).any():
+            return
         lag, alike = self._best_lag()
         echoes = alike >= ALIKE
         if echoes:
@@ -146,18 +149,22 @@ class EchoGuard:
         self._gains = np.where(loud.sum(axis=0) >= ENOUGH / 2, learnt, self._gains)
 
     def _best_lag(self) -> tuple[int, float]:
-        levels = np.sqrt(self._near)
-        scores = [similarity(np.sqrt(self._lagged(lag)), levels) for lag in range(LATEST)]
+        # (LATEST + 1, COUNT, HISTORY), the latest lag first
+        far = sliding_window_view(np.sqrt(self._far), HISTORY, axis=0)
+        scores = similarity(far[:0:-1], np.sqrt(self._near).T)  # (LATEST,) by lag
         best = int(np.argmax(scores))
-        return best, scores[best]
+        return best, float(scores[best])
 
     def _lagged(self, lag: int) -> np.ndarray:
         """(HISTORY, COUNT) what was said `lag` frames before what the microphone heard."""
         return self._far[LATEST - lag :][:HISTORY]
 
 
-def similarity(a: np.ndarray, b: np.ndarray) -> float:
-    """Normalised correlation of two (frames, COUNT) envelopes, each band about its own mean."""
-    a, b = a - a.mean(axis=0), b - b.mean(axis=0)
-    product = np.sqrt((a**2).sum() * (b**2).sum())
-    return float((a * b).sum() / product) if product > 0 else 0.0
+def similarity(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(…,) normalised correlation of (…, COUNT, frames) envelopes with (COUNT, frames) of one.
+
+    Each band is taken about its own mean.
+    """
+    a, b = a - a.mean(axis=-1, keepdims=True), b - b.mean(axis=-1, keepdims=True)
+    product = np.sqrt(np.einsum("...cf,...cf", a, a) * (b**2).sum())
+    return np.einsum("...cf,cf", a, b) / np.where(product > 0, product, np.inf)
