@@ -48,10 +48,12 @@ def test_there_are_no_more_visitors_than_tones():
     for visitors in (0, 101):
         with pytest.raises(SettingsError, match="visitors"):
             measure(Path("demo"), visitors)
+    with pytest.raises(SettingsError, match="microphones"):
+        measure(Path("demo"), 2, microphones=3)
 
 
 def test_four_visitors_of_a_real_server():
-    found = figures(measure(Path("demo"), 4, replace(SCRIPT, seconds=0.5)))
+    found = figures(measure(Path("demo"), 4, 2, replace(SCRIPT, seconds=0.5)))
     assert found["heard_their_own_tone_only"] == found["visitors"] == 4
     assert found["pieces"] > 50
     busy = os.getloadavg()[0] > os.cpu_count()

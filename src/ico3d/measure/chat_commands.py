@@ -79,18 +79,20 @@ class BenchChat:
 class BenchSessions:
     """Lets many visitors talk with one server at once, and checks what each of them hears.
 
-    All microphones are open and silent; the voices are made in advance, one tone for each
-    visitor; faces are made as always. Nobody may hear another one's tone, and each piece of
-    speech has to be there before it is played.
+    All ask within two seconds, twice. The voices are made in advance, one tone for each visitor;
+    faces are made as always. Nobody may hear another one's tone, and each piece of speech has to
+    be there before it is played.
 
     Attributes:
         bundle: The avatar to serve, by a process of its own.
         visitors: How many.
+        microphones: How many of them have theirs open, in a silent room: the server listens.
         json: File for the figures.
     """
 
     bundle: tyro.conf.Positional[Path] = Path("demo")
     visitors: int = 20
+    microphones: int = 0
     json: Path | None = None
 
     def run(self) -> None:
@@ -109,7 +111,7 @@ class BenchSessions:
         set_up_log(verbose=False)
         from ico3d.measure import crowd
 
-        figures = crowd.figures(crowd.measure(self.bundle, self.visitors))
+        figures = crowd.figures(crowd.measure(self.bundle, self.visitors, self.microphones))
         if self.json is not None:
             write_atomic(self.json, json.dumps(figures, indent=1).encode())
         Console().print(crowd.table(figures))

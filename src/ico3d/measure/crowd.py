@@ -20,6 +20,7 @@ MOST = 100  # of them: higher tones are at the end of what speech holds
 SCRIPT = Script(
     answer="One. Two. Three. Four.", seconds=3.0, pitch=LOWEST, apart=APART
 )  # 12 s of speech
+WITHIN = 2.0  # s in which all have asked: people do not ask in the same millisecond
 PATIENCE = 60.0  # s within which an answer must be over
 
 
@@ -37,28 +38,42 @@ class Visit:
     ahead: list[float]
 
 
-def measure(bundle: Path, visitors: int, script: Script = SCRIPT) -> list[Visit]:
-    """Has all visitors ask at once, twice; what the voices say is in the script.
+def measure(
+    bundle: Path, visitors: int, microphones: int = 0, script: Script = SCRIPT
+) -> list[Visit]:
+    """Has all visitors ask within WITHIN seconds, twice.
+
+    Args:
+        bundle: The avatar.
+        visitors: How many.
+        microphones: Of how many the microphone is open.
+        script: What the voices say.
 
     Raises:
-        SettingsError: If there are no visitors, or more than there are tones.
+        SettingsError: If there are no visitors, more than there are tones, or more microphones.
     """
     if not 1 <= visitors <= MOST:
         raise SettingsError(f"--visitors must be 1 to {MOST}.")
+    if not 0 <= microphones <= visitors:
+        raise SettingsError("--microphones must be at most as many as --visitors.")
     with serving_script(bundle, script, ChatSettings(max_sessions=visitors)) as url:
-        return asyncio.run(_visit(url, visitors))
+        return asyncio.run(_visit(url, visitors, microphones))
 
 
-async def _visit(url: str, visitors: int) -> list[Visit]:
-    pages = [(await open_page(url))[0] for _ in range(visitors)]
+async def _visit(url: str, visitors: int, microphones: int) -> list[Visit]:
+    opened = [await open_page(url, microphone=n < microphones) for n in range(visitors)]
+    pages = [page for page, _ in opened]
     for utterance in (1, 2):
-        await asyncio.gather(*(_ask(page, utterance) for page in pages))
+        delays = np.linspace(0, WITHIN, visitors)
+        asking = zip(pages, delays, strict=True)
+        await asyncio.gather(*(_ask(page, utterance, delay) for page, delay in asking))
     await asyncio.gather(*(page.close() for page in pages))
     return [Visit(tones(page), ahead(page)) for page in pages]
 
 
-async def _ask(page: Page, utterance: int) -> None:
+async def _ask(page: Page, utterance: int, delay: float) -> None:
     """The first question cuts the greeting short, which is number 0 once it is heard."""
+    await asyncio.sleep(delay)
     await page.wait(Speech, timeout=PATIENCE)
     await page.send(Text("What shall I ask?"))
     await page.wait(End, timeout=PATIENCE, where=lambda m: m.utterance == utterance)
