@@ -22,6 +22,7 @@ describe.skipIf(!existsSync(DEMO))('the packaged demo (needs src/ico3d/chat/data
 
   test('answers a typed question aloud, and its mouth moves', async () => {
     const { page } = browser;
+    await until(browser, ({ received }) => received.some(({ type }) => type === 'speech'), 30_000);
     await page.keyboard.press('Escape'); // the greeting is known
     await page.waitForFunction(() => window.ico3d!.conversation!.player.heard() === null);
     await page.waitForTimeout(1000);

@@ -30,10 +30,10 @@ export async function until(browser: Browser, condition: (record: Record) => boo
 }
 
 /** Whether all of an utterance has been said and heard. */
-export const finished = (utterance: number) => (record: Record) =>
-  record.received.some((m) => m.type === 'end' && m.utterance === utterance) &&
-  record.received.at(-1)!.type === 'state' &&
-  record.received.at(-1)!.state === 'idle';
+export const finished = (utterance: number) => ({ received }: Record) => {
+  const end = received.findIndex((m) => m.type === 'end' && m.utterance === utterance);
+  return end >= 0 && received.slice(end).findLast(({ type }) => type === 'state')?.state === 'idle';
+};
 
 /** When the visitor began to speak for the last time before `end`, after at least a second's pause. */
 export function lastOnset({ microphone }: Record, end: number): number {
