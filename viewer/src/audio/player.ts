@@ -28,7 +28,7 @@ export class Player {
     const previous = this.voices[this.voices.indexOf(voice) - 1];
     const first = voice.schedule.end === 0 && !voice.paused;
     voice.add(piece, previous?.schedule.end);
-    if (first && voice.schedule.end > 0) this.onStart(piece.utterance, voice.schedule.start / SPEECH_RATE - heardTime(this.context, performance.now()));
+    if (first && voice.schedule.end > 0) this.onStart(piece.utterance, voice.schedule.start / SPEECH_RATE - this.heardTime(performance.now()));
   }
 
   /** The server has sent all of an utterance. */
@@ -66,7 +66,7 @@ export class Player {
    * @param at performance.now() of the moment in question, in ms; at most a second ago
    */
   heard(at = performance.now()): Heard | null {
-    const frame = heardTime(this.context, at) * SPEECH_RATE;
+    const frame = this.heardTime(at) * SPEECH_RATE;
     this.retire(frame);
     const voice = this.voices.findLast((v) => v.schedule.start <= frame);
     if (!voice || voice.track.empty) return null;
@@ -82,6 +82,10 @@ export class Player {
   /** Seconds of silence that late pieces have put into the current utterance. */
   get underrun(): number {
     return (this.voices.at(-1)?.schedule.shifted ?? 0) / SPEECH_RATE;
+  }
+
+  private heardTime(at: number): number {
+    return heardTime(this.context, at);
   }
 
   private open(utterance: number): Voice {
