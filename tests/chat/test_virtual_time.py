@@ -68,7 +68,7 @@ def test_the_turn_is_timed_as_it_was(bundle, question, monkeypatch, speculate, t
     assert parts["turn"] + parts["token"] == pytest.approx(400 + token, abs=40)
     assert parts["voice"] == pytest.approx(200, abs=1)
     assert parts["clause"] + parts["expression"] + parts["send"] < 1
-    assert parts["total"] == pytest.approx(1000 * took, abs=60)  # chunks of 40, frames of 32 ms
+    assert parts["total"] == pytest.approx(1000 * took, abs=60)  # chunks of 32 ms
     assert heard == pytest.approx(parts["total"] + 50, abs=1)  # as the page schedules it
 
 

@@ -2,6 +2,7 @@
 
 export const VERSION = 3;
 export const MICROPHONE_RATE = 16000; // Hz
+export const MICROPHONE_CHUNK = 512; // samples of a message
 export const SPEECH_RATE = 24000; // Hz
 export const EXPRESSION_FPS = 25; // rows per second
 export const MAX_TEXT_FRAME = 16384; // bytes
@@ -213,7 +214,7 @@ export interface StopMessage {
   utterance: number;
 }
 
-/** Somebody may be speaking: fall silent at once, but keep all that belongs to an utterance. `resume` or `stop` follows. */
+/** Somebody may speak: fall silent at once, but keep it all; `resume` or `stop` follows. */
 export interface PauseMessage {
   type: "pause";
   /** Which answer. */

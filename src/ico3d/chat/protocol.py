@@ -23,6 +23,7 @@ from ico3d.chat.marks import (
 
 VERSION = 3
 MICROPHONE_RATE = 16_000  # Hz, PCM16 mono from the page
+MICROPHONE_CHUNK = 512  # samples of a message: what Silero judges at once, so that none waits
 SPEECH_RATE = 24_000  # Hz, PCM16 mono to the page
 EXPRESSION_FPS = 25  # rows per second of an utterance's sound
 MAX_TEXT_FRAME = 16 * 1024  # bytes
@@ -333,9 +334,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class Pause:
-    """Somebody may be speaking: fall silent at once, but keep all that belongs to an utterance.
-
-    `resume` or `stop` follows.
+    """Somebody may speak: fall silent at once, but keep it all; `resume` or `stop` follows.
 
     Attributes:
         utterance: Which answer.

@@ -19,6 +19,7 @@ TARGET = Path(__file__).parents[3] / "viewer" / "src" / "protocol.ts"
 CONSTANTS = {
     "VERSION": "",
     "MICROPHONE_RATE": "Hz",
+    "MICROPHONE_CHUNK": "samples of a message",
     "SPEECH_RATE": "Hz",
     "EXPRESSION_FPS": "rows per second",
     "MAX_TEXT_FRAME": "bytes",

@@ -12,6 +12,7 @@ from websockets.exceptions import ConnectionClosed
 
 from ico3d.chat import protocol
 from ico3d.chat.codec import decode_server, encode
+from ico3d.chat.protocol import MICROPHONE_CHUNK as CHUNK
 from ico3d.chat.protocol import (
     Audio,
     ClientMessage,
@@ -27,7 +28,6 @@ from ico3d.chat.protocol import (
     Welcome,
 )
 
-CHUNK = 640  # samples: 40 ms, as the page sends them
 SCHEDULING = 0.05  # s from the arrival of the first piece to its first sample
 CLOCK_EVERY = 0.15  # s
 

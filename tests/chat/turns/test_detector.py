@@ -8,6 +8,8 @@ import pytest
 import soxr
 
 from ico3d.chat.frames import VoiceFrame
+from ico3d.chat.protocol import MICROPHONE_CHUNK as PIECE
+from ico3d.chat.protocol import MICROPHONE_RATE as RATE
 from ico3d.chat.settings import Turns
 from ico3d.chat.turns.detector import Ear, Timbre
 from ico3d.chat.turns.floor import Floor, Verdict
@@ -15,7 +17,6 @@ from ico3d.chat.turns.phrases import phrases
 from ico3d.common.espeak import synthesize
 
 SPEECH = Path(__file__).parents[4] / "shared" / "speech"
-RATE, PIECE = 16_000, 640
 VOICES = ("en-us", "en-us+f3", "en-us+m3", "en-us+m7")
 FADE = 0.02  # s that the page takes to fall silent
 

@@ -5,6 +5,7 @@ import pytest
 import soxr
 from pipecat.audio.vad.vad_analyzer import VADState
 
+from ico3d.chat.protocol import MICROPHONE_CHUNK as PIECE
 from ico3d.chat.settings import Turns
 from ico3d.chat.turns.detector import Ear
 from ico3d.chat.turns.echo import EchoGuard, similarity
@@ -12,7 +13,6 @@ from ico3d.common.espeak import synthesize
 
 NEAR, FAR = 16_000, 24_000  # Hz
 EARLY = ((0.004, 0.5), (0.011, 0.35), (0.023, 0.3))  # s and height of first reflections
-PIECE = 640  # samples: 40 ms
 
 
 def speech(text: str, voice: str, rate: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-import { MICROPHONE_RATE } from '../protocol.ts';
+import { MICROPHONE_CHUNK, MICROPHONE_RATE } from '../protocol.ts';
 import { Resampler, toPcm16 } from './resampler.ts';
 
 // The scope that audio worklets run in; TypeScript's DOM library does not know it.
@@ -9,18 +9,16 @@ declare class AudioWorkletProcessor {
 }
 declare function registerProcessor(name: string, processor: unknown): void;
 
-const CHUNK = MICROPHONE_RATE / 25; // 40 ms: with 20 the server works twice as much and hears no sooner
-
 /** What is posted: PCM16, and the context time at which its last block came. */
 export interface Chunk {
   pcm: Int16Array;
   end: number;
 }
 
-/** Resamples the microphone and posts it as PCM16 in 40-ms chunks. */
+/** Resamples the microphone and posts it as PCM16 in chunks. */
 class MicrophoneProcessor extends AudioWorkletProcessor {
   private readonly resampler = new Resampler(sampleRate, MICROPHONE_RATE);
-  private readonly chunk = new Float32Array(CHUNK);
+  private readonly chunk = new Float32Array(MICROPHONE_CHUNK);
   private filled = 0;
 
   process(inputs: Float32Array[][]): boolean {
@@ -28,7 +26,7 @@ class MicrophoneProcessor extends AudioWorkletProcessor {
     if (!block) return true; // nothing is connected yet
     for (const value of this.resampler.push(block)) {
       this.chunk[this.filled++] = value;
-      if (this.filled === CHUNK) this.flush();
+      if (this.filled === MICROPHONE_CHUNK) this.flush();
     }
     return true;
   }

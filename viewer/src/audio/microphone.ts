@@ -5,7 +5,7 @@ import workletUrl from './mic-worklet.ts?worker&url';
 /** Takes a chunk and when its last sample was recorded, ms on the performance clock. */
 type OnChunk = (pcm: Int16Array, end: number) => void;
 
-/** The visitor's microphone as PCM16 at 16 kHz in 40-ms chunks. */
+/** The visitor's microphone as PCM16 at 16 kHz in chunks. */
 export class Microphone {
   private context: AudioContext | null = null;
   private stream: MediaStream | null = null;

@@ -17,11 +17,10 @@ from pipecat.frames.frames import (
 )
 
 from ico3d.chat.modules.headless import Spares, run
-from ico3d.chat.protocol import MICROPHONE_RATE
+from ico3d.chat.protocol import MICROPHONE_CHUNK, MICROPHONE_RATE
 from ico3d.errors import MissingExtraError, ProtocolError
 
-CHUNK = MICROPHONE_RATE // 25  # samples: 40 ms, as a page sends them
-LEAD_IN = 12  # chunks before speech is announced: a VAD is that late too
+LEAD_IN = 15  # chunks before speech is announced: a VAD is that late too
 QUIET = np.zeros(MICROPHONE_RATE * 3 // 10, np.int16)  # around speech, as recognisers expect it
 DTYPES = {1: np.uint8, 2: np.dtype("<i2"), 4: np.dtype("<i4")}  # by bytes of a WAV's samples
 
@@ -61,7 +60,8 @@ def _answer(said: list[TranscriptionFrame], duration: float, form: str) -> Respo
 def heard(pcm: np.ndarray) -> list[Frame]:
     """(S,) int16 at 16 kHz as a conversation would bring it: one stretch of speech."""
     pcm = np.concatenate([QUIET, pcm, QUIET])
-    pieces = [pcm[at : at + CHUNK].tobytes() for at in range(0, len(pcm), CHUNK)]
+    starts = range(0, len(pcm), MICROPHONE_CHUNK)
+    pieces = [pcm[at : at + MICROPHONE_CHUNK].tobytes() for at in starts]
     frames: list[Frame] = [InputAudioRawFrame(piece, MICROPHONE_RATE, 1) for piece in pieces]
     frames.insert(min(LEAD_IN, len(frames)), VADUserStartedSpeakingFrame())
     return [*frames, VADUserStoppedSpeakingFrame()]

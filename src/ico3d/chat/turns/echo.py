@@ -99,6 +99,7 @@ class EchoGuard:
         before, self._before = self._before, (playing, position)
         if playing is None:  # it may have fallen silent at any moment of this piece
             playing, position = before[0], before[1] + len(pcm) / MICROPHONE_RATE
+        position -= len(self._rest) / MICROPHONE_RATE  # where the last whole frame ends
         for index, row in enumerate(rows):
             self._hear(row, self.sent.at(playing, position - (count - index) * FRAME))
         return self._speaks() and self._since_voice >= AFTER
