@@ -232,10 +232,12 @@ def test_resuming_repeats_the_uninterrupted_run(capture):
     kept = {name: value.detach().clone() for name, value in whole.tensors().items()}
     resumed = trainer_of(capture, Ball())
     resumed.restore(kept, {})
+    counts = set()
     for index in range(95, 125):
         whole.step(index)
         resumed.step(index)
-    assert len(kept["gaussians.means"]) != len(whole.model)
+        counts.add(len(whole.model))
+    assert len(counts) > 1
     for name, value in whole.tensors().items():
         assert torch.equal(value, resumed.tensors()[name]), name
 

@@ -1,7 +1,6 @@
 """Speech recognition with pocketsphinx: offline, its model is inside the package."""
 
 import asyncio
-from collections import deque
 from collections.abc import AsyncGenerator
 from dataclasses import dataclass
 
@@ -72,8 +71,7 @@ class SphinxRecognition(STTService):
         self._decoder = SphinxProcess()
         self._leveller = Leveller()
         self._sound: asyncio.Queue[bytes | None] = asyncio.Queue()  # None: speech has ended
-        self._before: deque[bytes] = deque()
-        self._before_bytes = 0
+        self._before = b""
         self._hearing = False
         self._lost = False  # the decoder, in this utterance
         self._task: asyncio.Task | None = None
@@ -102,24 +100,16 @@ class SphinxRecognition(STTService):
         if self._hearing:
             self._sound.put_nowait(audio)
         else:
-            self._remember(audio)
+            self._before = (self._before + audio)[-2 * int(LEAD_IN * MICROPHONE_RATE) :]
         yield None
-
-    def _remember(self, audio: bytes) -> None:
-        self._before.append(audio)
-        self._before_bytes += len(audio)
-        while self._before_bytes - len(self._before[0]) >= int(LEAD_IN * MICROPHONE_RATE) * 2:
-            self._before_bytes -= len(self._before.popleft())
 
     async def _handle_vad_user_started_speaking(self, frame: VADUserStartedSpeakingFrame):
         await super()._handle_vad_user_started_speaking(frame)
         self._hearing = True
-        lead_in = b"".join(self._before)
+        lead_in, self._before = self._before, b""
         self._leveller.measure(lead_in)
         if lead_in:
             self._sound.put_nowait(lead_in)
-        self._before.clear()
-        self._before_bytes = 0
 
     async def _handle_vad_user_stopped_speaking(self, frame: VADUserStoppedSpeakingFrame):
         await super()._handle_vad_user_stopped_speaking(frame)
