@@ -221,7 +221,8 @@ def test_nine_sessions_leave_no_more_behind_than_three(bundle, monkeypatch):
 
     (tasks, threads, memory), (more_tasks, more_threads, more_memory) = run(monkeypatch, visits())
     print(f"{(more_memory - memory) / 6e6:.2f} MB for each of 6 sessions")
-    assert more_tasks == tasks and more_threads <= threads
+    assert more_tasks == tasks
+    assert more_threads < threads + 6  # a pool may still grow; one left by each would be six
     assert more_memory - memory < 6 * 2e6  # what a session takes is five times that
 
 
