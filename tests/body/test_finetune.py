@@ -40,7 +40,7 @@ def models(capture):
 def tuner_of(capture, models, consistency, **changes):
     """Fine-tuning of the second of two windows."""
     settings = replace(settings_for("cpu", "swings++"), **SMALL)
-    settings = replace(settings, finetune_steps=60, finetune_rate=3.0, consistency=consistency)
+    settings = replace(settings, finetune_steps=120, finetune_from=0.0, consistency=consistency)
     settings = replace(settings, **changes)
     cameras = [c for i, c in enumerate(capture.cameras) if i not in capture.split.test_cameras]
     pictures = BodyViews(capture, AFTER.frames, 0.1)
@@ -66,7 +66,7 @@ def test_windows_grow_together(capture, models):
     earlier = {n: v.detach().clone() for n, v in models[0].gaussians.items()}
     before = difference(capture, models)
     tuner = tuner_of(capture, models, 0.75)
-    kinds = [set(tuner.step(index)) for index in range(60)]
+    kinds = [set(tuner.step(index)) for index in range(120)]
     changed = {
         name
         for name, value in {**models[1].gaussians, **models[1].shared}.items()
@@ -79,23 +79,31 @@ def test_windows_grow_together(capture, models):
     assert agreeing == pytest.approx(0.75, abs=0.15)
 
 
-def test_it_ends_with_a_running_mean(capture, models):
-    """Of the second half of the steps, as a loop over their Gaussians has it."""
+def test_it_ends_with_a_mean(capture, models):
+    """Of the Gaussians of the second half of the steps."""
     start = {n: v.detach().clone() for n, v in models[1].gaussians.items()}
-    plain = tuner_of(capture, models, 0.75, finetune_average=0.0)
-    mean = None
+    plain = tuner_of(capture, models, 0.75, finetune_steps=60, finetune_mean=0.0)
+    every = []
     for index in range(60):
         plain.step(index)
-        if index >= 30:
-            now = models[1].gaussians["means"].detach().clone()
-            mean = now if mean is None else 0.9 * mean + 0.1 * now
+        every.append(models[1].gaussians["means"].detach().clone())
     models[1].gaussians = start
-    averaged = tuner_of(capture, models, 0.75, finetune_average=0.9)
+    averaged = tuner_of(capture, models, 0.75, finetune_steps=60, finetune_mean=0.5)
     for index in range(60):
         averaged.step(index)
     found = models[1].gaussians["means"].detach()
-    assert torch.allclose(found, mean, rtol=0, atol=1e-6)
-    assert (found - now).abs().max() > 1e-4
+    assert torch.allclose(found, torch.stack(every[30:]).mean(0), rtol=0, atol=1e-6)
+    assert (found - every[-1]).abs().max() > 1e-4
+
+
+def test_rates_begin_where_they_are_told(capture, models, monkeypatch):
+    """Half-way down at first, at the end of their decay at last."""
+    tuner = tuner_of(capture, models, 0.75, finetune_from=0.5)
+    learner, seen = tuner._learner, []
+    monkeypatch.setattr(learner, "update", seen.append)
+    for index in (0, 60, 120):
+        tuner.step(index)
+    assert seen == [0.5, 0.75, 1.0]
 
 
 def test_resuming_repeats_the_uninterrupted_run(capture, models):

@@ -19,8 +19,6 @@ from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.losses import l1
 from ico3d.splat.render import render
 
-AVERAGED = 0.5
-"""Part of the steps after which the running mean begins."""
 STILL_SEEN = 0.05
 """Opacity from which a Gaussian counts for where the person is in a picture."""
 
@@ -76,7 +74,8 @@ class FineTuner:
             values = self._agree(index)
         else:
             values = self._remember(index)
-        self._learner.update(index / self._settings.finetune_steps, self._settings.finetune_rate)
+        start, done = self._settings.finetune_from, index / self._settings.finetune_steps
+        self._learner.update(start + (1 - start) * done)
         self._average(index)
         self._learner.prune(index, self._settings.finetune_steps)
         return values
@@ -96,9 +95,10 @@ class FineTuner:
 
     def _average(self, index: int) -> None:
         """Ends with a mean over many steps: single ones look at one moment, from one side."""
-        steps, past = self._settings.finetune_steps, self._settings.finetune_average
-        if past and index >= AVERAGED * steps:
-            self._learner.keep_mean(past)
+        steps = self._settings.finetune_steps
+        first = round((1 - self._settings.finetune_mean) * steps)
+        if index >= first:
+            self._learner.keep_mean(index - first)
             if index == steps - 1:
                 self._learner.take_mean()
 

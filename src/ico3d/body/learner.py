@@ -119,31 +119,30 @@ class Learner:
         picture = photometric(rendering.rgb, example.target[None], settings.ssim_weight)
         return picture + settings.mask_weight * l1(rendering.alpha[0], example.mask)
 
-    def update(self, progress: float, factor: float = 1.0) -> None:
+    def update(self, progress: float) -> None:
         """One optimiser step on every tensor that has a gradient.
 
         Args:
             progress: Part of the steps that are done, 0 to 1.
-            factor: Of all learning rates.
         """
         tensors = {**self.model.gaussians, **self.model.shared, "affine": self.affine}
         for name, tensor in tensors.items():
             if tensor.grad is None:
                 continue
-            rate = factor * self._rates[_group(name)].at(progress)
+            rate = self._rates[_group(name)].at(progress)
             if name == "means":
                 rate *= self._extent
             self.optimiser.update(name, tensor, tensor.grad, rate)
             tensor.grad = None
 
     @torch.no_grad()
-    def keep_mean(self, past: float) -> None:
-        """Keeps a running mean of the canonical Gaussians, where `past` is the share of the old."""
+    def keep_mean(self, count: int) -> None:
+        """Keeps the mean of the canonical Gaussians, `count` of which are in it already."""
         moments = self.optimiser.moments
         for name in CANONICAL:
             value = self.model.gaussians[name].detach()
             mean = moments.setdefault(f"{name}.mean", value.clone())
-            mean.lerp_(value, 1.0 - past)
+            mean.lerp_(value, 1 / (count + 1))
 
     @torch.no_grad()
     def take_mean(self) -> None:

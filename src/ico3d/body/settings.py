@@ -66,9 +66,10 @@ class BodySettings:
         min_opacity: Below this a Gaussian dies.
         finetune_steps: Steps of temporal fine-tuning per window; 0 for none.
         consistency: Part of those steps that compare with the window before.
-        finetune_rate: Factor of the learning rates in fine-tuning.
-        finetune_average: Share of the past in the running mean of the Gaussians that fine-tuning
-            ends with; 0 for the last step's Gaussians as they are.
+        finetune_from: Where on the decay of the learning rates fine-tuning begins: 0 where training
+            did, 1 where that ended.
+        finetune_mean: Part of those steps, the last ones, with whose mean Gaussians they end; 0
+            for the last step's Gaussians as they are.
         checkpoint_every: Steps between checkpoints.
         cache_gib: Pictures kept in memory, in GiB; further ones are read again at each use.
     """
@@ -118,8 +119,8 @@ class BodySettings:
     min_opacity: float = 0.005
     finetune_steps: int = 20_000
     consistency: float = 0.75
-    finetune_rate: float = 1.0
-    finetune_average: float = 0.0
+    finetune_from: float = 0.0
+    finetune_mean: float = 0.0
     checkpoint_every: int = 1_000
     cache_gib: float = 2.0
 
@@ -167,8 +168,8 @@ CPU = BodySettings(
     densify_growth=0.12,
     absgrad=True,
     finetune_steps=3_500,
-    finetune_rate=0.5,
-    finetune_average=0.995,
+    finetune_from=0.5,
+    finetune_mean=0.5,
     checkpoint_every=500,
 )
 

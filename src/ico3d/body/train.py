@@ -24,7 +24,7 @@ from ico3d.errors import ModelError
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.run import RunFolder
 
-FINETUNING = ("finetune_steps", "consistency", "finetune_rate", "finetune_average")
+FINETUNING = ("finetune_steps", "consistency", "finetune_from", "finetune_mean")
 """Settings that windows do not depend on: fine-tuning can be done anew without training anew."""
 WINDOW_FILE = "window.safetensors"
 
