@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from loguru import logger
 from pipecat.adapters.llm.schemas.tools_schema import ToolsSchema
 from pipecat.audio.turn.smart_turn.base_smart_turn import SmartTurnParams
-from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
 from pipecat.pipeline.pipeline import Pipeline
 from pipecat.pipeline.worker import PipelineParams, PipelineWorker
 from pipecat.processors.aggregators.llm_context import LLMContext, NotGiven
@@ -44,6 +43,7 @@ from ico3d.chat.supervision.voice import endure
 from ico3d.chat.timing import Clock, TurnObserver
 from ico3d.chat.tools import functions
 from ico3d.chat.turns.detector import Ear, VoiceDetector
+from ico3d.chat.turns.eager import EagerSmartTurn
 from ico3d.chat.turns.echo import EchoGuard
 from ico3d.chat.turns.echo_filter import EchoFilter
 from ico3d.chat.turns.strategies import strategies
@@ -80,7 +80,7 @@ class Parts:
     """What takes a while to make; made in a thread."""
 
     ear: Ear
-    turn: LocalSmartTurnAnalyzerV3
+    turn: EagerSmartTurn
     recognition: FrameProcessor
     language: FrameProcessor
     voice: FrameProcessor
@@ -248,7 +248,9 @@ def make_parts(avatar: Avatar) -> Parts:
     context = Context(avatar.persona, avatar.head, avatar.animation)
     return Parts(
         Ear(turns.pause),
-        LocalSmartTurnAnalyzerV3(params=SmartTurnParams(stop_secs=turns.end_silence - turns.pause)),
+        EagerSmartTurn(
+            turns.pause, params=SmartTurnParams(stop_secs=turns.end_silence - turns.pause)
+        ),
         services.recognition.make(context),
         services.language.make(context),
         services.voice.make(context),

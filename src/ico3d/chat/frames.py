@@ -65,6 +65,7 @@ class VoiceFrame(SystemFrame):
         voiced: Whether there is a voice in them.
         plain: Whether all of the voice so far was one and the same vowel or hum.
         fading: Whether it is much quieter than it was, as at the end of a word.
+        silence: Seconds for which the VAD, which still knows of a voice, has not heard it.
     """
 
     at: float = 0.0
@@ -72,6 +73,7 @@ class VoiceFrame(SystemFrame):
     voiced: bool = False
     plain: bool = False
     fading: bool = False
+    silence: float = 0.0
 
 
 @dataclass

@@ -57,6 +57,9 @@ class Verdicts(BaseTurnAnalyzer):
     async def analyze_end_of_turn(self):
         return (EndOfTurnState.COMPLETE if self.complete else EndOfTurnState.INCOMPLETE), None
 
+    def listen(self, silence: float) -> None:
+        pass
+
     def clear(self):
         self.silence = False
 

@@ -35,11 +35,14 @@ class Ear(SileroVADAnalyzer):
             sample_rate=MICROPHONE_RATE, params=VADParams(stop_secs=pause, min_volume=QUIETEST)
         )
         self._hint = False
+        self.silence = 0.0  # s of a pause that may end the voice
 
     async def analyze_audio(self, buffer: bytes) -> VADState:
-        """Silero's verdict; `voiced` tells of this very sound."""
+        """Silero's verdict; `voiced` tells of this very sound, `silence` of those before too."""
         self._hint = False
         state = await super().analyze_audio(buffer)
+        seconds = len(buffer) / 2 / MICROPHONE_RATE
+        self.silence = self.silence + seconds if state == VADState.STOPPING else 0.0
         self.voiced = self._hint or state in (VADState.STARTING, VADState.SPEAKING)
         return state
 
@@ -132,7 +135,7 @@ class VoiceDetector(VADProcessor):
             return
         self._timbre.hear(samples)
         plain, fading = self._timbre.is_plain, self._timbre.is_fading
-        await self.push_frame(VoiceFrame(at, seconds, voiced, plain, fading))
+        await self.push_frame(VoiceFrame(at, seconds, voiced, plain, fading, self._ear.silence))
 
     async def _hold(self) -> None:
         if self._held:

@@ -16,7 +16,8 @@ from pipecat.turns.user_stop import (
     TurnAnalyzerUserTurnStopStrategy,
 )
 
-from ico3d.chat.frames import TalkFrame
+from ico3d.chat.frames import TalkFrame, VoiceFrame
+from ico3d.chat.turns.eager import EagerSmartTurn
 
 
 class SpeculativeTurnStop(TurnAnalyzerUserTurnStopStrategy):
@@ -27,10 +28,10 @@ class SpeculativeTurnStop(TurnAnalyzerUserTurnStopStrategy):
     the turn ends with these words, or for ever, when the visitor goes on.
     """
 
-    def __init__(self, speculate: bool, **kwargs):
+    def __init__(self, speculate: bool, analyzer: EagerSmartTurn, **kwargs):
         """A strategy for one session; the rest as the base takes it."""
-        super().__init__(**kwargs)
-        self._speculate = speculate
+        super().__init__(turn_analyzer=analyzer, **kwargs)
+        self._speculate, self._analyzer = speculate, analyzer
         self._match = NormalizedMatch()
         self._said = ""  # in this turn
         self._prepared: str | None = None  # the words that are being answered
@@ -50,7 +51,9 @@ class SpeculativeTurnStop(TurnAnalyzerUserTurnStopStrategy):
 
     async def process_frame(self, frame: Frame) -> ProcessFrameResult:
         """Follows voice and words."""
-        if isinstance(frame, VADUserStartedSpeakingFrame):
+        if isinstance(frame, VoiceFrame):
+            self._analyzer.listen(frame.silence)
+        elif isinstance(frame, VADUserStartedSpeakingFrame):
             self._silent = False
             await self._withdraw()
         elif isinstance(frame, VADUserStoppedSpeakingFrame):

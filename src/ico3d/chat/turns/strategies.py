@@ -3,10 +3,10 @@
 import time
 from collections.abc import Callable
 
-from pipecat.audio.turn.base_turn_analyzer import BaseTurnAnalyzer
 from pipecat.turns.user_turn_strategies import UserTurnStrategies
 
 from ico3d.chat.settings import Turns
+from ico3d.chat.turns.eager import EagerSmartTurn
 from ico3d.chat.turns.floor import Floor
 from ico3d.chat.turns.phrases import phrases
 from ico3d.chat.turns.start import FloorTurnStart
@@ -14,7 +14,7 @@ from ico3d.chat.turns.stop import ReleaseTurnStop, SpeculativeTurnStop
 
 
 def strategies(
-    analyzer: BaseTurnAnalyzer,
+    analyzer: EagerSmartTurn,
     settings: Turns,
     trusted: bool,
     hush: Callable[[bool], None],
@@ -34,6 +34,6 @@ def strategies(
         start=[FloorTurnStart(floor, hush)],
         stop=[
             ReleaseTurnStop(),
-            SpeculativeTurnStop(settings.speculate, turn_analyzer=analyzer),
+            SpeculativeTurnStop(settings.speculate, analyzer),
         ],
     )

@@ -1,0 +1,79 @@
+"""Smart-Turn, asked before a pause is long enough: its verdict is there when the pause is."""
+
+import asyncio
+import time
+
+import numpy as np
+from pipecat.audio.turn.base_turn_analyzer import EndOfTurnState
+from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
+from pipecat.metrics.metrics import MetricsData, TurnMetricsData
+
+from ico3d.chat.protocol import MICROPHONE_RATE
+
+SOON = 0.09  # s of silence after which a voice may well have ended
+SURE = 0.2  # a verdict this near to one half is asked for again
+LAST = MICROPHONE_RATE * 32 // 1000  # samples of silence that are taken to go on
+
+Verdict = tuple[EndOfTurnState, MetricsData | None]
+
+
+class EagerSmartTurn(LocalSmartTurnAnalyzerV3):
+    """Listens to a pause while it lasts, as if it went on in the way it began.
+
+    The model needs 40 to 100 ms of a core, which would come on top of the pause. At 94 pauses of
+    people and synthetic voices, with and without noise, it was sure of 84, and always right: its
+    verdict was that on the whole pause.
+    """
+
+    def __init__(self, pause: float, **kwargs):
+        """An analyzer for one session.
+
+        Args:
+            pause: Seconds of silence after which pipecat will ask.
+            **kwargs: As the base takes it.
+        """
+        super().__init__(**kwargs)
+        self._pause = pause
+        self._early: asyncio.Future[Verdict] | None = None
+
+    def listen(self, silence: float) -> None:
+        """Follows the voice: for how many seconds it has been silent."""
+        if silence <= 0:
+            self._forget()
+        elif self._early is None and SOON <= silence < self._pause and self._audio_buffer:
+            loop, sound = asyncio.get_running_loop(), self._foreseen(self._pause - silence)
+            self._early = loop.run_in_executor(
+                self._model_executor, self._process_speech_segment, sound
+            )
+
+    async def analyze_end_of_turn(self) -> Verdict:
+        """The verdict on the voice so far."""
+        early, self._early = self._early, None
+        if early is not None:
+            state, found = await early
+            if is_sure(found):
+                if state == EndOfTurnState.COMPLETE:
+                    self.clear()
+                return state, found
+        return await super().analyze_end_of_turn()
+
+    async def cleanup(self):
+        """Ends the thread."""
+        self._forget()
+        await super().cleanup()
+
+    def _forget(self) -> None:
+        if self._early is not None:
+            self._early.cancel()
+            self._early = None
+
+    def _foreseen(self, seconds: float) -> list[tuple[float, np.ndarray]]:
+        """What was heard, and the silence that is to come, made of the last of it."""
+        recent = np.concatenate([sound for _, sound in self._audio_buffer[-8:]])[-LAST:]
+        silence = np.resize(recent[::-1], round(seconds * MICROPHONE_RATE))  # (S,) int16
+        return [*self._audio_buffer, (time.monotonic(), silence)]
+
+
+def is_sure(found: MetricsData | None) -> bool:
+    """Whether the sound that is still missing would hardly change a verdict."""
+    return isinstance(found, TurnMetricsData) and abs(found.probability - 0.5) >= SURE
