@@ -1,7 +1,7 @@
 """One conversation: the pipecat pipeline between a page's messages and the page."""
 
 import asyncio
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from loguru import logger
 from pipecat.adapters.llm.schemas.tools_schema import ToolsSchema
@@ -47,6 +47,7 @@ from ico3d.chat.turns.eager import EagerSmartTurn
 from ico3d.chat.turns.echo import EchoGuard
 from ico3d.chat.turns.echo_filter import EchoFilter
 from ico3d.chat.turns.strategies import strategies
+from ico3d.chat.workers import Workers, at_once
 from ico3d.speech.runtime import SpeechModel
 
 NOTHING_HEARD = 3.0  # s without a sign of the recogniser after which a turn is given up
@@ -64,6 +65,7 @@ class Avatar:
         settings: Services and timing.
         animation: How its body moves; None for a head alone.
         speech_sha256: Of the file of `speech`, by which a remote module knows that it is its own.
+        workers: Threads in which faces are made.
     """
 
     head: HeadInfo
@@ -73,6 +75,7 @@ class Avatar:
     settings: ChatSettings
     animation: Animation | None
     speech_sha256: str = ""
+    workers: Workers = field(default_factory=Workers)
 
 
 @dataclass(frozen=True)
@@ -183,7 +186,7 @@ class Conversation:
 
     def _pipeline(self, parts: Parts) -> Pipeline:
         settings, face = self._avatar.settings, make_face(self._avatar)
-        turns = settings.turns
+        turns, run = settings.turns, at_once if face.is_remote else self._avatar.workers.run
         trusted = not self._avatar.services.recognition.provider.stand_in
         chosen = strategies(parts.turn, turns, trusted, self._speaker.hush, self._now)
         context = LLMContext(tools=self._functions(parts.language, face))
@@ -202,7 +205,7 @@ class Conversation:
                 ),
                 ClauseProcessor(next(iter(self._avatar.persona.languages), None)),
                 parts.voice,
-                ExpressionProcessor(face, self._utterances),
+                ExpressionProcessor(face, self._utterances, run),
                 self._speaker,
                 assistant,
             ]

@@ -19,6 +19,8 @@ from pipecat.utils.text.base_text_aggregator import TextType
 
 from ico3d.chat.face import MOST, ROW, Face, Piece, Sentence
 from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame, Utterances
+from ico3d.chat.protocol import EXPRESSION_FPS
+from ico3d.chat.workers import Run
 
 STEP = 3 * MOST * ROW  # samples that go through the model at once: the first face comes early
 
@@ -29,10 +31,16 @@ class ExpressionProcessor(FrameProcessor):
     An utterance is one answer of the language model, or one text spoken outside of an answer.
     """
 
-    def __init__(self, face: Face, utterances: Utterances):
-        """A processor for one session."""
+    def __init__(self, face: Face, utterances: Utterances, run: Run):
+        """A processor for one session.
+
+        Args:
+            face: What moves.
+            utterances: Which answers there are.
+            run: Does what takes a while, in time for the row that it is for.
+        """
         super().__init__()
-        self._face, self._utterances = face, utterances
+        self._face, self._utterances, self._run = face, utterances, run
         self._in_answer = False
         self._utterance: int | None = None
         self._reset()
@@ -83,14 +91,19 @@ class ExpressionProcessor(FrameProcessor):
             self._sentence = Sentence(self._face, self._next_row, self._start % 1e5)
         pcm = np.frombuffer(frame.audio, np.int16)
         for at in range(0, len(pcm), STEP):
-            await self._push(await asyncio.to_thread(self._sentence.push, pcm[at : at + STEP]))
+            due = self._due(self._sentence)
+            await self._push(await self._run(due, self._sentence.push, pcm[at : at + STEP]))
 
     async def _end_sentence(self) -> None:
         if self._sentence is None:
             return
         sentence, self._sentence = self._sentence, None
-        await self._push(await asyncio.to_thread(sentence.finish))
+        await self._push(await self._run(self._due(sentence), sentence.finish))
         self._next_row = sentence.next_row
+
+    def _due(self, sentence: Sentence) -> float:
+        """When the next piece is heard, at the soonest."""
+        return self._start + sentence.next_row / EXPRESSION_FPS
 
     async def _end_utterance(self) -> None:
         await self._end_sentence()

@@ -54,6 +54,11 @@ class Face:
         self._model, self._remote = model, remote
         self._eyes = EyeBehaviour(seed)
 
+    @property
+    def is_remote(self) -> bool:
+        """Whether another machine moves the mouth."""
+        return self._remote is not None
+
     def lips(self) -> Lips:
         """The mouth for a new sentence."""
         if self._remote is not None:
