@@ -2,8 +2,10 @@ import subprocess
 import sys
 
 import numpy as np
+import onnx
 import pytest
 import torch
+from onnx import numpy_helper
 
 from ico3d.errors import ModelError
 from ico3d.speech.encoder import FrozenEncoder, load_encoder
@@ -125,3 +127,19 @@ def test_serving_needs_no_torch(builtin, tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "(26, 32) (1, 7)"
+
+
+def test_weights_that_decayed_to_nothing_are_nothing(builtin):
+    encoder = builtin[0]
+    adaptor = SpeechAdaptor(encoder.size)
+    decayed = adaptor.attention.convolutions[0].weight
+    with torch.no_grad():
+        decayed.mul_(1e-37)
+    assert decayed.abs().max() > 0
+    model = export_speech(adaptor, encoder)
+    for weight in onnx.load_from_string(model).graph.initializer:
+        value = numpy_helper.to_array(weight)
+        assert not (value.dtype.kind == "f" and ((value != 0) & (abs(value) < 1e-20)).any())
+    samples = sound(1.0)
+    found = SpeechModel(model).expressions(samples, 16000)
+    np.testing.assert_allclose(found, track(encoder, adaptor, samples), atol=1e-5)
