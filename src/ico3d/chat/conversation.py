@@ -203,7 +203,7 @@ class Conversation:
                 AnswerGuard(
                     parts.recognition, parts.language, settings.patience.language, self._tongue()
                 ),
-                ClauseProcessor(next(iter(self._avatar.persona.languages), None)),
+                ClauseProcessor(self._language()),
                 parts.voice,
                 ExpressionProcessor(face, self._utterances, run),
                 self._speaker,
@@ -213,8 +213,11 @@ class Conversation:
 
     def _tongue(self) -> str:
         """Language of apologies."""
-        named = self._avatar.settings.patience.apologies
-        return named or next(iter(self._avatar.persona.languages), "en")
+        return self._avatar.settings.patience.apologies or self._language() or "en"
+
+    def _language(self) -> str | None:
+        """The persona's first."""
+        return next(iter(self._avatar.persona.languages), None)
 
     def _complain(self, sentence: str) -> None:
         self._page.send(Error(sentence, fatal=False))
