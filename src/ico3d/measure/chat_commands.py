@@ -52,13 +52,13 @@ class BenchChat:
         from ico3d.errors import SettingsError
 
         set_up_log(verbose=False)
-        from ico3d.measure import chat_bench
+        from ico3d.measure import chat_bench, host
         from ico3d.measure.questions import sayings
 
         if self.turns < 1:
             raise SettingsError("--turns must be at least 1.")
         said = sayings(self.speech)
-        with Progress() as progress:
+        with host.watched() as stolen, Progress() as progress:
             bars = {kind: progress.add_task(kind, total=self.turns) for kind in self.kinds}
             results = chat_bench.measure(
                 self.bundle,
@@ -68,11 +68,12 @@ class BenchChat:
                 self.turns,
                 lambda kind: progress.advance(bars[kind]),
             )
-        figures = chat_bench.figures(results)
+        figures = chat_bench.figures(results) | {"stolen_cores": stolen.cores}
         if self.json is not None:
             write_atomic(self.json, json.dumps(figures, indent=1).encode())
         for table in chat_bench.tables(figures):
             Console().print(table)
+        Console().print(stolen.sentence())
 
 
 @dataclass(frozen=True)
@@ -109,9 +110,12 @@ class BenchSessions:
         from ico3d.common.files import write_atomic
 
         set_up_log(verbose=False)
-        from ico3d.measure import crowd
+        from ico3d.measure import crowd, host
 
-        figures = crowd.figures(crowd.measure(self.bundle, self.visitors, self.microphones))
+        with host.watched() as stolen:
+            visits = crowd.measure(self.bundle, self.visitors, self.microphones)
+        figures = crowd.figures(visits) | {"stolen_cores": stolen.cores}
         if self.json is not None:
             write_atomic(self.json, json.dumps(figures, indent=1).encode())
         Console().print(crowd.table(figures))
+        Console().print(stolen.sentence())
