@@ -29,16 +29,20 @@ def test_figures_are_medians_and_what_went_wrong():
         interruptions=[Interruption(150, 500, 0), Interruption(250, 600, 2)],
         assents=[Assent(True, 900, True), Assent(False, 0, False), Assent(True, 1000, False)],
         shares=[10.0, None, 30.0],
+        undisturbed=[10.0],
     )
     found = figures(results)
     assert found["voice_to_voice_ms"] == {"p50": 550, "p95": pytest.approx(640)}
     assert found["server_share_ms"] == {"p50": 20, "p95": pytest.approx(29)}
+    assert found["undisturbed_share_ms"] == {"p50": 10, "p95": 10}
     assert found["duck_ms"]["p50"] == 200 and found["stop_ms"]["p95"] == pytest.approx(595)
     assert found["assent_silence_ms"]["p50"] == 900
     assert found["parts"]["voice"]["p50"] == 50
     assert found["trials"] == {
         "questions": 4,
         "questions_answered_in_order": 3,
+        "shares": 3,
+        "shares_undisturbed": 1,
         "interruptions": 2,
         "messages_after_stop": 2,
         "assents": 3,
@@ -143,5 +147,8 @@ def test_trials_against_real_servers(tmp_path):
     assert found["trials"]["interruptions"] == 1 and found["trials"]["messages_after_stop"] == 0
     assert found["trials"]["assents"] == found["trials"]["assents_lossless"] == 1
     assert 200 < found["voice_to_voice_ms"]["p50"] < 1300 * slowness
-    assert -60 < found["server_share_ms"]["p50"] < 100 * slowness
-    assert 0 < found["duck_ms"]["p50"] <= found["stop_ms"]["p50"] < 800 * slowness
+    if found["trials"]["shares_undisturbed"]:  # else it says how busy the host is
+        assert -60 < found["undisturbed_share_ms"]["p50"] < 100 * slowness
+    assert found["stolen_cores"] is None or found["stolen_cores"] >= 0
+    # "Stop it," may be over before it is sure; then the next words decide, at 0.83 s
+    assert 0 < found["duck_ms"]["p50"] <= found["stop_ms"]["p50"] < 900 * slowness

@@ -4,7 +4,7 @@ import asyncio
 import time
 from collections.abc import Callable
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from ico3d.chat.protocol import (
     Stop,
     Text,
 )
+from ico3d.measure.host import stolen_seconds
 from ico3d.measure.page import SCHEDULING, Page, open_page
 
 FADE = 0.02  # s in which the page falls silent, by far more than 20 dB
@@ -40,11 +41,13 @@ class Question:
             a page plays it.
         arrival: The same until the first sample was there.
         parts: What the server says of the same turn.
+        is_disturbed: Whether the machine's host took processor time meanwhile.
     """
 
     voice_to_voice: float
     arrival: float
     parts: dict[str, float]
+    is_disturbed: bool = False
 
 
 @dataclass(frozen=True)
@@ -102,6 +105,8 @@ async def ask(page: Page, sound: np.ndarray) -> Question | None:
     """Asks a question in real time; None if it was answered before its end or not at all."""
     since = len(page.log)
     said = page.say(sound)
+    await asyncio.sleep(max(0.0, said - time.monotonic()))
+    taken = stolen_seconds()
 
     def found() -> Question | None:
         first = first_speech(page, since)
@@ -112,8 +117,9 @@ async def ask(page: Page, sound: np.ndarray) -> Question | None:
         arrival = 1000 * (late[0] - said)
         return Question(arrival + 1000 * SCHEDULING, arrival, turns[0].values)
 
-    await until(lambda: found() is not None, said - time.monotonic() + PATIENCE)
-    return found()
+    await until(lambda: found() is not None, PATIENCE)
+    answered = found()
+    return answered and replace(answered, is_disturbed=stolen_seconds() != taken)
 
 
 async def interrupt(page: Page, sound: np.ndarray, after: float) -> Interruption:

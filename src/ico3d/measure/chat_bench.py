@@ -35,12 +35,14 @@ class Results:
         interruptions: Answers that were to stop.
         assents: Answers that were to go on.
         shares: Milliseconds of the server alone.
+        undisturbed: Those during which the machine's host took no processor time.
     """
 
     questions: list[chat.Question | None] = field(default_factory=list)
     interruptions: list[chat.Interruption] = field(default_factory=list)
     assents: list[chat.Assent] = field(default_factory=list)
     shares: list[float | None] = field(default_factory=list)
+    undisturbed: list[float] = field(default_factory=list)
 
 
 def measure(
@@ -117,6 +119,8 @@ async def _shares(url: str, said: Sayings, turns: int, results: Results, told: T
         for number in range(turns):
             question = await chat.ask(page, broken_off(nth(said.questions, number)))
             results.shares.append(question and share(question))
+            if question and not question.is_disturbed:
+                results.undisturbed.append(share(question))
             await chat.peace(page)
             told("share")
 
@@ -139,6 +143,7 @@ def figures(results: Results) -> dict[str, Any]:
     spans = {
         "voice_to_voice_ms": [question.voice_to_voice for question in answered],
         "server_share_ms": [value for value in results.shares if value is not None],
+        "undisturbed_share_ms": results.undisturbed,
         "duck_ms": [trial.duck for trial in results.interruptions],
         "stop_ms": [trial.stop for trial in results.interruptions],
         "assent_silence_ms": [trial.silence for trial in results.assents],
@@ -151,6 +156,8 @@ def figures(results: Results) -> dict[str, Any]:
     found["trials"] = {
         "questions": len(results.questions),
         "questions_answered_in_order": len(answered),
+        "shares": len(results.shares),
+        "shares_undisturbed": len(results.undisturbed),
         "interruptions": len(results.interruptions),
         "messages_after_stop": sum(trial.after for trial in results.interruptions),
         "assents": len(results.assents),

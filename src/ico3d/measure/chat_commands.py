@@ -68,9 +68,10 @@ class BenchChat:
                 self.turns,
                 lambda kind: progress.advance(bars[kind]),
             )
-        figures = chat_bench.figures(results) | {"stolen_cores": stolen.cores}
+        figures = chat_bench.figures(results)
         if self.json is not None:
-            write_atomic(self.json, json.dumps(figures, indent=1).encode())
+            told = figures | {"stolen_cores": stolen.cores}
+            write_atomic(self.json, json.dumps(told, indent=1).encode())
         for table in chat_bench.tables(figures):
             Console().print(table)
         Console().print(stolen.sentence())
@@ -114,8 +115,9 @@ class BenchSessions:
 
         with host.watched() as stolen:
             visits = crowd.measure(self.bundle, self.visitors, self.microphones)
-        figures = crowd.figures(visits) | {"stolen_cores": stolen.cores}
+        figures = crowd.figures(visits)
         if self.json is not None:
-            write_atomic(self.json, json.dumps(figures, indent=1).encode())
+            told = figures | {"stolen_cores": stolen.cores}
+            write_atomic(self.json, json.dumps(told, indent=1).encode())
         Console().print(crowd.table(figures))
         Console().print(stolen.sentence())

@@ -35,15 +35,15 @@ def watched() -> Iterator[Stolen]:
     Yields:
         Is filled in at the end.
     """
-    found, since, before = Stolen(), time.monotonic(), _seconds()
+    found, since, before = Stolen(), time.monotonic(), stolen_seconds()
     yield found
-    after = _seconds()
+    after = stolen_seconds()
     if before is not None and after is not None:
         found.cores = (after - before) / (time.monotonic() - since)
 
 
-def _seconds() -> float | None:
-    """Seconds stolen since the machine started, of all cores together."""
+def stolen_seconds() -> float | None:
+    """Seconds taken since the machine started, of all cores together; None where not known."""
     try:
         ticks = int(STAT.read_text().split("\n", 1)[0].split()[COLUMN])
         return ticks / os.sysconf("SC_CLK_TCK")
