@@ -17,7 +17,7 @@ from ico3d.chat.codec import (
     decode_server,
     encode,
     field_types,
-    split_annotation,
+    kind_of,
     tensor_of,
 )
 from ico3d.errors import ProtocolError
@@ -32,8 +32,8 @@ def values(annotation):
     tensor = tensor_of(annotation)
     if tensor:
         return arrays(tensor)
-    bare, marks = split_annotation(annotation)
-    origin, arguments = typing.get_origin(bare), typing.get_args(bare)
+    kind = kind_of(annotation)
+    bare, marks, origin, arguments = kind.bare, kind.marks, kind.origin, kind.arguments
     if origin is typing.Literal:
         return st.sampled_from(arguments)
     if origin is list:

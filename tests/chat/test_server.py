@@ -282,3 +282,8 @@ def test_a_server_needs_no_torch(bundle_path):
         "assert not {'torch', 'numba', 'scipy', 'transformers'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+async def test_messages_are_not_compressed(served):
+    async with connect(address(served[0]), compression="deflate") as socket:
+        assert socket.protocol.extensions == []

@@ -5,7 +5,7 @@ import math
 import struct
 import types
 import typing
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from typing import Annotated, Any, Literal
 
@@ -181,24 +181,43 @@ def plain(value: Any) -> Any:
 
 def rebuilt(value: Any, annotation: Any) -> Any:
     """Checked JSON as the dataclasses and tuples that the annotation names."""
-    annotation, _ = split_annotation(annotation)
-    if typing.get_origin(annotation) in (types.UnionType, typing.Union):  # T | None
-        return None if value is None else rebuilt(value, typing.get_args(annotation)[0])
-    if isinstance(annotation, type) and is_dataclass(annotation):
-        kinds = field_types(annotation)
-        return annotation(**{name: rebuilt(value[name], kinds[name]) for name in kinds})
-    if typing.get_origin(annotation) is list:
-        return [rebuilt(item, typing.get_args(annotation)[0]) for item in value]
-    if typing.get_origin(annotation) is tuple:
+    kind = kind_of(annotation)
+    if kind.origin in (types.UnionType, typing.Union):  # T | None
+        return None if value is None else rebuilt(value, kind.arguments[0])
+    if isinstance(kind.bare, type) and is_dataclass(kind.bare):
+        kinds = field_types(kind.bare)
+        return kind.bare(**{name: rebuilt(value[name], kinds[name]) for name in kinds})
+    if kind.origin is list:
+        return [rebuilt(item, kind.arguments[0]) for item in value]
+    if kind.origin is tuple:
         return tuple(value)
-    return float(value) if annotation is float else value
+    return float(value) if kind.bare is float else value
 
 
-def split_annotation(annotation: Any) -> tuple[Any, tuple]:
-    """The bare type and the marks of `Annotated[type, marks…]`."""
+@dataclass(frozen=True)
+class Kind:
+    """An annotation taken apart.
+
+    Attributes:
+        bare: The type in `Annotated[type, marks…]`.
+        marks: Its limits.
+        origin: `list` of a `list[int]`.
+        arguments: `int` of it.
+    """
+
+    bare: Any
+    marks: tuple
+    origin: Any
+    arguments: tuple
+
+
+@cache  # every field of every message asks
+def kind_of(annotation: Any) -> Kind:
+    """What an annotation says."""
+    bare, marks = annotation, ()
     if typing.get_origin(annotation) is Annotated:
-        return annotation.__origin__, annotation.__metadata__
-    return annotation, ()
+        bare, marks = annotation.__origin__, annotation.__metadata__
+    return Kind(bare, marks, typing.get_origin(bare), typing.get_args(bare))
 
 
 def check_fields(message: type, header: dict[str, Any], where: str = "") -> None:
@@ -220,8 +239,8 @@ def check_fields(message: type, header: dict[str, Any], where: str = "") -> None
 
 def check_value(value: Any, annotation: Any, where: str) -> None:
     """Checks one JSON value against its annotation."""
-    bare, marks = split_annotation(annotation)
-    origin, arguments = typing.get_origin(bare), typing.get_args(bare)
+    kind = kind_of(annotation)
+    bare, marks, origin, arguments = kind.bare, kind.marks, kind.origin, kind.arguments
     if origin in (types.UnionType, typing.Union):  # T | None
         if value is not None:
             check_value(value, arguments[0], where)

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ico3d.chat import protocol
-from ico3d.chat.codec import field_types, is_binary, split_annotation, tensor_of
+from ico3d.chat.codec import field_types, is_binary, kind_of, tensor_of
 
 TARGET = Path(__file__).parents[3] / "viewer" / "src" / "protocol.ts"
 
@@ -169,8 +169,8 @@ def translated(annotation: Any) -> str:
     tensor = tensor_of(annotation)
     if tensor:
         return "Int16Array" if tensor.dims == 1 else "Matrix"
-    bare, _ = split_annotation(annotation)
-    origin, arguments = typing.get_origin(bare), typing.get_args(bare)
+    kind = kind_of(annotation)
+    bare, origin, arguments = kind.bare, kind.origin, kind.arguments
     if origin in (types.UnionType, typing.Union):
         return f"{translated(arguments[0])} | null"
     if origin is Literal:

@@ -181,6 +181,7 @@ def make_server(app: Guard) -> uvicorn.Server:
         app,
         log_level="warning",
         ws_max_size=protocol.MAX_BINARY_FRAME,
+        ws_per_message_deflate=False,  # sound hardly shrinks, and a core has better things to do
         timeout_graceful_shutdown=2,
         server_header=False,
     )

@@ -38,23 +38,34 @@ class SentSound:
         """Nothing was said."""
         self._bands = Bands(SPEECH_RATE)
         self._utterance = -1
-        self._rows = np.zeros((0, COUNT))
-        self._rest = np.zeros(0)
+        self._forget()
 
     def add(self, utterance: int, pcm: np.ndarray) -> None:
         """The next (n,) int16 samples at 24 kHz of an utterance."""
         if utterance != self._utterance:
             self._utterance = utterance
-            self._rows, self._rest = np.zeros((0, COUNT)), np.zeros(0)
-        samples = np.concatenate([self._rest, pcm / 32768])
-        whole = len(samples) - len(samples) % self._bands.length
-        self._rest = samples[whole:]
-        self._rows = np.concatenate([self._rows, self._bands.energies(samples[:whole])])
+            self._forget()
+        self._fresh.append(pcm)
 
     def at(self, utterance: int | None, seconds: float) -> np.ndarray:
         """(COUNT,) energies around a time of an utterance; zero in silence (None)."""
         row = int(seconds / FRAME) if utterance == self._utterance else -1
+        if row >= 0 and self._fresh:
+            self._look()
         return self._rows[row] if 0 <= row < len(self._rows) else np.zeros(COUNT)
+
+    def _look(self) -> None:
+        """Takes energies of what is new; while no microphone is open nobody needs them."""
+        samples = np.concatenate([self._rest, *self._fresh])
+        self._fresh.clear()
+        whole = len(samples) - len(samples) % self._bands.length
+        self._rest = samples[whole:]
+        self._rows = np.concatenate([self._rows, self._bands.energies(samples[:whole] / 32768)])
+
+    def _forget(self) -> None:
+        self._rows = np.zeros((0, COUNT))
+        self._rest = np.zeros(0, np.int16)
+        self._fresh: list[np.ndarray] = []
 
 
 class EchoGuard:
