@@ -24,7 +24,7 @@ unit: $(VENV)/.develop src/ico3d/chat/static/index.html
 	# one thread each: tiny problems lose more by waiting for one another than they gain;
 	# two files at a time: talking with an avatar is mostly waiting
 	cd viewer && npm run --silent check && npm run --silent test
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(PY) -m pytest -n 2 --dist loadfile
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(PY) -m pytest -n 2 --dist loadfile --durations 15
 
 e2e: $(VENV)/.develop src/ico3d/chat/static/index.html
 	cd viewer && npm run --silent e2e
