@@ -10,6 +10,7 @@ from contextlib import closing
 
 import httpx
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
@@ -20,6 +21,7 @@ from ico3d.chat.face import open_face
 from ico3d.chat.guard import is_own
 from ico3d.chat.limits import FORGIVEN, Limits
 from ico3d.chat.protocol import Audio, Error, Hello, Speech, Text, Welcome
+from ico3d.chat.server import make_server
 from ico3d.cli import main
 from ico3d.errors import BundleError, ProtocolError, SettingsError
 from ico3d.measure.page import open_page
@@ -287,3 +289,13 @@ def test_a_server_needs_no_torch(bundle_path):
 async def test_messages_are_not_compressed(served):
     async with connect(address(served[0]), compression="deflate") as socket:
         assert socket.protocol.extensions == []
+
+
+def test_a_server_multiplies_in_one_thread():
+    async def app(scope, receive, send):
+        raise NotImplementedError
+
+    with threadpool_limits(2, user_api="blas"):
+        make_server(app)
+        pools = [pool for pool in threadpool_info() if pool["user_api"] == "blas"]
+        assert pools and {pool["num_threads"] for pool in pools} == {1}

@@ -12,6 +12,7 @@ import uvicorn
 from fastapi import FastAPI, Request, Response, WebSocket
 from fastapi.responses import JSONResponse, PlainTextResponse
 from fastapi.staticfiles import StaticFiles
+from threadpoolctl import threadpool_limits
 
 from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.bundle.manifest import MANIFEST
@@ -176,7 +177,12 @@ def address(listener: socket.socket) -> str:
 
 
 def make_server(app: Guard) -> uvicorn.Server:
-    """A server for `app`; run it with `server.run(sockets=[listener])`."""
+    """A server for `app`; run it with `server.run(sockets=[listener])`.
+
+    From now on numpy multiplies matrices in one thread. A server's are small, and others would
+    wait for the next one by spinning, on the cores that the conversation needs.
+    """
+    threadpool_limits(1, user_api="blas")
     config = uvicorn.Config(
         app,
         log_level="warning",
