@@ -194,10 +194,9 @@ def _timed(
 ) -> tuple[list[np.ndarray], float]:
     """The rows of each recording, and how many times as fast as the sound they came."""
     _streamed(model, np.zeros(size, np.float32))  # what the first run does once
-    with threadpool_limits(1, user_api="blas"):  # as in a server
-        before = time.process_time()
-        streams = [_streamed(model, recording.samples, size) for recording in recordings]
-        spent = time.process_time() - before
+    before = time.process_time()
+    streams = [_streamed(model, recording.samples, size) for recording in recordings]
+    spent = time.process_time() - before
     return streams, sum(len(recording.samples) for recording in recordings) / RATE / spent
 
 
@@ -251,6 +250,7 @@ def reading(hears: Hears) -> Callable[[np.ndarray], np.ndarray]:
     return lambda rows: (rows - mean) / deviation @ weights + y.mean()
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")  # as in a server
 def bench(folder: Path, avatar: Bundle, untrained: tuple[str, ...]) -> dict[str, dict]:
     """Measures everything that is here on the recordings of a folder, under a progress bar."""
     from rich.progress import track
