@@ -147,8 +147,6 @@ def test_trials_against_real_servers(tmp_path):
     assert found["trials"]["interruptions"] == 1 and found["trials"]["messages_after_stop"] == 0
     assert found["trials"]["assents"] == found["trials"]["assents_lossless"] == 1
     assert 200 < found["voice_to_voice_ms"]["p50"] < 1300 * slowness
-    if found["trials"]["shares_undisturbed"]:  # else it says how busy the host is
-        assert -60 < found["undisturbed_share_ms"]["p50"] < 100 * slowness
+    assert -60 < found["server_share_ms"]["p50"] < 100 * slowness
     assert found["stolen_cores"] is None or found["stolen_cores"] >= 0
-    # "Stop it," may be over before it is sure; then the next words decide, at 0.83 s
-    assert 0 < found["duck_ms"]["p50"] <= found["stop_ms"]["p50"] < 900 * slowness
+    assert 0 < found["duck_ms"]["p50"] <= found["stop_ms"]["p50"] < 800 * slowness

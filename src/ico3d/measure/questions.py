@@ -11,7 +11,7 @@ from ico3d.common.espeak import synthesize
 from ico3d.errors import CaptureError
 
 QUESTIONS = ("Who are you?", "What can you do?", "Tell me about yourself.", "How do you work?")
-OBJECTIONS = ("Stop it, I want to ask something else.", "Wait, that is not what I meant at all.")
+OBJECTIONS = ("Wait, that is not what I meant at all.", "Stop it, I want to ask something else.")
 ASSENT = ("Uh-huh.", "Aha.")
 VOICES = ("en-us", "en-us+f3", "en-us+m3", "en-us+m7")
 QUIET = 0.05  # of the loudest moment: quieter than this, speech has not begun or is over
