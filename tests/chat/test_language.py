@@ -91,6 +91,15 @@ async def test_an_interruption_hangs_up_and_only_what_was_said_is_remembered(bun
     assert "number 40" not in str(script.requests[1]), "it had no time to be said"
 
 
+async def test_a_question_over_an_answer_follows_what_was_said_of_it(bundle):
+    script = Script(lambda body: ["Apples cost 2,50 €. ", "Pears cost 3 €."])
+    async with talking(bundle, script) as page:
+        await ask(page, "What do apples cost?", 0)  # all is sent, and not heard yet
+        await ask(page, "And plums?", 1)
+    assert roles(script.requests[1]) == ["system", "user", "assistant", "user"]
+    assert script.requests[1]["messages"][2]["content"].startswith("Apples cost 2,50 €.")
+
+
 async def test_facts_told_early_outlive_the_budget_in_a_summary(bundle):
     script = Script()
 

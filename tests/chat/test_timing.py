@@ -11,7 +11,6 @@ from pipecat.frames.frames import (
     ErrorFrame,
     InterruptionFrame,
     LLMFullResponseStartFrame,
-    LLMMessagesAppendFrame,
     LLMTextFrame,
     TranscriptionFrame,
     TTSAudioRawFrame,
@@ -23,7 +22,7 @@ from pipecat.observers.base_observer import FramePushed
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 from prometheus_client.parser import text_string_to_metric_families
 
-from ico3d.chat.frames import SpeechFrame
+from ico3d.chat.frames import SpeechFrame, TypedFrame
 from ico3d.chat.monitor import Monitor, TurnLog
 from ico3d.chat.protocol import Metrics
 from ico3d.chat.timing import PARTS, TurnObserver
@@ -102,7 +101,7 @@ async def test_a_greeting_is_no_turn(watched):
 
 
 async def test_a_typed_question_counts_from_its_arrival(watched):
-    await watched.see(500, LLMMessagesAppendFrame([]))
+    await watched.see(500, TypedFrame("and now?"))
     await watched.answer(510)
     assert watched.told[0].values["total"] == pytest.approx(110)
     assert watched.told[0].values["vad"] == 0 and "recognition" not in watched.told[0].values

@@ -24,7 +24,7 @@ from ico3d.chat import protocol
 from ico3d.chat.activity import Activity
 from ico3d.chat.expression import ExpressionProcessor
 from ico3d.chat.face import Face
-from ico3d.chat.frames import Utterances
+from ico3d.chat.frames import TypedFrame, Utterances
 from ico3d.chat.gestures import Gestures
 from ico3d.chat.listener import Captions, PageInput
 from ico3d.chat.memory import remembering
@@ -125,6 +125,8 @@ class Conversation:
             enable_turn_tracking=False,
             idle_timeout_secs=None,
         )
+        self._worker.set_reached_downstream_filter((TypedFrame,))
+        self._worker.add_event_handler("on_frame_reached_downstream", self._stopped_for)
         runner = WorkerRunner(handle_sigint=False, handle_sigterm=False)
         await runner.add_workers(self._worker)
         self._task = asyncio.create_task(runner.run())
@@ -183,6 +185,10 @@ class Conversation:
     def release(self) -> None:
         """The page is back."""
         self._speaker.release()
+
+    async def _stopped_for(self, _: PipelineWorker, question: TypedFrame) -> None:
+        """Asked any sooner, the model would not know what it has just said."""
+        await self._input.answer(question.text)
 
     def _pipeline(self, parts: Parts) -> Pipeline:
         settings, face = self._avatar.settings, make_face(self._avatar)

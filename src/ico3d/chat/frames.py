@@ -88,6 +88,17 @@ class TalkFrame(SystemFrame):
 
 
 @dataclass
+class TypedFrame(SystemFrame):
+    """A typed question, behind the interruption that it is.
+
+    Parameters:
+        text: What was typed.
+    """
+
+    text: str = ""
+
+
+@dataclass
 class HeardFrame(SystemFrame):
     """What the browser's recogniser understood.
 

@@ -14,7 +14,7 @@ from pipecat.frames.frames import (
 )
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
-from ico3d.chat.frames import DeafFrame, HeardFrame, MicrophoneFrame, TalkFrame
+from ico3d.chat.frames import DeafFrame, HeardFrame, MicrophoneFrame, TalkFrame, TypedFrame
 from ico3d.chat.page import Page
 from ico3d.chat.protocol import MICROPHONE_RATE, Audio, Transcript
 
@@ -46,8 +46,12 @@ class PageInput(FrameProcessor):
         await self.push_frame(DeafFrame())
 
     async def ask(self, text: str) -> None:
-        """A typed question: whatever is being said stops, then it is answered."""
+        """A typed question: whatever is being said stops; `answer` comes when all have stopped."""
         await self.broadcast_interruption()
+        await self.push_frame(TypedFrame(text))
+
+    async def answer(self, text: str) -> None:
+        """Lets the language model answer a typed question."""
         message = {"role": "user", "content": text}
         await self.push_frame(LLMMessagesAppendFrame([message], run_llm=True))  # type: ignore[list-item]
 

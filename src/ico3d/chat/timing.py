@@ -11,7 +11,6 @@ from pipecat.frames.frames import (
     Frame,
     InterruptionFrame,
     LLMFullResponseStartFrame,
-    LLMMessagesAppendFrame,
     LLMTextFrame,
     TranscriptionFrame,
     TTSAudioRawFrame,
@@ -25,7 +24,7 @@ from pipecat.services.llm_service import LLMService
 from pipecat.services.stt_service import STTService
 from pipecat.services.tts_service import TTSService
 
-from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame
+from ico3d.chat.frames import SpeechFrame, TypedFrame, UtteranceEndFrame
 from ico3d.chat.protocol import SPEECH_RATE, Metrics
 
 PARTS = ("vad", "turn", "token", "clause", "voice", "expression", "send")
@@ -148,7 +147,7 @@ class TurnObserver(BaseObserver):
             self._words = at
         elif isinstance(frame, UserStoppedSpeakingFrame):
             self._spoken(at)
-        elif isinstance(frame, LLMMessagesAppendFrame):
+        elif isinstance(frame, TypedFrame):
             self._asked = Turn(at, typed=True)
         elif isinstance(frame, LLMFullResponseStartFrame):
             self._marks = {part: time for part, time in self._marks.items() if time >= at}
