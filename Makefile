@@ -4,12 +4,14 @@ PY := $(VENV)/bin/python
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 export ICO3D_PYTHON := $(CURDIR)/$(PY)
 
-.PHONY: demo test install viewer lint unit e2e bench clean
+.PHONY: demo test install viewer lint page unit e2e bench clean
 
 demo: $(VENV)/.serve src/ico3d/chat/static/index.html ## talk with the packaged avatar
 	$(VENV)/bin/ico3d demo
 
-test: lint unit e2e ## everything CI runs
+test: install ## everything CI runs
+	$(MAKE) --no-print-directory -j 2 lint page # neither keeps time
+	$(MAKE) --no-print-directory unit e2e
 
 install: $(VENV)/.develop src/ico3d/chat/static/index.html ## training, tracking, tests
 
@@ -20,10 +22,12 @@ lint: $(VENV)/.develop
 	pyright
 	lint-imports
 
+page: src/ico3d/chat/static/index.html
+	cd viewer && npm run --silent check && npm run --silent test
+
 unit: $(VENV)/.develop src/ico3d/chat/static/index.html
 	# one thread each: tiny problems lose more by waiting for one another than they gain;
 	# two files at a time: talking with an avatar is mostly waiting
-	cd viewer && npm run --silent check && npm run --silent test
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(PY) -m pytest -n 2 --dist loadfile --durations 15
 
 e2e: $(VENV)/.develop src/ico3d/chat/static/index.html
