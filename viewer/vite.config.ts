@@ -15,6 +15,7 @@ export default defineConfig({
     proxy: { '/bundle': SERVER, '/health': SERVER, '/ws': { target: SERVER, ws: true } },
   },
   test: {
+    isolate: false, // loading three and Spark anew for each file takes longer than most of the tests
     projects: [
       { extends: true, test: { name: 'unit', include: ['test/**/*.test.ts'] } },
       {

@@ -7,6 +7,7 @@ export interface Heard {
   level: number; // root mean square, full scale = 1
   playing: number | null;
   position: number; // s
+  underrun: number; // s of silence that late pieces have put into what was played
 }
 
 /** A message of the server as it reached the page. */
@@ -52,7 +53,8 @@ export async function recordWire(context: BrowserContext): Promise<void> {
         const pcm = new Int16Array(data.slice(4 + length));
         const power = pcm.reduce((sum, value) => sum + (value / 0x8000) ** 2, 0) / pcm.length;
         const { sample, playing, position } = fields;
-        record.microphone.push({ sample, at: performance.now(), level: Math.sqrt(power), playing, position });
+        const { underrun } = window.ico3d!.conversation!.player;
+        record.microphone.push({ sample, at: performance.now(), level: Math.sqrt(power), playing, position, underrun });
       }
       send.call(this, data);
     };
