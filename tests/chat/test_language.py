@@ -100,6 +100,19 @@ async def test_a_question_over_an_answer_follows_what_was_said_of_it(bundle):
     assert script.requests[1]["messages"][2]["content"].startswith("Apples cost 2,50 €.")
 
 
+@pytest.mark.parametrize("later", [Text("And plums?"), Interrupt(None)])
+async def test_of_questions_in_a_row_the_last_is_answered_and_all_are_known(bundle, later):
+    script = Script(lambda body: [f"You said {body['messages'][-1]['content']!r}."])
+    async with talking(bundle, script) as page:
+        await page.send(Text("What do apples cost?"))
+        await page.send(later)
+        await ask(page, "Well?", 0)
+        assert [m.text for m in page.messages(Answer)] == ["You said 'Well?'."]
+    said = [m["content"] for m in script.requests[-1]["messages"][1:]]
+    between = [later.text] if isinstance(later, Text) else []
+    assert said == ["What do apples cost?", *between, "Well?"]
+
+
 async def test_facts_told_early_outlive_the_budget_in_a_summary(bundle):
     script = Script()
 

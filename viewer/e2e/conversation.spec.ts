@@ -2,7 +2,7 @@ import { join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import type { Browser } from '../support/browser.ts';
 import { runPython } from '../support/python.ts';
-import { readRecord } from '../support/recorder.ts';
+import { readRecord, type Record } from '../support/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
 import { ChatServer } from '../support/server.ts';
 import { finished, openPage, SENTENCE, SILENCE, until } from '../support/talk.ts';
@@ -87,7 +87,9 @@ describe('a typed question', () => {
     const { page } = browser;
     await page.fill('#text', SENTENCE);
     await page.keyboard.press('Enter');
-    await until(browser, ({ loudness }) => loudness.slice(-20).every(({ level }) => level > SILENCE), 30_000);
+    const speaks = ({ received, loudness }: Record) =>
+      received.some((m) => m.type === 'speech' && m.utterance === 3) && loudness.slice(-20).every(({ level }) => level > SILENCE);
+    await until(browser, speaks, 30_000); // this answer, not what is left of the one before
     await page.evaluate(() => addEventListener('keydown', ({ timeStamp }) => Object.assign(window, { timeStamp })));
     await page.keyboard.press('Escape');
     await page.waitForTimeout(1500);

@@ -126,7 +126,7 @@ class Conversation:
             idle_timeout_secs=None,
         )
         self._worker.set_reached_downstream_filter((TypedFrame,))
-        self._worker.add_event_handler("on_frame_reached_downstream", self._stopped_for)
+        self._worker.add_event_handler("on_frame_reached_downstream", self._all_stopped)
         runner = WorkerRunner(handle_sigint=False, handle_sigterm=False)
         await runner.add_workers(self._worker)
         self._task = asyncio.create_task(runner.run())
@@ -170,7 +170,7 @@ class Conversation:
         """Silence, if that utterance (any, for null) is being said or prepared."""
         self.activity.touch()
         if utterance is None or self._speaker.is_speaking(utterance):
-            await self._input.broadcast_interruption()
+            await self._input.interrupt()
 
     def clock(self, message: protocol.Clock) -> None:
         """Where the page is."""
@@ -186,9 +186,9 @@ class Conversation:
         """The page is back."""
         self._speaker.release()
 
-    async def _stopped_for(self, _: PipelineWorker, question: TypedFrame) -> None:
+    async def _all_stopped(self, _: PipelineWorker, question: TypedFrame) -> None:
         """Asked any sooner, the model would not know what it has just said."""
-        await self._input.answer(question.text)
+        await self._input.answer(question)
 
     def _pipeline(self, parts: Parts) -> Pipeline:
         settings, face = self._avatar.settings, make_face(self._avatar)

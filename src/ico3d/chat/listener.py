@@ -22,6 +22,11 @@ from ico3d.chat.protocol import MICROPHONE_RATE, Audio, Transcript
 class PageInput(FrameProcessor):
     """Where the page's messages enter the pipeline."""
 
+    def __init__(self):
+        """Nothing was asked."""
+        super().__init__()
+        self._question: TypedFrame | None = None  # the last one, unless it was taken back
+
     async def process_frame(self, frame: Frame, direction: FrameDirection):
         """Passes everything on."""
         await super().process_frame(frame, direction)
@@ -47,13 +52,20 @@ class PageInput(FrameProcessor):
 
     async def ask(self, text: str) -> None:
         """A typed question: whatever is being said stops; `answer` comes when all have stopped."""
+        self._question = TypedFrame(text)
         await self.broadcast_interruption()
-        await self.push_frame(TypedFrame(text))
+        await self.push_frame(self._question)
 
-    async def answer(self, text: str) -> None:
-        """Lets the language model answer a typed question."""
-        message = {"role": "user", "content": text}
-        await self.push_frame(LLMMessagesAppendFrame([message], run_llm=True))  # type: ignore[list-item]
+    async def interrupt(self) -> None:
+        """Whatever is being said or prepared stops."""
+        self._question = None
+        await self.broadcast_interruption()
+
+    async def answer(self, question: TypedFrame) -> None:
+        """Gives a typed question to the language model; nothing may have been asked since."""
+        message = {"role": "user", "content": question.text}
+        wanted = question is self._question
+        await self.push_frame(LLMMessagesAppendFrame([message], run_llm=wanted))  # type: ignore[list-item]
 
     async def say(self, text: str) -> None:
         """Lets the avatar say something by itself, as if the language model had."""
