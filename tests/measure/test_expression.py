@@ -16,6 +16,12 @@ from ico3d.speech.targets import ARTICULATION, articulation_track
 SPEECH = Path(__file__).parents[3] / "shared" / "speech"
 
 
+@pytest.fixture(autouse=True)
+def one_round(monkeypatch):
+    """Speed is not what is tested here."""
+    monkeypatch.setattr(room, "TIMED", 1e-3)
+
+
 def test_transcripts_come_from_the_readmes_table(tmp_path):
     with pytest.raises(SettingsError, match=r"no README\.md"):
         transcripts(tmp_path)
