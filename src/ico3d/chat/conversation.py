@@ -99,6 +99,7 @@ class Conversation:
         self.activity = Activity(now)
         self._clock = Clock(now)
         self._timing = TurnObserver(now, page.send, visitor.turn, visitor.failed)
+        self._context = LLMContext()
         self._utterances = Utterances()
         self._input = PageInput()
         self._captions = Captions(page)
@@ -187,7 +188,8 @@ class Conversation:
         self._speaker.release()
 
     async def _all_stopped(self, _: PipelineWorker, question: TypedFrame) -> None:
-        """Asked any sooner, the model would not know what it has just said."""
+        """Any sooner, the question would stand before the words that it interrupts."""
+        self._context.add_message({"role": "user", "content": question.text})
         await self._input.answer(question)
 
     def _pipeline(self, parts: Parts) -> Pipeline:
@@ -195,8 +197,8 @@ class Conversation:
         turns, run = settings.turns, at_once if face.is_remote else self._avatar.workers.run
         trusted = not self._avatar.services.recognition.provider.stand_in
         chosen = strategies(parts.turn, turns, trusted, self._speaker.hush, self._now)
-        context = LLMContext(tools=self._functions(parts.language, face))
-        user, assistant = aggregators(chosen, settings, parts.language, context)
+        self._context.set_tools(self._functions(parts.language, face))
+        user, assistant = aggregators(chosen, settings, parts.language, self._context)
         return Pipeline(
             [
                 self._input,

@@ -5,7 +5,7 @@ from pipecat.frames.frames import (
     InterimTranscriptionFrame,
     LLMFullResponseEndFrame,
     LLMFullResponseStartFrame,
-    LLMMessagesAppendFrame,
+    LLMRunFrame,
     LLMTextFrame,
     TranscriptionFrame,
     UserStartedSpeakingFrame,
@@ -25,7 +25,7 @@ class PageInput(FrameProcessor):
     def __init__(self):
         """Nothing was asked."""
         super().__init__()
-        self._question: TypedFrame | None = None  # the last one, unless it was taken back
+        self._question: TypedFrame | None = None  # that is to be answered
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
         """Passes everything on."""
@@ -62,10 +62,9 @@ class PageInput(FrameProcessor):
         await self.broadcast_interruption()
 
     async def answer(self, question: TypedFrame) -> None:
-        """Gives a typed question to the language model; nothing may have been asked since."""
-        message = {"role": "user", "content": question.text}
-        wanted = question is self._question
-        await self.push_frame(LLMMessagesAppendFrame([message], run_llm=wanted))  # type: ignore[list-item]
+        """Asks the language model, which knows the question, unless it was taken back since."""
+        if question is self._question:
+            await self.push_frame(LLMRunFrame())
 
     async def say(self, text: str) -> None:
         """Lets the avatar say something by itself, as if the language model had."""
