@@ -13,7 +13,6 @@ import { finished, lastOnset, makeVoice, openPage, SENTENCE, SILENCE, until } fr
 const folder = scratchFolder();
 const LONG_ENOUGH = 2000; // ms of speech before the interruption
 const EASED = 700; // ms until the face rests after it has been silenced
-const DRAWN = 100; // ms by which a picture may be ahead of the sound's first reading
 
 describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a talk with the avatar', () => {
   let server: ChatServer;
@@ -68,15 +67,12 @@ describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a tal
     expect(during.length).toBeGreaterThan(LONG_ENOUGH / 40 / 2);
     const { utterance } = record.received.find(({ type }) => type === 'stop')!;
     const answer = during.filter(({ playing, position }) => playing === utterance && position > 0);
-    const resumed = record.received.find((m) => m.type === 'resume' && m.utterance === utterance)?.at ?? Infinity;
-    // One constant, for both run in real time, but for silence that was put in; not even late messages change it.
-    const offsets = answer
-      .filter(({ at }) => at < resumed)
-      .map(({ sample, position, underrun }) => position + underrun - sample / MICROPHONE_RATE);
+    // One constant, for both run in real time but for the silence of late pieces; not even late messages change it.
+    const offsets = answer.map(({ sample, position, underrun }) => position + underrun - sample / MICROPHONE_RATE);
     const spread = quantile(offsets, 0.9) - quantile(offsets, 0.1);
     const late = Math.max(...answer.map(({ underrun }) => underrun));
     console.log(
-      `position against sample: ${(1000 * spread).toFixed(1)} ms apart in ${offsets.length} of ${answer.length} chunks; ` +
+      `position against sample: ${(1000 * spread).toFixed(1)} ms apart in ${answer.length} chunks; ` +
         `late pieces: ${(1000 * late).toFixed(0)} ms`,
     );
     expect(spread).toBeLessThan(0.06); // what the server's echo guard forgives
@@ -93,7 +89,7 @@ describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a tal
     const together = correlation(watched.map(({ at }) => heard(record.loudness, at)), watched.map(({ speech }) => speech));
     const changes = (when: (at: number) => boolean) => pictures.filter(({ at }) => when(at)).map(({ change }) => change);
     const during = changes((at) => at > began + 200 && at < ended);
-    const rest = changes((at) => at < began - DRAWN || (at > ended + EASED && at < ended + EASED + 1000));
+    const rest = changes((at) => at < began || (at > ended + EASED && at < ended + EASED + 1000));
     const moving = quantile(during, 0.5);
     const still = quantile(rest, 0.9);
     console.log(
