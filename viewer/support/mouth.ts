@@ -50,14 +50,21 @@ export function watchMouth(page: Page): Promise<void> {
         side * height,
       );
     }
+    const { generator, expression } = head!;
+    const rest = expression.slice();
+    const shown = expression.slice();
     const lowerHalf = () => {
+      // Only the mouth may differ: lids reach into the lower half, and move lips after a short training.
+      shown.set(expression.subarray(0, FEATURES));
+      generator.express(shown);
       draw();
+      generator.express(expression);
       const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight >> 1];
       const rgba = new Uint8Array(4 * width * height);
       gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, rgba); // WebGL counts rows from below
       return rgba;
     };
-    const [rest, restPicture] = [head!.expression.slice(0, FEATURES), lowerHalf()];
+    const restPicture = lowerHalf();
     const change = () => {
       const differences = lowerHalf().map((level, i) => Math.abs(level - restPicture[i]!)).sort();
       const most = differences.subarray(-Math.ceil(differences.length / 100));
@@ -65,7 +72,7 @@ export function watchMouth(page: Page): Promise<void> {
     };
     setInterval(() => {
       const at = performance.now();
-      record.sights.push({ at, speech: Math.hypot(...rest.map((value, i) => value - head!.expression[i]!)) });
+      record.sights.push({ at, speech: Math.hypot(...rest.subarray(0, FEATURES).map((value, i) => value - expression[i]!)) });
       if (at - (record.pictures.at(-1)?.at ?? 0) > every) record.pictures.push({ at, change: change() });
     }, 33);
   }, PICTURE_EVERY);
