@@ -17,7 +17,7 @@ from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
 
 sys.path.insert(0, str(Path(__file__).parent))
-from planted import PlantedCapture, planted_model
+from planted import PlantedCapture, planted_eyes, planted_model
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -49,8 +49,8 @@ def _speech_head(folder: Path) -> tuple[TrainedHead, PlantedCapture]:
     encoder = load_encoder("builtin")
     torch.manual_seed(0)
     adaptor = SpeechAdaptor(encoder.size).requires_grad_(False)
-    model = planted_model(39)
-    capture.head = TrainedHead(model, "speech", (), "builtin", encoder.sha256, adaptor, {})
+    about = ("speech", (), "builtin", encoder.sha256, adaptor, {})
+    capture.head = TrainedHead(planted_model(39), *about, eyes=planted_eyes(capture))
     return capture.head, capture
 
 

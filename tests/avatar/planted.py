@@ -7,6 +7,7 @@ import torch
 
 from ico3d.capture.capture import Capture, Sound, last_eleventh
 from ico3d.common.camera import Camera, look_at
+from ico3d.common.expression import EyeRange, eye_range
 from ico3d.head.model import HeadModel, HeadShape
 from ico3d.head.trained import TrainedHead
 from ico3d.splat.render import render
@@ -95,3 +96,16 @@ def planted_model(size: int) -> HeadModel:
     model.opacity_branch.bias.data.fill_(2.0)
     model.log_scales.data[-10:].fill_(np.log(1e-5))
     return model
+
+
+def planted_eyes(capture: PlantedCapture) -> EyeRange:
+    """How far eyes and brows move in what trains a head."""
+    return eye_range(np.stack([capture.eyes(frame) for frame in capture.split.train]))
+
+
+def driving(head: TrainedHead, recorded: np.ndarray) -> np.ndarray:
+    """The expression that makes an avatar look as in a recording."""
+    if head.adaptor is None:
+        return recorded
+    rest, most = np.array(head.eyes.rest), np.array(head.eyes.most)
+    return np.concatenate([recorded[:32], (recorded[32:] - rest) / (most - rest)])

@@ -16,6 +16,7 @@ from ico3d.bundle.manifest import Loss
 from ico3d.errors import BundleError
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "bundle"))
+from planted import driving
 from random_bundle import random_head
 
 QUICK = BakeSettings(hidden=64, augmented=100, steps=300)
@@ -117,7 +118,7 @@ def test_a_rendered_bundle_looks_like_the_exact_head(baked):
     camera = frame % 2
     picture = render_bundle(
         bundle,
-        expressions(head, capture, [frame])[0],
+        driving(head, expressions(head, capture, [frame])[0]),
         capture.cameras[camera],
         capture.background(camera),
         capture.world_from_head(frame),
@@ -144,7 +145,26 @@ def test_idle_is_silence_with_open_eyes(baked):
     rows = SpeechModel(bundle.read("speech.onnx")).expressions(silence, 16_000)
     idle = bundle.manifest.head.idle_expression
     np.testing.assert_allclose(rows[len(rows) // 2], idle[:32], atol=2e-3)
-    assert max(idle[32 + 5], idle[32 + 6]) < 0.1  # tracked lids go from 0 to 1
+    assert idle[32:] == (0.0,) * 7
+
+
+def test_what_drives_an_avatar_stays_within_what_was_recorded(baked):
+    """Brows that hardly moved would turn the face to rags if they were raised by half."""
+    head, capture, _ = speaks(baked)
+    recorded = expressions(head, capture, capture.split.train)
+    exact = baker(head, capture).baked(8)
+    driven = baking.driven(exact, head)
+    for row in recorded[::9]:
+        np.testing.assert_allclose(
+            logits(driven, driving(head, row)), logits(exact, row), atol=1e-4
+        )
+    lively, calm = recorded[0].copy(), recorded[0].copy()
+    lively[32:], calm[32:] = 1, 0
+    assert (head.recorded(lively)[32:] <= recorded[:, 32:].max(0) + 1e-6).all()
+    np.testing.assert_allclose(
+        head.recorded(calm)[32:37], np.median(recorded[:, 32:37], 0), atol=1e-6
+    )
+    np.testing.assert_array_equal(head.recorded(lively)[:32], recorded[0, :32])
 
 
 def test_idle_of_blendshapes_is_the_most_neutral_face(baked):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import torch
-from planted import PlantedCapture, planted_model
+from planted import PlantedCapture, planted_eyes, planted_model
 from test_bake_body import FilmedPerson
 
 from ico3d.avatar.avatar import BODY, Placement, TrainedAvatar
@@ -14,6 +14,7 @@ from ico3d.body.formulas import SPACETIME
 from ico3d.body.model import WindowModel
 from ico3d.body.trained import TrainedBody, save_window
 from ico3d.body.windows import Window
+from ico3d.common.expression import EyeRange
 from ico3d.head.trained import TrainedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
@@ -25,7 +26,7 @@ NECK = np.array([0.0, 1.55, 0.0])
 
 def write_whole_person(folder: Path) -> TrainedAvatar:
     """An avatar's folder, as `ico3d assemble` leaves it."""
-    body, head = _body(folder / BODY), _head()
+    body, head = _body(folder / BODY), _head(planted_eyes(head_recording(folder)))
     expressions = training_expressions(head, head_recording(folder))[10 : 10 + FRAMES]
     avatar = TrainedAvatar(head, body, _placement(), expressions, {})
     avatar.save(folder)
@@ -45,13 +46,13 @@ def head_recording(path: Path) -> PlantedCapture:
     return PlantedCapture(path)
 
 
-def _head() -> TrainedHead:
+def _head(eyes: EyeRange) -> TrainedHead:
     encoder = load_encoder("builtin")
     torch.manual_seed(0)
     adaptor = SpeechAdaptor(encoder.size).requires_grad_(False)
     about = {"kind": "planted", "sources": ["a seed"], "consent": "none", "licence": "CC0-1.0"}
     args = ("speech", (), "builtin", encoder.sha256, adaptor, {"capture": about})
-    return TrainedHead(planted_model(39), *args)
+    return TrainedHead(planted_model(39), *args, eyes=eyes)
 
 
 def _body(folder: Path) -> TrainedBody:

@@ -1,11 +1,13 @@
 """Training end to end on a tiny capture."""
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
 import torch
 
+from ico3d.common.expression import EyeRange, eye_range
 from ico3d.errors import CaptureError, ModelError, SettingsError
 from ico3d.head.settings import PRESETS
 from ico3d.head.train import HeadJob, train_head
@@ -87,6 +89,23 @@ def test_a_saved_head_gives_the_same_expressions_and_gaussians(tiny, tmp_path):
     assert torch.equal(loaded.track(tiny).at(7), expression)
     assert torch.equal(loaded.model.logits(expression), head.model.logits(expression))
     assert len(loaded.model) <= SETTINGS.max_gaussians
+    recorded = np.stack([tiny.eyes(frame) for frame in tiny.split.train])
+    assert loaded.eyes == head.eyes == eye_range(recorded)
+    np.testing.assert_allclose(loaded.neutral()[32:], loaded.eyes.rest)
+
+
+@pytest.mark.parametrize(
+    "eyes",
+    [7, {"rest": [0] * 7}, {"rest": [0] * 7, "most": [1] * 6}, {"rest": [1] * 7, "most": [0] * 7}],
+)
+def test_eyes_that_make_no_sense_are_refused(tiny, tmp_path, eyes):
+    train_head(tiny, tmp_path, _job("speech", steps=2))
+    about = json.loads((tmp_path / "head.json").read_text())
+    (tmp_path / "head.json").write_text(json.dumps({**about, "eyes": eyes}))
+    with pytest.raises(ModelError, match="holds no trained head"):
+        TrainedHead.load(tmp_path)
+    (tmp_path / "head.json").write_text(json.dumps({**about, "eyes": None}))
+    assert TrainedHead.load(tmp_path).eyes == EyeRange()
 
 
 def test_the_adaptor_learns(tiny, tmp_path):

@@ -1,7 +1,7 @@
 """From a trained head and its capture to a bundle."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -128,13 +128,14 @@ def write(
     poses = staging.idle_motion(capture)
     frontal = staging.frontal_camera(capture)
     idle = idle_expression(head, training_expressions(head, capture))
-    seen = baked_gaussians(result.head, idle)
+    baked = driven(result.head, head)
+    seen = baked_gaussians(baked, idle)
     middle = poses[len(poses) // 2]
     points = seen.means[seen.opacities > 0.1].numpy() @ middle[:3, :3].T + middle[:3, 3]
     camera = staging.visitor_view(capture.cameras[frontal], points)
     background = staging.background_colour(capture, frontal)
     files = {
-        HEAD: result.head.to_bytes(),
+        HEAD: baked.to_bytes(),
         POSES: poses_to_bytes(poses),
         THUMBNAIL: staging.thumbnail(seen.transform(middle), camera, background),
     }
@@ -145,7 +146,7 @@ def write(
         files[LICENSES] = notices.encode()
     manifest = Manifest(
         name=name,
-        head=head_info(result.head, head, idle, capture.fps, len(poses)),
+        head=head_info(baked, head, idle, capture.fps, len(poses)),
         body=None,
         speech=speech,
         camera=camera,
@@ -160,21 +161,27 @@ def write(
 def idle_expression(head: TrainedHead, recorded: np.ndarray) -> np.ndarray:
     """(B,) silence with open eyes; for blendshapes, the most neutral face that was recorded.
 
+    It is what drives an avatar: eyes and brows at rest are 0 (`TrainedHead.recorded`).
+
     Args:
         head: Whose face.
         recorded: (T, B) what it usually does.
     """
     if head.adaptor is None:
         return recorded[np.abs(recorded).sum(axis=1).argmin()]
-    return np.concatenate([head.neutral()[:SPEECH_SIZE], _open_eyes(recorded[:, SPEECH_SIZE:])])
+    return np.concatenate([head.neutral()[:SPEECH_SIZE], np.zeros(len(EYE_NAMES), np.float32)])
 
 
-def _open_eyes(recorded: np.ndarray) -> np.ndarray:
-    """(7,) brows at their usual place, lids as open as they usually get, from (T, 7)."""
-    eyes = np.median(recorded, axis=0)
-    lids = [i for i, name in enumerate(EYE_NAMES) if "Blink" in name]
-    eyes[lids] = np.percentile(recorded[:, lids], 10, axis=0)
-    return eyes.astype(np.float32)
+def driven(baked: BakedHead, head: TrainedHead) -> BakedHead:
+    """A head that takes what drives avatars, from one that takes what was recorded.
+
+    `TrainedHead.recorded` is linear, so it goes into the coefficient network's first layer.
+    """
+    size = baked.expression_size
+    offset = head.recorded(np.zeros(size, np.float32))  # (B,)
+    slope = head.recorded(np.ones(size, np.float32)) - offset  # (B,)
+    bias = baked.b1 + offset.astype(np.float64) @ baked.w1
+    return replace(baked, w1=slope[:, None] * baked.w1, b1=bias.astype(np.float32))
 
 
 def speech_file(adaptor: SpeechAdaptor, encoder_name: str) -> tuple[bytes, SpeechInfo]:

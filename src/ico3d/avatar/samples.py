@@ -89,7 +89,7 @@ def spoken_expressions(head: TrainedHead, texts: Sequence[str], seed: int = 0) -
         rows.append(lips_of(head, speech.samples, speech.rate))
     lips = np.concatenate(rows)
     eyes = EyeBehaviour(seed).values(np.arange(len(lips)) / FEATURE_RATE)
-    return np.concatenate([lips, eyes], 1)
+    return head.recorded(np.concatenate([lips, eyes], 1))
 
 
 def lips_of(head: TrainedHead, samples: np.ndarray, rate: int) -> np.ndarray:

@@ -192,12 +192,13 @@ def write(
         BundleError: If the animation is not that of this body.
     """
     persona, name, notices = about
-    person, head = result.person, avatar.head
+    head = avatar.head
+    person = replace(result.person, head=baking.driven(result.person.head, head))
+    start = person.gaussians(animation.rest.start / avatar.fps, result.idle)
     body = body_bundle.body_info([window.window for window in result.windows], avatar.body)
     animation.check_body(body)
     camera = standing_camera(avatar, person, capture)
     background = staging.background_colour(capture, 0) if capture else staging.NEUTRAL
-    start = person.gaussians(animation.rest.start / avatar.fps, result.idle)
     files = {window_file(i): window.data for i, window in enumerate(result.windows)}
     files |= {
         HEAD: person.head.to_bytes(),

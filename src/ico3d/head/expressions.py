@@ -74,7 +74,11 @@ class BlendshapeTrack:
 
 
 class SpeechTrack:
-    """32 adapted speech features and 7 eye values, B = 39."""
+    """32 adapted speech features and 7 eye values, B = 39.
+
+    Attributes:
+        eyes: (F, 7) the eye values of all frames.
+    """
 
     size = SPEECH_SIZE + len(EYE_NAMES)
 
@@ -82,7 +86,7 @@ class SpeechTrack:
         """Binds the capture's eyes, its speech features (T, D) at 25 rows/s and an adaptor."""
         self._adaptor = adaptor
         self._fps = capture.fps
-        self._eyes = eye_track(capture)  # (F, 7)
+        self.eyes = eye_track(capture)  # (F, 7)
         self._features = torch.from_numpy(features)
 
     def at(self, frame: int) -> Tensor:
@@ -93,7 +97,7 @@ class SpeechTrack:
         rows = torch.arange(lower, lower + 2 if part > 1e-6 else lower + 1)  # (1 or 2,)
         adapted = self._adaptor(feature_windows(self._features, rows))  # (1 or 2, 32)
         speech = torch.lerp(adapted[0], adapted[-1], part)  # (32,)
-        return torch.cat([speech, self._eyes[frame]])
+        return torch.cat([speech, self.eyes[frame]])
 
 
 def eye_track(capture: Capture) -> Tensor:

@@ -9,6 +9,7 @@ import torch
 
 from ico3d.capture.canonical import canonical_landmarks
 from ico3d.capture.capture import Capture
+from ico3d.common.expression import EyeRange, eye_range
 from ico3d.errors import CaptureError
 from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack, SpeechTrack, speech_features
 from ico3d.head.initial import initial_head
@@ -85,10 +86,20 @@ def train_head(
         "settings": asdict(job.settings),
     }
     landmarks = canonical_landmarks(capture)
-    head = TrainedHead(trainer.model, job.inputs, names, *encoder, adaptor, summary, landmarks)
+    eyes = _eyes(capture, track)
+    head = TrainedHead(
+        trainer.model, job.inputs, names, *encoder, adaptor, summary, landmarks, eyes
+    )
     head.save(folder)
     run.finish({"train_seconds": seconds, "num_gaussians": len(trainer.model)})
     return head
+
+
+def _eyes(capture: Capture, track: ExpressionTrack) -> EyeRange:
+    """How far eyes and brows move in the frames that train the head."""
+    if not isinstance(track, SpeechTrack):
+        return EyeRange()
+    return eye_range(track.eyes[list(capture.split.train)].numpy())
 
 
 def _page(

@@ -1,7 +1,7 @@
 """A trained head with everything needed to drive it: what a model folder holds."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from ico3d.capture.capture import Capture
-from ico3d.common.expression import EYE_NAMES
+from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE, EyeRange
 from ico3d.common.files import write_atomic
 from ico3d.errors import ModelError
 from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack, SpeechTrack, speech_features
@@ -37,6 +37,7 @@ class TrainedHead:
         summary: How it was made: provenance of the capture, seconds of training, settings.
         landmarks: (68, 3) Multi-PIE landmarks in canonical head space, metres; None where the
             capture has none. They tell where the head belongs on a body.
+        eyes: How far eyes and brows move in what it was trained with; for `speech`.
     """
 
     model: HeadModel
@@ -47,6 +48,7 @@ class TrainedHead:
     adaptor: SpeechAdaptor | None
     summary: dict
     landmarks: np.ndarray | None = None
+    eyes: EyeRange = field(default_factory=EyeRange)
 
     def track(self, capture: Capture) -> ExpressionTrack:
         """The expressions that drive this head through a capture.
@@ -73,7 +75,18 @@ class TrainedHead:
         features = torch.from_numpy(load_encoder(self.encoder).features(silence, 16_000))
         with torch.no_grad():
             rows = self.adaptor.track(features)  # (T, 32)
-        return np.concatenate([rows[len(rows) // 2].numpy(), np.zeros(len(EYE_NAMES), np.float32)])
+        return np.concatenate([rows[len(rows) // 2].numpy(), np.array(self.eyes.rest, np.float32)])
+
+    def recorded(self, driven: np.ndarray) -> np.ndarray:
+        """Expressions (..., B) as they were recorded, from those that drive an avatar.
+
+        What drives an avatar (and a bundle) says how far its eyes and brows move: 0 is at rest, 1
+        as far as this person was seen to move them.
+        """
+        if self.adaptor is None:
+            return driven
+        speech, eyes = driven[..., :SPEECH_SIZE], driven[..., SPEECH_SIZE:]
+        return np.concatenate([speech, self.eyes.values(eyes)], -1)
 
     def save(self, folder: Path) -> None:
         """Writes `model.safetensors`, `adaptor.safetensors` and `head.json` into a folder."""
@@ -88,6 +101,7 @@ class TrainedHead:
             "encoder_sha256": self.encoder_sha256,
             "summary": self.summary,
             "landmarks": None if self.landmarks is None else self.landmarks.round(6).tolist(),
+            "eyes": asdict(self.eyes),
         }
         write_atomic(folder / "head.json", json.dumps(about, indent=1).encode())
 
@@ -104,13 +118,14 @@ class TrainedHead:
             inputs, names = about["inputs"], tuple(about["blendshape_names"])
             encoder = about["encoder"], about["encoder_sha256"]
             summary, landmarks = about["summary"], _landmarks(about.get("landmarks"))
+            eyes = _eyes(about.get("eyes"))
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ModelError(
                 f"{folder} holds no trained head ({error}): train one with ico3d train head."
             ) from error
         adaptor = _load_adaptor(folder / "adaptor.safetensors") if inputs == "speech" else None
         model = HeadModel.load(folder / "model.safetensors")
-        return cls(model, inputs, names, *encoder, adaptor, summary, landmarks)
+        return cls(model, inputs, names, *encoder, adaptor, summary, landmarks, eyes)
 
 
 def _landmarks(values: list | None) -> np.ndarray | None:
@@ -125,6 +140,22 @@ def _landmarks(values: list | None) -> np.ndarray | None:
     if landmarks.shape != (68, 3) or not np.isfinite(landmarks).all():
         raise ValueError("landmarks must be 68 points")
     return landmarks
+
+
+def _eyes(values: dict | None) -> EyeRange:
+    """Heads of earlier versions say nothing of them, and count from 0 to 1.
+
+    Raises:
+        ValueError: If it is something else.
+        KeyError, TypeError: Likewise.
+    """
+    if values is None:
+        return EyeRange()
+    rows = np.array([values["rest"], values["most"]], np.float64)  # (2, 7)
+    seven = rows.shape == (2, len(EYE_NAMES)) and np.isfinite(rows).all()
+    if not seven or (rows[1] < rows[0]).any():
+        raise ValueError("eyes must be seven values at rest, and seven that are not lower")
+    return EyeRange(tuple(rows[0].tolist()), tuple(rows[1].tolist()))
 
 
 def _load_adaptor(path: Path) -> SpeechAdaptor:

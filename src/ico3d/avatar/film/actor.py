@@ -130,7 +130,7 @@ def avatar_actor(folder: Path, capture: Capture | None) -> Actor:
     head = avatar.head
     driven = head.adaptor is not None
     return Actor(
-        avatar.gaussians,
+        lambda seconds, expression: avatar.gaussians(seconds, head.recorded(expression)),
         avatar.seconds,
         view,
         portrait_of(view, np.concatenate(face)),
