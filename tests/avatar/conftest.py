@@ -65,5 +65,5 @@ def baked(request, tmp_path_factory):
     samples = recorded_samples(head, capture)
     result = baking.bake(head, views, samples, 8, [].append, quick)
     out = folder / "planted.ico3d"
-    baking.write(out, "Planted", result, head, capture, load_persona(None), "A notice.")
+    baking.write(out, "Planted", result, samples, head, capture, load_persona(None), "A notice.")
     return head, capture, Bundle.open(out)

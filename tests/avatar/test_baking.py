@@ -140,12 +140,14 @@ def test_the_bundles_speech_graph_speaks_the_adaptors_language(baked):
 def test_idle_is_silence_with_open_eyes(baked):
     from ico3d.speech.runtime import SpeechModel
 
-    _, _, bundle = speaks(baked)
+    head, _, bundle = speaks(baked)
     silence = np.zeros(32_000, np.float32)
     rows = SpeechModel(bundle.read("speech.onnx")).expressions(silence, 16_000)
     idle = bundle.manifest.head.idle_expression
     np.testing.assert_allclose(rows[len(rows) // 2], idle[:32], atol=2e-3)
     assert idle[32:] == (0.0,) * 7
+    idle = head.recorded(np.array(idle))
+    assert max(idle[32 + 5], idle[32 + 6]) < 0.1  # tracked lids go from 0 to 1
 
 
 def test_what_drives_an_avatar_stays_within_what_was_recorded(baked):

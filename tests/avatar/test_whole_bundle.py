@@ -126,8 +126,9 @@ def test_without_a_recording_voices_say_how_the_face_moves(avatar):
     few = type(persona)(persona.name, persona.greeting, persona.notes[:2])
     samples, views = whole_bundle.head_samples(person, None, few)
     assert samples.expressions.shape[1] == 39 and len(samples.expressions) > FRAMES + 50
-    lids = samples.expressions[FRAMES:, 32 + 5]  # somebody blinks, as far as the person ever did
-    assert lids.max() == pytest.approx(person.head.eyes.most[5], abs=0.02)
+    lids = samples.expressions[FRAMES:, 32 + 5]
+    assert lids.max() > 0.9  # somebody blinks, but not farther than the person ever did
+    assert lids.max() <= person.head.eyes.most[5] + 1e-6
     assert lids.min() == pytest.approx(person.head.eyes.rest[5], abs=1e-5)
     assert samples.importance.shape == (300, 4) and views[0].truth is None
     assert all(view.exact.std() > 0.02 for view in views)

@@ -9,7 +9,7 @@ import numpy as np
 from ico3d.avatar import comparison, staging
 from ico3d.avatar.bake_head import MAX_RANK, BakeSettings, HeadBaker, megabytes_per_10k
 from ico3d.avatar.render_bundle import baked_gaussians
-from ico3d.avatar.samples import Samples, training_expressions
+from ico3d.avatar.samples import Samples
 from ico3d.bundle.format import HEAD, LICENSES, POSES, SPEECH, THUMBNAIL, write_bundle
 from ico3d.bundle.head import BakedHead, poses_to_bytes
 from ico3d.bundle.manifest import (
@@ -109,6 +109,7 @@ def write(
     out: Path,
     name: str,
     result: BakedResult,
+    samples: Samples,
     head: TrainedHead,
     capture: Capture,
     persona: Persona,
@@ -120,6 +121,7 @@ def write(
         out: The file to write.
         name: The avatar's name.
         result: The baked head and its loss.
+        samples: What it was baked from.
         head: The exact head, for its speech adaptor.
         capture: For motion, camera, background and provenance.
         persona: Who the avatar is.
@@ -127,7 +129,7 @@ def write(
     """
     poses = staging.idle_motion(capture)
     frontal = staging.frontal_camera(capture)
-    idle = idle_expression(head, training_expressions(head, capture))
+    idle = idle_expression(head, samples.expressions)
     baked = driven(result.head, head)
     seen = baked_gaussians(baked, idle)
     middle = poses[len(poses) // 2]

@@ -103,7 +103,7 @@ class Bake:
         if not self.force:
             baking.check(result)
         name = self.name or persona.name
-        baking.write(self._out, name, result, head, capture, persona, notices)
+        baking.write(self._out, name, result, samples, head, capture, persona, notices)
 
     def _bake_body(self, report) -> None:
         from ico3d.avatar import body_bundle
