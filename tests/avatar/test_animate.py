@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from ico3d.bundle.animation import Animation
+from ico3d.avatar.animated import open_person
+from ico3d.bundle.animation import Action, Animation, Rest
+from ico3d.capture.capture import Capture
 from ico3d.cli import main
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "bundle"))
@@ -15,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from random_body import write_random_body
 from random_bundle import write_random_bundle
 from random_whole import ANIMATION, write_random_whole
-from whole_person import FRAMES, write_whole_person
+from whole_person import FRAMES, WholeFilmed, write_whole_person
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +39,30 @@ def test_what_is_found_is_written_and_drawn(avatar, tmp_path, capsys):
         assert picture.format == "JPEG" and picture.size == (1200, 660)
         low, high = picture.convert("L").getextrema()
     assert high - low > 200
+
+
+def test_gestures_that_look_bad_are_refused(avatar, tmp_path, capsys, monkeypatch):
+    person = open_person(avatar).avatar
+    capture = WholeFilmed(person, tmp_path / "body")
+    picture = capture.image
+
+    def image(camera, frame):  # the model has learnt nothing of these frames
+        return picture(camera, 0)[::-1].copy() if 9 <= frame <= 10 else picture(camera, frame)
+
+    monkeypatch.setattr(capture, "image", image)
+    monkeypatch.setattr(Capture, "open", lambda path: capture)
+    asked = Animation(15.0, FRAMES, Rest(1, 5), (Action(7, 0.5), Action(9, 1.0), Action(12, 0.8)))
+    (avatar / "animation.json").write_bytes(asked.to_bytes())
+    out, sheet = tmp_path / "animation.json", tmp_path / "sheet.png"
+    words = ["animate", str(avatar), "--capture", "body", "--out", str(out)]
+    assert main([*words, "--contact-sheet", str(sheet)]) == 0
+    (avatar / "animation.json").unlink()
+    assert Animation.from_bytes(out.read_bytes()).actions == (Action(7, 0.5),)
+    printed = capsys.readouterr().out
+    assert "frames 9 to 10 fall far below the clip's own quality" in printed
+    rows = [line.split("│") for line in printed.splitlines() if "refused" in line]
+    assert {"9", "12"} <= {row[1].strip() for row in rows}
+    assert Image.open(sheet).size[1] == 960  # with the curve of the pictures
 
 
 def test_what_was_edited_is_shown(avatar, capsys):

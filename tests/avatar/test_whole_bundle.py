@@ -63,6 +63,7 @@ def test_the_bundle_says_what_it_is(baked):
     assert manifest.provenance.sources == ("a seed",)
     assert manifest.provenance.licence == "CC0-1.0; CC-BY-4.0"
     assert bundle.animation.num_frames == FRAMES
+    assert len(bundle.animation.quality) == FRAMES  # looked at beside the recording
     np.testing.assert_allclose(manifest.background, (0.3, 0.4, 0.5), atol=1e-4)
     np.testing.assert_allclose(
         bundle.world_from_head, person.placement.world_from_canonical, atol=1e-6

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+import torch
 
 from ico3d.avatar.avatar import ABOUT as AVATAR
 from ico3d.avatar.avatar import TrainedAvatar
@@ -40,8 +41,17 @@ class Person(MovingBody, Protocol):
         """How long the clip lasts."""
         ...
 
+    @property
+    def has_head(self) -> bool:
+        """Whether a head of its own kind is on the body."""
+        ...
+
     def gaussians(self, seconds: float) -> Gaussians:
         """All of the person in the world at a time."""
+        ...
+
+    def body_gaussians(self, seconds: float) -> Gaussians:
+        """The same without the head."""
         ...
 
 
@@ -69,9 +79,19 @@ class TrainedPerson:
         """Where the face looks, if there is one."""
         return self.avatar and front_of(self.avatar)
 
+    @property
+    def has_head(self) -> bool:
+        """Whether this is an avatar."""
+        return self.avatar is not None
+
     def gaussians(self, seconds: float) -> Gaussians:
         """With the head, if there is one."""
         return (self.avatar or self.body).gaussians(seconds)
+
+    @torch.no_grad()
+    def body_gaussians(self, seconds: float) -> Gaussians:
+        """The body alone."""
+        return self.body.gaussians(seconds)
 
 
 @dataclass
@@ -79,7 +99,8 @@ class BakedPerson:
     """A bundle with a body.
 
     Attributes:
-        bundle: It.
+        bundle: The opened bundle.
+        summary: Empty: a bundle does not say how its body was made.
     """
 
     bundle: Bundle
@@ -108,6 +129,15 @@ class BakedPerson:
     def window_gaussians(self, index: int, tau: float) -> Gaussians:
         """The Gaussians of a window."""
         return window_gaussians(self.bundle.window(index), tau)
+
+    @property
+    def has_head(self) -> bool:
+        """Whether the bundle has a head."""
+        return self.bundle.manifest.head is not None
+
+    def body_gaussians(self, seconds: float) -> Gaussians:
+        """The body alone."""
+        return body_gaussians(self.bundle, seconds)
 
     def gaussians(self, seconds: float) -> Gaussians:
         """With an idle face, if there is a head."""

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from ico3d.avatar.body_bundle import WindowResult
+    from ico3d.bundle.animation import Animation
     from ico3d.bundle.manifest import Persona
     from ico3d.capture.capture import Capture
 
@@ -36,7 +37,7 @@ class Bake:
         licences: Text files with notices that the sources ask for; they go into LICENSES.txt.
         background: Splats that stand behind the person, in the same world: .spz or .ply.
         strip: Also write a picture here: recorded | exact | baked.
-        force: Write the bundle although it breaks a bound.
+        force: Write the bundle although it breaks a bound, and play motion that looks bad.
     """
 
     model: tyro.conf.Positional[Path]
@@ -139,10 +140,12 @@ class Bake:
         report(f"the whole person: {comparison.in_words(result.loss)}.")
         if self.strip:
             _save_picture(whole_bundle.strip(avatar, result.person, body_capture), self.strip)
+        animation = whole_bundle.with_quality(animation, avatar, result.person, body_capture)
         if not self.force:
             baking.check(head)
             body_bundle.check(windows)
             whole_bundle.check(result)
+            animation = _played(animation, report)
         about = (persona, self.name or persona.name, notices)
         whole_bundle.write(self._out, avatar, result, animation, body_capture, about)
 
@@ -179,6 +182,19 @@ class Bake:
         from ico3d.errors import SettingsError
 
         raise SettingsError(sentence)
+
+
+def _played(animation: "Animation", report: Callable[[str], None]) -> "Animation":
+    """Leaves out motion that looks far worse than the rest of the clip."""
+    from ico3d.avatar import motion_quality
+
+    played = motion_quality.playable(animation)
+    if animation.quality:
+        left_out = motion_quality.refused(animation.actions, played)
+        report(motion_quality.in_words(animation, len(left_out)))
+    else:
+        report("how the motion looks was not measured: that takes the body's recording.")
+    return played
 
 
 def _watched(

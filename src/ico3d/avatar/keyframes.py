@@ -129,7 +129,7 @@ def find_rest(motion: Motion) -> Rest:
     speeds = motion.speeds
     bound = max(CALM, _division(speeds))
     wanted = min(math.ceil(LEAST_REST * motion.fps), len(speeds) - 1)
-    first, last = _longest_run(speeds <= bound)
+    first, last = longest_run(speeds <= bound)
     if last - first < wanted:
         sums = np.convolve(speeds, np.ones(wanted + 1), "valid")
         first = int(np.argmin(sums))
@@ -194,7 +194,7 @@ def _division(speeds: np.ndarray) -> float:
     return float(np.exp((values[index] + values[index + 1]) / 2))
 
 
-def _longest_run(calm: np.ndarray) -> tuple[int, int]:
+def longest_run(calm: np.ndarray) -> tuple[int, int]:
     """First and last index of the longest stretch of True; of equal ones the first."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], calm, [False]])))
     runs = edges.reshape(-1, 2)  # begin, one after the end

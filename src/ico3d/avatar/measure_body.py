@@ -52,16 +52,21 @@ def recorded_views(capture: Capture, span: Span, count: int = VIEWS) -> Iterator
     One at a time: large recordings do not fit into memory. Where the capture lacks a clean
     background, the person is cut out over a neutral colour.
     """
-    cameras = capture.split.test_cameras or tuple(range(len(capture.cameras)))
-    pairs = [(c, f) for f in range(span.first, span.last + 1) for c in cameras]
+    frames, cameras = range(span.first, span.last + 1), measuring_cameras(capture)
+    pairs = [(camera, frame) for frame in frames for camera in cameras]
     for number in np.unique(np.linspace(0, len(pairs) - 1, count).astype(int)):
-        view = _recorded_view(capture, *pairs[number], span=span)
+        view = recorded_view(capture, *pairs[number], span=span)
         if view is not None:
             yield view
 
 
-def _recorded_view(capture: Capture, camera: int, frame: int, span: Span) -> View | None:
-    """None where there is no picture, or nobody in it."""
+def measuring_cameras(capture: Capture) -> tuple[int, ...]:
+    """The test cameras, or all where none tests."""
+    return capture.split.test_cameras or tuple(range(len(capture.cameras)))
+
+
+def recorded_view(capture: Capture, camera: int, frame: int, span: Span) -> View | None:
+    """One recorded picture; None where there is none, or nobody in it."""
     truth, mask = capture.image(camera, frame), capture.mask(camera, frame)
     if truth is None or (mask is not None and not mask.any()):
         return None
@@ -129,27 +134,27 @@ def measure(exact: At, baked: At, recorded: Iterable[View], probes: Iterable[Vie
     exact_psnr, baked_psnr, likeness = [], [], []
     for view in recorded:
         assert view.truth is not None
-        model, ours = _drawn(exact, view)[0], _drawn(baked, view)[0]
+        model, ours = drawn(exact, view)[0], drawn(baked, view)[0]
         exact_psnr.append(psnr(model, view.truth, view.mask))
         baked_psnr.append(psnr(ours, view.truth, view.mask))
     for view in probes:
-        model, alpha = _drawn(exact, view)
+        model, alpha = drawn(exact, view)
         if alpha.any():
-            likeness.append(psnr(_drawn(baked, view)[0], model, alpha))
+            likeness.append(psnr(drawn(baked, view)[0], model, alpha))
     return Loss(_mean(exact_psnr), _mean(baked_psnr), _mean(likeness))
 
 
 def comparison_line(exact: At, baked: At, view: View) -> np.ndarray:
     """[recorded |] exact | baked of one view, side by side: (H, W·3 or W·2, 3) float32."""
-    pictures = [_drawn(model, view)[0] for model in (exact, baked)]
+    pictures = [drawn(model, view)[0] for model in (exact, baked)]
     return np.hstack(pictures if view.truth is None else [view.truth, *pictures])
 
 
-def _drawn(person: At, view: View) -> tuple[np.ndarray, np.ndarray]:
-    """(H, W, 3) and alpha (H, W)."""
+def drawn(person: At, view: View) -> tuple[np.ndarray, np.ndarray]:
+    """What a view shows of somebody: (H, W, 3) and alpha (H, W)."""
     with torch.no_grad():
-        drawn = render(person(view.tau), [view.camera], view.background)
-    return drawn.rgb[0].numpy(), drawn.alpha[0].numpy()
+        rendered = render(person(view.tau), [view.camera], view.background)
+    return rendered.rgb[0].numpy(), rendered.alpha[0].numpy()
 
 
 def _mean(values: list[float]) -> float | None:

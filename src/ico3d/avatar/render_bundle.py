@@ -91,10 +91,14 @@ class BakedAvatar:
             seconds: Where in the body's motion; clamped to it.
             expression: (B,).
         """
-        index, tau = place_in(self.spans, seconds * self.fps)
         head = baked_gaussians(self.head, np.asarray(expression, np.float32))
         pose = pose_at(self.world_from_head, seconds * self.fps)
-        return cat([window_gaussians(self.window(index), tau), head.transform(pose)])
+        return cat([self.body_gaussians(seconds), head.transform(pose)])
+
+    def body_gaussians(self, seconds: float) -> Gaussians:
+        """The body alone, in the world."""
+        index, tau = place_in(self.spans, seconds * self.fps)
+        return window_gaussians(self.window(index), tau)
 
 
 def pose_at(world_from_head: np.ndarray, frame: float) -> np.ndarray:

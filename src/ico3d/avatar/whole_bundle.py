@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from ico3d.avatar import baking, body_bundle, comparison, measure_body, staging
+from ico3d.avatar import baking, body_bundle, comparison, measure_body, motion_quality, staging
 from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.body_bundle import WindowResult
 from ico3d.avatar.keyframes import Motion, find_animation, read_animation
@@ -167,6 +167,29 @@ def animation_of(folder: Path, avatar: TrainedAvatar) -> Animation:
         BundleError: If the file makes no sense, or is for another body.
     """
     return read_animation(folder, avatar.body) or find_animation(Motion.of(avatar.body))
+
+
+def with_quality(
+    animation: Animation, avatar: TrainedAvatar, person: BakedAvatar, capture: Capture | None
+) -> Animation:
+    """An animation that knows how the baked body looks in each frame of its recording.
+
+    Args:
+        animation: As found or edited.
+        avatar: The exact person, for the recorded expressions.
+        person: The baked one, which will be played.
+        capture: The body's recording; without one nothing is known.
+    """
+    if capture is None:
+        return replace(animation, quality=())
+    length = avatar.seconds
+    quality = motion_quality.measure_motion(
+        _pair(avatar, person)[1],
+        lambda tau: person.body_gaussians(tau * length),
+        capture,
+        _span(avatar),
+    )
+    return replace(animation, quality=quality)
 
 
 def write(

@@ -59,6 +59,8 @@ class Animation:
         actions: Key frames of gestures.
         min_speed: Captured seconds per second that motion lasts at least, but for easing.
         max_speed: Captured seconds per second at most.
+        quality: PSNR in dB of the worst part of the body in each frame, as far as somebody
+            measured it; empty where nobody did.
         version: Of the file.
     """
 
@@ -68,6 +70,7 @@ class Animation:
     actions: tuple[Action, ...]
     min_speed: float = 0.6
     max_speed: float = 1.2
+    quality: tuple[float, ...] = ()
     version: int = VERSION
 
     def __post_init__(self):
@@ -92,11 +95,14 @@ class Animation:
         _require(0 < self.min_speed <= FASTEST, "min_speed", f"lie between 0 and {FASTEST:g}")
         inside = self.min_speed <= self.max_speed <= FASTEST
         _require(inside, "max_speed", f"lie between min_speed and {FASTEST:g}")
+        known = len(self.quality) in (0, self.num_frames)
+        _require(known, "quality", f"have {self.num_frames} entries, or none")
 
     def to_bytes(self) -> bytes:
         """The content of `animation.json`, the same bytes for the same animation."""
         values = encode(self)
-        lines = [f" {json.dumps(name)}: {json.dumps(values[name])}" for name in _ORDER]
+        names = [name for name in _ORDER if name != "quality" or self.quality]
+        lines = [f" {json.dumps(name)}: {json.dumps(values[name])}" for name in names]
         return ("{\n" + ",\n".join(lines) + "\n}\n").encode()
 
     @staticmethod
@@ -107,7 +113,10 @@ class Animation:
             BundleError: In one sentence, if it is none or makes no sense.
         """
         _require(len(data) <= MAX_BYTES, "it", f"have at most {MAX_BYTES} bytes")
-        return decode(Animation, parse_json(data, ANIMATION), ANIMATION)
+        values = parse_json(data, ANIMATION)
+        if isinstance(values, dict):
+            values.setdefault("quality", [])  # older bundles have none
+        return decode(Animation, values, ANIMATION)
 
     def check_body(self, body: BodyInfo) -> None:
         """Checks that this is the animation of a body.
@@ -132,7 +141,7 @@ class Animation:
         return (self.num_frames - 1) / self.fps
 
 
-_ORDER = ("version", "fps", "num_frames", "rest", "actions", "min_speed", "max_speed")
+_ORDER = ("version", "fps", "num_frames", "rest", "actions", "min_speed", "max_speed", "quality")
 """Of the entries in the file."""
 
 
