@@ -28,16 +28,17 @@ from ico3d.chat.sessions import FullError, Session, Sessions
 from ico3d.errors import Ico3dError, ProtocolError
 
 HELLO_SECONDS = 10  # that a page may take to say hello
-GOING, BROKEN, TOO_BIG, BUSY = 1000, 1008, 1009, 1013  # WebSocket close codes
+GOING, BROKEN, TOO_BIG, FAILED, BUSY = 1000, 1008, 1009, 1011, 1013  # WebSocket close codes
+FULL = "all places are taken: try again in a minute."
 
 
 class Hangup(Exception):
     """The connection is to be closed with an error."""
 
-    def __init__(self, code: int, message: str):
-        """A close code and one sentence for the page."""
+    def __init__(self, code: int, message: str, again: bool = False):
+        """A close code, one sentence for the page, and whether a new session may succeed."""
         super().__init__(message)
-        self.code = code
+        self.code, self.again = code, again
 
 
 class Connection:
@@ -70,13 +71,13 @@ class Connection:
             writer = asyncio.create_task(self._write())
             await self._read(session)
         except Hangup as hangup:
-            await self._hang_up(hangup.code, str(hangup))
+            await self._hang_up(hangup)
         except FullError:
             self._sessions.monitor.failed("full")
-            await self._hang_up(BUSY, "all places are taken: try again in a minute.")
+            await self._hang_up(Hangup(BUSY, FULL, again=True))
         except Ico3dError as error:
             self._sessions.monitor.failed("start")
-            await self._hang_up(1011, str(error))
+            await self._hang_up(Hangup(FAILED, str(error), again=True))
         except WebSocketDisconnect:
             pass
         finally:
@@ -131,7 +132,7 @@ class Connection:
             except ProtocolError as error:
                 self._sessions.monitor.failed("protocol")
                 if not self._limits.forgive():
-                    raise Hangup(BROKEN, str(error)) from error
+                    raise Hangup(BROKEN, str(error), again=True) from error
                 self._outbox.put(Error(str(error), fatal=False))
 
     async def _receive(self) -> str | bytes:
@@ -175,11 +176,12 @@ class Connection:
                     await self._socket.send_bytes(frame)
             await self._socket.close(GOING)
 
-    async def _hang_up(self, code: int, message: str) -> None:
-        logger.debug(f"closing a connection with {code}: {message}")
+    async def _hang_up(self, hangup: Hangup) -> None:
+        logger.debug(f"closing a connection with {hangup.code}: {hangup}")
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
-            await self._socket.send_text(str(encode(Error(message, fatal=True))))
-            await self._socket.close(code)
+            error = Error(str(hangup), fatal=True, again=hangup.again)
+            await self._socket.send_text(str(encode(error)))
+            await self._socket.close(hangup.code)
 
 
 def _is_big(error: ProtocolError) -> bool:

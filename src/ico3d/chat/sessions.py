@@ -11,7 +11,7 @@ from ico3d.chat.page import Outbox, Page
 from ico3d.chat.protocol import RESUME_SECONDS, Error, Hello, Offer
 from ico3d.chat.services.offers import wished
 
-IDLE = "Nothing was said for {:g} min, so this conversation has ended: reload the page."
+IDLE = "Nothing was said for {:g} min, so this conversation has ended."
 
 
 class FullError(Exception):
@@ -122,7 +122,7 @@ class Sessions:
             loop = asyncio.get_running_loop()
             session.idle_check = loop.call_later(left, self._check_idle, session)
             return
-        session.page.end(Error(IDLE.format(minutes), fatal=True))
+        session.page.end(Error(IDLE.format(minutes), fatal=True, again=True))
         self._close_soon(session, "idle")
 
     def _close_soon(self, session: Session, why: str) -> None:
