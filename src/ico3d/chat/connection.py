@@ -9,7 +9,7 @@ from loguru import logger
 
 from ico3d.chat import protocol
 from ico3d.chat.codec import OversizedError, decode_client, encode
-from ico3d.chat.limits import Limits
+from ico3d.chat.limits import Inlet, Limits
 from ico3d.chat.page import Outbox
 from ico3d.chat.protocol import (
     Audio,
@@ -53,7 +53,7 @@ class Connection:
             welcome: What every page is told; what belongs to a session is filled in.
         """
         self._socket, self._sessions, self._welcome = socket, sessions, welcome
-        self._limits = Limits()
+        self._limits, self._inlet = Limits(), Inlet()
         self._outbox = Outbox()
 
     async def run(self) -> None:
@@ -123,7 +123,7 @@ class Connection:
         while True:
             frame = await self._receive()
             try:
-                self._limits.check_frame()
+                self._limits.check_frame(frame)
                 message = decode_client(frame)
                 self._limits.check_message(message)
                 await self._handle(session, message)
@@ -145,7 +145,8 @@ class Connection:
     async def _handle(self, session: Session, message: ClientMessage) -> None:
         conversation = session.conversation
         if isinstance(message, Audio):
-            await conversation.hear(message)
+            for sound in self._inlet.take(message):
+                await conversation.hear(sound)
         elif isinstance(message, Clock):
             conversation.clock(message)
         elif isinstance(message, Text):
@@ -159,6 +160,8 @@ class Connection:
         elif isinstance(message, Deaf):
             await conversation.deaf(message.reason)
         elif isinstance(message, Talk):
+            for sound in self._inlet.rest():  # it belongs to the button's last state
+                await conversation.hear(sound)
             await conversation.talk(message.pressed)
         elif isinstance(message, Interrupt):
             await conversation.interrupt(message.utterance)
