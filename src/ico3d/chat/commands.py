@@ -64,6 +64,7 @@ class Serve:
         services = make_parts(avatar).services if avatar else None  # loads what they need, too
         app = server.make_app(bundle, avatar, self.host, sessions)
         url = server.address(listener)
+        listener.listen()  # whoever reads the address and comes at once is served in a moment
         print(f"{(persona or bundle.manifest.persona).name} is at {url} (Ctrl+C ends)")
         if avatar:
             offered = offers(settings, avatar.persona.voice)

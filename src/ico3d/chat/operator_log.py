@@ -24,6 +24,7 @@ OWN = "ico3d."
 TOLD = (  # places where pipecat logs the errors of processors, of which `monitor.py` tells
     ("pipecat.processors.frame_processor", "push_error_frame"),
     ("pipecat.pipeline.worker", "_source_push_frame"),
+    ("pipecat.pipeline.worker", "_handle_unusable_processor"),
 )
 QUIET = 60.0  # s for which a line that has just been written is not written again
 MOST = 200  # lines that are remembered for it
