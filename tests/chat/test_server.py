@@ -20,11 +20,10 @@ from ico3d.chat import protocol
 from ico3d.chat.codec import decode_server, encode
 from ico3d.chat.face import open_face
 from ico3d.chat.guard import is_own
-from ico3d.chat.limits import FORGIVEN, Limits
-from ico3d.chat.protocol import Audio, Error, Hello, Speech, Text, Welcome
+from ico3d.chat.protocol import Error, Hello, Speech, Text, Welcome
 from ico3d.chat.server import make_server
 from ico3d.cli import main
-from ico3d.errors import BundleError, ProtocolError, SettingsError
+from ico3d.errors import BundleError, SettingsError
 from ico3d.measure.page import open_page
 
 from .conftest import serving
@@ -97,7 +96,7 @@ async def test_figures_are_for_those_who_may_see_the_page(served):
         await page.close()
         while "ico3d_connections 0.0" not in lines:
             lines = (await client.get("/metrics")).text.splitlines()
-    assert "ico3d_sessions 1.0" in lines  # it may come back
+    assert "ico3d_sessions 0.0" in lines  # it left: what only drops comes back
     assert 'ico3d_errors_total{where="protocol"} 1.0' in lines
 
 
@@ -179,7 +178,8 @@ async def test_a_bad_hello_is_answered_in_one_sentence(served, first, code):
         error, closed = await farewell(socket)
     assert closed == code and len(sessions) == 0
     if len(first) < 65_536:  # beyond it the WebSocket library closes by itself
-        assert error.fatal and "\n" not in error.message and len(error.message) < 300
+        assert error.fatal and not error.again
+        assert "\n" not in error.message and len(error.message) < 300
 
 
 async def test_garbage_and_floods_end_their_connection_only(served):
@@ -204,40 +204,6 @@ async def test_garbage_and_floods_end_their_connection_only(served):
     _, speech = await good.wait(Speech, since)
     assert speech.utterance == 1
     await good.close()
-
-
-def test_a_page_may_be_clumsy_a_few_times_only():
-    limits = Limits()
-    assert [limits.forgive() for _ in range(FORGIVEN)] == [True] * (FORGIVEN - 1) + [False]
-
-
-def test_rates_are_limited_by_the_clock():
-    now = 0.0
-    limits = Limits(lambda: now)
-    for _ in range(200):
-        limits.check_frame()
-    with pytest.raises(ProtocolError):
-        limits.check_frame()
-    now = 1.0
-    for _ in range(100):
-        limits.check_frame()
-    with pytest.raises(ProtocolError):
-        limits.check_frame()
-
-
-def test_more_sound_than_a_microphone_makes_is_refused():
-    import numpy as np
-
-    now = 0.0
-    limits = Limits(lambda: now)
-    second = Audio(0, np.zeros(16000, np.int16))
-    for _ in range(5):
-        limits.check_message(second)
-    with pytest.raises(ProtocolError):
-        limits.check_message(second)
-    for _ in range(60):
-        now += 1.0
-        limits.check_message(second)
 
 
 def test_serve_prints_where_it_is_and_ends_on_interrupt(bundle_path, tmp_path):

@@ -99,8 +99,8 @@ def test_a_session_in_which_nothing_happens_ends_with_a_sentence(bundle, questio
             return ends, left
 
     ends, left = run(monkeypatch, stay())
-    sentence = "Nothing was said for 1 min, so this conversation has ended: reload the page."
-    assert {error for _, error in ends.values()} == {Error(sentence, fatal=True)}
+    sentence = "Nothing was said for 1 min, so this conversation has ended."
+    assert {error for _, error in ends.values()} == {Error(sentence, fatal=True, again=True)}
     assert ends[2][0] == pytest.approx(10 + 60, abs=0.5)
     assert ends[0][0] == pytest.approx(60 + 10 + 60, abs=0.5)
     assert ends[1][0] == pytest.approx(60 + 10 + 60, abs=3)

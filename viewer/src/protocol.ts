@@ -242,8 +242,10 @@ export interface ErrorMessage {
   type: "error";
   /** One sentence. */
   message: string;
-  /** True if the server closes the connection after it. */
+  /** True if the server closes the connection after it; the session is over. */
   fatal: boolean;
+  /** Whether, after a fatal one, a new session may succeed: the page offers to try again. */
+  again: boolean;
 }
 
 export type ClientMessage =

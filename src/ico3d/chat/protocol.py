@@ -373,11 +373,13 @@ class Error:
 
     Attributes:
         message: One sentence.
-        fatal: True if the server closes the connection after it.
+        fatal: True if the server closes the connection after it; the session is over.
+        again: Whether, after a fatal one, a new session may succeed: the page offers to try again.
     """
 
     message: Sentence
     fatal: bool
+    again: bool = False
 
 
 ClientMessage = Hello | Audio | Text | Interrupt | Clock | Talk | Heard | Deaf

@@ -62,7 +62,7 @@ export class Connection {
     Object.assign(this.wishes, wishes);
     this.session = null;
     this.lastIndex = -1;
-    this.socket?.close();
+    this.socket?.close(1000); // on purpose: the server gives the place away at once
   }
 
   private receive(frame: string | ArrayBuffer): void {
