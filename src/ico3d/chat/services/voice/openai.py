@@ -1,8 +1,8 @@
 """Any voice behind an OpenAI-compatible server."""
 
 import os
-from collections.abc import AsyncGenerator
-from dataclasses import dataclass
+from collections.abc import AsyncGenerator, AsyncIterator
+from dataclasses import dataclass, replace
 
 from pipecat.audio.utils import create_stream_resampler
 from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
@@ -11,7 +11,8 @@ from pipecat.services.openai.tts import OpenAITTSService
 from ico3d.chat.protocol import SPEECH_RATE
 from ico3d.chat.services.provider import Context, lacks_server
 from ico3d.chat.services.voice.pieces import OPTIONS, STARVED, Prompt
-from ico3d.errors import SettingsError
+from ico3d.common.sound import REQUEST, Claim, fault, wav_claim
+from ico3d.errors import ServiceError, SettingsError
 
 CHUNK = 4800  # bytes that are passed on at once: 0.1 s
 
@@ -77,10 +78,11 @@ class ServerVoice(Prompt, OpenAITTSService):
         )
         try:
             async with request as response:
+                rate = self._rate_of(response.headers.get("content-type", ""))
                 async for frame in self._stream_audio_frames_from_iterator(
-                    response.iter_bytes(CHUNK),
+                    judged(response.iter_bytes(CHUNK), rate or SPEECH_RATE),
                     strip_wav_header=True,
-                    in_sample_rate=self._rate_of(response.headers.get("content-type", "")),
+                    in_sample_rate=rate,
                     context_id=context_id,
                 ):
                     yield frame
@@ -98,6 +100,29 @@ class ServerVoice(Prompt, OpenAITTSService):
     def _rate_of(self, content_type: str) -> int | None:
         """Null for sound whose header tells it."""
         return None if "wav" in content_type else self._options.rate
+
+
+async def judged(sound: AsyncIterator[bytes], rate: int) -> AsyncIterator[bytes]:
+    """The pieces of a server's answer, for as long as they are sound that is taken.
+
+    Args:
+        sound: PCM16, a WAV file's header before it or not.
+        rate: Samples per second, unless a header says so.
+
+    Raises:
+        ServiceError: If a header claims what is not taken, or the sound does not end in time.
+    """
+    claim, frames, first = Claim(rate, width=2), 0, True
+    async for piece in sound:
+        if first:
+            claim, first = wav_claim(piece) or claim, False
+        frames += len(piece) // 2
+        wrong = fault(replace(claim, frames=frames), REQUEST)
+        if not wrong and (claim.channels, claim.width) != (1, 2):
+            wrong = "is not mono with 16 bits"
+        if wrong:
+            raise ServiceError(f"its sound {wrong}")
+        yield piece
 
 
 def hindrance(settings: Settings) -> str:
