@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
 
+from ico3d.chat.keys import check_key
 from ico3d.chat.tool_settings import Tool, check_tools
 from ico3d.errors import SettingsError
 
@@ -98,8 +99,10 @@ class Expression:
     Attributes:
         use: `own` for the avatar's speech model in this process; `remote` for the same one on
             another machine, and in this process whenever that fails.
-        url: Of `ico3d serve-module expression`, such as `http://192.168.1.5:8766`.
-        key_variable: Environment variable that holds its key, if it wants one.
+        url: Of `ico3d serve-module expression`, such as `http://127.0.0.1:8766` where a tunnel
+            ends.
+        key_variable: Environment variable that holds its key, if it wants one. It is sent nowhere
+            unencrypted but to this machine.
         timeout: Seconds that a piece of sound may take before the face goes on here.
     """
 
@@ -118,6 +121,8 @@ class Expression:
             raise SettingsError(f"chat settings: expression '{self.use}': use own or remote.")
         if self.use == "remote" and not self.url.startswith(("http://", "https://")):
             raise SettingsError("chat settings: [expression] needs the url of the remote module.")
+        if self.use == "remote":
+            check_key(self.url, self.key_variable, "chat settings: [expression]")
 
 
 @dataclass(frozen=True)

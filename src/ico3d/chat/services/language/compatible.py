@@ -3,7 +3,7 @@
 from typing import Any
 
 from loguru import logger
-from openai import APIStatusError, AsyncStream
+from openai import APIStatusError, AsyncOpenAI, AsyncStream
 from openai.types.chat import ChatCompletionChunk
 from pipecat.adapters.llm.services.open_ai_adapter import OpenAILLMInvocationParams
 from pipecat.processors.aggregators.llm_context import LLMContext
@@ -18,22 +18,24 @@ class CompatibleModel(OpenAILLMService):
 
     supports_developer_role = False  # chat templates of open models do not know it
 
-    def __init__(self, url: str, key: str, model: str, instruction: str, functions: bool):
+    def __init__(self, client: dict[str, Any], model: str, instruction: str, functions: bool):
         """A model for one session.
 
         Args:
-            url: Of the server; empty for OpenAI's.
-            key: Sent as the bearer's.
+            client: What the SDK's client is made with.
             model: Its name.
             instruction: Who it is.
             functions: Whether it may call functions.
         """
+        self._made_with = client
         super().__init__(
-            api_key=key,
-            base_url=url or None,
             settings=OpenAILLMService.Settings(model=model, system_instruction=instruction),
         )
         self._functions_allowed = functions
+
+    def create_client(self, *_, **__) -> AsyncOpenAI:
+        """The client that pipecat asks by."""
+        return AsyncOpenAI(**self._made_with)
 
     def build_chat_completion_params(
         self, params_from_context: OpenAILLMInvocationParams

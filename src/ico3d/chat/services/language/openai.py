@@ -1,16 +1,16 @@
 """Any language model behind an OpenAI-compatible server, through pipecat's own service."""
 
-import os
 from dataclasses import dataclass
 
 from pipecat.processors.frame_processor import FrameProcessor
 
+from ico3d.chat.keys import NONE, check_key, key_for
 from ico3d.chat.services.language.instruction import instruction
 from ico3d.chat.services.language.servers import language_models
 from ico3d.chat.services.provider import Context, lacks_server
 from ico3d.errors import SettingsError
 
-OWN_KEY = "OPENAI_API_KEY"
+WHERE = "chat settings: language 'openai'"
 OWN_MODEL = "gpt-4.1-mini"
 SLOWEST = 5.0  # s for the list of a server's models
 
@@ -23,7 +23,8 @@ class Settings:
         url: Its address, such as `http://localhost:11434/v1`; empty for OpenAI's own.
         model: Name of its model; empty for the first that the server offers.
         key_variable: Environment variable that holds the key; empty for none, or for
-            OPENAI_API_KEY where there is no `url`.
+            OPENAI_API_KEY where the server is OpenAI's. It is sent nowhere unencrypted but to
+            this machine.
         functions: Whether the model may call functions (gestures, moods, tools).
     """
 
@@ -32,6 +33,14 @@ class Settings:
     key_variable: str = ""
     functions: bool = True
 
+    def __post_init__(self):
+        """Checks where the key would go.
+
+        Raises:
+            SettingsError: If it must not go there.
+        """
+        check_key(self.url, self.key_variable, WHERE)
+
 
 def make(settings: Settings, context: Context) -> FrameProcessor:
     """A language model for one session that knows who it is.
@@ -39,11 +48,16 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
     Raises:
         SettingsError: If no key is there, or the server does not say which models it has.
     """
+    from pipecat.utils.http import connection_limits
+
+    from ico3d.chat.services.client import client_options
     from ico3d.chat.services.language.compatible import CompatibleModel
 
+    kept = connection_limits(
+        max_keepalive_connections=100, max_connections=1000, keepalive_expiry=None
+    )
     return CompatibleModel(
-        settings.url,
-        key(settings),
+        client_options(settings.url, settings.key_variable, WHERE, limits=kept),
         model(settings),
         instruction(context.persona),
         settings.functions,
@@ -52,29 +66,12 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
 
 def hindrance(settings: Settings) -> str:
     """Whether a server is chosen."""
-    return lacks_server(settings.url, settings.key_variable or OWN_KEY, "language")
+    return lacks_server(settings.url, settings.key_variable, "language")
 
 
 def detail(settings: Settings) -> str:
     """For the visitor's eyes: which model, as far as the settings say."""
     return settings.model or settings.url or OWN_MODEL
-
-
-def key(settings: Settings) -> str:
-    """The key to send; one for OpenAI goes nowhere else by itself.
-
-    Raises:
-        SettingsError: If the environment lacks it.
-    """
-    variable = settings.key_variable or ("" if settings.url else OWN_KEY)
-    if not variable:
-        return "none"
-    value = os.environ.get(variable, "")
-    if not value:
-        raise SettingsError(
-            f"chat settings: language 'openai' needs its key in the environment as {variable}."
-        )
-    return value
 
 
 def model(settings: Settings) -> str:
@@ -85,7 +82,8 @@ def model(settings: Settings) -> str:
     """
     if settings.model or not settings.url:
         return settings.model or OWN_MODEL
-    offered = language_models(settings.url, key(settings), SLOWEST)
+    key = key_for(settings.url, settings.key_variable, WHERE) or NONE
+    offered = language_models(settings.url, key, SLOWEST)
     if not offered:
         raise SettingsError(
             f"chat settings: the language model's server {settings.url} offers no model: start "

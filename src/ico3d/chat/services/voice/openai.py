@@ -1,6 +1,5 @@
 """Any voice behind an OpenAI-compatible server."""
 
-import os
 from collections.abc import AsyncGenerator, AsyncIterator
 from dataclasses import dataclass, replace
 
@@ -8,12 +7,14 @@ from pipecat.audio.utils import create_stream_resampler
 from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
 from pipecat.services.openai.tts import OpenAITTSService
 
+from ico3d.chat.keys import check_key
 from ico3d.chat.protocol import SPEECH_RATE
 from ico3d.chat.services.provider import Context, lacks_server
 from ico3d.chat.services.voice.pieces import OPTIONS, STARVED, Prompt
 from ico3d.common.sound import REQUEST, Claim, fault, wav_claim
 from ico3d.errors import ServiceError, SettingsError
 
+WHERE = "chat settings: voice 'openai'"
 CHUNK = 4800  # bytes that are passed on at once: 0.1 s
 
 
@@ -25,7 +26,9 @@ class Settings:
         url: Its address, such as `http://localhost:8880/v1`; empty for the provider's own.
         model: Name of its model.
         voice: Name of its voice.
-        key_variable: Environment variable that holds the key.
+        key_variable: Environment variable that holds the key; empty for none, or for
+            OPENAI_API_KEY where the server is OpenAI's. It is sent nowhere unencrypted but to
+            this machine.
         rate: Samples per second of its sound; a WAV file says so itself.
         timeout: Seconds to wait for an answer, or for more of it.
     """
@@ -33,16 +36,17 @@ class Settings:
     url: str = ""
     model: str = "gpt-4o-mini-tts"
     voice: str = "alloy"
-    key_variable: str = "OPENAI_API_KEY"
+    key_variable: str = ""
     rate: int = SPEECH_RATE
     timeout: float = 10.0
 
     def __post_init__(self):
-        """Checks ranges.
+        """Checks ranges, and where the key would go.
 
         Raises:
-            SettingsError: If rate or time-out make no sense.
+            SettingsError: If rate or time-out make no sense, or the key must not go there.
         """
+        check_key(self.url, self.key_variable, WHERE)
         if not (8000 <= self.rate <= 48000 and 0 < self.timeout < STARVED):
             raise SettingsError(
                 "chat settings: voice 'openai': rate must be 8000 to 48000 samples per second "
@@ -55,12 +59,11 @@ class ServerVoice(Prompt, OpenAITTSService):
 
     def __init__(self, settings: Settings):
         """For one session."""
-        from openai import DefaultAsyncHttpxClient
+        from ico3d.chat.services.client import client_options
 
+        where = (settings.url, settings.key_variable, WHERE)
         super().__init__(
-            api_key=os.environ.get(settings.key_variable, "none"),
-            base_url=settings.url or None,
-            http_client=DefaultAsyncHttpxClient(timeout=settings.timeout),
+            **client_options(*where, timeout=settings.timeout),
             settings=OpenAITTSService.Settings(model=settings.model, voice=settings.voice),
             **OPTIONS,
         )
@@ -131,5 +134,9 @@ def hindrance(settings: Settings) -> str:
 
 
 def make(settings: Settings, context: Context) -> ServerVoice:
-    """A voice for one session."""
+    """A voice for one session.
+
+    Raises:
+        SettingsError: If the key is not here.
+    """
     return ServerVoice(settings)
