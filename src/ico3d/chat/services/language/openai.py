@@ -1,11 +1,14 @@
 """Any language model behind an OpenAI-compatible server, through pipecat's own service."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 from pipecat.processors.frame_processor import FrameProcessor
 
-from ico3d.chat.keys import NONE, check_key, key_for
+from ico3d.chat.keys import NONE, check_key, is_openai, key_for
 from ico3d.chat.services.language.instruction import instruction
+from ico3d.chat.services.language.sampling import check_sampling
 from ico3d.chat.services.language.servers import language_models
 from ico3d.chat.services.provider import Context, lacks_server
 from ico3d.errors import SettingsError
@@ -26,20 +29,28 @@ class Settings:
             OPENAI_API_KEY where the server is OpenAI's. It is sent nowhere unencrypted but to
             this machine.
         functions: Whether the model may call functions (gestures, moods, tools).
+        temperature: Of the choice of words, 0 to 2; left to the server where not given.
+        max_tokens: Longest answer, thoughts included; left to the server where not given.
+        extra: Further fields of each request, such as `{ top_k = 20 }` or
+            `{ chat_template_kwargs = { enable_thinking = false } }`.
     """
 
     url: str = ""
     model: str = ""
     key_variable: str = ""
     functions: bool = True
+    temperature: float | None = None
+    max_tokens: int | None = None
+    extra: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self):
-        """Checks where the key would go.
+        """Checks where the key would go, and what requests say.
 
         Raises:
-            SettingsError: If it must not go there.
+            SettingsError: If the key must not go there, or a request would make no sense.
         """
         check_key(self.url, self.key_variable, WHERE)
+        check_sampling(self.temperature, self.max_tokens, self.extra, WHERE)
 
 
 def make(settings: Settings, context: Context) -> FrameProcessor:
@@ -61,7 +72,16 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
         model(settings),
         instruction(context.persona),
         settings.functions,
+        sampling(settings),
     )
+
+
+def sampling(settings: Settings) -> dict[str, Any]:
+    """What pipecat's settings say of a request; OpenAI's own models know another name of one."""
+    longest = "max_completion_tokens" if is_openai(settings.url) else "max_tokens"
+    given = {"temperature": settings.temperature, longest: settings.max_tokens}
+    found: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    return {**found, "extra": {"extra_body": dict(settings.extra)}} if settings.extra else found
 
 
 def hindrance(settings: Settings) -> str:
