@@ -20,12 +20,20 @@ class Call:
     arguments: dict = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Thought:
+    """What the server gives apart from the text."""
+
+    text: str
+    field: str = "reasoning_content"
+
+
 class Script:
     """What a server answers, and what it was asked.
 
     Attributes:
-        answer: From a request's body to a list of texts, `Call`s and pauses in seconds; or to a
-            number, the status of a refusal.
+        answer: From a request's body to a list of texts, `Thought`s, `Call`s and pauses in seconds;
+            or to a number, the status of a refusal.
         requests: Bodies of the chat requests.
         abandoned: Streams whose reader hung up.
         models: Names that it offers.
@@ -66,6 +74,8 @@ class Script:
                 elif isinstance(part, Call):
                     yield chunk({"tool_calls": [tool_call(part, calls)]})
                     calls += 1
+                elif isinstance(part, Thought):
+                    yield chunk({part.field: part.text})
                 else:
                     yield chunk({"content": part})
             yield chunk({}, "tool_calls" if calls else "stop")

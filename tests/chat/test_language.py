@@ -79,16 +79,18 @@ async def test_a_conversation_keeps_its_thread_and_the_key_stays_at_home(bundle,
 async def test_an_interruption_hangs_up_and_only_what_was_said_is_remembered(bundle):
     long = [f"This is sentence number {i}. " for i in range(200)]
     parts = [part for sentence in long for part in (sentence, 0.05)]
-    script = Script(lambda body: parts if len(script.requests) == 1 else ["Yes."])
+    script = Script(lambda body: parts if len(script.requests) == 2 else ["Yes."])
     async with talking(bundle, script) as page:
+        await ask(page, "hello", 0)  # from now on the model is known to think nothing aloud
+        await page.heard(0)
         await page.send(Text("count"))
-        await page.wait(Speech)
+        await page.wait(Speech, where=lambda m: m.utterance == 1)
         await page.send(Interrupt(None))
-        await page.wait(Stop)
-        await ask(page, "go on", 1)
+        await page.wait(Stop, where=lambda m: m.utterance == 1)
+        await ask(page, "go on", 2)
     assert script.abandoned == 1
-    assert script.requests[1]["messages"][-1] == {"role": "user", "content": "go on"}
-    assert "number 40" not in str(script.requests[1]), "it had no time to be said"
+    assert script.requests[2]["messages"][-1] == {"role": "user", "content": "go on"}
+    assert "number 40" not in str(script.requests[2]), "it had no time to be said"
 
 
 async def test_a_question_over_an_answer_follows_what_was_said_of_it(bundle):

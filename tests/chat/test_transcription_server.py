@@ -14,6 +14,7 @@ from fastapi.responses import JSONResponse
 from ico3d.chat import server
 from ico3d.chat.services.recognition.openai import Settings, hindrance, make
 from ico3d.chat.services.recognition.segments import BLANK
+from ico3d.errors import SettingsError
 
 from .listening import NOBODY, listen, noise
 
@@ -63,7 +64,7 @@ async def test_the_server_gets_what_was_said(monkeypatch):
         assert [(frame.text, frame.finalized) for frame in frames] == [
             ("2.5 s, 16000 Hz, 1; de; Bearer secret", True)  # pipecat adds half a second of silence
         ]
-        automatic = make(Settings(url, "any", "NO_KEY"), NOBODY)
+        automatic = make(Settings(url, "any"), NOBODY)
         (frame,), _ = await listen(automatic, noise())
         assert frame.text == "1.5 s, 16000 Hz, 1; None; Bearer none"
         assert calls == ["any", "any"]
@@ -102,6 +103,8 @@ async def test_no_server_is_told_of():
 
 async def test_it_is_never_chosen_by_itself():
     assert hindrance(Settings()) == 'no server is chosen: set [recognition] use = "openai" and url.'
-    assert "no server answers at http://[" in hindrance(Settings("http://["))
+    with pytest.raises(SettingsError, match="url must be an address"):
+        Settings("http://[")
+    assert "no server answers at http://[" in hindrance(Settings("http://[::1]:9/v1"))
     async with transcribing() as (url, _):
         assert await asyncio.to_thread(hindrance, Settings(url)) == ""

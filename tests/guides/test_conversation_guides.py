@@ -14,7 +14,9 @@ import time
 import urllib.request
 from pathlib import Path
 
+import numpy as np
 import pytest
+import soundfile
 
 from ico3d.bundle.persona import read_persona
 from ico3d.chat import server
@@ -165,7 +167,7 @@ def test_own_voice(visited):
 
 def test_a_voice_is_cloned_with_the_guides_consent_only():
     guide.write_files("own-voice.md")
-    Path("my-voice.wav").write_bytes(b"RIFF")
+    soundfile.write("my-voice.wav", np.zeros(16_000), 16_000)
     options = _chosen("clone.toml").voice.options
     with pytest.raises(SettingsError, match="consent"):
         permitted(type(options)(reference="my-voice.wav"))
@@ -204,7 +206,7 @@ def _all_have_the_key(path):
     for kind, port in (("recognition", 9001), ("language", 8000), ("voice", 9003)):
         options = getattr(services, kind).options
         assert options.key_variable == "MODULE_KEY"
-        assert options.url == f"http://192.168.1.5:{port}/v1"
+        assert options.url == f"http://127.0.0.1:{port}/v1"
 
 
 def test_a_proxy_that_passes_host_and_origin_is_let_in_under_the_servers_own_name_only():

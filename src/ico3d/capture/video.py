@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.capture.capture import Sound
+from ico3d.capture.sound import check_claim
+from ico3d.common.sound import Claim
 from ico3d.errors import CaptureError
 
 SOUND_RATE = 16_000
@@ -120,6 +122,9 @@ def read_sound(path: Path) -> Sound | None:
 
     Returns:
         The sound, or None where the file has none.
+
+    Raises:
+        CaptureError: If it claims what is not taken.
     """
     import av
     import soxr
@@ -128,10 +133,11 @@ def read_sound(path: Path) -> Sound | None:
         if not container.streams.audio:
             return None
         stream, offset = container.streams.audio[0], _sound_offset(container)
+        check_claim(path, Claim(stream.rate, frames=int(abs(offset) * stream.rate)))
         mono = av.AudioResampler("flt", "mono", stream.rate)
         parts = [
             out.to_ndarray()[0]
-            for frame in _decode(None, container, stream)
+            for frame in _sound_frames(path, container, stream)
             for out in mono.resample(frame)
         ]
         rate = stream.rate
@@ -139,6 +145,15 @@ def read_sound(path: Path) -> Sound | None:
         return None
     samples = soxr.resample(np.concatenate(parts), rate, SOUND_RATE, quality="VHQ")
     return Sound(_shifted(samples, round(offset * SOUND_RATE)), SOUND_RATE)
+
+
+def _sound_frames(path: Path, container, stream) -> Iterator:
+    """The decoded pieces of a sound, for as long as it keeps to what is taken."""
+    samples = 0
+    for frame in _decode(None, container, stream):
+        samples += frame.samples
+        check_claim(path, Claim(frame.sample_rate, frame.layout.nb_channels, samples))
+        yield frame
 
 
 def _sound_offset(container) -> float:

@@ -190,9 +190,7 @@ class Conversation:
                 self._captions,
                 user,
                 parts.language,
-                AnswerGuard(
-                    parts.recognition, parts.language, settings.patience.language, self._tongue()
-                ),
+                AnswerGuard(parts.recognition, parts.language, settings.patience, self._tongue()),
                 ClauseProcessor(self._language()),
                 parts.voice,
                 ExpressionProcessor(face, self._utterances, run),

@@ -7,8 +7,10 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import UnionType
 from typing import Any, TypeVar, get_args, get_origin
 
+from ico3d.chat.keys import check_key
 from ico3d.chat.tool_settings import Tool, check_tools
 from ico3d.errors import SettingsError
 
@@ -72,12 +74,15 @@ class Patience:
 
     Attributes:
         language: Seconds until the first words of an answer, and between two pieces of it.
+        reasoning: Seconds that a model may think before its first words, as long as it shows that
+            it does.
         voice: Seconds until the first sound of a sentence, and between two pieces of it.
         apologies: Language that the avatar apologises in, such as `de`; empty for the persona's
             first. English where it is none of those known.
     """
 
     language: float = 12.0
+    reasoning: float = 60.0
     voice: float = 8.0
     apologies: str = ""
 
@@ -87,7 +92,7 @@ class Patience:
         Raises:
             SettingsError: If there is no patience at all.
         """
-        if min(self.language, self.voice) < 0.1:
+        if min(self.language, self.reasoning, self.voice) < 0.1:
             raise SettingsError("chat settings: [patience] needs at least 0.1 seconds for each.")
 
 
@@ -98,8 +103,10 @@ class Expression:
     Attributes:
         use: `own` for the avatar's speech model in this process; `remote` for the same one on
             another machine, and in this process whenever that fails.
-        url: Of `ico3d serve-module expression`, such as `http://192.168.1.5:8766`.
-        key_variable: Environment variable that holds its key, if it wants one.
+        url: Of `ico3d serve-module expression`, such as `http://127.0.0.1:8766` where a tunnel
+            ends.
+        key_variable: Environment variable that holds its key, if it wants one. It is sent nowhere
+            unencrypted but to this machine.
         timeout: Seconds that a piece of sound may take before the face goes on here.
     """
 
@@ -118,6 +125,8 @@ class Expression:
             raise SettingsError(f"chat settings: expression '{self.use}': use own or remote.")
         if self.use == "remote" and not self.url.startswith(("http://", "https://")):
             raise SettingsError("chat settings: [expression] needs the url of the remote module.")
+        if self.use == "remote":
+            check_key(self.url, self.key_variable, "chat settings: [expression]")
 
 
 @dataclass(frozen=True)
@@ -220,6 +229,7 @@ def filled(kind: type[T], values: Mapping[str, Any], where: str) -> T:
 
 
 def _value(kind: Any, value: Any, where: str, name: str) -> Any:
+    kind = _given(kind)
     if kind is Choice:
         return _choice(value, where, name)
     if dataclasses.is_dataclass(kind) and isinstance(value, dict):
@@ -238,6 +248,12 @@ def _value(kind: Any, value: Any, where: str, name: str) -> Any:
     elif type(value) is kind:
         return value
     raise SettingsError(f"{where}: '{name}' must be {described(kind)}.")
+
+
+def _given(kind: Any) -> Any:
+    """The type of a setting that may be left out, where it is given."""
+    kinds = [one for one in get_args(kind) if one is not type(None)]
+    return kinds[0] if isinstance(kind, UnionType) and len(kinds) == 1 else kind
 
 
 def entry_kind_of(kind: Any) -> Any:
@@ -263,6 +279,7 @@ def _choice(value: Any, where: str, name: str) -> Choice:
 
 def described(kind: Any) -> str:
     """The type of a setting, for people."""
+    kind = _given(kind)
     if kind is Choice:
         return "a provider's name or a table with 'use'"
     if kind == tuple[str, ...]:

@@ -120,6 +120,8 @@ def row(field: dataclasses.Field, sentences: dict[str, str], before: str = "") -
 
 def default(field: dataclasses.Field) -> str:
     """What a setting is where the file does not say it, as the file would."""
+    if field.default is None:
+        return "not given"
     if field.default is not dataclasses.MISSING:
         return f"`{written(field.default)}`"
     if field.default_factory is not dataclasses.MISSING:

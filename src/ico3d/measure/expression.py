@@ -11,6 +11,8 @@ import torch
 from threadpoolctl import threadpool_limits
 
 from ico3d.bundle.format import SPEECH, Bundle
+from ico3d.capture.sound import check_claim
+from ico3d.common.sound import file_claim
 from ico3d.common.weights import cached
 from ico3d.errors import SettingsError
 from ico3d.measure.alignment import aligned, transcripts
@@ -78,9 +80,11 @@ def read_recordings(folder: Path) -> list[Recording]:
 
     found = []
     for path, words in transcripts(folder).items():
-        samples, rate = soundfile.read(path, dtype="int16")
-        if rate != RATE or samples.ndim != 1:
+        claim = file_claim(path)
+        if (claim.rate, claim.channels) != (RATE, 1):
             raise SettingsError(f"{path} is not mono at {RATE} Hz.")
+        check_claim(path, claim)
+        samples, _ = soundfile.read(path, dtype="int16")  # (S,)
         phonemes, end = aligned(samples, words)
         times = np.arange(int(len(samples) / RATE * FPS) + 1) / FPS
         track = articulation_track(phonemes, end, times)  # (T, 5)

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ico3d.capture.sound import check_claim
 from ico3d.chat.protocol import MICROPHONE_RATE
 from ico3d.common.espeak import synthesize
+from ico3d.common.sound import open_claim
 from ico3d.errors import CaptureError
 
 QUESTIONS = ("Who are you?", "What can you do?", "Tell me about yourself.", "How do you work?")
@@ -62,11 +64,12 @@ def read_recording(path: Path) -> np.ndarray:
     try:
         with wave.open(str(path)) as file:
             form = (file.getnchannels(), file.getsampwidth(), file.getframerate())
+            if form != (1, 2, MICROPHONE_RATE):
+                raise CaptureError(f"{path}: must be PCM16, mono, 16 kHz.")
+            check_claim(path, open_claim(file, path.stat().st_size))
             data = file.readframes(file.getnframes())
     except (OSError, EOFError, wave.Error) as error:
         raise CaptureError(f"{path}: cannot be read as WAV ({error}).") from error
-    if form != (1, 2, MICROPHONE_RATE):
-        raise CaptureError(f"{path}: must be PCM16, mono, 16 kHz.")
     samples = np.frombuffer(data, np.int16)
     if not samples.any():
         raise CaptureError(f"{path}: is silent.")

@@ -1,6 +1,7 @@
 """Reads a recording of the RenderMe-360 data set: `docs/captures-renderme.md`."""
 
 import logging
+import math
 from functools import cached_property
 from itertools import islice, product
 from pathlib import Path
@@ -18,7 +19,8 @@ from ico3d.capture.renderme.flame import FlameFit, FlameFits
 from ico3d.capture.renderme.landmarks import MULTI_PIE, POINTS, in_known_order, in_space
 from ico3d.capture.smc.file import SmcFile
 from ico3d.capture.smc.reader import SmcCapture, count_frames
-from ico3d.capture.sound import mono
+from ico3d.capture.sound import check_claim, mono
+from ico3d.common.sound import Claim
 from ico3d.errors import CaptureError
 
 log = logging.getLogger(__name__)
@@ -86,8 +88,12 @@ class RenderMe360(SmcCapture):
     def audio(self) -> Sound | None:
         """The whole sound, 16 kHz mono; only parts with speech have one."""
         file = self._holding(SOUND)
-        samples, rate = file.numbers(f"{SOUND}/audio", None), self._sample_rate()
-        if samples is None or rate is None:
+        shape, rate = file.shape(f"{SOUND}/audio"), self._sample_rate()
+        if not shape or rate is None:
+            return None
+        check_claim(file.path, Claim(rate, math.prod(shape[1:]), shape[0]))
+        samples = file.numbers(f"{SOUND}/audio", None)
+        if samples is None:
             return None
         if samples.ndim > 2 or np.abs(samples).max(initial=0.0) > LOUDEST:
             raise CaptureError(f"{file.path}: {SOUND}/audio is no sound between -1 and 1.")

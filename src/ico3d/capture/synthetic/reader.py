@@ -10,7 +10,9 @@ from safetensors import SafetensorError
 from safetensors.numpy import load
 
 from ico3d.capture.capture import Capture, Sound, all_frames, last_eleventh
+from ico3d.capture.sound import check_claim
 from ico3d.common.camera import Camera
+from ico3d.common.sound import open_claim
 from ico3d.errors import CaptureError
 
 FORMAT, VERSION = "ico3d-synthetic", 2
@@ -86,6 +88,7 @@ class SyntheticCapture(Capture):
             with wave.open(str(file), "rb") as sound:
                 if sound.getnchannels() != 1 or sound.getsampwidth() != 2:
                     raise CaptureError(f"the sound {file} is not mono with 16 bits.")
+                check_claim(file, open_claim(sound, file.stat().st_size))
                 rate, data = sound.getframerate(), sound.readframes(sound.getnframes())
         except (OSError, EOFError, wave.Error) as error:
             raise CaptureError(f"the sound {file} is missing or damaged: record again.") from error

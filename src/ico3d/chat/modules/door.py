@@ -1,7 +1,6 @@
 """What lets a request into a module: its key, its size, and how many there are."""
 
 import hmac
-from collections.abc import Awaitable, Callable
 
 from starlette.datastructures import Headers
 from starlette.responses import JSONResponse
@@ -32,7 +31,8 @@ class Door:
             return
         self._inside += 1
         try:
-            await self._app(scope, self._counted(receive), send)
+            body = Body(self._limits.megabytes, scope, receive, send)
+            await self._app(scope, body.receive, body.send)
         finally:
             self._inside -= 1
 
@@ -43,25 +43,43 @@ class Door:
         if self._inside >= self._limits.requests:
             return 429, f"{self._limits.requests} requests are being served: try again soon."
         length = headers.get("content-length", "0")
-        if length.isdecimal() and int(length) > self._most:
-            return 413, f"the request is larger than {self._limits.megabytes:g} MB."
+        if length.isdecimal() and int(length) > self._limits.megabytes * 1e6:
+            return 413, too_large(self._limits.megabytes)
         return None
 
-    def _counted(self, receive: Receive) -> Callable[[], Awaitable[Message]]:
-        """`receive`, which gives up a body that says nothing of its length and never stops."""
-        taken = 0
 
-        async def counted() -> Message:
-            nonlocal taken
-            message = await receive()
-            taken += len(message.get("body", b""))
-            return message if taken <= self._most else {"type": "http.disconnect"}
+class Body:
+    """One request whose length is counted, for it may tell none; past the limit it is refused."""
 
-        return counted
+    def __init__(self, megabytes: float, scope: Scope, receive: Receive, send: Send):
+        """Counts what `receive` brings, and answers by `send`."""
+        self._megabytes, self._scope = megabytes, scope
+        self._receive, self._send = receive, send
+        self._taken, self._refused = 0, False
+
+    async def receive(self) -> Message:
+        """The next message; the end of the connection past the limit."""
+        message = await self._receive()
+        self._taken += len(message.get("body", b""))
+        return {"type": "http.disconnect"} if self._is_over else message
+
+    async def send(self, message: Message) -> None:
+        """Passes the answer on; whatever was made of a body that was cut off is a refusal."""
+        if not self._is_over or self._scope["type"] != "http":
+            await self._send(message)
+        elif not self._refused and message["type"] == "http.response.start":
+            self._refused = True
+            refusal = error_response(413, too_large(self._megabytes))
+            await refusal(self._scope, self._receive, self._send)
 
     @property
-    def _most(self) -> float:
-        return self._limits.megabytes * 1e6
+    def _is_over(self) -> bool:
+        return self._taken > self._megabytes * 1e6
+
+
+def too_large(megabytes: float) -> str:
+    """Why a request is refused."""
+    return f"the request is larger than {megabytes:g} MB."
 
 
 def error_response(status: int, sentence: str) -> JSONResponse:

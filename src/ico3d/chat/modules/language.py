@@ -15,6 +15,7 @@ from pipecat.frames.frames import (
     FunctionCallsStartedFrame,
     LLMContextFrame,
     LLMTextFrame,
+    LLMThoughtTextFrame,
     LLMUpdateSettingsFrame,
 )
 from pipecat.processors.aggregators.llm_context import NOT_GIVEN, LLMContext
@@ -25,6 +26,7 @@ from pydantic import BaseModel, Field
 from ico3d.chat.modules.headless import Spares, run
 from ico3d.errors import ServiceError
 
+THOUGHTS = "reasoning_content"
 SAMPLING = ("temperature", "top_p", "max_tokens", "seed", "frequency_penalty", "presence_penalty")
 
 
@@ -79,7 +81,7 @@ def add_routes(app: FastAPI, name: str, spares: Spares, seconds: float) -> None:
 async def answered(
     request: ChatRequest, spares: Spares, seconds: float
 ) -> AsyncGenerator[dict[str, Any], None]:
-    """The answer as the API's deltas: `content`, or `tool_calls`.
+    """The answer as the API's deltas: `content`, `tool_calls`, or `reasoning_content`.
 
     Raises:
         ServiceError: If the model fails or has no answer.
@@ -98,7 +100,7 @@ async def answered(
         async for frame in made:
             delta = _delta(frame)
             if delta is not None:
-                silent = False
+                silent = silent and THOUGHTS in delta
                 yield delta
     if silent:
         raise ServiceError("the model gave no answer.")
@@ -126,6 +128,8 @@ async def _left_to_the_client(call: FunctionCallParams) -> None:
 def _delta(frame: Frame) -> dict[str, Any] | None:
     if isinstance(frame, LLMTextFrame) and frame.text:
         return {"content": frame.text}
+    if isinstance(frame, LLMThoughtTextFrame):
+        return {THOUGHTS: frame.text}  # empty for a mere sign of life
     if not isinstance(frame, FunctionCallsStartedFrame):
         return None
     calls = [
@@ -169,6 +173,8 @@ def _whole(name: str, deltas: list[dict[str, Any]]) -> dict[str, Any]:
     ]
     text = "".join(delta.get("content", "") for delta in deltas)
     message: dict[str, Any] = {"role": "assistant", "content": text or None}
+    if thoughts := "".join(delta.get(THOUGHTS, "") for delta in deltas):
+        message[THOUGHTS] = thoughts
     if calls:
         message["tool_calls"] = calls
     choice = {"index": 0, "message": message, "finish_reason": "tool_calls" if calls else "stop"}

@@ -1,7 +1,6 @@
 """A remote expression module as the conversation uses it, with the own model behind it."""
 
 import json
-import os
 import threading
 import time
 from collections.abc import Callable
@@ -11,15 +10,16 @@ from loguru import logger
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
+from ico3d.chat.keys import key_for
 from ico3d.chat.modules.expression import FINISH, PATH, ROW, START
 from ico3d.chat.protocol import EXPRESSION_FPS, SPEECH_RATE
 from ico3d.chat.settings import Expression
 from ico3d.common.expression import SPEECH_SIZE
-from ico3d.errors import ServiceError
+from ico3d.errors import Ico3dError, ServiceError
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions
 
 AVOIDED = 20.0  # s for which a server that failed is not asked again
-FAILURES = (OSError, WebSocketException, ServiceError, ValueError)  # TimeoutError is an OSError
+FAILURES = (OSError, WebSocketException, Ico3dError, ValueError)  # TimeoutError is an OSError
 
 
 class RemoteMouth:
@@ -94,7 +94,7 @@ class RemoteMouth:
 
     def _connected(self) -> ClientConnection:
         settings = self._settings
-        key = os.environ.get(settings.key_variable, "") if settings.key_variable else ""
+        key = key_for(settings.url, settings.key_variable, "chat settings: [expression]")
         socket = connect(
             settings.url.replace("http", "ws", 1).rstrip("/") + PATH,
             additional_headers={"Authorization": f"Bearer {key}"} if key else {},

@@ -3,7 +3,8 @@
 import asyncio
 import io
 import wave
-from typing import Annotated, Literal
+from collections.abc import Iterator
+from typing import Annotated, BinaryIO, Literal
 
 import numpy as np
 from fastapi import FastAPI, File, Form, Response, UploadFile
@@ -18,10 +19,13 @@ from pipecat.frames.frames import (
 
 from ico3d.chat.modules.headless import Spares, run
 from ico3d.chat.protocol import MICROPHONE_CHUNK, MICROPHONE_RATE
-from ico3d.errors import MissingExtraError, ProtocolError
+from ico3d.common.sound import REQUEST, fault, open_claim
+from ico3d.errors import ProtocolError
+from ico3d.speech.mel import resampling_stream
 
 LEAD_IN = 15  # chunks before speech is announced: a VAD is that late too
 QUIET = np.zeros(MICROPHONE_RATE * 3 // 10, np.int16)  # around speech, as recognisers expect it
+BLOCK = 1 << 14  # frames that are converted at once
 DTYPES = {1: np.uint8, 2: np.dtype("<i2"), 4: np.dtype("<i4")}  # by bytes of a WAV's samples
 
 
@@ -40,7 +44,7 @@ def add_routes(app: FastAPI, name: str, spares: Spares, seconds: float) -> None:
         file: Annotated[UploadFile, File()],
         response_format: Annotated[Literal["json", "text", "verbose_json"], Form()] = "json",
     ) -> Response:
-        pcm = await asyncio.to_thread(read_wav, await file.read())
+        pcm = await asyncio.to_thread(read_wav, file.file)
         made = run(await spares.take(), heard(pcm), seconds)
         said = [frame async for frame in made if isinstance(frame, TranscriptionFrame)]
         return _answer(said, len(pcm) / MICROPHONE_RATE, response_format)
@@ -67,36 +71,47 @@ def heard(pcm: np.ndarray) -> list[Frame]:
     return [*frames, VADUserStoppedSpeakingFrame()]
 
 
-def read_wav(data: bytes) -> np.ndarray:
-    """A WAV file as (S,) int16 mono at 16 kHz.
+def read_wav(file: BinaryIO) -> np.ndarray:
+    """A WAV file as (S,) int16 mono at 16 kHz, judged by its header before its samples are read.
 
     Raises:
-        ProtocolError: If it is none, or has no sound.
+        ProtocolError: If it is none, has no sound, or claims what is not taken.
         MissingExtraError: If soxr is needed and not installed.
     """
+    size = file.seek(0, io.SEEK_END)
+    file.seek(0)
     try:
-        with wave.open(io.BytesIO(data)) as file:
-            width, channels, rate = file.getsampwidth(), file.getnchannels(), file.getframerate()
-            raw = file.readframes(file.getnframes())
+        with wave.open(file, "rb") as sound:
+            pieces = list(_pieces(sound, size))
     except (wave.Error, EOFError) as error:
         raise ProtocolError(f"the file is no WAV file of PCM samples ({error}).") from None
-    if width not in DTYPES:
-        raise ProtocolError(f"the WAV file has samples of {8 * width} bits: use 16.")
-    values = np.frombuffer(
-        raw[: len(raw) // (width * channels) * (width * channels)], DTYPES[width]
-    )
-    if len(values) == 0:
+    pcm = np.concatenate(pieces)
+    if len(pcm) == 0:
         raise ProtocolError("the WAV file has no sound in it.")
-    samples = values.reshape(-1, channels).mean(axis=1)  # (S,)
-    samples = (samples - 128 if width == 1 else samples) / 256.0 ** (width - 2)
-    if rate != MICROPHONE_RATE:
-        samples = _resampled(samples, rate)
+    return pcm
+
+
+def _pieces(sound: wave.Wave_read, size: int) -> Iterator[np.ndarray]:
+    """The (n,) int16 pieces of a sound of at most `size` bytes, mono at 16 kHz."""
+    claim = open_claim(sound, size)
+    if claim.width not in DTYPES:
+        raise ProtocolError(f"the WAV file has samples of {8 * claim.width} bits: use 16.")
+    wrong = fault(claim, REQUEST)
+    if wrong:
+        raise ProtocolError(f"the WAV file {wrong}.")
+    convert = resampling_stream(claim.rate)
+    one = claim.width * claim.channels  # bytes
+    while raw := sound.readframes(BLOCK):
+        whole = raw[: len(raw) // one * one]
+        yield _int16(convert(_mono(whole, claim.width, claim.channels), False))
+    yield _int16(convert(np.zeros(0, np.float32), True))
+
+
+def _mono(raw: bytes, width: int, channels: int) -> np.ndarray:
+    """Whole frames as (n,) samples in [-32768, 32768)."""
+    samples = np.frombuffer(raw, DTYPES[width]).reshape(-1, channels).mean(axis=1)  # (n,)
+    return (samples - 128 if width == 1 else samples) / 256.0 ** (width - 2)
+
+
+def _int16(samples: np.ndarray) -> np.ndarray:
     return np.clip(np.round(samples), -32768, 32767).astype(np.int16)
-
-
-def _resampled(samples: np.ndarray, rate: int) -> np.ndarray:
-    try:
-        import soxr
-    except ImportError:
-        raise MissingExtraError("soxr", "chat", "sound at another rate") from None
-    return soxr.resample(samples, rate, MICROPHONE_RATE)

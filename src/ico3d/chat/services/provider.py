@@ -11,8 +11,9 @@ from pipecat.processors.frame_processor import FrameProcessor
 from ico3d.bundle.animation import Animation
 from ico3d.bundle.manifest import HeadInfo
 from ico3d.bundle.persona import Persona
+from ico3d.chat.keys import OPENAI_KEY, key_for
 from ico3d.common.weights import model_of
-from ico3d.errors import MissingModelError
+from ico3d.errors import MissingModelError, SettingsError
 
 
 @dataclass(frozen=True)
@@ -59,10 +60,14 @@ def nothing(settings: Any) -> str:
 
 
 def lacks_server(url: str, key_variable: str, kind: str) -> str:
-    """What hinders a provider that asks a server: none is named, and no key for OpenAI's is set."""
-    if url or os.environ.get(key_variable):
-        return ""
-    return f'no server is chosen: set [{kind}] use = "openai" and url.'
+    """What hinders a provider that asks a server: none is named, or its key is not here."""
+    if not url and not os.environ.get(key_variable or OPENAI_KEY):
+        return f'no server is chosen: set [{kind}] use = "openai" and url.'
+    try:
+        key_for(url, key_variable, f"[{kind}]")
+    except SettingsError as error:
+        return str(error)
+    return ""
 
 
 @dataclass(frozen=True)

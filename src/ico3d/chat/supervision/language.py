@@ -12,9 +12,11 @@ from pipecat.frames.frames import (
     LLMFullResponseEndFrame,
     LLMFullResponseStartFrame,
     LLMTextFrame,
+    LLMThoughtTextFrame,
 )
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
+from ico3d.chat.settings import Patience
 from ico3d.chat.supervision.apologies import Failed, apology
 
 
@@ -22,18 +24,19 @@ class AnswerGuard(FrameProcessor):
     """Watches answers on their way from the language model to the voice.
 
     The visitor hears one sentence instead of silence when the model gives no words, breaks off,
-    or takes longer than `patience`; and when the recogniser failed. All else passes unchanged.
+    or takes longer than `patience`; and when the recogniser failed. What a model thinks is a sign
+    of life that goes no further. All else passes unchanged.
     """
 
     def __init__(
-        self, recognition: FrameProcessor, language: FrameProcessor, patience: float, tongue: str
+        self, recognition: FrameProcessor, language: FrameProcessor, patience: Patience, tongue: str
     ):
         """A guard for one session.
 
         Args:
             recognition: Whose errors are apologised for.
             language: Whose answers are watched.
-            patience: Seconds until the first words of an answer, and between two pieces of it.
+            patience: How long an answer, a piece of it, and thinking may take.
             tongue: Language of the apologies.
         """
         super().__init__()
@@ -41,6 +44,7 @@ class AnswerGuard(FrameProcessor):
         self._answering = False  # between the start of an answer and its end
         self._spoken = self._called = self._broken = False  # this answer has words, calls, an error
         self._timer: asyncio.TimerHandle | None = None
+        self._latest = 0.0  # until when it may think, the event loop's clock
         language.add_event_handler("on_before_process_frame", self._asked)
         language.add_event_handler("on_error", self._language_failed)
         recognition.add_event_handler("on_error", self._recognition_failed)
@@ -54,6 +58,9 @@ class AnswerGuard(FrameProcessor):
         elif direction == FrameDirection.DOWNSTREAM:
             if isinstance(frame, LLMFullResponseStartFrame):
                 self._begin()
+            elif isinstance(frame, LLMThoughtTextFrame):
+                self._think()
+                return
             elif isinstance(frame, LLMTextFrame) and frame.text.strip():
                 self._spoken = True
                 self._start_timer()
@@ -99,7 +106,11 @@ class AnswerGuard(FrameProcessor):
 
     async def _give_up(self) -> None:
         """Stops the model where it stands, and ends its answer."""
-        logger.error(f"language gave nothing for {self._patience:g} s")
+        self._timer = None
+        logger.error(
+            f"language gave nothing for {self._patience.language:g} s, or thought for more than "
+            f"{self._patience.reasoning:g} s"
+        )
         await self.push_frame(InterruptionFrame(), FrameDirection.UPSTREAM)
         if not self._answering:
             await self._say("language")
@@ -119,13 +130,22 @@ class AnswerGuard(FrameProcessor):
         gap = " " if self._spoken else ""
         await self.push_frame(LLMTextFrame(gap + apology(failed, self._tongue)))
 
+    def _think(self) -> None:
+        """A sign of life, if an answer is waited for: there is time until the next, up to a cap."""
+        if self._timer is not None:
+            left = self._latest - asyncio.get_running_loop().time()
+            self._wait(min(self._patience.language, max(left, 0.0)))
+
     def _start_timer(self) -> None:
+        self._latest = asyncio.get_running_loop().time() + self._patience.reasoning
+        self._wait(self._patience.language)
+
+    def _wait(self, seconds: float) -> None:
         self._stop_timer()
         loop = asyncio.get_running_loop()
-        self._timer = loop.call_later(
-            self._patience, lambda: self.create_task(self._give_up(), "give up")
-        )
+        self._timer = loop.call_later(seconds, lambda: self.create_task(self._give_up(), "give up"))
 
     def _stop_timer(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
+            self._timer = None

@@ -224,3 +224,15 @@ def test_the_api_is_the_documented_one(fake, real):
     assert parameters(kind.load_ckpt)[1:] == ["ckpt_path"]
     assert parameters(kind.extract_se)[1] == "ref_wav_list"
     assert parameters(kind.convert)[1:5] == ["audio_src_path", "src_se", "tgt_se", "output_path"]
+
+
+def test_a_reference_is_judged_before_it_is_listened_to(installed, fake, tmp_path):
+    path = tmp_path / "me.wav"
+    soundfile.write(path, np.zeros(1000), 1)
+    settings = openvoice.Settings(reference=str(path), **CONSENT)
+    with pytest.raises(SettingsError, match="claims 1 samples per second"):
+        openvoice.make(settings, None)
+    assert not fake.ToneColorConverter.made
+    path.write_bytes(b"no sound at all")
+    with pytest.raises(SettingsError, match="is no sound"):
+        openvoice.make(settings, None)

@@ -3,6 +3,8 @@
 import asyncio
 import contextlib
 import io
+import struct
+import tracemalloc
 import wave
 
 import numpy as np
@@ -217,3 +219,36 @@ async def test_an_interrupted_piece_leaves_no_trace_in_the_next(speech):
     ideal = 20_000 * np.sin(2 * TONE * np.arange(len(samples)))
     np.testing.assert_allclose(samples[150:-150], ideal[150:-150], atol=300)
     await own.cleanup()
+
+
+@pytest.mark.parametrize(
+    ("rate", "channels", "reason"),
+    [(1, 1, "claims 1 samples per second"), (24_000, 2, "is not mono with 16 bits")],
+)
+async def test_a_header_that_claims_what_is_no_speech_is_an_error(
+    speech, say, rate, channels, reason
+):
+    data = bytearray(as_wav(tone(2400), 24_000))
+    struct.pack_into("<HI", data, 22, channels, rate)
+
+    async def respond():
+        return StreamingResponse(speech.streamed(bytes(data)), media_type="audio/wav")
+
+    speech.respond = respond
+    tracemalloc.start()
+    heard, errors = await say(voice(speech), "Hello")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert not len(heard) and reason in errors[0] and peak < 30_000_000
+
+
+async def test_a_voice_that_does_not_end_is_ended(speech, say, monkeypatch):
+    monkeypatch.setattr(openai, "REQUEST", 2.0, raising=False)
+
+    async def respond():
+        data = bytes(10 * 2 * SPEECH_RATE)  # more than it takes
+        return StreamingResponse(speech.streamed(data), media_type="audio/pcm")
+
+    speech.respond = respond
+    heard, errors = await say(voice(speech), "Hello")
+    assert len(heard) <= 2 * SPEECH_RATE and "is longer than 2 s" in errors[0]

@@ -1,18 +1,32 @@
 """pipecat's OpenAI service, for servers that lack some of what OpenAI's has."""
 
+import contextlib
+from collections.abc import AsyncGenerator
+from contextvars import ContextVar
 from typing import Any
 
 from loguru import logger
-from openai import APIStatusError, AsyncStream
+from openai import APIStatusError, AsyncOpenAI, AsyncStream
 from openai.types.chat import ChatCompletionChunk
+from openai.types.chat.chat_completion_chunk import ChoiceDelta
 from pipecat.adapters.llm.services.open_ai_adapter import OpenAILLMInvocationParams
+from pipecat.frames.frames import LLMThoughtTextFrame
 from pipecat.processors.aggregators.llm_context import LLMContext
 from pipecat.services.openai.llm import OpenAILLMService
 
 from ico3d.chat.failures import cause
+from ico3d.chat.keys import is_openai
+from ico3d.chat.services.language.reasoning import Parts, Thoughts, field_of, without_thoughts
 
 MOST_ROUNDS = 4
 """How often in a turn a model may call functions before it must speak."""
+COMPLETE = ("stop", "tool_calls", "function_call")
+"""Why an answer ended that was not cut off."""
+_opens: dict[tuple[str, str], bool] = {}
+"""By server and model: whether its chat template opens a thought, so that a stream holds only the
+end of it. One answer tells; of a model that is not in here the first is given out when it is whole.
+"""
+_summarising: ContextVar[bool] = ContextVar("summarising", default=False)
 
 
 class CompatibleModel(OpenAILLMService):
@@ -20,22 +34,37 @@ class CompatibleModel(OpenAILLMService):
 
     supports_developer_role = False  # chat templates of open models do not know it
 
-    def __init__(self, url: str, key: str, model: str, instruction: str, functions: bool):
+    def __init__(
+        self,
+        client: dict[str, Any],
+        model: str,
+        instruction: str,
+        functions: bool,
+        sampling: dict[str, Any],
+    ):
         """A model for one session.
 
         Args:
-            url: Of the server; empty for OpenAI's.
-            key: Sent as the bearer's.
+            client: What the SDK's client is made with.
             model: Its name.
             instruction: Who it is.
             functions: Whether it may call functions.
+            sampling: What else pipecat's settings say of a request.
         """
+        self._made_with = client
         super().__init__(
-            api_key=key,
-            base_url=url or None,
-            settings=OpenAILLMService.Settings(model=model, system_instruction=instruction),
+            settings=OpenAILLMService.Settings(
+                model=model, system_instruction=instruction, **sampling
+            ),
         )
         self._functions_allowed = functions
+        self._place = (str(client["base_url"]), model)
+        if is_openai(client["base_url"]):
+            _opens.setdefault(self._place, False)  # its thoughts stay with it
+
+    def create_client(self, *_, **__) -> AsyncOpenAI:
+        """The client that pipecat asks by."""
+        return AsyncOpenAI(**self._made_with)
 
     def build_chat_completion_params(
         self, params_from_context: OpenAILLMInvocationParams
@@ -45,9 +74,63 @@ class CompatibleModel(OpenAILLMService):
         if not self._functions_allowed or rounds(params["messages"]) >= MOST_ROUNDS:
             for name in ("tools", "tool_choice"):
                 params.pop(name, None)
+        if _summarising.get():
+            params.pop("max_tokens", None)
         return params
 
-    async def get_chat_completions(self, context: LLMContext) -> AsyncStream[ChatCompletionChunk]:
+    async def run_inference(self, *args: Any, **options: Any) -> str | None:
+        """A whole answer beside the conversation, such as a summary, of a length of its own."""
+        token = _summarising.set(True)
+        try:
+            text = await super().run_inference(*args, **options)
+        finally:
+            _summarising.reset(token)
+        return text and without_thoughts(text)
+
+    async def get_chat_completions(
+        self, context: LLMContext
+    ) -> AsyncGenerator[ChatCompletionChunk, None]:
+        """Asks, and takes thoughts out of the answer."""
+        return self._without_thoughts(await self._asked(context))
+
+    async def _without_thoughts(
+        self, stream: AsyncStream[ChatCompletionChunk]
+    ) -> AsyncGenerator[ChatCompletionChunk, None]:
+        """The stream with what is said alone; signs of thinking go down beside it."""
+        opens = _opens.get(self._place)
+        thoughts, end = Thoughts(False if opens is False else None), None
+        async with contextlib.aclosing(_closing(stream)) as chunks:
+            async for chunk in chunks:
+                for choice in chunk.choices or []:
+                    end = choice.finish_reason or end
+                    await self._take_apart(choice.delta, thoughts)
+                yield chunk
+        if end == "length" and opens and not thoughts.begun:
+            return  # it was cut off within its thoughts
+        await self._tell(thoughts.finish())
+        if thoughts.lone:
+            _opens[self._place] = True
+        elif thoughts.begun and end in COMPLETE:
+            _opens.setdefault(self._place, False)
+
+    async def _take_apart(self, delta: ChoiceDelta | None, thoughts: Thoughts) -> None:
+        if delta is None:
+            return
+        apart = field_of(delta)
+        if apart:
+            await self._tell(thoughts.separate())
+        if delta.content:
+            parts = thoughts.push(delta.content)
+            delta.content = parts.said or None
+            apart = apart if parts.said else (apart or "") + parts.thought
+        if apart is not None:
+            await self.push_frame(LLMThoughtTextFrame(apart))
+
+    async def _tell(self, parts: Parts) -> None:
+        if parts.said:
+            await self._push_llm_text(parts.said)
+
+    async def _asked(self, context: LLMContext) -> AsyncStream[ChatCompletionChunk]:
         """Asks; once more without functions if the server refuses those."""
         try:
             return await super().get_chat_completions(context)
@@ -57,6 +140,17 @@ class CompatibleModel(OpenAILLMService):
             logger.warning(f"language goes on without functions, refused by {cause(error)}")
             self._functions_allowed = False
             return await super().get_chat_completions(context)
+
+
+async def _closing(
+    stream: AsyncStream[ChatCompletionChunk],
+) -> AsyncGenerator[ChatCompletionChunk, None]:
+    """A stream whose connection ends with whoever reads it."""
+    try:
+        async for chunk in stream:
+            yield chunk
+    finally:
+        await stream.close()
 
 
 def rounds(messages: list[dict[str, Any]]) -> int:

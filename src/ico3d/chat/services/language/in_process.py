@@ -10,7 +10,7 @@ from collections.abc import AsyncGenerator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import aclosing
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 from pipecat.frames.frames import (
@@ -18,6 +18,7 @@ from pipecat.frames.frames import (
     LLMContextFrame,
     LLMFullResponseEndFrame,
     LLMFullResponseStartFrame,
+    LLMThoughtTextFrame,
 )
 from pipecat.processors.aggregators.llm_context import LLMContext
 from pipecat.processors.frame_processor import FrameDirection
@@ -32,6 +33,13 @@ from transformers import (
     StoppingCriteriaList,
 )
 from transformers.utils.import_utils import is_torch_cuda_available
+
+from ico3d.chat.services.language.reasoning import (
+    Parts,
+    Thoughts,
+    opens_thoughts,
+    without_thoughts,
+)
 
 AT_ONCE = 2  # answers generated side by side; further ones wait
 _loading = threading.Lock()
@@ -71,19 +79,35 @@ class Loaded:
         default_factory=lambda: ThreadPoolExecutor(AT_ONCE, "language")
     )
 
-    async def stream(self, messages: list[dict[str, Any]], most: int) -> AsyncGenerator[str, None]:
+    @cached_property
+    def opens(self) -> bool:
+        """Whether its chat template opens a thought, so that answers hold only the end of it."""
+        try:
+            prompt = self.tokenizer.apply_chat_template(
+                [{"role": "user", "content": "?"}], add_generation_prompt=True, tokenize=False
+            )
+        except Exception:  # a template may want anything; it then says so with the first question
+            return False
+        return opens_thoughts(prompt)
+
+    async def stream(
+        self, messages: list[dict[str, Any]], most: int, temperature: float | None = None
+    ) -> AsyncGenerator[str, None]:
         """An answer, piece by piece; generation stops when the caller does.
 
         Args:
             messages: Roles and contents, the system instruction first.
             most: Tokens at most.
+            temperature: Of the choice of tokens; None for the model's own way.
         """
         streamer = AsyncTextIteratorStreamer(
             self.tokenizer, skip_prompt=True, skip_special_tokens=True
         )
         stop = Stop()
         run = asyncio.get_running_loop().run_in_executor
-        generated = run(self.threads, self._generate, messages, most, streamer, stop)
+        generated = run(
+            self.threads, self._generate, messages, chosen(most, temperature), streamer, stop
+        )
         try:
             async for text in streamer:
                 if text:
@@ -94,19 +118,27 @@ class Loaded:
             generated.cancel()  # if it still waits for a thread
 
     def _generate(
-        self, messages: list[dict[str, Any]], most: int, streamer: Any, stop: Stop
+        self, messages: list[dict[str, Any]], how: dict[str, Any], streamer: Any, stop: Stop
     ) -> None:
         try:
             prompt = self.tokenizer.apply_chat_template(
                 messages, add_generation_prompt=True, return_tensors="pt", return_dict=True
             ).to(self.model.device)
             criteria = StoppingCriteriaList([stop])
-            self.model.generate(
-                **prompt, max_new_tokens=most, streamer=streamer, stopping_criteria=criteria
-            )
+            self.model.generate(**prompt, **how, streamer=streamer, stopping_criteria=criteria)
         except BaseException:
             streamer.on_finalized_text("", stream_end=True)  # or its reader waits for ever
             raise
+
+
+def chosen(most: int, temperature: float | None) -> dict[str, Any]:
+    """How tokens are chosen, as transformers takes it; how else is in the model's own file."""
+    how: dict[str, Any] = {"max_new_tokens": most}
+    if temperature is None:
+        return how
+    if temperature == 0:
+        return {**how, "do_sample": False}
+    return {**how, "do_sample": True, "temperature": temperature}
 
 
 def on_cuda() -> bool:
@@ -132,19 +164,22 @@ def _load(name: str) -> Loaded:
 class InProcessModel(LLMService):
     """Streams its answers; calls no functions."""
 
-    def __init__(self, loaded: Loaded, instruction: str, max_tokens: int):
+    def __init__(
+        self, loaded: Loaded, instruction: str, max_tokens: int, temperature: float | None = None
+    ):
         """A model for one session.
 
         Args:
             loaded: Shared by all.
             instruction: Who it is.
             max_tokens: Longest answer.
+            temperature: Of the choice of tokens; None for the model's own way.
         """
         super().__init__(
             settings=LLMSettings(
                 model=loaded.name,
                 system_instruction=instruction,
-                temperature=None,  # how to sample is in the model's own generation_config.json
+                temperature=temperature,
                 max_tokens=max_tokens,
                 top_p=None,
                 top_k=None,
@@ -167,10 +202,13 @@ class InProcessModel(LLMService):
         try:
             await self.start_ttfb_metrics()
             messages = await self._messages(frame.context, None)
-            async with aclosing(self._loaded.stream(messages, self._max_tokens)) as texts:
+            thoughts = Thoughts(self._loaded.opens)
+            async with aclosing(self._loaded.stream(messages, *self._limits())) as texts:
                 async for text in texts:
                     await self.stop_ttfb_metrics()
-                    await self._push_llm_text(text)
+                    await self._tell(thoughts.push(text))
+            if rest := thoughts.finish().said:
+                await self._push_llm_text(rest)
         except Exception as error:
             await self.push_error(f"The language model failed: {error}", exception=error)
         finally:
@@ -186,8 +224,23 @@ class InProcessModel(LLMService):
         """A whole answer beside the conversation, such as a summary of it."""
         self._check_response_schema(response_schema)
         messages = await self._messages(context, system_instruction)
-        async with aclosing(self._loaded.stream(messages, max_tokens or self._max_tokens)) as texts:
-            return "".join([text async for text in texts])
+        most, temperature = self._limits()
+        stream = self._loaded.stream(messages, max_tokens or most, temperature)
+        async with aclosing(stream) as texts:
+            text = "".join([text async for text in texts])
+        return without_thoughts(text, self._loaded.opens)
+
+    def _limits(self) -> tuple[int, float | None]:
+        """The longest answer, and the temperature, as whoever asks may have changed them."""
+        settings = self._settings
+        longest = assert_given(settings.max_tokens) or self._max_tokens
+        return longest, assert_given(settings.temperature)
+
+    async def _tell(self, parts: Parts) -> None:
+        if parts.said:
+            await self._push_llm_text(parts.said)
+        else:
+            await self.push_frame(LLMThoughtTextFrame(parts.thought))
 
     async def _messages(self, context: LLMContext, instruction: str | None) -> list[Any]:
         request = await self.get_llm_adapter().get_llm_invocation_params(

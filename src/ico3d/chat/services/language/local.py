@@ -1,10 +1,13 @@
 """An OpenAI-compatible server on this machine: Ollama, vLLM, llama.cpp, `transformers serve`."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.chat.services.language import openai
+from ico3d.chat.services.language.sampling import check_sampling
 from ico3d.chat.services.language.servers import first_server
 from ico3d.chat.services.provider import Context
 from ico3d.errors import SettingsError
@@ -22,10 +25,26 @@ class Settings:
     Attributes:
         model: Name of the model; empty for the first that the server offers.
         functions: Whether the model may call functions (gestures, moods, tools).
+        temperature: Of the choice of words, 0 to 2; left to the server where not given.
+        max_tokens: Longest answer, thoughts included; left to the server where not given.
+        extra: Further fields of each request, such as `{ top_k = 20 }` or
+            `{ chat_template_kwargs = { enable_thinking = false } }`.
     """
 
     model: str = ""
     functions: bool = True
+    temperature: float | None = None
+    max_tokens: int | None = None
+    extra: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self):
+        """Checks what requests say.
+
+        Raises:
+            SettingsError: If they would make no sense.
+        """
+        where = "chat settings: language 'local'"
+        check_sampling(self.temperature, self.max_tokens, self.extra, where)
 
 
 def find(settings: Settings, seconds: float) -> tuple[str, str] | None:
@@ -61,4 +80,12 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
             f"machine's ports {ports}: start one, or choose another language."
         )
     url, model = found
-    return openai.make(openai.Settings(url, model, functions=settings.functions), context)
+    asked = openai.Settings(
+        url,
+        model,
+        functions=settings.functions,
+        temperature=settings.temperature,
+        max_tokens=settings.max_tokens,
+        extra=settings.extra,
+    )
+    return openai.make(asked, context)

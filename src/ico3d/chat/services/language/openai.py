@@ -1,16 +1,19 @@
 """Any language model behind an OpenAI-compatible server, through pipecat's own service."""
 
-import os
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 from pipecat.processors.frame_processor import FrameProcessor
 
+from ico3d.chat.keys import NONE, check_key, is_openai, key_for
 from ico3d.chat.services.language.instruction import instruction
+from ico3d.chat.services.language.sampling import check_sampling
 from ico3d.chat.services.language.servers import language_models
 from ico3d.chat.services.provider import Context, lacks_server
 from ico3d.errors import SettingsError
 
-OWN_KEY = "OPENAI_API_KEY"
+WHERE = "chat settings: language 'openai'"
 OWN_MODEL = "gpt-4.1-mini"
 SLOWEST = 5.0  # s for the list of a server's models
 
@@ -23,14 +26,31 @@ class Settings:
         url: Its address, such as `http://localhost:11434/v1`; empty for OpenAI's own.
         model: Name of its model; empty for the first that the server offers.
         key_variable: Environment variable that holds the key; empty for none, or for
-            OPENAI_API_KEY where there is no `url`.
+            OPENAI_API_KEY where the server is OpenAI's. It is sent nowhere unencrypted but to
+            this machine.
         functions: Whether the model may call functions (gestures, moods, tools).
+        temperature: Of the choice of words, 0 to 2; left to the server where not given.
+        max_tokens: Longest answer, thoughts included; left to the server where not given.
+        extra: Further fields of each request, such as `{ top_k = 20 }` or
+            `{ chat_template_kwargs = { enable_thinking = false } }`.
     """
 
     url: str = ""
     model: str = ""
     key_variable: str = ""
     functions: bool = True
+    temperature: float | None = None
+    max_tokens: int | None = None
+    extra: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self):
+        """Checks where the key would go, and what requests say.
+
+        Raises:
+            SettingsError: If the key must not go there, or a request would make no sense.
+        """
+        check_key(self.url, self.key_variable, WHERE)
+        check_sampling(self.temperature, self.max_tokens, self.extra, WHERE)
 
 
 def make(settings: Settings, context: Context) -> FrameProcessor:
@@ -39,42 +59,39 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
     Raises:
         SettingsError: If no key is there, or the server does not say which models it has.
     """
+    from pipecat.utils.http import connection_limits
+
+    from ico3d.chat.services.client import client_options
     from ico3d.chat.services.language.compatible import CompatibleModel
 
+    kept = connection_limits(
+        max_keepalive_connections=100, max_connections=1000, keepalive_expiry=None
+    )
     return CompatibleModel(
-        settings.url,
-        key(settings),
+        client_options(settings.url, settings.key_variable, WHERE, limits=kept),
         model(settings),
         instruction(context.persona),
         settings.functions,
+        sampling(settings),
     )
+
+
+def sampling(settings: Settings) -> dict[str, Any]:
+    """What pipecat's settings say of a request; OpenAI's own models know another name of one."""
+    longest = "max_completion_tokens" if is_openai(settings.url) else "max_tokens"
+    given = {"temperature": settings.temperature, longest: settings.max_tokens}
+    found: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    return {**found, "extra": {"extra_body": dict(settings.extra)}} if settings.extra else found
 
 
 def hindrance(settings: Settings) -> str:
     """Whether a server is chosen."""
-    return lacks_server(settings.url, settings.key_variable or OWN_KEY, "language")
+    return lacks_server(settings.url, settings.key_variable, "language")
 
 
 def detail(settings: Settings) -> str:
     """For the visitor's eyes: which model, as far as the settings say."""
     return settings.model or settings.url or OWN_MODEL
-
-
-def key(settings: Settings) -> str:
-    """The key to send; one for OpenAI goes nowhere else by itself.
-
-    Raises:
-        SettingsError: If the environment lacks it.
-    """
-    variable = settings.key_variable or ("" if settings.url else OWN_KEY)
-    if not variable:
-        return "none"
-    value = os.environ.get(variable, "")
-    if not value:
-        raise SettingsError(
-            f"chat settings: language 'openai' needs its key in the environment as {variable}."
-        )
-    return value
 
 
 def model(settings: Settings) -> str:
@@ -85,7 +102,8 @@ def model(settings: Settings) -> str:
     """
     if settings.model or not settings.url:
         return settings.model or OWN_MODEL
-    offered = language_models(settings.url, key(settings), SLOWEST)
+    key = key_for(settings.url, settings.key_variable, WHERE) or NONE
+    offered = language_models(settings.url, key, SLOWEST)
     if not offered:
         raise SettingsError(
             f"chat settings: the language model's server {settings.url} offers no model: start "

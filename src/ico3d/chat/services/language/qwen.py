@@ -7,6 +7,7 @@ from pathlib import Path
 from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.chat.services.language.instruction import instruction
+from ico3d.chat.services.language.sampling import check_sampling
 from ico3d.chat.services.provider import Context, lacks_package
 from ico3d.common.weights import cached, weights_named
 from ico3d.errors import MissingExtraError, MissingModelError
@@ -26,11 +27,21 @@ class Settings:
     Attributes:
         model: A folder, or a name on the Hugging Face hub whose files are in its cache; empty for
             Qwen2-0.5B-Instruct, on CUDA its AWQ form if that is there.
-        max_tokens: Longest answer.
+        max_tokens: Longest answer, thoughts included.
+        temperature: Of the choice of words, 0 to 2; the model's own where not given.
     """
 
     model: str = ""
     max_tokens: int = 200
+    temperature: float | None = None
+
+    def __post_init__(self):
+        """Checks ranges.
+
+        Raises:
+            SettingsError: If an answer could have no words, or the temperature makes no sense.
+        """
+        check_sampling(self.temperature, self.max_tokens, {}, "chat settings: language 'qwen'")
 
 
 def hindrance(settings: Settings) -> str:
@@ -65,7 +76,9 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
             f"this machine: fetch it with `ico3d weights fetch {PLAIN}`, or give its folder as "
             "'model'."
         )
-    return InProcessModel(load(where), instruction(context.persona), settings.max_tokens)
+    return InProcessModel(
+        load(where), instruction(context.persona), settings.max_tokens, settings.temperature
+    )
 
 
 def source(settings: Settings, cuda: bool) -> str | None:

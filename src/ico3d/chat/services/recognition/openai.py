@@ -6,8 +6,10 @@ from urllib.parse import urlsplit
 
 from pipecat.processors.frame_processor import FrameProcessor
 
-from ico3d.chat.services.provider import Context
+from ico3d.chat.keys import check_key
+from ico3d.chat.services.provider import Context, lacks_server
 
+WHERE = "chat settings: recognition 'openai'"
 KNOCK = 0.3  # s that a server may take to accept a connection
 
 
@@ -18,22 +20,33 @@ class Settings:
     Attributes:
         url: Its address, such as `http://localhost:8000/v1`; empty for OpenAI's own.
         model: Name of its model.
-        key_variable: Environment variable that holds the key.
+        key_variable: Environment variable that holds the key; empty for none, or for
+            OPENAI_API_KEY where the server is OpenAI's. It is sent nowhere unencrypted but to
+            this machine.
         language: Code of the language that is spoken, such as `de`; empty: the server tells.
         timeout: Seconds after which a transcript is given up, one retry included.
     """
 
     url: str = ""
     model: str = "whisper-1"
-    key_variable: str = "OPENAI_API_KEY"
+    key_variable: str = ""
     language: str = ""
     timeout: float = 8.0
 
+    def __post_init__(self):
+        """Checks where the key would go.
+
+        Raises:
+            SettingsError: If it must not go there.
+        """
+        check_key(self.url, self.key_variable, WHERE)
+
 
 def hindrance(settings: Settings) -> str:
-    """No server, or one that is not there."""
-    if not settings.url:
-        return 'no server is chosen: set [recognition] use = "openai" and url.'
+    """No server, no key, or a server that is not there."""
+    lacking = lacks_server(settings.url, settings.key_variable, "recognition")
+    if lacking or not settings.url:
+        return lacking
     try:
         address = urlsplit(settings.url)
         port = address.port or (443 if address.scheme == "https" else 80)
@@ -44,7 +57,11 @@ def hindrance(settings: Settings) -> str:
 
 
 def make(settings: Settings, context: Context) -> FrameProcessor:
-    """A recogniser for one session."""
+    """A recogniser for one session.
+
+    Raises:
+        SettingsError: If the key is not here.
+    """
     from ico3d.chat.services.recognition.openai_service import OpenAIRecognition
 
     return OpenAIRecognition(settings)

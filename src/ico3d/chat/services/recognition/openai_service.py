@@ -1,7 +1,6 @@
 """pipecat's OpenAI service with any language and an end to waiting; slow to import."""
 
 import asyncio
-import os
 from collections.abc import AsyncGenerator
 from typing import Any
 
@@ -10,7 +9,8 @@ from pipecat.frames.frames import Frame, TranscriptionFrame
 from pipecat.services.openai.stt import OpenAISTTService
 from pipecat.utils.time import time_now_iso8601
 
-from ico3d.chat.services.recognition.openai import Settings
+from ico3d.chat.services.client import client_options
+from ico3d.chat.services.recognition.openai import WHERE, Settings
 from ico3d.chat.services.recognition.segments import Segments
 
 
@@ -23,13 +23,12 @@ class Transcriptions(OpenAISTTService):
     def __init__(self, options: Settings, **rest):
         """A client of the server that the settings name."""
         super().__init__(
-            api_key=os.environ.get(options.key_variable, "none"),
-            base_url=options.url or None,
+            **client_options(options.url, options.key_variable, WHERE),
             settings=OpenAISTTService.Settings(model=options.model),
             **rest,
         )
         self._options = options
-        self._client = self._client.with_options(max_retries=1)
+        self._client.max_retries = 1
 
     async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame, None]:
         """Transcribes a WAV file.

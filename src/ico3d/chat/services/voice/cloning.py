@@ -12,6 +12,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from ico3d.common.files import write_atomic
+from ico3d.common.sound import REQUEST, fault, file_claim
 from ico3d.errors import SettingsError
 
 KEY = "embedding"
@@ -53,12 +54,19 @@ def permitted_recording(path: Path, consent: str, consent_by: str) -> Recording:
         consent_by: The owner's name.
 
     Raises:
-        SettingsError: If the recording cannot be read, or nobody has consented.
+        SettingsError: If the recording cannot be read, claims what is not taken, or nobody has
+            consented.
     """
     try:
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        with path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        wrong = fault(file_claim(path), REQUEST)
     except OSError as error:
         raise SettingsError(f"{path}: cannot be read ({error.strerror}).") from error
+    except RuntimeError as error:
+        raise SettingsError(f"{path}: is no sound ({error}).") from error
+    if wrong:
+        raise SettingsError(f"{path}: the voice to speak with {wrong}.")
     recording = Recording(path, digest)
     record_consent(recording, consent.strip(), consent_by.strip())
     return recording

@@ -1,18 +1,20 @@
 """Any voice behind an OpenAI-compatible server."""
 
-import os
-from collections.abc import AsyncGenerator
-from dataclasses import dataclass
+from collections.abc import AsyncGenerator, AsyncIterator
+from dataclasses import dataclass, replace
 
 from pipecat.audio.utils import create_stream_resampler
 from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
 from pipecat.services.openai.tts import OpenAITTSService
 
+from ico3d.chat.keys import check_key
 from ico3d.chat.protocol import SPEECH_RATE
 from ico3d.chat.services.provider import Context, lacks_server
 from ico3d.chat.services.voice.pieces import OPTIONS, STARVED, Prompt
-from ico3d.errors import SettingsError
+from ico3d.common.sound import REQUEST, Claim, fault, wav_claim
+from ico3d.errors import ServiceError, SettingsError
 
+WHERE = "chat settings: voice 'openai'"
 CHUNK = 4800  # bytes that are passed on at once: 0.1 s
 
 
@@ -24,7 +26,9 @@ class Settings:
         url: Its address, such as `http://localhost:8880/v1`; empty for the provider's own.
         model: Name of its model.
         voice: Name of its voice.
-        key_variable: Environment variable that holds the key.
+        key_variable: Environment variable that holds the key; empty for none, or for
+            OPENAI_API_KEY where the server is OpenAI's. It is sent nowhere unencrypted but to
+            this machine.
         rate: Samples per second of its sound; a WAV file says so itself.
         timeout: Seconds to wait for an answer, or for more of it.
     """
@@ -32,16 +36,17 @@ class Settings:
     url: str = ""
     model: str = "gpt-4o-mini-tts"
     voice: str = "alloy"
-    key_variable: str = "OPENAI_API_KEY"
+    key_variable: str = ""
     rate: int = SPEECH_RATE
     timeout: float = 10.0
 
     def __post_init__(self):
-        """Checks ranges.
+        """Checks ranges, and where the key would go.
 
         Raises:
-            SettingsError: If rate or time-out make no sense.
+            SettingsError: If rate or time-out make no sense, or the key must not go there.
         """
+        check_key(self.url, self.key_variable, WHERE)
         if not (8000 <= self.rate <= 48000 and 0 < self.timeout < STARVED):
             raise SettingsError(
                 "chat settings: voice 'openai': rate must be 8000 to 48000 samples per second "
@@ -54,12 +59,11 @@ class ServerVoice(Prompt, OpenAITTSService):
 
     def __init__(self, settings: Settings):
         """For one session."""
-        from openai import DefaultAsyncHttpxClient
+        from ico3d.chat.services.client import client_options
 
+        where = (settings.url, settings.key_variable, WHERE)
         super().__init__(
-            api_key=os.environ.get(settings.key_variable, "none"),
-            base_url=settings.url or None,
-            http_client=DefaultAsyncHttpxClient(timeout=settings.timeout),
+            **client_options(*where, timeout=settings.timeout),
             settings=OpenAITTSService.Settings(model=settings.model, voice=settings.voice),
             **OPTIONS,
         )
@@ -77,10 +81,11 @@ class ServerVoice(Prompt, OpenAITTSService):
         )
         try:
             async with request as response:
+                rate = self._rate_of(response.headers.get("content-type", ""))
                 async for frame in self._stream_audio_frames_from_iterator(
-                    response.iter_bytes(CHUNK),
+                    judged(response.iter_bytes(CHUNK), rate or SPEECH_RATE),
                     strip_wav_header=True,
-                    in_sample_rate=self._rate_of(response.headers.get("content-type", "")),
+                    in_sample_rate=rate,
                     context_id=context_id,
                 ):
                     yield frame
@@ -100,11 +105,38 @@ class ServerVoice(Prompt, OpenAITTSService):
         return None if "wav" in content_type else self._options.rate
 
 
+async def judged(sound: AsyncIterator[bytes], rate: int) -> AsyncIterator[bytes]:
+    """The pieces of a server's answer, for as long as they are sound that is taken.
+
+    Args:
+        sound: PCM16, a WAV file's header before it or not.
+        rate: Samples per second, unless a header says so.
+
+    Raises:
+        ServiceError: If a header claims what is not taken, or the sound does not end in time.
+    """
+    claim, frames, first = Claim(rate, width=2), 0, True
+    async for piece in sound:
+        if first:
+            claim, first = wav_claim(piece) or claim, False
+        frames += len(piece) // 2
+        wrong = fault(replace(claim, frames=frames), REQUEST)
+        if not wrong and (claim.channels, claim.width) != (1, 2):
+            wrong = "is not mono with 16 bits"
+        if wrong:
+            raise ServiceError(f"its sound {wrong}")
+        yield piece
+
+
 def hindrance(settings: Settings) -> str:
     """Whether a server is chosen."""
     return lacks_server(settings.url, settings.key_variable, "voice")
 
 
 def make(settings: Settings, context: Context) -> ServerVoice:
-    """A voice for one session."""
+    """A voice for one session.
+
+    Raises:
+        SettingsError: If the key is not here.
+    """
     return ServerVoice(settings)

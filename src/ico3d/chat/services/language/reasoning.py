@@ -1,0 +1,177 @@
+"""Keeps what a language model thinks apart from what it says.
+
+Models mark their thoughts with tags, each family with its own; servers may put them into a field
+of their own; and some chat templates open the tag themselves, so that the stream holds its end
+alone. pipecat's filter, a part of its service for NVIDIA, knows one tag at the very beginning.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+FIELDS = ("reasoning_content", "reasoning")
+"""Where servers put thoughts that they have taken out of the text themselves."""
+_NAMES = (
+    *("think", "thinking", "thought", "thoughts", "reason", "reasoning", "reflection"),
+    *("analysis", "scratchpad", "seed:think", "internal_monologue"),
+)
+_TAG = rf"(?:{'|'.join(_NAMES)})(?:\s[^<>]*)?>"
+_OPENERS = (
+    rf"<{_TAG}",
+    r"\[THINK\]",
+    "◁think▷",
+    r"<\|begin_of_thought\|>",
+    r"<\|START_THINKING\|>",
+    r"<\|channel\|>(?:analysis|commentary)[^<>]*<\|message\|>",
+)
+_CLOSERS = (
+    rf"</{_TAG}",
+    r"\[/THINK\]",
+    "◁/think▷",
+    r"<\|end_of_thought\|>",
+    r"<\|END_THINKING\|>",
+)
+_FINAL = r"<\|channel\|>final[^<>]*<\|message\|>"  # ends all thoughts before it
+_MARK = re.compile(
+    rf"(?P<open>{'|'.join(_OPENERS)})|(?P<close>{'|'.join(_CLOSERS)})|(?P<final>{_FINAL})"
+    r"|(?P<nothing><\|(?:start\|>assistant|end\|>|return\|>))",
+    re.IGNORECASE,
+)
+_BEGINNINGS = (
+    *(f"<{name}" for name in _NAMES),
+    *(f"</{name}" for name in _NAMES),
+    *("[think]", "[/think]", "◁think▷", "◁/think▷"),
+    *("<|begin_of_thought|>", "<|end_of_thought|>", "<|start_thinking|>", "<|end_thinking|>"),
+    *("<|channel|>", "<|start|>assistant", "<|end|>", "<|return|>"),
+)
+_LONGEST = 100  # letters of a mark
+
+
+@dataclass(frozen=True)
+class Parts:
+    """A piece of a model's text, taken apart.
+
+    Attributes:
+        said: Of the answer.
+        thought: Of the thoughts.
+    """
+
+    said: str = ""
+    thought: str = ""
+
+    def __add__(self, more: "Parts") -> "Parts":
+        """What comes after it, too."""
+        return Parts(self.said + more.said, self.thought + more.thought)
+
+
+class Thoughts:
+    """Takes one answer apart while it streams.
+
+    Attributes:
+        opened: Whether the stream begins within a thought that the chat template has opened; None
+            while that is not known. Until then nothing of the answer is given out, for the end of
+            a thought may still come.
+        lone: Whether there was an end of a thought without its beginning.
+        begun: Whether some of the answer was given out.
+    """
+
+    def __init__(self, opened: bool | None = False):
+        """An answer that has not begun."""
+        self.opened, self.lone, self.begun = opened, False, False
+        self._depth = 1 if opened else 0
+        self._rest = ""  # may be the beginning of a mark
+        self._held = ""  # an answer, or a thought whose end will show what it was
+        self._fresh = True  # nothing has come, white space aside
+
+    def push(self, text: str) -> Parts:
+        """Takes some more of the text; gives what is known of it."""
+        text = self._rest + text
+        parts, at = Parts(), 0
+        for mark in _MARK.finditer(text):
+            parts += self._take(text[at : mark.start()])
+            at = mark.end()
+            if mark["open"]:
+                self._open()
+            elif self._depth:
+                self._depth = 0 if mark["final"] else self._depth - (mark["close"] is not None)
+            elif mark["close"]:
+                parts = Parts("", parts.thought + self._held + parts.said)
+                self._held, self.opened, self.lone = "", False, True
+        cut = at + _whole(text[at:])
+        self._rest = text[cut:]
+        return parts + self._take(text[at:cut])
+
+    def separate(self) -> Parts:
+        """The server takes thoughts out itself, so what it gives as text is the answer."""
+        held, self._held = self._held, ""
+        if self.opened is None:
+            self.opened = False
+        return Parts(self._spoken(held))
+
+    def finish(self) -> Parts:
+        """The end of the text; the rest of it."""
+        rest, self._rest = self._take(self._rest), ""
+        return self.separate() + rest
+
+    def _take(self, text: str) -> Parts:
+        """Text without marks."""
+        self._fresh = self._fresh and not text.strip()
+        if self._depth:
+            return Parts("", text)
+        if self.opened is None:
+            self._held += text
+            return Parts()
+        return Parts(self._spoken(text))
+
+    def _open(self) -> None:
+        if self._fresh:  # first of all: the model opens its thoughts itself, whatever was expected
+            self.opened, self._depth, self._fresh = False, 0, False
+        self._depth += 1
+
+    def _spoken(self, text: str) -> str:
+        """Text of the answer, which does not begin with white space."""
+        text = text if self.begun else text.lstrip()
+        self.begun = self.begun or bool(text)
+        return text
+
+
+def without_thoughts(text: str, opened: bool | None = None) -> str:
+    """What a whole text says."""
+    thoughts = Thoughts(opened)
+    return thoughts.push(text).said + thoughts.finish().said
+
+
+def opens_thoughts(prompt: str) -> bool:
+    """Whether a prompt, as a chat template writes it, ends with the beginning of a thought."""
+    marks = list(_MARK.finditer(prompt))
+    return bool(marks and marks[-1]["open"] and not prompt[marks[-1].end() :].strip())
+
+
+def field_of(delta: Any) -> str | None:
+    """The thoughts that a server gives apart from the text; empty for a mere sign of them."""
+    values = [getattr(delta, name, None) for name in FIELDS]
+    return next((value for value in values if isinstance(value, str)), None)
+
+
+def _whole(text: str) -> int:
+    """How much of a text, from its beginning, can be no unfinished mark."""
+    for at in range(max(0, len(text) - _LONGEST), len(text)):
+        if text[at] in "<[◁" and _may_become_a_mark(text[at:].lower()):
+            return at
+    return len(text)
+
+
+def _may_become_a_mark(tail: str) -> bool:
+    return any(
+        beginning.startswith(tail) or (tail.startswith(beginning) and _goes_on(tail, beginning))
+        for beginning in _BEGINNINGS
+    )
+
+
+def _goes_on(tail: str, beginning: str) -> bool:
+    """Whether what follows the beginning of a mark may still belong to it."""
+    if beginning == "<|channel|>":
+        return tail.count("<") < 2 or "<|message|>".startswith(tail[tail.rindex("<") :])
+    attributes = tail[len(beginning) :]
+    is_tag = beginning.strip("</") in _NAMES
+    return is_tag and re.fullmatch(r"(\s[^<>]*)?", attributes) is not None

@@ -1,0 +1,41 @@
+"""What a request to a language model says beside the conversation."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from ico3d.errors import SettingsError
+
+HOTTEST = 2.0
+OWN = (
+    *("model", "messages", "stream", "stream_options", "tools", "tool_choice", "n"),
+    *("temperature", "max_tokens", "max_completion_tokens"),
+)
+"""Fields of a request that ico3d fills."""
+
+
+def check_sampling(
+    temperature: float | None, max_tokens: int | None, extra: Mapping[str, Any], where: str
+) -> None:
+    """Checks what a request is to say.
+
+    Args:
+        temperature: Of the choice of words; None leaves it to the server.
+        max_tokens: Longest answer, thoughts included; None leaves it to the server.
+        extra: Further fields of the request.
+        where: What an error names as the place.
+
+    Raises:
+        SettingsError: If something is out of range, ico3d's own, or no JSON.
+    """
+    if temperature is not None and not 0 <= temperature <= HOTTEST:
+        raise SettingsError(f"{where}: temperature must be 0 to {HOTTEST:g}.")
+    if max_tokens is not None and max_tokens < 1:
+        raise SettingsError(f"{where}: max_tokens must be at least 1.")
+    taken = [name for name in extra if name in OWN]
+    if taken:
+        raise SettingsError(f"{where}: extra must not have {' or '.join(taken)}: ico3d sets that.")
+    try:
+        json.dumps(dict(extra), allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise SettingsError(f"{where}: extra cannot be sent as JSON ({error}).") from None

@@ -1,0 +1,114 @@
+"""Sound that another machine sends is judged by what it claims before it is made larger."""
+
+import io
+import struct
+import tracemalloc
+
+import httpx
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pipecat.processors.frame_processor import FrameProcessor
+
+from ico3d.chat.modules.limits import Limits
+from ico3d.chat.modules.recognition import read_wav
+from ico3d.errors import ProtocolError
+
+from .serving import service_app, serving
+
+RATE = 16_000
+LONGEST = 600  # s
+MB = 1 << 20
+
+
+def wav(rate, channels, bits, claimed, payload):
+    """A WAV file whose header says what it likes."""
+    size = bits // 8 * channels
+    form = struct.pack("<HHIIHH", 1, channels, rate, rate * size & 0xFFFFFFFF, size & 0xFFFF, bits)
+    chunks = b"fmt " + struct.pack("<I", 16) + form + b"data" + struct.pack("<I", claimed) + payload
+    return b"RIFF" + struct.pack("<I", 0xFFFFFFFF) + b"WAVE" + chunks
+
+
+class Deaf(FrameProcessor):
+    """A recogniser that understands nothing."""
+
+    async def process_frame(self, frame, direction):
+        await super().process_frame(frame, direction)
+        await self.push_frame(frame, direction)
+
+
+async def posted(data, limits=None):
+    """The answer to a file, and the most memory that it took."""
+    app = service_app("recognition", Deaf, limits or Limits(seconds=3))
+    async with serving(app) as url, httpx.AsyncClient(base_url=url, timeout=60) as client:
+        path = "v1/audio/transcriptions"
+        await client.post(path, files={"file": wav(RATE, 1, 16, 3200, bytes(3200))})
+        tracemalloc.start()
+        answer = await client.post(path, files={"file": data})
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    return answer, peak
+
+
+@pytest.mark.parametrize(
+    ("rate", "channels", "claims"),
+    [(1, 1, "1 samples"), (0, 1, "0 samples"), (RATE, 500, "500 ch")],
+)
+async def test_two_kilobytes_stay_small(rate, channels, claims):
+    answer, peak = await posted(wav(rate, channels, 16, 2000, bytes(2000)))
+    assert peak < 30 * MB
+    assert answer.status_code == 400
+    assert claims in answer.json()["error"]["message"]
+
+
+async def test_more_than_ten_minutes_are_refused_before_they_are_decoded():
+    data = wav(4000, 1, 8, 4000 * (LONGEST + 1), bytes(4000 * (LONGEST + 1)))
+    answer, peak = await posted(data)
+    assert peak < 4 * len(data) + 30 * MB
+    assert answer.status_code == 400 and "longer than 600 s" in answer.json()["error"]["message"]
+
+
+async def test_an_upload_that_tells_no_length_is_not_kept():
+    async def endless():
+        yield b'--x\r\nContent-Disposition: form-data; name="file"; filename="a"\r\n\r\n'
+        for _ in range(200):
+            yield bytes(MB // 4)
+
+    app = service_app("recognition", Deaf, Limits(megabytes=1))
+    async with serving(app) as url, httpx.AsyncClient(base_url=url, timeout=60) as client:
+        tracemalloc.start()
+        kind = {"Content-Type": "multipart/form-data; boundary=x"}
+        path = "v1/audio/transcriptions"
+        answer = await client.post(path, content=endless(), headers=kind)
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    assert peak < 10 * MB
+    assert answer.status_code == 413 and "larger than 1 MB" in answer.json()["error"]["message"]
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    rate=st.one_of(st.integers(0, 2**32 - 1), st.integers(4000, 48_000)),
+    channels=st.one_of(st.integers(0, 65_535), st.integers(1, 4)),
+    bits=st.sampled_from([0, 8, 16, 24, 32, 64]),
+    claimed=st.one_of(st.integers(0, 2**32 - 1), st.integers(0, 4000)),
+    payload=st.binary(max_size=4000),
+)
+def test_no_header_makes_sound_large(rate, channels, bits, claimed, payload):
+    data = wav(rate, channels, bits, claimed, payload)
+    tracemalloc.start()
+    try:
+        pcm = read_wav(io.BytesIO(data))
+    except ProtocolError:
+        pcm = None
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < MB
+    if pcm is not None:
+        frames = min(claimed, len(payload)) // (bits // 8 * channels)
+        assert abs(len(pcm) - frames * RATE / rate) <= 2
+
+
+def test_a_file_that_claims_more_than_it_holds_is_read():
+    pcm = read_wav(io.BytesIO(wav(RATE, 1, 16, 0xFFFFFFFE, bytes(3200))))
+    assert len(pcm) == 1600
