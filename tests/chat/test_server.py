@@ -9,6 +9,7 @@ import sys
 from contextlib import closing
 
 import httpx
+import numpy as np
 import pytest
 from fastapi import FastAPI
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -21,7 +22,7 @@ from ico3d.chat.codec import decode_server, encode
 from ico3d.chat.face import open_face
 from ico3d.chat.guard import is_own
 from ico3d.chat.limits import FORGIVEN, Limits
-from ico3d.chat.protocol import Audio, Error, Hello, Speech, Text, Welcome
+from ico3d.chat.protocol import Ack, Audio, Error, Hello, Speech, Text, Welcome
 from ico3d.chat.server import make_server
 from ico3d.cli import main
 from ico3d.errors import BundleError, ProtocolError, SettingsError
@@ -179,7 +180,12 @@ async def test_a_bad_hello_is_answered_in_one_sentence(served, first, code):
         error, closed = await farewell(socket)
     assert closed == code and len(sessions) == 0
     if len(first) < 65_536:  # beyond it the WebSocket library closes by itself
-        assert error.fatal and not error.again and "\n" not in error.message and len(error.message) < 300
+        assert (
+            error.fatal
+            and not error.again
+            and "\n" not in error.message
+            and len(error.message) < 300
+        )
 
 
 async def test_garbage_and_floods_end_their_connection_only(served):
@@ -206,6 +212,20 @@ async def test_garbage_and_floods_end_their_connection_only(served):
     await good.close()
 
 
+async def test_every_binary_frame_is_acknowledged_also_a_refused_one(served):
+    url, _ = served
+    page, _ = await open_page(url, microphone=False)
+    second = np.zeros(16_000, np.int16)
+    for at in range(7):  # a burst of five seconds is allowed
+        await page.send(Audio(16_000 * at, second))
+    await page.send(Text("who are you"))
+    await page.send_frame(b"no frame of ours")
+    await page.wait(Ack, where=lambda ack: ack.frames == 8)
+    assert [ack.frames for ack in page.messages(Ack)] == [1, 2, 3, 4, 5, 6, 7, 8]
+    assert page.messages(Error)
+    await page.close()
+
+
 def test_a_page_may_be_clumsy_a_few_times_only():
     limits = Limits()
     assert [limits.forgive() for _ in range(FORGIVEN)] == [True] * (FORGIVEN - 1) + [False]
@@ -226,8 +246,6 @@ def test_rates_are_limited_by_the_clock():
 
 
 def test_more_sound_than_a_microphone_makes_is_refused():
-    import numpy as np
-
     now = 0.0
     limits = Limits(lambda: now)
     second = Audio(0, np.zeros(16000, np.int16))
