@@ -21,11 +21,10 @@ from ico3d.chat import protocol
 from ico3d.chat.codec import decode_server, encode
 from ico3d.chat.face import open_face
 from ico3d.chat.guard import is_own
-from ico3d.chat.limits import FORGIVEN, Limits
 from ico3d.chat.protocol import Ack, Audio, Error, Hello, Speech, Text, Welcome
 from ico3d.chat.server import make_server
 from ico3d.cli import main
-from ico3d.errors import BundleError, ProtocolError, SettingsError
+from ico3d.errors import BundleError, SettingsError
 from ico3d.measure.page import open_page
 
 from .conftest import serving
@@ -98,7 +97,7 @@ async def test_figures_are_for_those_who_may_see_the_page(served):
         await page.close()
         while "ico3d_connections 0.0" not in lines:
             lines = (await client.get("/metrics")).text.splitlines()
-    assert "ico3d_sessions 1.0" in lines  # it may come back
+    assert "ico3d_sessions 0.0" in lines  # it left: what only drops comes back
     assert 'ico3d_errors_total{where="protocol"} 1.0' in lines
 
 
@@ -180,12 +179,8 @@ async def test_a_bad_hello_is_answered_in_one_sentence(served, first, code):
         error, closed = await farewell(socket)
     assert closed == code and len(sessions) == 0
     if len(first) < 65_536:  # beyond it the WebSocket library closes by itself
-        assert (
-            error.fatal
-            and not error.again
-            and "\n" not in error.message
-            and len(error.message) < 300
-        )
+        assert error.fatal and not error.again
+        assert "\n" not in error.message and len(error.message) < 300
 
 
 async def test_garbage_and_floods_end_their_connection_only(served):
@@ -216,46 +211,14 @@ async def test_every_binary_frame_is_acknowledged_also_a_refused_one(served):
     url, _ = served
     page, _ = await open_page(url, microphone=False)
     second = np.zeros(16_000, np.int16)
-    for at in range(7):  # a burst of five seconds is allowed
+    for at in range(3):
         await page.send(Audio(16_000 * at, second))
     await page.send(Text("who are you"))
     await page.send_frame(b"no frame of ours")
-    await page.wait(Ack, where=lambda ack: ack.frames == 8)
-    assert [ack.frames for ack in page.messages(Ack)] == [1, 2, 3, 4, 5, 6, 7, 8]
+    await page.wait(Ack, where=lambda ack: ack.frames == 4)
+    assert [ack.frames for ack in page.messages(Ack)] == [1, 2, 3, 4]
     assert page.messages(Error)
     await page.close()
-
-
-def test_a_page_may_be_clumsy_a_few_times_only():
-    limits = Limits()
-    assert [limits.forgive() for _ in range(FORGIVEN)] == [True] * (FORGIVEN - 1) + [False]
-
-
-def test_rates_are_limited_by_the_clock():
-    now = 0.0
-    limits = Limits(lambda: now)
-    for _ in range(200):
-        limits.check_frame()
-    with pytest.raises(ProtocolError):
-        limits.check_frame()
-    now = 1.0
-    for _ in range(100):
-        limits.check_frame()
-    with pytest.raises(ProtocolError):
-        limits.check_frame()
-
-
-def test_more_sound_than_a_microphone_makes_is_refused():
-    now = 0.0
-    limits = Limits(lambda: now)
-    second = Audio(0, np.zeros(16000, np.int16))
-    for _ in range(5):
-        limits.check_message(second)
-    with pytest.raises(ProtocolError):
-        limits.check_message(second)
-    for _ in range(60):
-        now += 1.0
-        limits.check_message(second)
 
 
 def test_serve_prints_where_it_is_and_ends_on_interrupt(bundle_path, tmp_path):

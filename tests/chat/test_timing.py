@@ -37,8 +37,11 @@ class Watched:
         self.now = 0  # ms
         self.told, self.turns, self.failures = [], [], []
         self.observer = TurnObserver(
-            lambda: self.now / 1000, self.told.append, self.turns.append, self.failures.append
+            lambda: self.now / 1000, self.told.append, self.turns.append, self._failed
         )
+
+    def _failed(self, part, cause):
+        self.failures.append(part)
 
     async def see(self, at, *frames, source=None):
         """Frames pushed at a time, ms."""
@@ -175,7 +178,7 @@ async def test_turns_become_figures_and_lines(watched, tmp_path):
     await watched.see(2000, InterruptionFrame(), BotStoppedSpeakingFrame())
     second.turn(watched.turns[0])
     second.turn(watched.turns[0])
-    first.failed("voice")
+    first.failed("voice", "500")
     monitor.left("idle")
 
     kept, line, last = [json.loads(text) for text in path.read_text().splitlines()]

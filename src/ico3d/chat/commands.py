@@ -10,7 +10,7 @@ from typing import Annotated
 import tyro
 
 from ico3d.bundle import packaged
-from ico3d.errors import MissingExtraError
+from ico3d.chat.operator_log import set_up_log
 
 
 @dataclass(frozen=True)
@@ -41,13 +41,15 @@ class Serve:
         """Serves until it is interrupted.
 
         Raises:
-            Ico3dError: If the bundle, the settings or the port cannot be used.
+            Ico3dError: If the bundle, the settings or the port cannot be used, or a service
+                cannot be made.
         """
         set_up_log(self.verbose)
         from ico3d.bundle.format import Bundle
         from ico3d.bundle.persona import read_persona
         from ico3d.chat import server
         from ico3d.chat.monitor import Monitor, TurnLog
+        from ico3d.chat.parts import make_parts
         from ico3d.chat.services.offers import offers
         from ico3d.chat.sessions import Sessions
         from ico3d.chat.settings import read_settings
@@ -59,12 +61,14 @@ class Serve:
         bundle = Bundle.open(self.bundle)
         avatar = server.open_avatar(bundle, settings, persona) if bundle.manifest.head else None
         sessions = Sessions(avatar, monitor=monitor) if avatar else None
+        services = make_parts(avatar).services if avatar else None  # loads what they need, too
         app = server.make_app(bundle, avatar, self.host, sessions)
         url = server.address(listener)
+        listener.listen()  # whoever reads the address and comes at once is served in a moment
         print(f"{(persona or bundle.manifest.persona).name} is at {url} (Ctrl+C ends)")
         if avatar:
             offered = offers(settings, avatar.persona.voice)
-            print("\n".join(described(avatar.services.described(), offered)))
+            print("\n".join(described(services, offered)))
         if not (server.STATIC / "index.html").is_file():
             print("The page is not built: run `make viewer`.", file=sys.stderr)
         sys.stdout.flush()
@@ -120,18 +124,3 @@ def described(services, offers) -> list[str]:
     if stand_ins:
         lines.append("  (small offline stand-ins; choose others with --settings)")
     return lines
-
-
-def set_up_log(verbose: bool) -> None:
-    """Silences pipecat's log, which starts with its import, unless it is wanted.
-
-    Raises:
-        MissingExtraError: If the extra `chat` is not installed.
-    """
-    try:
-        from loguru import logger
-    except ImportError:
-        raise MissingExtraError("pipecat-ai", "chat", "talking with an avatar") from None
-    logger.remove()
-    if verbose:
-        logger.add(sys.stderr, level="DEBUG")

@@ -2,14 +2,14 @@
 
 import asyncio
 import contextlib
-from dataclasses import replace
 
 from fastapi import WebSocket, WebSocketDisconnect
 from loguru import logger
 
 from ico3d.chat import protocol
 from ico3d.chat.codec import OversizedError, decode_client, encode
-from ico3d.chat.limits import Limits
+from ico3d.chat.failures import cause
+from ico3d.chat.limits import Inlet, Limits
 from ico3d.chat.page import Outbox
 from ico3d.chat.protocol import (
     Ack,
@@ -25,12 +25,13 @@ from ico3d.chat.protocol import (
     Text,
     Welcome,
 )
-from ico3d.chat.sessions import FullError, Session, Sessions
+from ico3d.chat.sessions import BROKEN_OFF, FullError, Session, Sessions
 from ico3d.errors import Ico3dError, ProtocolError
 
 HELLO_SECONDS = 10  # that a page may take to say hello
 GOING, BROKEN, TOO_BIG, FAILED, BUSY = 1000, 1008, 1009, 1011, 1013  # WebSocket close codes
-FULL = "all places are taken: try again in a minute."
+GONE = (1000, 1001)  # what pages send that will not come back: the visitor left, or loads it anew
+UNREADY = "the avatar cannot talk now: something on the server does not start. Try again later."
 
 
 class Hangup(Exception):
@@ -45,16 +46,16 @@ class Hangup(Exception):
 class Connection:
     """Reads a page's messages and writes what its session has for it."""
 
-    def __init__(self, socket: WebSocket, sessions: Sessions, welcome: Welcome):
+    def __init__(self, socket: WebSocket, sessions: Sessions, notices: list[str]):
         """A connection.
 
         Args:
             socket: An accepted WebSocket.
             sessions: Where its session comes from.
-            welcome: What every page is told; what belongs to a session is filled in.
+            notices: What every page is told of the avatar.
         """
-        self._socket, self._sessions, self._welcome = socket, sessions, welcome
-        self._limits = Limits()
+        self._socket, self._sessions, self._notices = socket, sessions, notices
+        self._limits, self._inlet = Limits(), Inlet()
         self._outbox = Outbox()
 
     async def run(self) -> None:
@@ -65,29 +66,39 @@ class Connection:
     async def _run(self) -> None:
         writer: asyncio.Task | None = None
         session: Session | None = None
+        for_good = True
         try:
             hello = await self._hello()
-            session, resumed = await self._sessions.enter(hello, self._outbox)
+            session, resumed = await self._enter(hello)
             await self._greet(session, resumed)
             writer = asyncio.create_task(self._write())
             await self._read(session)
         except Hangup as hangup:
             await self._hang_up(hangup)
-        except FullError:
-            self._sessions.monitor.failed("full")
-            await self._hang_up(Hangup(BUSY, FULL, again=True))
-        except Ico3dError as error:
-            self._sessions.monitor.failed("start")
-            await self._hang_up(Hangup(FAILED, str(error), again=True))
-        except WebSocketDisconnect:
-            pass
+        except WebSocketDisconnect as disconnect:
+            for_good = disconnect.code in GONE and not self._outbox.is_closed
+        except Exception as error:
+            await self._break_off(error)
         finally:
             self._outbox.close()
             if writer is not None:
                 writer.cancel()
                 await asyncio.gather(writer, return_exceptions=True)
             if session is not None:
-                self._sessions.leave(session, self._outbox)
+                self._sessions.leave(session, self._outbox, for_good)
+
+    async def _enter(self, hello: Hello) -> tuple[Session, bool]:
+        """The page's session, or a sentence on why there is none."""
+        try:
+            return await self._sessions.enter(hello, self._outbox)
+        except FullError as error:
+            self._sessions.monitor.failed("full")
+            raise Hangup(BUSY, str(error), again=True) from error
+        except Exception as error:
+            own = isinstance(error, Ico3dError)
+            self._sessions.monitor.failed("start", str(error) if own else cause(error))
+            told = str(error) if own and self._sessions.at_home else UNREADY
+            raise Hangup(FAILED, told, again=True) from error
 
     async def _hello(self) -> Hello:
         try:
@@ -108,13 +119,15 @@ class Connection:
         return message
 
     async def _greet(self, session: Session, resumed: bool) -> None:
-        welcome = replace(
-            self._welcome,
-            session=session.id,
-            resumed=resumed,
-            services=session.services.described(),
-            dictation=session.services.dictation(),
-            offers=self._sessions.offers,
+        assert session.parts is not None
+        welcome = Welcome(
+            protocol.VERSION,
+            session.id,
+            resumed,
+            session.parts.services,
+            self._notices,
+            session.parts.dictation,
+            self._sessions.offers,
         )
         await self._socket.send_text(str(encode(welcome)))
         if not resumed:
@@ -128,7 +141,7 @@ class Connection:
                 binary += 1
                 self._outbox.put(Ack(binary))
             try:
-                self._limits.check_frame()
+                self._limits.check_frame(frame)
                 message = decode_client(frame)
                 self._limits.check_message(message)
                 await self._handle(session, message)
@@ -150,20 +163,23 @@ class Connection:
     async def _handle(self, session: Session, message: ClientMessage) -> None:
         conversation = session.conversation
         if isinstance(message, Audio):
-            await conversation.hear(message)
+            for sound in self._inlet.take(message):
+                await conversation.hear(sound)
         elif isinstance(message, Clock):
             conversation.clock(message)
         elif isinstance(message, Text):
             if not message.text.strip():
                 raise ProtocolError("text: is empty.")
             await conversation.ask(message.text.strip())
-        elif isinstance(message, Heard | Deaf) and session.services.dictation() is None:
+        elif isinstance(message, Heard | Deaf) and not (session.parts and session.parts.dictation):
             raise ProtocolError("this server listens itself.")
         elif isinstance(message, Heard):
             await conversation.heard(message)
         elif isinstance(message, Deaf):
             await conversation.deaf(message.reason)
         elif isinstance(message, Talk):
+            for sound in self._inlet.rest():  # it belongs to the button's last state
+                await conversation.hear(sound)
             await conversation.talk(message.pressed)
         elif isinstance(message, Interrupt):
             await conversation.interrupt(message.utterance)
@@ -174,12 +190,22 @@ class Connection:
         """Sends until the outbox is closed, which ends the connection too."""
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # the page is gone
             while (message := await self._outbox.get()) is not None:
-                frame = encode(message)
+                try:
+                    frame = encode(message)
+                except ProtocolError as error:  # one message less, and the conversation goes on
+                    self._sessions.monitor.failed("encoding", str(error))
+                    continue
                 if isinstance(frame, str):
                     await self._socket.send_text(frame)
                 else:
                     await self._socket.send_bytes(frame)
             await self._socket.close(GOING)
+
+    async def _break_off(self, error: Exception) -> None:
+        """A fault of ours: the page is told, and does not come back to the same again."""
+        self._sessions.monitor.failed("connection", cause(error))
+        logger.opt(exception=error).debug("the connection's fault in full")
+        await self._hang_up(Hangup(FAILED, BROKEN_OFF, again=True))
 
     async def _hang_up(self, hangup: Hangup) -> None:
         logger.debug(f"closing a connection with {hangup.code}: {hangup}")

@@ -1,11 +1,10 @@
 """One conversation: the pipecat pipeline between a page's messages and the page."""
 
 import asyncio
-from dataclasses import dataclass, field
+from collections.abc import Callable
 
 from loguru import logger
 from pipecat.adapters.llm.schemas.tools_schema import ToolsSchema
-from pipecat.audio.turn.smart_turn.base_smart_turn import SmartTurnParams
 from pipecat.pipeline.pipeline import Pipeline
 from pipecat.pipeline.worker import PipelineParams, PipelineWorker
 from pipecat.processors.aggregators.llm_context import LLMContext, NotGiven
@@ -18,8 +17,6 @@ from pipecat.services.tts_service import TTSService
 from pipecat.turns.user_turn_strategies import UserTurnStrategies
 from pipecat.workers.runner import WorkerRunner
 
-from ico3d.bundle.animation import Animation
-from ico3d.bundle.manifest import HeadInfo, Persona
 from ico3d.chat import protocol
 from ico3d.chat.activity import Activity
 from ico3d.chat.expression import ExpressionProcessor
@@ -31,9 +28,8 @@ from ico3d.chat.memory import remembering
 from ico3d.chat.modules.mouth import RemoteMouth
 from ico3d.chat.monitor import Visitor
 from ico3d.chat.page import Page
+from ico3d.chat.parts import Avatar, Parts, make_aside
 from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Error, Heard
-from ico3d.chat.services import Chosen
-from ico3d.chat.services.provider import Context
 from ico3d.chat.services.voice.clauses import ClauseProcessor
 from ico3d.chat.services.voice.markup import speakable
 from ico3d.chat.settings import ChatSettings
@@ -42,59 +38,28 @@ from ico3d.chat.supervision.language import AnswerGuard
 from ico3d.chat.supervision.voice import endure
 from ico3d.chat.timing import Clock, TurnObserver
 from ico3d.chat.tools import functions
-from ico3d.chat.turns.detector import Ear, VoiceDetector
-from ico3d.chat.turns.eager import EagerSmartTurn
+from ico3d.chat.turns.detector import VoiceDetector
 from ico3d.chat.turns.echo import EchoGuard
 from ico3d.chat.turns.echo_filter import EchoFilter
 from ico3d.chat.turns.strategies import strategies
-from ico3d.chat.workers import Workers, at_once
-from ico3d.speech.runtime import SpeechModel
+from ico3d.chat.workers import at_once
 
 NOTHING_HEARD = 3.0  # s without a sign of the recogniser after which a turn is given up
-
-
-@dataclass(frozen=True)
-class Avatar:
-    """What all sessions of a server share, read only.
-
-    Attributes:
-        head: The head's sizes.
-        speech: Sound to mouth; null for heads driven by blendshapes.
-        persona: Who the avatar is.
-        services: Who listens, thinks and speaks.
-        settings: Services and timing.
-        animation: How its body moves; None for a head alone.
-        speech_sha256: Of the file of `speech`, by which a remote module knows that it is its own.
-        workers: Threads in which faces are made.
-    """
-
-    head: HeadInfo
-    speech: SpeechModel | None
-    persona: Persona
-    services: Chosen
-    settings: ChatSettings
-    animation: Animation | None
-    speech_sha256: str = ""
-    workers: Workers = field(default_factory=Workers)
-
-
-@dataclass(frozen=True)
-class Parts:
-    """What takes a while to make; made in a thread."""
-
-    ear: Ear
-    turn: EagerSmartTurn
-    recognition: FrameProcessor
-    language: FrameProcessor
-    voice: FrameProcessor
 
 
 class Conversation:
     """A running pipeline. What the page says goes in here; what it shall hear goes to `Page`."""
 
-    def __init__(self, avatar: Avatar, page: Page, visitor: Visitor):
-        """A conversation that has not started."""
-        self._avatar, self._page = avatar, page
+    def __init__(self, avatar: Avatar, page: Page, visitor: Visitor, ended: Callable[[], None]):
+        """A conversation that has not started.
+
+        Args:
+            avatar: Who talks, and how.
+            page: Where its messages go.
+            visitor: Counts what happens.
+            ended: Called if the pipeline ends without having been closed.
+        """
+        self._avatar, self._page, self._ended = avatar, page, ended
         self._now = now = asyncio.get_running_loop().time  # for all that waits and measures
         self.activity = Activity(now)
         self._clock = Clock(now)
@@ -111,9 +76,13 @@ class Conversation:
         self._worker: PipelineWorker | None = None
         self._task: asyncio.Task | None = None
 
-    async def start(self) -> None:
-        """Builds and starts the pipeline (about 0.5 s, most of it in a thread)."""
-        parts = await asyncio.to_thread(make_parts, self._avatar)
+    async def start(self) -> Parts:
+        """Builds and starts the pipeline (about 0.5 s, most of it in a thread).
+
+        Raises:
+            Ico3dError: If a service cannot be made, whatever the reason.
+        """
+        parts = await make_aside(self._avatar)
         self._prepare_voice(parts.voice)
         self._worker = PipelineWorker(
             self._pipeline(parts),
@@ -131,13 +100,16 @@ class Conversation:
         runner = WorkerRunner(handle_sigint=False, handle_sigterm=False)
         await runner.add_workers(self._worker)
         self._task = asyncio.create_task(runner.run())
+        self._task.add_done_callback(self._stopped)
+        return parts
 
     async def close(self) -> None:
         """Ends the pipeline and everything it started."""
         if self._worker is None or self._task is None:
             return
+        self._task.remove_done_callback(self._stopped)
         await self._worker.cancel()
-        await self._task
+        await asyncio.gather(self._task, return_exceptions=True)
 
     async def greet(self) -> None:
         """Says the persona's first words."""
@@ -186,6 +158,11 @@ class Conversation:
     def release(self) -> None:
         """The page is back."""
         self._speaker.release()
+
+    def _stopped(self, task: asyncio.Task) -> None:
+        if not task.cancelled():
+            task.exception()  # taken, else asyncio complains of it
+        self._ended()
 
     async def _all_stopped(self, _: PipelineWorker, question: TypedFrame) -> None:
         """Any sooner, the question would stand before the words that it interrupts."""
@@ -254,21 +231,6 @@ def make_face(avatar: Avatar) -> Face:
     if settings.use == "remote" and avatar.speech is not None:
         remote = RemoteMouth(settings, avatar.speech, avatar.speech_sha256)
     return Face(avatar.head, avatar.speech, remote=remote)
-
-
-def make_parts(avatar: Avatar) -> Parts:
-    """Loads the models of one session."""
-    turns, services = avatar.settings.turns, avatar.services
-    context = Context(avatar.persona, avatar.head, avatar.animation)
-    return Parts(
-        Ear(turns.pause),
-        EagerSmartTurn(
-            turns.pause, params=SmartTurnParams(stop_secs=turns.end_silence - turns.pause)
-        ),
-        services.recognition.make(context),
-        services.language.make(context),
-        services.voice.make(context),
-    )
 
 
 def aggregators(

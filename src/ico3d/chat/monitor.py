@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TextIO
 
+from loguru import logger
 from prometheus_client import (
     CONTENT_TYPE_LATEST,
     CollectorRegistry,
@@ -100,9 +101,16 @@ class Monitor:
         self._sessions.dec()
         self._ended.labels(why).inc()
 
-    def failed(self, where: str) -> None:
-        """Counts an error."""
+    def failed(self, where: str, cause: str = "") -> None:
+        """Counts an error, and tells whoever runs the server why it happened, where that is known.
+
+        Args:
+            where: Part of the conversation or of the server.
+            cause: Without a word that anybody said.
+        """
         self._errors.labels(where).inc()
+        if cause:
+            logger.error(f"{where} failed: {cause}")
 
     def turn(self, session: int, number: int, turn: Turn) -> None:
         """Counts a turn whose answer is over.
@@ -151,6 +159,6 @@ class Visitor:
         """A turn is over."""
         self._monitor.turn(self._number, next(self._turns), turn)
 
-    def failed(self, where: str) -> None:
-        """Something went wrong."""
-        self._monitor.failed(where)
+    def failed(self, where: str, cause: str) -> None:
+        """Something went wrong; `cause` holds no word that anybody said."""
+        self._monitor.failed(where, f"{cause} [session {self._number}]")

@@ -58,6 +58,11 @@ class Outbox:
         kept = [message for message in self._waiting if not _belongs(message, utterance)]
         self._waiting = deque(kept)
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether the connection is to end."""
+        return self._closed
+
     def close(self) -> None:
         """Ends the connection once everything has been read."""
         self._closed = True

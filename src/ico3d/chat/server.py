@@ -19,11 +19,10 @@ from ico3d.bundle.manifest import MANIFEST
 from ico3d.bundle.persona import Persona
 from ico3d.chat import protocol
 from ico3d.chat.connection import Connection
-from ico3d.chat.conversation import Avatar
 from ico3d.chat.face import open_face
 from ico3d.chat.guard import LOOPBACK, Guard
 from ico3d.chat.monitor import CONTENT_TYPE
-from ico3d.chat.protocol import Welcome
+from ico3d.chat.parts import Avatar
 from ico3d.chat.services import choose
 from ico3d.chat.services.offers import offers
 from ico3d.chat.sessions import Sessions
@@ -70,7 +69,8 @@ def make_app(
     """
     if avatar is not None:
         sessions = Sessions(avatar) if sessions is None else sessions
-        if host in LOOPBACK:  # the visitor is at home: it may cost money, and tells of the machine
+        sessions.at_home = host in LOOPBACK  # it may cost money, and tells of the machine
+        if sessions.at_home:
             sessions.offers = offers(avatar.settings, avatar.persona.voice)
 
     @contextlib.asynccontextmanager
@@ -89,7 +89,8 @@ def make_app(
     @app.get("/bundle/{name:path}")
     async def bundle_file(name: str, request: Request) -> Response:
         if name == MANIFEST and avatar is not None:
-            return Response(shown_manifest(bundle, avatar.persona), headers=FRESH, media_type=JSON)
+            manifest = await asyncio.to_thread(shown_manifest, bundle, avatar.persona)
+            return Response(manifest, headers=FRESH, media_type=JSON)
         return await asyncio.to_thread(serve_file, bundle, name, request)
 
     if avatar is not None and sessions is not None:
@@ -101,12 +102,11 @@ def make_app(
 def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
     """The WebSocket, and figures of what happens on it."""
     notices = [] if avatar.speech else [STILL]
-    welcome = Welcome(protocol.VERSION, "-", False, avatar.services.described(), notices, None)
 
     @app.websocket("/ws")
     async def conversation(socket: WebSocket) -> None:
         await socket.accept()
-        await Connection(socket, sessions, welcome).run()
+        await Connection(socket, sessions, notices).run()
 
     @app.get("/metrics")
     async def metrics() -> Response:
@@ -185,6 +185,7 @@ def make_server(app: Guard) -> uvicorn.Server:
     threadpool_limits(1, user_api="blas")
     config = uvicorn.Config(
         app,
+        log_config=None,  # `operator_log` takes what it says
         log_level="warning",
         ws_max_size=protocol.MAX_BINARY_FRAME,
         ws_per_message_deflate=False,  # sound hardly shrinks, and a core has better things to do

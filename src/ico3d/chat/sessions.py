@@ -2,31 +2,40 @@
 
 import asyncio
 import secrets
+from collections.abc import Callable
 from dataclasses import replace
 
-from ico3d.chat.conversation import Avatar, Conversation
+from ico3d.chat.conversation import Conversation
 from ico3d.chat.freeing import give_back
 from ico3d.chat.monitor import Monitor, Visitor
 from ico3d.chat.page import Outbox, Page
+from ico3d.chat.parts import Avatar, Parts
 from ico3d.chat.protocol import RESUME_SECONDS, Error, Hello, Offer
 from ico3d.chat.services.offers import wished
+from ico3d.errors import ServiceError
 
 IDLE = "Nothing was said for {:g} min, so this conversation has ended."
+BROKEN_OFF = "The conversation broke off because of a fault in the server."
+FULL = "all places are taken: try again in a minute."
+LATE = "your place was kept for {:g} s and then given away, and all places are taken: " + (
+    "try again in a minute."
+)
+STARTING = 30.0  # s that a conversation may take to start: a model may be loaded, a server asked
 
 
 class FullError(Exception):
-    """There are as many visitors as the server takes."""
+    """There are as many visitors as the server takes; says so in a sentence for the page."""
 
 
 class Session:
     """One visitor: a page, a conversation, and nothing that another one could see."""
 
-    def __init__(self, avatar: Avatar, visitor: Visitor):
-        """A session whose conversation has not started."""
+    def __init__(self, avatar: Avatar, visitor: Visitor, ended: Callable[["Session"], None]):
+        """A session whose conversation has not started; `ended` is told if that breaks off."""
         self.id = secrets.token_urlsafe(16)
-        self.services = avatar.services
         self.page = Page()
-        self.conversation = Conversation(avatar, self.page, visitor)
+        self.conversation = Conversation(avatar, self.page, visitor, lambda: ended(self))
+        self.parts: Parts | None = None  # once it has started
         self.expiry: asyncio.TimerHandle | None = None  # while its page is away
         self.idle_check: asyncio.TimerHandle | None = None
 
@@ -39,12 +48,22 @@ class Sessions:
         avatar: Avatar,
         resume_seconds: float = RESUME_SECONDS,
         monitor: Monitor | None = None,
+        starting: float = STARTING,
     ):
-        """No visitors yet; `monitor` counts them."""
+        """No visitors yet.
+
+        Args:
+            avatar: What they share.
+            resume_seconds: How long a place is kept for a page whose connection dropped.
+            monitor: Counts visitors and errors.
+            starting: Seconds that a conversation may take to start.
+        """
         self.offers: list[Offer] = []
         """What visitors may choose from."""
+        self.at_home = False
+        """Whether visitors may know what is wrong with the server: it is their own machine."""
         self._avatar = avatar
-        self._resume_seconds = resume_seconds
+        self._resume_seconds, self._starting = resume_seconds, starting
         self.monitor = monitor or Monitor()
         self._open: dict[str, Session] = {}
         self._closing: set[asyncio.Task] = set()
@@ -60,36 +79,30 @@ class Sessions:
             The session and whether it is an old one.
 
         Raises:
-            FullError: If there is no room.
+            FullError: If there is no room: a place is kept even while its page is away.
+            Ico3dError: If the conversation does not start, or not in time.
         """
         session = self._open.get(hello.session or "")
-        if session is not None:
+        if session is not None and session.parts is not None:
             self._cancel_expiry(session)
             session.page.attach(outbox)
             session.page.replay(hello.last_index)  # before anything new can get in between
             session.conversation.release()
             return session, True
-        self._make_room()
-        session = Session(self._wished(hello), self.monitor.visitor())
-        self._open[session.id] = session
-        session.page.attach(outbox)
-        try:
-            await session.conversation.start()
-        except BaseException:
-            del self._open[session.id]
-            self.monitor.left("error")
-            raise
-        self._check_idle(session)
-        return session, False
+        if len(self._open) >= self._avatar.settings.max_sessions:
+            raise FullError(LATE.format(self._resume_seconds) if hello.session else FULL)
+        return await self._begin(hello, outbox), False
 
-    def leave(self, session: Session, outbox: Outbox) -> None:
-        """A connection closed; its session waits for the page to come back."""
-        if session.id in self._open and session.page.detach(outbox):
-            session.conversation.hold()
-            loop = asyncio.get_running_loop()
-            session.expiry = loop.call_later(
-                self._resume_seconds, self._close_soon, session, "left"
-            )
+    def leave(self, session: Session, outbox: Outbox, for_good: bool = False) -> None:
+        """A connection closed; unless that is for good its session waits for the page."""
+        if session.id not in self._open or not session.page.detach(outbox):
+            return
+        if for_good:
+            self._close_soon(session, "left")
+            return
+        session.conversation.hold()
+        loop = asyncio.get_running_loop()
+        session.expiry = loop.call_later(self._resume_seconds, self._close_soon, session, "left")
 
     async def close_all(self) -> None:
         """Ends every conversation."""
@@ -103,14 +116,28 @@ class Sessions:
         services = wished(avatar.services, avatar.settings, voices, hello.wishes, self.offers)
         return replace(avatar, services=services)
 
-    def _make_room(self) -> None:
-        if len(self._open) < self._avatar.settings.max_sessions:
-            return
-        for session in self._open.values():
-            if not session.page.is_attached:
-                self._close_soon(session, "room")
-                return
-        raise FullError
+    async def _begin(self, hello: Hello, outbox: Outbox) -> Session:
+        session = Session(self._wished(hello), self.monitor.visitor(), self._broke_off)
+        self._open[session.id] = session
+        session.page.attach(outbox)
+        try:
+            async with asyncio.timeout(self._starting):
+                session.parts = await session.conversation.start()
+        except BaseException as error:
+            self._close_soon(session, "error")
+            if isinstance(error, TimeoutError):
+                raise ServiceError(
+                    f"the services of the conversation were not ready within {self._starting:g} s."
+                ) from error
+            raise
+        self._check_idle(session)
+        return session
+
+    def _broke_off(self, session: Session) -> None:
+        """Its pipeline ended by itself: nothing that the visitor says would be answered."""
+        self.monitor.failed("pipeline", "it ended by itself, and the conversation with it")
+        session.page.end(Error(BROKEN_OFF, fatal=True, again=True))
+        self._close_soon(session, "broken")
 
     def _check_idle(self, session: Session) -> None:
         """Ends a session in which nothing happens; looks again when that may be so."""

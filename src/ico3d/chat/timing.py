@@ -24,6 +24,7 @@ from pipecat.services.llm_service import LLMService
 from pipecat.services.stt_service import STTService
 from pipecat.services.tts_service import TTSService
 
+from ico3d.chat.failures import cause_of
 from ico3d.chat.frames import SpeechFrame, TypedFrame, UtteranceEndFrame
 from ico3d.chat.protocol import SPEECH_RATE, Metrics
 
@@ -100,7 +101,7 @@ class TurnObserver(BaseObserver):
         now: Callable[[], float],
         report: Callable[[Metrics], None],
         done: Callable[[Turn], None],
-        failed: Callable[[str], None],
+        failed: Callable[[str, str], None],
     ):
         """An observer for one session.
 
@@ -108,7 +109,7 @@ class TurnObserver(BaseObserver):
             now: The pipeline's clock, in seconds.
             report: Takes what the page shall know.
             done: Takes every turn whose answer is over.
-            failed: Takes the part that reported an error.
+            failed: Takes the part that reported an error, and the cause.
         """
         super().__init__(observe_every_push=False)
         self._now, self._report, self._done, self._failed = now, report, done, failed
@@ -123,7 +124,7 @@ class TurnObserver(BaseObserver):
         """Looks at a frame where it enters the pipeline."""
         frame, at = data.frame, data.timestamp / 1e9
         if isinstance(frame, ErrorFrame):
-            self._failed(part_of(data.source))
+            self._failed(part_of(data.source), cause_of(frame))
         elif data.direction == FrameDirection.DOWNSTREAM:
             self._look(frame, at)
 

@@ -47,7 +47,7 @@ class BenchChat:
         from rich.console import Console
         from rich.progress import Progress
 
-        from ico3d.chat.commands import set_up_log
+        from ico3d.chat.operator_log import set_up_log
         from ico3d.common.files import write_atomic
         from ico3d.errors import SettingsError
 
@@ -107,7 +107,7 @@ class BenchSessions:
 
         from rich.console import Console
 
-        from ico3d.chat.commands import set_up_log
+        from ico3d.chat.operator_log import set_up_log
         from ico3d.common.files import write_atomic
 
         set_up_log(verbose=False)

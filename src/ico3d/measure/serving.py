@@ -82,7 +82,7 @@ def main(bundle: str, script: str, turns: str, sessions: str) -> None:
     """Serves with services of set delays until it is ended."""
     from ico3d.bundle.format import Bundle
     from ico3d.chat import server
-    from ico3d.chat.commands import set_up_log
+    from ico3d.chat.operator_log import set_up_log
 
     set_up_log(verbose=False)
     opened = Bundle.open(Path(bundle))

@@ -93,7 +93,7 @@ export class Connection {
   restart(wishes: Record<string, string>): void {
     Object.assign(this.wishes, wishes);
     this.forget();
-    this.socket?.close();
+    this.socket?.close(1000); // on purpose: the server gives the place away at once
   }
 
   private receive(frame: string | ArrayBuffer): void {

@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 import tyro
 
 from ico3d.bundle import packaged
-from ico3d.chat.commands import set_up_log
 from ico3d.chat.modules.limits import Limits
+from ico3d.chat.operator_log import set_up_log
 from ico3d.errors import BundleError, SettingsError
 
 LOOPBACK = ("127.0.0.1", "::1", "localhost")

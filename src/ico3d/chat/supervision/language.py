@@ -90,12 +90,10 @@ class AnswerGuard(FrameProcessor):
             self._start_timer()
 
     async def _language_failed(self, _: FrameProcessor, error: ErrorFrame) -> None:
-        logger.error(f"language failed: {error.error}")
         # a summary is made beside the answer, which does without it
         self._broken = self._broken or "summar" not in error.error
 
     async def _recognition_failed(self, _: FrameProcessor, error: ErrorFrame) -> None:
-        logger.error(f"recognition failed: {error.error}")
         if not self._answering:
             await self._say("recognition")
 

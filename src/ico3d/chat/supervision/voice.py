@@ -11,7 +11,9 @@ from collections.abc import AsyncGenerator, Callable
 import numpy as np
 from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
 from pipecat.services.tts_service import TTSService
+from pipecat.utils.errors import ErrorCategory
 
+from ico3d.chat.failures import ReportedError
 from ico3d.chat.protocol import SPEECH_RATE
 from ico3d.chat.services.voice import espeak
 from ico3d.chat.supervision.apologies import apology, espeak_voice
@@ -23,6 +25,10 @@ READING = 15.0  # letters per second that a reader takes in
 SHORTEST, LONGEST = 1.0, 12.0  # s that a caption without a voice stays
 
 Speak = Callable[[str, str], AsyncGenerator[Frame | None, None]]
+
+
+class LateError(ServiceError):
+    """A voice takes too long."""
 
 
 class EnduringVoice:
@@ -48,7 +54,7 @@ class EnduringVoice:
         if context_id == self._lost:
             yield _sound(silence(text), context_id)
             return
-        heard, reason = False, ""
+        heard, reason = False, Exception()
         for _ in range(TRIES):
             try:
                 async with contextlib.aclosing(self._patient(text, context_id)) as sound:
@@ -57,11 +63,12 @@ class EnduringVoice:
                         yield frame
                 return
             except Exception as error:
-                reason = str(error)
-                if heard or isinstance(error, TimeoutError):
+                reason = error
+                if heard or isinstance(error, LateError):
                     break  # half a sentence is not said twice, and nobody waits twice
         self._lost = context_id
-        yield ErrorFrame(f"the voice failed: {reason}")
+        unknown = ErrorCategory.UNKNOWN  # others would end the voice for good
+        yield ErrorFrame(f"the voice failed: {reason}", exception=reason, category=unknown)
         yield _sound(await asyncio.to_thread(self._apology, text), context_id)
 
     async def _patient(self, text: str, context_id: str) -> AsyncGenerator[Frame | None, None]:
@@ -69,7 +76,7 @@ class EnduringVoice:
 
         Raises:
             ServiceError: If the voice reports an error or gives no sound.
-            TimeoutError: If it takes too long.
+            LateError: If it takes too long.
         """
         silent = True
         async with contextlib.aclosing(self._speak(text, context_id)) as sound:
@@ -80,9 +87,9 @@ class EnduringVoice:
                 except StopAsyncIteration:
                     break
                 except TimeoutError:
-                    raise TimeoutError(f"it gave no sound for {self._patience:g} s") from None
+                    raise LateError(f"it gave no sound for {self._patience:g} s") from None
                 if isinstance(frame, ErrorFrame):
-                    raise ServiceError(frame.error)
+                    raise ReportedError(frame.error) from frame.exception
                 # without a frame, the sound comes later and by another way
                 silent = silent and frame is not None and not isinstance(frame, TTSAudioRawFrame)
                 yield frame

@@ -9,6 +9,8 @@ from pipecat.adapters.llm.services.open_ai_adapter import OpenAILLMInvocationPar
 from pipecat.processors.aggregators.llm_context import LLMContext
 from pipecat.services.openai.llm import OpenAILLMService
 
+from ico3d.chat.failures import cause
+
 MOST_ROUNDS = 4
 """How often in a turn a model may call functions before it must speak."""
 
@@ -52,7 +54,7 @@ class CompatibleModel(OpenAILLMService):
         except APIStatusError as error:
             if not self._functions_allowed or "tool" not in str(error).lower():
                 raise
-            logger.warning(f"{self}: goes on without functions, the server refuses them: {error}")
+            logger.warning(f"language goes on without functions, refused by {cause(error)}")
             self._functions_allowed = False
             return await super().get_chat_completions(context)
 

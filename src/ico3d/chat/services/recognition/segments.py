@@ -13,6 +13,7 @@ from pipecat.frames.frames import (
 )
 from pipecat.processors.frame_processor import FrameDirection
 from pipecat.services.stt_service import SegmentedSTTService, STTService
+from pipecat.utils.errors import ErrorCategory
 from pipecat.utils.time import time_now_iso8601
 
 BLANK = " "
@@ -58,7 +59,9 @@ class Segments(SegmentedSTTService):
             async for frame in super().run_stt(audio):  # type: ignore[reportAbstractUsage]
                 frames.append(frame)
         except Exception as error:  # without it, for pipecat would give up the service for good
-            frames.append(ErrorFrame(f"the visitor's speech was not recognised: {error}"))
+            sentence = f"the visitor's speech was not recognised: {error}"
+            unknown = ErrorCategory.UNKNOWN  # none that would end the service, either
+            frames.append(ErrorFrame(sentence, exception=error, category=unknown))
         finally:
             await self.cancel_task(busy)
             self._unanswered -= 1

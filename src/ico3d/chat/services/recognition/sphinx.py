@@ -142,7 +142,7 @@ class SphinxRecognition(STTService):
             return await self._decoder.decode(self._leveller.apply(audio))
         except DecoderLostError as error:
             self._lost = audio is not None  # at an end the next utterance begins anew anyway
-            await self.push_error(f"the visitor's speech was not recognised: {error}.")
+            await self.push_error("the visitor's speech was not recognised", exception=error)
             return ""
 
     async def _tell(self, text: str, final: bool) -> None:

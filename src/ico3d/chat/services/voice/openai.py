@@ -86,7 +86,7 @@ class ServerVoice(Prompt, OpenAITTSService):
                     yield frame
         except Exception as error:
             where = self._client.base_url
-            yield ErrorFrame(f"the voice server {where} did not speak '{text}': {error}")
+            yield ErrorFrame(f"the voice server {where} did not speak: {error}", exception=error)
         if rest := await self._resampler.flush():
             yield TTSAudioRawFrame(rest, SPEECH_RATE, 1, context_id=context_id)
 

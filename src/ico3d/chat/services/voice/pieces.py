@@ -62,7 +62,7 @@ class PieceVoice(Prompt):
         try:
             pcm = await asyncio.to_thread(self._speak, text)
         except Exception as error:
-            yield ErrorFrame(f"'{text}' could not be spoken: {error}")
+            yield ErrorFrame(f"a sentence could not be spoken: {error}", exception=error)
             return
         yield TTSAudioRawFrame(pcm.tobytes(), SPEECH_RATE, 1, context_id=context_id)
 

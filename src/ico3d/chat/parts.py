@@ -1,0 +1,121 @@
+"""What conversations are made of: what all share, and what each has for itself.
+
+Services are looked up and made here and nowhere else: it may take seconds, for servers are asked
+and models loaded, so while visitors talk it happens in threads of its own.
+"""
+
+import asyncio
+import contextlib
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+from pipecat.audio.turn.smart_turn.base_smart_turn import SmartTurnParams
+from pipecat.processors.frame_processor import FrameProcessor
+
+from ico3d.bundle.animation import Animation
+from ico3d.bundle.manifest import HeadInfo, Persona
+from ico3d.chat import protocol
+from ico3d.chat.services import Chosen, Service
+from ico3d.chat.services.provider import Context
+from ico3d.chat.settings import ChatSettings
+from ico3d.chat.turns.detector import Ear
+from ico3d.chat.turns.eager import EagerSmartTurn
+from ico3d.chat.workers import Workers
+from ico3d.errors import Ico3dError, ServiceError
+from ico3d.speech.runtime import SpeechModel
+
+AT_ONCE = 8  # conversations whose parts are made side by side
+
+_threads = ThreadPoolExecutor(AT_ONCE, "making")  # the loop's own have conversations to serve
+
+
+@dataclass(frozen=True)
+class Avatar:
+    """What all sessions of a server share, read only.
+
+    Attributes:
+        head: The head's sizes.
+        speech: Sound to mouth; null for heads driven by blendshapes.
+        persona: Who the avatar is.
+        services: Who listens, thinks and speaks.
+        settings: Services and timing.
+        animation: How its body moves; None for a head alone.
+        speech_sha256: Of the file of `speech`, by which a remote module knows that it is its own.
+        workers: Threads in which faces are made.
+    """
+
+    head: HeadInfo
+    speech: SpeechModel | None
+    persona: Persona
+    services: Chosen
+    settings: ChatSettings
+    animation: Animation | None
+    speech_sha256: str = ""
+    workers: Workers = field(default_factory=Workers)
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What takes a while to make, and what takes a while to find out.
+
+    Attributes:
+        ear: Hears voices.
+        turn: Tells whether a turn is over.
+        recognition: Speech to text.
+        language: Question to answer.
+        voice: Text to speech.
+        services: Their names, as the page is told.
+        dictation: How the browser is to recognise speech; None where the server does.
+    """
+
+    ear: Ear
+    turn: EagerSmartTurn
+    recognition: FrameProcessor
+    language: FrameProcessor
+    voice: FrameProcessor
+    services: protocol.Services
+    dictation: protocol.Dictation | None
+
+
+def make_parts(avatar: Avatar) -> Parts:
+    """Makes what one session has for itself; loads what it shares with others.
+
+    Raises:
+        Ico3dError: If a service cannot be made, whatever the reason.
+    """
+    turns, services = avatar.settings.turns, avatar.services
+    context = Context(avatar.persona, avatar.head, avatar.animation)
+    params = SmartTurnParams(stop_secs=turns.end_silence - turns.pause)
+    with _explained("turn-taking"):
+        ear, turn = Ear(turns.pause), EagerSmartTurn(turns.pause, params=params)
+    made = {}
+    for kind in ("recognition", "language", "voice"):
+        service: Service = getattr(services, kind)
+        with _explained(f"{kind} with {service.provider.title}"):
+            made[kind] = service.make(context)
+    with _explained("a service"):
+        return Parts(
+            ear, turn, **made, services=services.described(), dictation=services.dictation()
+        )
+
+
+async def make_aside(avatar: Avatar) -> Parts:
+    """`make_parts` beside the event loop.
+
+    Raises:
+        Ico3dError: If a service cannot be made, whatever the reason.
+    """
+    return await asyncio.get_running_loop().run_in_executor(_threads, make_parts, avatar)
+
+
+@contextlib.contextmanager
+def _explained(what: str) -> Iterator[None]:
+    """Whatever goes wrong within becomes one sentence that names what it is about."""
+    try:
+        yield
+    except Ico3dError:
+        raise
+    except Exception as error:
+        said = str(error).strip().partition("\n")[0].rstrip(".")
+        raise ServiceError(f"{what} cannot start ({type(error).__name__}: {said}).") from error

@@ -1,0 +1,229 @@
+"""Whoever runs a server learns of every failure, and of no word that was said."""
+
+import asyncio
+import contextlib
+import io
+import logging
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from fastapi import FastAPI, Request
+from fastapi.responses import JSONResponse, Response
+from loguru import logger
+from openai import AuthenticationError
+from pipecat.frames.frames import ErrorFrame
+
+from ico3d.chat.failures import ReportedError, cause, cause_of
+from ico3d.chat.operator_log import OperatorLog, StandardHandler, constant_part
+from ico3d.chat.protocol import Answer, Speech, State, Text
+from ico3d.errors import ServiceError
+from ico3d.measure.page import open_page
+
+from .modules.serving import serving
+from .scripted_server import chunk
+
+MARKER = "zanzibar"
+SETTINGS = """
+[recognition]
+use = "openai"
+url = "{url}v1"
+[language]
+use = "openai"
+url = "{url}v1"
+model = "any"
+[voice]
+use = "openai"
+url = "{url}v1"
+[patience]
+language = 20.0
+voice = 20.0
+"""
+
+
+def echoing():
+    """A server of all three kinds that puts what it was asked into what it refuses."""
+    app, languages = FastAPI(), iter([None, 401])
+
+    def refusal(status, said):
+        return JSONResponse(
+            {"error": {"message": f"refused: {said}", "code": "no_such_key"}}, status
+        )
+
+    @app.post("/v1/chat/completions")
+    async def chat(request: Request):
+        body = await request.json()
+        if status := next(languages):
+            return refusal(status, body["messages"])
+        lines = [chunk({"content": f"You said {MARKER}."}), chunk({}, "stop"), "data: [DONE]\n\n"]
+        return Response("".join(lines), media_type="text/event-stream")
+
+    @app.post("/v1/audio/speech")
+    async def speech(request: Request):
+        body = await request.json()
+        if MARKER in body["input"]:
+            return refusal(400, body["input"])
+        return Response(np.zeros(12000, np.int16).tobytes(), media_type="audio/pcm")
+
+    @app.post("/v1/audio/transcriptions")
+    async def transcription():
+        return refusal(403, f"{MARKER} is what I heard")
+
+    return app
+
+
+@contextlib.asynccontextmanager
+async def served_by_command(bundle_path, settings):
+    """Yields the URL of `ico3d serve`, and a list that its standard error is in afterwards."""
+    command = [sys.executable, "-m", "ico3d.cli", "serve", str(bundle_path), "--port", "0"]
+    command += ["--settings", str(settings)]
+    process = await asyncio.create_subprocess_exec(
+        *command, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    errors = []
+    try:
+        line = (await process.stdout.readline()).decode()
+        yield line.split()[3], errors
+    finally:
+        if process.returncode is None:
+            process.terminate()
+        errors.extend((await process.communicate())[1].decode().splitlines())
+
+
+async def asked(page, text):
+    since, before = len(page.log), page.messages(Speech)[-1].utterance
+    await page.send(Text(text))
+    await page.wait(Speech, since, where=lambda m: m.utterance > before, timeout=40)
+
+
+async def test_each_failure_is_one_line_without_what_was_said(bundle_path, tmp_path, question):
+    async with serving(echoing()) as url:
+        settings = tmp_path / "settings.toml"
+        settings.write_text(SETTINGS.format(url=url))
+        async with served_by_command(bundle_path, settings) as (address, lines):
+            page, _ = await open_page(address)
+            await page.wait(Speech, timeout=40)
+            await asked(page, f"Where is {MARKER}?")  # the answer cannot be spoken
+            await asked(page, f"Is {MARKER} far?")  # there is no answer
+            await page.wait(State, len(page.log), where=lambda m: m.state == "idle")
+            since = len(page.log)
+            page.say(question)  # it is not understood
+            await page.wait(Answer, since, timeout=40)
+            await page.close()
+    log = "\n".join(lines)
+    assert MARKER not in log, log
+    for part, why in (("voice", "400"), ("language", "401"), ("recognition", "403")):
+        told = [line for line in lines if f"{part} failed: " in line]
+        assert len(told) == 1 and why in told[0], log
+    assert len([line for line in lines if re.match(r"\d\d:", line)]) == 3, log
+
+
+def records(log):
+    return [re.sub(r"^\S+ ", "", line) for line in log.getvalue().splitlines()]
+
+
+@pytest.fixture
+def log():
+    """What is written, and the clock."""
+    file, clock = io.StringIO(), [0.0]
+    log = OperatorLog(file, lambda: clock[0])
+    number = logger.add(log.take, level="WARNING", format="{message}")
+    handler = StandardHandler(log)
+    logging.getLogger("someone").addHandler(handler)
+    yield log, file, clock
+    logging.getLogger("someone").removeHandler(handler)
+    logger.remove(number)
+
+
+def test_of_what_others_log_the_constant_part_is_shown(log):
+    _, file, _ = log
+    said = "my secret"
+    logger.warning(f"Empty answer to {said}")
+    logger.error(
+        f"{said}: got {len(said)} words, "
+        f"too many"
+    )  # fmt: skip
+    logger.error(said)
+    logger.info("not shown")
+    someone = logging.getLogger("someone")
+    someone.warning("cannot bind %s", said)
+    try:
+        raise ValueError(said)
+    except ValueError:
+        someone.exception(f"in {said}")
+        logger.exception("it broke")
+    here = f"{__name__}.test_of_what_others_log_the_constant_part_is_shown"
+    assert records(file) == [
+        f"WARNING: {here}: Empty answer to …",
+        f"ERROR: {here}: …: got … words, too many",
+        f"ERROR: {here}",
+        "WARNING: someone: cannot bind %s",
+        "ERROR: someone: in …: ValueError",
+        f"ERROR: {here}: it broke: ValueError",
+    ]
+
+
+def test_lines_that_repeat_themselves_are_counted(log):
+    written, file, clock = log
+    for _ in range(1000):
+        written.write("ERROR", "the same")
+        clock[0] += 0.05
+    written.write("ERROR", "another")
+    assert records(file) == ["ERROR: the same", "ERROR: another"]
+    clock[0] += 60
+    written.write("ERROR", "the same")
+    assert records(file)[2:] == ["ERROR: the same (999 more of these since)"]
+
+
+def test_source_that_is_not_there_says_nothing():
+    assert constant_part("/nowhere/at_all.py", 3) == ""
+
+
+class Refusal(AuthenticationError):
+    """As a client raises it."""
+
+    def __init__(self, said):
+        Exception.__init__(self, f"Error code: 401 - {said}")
+        self.status_code, self.code = 401, "invalid_api_key"
+
+
+def chained(error, behind):
+    try:
+        try:
+            raise behind
+        except type(behind) as known:
+            raise error from known
+    except type(error) as raised:
+        return raised
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (Refusal("my secret"), "401 Refusal (invalid_api_key)"),
+        (ConnectionRefusedError(111, "my secret"), "ConnectionRefusedError (111)"),
+        (ServiceError("it gave no sound."), "it gave no sound"),
+        (chained(ReportedError("my secret"), Refusal("x")), "401 Refusal (invalid_api_key)"),
+        (
+            chained(ConnectionError("my secret"), OSError(5, "x")),
+            "ConnectionError from OSError (5)",
+        ),
+    ],
+)
+def test_a_cause_is_kinds_and_numbers(error, told):
+    assert cause(error) == told
+    assert cause_of(ErrorFrame("my secret", exception=error)) == told
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("Error code: 429 - {'message': 'my secret'}", "429"),
+        ("Error getting audio (status: 503, error: my secret)", "503"),
+    ],
+)
+def test_a_status_is_found_where_the_exception_is_lost(text, told):
+    assert cause_of(ErrorFrame(text)) == told
+    assert "secret" not in cause_of(ErrorFrame("my secret of 401 nights"))
