@@ -42,9 +42,10 @@ test('a network that stalls while the microphone is open brings no old sound, an
   const now = () => page.evaluate(() => performance.now());
   line.stall();
   const stalled = await now();
-  await page.waitForTimeout(STALL);
-  expect(await page.locator('#state').textContent()).toBe('Connecting …');
+  await page.locator('#notices p').waitFor();
   expect(await page.locator('#notices').textContent()).toBe('The network has stalled: what you say now may not be heard.');
+  await page.waitForTimeout(STALL - ((await now()) - stalled));
+  expect(await page.locator('#state').textContent()).toBe('Connecting …');
   const flowed = await now();
   line.flow();
   const understood = await until(
