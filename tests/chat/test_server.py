@@ -9,6 +9,7 @@ import sys
 from contextlib import closing
 
 import httpx
+import numpy as np
 import pytest
 from fastapi import FastAPI
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -20,7 +21,7 @@ from ico3d.chat import protocol
 from ico3d.chat.codec import decode_server, encode
 from ico3d.chat.face import open_face
 from ico3d.chat.guard import is_own
-from ico3d.chat.protocol import Error, Hello, Speech, Text, Welcome
+from ico3d.chat.protocol import Ack, Audio, Error, Hello, Speech, Text, Welcome
 from ico3d.chat.server import make_server
 from ico3d.cli import main
 from ico3d.errors import BundleError, SettingsError
@@ -204,6 +205,20 @@ async def test_garbage_and_floods_end_their_connection_only(served):
     _, speech = await good.wait(Speech, since)
     assert speech.utterance == 1
     await good.close()
+
+
+async def test_every_binary_frame_is_acknowledged_also_a_refused_one(served):
+    url, _ = served
+    page, _ = await open_page(url, microphone=False)
+    second = np.zeros(16_000, np.int16)
+    for at in range(3):
+        await page.send(Audio(16_000 * at, second))
+    await page.send(Text("who are you"))
+    await page.send_frame(b"no frame of ours")
+    await page.wait(Ack, where=lambda ack: ack.frames == 4)
+    assert [ack.frames for ack in page.messages(Ack)] == [1, 2, 3, 4]
+    assert page.messages(Error)
+    await page.close()
 
 
 def test_serve_prints_where_it_is_and_ends_on_interrupt(bundle_path, tmp_path):

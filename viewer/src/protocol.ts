@@ -1,6 +1,6 @@
 // Written by `python -m ico3d.chat.protocol_typescript` from src/ico3d/chat/protocol.py: edit that.
 
-export const VERSION = 3;
+export const VERSION = 4;
 export const MICROPHONE_RATE = 16000; // Hz
 export const MICROPHONE_CHUNK = 512; // samples of a message
 export const SPEECH_RATE = 24000; // Hz
@@ -66,7 +66,7 @@ export interface HelloMessage {
 /** Sound from the microphone (binary). */
 export interface AudioMessage {
   type: "audio";
-  /** Index of the first sample since the microphone opened. */
+  /** Index of the first sample since the microphone opened; where it jumps, the page left sound out that the network did not carry. */
   sample: number;
   /** (n,) int16 at 16 kHz, at most 1 s. */
   pcm: Int16Array;
@@ -143,6 +143,13 @@ export interface WelcomeMessage {
   dictation: Dictation | null;
   /** Services to choose from; none where strangers may be talking. */
   offers: Offer[];
+}
+
+/** Binary frames of this connection have arrived, whatever became of them. Neither page nor browser can tell otherwise what a network still holds. A page sends sound only a little ahead of what is acknowledged: after a stall no old sound arrives. */
+export interface AckMessage {
+  type: "ack";
+  /** How many so far. */
+  frames: number;
 }
 
 /** What the avatar does now. */
@@ -260,6 +267,7 @@ export type ClientMessage =
 
 export type ServerMessage =
   | WelcomeMessage
+  | AckMessage
   | StateMessage
   | TranscriptMessage
   | AnswerMessage
@@ -272,7 +280,7 @@ export type ServerMessage =
   | MetricsMessage
   | ErrorMessage;
 
-const SERVER_TYPES = ["welcome", "state", "transcript", "answer", "speech", "timeline", "end", "stop", "pause", "resume", "metrics", "error"];
+const SERVER_TYPES = ["welcome", "ack", "state", "transcript", "answer", "speech", "timeline", "end", "stop", "pause", "resume", "metrics", "error"];
 
 const TENSORS: Record<string, readonly Tensor[]> = {
   audio: [["pcm", "int16"]],

@@ -29,6 +29,7 @@ export interface Record {
   received: Received[];
   loudness: Loudness[];
   sockets: WebSocket[]; // only in the page
+  streams: MediaStream[]; // of microphones; only in the page
 }
 
 declare global {
@@ -40,7 +41,7 @@ declare global {
 /** Watches the wire of every page that opens from now on. */
 export async function recordWire(context: BrowserContext): Promise<void> {
   await context.addInitScript(() => {
-    const record: Record = { microphone: [], received: [], loudness: [], sockets: [] };
+    const record: Record = { microphone: [], received: [], loudness: [], sockets: [], streams: [] };
     window.record = record;
     const header = (frame: ArrayBuffer) => {
       const length = new DataView(frame).getUint32(0, true);
@@ -57,6 +58,12 @@ export async function recordWire(context: BrowserContext): Promise<void> {
         record.microphone.push({ sample, at: performance.now(), level: Math.sqrt(power), playing, position, underrun });
       }
       send.call(this, data);
+    };
+    const ask = navigator.mediaDevices.getUserMedia.bind(navigator.mediaDevices);
+    navigator.mediaDevices.getUserMedia = async (constraints) => {
+      const stream = await ask(constraints);
+      record.streams.push(stream);
+      return stream;
     };
     window.WebSocket = class extends WebSocket {
       constructor(url: string | URL) {
@@ -88,7 +95,12 @@ export function recordLoudness(page: Page): Promise<void> {
 
 /** Everything recorded so far. */
 export async function readRecord(page: Page): Promise<Record> {
-  return page.evaluate(() => ({ ...window.record!, sockets: [] }));
+  return page.evaluate(() => ({ ...window.record!, sockets: [], streams: [] }));
+}
+
+/** The state of each microphone that the browser gave: it shows that it records while one is `live`. */
+export function microphones(page: Page): Promise<string[]> {
+  return page.evaluate(() => window.record!.streams.flatMap((stream) => stream.getTracks().map(({ readyState }) => readyState)));
 }
 
 /** Stops drawing: software rendering takes its share of the processor from recogniser and voice. */

@@ -12,6 +12,7 @@ from ico3d.chat.failures import cause
 from ico3d.chat.limits import Inlet, Limits
 from ico3d.chat.page import Outbox
 from ico3d.chat.protocol import (
+    Ack,
     Audio,
     ClientMessage,
     Clock,
@@ -133,8 +134,12 @@ class Connection:
             await session.conversation.greet()
 
     async def _read(self, session: Session) -> None:
+        binary = 0
         while True:
             frame = await self._receive()
+            if isinstance(frame, bytes):
+                binary += 1
+                self._outbox.put(Ack(binary))
             try:
                 self._limits.check_frame(frame)
                 message = decode_client(frame)

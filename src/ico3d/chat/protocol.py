@@ -21,7 +21,7 @@ from ico3d.chat.marks import (
     Tensor,
 )
 
-VERSION = 3
+VERSION = 4
 MICROPHONE_RATE = 16_000  # Hz, PCM16 mono from the page
 MICROPHONE_CHUNK = 512  # samples of a message: what Silero judges at once, so that none waits
 SPEECH_RATE = 24_000  # Hz, PCM16 mono to the page
@@ -57,7 +57,8 @@ class Audio:
     """Sound from the microphone (binary).
 
     Attributes:
-        sample: Index of the first sample since the microphone opened.
+        sample: Index of the first sample since the microphone opened; where it jumps, the page
+            left sound out that the network did not carry.
         pcm: (n,) int16 at 16 kHz, at most 1 s.
         playing: The utterance that left the loudspeaker when the last sample was recorded; null
             in silence.
@@ -230,6 +231,20 @@ class Welcome:
 
 
 @dataclass(frozen=True)
+class Ack:
+    """Binary frames of this connection have arrived, whatever became of them.
+
+    Neither page nor browser can tell otherwise what a network still holds. A page sends sound
+    only a little ahead of what is acknowledged: after a stall no old sound arrives.
+
+    Attributes:
+        frames: How many so far.
+    """
+
+    frames: Count
+
+
+@dataclass(frozen=True)
 class State:
     """What the avatar does now.
 
@@ -385,6 +400,7 @@ class Error:
 ClientMessage = Hello | Audio | Text | Interrupt | Clock | Talk | Heard | Deaf
 ServerMessage = (
     Welcome
+    | Ack
     | State
     | Transcript
     | Answer

@@ -1,84 +1,73 @@
 import { PageError } from '../errors.ts';
-import type { Chunk } from './mic-worklet.ts';
-import workletUrl from './mic-worklet.ts?worker&url';
+import { Recording, type OnChunk } from './recording.ts';
 
-/** Takes a chunk and when its last sample was recorded, ms on the performance clock. */
-type OnChunk = (pcm: Int16Array, end: number) => void;
-
-/** The visitor's microphone as PCM16 at 16 kHz in chunks. */
+/**
+ * The visitor's microphone as PCM16 at 16 kHz in chunks.
+ *
+ * It is open exactly while sound comes from it: opening ends with the first sound, and whatever
+ * ends the sound closes it and is told.
+ */
 export class Microphone {
-  private context: AudioContext | null = null;
-  private stream: MediaStream | null = null;
+  private recording: Recording | null = null; // open
+  private starting: Promise<boolean> | null = null;
+  private stopping = new AbortController(); // of the latest start
   private readonly onChunk: OnChunk;
   private readonly onLost: (error: PageError) => void;
 
-  /** @param onLost the device went away */
+  /** @param onLost an open microphone has closed by itself */
   constructor(onChunk: OnChunk, onLost: (error: PageError) => void) {
     this.onChunk = onChunk;
     this.onLost = onLost;
   }
 
   get open(): boolean {
-    return this.stream !== null;
+    return this.recording !== null;
   }
 
   /** What it records; null while it is closed. */
   get track(): MediaStreamTrack | null {
-    return this.stream?.getAudioTracks()[0] ?? null;
+    return this.recording?.track ?? null;
   }
 
   /**
-   * Asks for the microphone and starts it.
+   * Asks for the microphone and opens it; whoever starts it meanwhile waits for the same.
    *
+   * @returns whether it is open: not if it was stopped meanwhile
    * @throws PageError saying what the visitor can do about it
    */
-  async start(): Promise<void> {
-    this.stream = await askForMicrophone();
-    this.stream.getAudioTracks()[0]!.onended = () => {
-      this.stop();
-      this.onLost(new PageError('The microphone was disconnected; you can type instead.'));
-    };
-    // Its own context: some browsers refuse a source whose rate differs from the context's.
-    const context = new AudioContext();
-    this.context = context;
-    await context.audioWorklet.addModule(workletUrl);
-    const source = new MediaStreamAudioSourceNode(context, { mediaStream: this.stream });
-    const node = new AudioWorkletNode(context, 'microphone', {
-      channelCount: 1,
-      channelCountMode: 'explicit',
-    });
-    node.port.onmessage = ({ data }: MessageEvent<Chunk>) => {
-      const age = Math.max(0, context.currentTime - data.end); // while this thread was busy
-      this.onChunk(data.pcm, performance.now() - 1000 * age);
-    };
-    // It outputs silence; Chromium leaves out blocks of a node that leads nowhere when it is busy.
-    source.connect(node).connect(context.destination);
-    await context.resume();
+  start(): Promise<boolean> {
+    if (this.recording) return Promise.resolve(true);
+    if (!this.starting) {
+      this.stopping = new AbortController();
+      this.starting = this.begin(this.stopping.signal);
+    }
+    return this.starting;
   }
 
   stop(): void {
-    this.stream?.getTracks().forEach((track) => track.stop());
-    this.stream = null;
-    void this.context?.close();
-    this.context = null;
+    this.stopping.abort();
+    this.starting = null;
+    this.recording = null;
   }
-}
 
-async function askForMicrophone(): Promise<MediaStream> {
-  if (!navigator.mediaDevices) {
-    throw new PageError('Browsers give the microphone only to HTTPS pages and localhost; you can type instead.');
-  }
-  try {
-    return await navigator.mediaDevices.getUserMedia({
-      audio: { channelCount: 1, echoCancellation: true, noiseSuppression: true, autoGainControl: true },
+  private async begin(stopped: AbortSignal): Promise<boolean> {
+    const cancelled = new Promise<never>((_, reject) => {
+      stopped.addEventListener('abort', () => reject(stopped.reason)); // a browser that asks may wait for ever
     });
-  } catch (error) {
-    throw new PageError(REASONS[(error as DOMException).name] ?? 'The microphone could not be opened; you can type instead.');
+    try {
+      const opened = Recording.open(this.onChunk, (error) => this.lose(error), stopped);
+      const recording = await Promise.race([opened, cancelled]);
+      if (!stopped.aborted) this.recording = recording;
+    } catch (error) {
+      if (!stopped.aborted) throw error;
+    } finally {
+      if (!stopped.aborted) this.starting = null;
+    }
+    return !stopped.aborted;
+  }
+
+  private lose(error: PageError): void {
+    this.stop();
+    this.onLost(error);
   }
 }
-
-const REASONS: Record<string, string> = {
-  NotAllowedError: 'The microphone is blocked for this page: allow it in the address bar, or type instead.',
-  NotFoundError: 'No microphone was found; plug one in, or type instead.',
-  NotReadableError: 'Another program holds the microphone; close it there, or type instead.',
-};

@@ -1,25 +1,46 @@
-import { PageError } from '../errors.ts';
 import {
   decode,
   encode,
+  RESUME_SECONDS,
   VERSION,
   type ClientMessage,
+  type ErrorMessage,
   type ServerMessage,
   type WelcomeMessage,
 } from '../protocol.ts';
+import { SoundQueue } from './sound-queue.ts';
 
-const FIRST_RETRY = 300; // ms
-const LONGEST_RETRY = 5000;
+const FIRST_RETRY = 300; // ms; the next waits are twice as long each
+const LONGEST_RETRY = 5000; // while the session may still be resumed
+const FIRST_VISIT = 5000; // ms until a full server is asked again
+const LONGEST_VISIT = 60_000;
+const FULL = 1013; // close code
+const UNREACHABLE = 'The connection to the server was lost.';
+
+/** The session is over. */
+export interface Ending {
+  sentence: string;
+  /** Whether a new session may succeed; else only loading the page anew helps. */
+  again: boolean;
+  /** When a new one is tried without being asked for, ms from now; null for never. */
+  wait: number | null;
+}
 
 /** What a connection tells its owner. */
 export interface ConnectionEvents {
   message(message: ServerMessage): void;
-  /** The line is up; `resumed` tells whether the session of before goes on. */
-  welcome(message: WelcomeMessage): void;
-  /** The line is down; it will be tried again. */
+  /**
+   * The line is up.
+   *
+   * @param message `resumed` tells whether the session of before goes on
+   * @param replaced there was one, which the server no longer has
+   */
+  welcome(message: WelcomeMessage, replaced: boolean): void;
+  /** The line is down; the session is resumed as soon as it is up again. */
   lost(): void;
-  /** The line is down for good. */
-  failed(error: PageError): void;
+  /** The line loses sound, or carries it again. */
+  stalled(stalls: boolean): void;
+  ended(ending: Ending): void;
 }
 
 /** One WebSocket that comes back: after a drop it resumes its session where it broke off. */
@@ -28,17 +49,27 @@ export class Connection {
   private session: string | null = null;
   private lastIndex = -1;
   private wishes: Record<string, string> = {};
-  private retry = FIRST_RETRY;
+  private wait = 0; // before the latest retry, ms
+  private retry: ReturnType<typeof setTimeout> | undefined;
   private welcomed = false;
+  private lastUp: number | null = null; // or the first try; ms on the performance clock
+  private fatal: ErrorMessage | null = null; // the server's last word
+  private over = false; // the session is, and no other one has begun
+  private readonly sound: SoundQueue;
   private readonly url: string;
   private readonly events: ConnectionEvents;
 
   constructor(url: string, events: ConnectionEvents) {
     this.url = url;
     this.events = events;
+    this.sound = new SoundQueue((message) => this.socket!.send(encode(message)), events.stalled);
   }
 
+  /** Connects, unless it is trying to already. */
   open(): void {
+    clearTimeout(this.retry);
+    if (this.socket) return;
+    this.lastUp ??= performance.now();
     const socket = new WebSocket(this.url);
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => {
@@ -46,29 +77,30 @@ export class Connection {
       socket.send(encode({ type: 'hello', version: VERSION, session, last_index, wishes }));
     };
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(event.data);
-    socket.onclose = () => this.closed();
+    socket.onclose = ({ code }) => this.closed(code);
     this.socket = socket;
   }
 
   /** Sends if the line is up; false if it is not. */
   send(message: ClientMessage): boolean {
     if (!this.welcomed) return false;
-    this.socket!.send(encode(message));
+    if (message.type === 'audio' || message.type === 'talk') this.sound.push(message);
+    else this.socket!.send(encode(message));
     return true;
   }
 
   /** Leaves the session for a new one with other services, by kind. */
   restart(wishes: Record<string, string>): void {
     Object.assign(this.wishes, wishes);
-    this.session = null;
-    this.lastIndex = -1;
+    this.forget();
     this.socket?.close(1000); // on purpose: the server gives the place away at once
   }
 
   private receive(frame: string | ArrayBuffer): void {
     const message = decode(frame);
     if (message.type === 'welcome') this.welcome(message);
-    else if (message.type === 'error' && message.fatal) this.fail(new PageError(message.message));
+    else if (message.type === 'ack') this.sound.acknowledge(message.frames);
+    else if (message.type === 'error' && message.fatal) this.hangUp(message);
     else if (message.type !== 'speech') this.events.message(message);
     else if (message.index > this.lastIndex) {
       this.lastIndex = message.index; // a resume may repeat what is already here
@@ -78,28 +110,57 @@ export class Connection {
 
   private welcome(message: WelcomeMessage): void {
     if (message.version !== VERSION) {
-      this.fail(new PageError('The server speaks another version of the protocol; reload the page.'));
-      return;
+      const sentence = 'The server speaks another version of the protocol.';
+      return this.hangUp({ type: 'error', message: sentence, fatal: true, again: false });
     }
+    const replaced = this.session !== null && !message.resumed;
     this.session = message.session;
     if (!message.resumed) this.lastIndex = -1;
-    this.retry = FIRST_RETRY;
+    this.wait = 0;
+    this.over = false;
+    this.sound.reset();
     this.welcomed = true;
-    this.events.welcome(message);
+    this.events.welcome(message, replaced);
   }
 
-  private closed(): void {
+  /** The session ends when the socket has closed: its code tells more. */
+  private hangUp(why: ErrorMessage): void {
+    this.fatal = why;
     this.welcomed = false;
-    this.events.lost();
-    setTimeout(() => this.open(), this.retry);
-    this.retry = Math.min(2 * this.retry, LONGEST_RETRY);
-  }
-
-  private fail(error: PageError): void {
-    this.welcomed = false;
-    this.socket!.onclose = null;
     this.socket!.close();
-    this.events.failed(error);
+  }
+
+  private closed(code: number): void {
+    const now = performance.now();
+    if (this.welcomed) this.lastUp = now;
+    this.welcomed = false;
+    this.socket = null;
+    if (this.fatal) this.end(this.fatal, code === FULL);
+    else if (this.over || now - this.lastUp! > 1000 * RESUME_SECONDS) {
+      this.end({ message: UNREACHABLE, again: true }, true);
+    } else {
+      this.events.lost();
+      this.openLater(FIRST_RETRY, LONGEST_RETRY);
+    }
+  }
+
+  /** @param bySelf whether a new session is tried without being asked for */
+  private end({ message, again }: Pick<ErrorMessage, 'message' | 'again'>, bySelf: boolean): void {
+    this.fatal = null;
+    this.over = true;
+    this.forget();
+    if (bySelf) this.openLater(FIRST_VISIT, LONGEST_VISIT);
+    this.events.ended({ sentence: message, again, wait: bySelf ? this.wait : null });
+  }
+
+  private forget(): void {
+    this.session = null;
+    this.lastIndex = -1;
+  }
+
+  private openLater(first: number, longest: number): void {
+    this.wait = Math.min(Math.max(first, 2 * this.wait), longest);
+    this.retry = setTimeout(() => this.open(), this.wait);
   }
 }
 

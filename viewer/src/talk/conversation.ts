@@ -1,10 +1,8 @@
-import { Microphone } from '../audio/microphone.ts';
 import { Player } from '../audio/player.ts';
-import type { PageError } from '../errors.ts';
 import type { Offer, ServerMessage, Services, StateMessage, WelcomeMessage } from '../protocol.ts';
-import { Connection } from './connection.ts';
-import { TurnTimer, VoiceMeter } from './latency.ts';
-import { Listening, type ListeningView } from './listening.ts';
+import { Connection, type Ending } from './connection.ts';
+import { TurnTimer } from './latency.ts';
+import { VoiceInput, type VoiceView } from './voice-input.ts';
 
 /** Who moves the body while it speaks. */
 export interface Gestures {
@@ -15,19 +13,21 @@ export interface Gestures {
 }
 
 const CLOCK_PERIOD = 200; // ms between reports of what has been heard
-const KEPT_OPEN = 20_000; // ms after talking by the button: opening a microphone costs the first words
+
+const STALLED = 'The network has stalled: what you say now may not be heard.';
+const REPLACED = 'The conversation of before is over; a new one begins.';
 
 /** What the page shows of a conversation. */
-export interface ConversationView extends ListeningView {
-  state(state: StateMessage['state'] | 'connecting'): void;
+export interface ConversationView extends VoiceView {
+  state(state: StateMessage['state'] | 'connecting' | 'ended'): void;
   question(text: string, final: boolean): void;
   answer(sentence: string): void;
   services(services: Services, offers: readonly Offer[]): void;
-  microphone(open: boolean): void;
-  talking(held: boolean): void;
   latency(milliseconds: number): void;
   metrics(name: string, values: Record<string, number>): void;
-  failed(error: PageError): void;
+  /** A session has begun or goes on. */
+  connected(): void;
+  ended(ending: Ending): void;
 }
 
 /** Microphone, wire and loudspeaker joined into a conversation. */
@@ -38,40 +38,27 @@ export class Conversation {
   gestures: Gestures | null = null;
   private readonly view: ConversationView;
   private readonly connection: Connection;
-  private readonly microphone: Microphone;
-  private readonly listening: Listening;
-  private readonly meter = new VoiceMeter();
+  private readonly voice: VoiceInput;
   private readonly timer = new TurnTimer();
-  private sample = 0; // of the microphone
-  private open = false; // what the microphone hears is sent
-  private held = false; // the button to talk is
-  private closing: ReturnType<typeof setTimeout> | undefined;
+  private state: StateMessage['state'] = 'idle'; // of the server
 
   constructor(url: string, view: ConversationView) {
     this.view = view;
     this.connection = new Connection(url, {
       message: (message) => this.receive(message),
-      welcome: (message) => this.welcome(message),
+      welcome: (message, replaced) => this.welcome(message, replaced),
       lost: () => view.state('connecting'),
-      failed: (error) => view.failed(error),
+      stalled: (stalls) => this.stalled(stalls),
+      ended: (ending) => this.ended(ending),
     });
-    this.listening = new Listening((message) => this.connection.send(message), view);
-    this.microphone = new Microphone(
-      (pcm, end) => this.hear(pcm, end),
-      (error) => {
-        this.open = false;
-        this.release();
-        this.listening.close();
-        view.microphone(false);
-        view.notice(error.message);
-      },
-    );
+    const send = this.connection.send.bind(this.connection);
+    this.voice = new VoiceInput(send, (at) => this.player.heard(at), view);
     this.player.onStart = (_, delay) => this.answerStarts(performance.now() + 1000 * delay);
     this.player.onFinish = (utterance, seconds) => this.report(utterance, seconds);
     setInterval(() => this.reportHeard(), CLOCK_PERIOD);
   }
 
-  /** Connects; call it when sound may play. */
+  /** Connects, at first or after an ending; call it when sound may play. */
   start(): void {
     this.view.state('connecting');
     this.connection.open();
@@ -101,82 +88,59 @@ export class Conversation {
   }
 
   /** Opens or closes the microphone; what hinders it is shown as a notice. */
-  async toggleMicrophone(): Promise<void> {
-    this.open = !this.open && (await this.startMicrophone());
-    this.dictate();
-    if (!this.open) this.microphone.stop();
-    this.view.microphone(this.open);
+  toggleMicrophone(): Promise<void> {
+    return this.voice.toggle();
   }
 
   /** Push to talk: from here to `release` all that the microphone hears is one turn. */
-  async press(): Promise<void> {
-    if (this.held) return;
-    this.held = true;
-    clearTimeout(this.closing);
-    const started = await this.startMicrophone();
-    if (!this.held) return; // let go while the browser asked for the microphone
-    this.held = started && this.connection.send({ type: 'talk', pressed: true });
-    this.view.talking(this.held);
-    this.dictate();
+  press(): Promise<void> {
+    return this.voice.press();
   }
 
   release(): void {
-    if (!this.held) return;
-    this.held = false;
-    this.connection.send({ type: 'talk', pressed: false });
-    this.view.talking(false);
-    this.dictate();
-    this.closing = setTimeout(() => this.open || this.microphone.stop(), KEPT_OPEN);
+    this.voice.release();
   }
 
-  private async startMicrophone(): Promise<boolean> {
-    if (this.microphone.open) return true;
-    try {
-      this.sample = 0;
-      await this.microphone.start();
-    } catch (error) {
-      this.view.notice((error as Error).message);
+  private welcome(message: WelcomeMessage, replaced: boolean): void {
+    if (!message.resumed) this.silence();
+    if (replaced) {
+      this.voice.close(); // what is said was meant for somebody who knew what was said before
+      this.view.notice(REPLACED);
     }
-    return this.microphone.open;
-  }
-
-  /** The browser recognises speech, where it is asked to, while the server hears it too. */
-  private dictate(): void {
-    const track = this.open || this.held ? this.microphone.track : null;
-    if (track) this.listening.open(track);
-    else this.listening.close();
-  }
-
-  private hear(pcm: Int16Array, end: number): void {
-    if (!this.open && !this.held) return;
-    this.meter.hear(pcm, end);
-    const heard = this.player.heard(end);
-    const sounds = heard !== null && !heard.paused;
-    this.connection.send({
-      type: 'audio',
-      sample: this.sample,
-      pcm,
-      playing: sounds ? heard.utterance : null,
-      position: sounds ? Math.max(0, heard.seconds) : 0,
-    });
-    this.sample += pcm.length;
-  }
-
-  private welcome(message: WelcomeMessage): void {
-    if (!message.resumed) {
-      this.player.reset();
-      this.gestures?.reset();
-    }
-    this.listening.welcome(message);
+    this.voice.welcome(message);
+    this.view.connected();
     this.view.services(message.services, message.offers);
-    this.view.state('idle');
+    this.show('idle');
     for (const notice of message.notices) this.view.notice(notice);
+  }
+
+  private stalled(stalls: boolean): void {
+    this.view.state(stalls ? 'connecting' : this.state);
+    if (stalls) this.view.notice(STALLED);
+  }
+
+  private ended(ending: Ending): void {
+    this.voice.end();
+    this.silence();
+    this.view.state('ended');
+    this.view.ended(ending);
+  }
+
+  /** Utterances are counted from the start again. */
+  private silence(): void {
+    this.player.reset();
+    this.gestures?.reset();
+  }
+
+  private show(state: StateMessage['state']): void {
+    this.state = state;
+    this.view.state(state);
   }
 
   private receive(message: ServerMessage): void {
     switch (message.type) {
       case 'state':
-        return this.view.state(message.state);
+        return this.show(message.state);
       case 'transcript':
         return this.transcript(message.text, message.final);
       case 'answer':
@@ -203,7 +167,7 @@ export class Conversation {
 
   private transcript(text: string, final: boolean): void {
     this.view.question(text, final);
-    if (final && this.meter.lastVoice !== null) this.timer.asked(this.meter.lastVoice);
+    if (final && this.voice.lastVoice !== null) this.timer.asked(this.voice.lastVoice);
   }
 
   private answerStarts(at: number): void {

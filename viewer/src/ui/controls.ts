@@ -1,6 +1,13 @@
 import type { Conversation } from '../talk/conversation.ts';
+import type { MicrophoneState } from '../talk/voice-input.ts';
 import { byId } from './elements.ts';
 import { icon } from './icons.ts';
+
+const TITLES: Record<MicrophoneState, string> = {
+  closed: 'Turn the microphone on',
+  opening: 'The microphone is being opened',
+  open: 'Turn the microphone off',
+};
 
 /** Text box, microphone, button to talk, send and stop: what the visitor does. */
 export class Controls {
@@ -63,13 +70,19 @@ export class Controls {
     return target === this.talk || !(target as Element).closest('button, input, select, textarea, a');
   }
 
+  /** Lets the visitor type at once. */
+  focus(): void {
+    this.input.focus();
+  }
+
   setTalking(held: boolean): void {
     this.talk.setAttribute('aria-pressed', String(held));
   }
 
-  setMicrophone(open: boolean): void {
-    this.microphone.setAttribute('aria-pressed', String(open));
-    this.microphone.title = open ? 'Turn the microphone off' : 'Turn the microphone on';
+  setMicrophone(state: MicrophoneState): void {
+    this.microphone.setAttribute('aria-pressed', String(state === 'open'));
+    this.microphone.setAttribute('aria-busy', String(state === 'opening'));
+    this.microphone.title = TITLES[state];
   }
 
   setSpeaking(speaking: boolean): void {

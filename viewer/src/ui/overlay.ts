@@ -1,14 +1,17 @@
 import { THUMBNAIL } from '../bundle/load.ts';
+import type { Ending } from '../talk/connection.ts';
 import { byId } from './elements.ts';
 
 /** How the visitor wants to talk. */
 export type Choice = 'voice' | 'typing';
 
-/** The first screen: picture, progress, the button that lets sound play, or what went wrong. */
+/** The first screen: picture, progress, the button that lets sound play, or what went wrong and a way on. */
 export class Overlay {
   private readonly root = byId('overlay');
   private readonly bar = byId<HTMLProgressElement>('progress');
   private readonly thumbnail = byId<HTMLImageElement>('thumbnail');
+  private readonly waiting = byId('overlay-wait');
+  private counting: ReturnType<typeof setTimeout> | undefined;
 
   greet(name: string): void {
     byId('overlay-name').textContent = name;
@@ -32,18 +35,61 @@ export class Overlay {
     });
   }
 
-  hide(): void {
-    this.root.classList.add('gone');
-    this.root.inert = true;
+  get isShown(): boolean {
+    return !this.root.inert;
   }
 
+  hide(): void {
+    this.root.classList.add('gone');
+    this.cover(false);
+  }
+
+  /** The page cannot go on; only loading it anew may help. */
   fail(sentence: string): void {
-    this.root.classList.remove('gone');
-    this.root.inert = false;
-    this.bar.hidden = true;
-    byId('choices').hidden = true;
+    this.say(sentence, 'Reload the page', () => location.reload());
+  }
+
+  /**
+   * A session is over.
+   *
+   * @param again begins a new one
+   */
+  end({ sentence, again: mayBegin, wait }: Ending, again: () => void): void {
+    if (!mayBegin) return this.fail(sentence);
+    this.say(sentence, 'Try again', () => {
+      this.count(0);
+      again();
+    });
+    if (wait !== null) this.count(Math.round(wait / 1000));
+  }
+
+  private say(sentence: string, label: string, act: () => void): void {
+    this.bar.hidden = byId('choices').hidden = true;
     const text = byId('overlay-error');
-    text.textContent = sentence;
-    text.hidden = false;
+    if (text.textContent !== sentence) text.textContent = sentence; // what is said again need not be read aloud again
+    const button = byId<HTMLButtonElement>('again');
+    button.textContent = label;
+    button.onclick = act;
+    text.hidden = button.hidden = false;
+    clearTimeout(this.counting);
+    this.waiting.hidden = true;
+    this.root.classList.remove('gone');
+    this.cover(true);
+    button.focus();
+  }
+
+  /** Shows the seconds until the next try; at 0 it is made. */
+  private count(seconds: number): void {
+    clearTimeout(this.counting);
+    this.waiting.hidden = false;
+    this.waiting.textContent = seconds > 0 ? `Trying again in ${seconds} s` : 'Connecting …';
+    if (seconds > 0) this.counting = setTimeout(() => this.count(seconds - 1), 1000);
+  }
+
+  /** Whether the overlay is all that a keyboard reaches. */
+  private cover(covered: boolean): void {
+    for (const element of document.body.children) {
+      (element as HTMLElement).inert = (element === this.root) !== covered;
+    }
   }
 }

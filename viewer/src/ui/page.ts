@@ -15,6 +15,7 @@ const STATES = {
   listening: 'Listening',
   thinking: 'Thinking',
   speaking: 'Speaking',
+  ended: 'Ended',
 } as const;
 
 /** What is around the picture. */
@@ -30,6 +31,7 @@ export function makePage(overlay: Overlay, frames: () => number): Page {
   const controls = new Controls();
   const panel = new Panel(frames);
   let choose: (offer: Offer) => void = () => {};
+  let again = () => {};
   const sheet = new ServiceSheet((offer) => choose(offer));
   const view: ConversationView = {
     state(state) {
@@ -45,16 +47,18 @@ export function makePage(overlay: Overlay, frames: () => number): Page {
     },
     notice: showNotice,
     sharesVoice: (shared) => (byId('shared-voice').hidden = !shared),
-    microphone: (open) => controls.setMicrophone(open),
+    microphone: (state) => controls.setMicrophone(state),
     talking: (held) => controls.setTalking(held),
     latency: (milliseconds) => panel.latency(milliseconds),
     metrics: (name, values) => panel.metrics(name, values),
-    failed: (error) => overlay.fail(error.message),
+    connected: () => overlay.isShown && (overlay.hide(), controls.focus()),
+    ended: (ending) => overlay.end(ending, () => again()),
   };
   const talk = (conversation: Conversation) => {
     byId('state-line').hidden = false;
     controls.bind(conversation);
     choose = (offer) => conversation.choose(offer);
+    again = () => conversation.start();
     conversation.start();
   };
   return { view, talk };

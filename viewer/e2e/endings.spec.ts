@@ -1,0 +1,122 @@
+import { writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { afterEach, beforeAll, expect, test } from 'vitest';
+import type { Browser } from '../support/browser.ts';
+import { runPython } from '../support/python.ts';
+import { microphones, pauseDrawing } from '../support/recorder.ts';
+import { scratchFolder } from '../support/scratch.ts';
+import { ChatServer } from '../support/server.ts';
+import { openPage, until } from '../support/talk.ts';
+
+const folder = scratchFolder();
+const [bundle, silence] = [join(folder, 'talking.ico3d'), join(folder, 'silence.wav')];
+const IDLE = /^Nothing was said for 0\.05 min/;
+const FULL = /^all places are taken/;
+
+const opened: { close(): Promise<void> }[] = [];
+
+beforeAll(() => {
+  runPython('talking_bundle.py', bundle);
+  runPython('voice.py', silence, '90');
+});
+
+afterEach(async () => {
+  for (const browser of opened.splice(0)) await browser.close();
+});
+
+/** A server with these settings, which ends with the test. */
+async function serve(...settings: string[]): Promise<string> {
+  const file = join(folder, 'talk.toml');
+  writeFileSync(file, settings.join('\n'));
+  const server = await ChatServer.start(bundle, 0, '--settings', file);
+  opened.push({ close: () => server.stop() });
+  return server.url;
+}
+
+/** A page with a silent microphone; the browser is gone before its server. */
+async function visit(url: string): Promise<Browser> {
+  const browser = await openPage(url, { microphone: silence });
+  opened.unshift(browser);
+  await pauseDrawing(browser.page);
+  return browser;
+}
+
+const focused = ({ page }: Browser) => page.evaluate(() => document.activeElement?.id);
+const pressed = ({ page }: Browser) => page.getAttribute('#microphone', 'aria-pressed');
+
+/** Waits until the overlay says something. */
+async function says({ page }: Browser, sentence: RegExp): Promise<void> {
+  await page.waitForFunction(
+    (sentence) => new RegExp(sentence).test(document.getElementById('overlay-error')!.textContent!),
+    sentence.source,
+    { timeout: 60_000 },
+  );
+  expect(await page.locator('#overlay').evaluate((overlay) => (overlay as HTMLElement).inert)).toBe(false);
+}
+
+const goes = ({ page }: Browser) => page.waitForFunction(() => document.getElementById('overlay')!.inert, undefined, { timeout: 60_000 });
+
+test('whoever falls silent makes room; who waits for a place gets it, and both may try again', async () => {
+  const url = await serve('max_sessions = 1', 'idle_minutes = 0.05');
+  const first = await visit(url);
+  await first.page.click('#microphone');
+  await first.page.waitForFunction(() => document.getElementById('microphone')!.ariaPressed === 'true');
+  expect(await microphones(first.page)).toEqual(['live']);
+
+  // The first visitor goes on asking until the second one is there.
+  const asking = await first.page.evaluate(() => setInterval(() => window.ico3d!.conversation!.ask('Who are you?'), 1000));
+  const second = await visit(url);
+  await says(second, FULL);
+  expect(await focused(second)).toBe('again');
+  expect(await second.page.textContent('#overlay-wait')).toMatch(/^(Trying again in \d+ s|Connecting …)$/);
+  for (let i = 0; i < 3; i++) {
+    await second.page.keyboard.press('Tab'); // behind the overlay nothing can be reached
+    expect(await focused(second)).toMatch(/^(again)?$/);
+  }
+
+  await first.page.evaluate((asking) => clearInterval(asking), asking);
+  await says(first, IDLE);
+  expect(await first.page.textContent('#again')).toBe('Try again');
+  expect(await focused(first)).toBe('again');
+  expect(await first.page.isHidden('#overlay-wait')).toBe(true); // nobody may be there
+  expect(await pressed(first)).toBe('false');
+  expect(await microphones(first.page)).toEqual(['ended']);
+
+  await goes(second); // by itself
+  expect(await focused(second)).toBe('text');
+  await second.page.keyboard.type('Who are you?');
+  await second.page.keyboard.press('Enter');
+  await until(second, ({ received }) => received.some(({ text }) => text === 'I am Stella.'), 30_000);
+
+  await first.page.keyboard.press('Enter');
+  await says(first, FULL);
+  await says(second, IDLE);
+  await goes(first);
+  expect(await pressed(first)).toBe('false');
+});
+
+test('a microphone whose worklet does not load is shown as closed, and is', async () => {
+  const browser = await visit(await serve());
+  const { page } = browser;
+  await page.evaluate(() => {
+    const { prototype } = AudioWorklet;
+    const { addModule } = prototype;
+    prototype.addModule = function (url) {
+      prototype.addModule = addModule; // the next time it is there
+      return addModule.call(this, `${url}.missing`);
+    };
+  });
+  await page.click('#microphone');
+  await page.waitForSelector('#notices p');
+  expect(await page.textContent('#notices')).toBe('The microphone could not be started; try again, or type instead.');
+  expect(await pressed(browser)).toBe('false');
+  expect(await microphones(page)).toEqual(['ended']);
+
+  await page.dblclick('#microphone');
+  await page.waitForFunction(() => document.getElementById('microphone')!.ariaPressed === 'true');
+  expect(await microphones(page)).toEqual(['ended', 'live']);
+  await until(browser, ({ microphone }) => microphone.length > 10, 30_000);
+  await page.click('#microphone');
+  expect(await pressed(browser)).toBe('false');
+  expect(await microphones(page)).toEqual(['ended', 'ended']);
+});

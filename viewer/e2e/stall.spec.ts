@@ -1,0 +1,86 @@
+import { join } from 'node:path';
+import { afterAll, beforeAll, expect, test } from 'vitest';
+import { MICROPHONE_CHUNK, MICROPHONE_RATE } from '../src/protocol.ts';
+import type { Browser } from '../support/browser.ts';
+import { runPython } from '../support/python.ts';
+import { pauseDrawing, type Heard } from '../support/recorder.ts';
+import { scratchFolder } from '../support/scratch.ts';
+import { ChatServer } from '../support/server.ts';
+import { StallingLine } from '../support/stalling.ts';
+import { quantile } from '../support/statistics.ts';
+import { finished, makeVoice, openPage, until } from '../support/talk.ts';
+
+const STALL = 8000; // ms: more than a server takes at once of sound that comes late
+
+let server: ChatServer;
+let line: StallingLine;
+let browser: Browser;
+
+beforeAll(async () => {
+  const folder = scratchFolder();
+  const [bundle, voice] = [join(folder, 'talking.ico3d'), join(folder, 'voice.wav')];
+  runPython('talking_bundle.py', bundle);
+  makeVoice(voice);
+  server = await ChatServer.start(bundle);
+  line = await StallingLine.to(server.url);
+  browser = await openPage(line.url, { microphone: voice });
+});
+
+afterAll(async () => {
+  await browser?.close();
+  await line?.stop();
+  await server?.stop();
+});
+
+test('a network that stalls while the microphone is open brings no old sound, and the talk goes on', async () => {
+  const { page } = browser;
+  await until(browser, finished(0), 30_000); // the greeting
+  await pauseDrawing(page);
+  await page.click('#microphone');
+  await until(browser, ({ microphone }) => microphone.length > 60, 30_000);
+
+  const now = () => page.evaluate(() => performance.now());
+  line.stall();
+  const stalled = await now();
+  await page.locator('#notices p').waitFor();
+  expect(await page.locator('#notices').textContent()).toBe('The network has stalled: what you say now may not be heard.');
+  await page.waitForTimeout(STALL - ((await now()) - stalled));
+  expect(await page.locator('#state').textContent()).toBe('Connecting …');
+  const flowed = await now();
+  line.flow();
+  const understood = await until(
+    browser,
+    ({ received }) => received.some(({ type, at, final }) => type === 'transcript' && final && at > flowed + 1000),
+    30_000,
+  );
+  const { microphone } = understood;
+  const during = microphone.filter(({ at }) => at > stalled && at < flowed);
+  const after = microphone.filter(({ at }) => at > flowed);
+  const late = after.filter((chunk) => recorded(chunk, microphone) < flowed);
+  const old = ((during.length + late.length) * MICROPHONE_CHUNK) / MICROPHONE_RATE;
+  console.log(`of ${STALL / 1000} s ${during.length} chunks were sent meanwhile and ${late.length} late: ${old.toFixed(2)} s of old sound`);
+  expect(old).toBeLessThan(1.1);
+  expect(understood.received.filter(({ type }) => type === 'error')).toEqual([]);
+  expect(await page.locator('#overlay').getAttribute('class')).toBe('gone');
+  expect(await page.locator('#microphone').getAttribute('aria-pressed')).toBe('true');
+
+  // What is numbered was recorded then: live chunks leave the page as long after their sample as before.
+  const delay = (chunks: Heard[]) => quantile(chunks.map(({ at, sample }) => at - (1000 * sample) / MICROPHONE_RATE), 0.5);
+  const before = microphone.filter(({ at }) => at < stalled);
+  expect(Math.abs(delay(after.slice(-60)) - delay(before))).toBeLessThan(100);
+
+  const answers = understood.received.filter(({ type }) => type === 'speech').map(({ utterance }) => utterance as number);
+  await page.click('#microphone');
+  await page.fill('#text', 'Who are you?');
+  await page.keyboard.press('Enter');
+  await until(browser, ({ received }) => received.some(({ type, text }) => type === 'answer' && text === 'I am Stella.'), 30_000);
+  expect(answers.length).toBeGreaterThan(0);
+  const { sockets } = await page.evaluate(() => ({ sockets: window.record!.sockets.length }));
+  expect(sockets).toBe(1);
+});
+
+/** When a chunk's last sample was recorded, ms of the page's clock, as the first chunks tell. */
+function recorded({ sample }: Heard, microphone: Heard[]): number {
+  const offsets = microphone.slice(0, 30).map((chunk) => chunk.at - (1000 * chunk.sample) / MICROPHONE_RATE);
+  return quantile(offsets, 0.5) + (1000 * sample) / MICROPHONE_RATE;
+}

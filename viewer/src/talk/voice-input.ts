@@ -1,0 +1,151 @@
+import { Microphone } from '../audio/microphone.ts';
+import type { Heard } from '../face/face.ts';
+import type { ClientMessage, WelcomeMessage } from '../protocol.ts';
+import { VoiceMeter } from './latency.ts';
+import { Listening, type ListeningView } from './listening.ts';
+
+const KEPT_OPEN = 20_000; // ms after talking by the button: opening a microphone costs the first words
+
+export type MicrophoneState = 'closed' | 'opening' | 'open';
+
+/** What the page shows of the visitor's voice. */
+export interface VoiceView extends ListeningView {
+  microphone(state: MicrophoneState): void;
+  talking(held: boolean): void;
+}
+
+/** What the visitor says: the microphone and the button to talk, on their way to the server. */
+export class VoiceInput {
+  private readonly send: (message: ClientMessage) => boolean;
+  private readonly heard: (at: number) => Heard | null;
+  private readonly view: VoiceView;
+  private readonly microphone: Microphone;
+  private readonly listening: Listening;
+  private readonly meter = new VoiceMeter();
+  private ended = false; // the session is: nothing opens
+  private sample = 0; // since the microphone opened
+  private state: MicrophoneState = 'closed'; // open: what it hears is sent
+  private held = false; // the button to talk is
+  private talking = false; // and the server was told
+  private releasing = false; // it has yet to be told of the end
+  private closing: ReturnType<typeof setTimeout> | undefined;
+
+  /** @param heard what leaves the loudspeaker at a moment of the performance clock */
+  constructor(send: (message: ClientMessage) => boolean, heard: (at: number) => Heard | null, view: VoiceView) {
+    this.send = send;
+    this.heard = heard;
+    this.view = view;
+    this.listening = new Listening(send, view);
+    this.microphone = new Microphone(
+      (pcm, end) => this.hear(pcm, end),
+      (error) => {
+        this.close();
+        view.notice(error.message);
+      },
+    );
+  }
+
+  /** When the visitor last spoke, ms on the performance clock. */
+  get lastVoice(): number | null {
+    return this.meter.lastVoice;
+  }
+
+  /** Opens or closes the microphone; what hinders it is shown as a notice. */
+  async toggle(): Promise<void> {
+    if (this.ended || this.state === 'opening') return;
+    if (this.state === 'open') this.show('closed');
+    else {
+      this.show('opening');
+      this.show((await this.start()) ? 'open' : 'closed');
+    }
+    this.settle(0);
+  }
+
+  /** Push to talk: from here to `release` all that the microphone hears is one turn. */
+  async press(): Promise<void> {
+    if (this.ended || this.held) return;
+    this.held = true;
+    const open = await this.start();
+    // The button may be up again, or down for the second time: browsers take their time to ask.
+    if (this.held && !this.talking) this.talking = open && this.send({ type: 'talk', pressed: true });
+    this.held = this.talking;
+    this.settle(KEPT_OPEN);
+  }
+
+  release(): void {
+    this.held = false;
+    if (!this.talking) return;
+    this.talking = false;
+    this.releasing = !this.send({ type: 'talk', pressed: false });
+    this.settle(KEPT_OPEN);
+  }
+
+  /** Closes the microphone. */
+  close(): void {
+    this.release();
+    this.microphone.stop();
+    this.show('closed');
+    this.settle(0);
+  }
+
+  /** The session is over. */
+  end(): void {
+    this.close();
+    this.ended = true;
+  }
+
+  /** The line is up. */
+  welcome(message: WelcomeMessage): void {
+    this.ended = false;
+    const missed = message.resumed ? this.releasing : this.talking; // what the server does not know
+    if (missed) this.send({ type: 'talk', pressed: this.talking });
+    this.releasing = false;
+    this.listening.welcome(message);
+  }
+
+  private async start(): Promise<boolean> {
+    clearTimeout(this.closing);
+    if (this.microphone.open) return true;
+    this.sample = 0;
+    try {
+      return await this.microphone.start();
+    } catch (error) {
+      this.view.notice((error as Error).message);
+      return false;
+    }
+  }
+
+  private show(state: MicrophoneState): void {
+    this.state = state;
+    this.view.microphone(state);
+  }
+
+  /**
+   * Makes everything follow from who wants to be heard.
+   *
+   * @param kept ms after which a microphone that nobody wants closes
+   */
+  private settle(kept: number): void {
+    this.view.talking(this.talking);
+    clearTimeout(this.closing);
+    const track = this.state === 'open' || this.talking ? this.microphone.track : null;
+    if (track) this.listening.open(track);
+    else {
+      this.listening.close();
+      if (kept > 0) this.closing = setTimeout(() => this.microphone.stop(), kept);
+      else this.microphone.stop();
+    }
+  }
+
+  private hear(pcm: Int16Array, end: number): void {
+    const { sample } = this;
+    this.sample += pcm.length; // also of what is not sent
+    if (this.state !== 'open' && !this.talking) return;
+    this.meter.hear(pcm, end);
+    const heard = this.heard(end);
+    const sounds = heard !== null && !heard.paused;
+    const playing = sounds ? heard.utterance : null;
+    const position = sounds ? Math.max(0, heard.seconds) : 0;
+    this.send({ type: 'audio', sample, pcm, playing, position });
+  }
+}
