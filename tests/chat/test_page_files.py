@@ -149,6 +149,16 @@ async def test_another_page_of_the_same_size_and_second_is_another_page(tmp_path
         answers.append(answer)
 
 
+async def test_a_part_is_one_of_the_same_form(page):
+    whole, body = await raw(page, SCRIPT, Accept_Encoding="gzip")
+    part, piece = await raw(
+        page, SCRIPT, Accept_Encoding="gzip", Range="bytes=5-9", If_Range=whole.headers["etag"]
+    )
+    assert (part.status_code, piece) == (206, body[5:10])
+    other, everything = await raw(page, SCRIPT, Range="bytes=5-9", If_Range=whole.headers["etag"])
+    assert (other.status_code, everything) == (200, TEXTS[SCRIPT])
+
+
 async def test_compressed_files_have_no_address_of_their_own(page):
     for suffix in (".gz", ".br"):
         answer, _ = await raw(page, SCRIPT + suffix)

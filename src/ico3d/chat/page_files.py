@@ -60,7 +60,7 @@ class PageFiles(StaticFiles):
         stat = file.stat() if chosen else stat_result
         media_type = TYPES.get(plain.suffix) or guess_type(plain)[0]
         response = FileResponse(file, status_code, media_type=media_type, stat_result=stat)
-        del response.headers["Last-Modified"]  # all files of a wheel are of the same second
+        # of the content: all files of a wheel are of the same second, and often of the same size
         response.headers["ETag"] = _tag(file, stat.st_mtime_ns, stat.st_size)
         response.headers["Cache-Control"] = FOR_EVER if self._hashed in plain.parents else ASK_AGAIN
         if forms:

@@ -1,48 +1,44 @@
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import type { StartCamera } from '../bundle/manifest.ts';
+import { confine, type Bounds } from './bounds.ts';
+import type { Framing, Picture } from './framing.ts';
 
-/** What a visitor may do. */
-export interface Freedom {
+/** What the camera is pointed at, and what a visitor may do with it. */
+export interface Subject {
+  up: readonly [number, number, number]; // of the world, the same for every subject
+  framing: Framing;
+  bounds: (start: StartCamera) => Bounds;
   sideways: number; // rad to walk around, to either side
-  nearest: number; // of the start distance
-  narrowest: number; // width / height under which the view widens instead of cutting off the sides
+  face: THREE.Vector3 | null; // what + and − zoom at while it is in the picture
 }
 
-/** Heads are recorded from the front. */
-export const IN_FRONT: Freedom = { sideways: THREE.MathUtils.degToRad(75), nearest: 0.5, narrowest: 0.8 };
-
-/** Bodies are recorded from all around. */
-export const AROUND: Freedom = { sideways: Infinity, nearest: 0.2, narrowest: 0.45 };
-
 const UPWARDS = THREE.MathUtils.degToRad(30);
-const FARTHEST = 1.8; // of the start distance
 const KEY_STEP = THREE.MathUtils.degToRad(4);
 const KEY_ZOOM = 1.08;
+const WHEEL_SPEED = 2; // 10 % for each notch
 
-/** The camera that a visitor moves around the avatar: mouse, touch, arrow keys, + and −. */
+/**
+ * The camera that a visitor moves around the avatar: mouse, touch, arrow keys, + and −.
+ *
+ * Wheel and fingers zoom at what is under them. Until the visitor moves it, the camera follows the
+ * shape of the picture.
+ */
 export class Orbit {
   readonly camera: THREE.PerspectiveCamera;
   private readonly controls: OrbitControls;
-  private readonly start: StartCamera;
-  private readonly freedom: Freedom;
+  private subject: Subject;
+  private picture: Picture = { aspect: 1, free: 1 };
+  private bounds: Bounds | null = null; // none while the camera is being placed
+  private moved = false; // by the visitor
   private changed = true;
 
-  constructor(canvas: HTMLCanvasElement, start: StartCamera, freedom: Freedom, onChange: () => void) {
-    this.start = start;
-    this.freedom = freedom;
-    this.camera = new THREE.PerspectiveCamera(start.fov_y, 1, 0.01, 100);
-    this.camera.up.set(...start.up);
-    this.camera.position.set(...start.eye);
-    this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.target.set(...start.target);
-    this.controls.enablePan = false;
-    this.controls.enableDamping = !matchMedia('(prefers-reduced-motion: reduce)').matches;
-    this.limit();
-    this.controls.addEventListener('change', () => {
-      this.changed = true;
-      onChange();
-    });
+  constructor(canvas: HTMLCanvasElement, subject: Subject, onChange: () => void) {
+    this.subject = subject;
+    this.camera = new THREE.PerspectiveCamera(30, 1, 0.01, 100);
+    this.camera.up.set(...subject.up); // the controls take it over once
+    this.controls = this.control(canvas, onChange);
+    this.home();
     canvas.addEventListener('keydown', (event) => this.key(event));
     canvas.addEventListener('dblclick', () => this.home());
   }
@@ -55,31 +51,89 @@ export class Orbit {
     return changed;
   }
 
-  resize(aspect: number): void {
-    const widened = Math.max(1, this.freedom.narrowest / aspect);
-    const half = Math.tan(THREE.MathUtils.degToRad(this.start.fov_y) / 2) * widened;
-    this.camera.fov = THREE.MathUtils.radToDeg(2 * Math.atan(half));
-    this.camera.aspect = aspect;
+  /** Points the camera at somebody. */
+  face(subject: Subject): void {
+    this.subject = subject;
+    this.home();
+  }
+
+  /** Fits the camera to the shape of the picture. */
+  fit(picture: Picture): void {
+    this.picture = picture;
+    this.camera.aspect = picture.aspect;
+    const start = this.subject.framing(picture);
+    this.camera.fov = start.fov_y;
     this.camera.updateProjectionMatrix();
+    if (!this.moved) this.look(start);
     this.changed = true;
   }
 
   /** Back to where the visitor started. */
   home(): void {
-    this.camera.position.set(...this.start.eye);
-    this.controls.update();
+    this.moved = false;
+    this.fit(this.picture);
   }
 
-  private limit(): void {
-    const { controls, freedom } = this;
+  /** Puts the camera somewhere; what the visitor may do is measured from there. */
+  look(start: StartCamera): void {
+    const { camera, controls } = this;
+    this.release();
+    camera.fov = start.fov_y;
+    camera.updateProjectionMatrix();
+    camera.position.set(...start.eye);
+    controls.target.set(...start.target);
     controls.update();
-    const distance = controls.getDistance();
-    controls.minDistance = freedom.nearest * distance;
-    controls.maxDistance = FARTHEST * distance;
-    controls.minAzimuthAngle = controls.getAzimuthalAngle() - freedom.sideways;
-    controls.maxAzimuthAngle = controls.getAzimuthalAngle() + freedom.sideways;
+    this.limit(start);
+    this.changed = true;
+  }
+
+  private control(canvas: HTMLCanvasElement, onChange: () => void): OrbitControls {
+    const controls = new OrbitControls(this.camera, canvas);
+    controls.zoomToCursor = true;
+    const zoomsBy = (speed: number) => () => (controls.zoomSpeed = speed);
+    canvas.addEventListener('wheel', zoomsBy(WHEEL_SPEED), { capture: true, passive: true });
+    canvas.addEventListener('pointerdown', zoomsBy(1), { capture: true }); // as fast as the fingers
+    controls.addEventListener('change', () => {
+      this.confine();
+      this.changed = true;
+      onChange();
+    });
+    return controls;
+  }
+
+  /** Whatever still glides stops, and nothing is in the way of the camera. */
+  private release(): void {
+    const { controls } = this;
+    this.bounds = null;
+    controls.enableDamping = false;
+    controls.update();
+    controls.enableDamping = !matchMedia('(prefers-reduced-motion: reduce)').matches;
+    controls.minDistance = controls.minPolarAngle = 0;
+    controls.maxDistance = controls.maxAzimuthAngle = Infinity;
+    controls.minAzimuthAngle = -Infinity;
+    controls.maxPolarAngle = Math.PI;
+  }
+
+  private limit(start: StartCamera): void {
+    const { controls } = this;
+    const { sideways, bounds } = this.subject;
+    this.bounds = bounds(start);
+    controls.minDistance = this.bounds.nearest;
+    controls.maxDistance = this.bounds.farthest;
+    controls.minAzimuthAngle = controls.getAzimuthalAngle() - sideways;
+    controls.maxAzimuthAngle = controls.getAzimuthalAngle() + sideways;
     controls.minPolarAngle = controls.getPolarAngle() - UPWARDS;
     controls.maxPolarAngle = controls.getPolarAngle() + UPWARDS;
+  }
+
+  /** The visitor moved the camera: it stays where there is somebody to see. */
+  private confine(): void {
+    const { camera, controls, bounds } = this;
+    if (!bounds) return;
+    this.moved = true;
+    const slope = Math.tan(THREE.MathUtils.degToRad(camera.fov) / 2);
+    confine(camera.position, controls.target, bounds, slope * Math.min(1, camera.aspect));
+    camera.updateMatrixWorld();
   }
 
   private key(event: KeyboardEvent): void {
@@ -108,7 +162,19 @@ export class Orbit {
     this.camera.position.copy(this.controls.target).add(offset);
   }
 
+  /** The face keeps its place in the picture, or what is in the middle where no face is seen. */
   private zoom(factor: number): void {
-    this.camera.position.sub(this.controls.target).multiplyScalar(factor).add(this.controls.target);
+    const { camera, controls } = this;
+    const { minDistance: nearest, maxDistance: farthest } = controls;
+    const distance = controls.getDistance();
+    const allowed = THREE.MathUtils.clamp(distance * factor, nearest, farthest) / distance;
+    const fixed = this.faceInSight() ?? controls.target.clone();
+    for (const point of [camera.position, controls.target]) point.sub(fixed).multiplyScalar(allowed).add(fixed);
+  }
+
+  private faceInSight(): THREE.Vector3 | null {
+    const { face } = this.subject;
+    const { x, y, z } = face?.clone().project(this.camera) ?? { x: 1, y: 1, z: 1 };
+    return Math.max(Math.abs(x), Math.abs(y), z) < 1 ? face!.clone() : null;
   }
 }

@@ -32,7 +32,7 @@ export class Controls {
     this.bindTalk(conversation);
     document.addEventListener('keydown', (event) => {
       if (event.key === 'Escape') conversation.interrupt();
-      if (event.key === '/' && document.activeElement !== this.input) {
+      if (event.key === '/' && this.takesSlash(event)) {
         event.preventDefault();
         this.input.focus();
       }
@@ -61,6 +61,13 @@ export class Controls {
   private takesSpace(target: EventTarget | null): boolean {
     if (target === this.input) return this.input.value === '';
     return target === this.talk || !(target as Element).closest('button, input, select, textarea, a');
+  }
+
+  /** Whether a slash leads to the text box: everywhere but inside a text that is being typed. */
+  private takesSlash({ target, ctrlKey, metaKey, altKey }: KeyboardEvent): boolean {
+    if (ctrlKey || metaKey || altKey) return false;
+    if (target === this.input) return this.input.value === '';
+    return !(target as Element).closest('textarea, [contenteditable], input:not([type=radio], [type=range])');
   }
 
   setTalking(held: boolean): void {
