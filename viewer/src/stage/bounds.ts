@@ -17,6 +17,7 @@ const HEAD_BEHIND = 0.08; // m from the eyes back to the middle of a head
 const UNDER_FACE = 0.13; // m from the eyes down to where the body begins
 const CLEAR = 0.1; // m around a body
 const ASIDE = 0.25; // m from the spine that may be looked at from nearby: arms
+const HALVINGS = 16;
 const FARTHER = 1.8; // than where the visitor starts
 
 /**
@@ -63,6 +64,26 @@ export function confine(eye: THREE.Vector3, target: THREE.Vector3, bounds: Bound
   for (const solid of bounds.solids) eye.addScaledVector(back, wayOut(eye, back, solid));
   if (bounds.head) eye.addScaledVector(back, wayOutOfSphere(eye, back, bounds.head));
   for (const solid of bounds.solids) eye.addScaledVector(back, wayOut(eye, back, solid));
+}
+
+/**
+ * A scale as near to the wanted one as nobody is in the way of the camera; at scale 1 it is free.
+ * Only pushed back, it would slide aside.
+ */
+export function freeScale(wanted: number, eyeAt: (scale: number) => THREE.Vector3, bounds: Bounds): number {
+  if (!isInside(eyeAt(wanted), bounds)) return wanted;
+  let [free, taken] = [1, wanted];
+  for (let i = 0; i < HALVINGS; i++) {
+    const between = (free + taken) / 2;
+    if (isInside(eyeAt(between), bounds)) taken = between;
+    else free = between;
+  }
+  return free;
+}
+
+function isInside(eye: THREE.Vector3, { solids, head }: Bounds): boolean {
+  const inSolid = solids.some((solid) => solid.every((plane) => plane.distanceToPoint(eye) < 0));
+  return inSolid || (head !== null && head.distanceToPoint(eye) < 0);
 }
 
 /** How far it is along a direction until a point is outside; 0 if it is. */

@@ -27,23 +27,35 @@ const CHIN = 0.15; // m down from the eyes to under the chin
 export function portrait(sitter: Sitter, fov: number): Framing {
   const slope = Math.tan(THREE.MathUtils.degToRad(fov) / 2);
   const { eyes, toward, up } = sitter;
-  return ({ aspect, free }) => {
-    const { line, height } = composition(sitter, aspect, free);
-    const distance = height / (2 * slope);
+  return (picture) => {
+    const { tilt, distance } = composition(sitter, slope, picture);
     const eye = eyes.clone().addScaledVector(toward, distance);
     const upright = up.clone().projectOnPlane(toward).normalize();
-    const target = eyes.clone().addScaledVector(upright, (2 * line - 1) * slope * distance);
+    const target = eyes.clone().addScaledVector(upright, -tilt * distance);
     return { eye: eye.toArray(), target: target.toArray(), up: up.toArray(), fov_y: fov };
   };
 }
 
-/** Where the eyes are, from above, and how many metres of the eyes' plane the picture is high. */
-function composition({ crown, lowest }: Sitter, aspect: number, free: number): { line: number; height: number } {
+/**
+ * How far the camera looks under the eyes, as a slope, and how far from them it is, m.
+ *
+ * @param slope of the picture's upper edge against its middle
+ */
+function composition({ crown, lowest }: Sitter, slope: number, { aspect, free }: Picture): { tilt: number; distance: number } {
   const above = crown + ABOVE;
   const line = Math.min(EYE_LINE, (free * above) / (above + CHIN));
-  const least = Math.max(above / line, CHIN / (free - line), FACE / aspect);
-  const wanted = Math.max(TABLE, SHOULDERS / aspect);
-  return { line, height: Math.max(least, Math.min(wanted, lowest / (1 - line))) };
+  const tilt = (1 - 2 * line) * slope;
+  // Angles between the ray to the eyes and those to the edges.
+  const [edge, down] = [Math.atan(slope), Math.atan(tilt)];
+  const [toTop, toBottom, toControls] = [edge - down, edge + down, Math.atan((2 * free - 1) * slope) + down];
+  const least = Math.max(
+    above / Math.tan(toTop),
+    CHIN / Math.tan(toControls),
+    FACE / (2 * aspect * slope * Math.cos(down)),
+  );
+  const wanted = Math.max(TABLE, SHOULDERS / aspect) / (2 * slope);
+  const nothingUnder = toBottom < Math.PI / 2 ? lowest / Math.tan(toBottom) : 0;
+  return { tilt, distance: Math.max(least, Math.min(wanted, nothingUnder)) };
 }
 
 /** The bundle's own camera, which sees everybody whole; the view widens where the sides would be cut off. */

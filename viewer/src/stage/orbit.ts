@@ -1,8 +1,9 @@
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import type { StartCamera } from '../bundle/manifest.ts';
-import { confine, type Bounds } from './bounds.ts';
+import { confine, freeScale, type Bounds } from './bounds.ts';
 import type { Framing, Picture } from './framing.ts';
+import { listenToZooming, type Place } from './zooming.ts';
 
 /** What the camera is pointed at, and what a visitor may do with it. */
 export interface Subject {
@@ -16,7 +17,6 @@ export interface Subject {
 const UPWARDS = THREE.MathUtils.degToRad(30);
 const KEY_STEP = THREE.MathUtils.degToRad(4);
 const KEY_ZOOM = 1.08;
-const WHEEL_SPEED = 2; // 10 % for each notch
 
 /**
  * The camera that a visitor moves around the avatar: mouse, touch, arrow keys, + and −.
@@ -87,16 +87,19 @@ export class Orbit {
     this.changed = true;
   }
 
+  /** Turning is the library's; it zooms beside the pointer, so that zooming is done here. */
   private control(canvas: HTMLCanvasElement, onChange: () => void): OrbitControls {
     const controls = new OrbitControls(this.camera, canvas);
-    controls.zoomToCursor = true;
-    const zoomsBy = (speed: number) => () => (controls.zoomSpeed = speed);
-    canvas.addEventListener('wheel', zoomsBy(WHEEL_SPEED), { capture: true, passive: true });
-    canvas.addEventListener('pointerdown', zoomsBy(1), { capture: true }); // as fast as the fingers
+    controls.enableZoom = controls.enablePan = false;
+    controls.touches.TWO = null;
     controls.addEventListener('change', () => {
       this.confine();
       this.changed = true;
       onChange();
+    });
+    listenToZooming(canvas, {
+      zoom: (at, factor) => this.zoom(this.under(at), factor),
+      pull: (from, to) => this.move(this.under(from).sub(this.under(to))),
     });
     return controls;
   }
@@ -142,8 +145,8 @@ export class Orbit {
       ArrowRight: () => this.turn(this.camera.up, -KEY_STEP),
       ArrowUp: () => this.turn(this.right(), -KEY_STEP),
       ArrowDown: () => this.turn(this.right(), KEY_STEP),
-      '+': () => this.zoom(1 / KEY_ZOOM),
-      '-': () => this.zoom(KEY_ZOOM),
+      '+': () => this.zoom(this.centre(), 1 / KEY_ZOOM),
+      '-': () => this.zoom(this.centre(), KEY_ZOOM),
       Home: () => this.home(),
     };
     const move = moves[event.key];
@@ -162,19 +165,38 @@ export class Orbit {
     this.camera.position.copy(this.controls.target).add(offset);
   }
 
-  /** The face keeps its place in the picture, or what is in the middle where no face is seen. */
-  private zoom(factor: number): void {
-    const { camera, controls } = this;
+  /** Comes nearer by a factor under 1 to a point, which keeps its place in the picture. */
+  private zoom(fixed: THREE.Vector3, factor: number): void {
+    const { camera, controls, bounds } = this;
     const { minDistance: nearest, maxDistance: farthest } = controls;
     const distance = controls.getDistance();
-    const allowed = THREE.MathUtils.clamp(distance * factor, nearest, farthest) / distance;
-    const fixed = this.faceInSight() ?? controls.target.clone();
-    for (const point of [camera.position, controls.target]) point.sub(fixed).multiplyScalar(allowed).add(fixed);
+    const wanted = THREE.MathUtils.clamp(factor * distance, nearest, farthest) / distance;
+    const scaled = (point: THREE.Vector3, by: number) => point.clone().sub(fixed).multiplyScalar(by).add(fixed);
+    const allowed = bounds ? freeScale(wanted, (by) => scaled(camera.position, by), bounds) : wanted;
+    for (const point of [camera.position, controls.target]) point.copy(scaled(point, allowed));
+    controls.update();
   }
 
-  private faceInSight(): THREE.Vector3 | null {
+  /** Shifts camera and target alike. */
+  private move(by: THREE.Vector3): void {
+    this.camera.position.add(by);
+    this.controls.target.add(by);
+    this.controls.update();
+  }
+
+  /** What is at a place of the picture, as far away as what the camera looks at. */
+  private under([x, y]: Place): THREE.Vector3 {
+    const { camera, controls } = this;
+    camera.updateMatrixWorld();
+    const ahead = controls.target.clone().sub(camera.position);
+    const ray = new THREE.Vector3(x, y, 0).unproject(camera).sub(camera.position);
+    return ray.multiplyScalar(ahead.lengthSq() / ray.dot(ahead)).add(camera.position);
+  }
+
+  /** What keys zoom at: the face, or the middle of the picture where no face is seen. */
+  private centre(): THREE.Vector3 {
     const { face } = this.subject;
     const { x, y, z } = face?.clone().project(this.camera) ?? { x: 1, y: 1, z: 1 };
-    return Math.max(Math.abs(x), Math.abs(y), z) < 1 ? face!.clone() : null;
+    return (Math.max(Math.abs(x), Math.abs(y), z) < 1 ? face! : this.controls.target).clone();
   }
 }
