@@ -41,7 +41,7 @@ export async function makeCast(manifest: Manifest, stage: Stage, calm: boolean, 
   const backdrop = await makeBackdrop(manifest, ports.loaded);
   if (backdrop) stage.add(backdrop);
   if (head && body) return makePerson(manifest, head, body, stage, calm, ports);
-  if (head) return { head: await makeHead(manifest, head, stage, rows(0, head.num_poses - 1), calm ? () => 0 : sway(head), ports) };
+  if (head) return { head: await makeHead(manifest, head, stage, rows(0, calm ? 0 : head.num_poses - 1), calm ? () => 0 : sway(head), ports) };
   const timeline = new Timeline(body!);
   const playback = new Playback(timeline.duration, !calm);
   return { playback, body: makeBody(manifest, body!, timeline, playback, stage, ports) };

@@ -64,7 +64,7 @@ export class Orbit {
     const start = this.subject.framing(picture);
     this.camera.fov = start.fov_y;
     this.camera.updateProjectionMatrix();
-    if (!this.moved) this.look(start);
+    if (!this.moved) this.place(start);
     this.changed = true;
   }
 
@@ -74,8 +74,13 @@ export class Orbit {
     this.fit(this.picture);
   }
 
-  /** Puts the camera somewhere; what the visitor may do is measured from there. */
-  look(start: StartCamera): void {
+  /** Puts the camera somewhere, as a visitor might; limits are measured from there. */
+  look(view: StartCamera): void {
+    this.place(view);
+    this.moved = true;
+  }
+
+  private place(start: StartCamera): void {
     const { camera, controls } = this;
     this.release();
     camera.fov = start.fov_y;
