@@ -1,14 +1,17 @@
 import { defineConfig } from 'vitest/config';
+import { compressed } from './compression.ts';
 
 // `npm run dev` shows the page against a running `ico3d serve … --port 8700`.
 const SERVER = process.env.ICO3D_SERVER ?? 'http://127.0.0.1:8700';
 
 export default defineConfig({
   base: './',
+  plugins: [compressed()],
   build: {
     outDir: '../src/ico3d/chat/static',
     emptyOutDir: true,
     target: 'es2023',
+    rolldownOptions: { checks: { pluginTimings: false } }, // to compress well takes its time
     chunkSizeWarningLimit: 4000, // three and Spark (with its sort worker) in one file
   },
   server: {

@@ -1,6 +1,6 @@
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import { Browser } from '../support/browser.ts';
-import { psnr, takeStill, worst } from '../support/pictures.ts';
+import { lookAsBundled, psnr, takeStill, worst } from '../support/pictures.ts';
 import { makeReference } from '../support/reference.ts';
 import { servePage } from '../support/static.ts';
 
@@ -17,7 +17,7 @@ describe('what the GPU makes of a bundle', () => {
   beforeAll(async () => {
     server = await servePage(reference.folder);
     browser = await Browser.launch({ width: WIDTH, height: HEIGHT });
-    await browser.open(server.url);
+    await lookAsBundled(await browser.open(server.url), reference.folder);
   });
 
   afterAll(async () => {

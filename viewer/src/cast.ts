@@ -9,7 +9,9 @@ import { MotionDirector, type Spoken } from './motion/director.ts';
 import type { Motion } from './motion/motion.ts';
 import { Playback } from './motion/playback.ts';
 import { makeBackdrop } from './stage/backdrop.ts';
+import { sitterOf } from './stage/sitter.ts';
 import type { Stage } from './stage/stage.ts';
+import { person } from './stage/subject.ts';
 
 /** Who is on stage: a head, a body that plays, or a whole person whose body a director moves. */
 export interface Cast {
@@ -39,7 +41,7 @@ export async function makeCast(manifest: Manifest, stage: Stage, calm: boolean, 
   const backdrop = await makeBackdrop(manifest, ports.loaded);
   if (backdrop) stage.add(backdrop);
   if (head && body) return makePerson(manifest, head, body, stage, calm, ports);
-  if (head) return { head: await makeHead(manifest, head, stage, calm ? () => 0 : sway(head), ports) };
+  if (head) return { head: await makeHead(manifest, head, stage, rows(0, calm ? 0 : head.num_poses - 1), calm ? () => 0 : sway(head), ports) };
   const timeline = new Timeline(body!);
   const playback = new Playback(timeline.duration, !calm);
   return { playback, body: makeBody(manifest, body!, timeline, playback, stage, ports) };
@@ -59,20 +61,31 @@ async function makePerson(
   if (calm) director.hold(animation.rest.end / animation.fps);
   // Before the head: it goes where the body is in the same tick.
   const body = makeBody(manifest, bodyInfo, new Timeline(bodyInfo), director, stage, ports);
-  const head = await makeHead(manifest, info, stage, () => body.time * info.fps, ports);
+  const { start, end } = animation.rest;
+  const resting = rows(calm ? end : start, end);
+  const head = await makeHead(manifest, info, stage, resting, () => body.time * info.fps, ports);
   return { head, body, director };
 }
 
+/** @param resting the rows of its poses where the head is at rest */
 async function makeHead(
   manifest: Manifest,
   info: HeadInfo,
   stage: Stage,
+  resting: readonly number[],
   carrier: (step: number) => number,
   { loaded }: CastPorts,
 ): Promise<Head> {
-  const head = new Head(await loadHead(manifest, info, loaded), carrier);
+  const files = await loadHead(manifest, info, loaded);
+  const head = new Head(files, carrier);
   stage.add(head);
+  stage.orbit.face(person(manifest, sitterOf(manifest, files, resting)));
   return head;
+}
+
+/** From the first to the last row of a head's poses. */
+function rows(first: number, last: number): number[] {
+  return Array.from({ length: last - first + 1 }, (_, i) => first + i);
 }
 
 /** A body whose windows come from the server as they are needed. */

@@ -13,6 +13,7 @@ import { readSplats, type Splats } from './stage/readback.ts';
 import { Stage } from './stage/stage.ts';
 import { socketUrl } from './talk/connection.ts';
 import { Conversation } from './talk/conversation.ts';
+import { watchCover } from './ui/cover.ts';
 import { byId } from './ui/elements.ts';
 import { Overlay } from './ui/overlay.ts';
 import { makePage, showNotice } from './ui/page.ts';
@@ -47,6 +48,7 @@ async function run(): Promise<void> {
   overlay.greet(name);
 
   const stage = new Stage(byId<HTMLCanvasElement>('stage'), manifest);
+  watchCover((pixels) => stage.keepClear(pixels));
   const page = makePage(overlay, () => stage.frames);
   const conversation = manifest.head ? new Conversation(socketUrl(location), page.view) : undefined;
   const { head, body, playback, director } = await enter(manifest, stage, conversation);

@@ -1,4 +1,7 @@
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
 import type { Page } from 'playwright-core';
+import type { Manifest } from '../src/bundle/manifest.ts';
 
 /** What the page drew of one expression. */
 export interface Still {
@@ -18,6 +21,12 @@ export async function takeStill(page: Page, expression: number[]): Promise<Still
     return { attributes: [...rgba], coefficients: [...head!.generator.shown] };
   }, expression);
   return { pixels: await takePixels(page), attributes: Float32Array.from(attributes), coefficients };
+}
+
+/** Looks from where the bundle in a folder says, as Python's references do. */
+export async function lookAsBundled(page: Page, folder: string): Promise<void> {
+  const { camera } = JSON.parse(readFileSync(join(folder, 'manifest.json'), 'utf8')) as Manifest;
+  await page.evaluate((view) => window.ico3d!.stage.orbit.look(view), camera);
 }
 
 /** Draws what is on stage and reads it back: (H, W, 3), top row first. */

@@ -11,7 +11,6 @@ from pathlib import Path
 import uvicorn
 from fastapi import FastAPI, Request, Response, WebSocket
 from fastapi.responses import JSONResponse, PlainTextResponse
-from fastapi.staticfiles import StaticFiles
 from threadpoolctl import threadpool_limits
 
 from ico3d.bundle.format import SPEECH, Bundle
@@ -22,6 +21,7 @@ from ico3d.chat.connection import Connection
 from ico3d.chat.face import open_face
 from ico3d.chat.guard import LOOPBACK, Guard
 from ico3d.chat.monitor import CONTENT_TYPE
+from ico3d.chat.page_files import PageFiles
 from ico3d.chat.parts import Avatar
 from ico3d.chat.services import choose
 from ico3d.chat.services.offers import offers
@@ -141,7 +141,7 @@ def serve_file(bundle: Bundle, name: str, request: Request) -> Response:
 def add_page(app: FastAPI) -> None:
     """The viewer's files, or a sentence on how to build them."""
     if (STATIC / "index.html").is_file():
-        app.mount("/", StaticFiles(directory=STATIC, html=True))
+        app.mount("/", PageFiles(STATIC))
         return
 
     @app.get("/")

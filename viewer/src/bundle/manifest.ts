@@ -36,6 +36,8 @@ export interface WindowInfo {
 export interface BodyInfo {
   fps: number;
   samples_per_frame: number;
+  low: [number, number, number]; // bounds of what is seen at any time, world space
+  high: [number, number, number];
   windows: WindowInfo[];
 }
 
@@ -89,6 +91,7 @@ function checkHead(head: HeadInfo): void {
 
 function checkBody(body: BodyInfo): void {
   for (const key of ['fps', 'samples_per_frame'] as const) if (!isPositive(body[key])) bad(`body.${key}`);
+  for (const key of ['low', 'high'] as const) if (!isNumbers(body[key], 3)) bad(`body.${key}`);
   if (!Array.isArray(body.windows) || body.windows.length === 0) bad('body.windows');
   body.windows.forEach((window, i) => {
     const { first, last, ranks } = window;

@@ -1,48 +1,44 @@
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import type { StartCamera } from '../bundle/manifest.ts';
+import { confine, freeScale, type Bounds } from './bounds.ts';
+import type { Framing, Picture } from './framing.ts';
+import { listenToZooming, type Place } from './zooming.ts';
 
-/** What a visitor may do. */
-export interface Freedom {
+/** What the camera is pointed at, and what a visitor may do with it. */
+export interface Subject {
+  up: readonly [number, number, number]; // of the world, the same for every subject
+  framing: Framing;
+  bounds: (start: StartCamera) => Bounds;
   sideways: number; // rad to walk around, to either side
-  nearest: number; // of the start distance
-  narrowest: number; // width / height under which the view widens instead of cutting off the sides
+  face: THREE.Vector3 | null; // what + and − zoom at while it is in the picture
 }
 
-/** Heads are recorded from the front. */
-export const IN_FRONT: Freedom = { sideways: THREE.MathUtils.degToRad(75), nearest: 0.5, narrowest: 0.8 };
-
-/** Bodies are recorded from all around. */
-export const AROUND: Freedom = { sideways: Infinity, nearest: 0.2, narrowest: 0.45 };
-
 const UPWARDS = THREE.MathUtils.degToRad(30);
-const FARTHEST = 1.8; // of the start distance
 const KEY_STEP = THREE.MathUtils.degToRad(4);
 const KEY_ZOOM = 1.08;
 
-/** The camera that a visitor moves around the avatar: mouse, touch, arrow keys, + and −. */
+/**
+ * The camera that a visitor moves around the avatar: mouse, touch, arrow keys, + and −.
+ *
+ * Wheel and fingers zoom at what is under them. Until the visitor moves it, the camera follows the
+ * shape of the picture.
+ */
 export class Orbit {
   readonly camera: THREE.PerspectiveCamera;
   private readonly controls: OrbitControls;
-  private readonly start: StartCamera;
-  private readonly freedom: Freedom;
+  private subject: Subject;
+  private picture: Picture = { aspect: 1, free: 1 };
+  private bounds: Bounds | null = null; // none while the camera is being placed
+  private moved = false; // by the visitor
   private changed = true;
 
-  constructor(canvas: HTMLCanvasElement, start: StartCamera, freedom: Freedom, onChange: () => void) {
-    this.start = start;
-    this.freedom = freedom;
-    this.camera = new THREE.PerspectiveCamera(start.fov_y, 1, 0.01, 100);
-    this.camera.up.set(...start.up);
-    this.camera.position.set(...start.eye);
-    this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.target.set(...start.target);
-    this.controls.enablePan = false;
-    this.controls.enableDamping = !matchMedia('(prefers-reduced-motion: reduce)').matches;
-    this.limit();
-    this.controls.addEventListener('change', () => {
-      this.changed = true;
-      onChange();
-    });
+  constructor(canvas: HTMLCanvasElement, subject: Subject, onChange: () => void) {
+    this.subject = subject;
+    this.camera = new THREE.PerspectiveCamera(30, 1, 0.01, 100);
+    this.camera.up.set(...subject.up); // the controls take it over once
+    this.controls = this.control(canvas, onChange);
+    this.home();
     canvas.addEventListener('keydown', (event) => this.key(event));
     canvas.addEventListener('dblclick', () => this.home());
   }
@@ -55,31 +51,97 @@ export class Orbit {
     return changed;
   }
 
-  resize(aspect: number): void {
-    const widened = Math.max(1, this.freedom.narrowest / aspect);
-    const half = Math.tan(THREE.MathUtils.degToRad(this.start.fov_y) / 2) * widened;
-    this.camera.fov = THREE.MathUtils.radToDeg(2 * Math.atan(half));
-    this.camera.aspect = aspect;
+  /** Points the camera at somebody. */
+  face(subject: Subject): void {
+    this.subject = subject;
+    this.home();
+  }
+
+  /** Fits the camera to the shape of the picture. */
+  fit(picture: Picture): void {
+    this.picture = picture;
+    this.camera.aspect = picture.aspect;
+    const start = this.subject.framing(picture);
+    this.camera.fov = start.fov_y;
     this.camera.updateProjectionMatrix();
+    if (!this.moved) this.place(start);
     this.changed = true;
   }
 
   /** Back to where the visitor started. */
   home(): void {
-    this.camera.position.set(...this.start.eye);
-    this.controls.update();
+    this.moved = false;
+    this.fit(this.picture);
   }
 
-  private limit(): void {
-    const { controls, freedom } = this;
+  /** Puts the camera somewhere, as a visitor might; limits are measured from there. */
+  look(view: StartCamera): void {
+    this.place(view);
+    this.moved = true;
+  }
+
+  private place(start: StartCamera): void {
+    const { camera, controls } = this;
+    this.release();
+    camera.fov = start.fov_y;
+    camera.updateProjectionMatrix();
+    camera.position.set(...start.eye);
+    controls.target.set(...start.target);
     controls.update();
-    const distance = controls.getDistance();
-    controls.minDistance = freedom.nearest * distance;
-    controls.maxDistance = FARTHEST * distance;
-    controls.minAzimuthAngle = controls.getAzimuthalAngle() - freedom.sideways;
-    controls.maxAzimuthAngle = controls.getAzimuthalAngle() + freedom.sideways;
+    this.limit(start);
+    this.changed = true;
+  }
+
+  /** Turning is the library's; it zooms beside the pointer, so that zooming is done here. */
+  private control(canvas: HTMLCanvasElement, onChange: () => void): OrbitControls {
+    const controls = new OrbitControls(this.camera, canvas);
+    controls.enableZoom = controls.enablePan = false;
+    controls.touches.TWO = null;
+    controls.addEventListener('change', () => {
+      this.confine();
+      this.changed = true;
+      onChange();
+    });
+    listenToZooming(canvas, {
+      zoom: (at, factor) => this.zoom(this.under(at), factor),
+      pull: (from, to) => this.move(this.under(from).sub(this.under(to))),
+    });
+    return controls;
+  }
+
+  /** Whatever still glides stops, and nothing is in the way of the camera. */
+  private release(): void {
+    const { controls } = this;
+    this.bounds = null;
+    controls.enableDamping = false;
+    controls.update();
+    controls.enableDamping = !matchMedia('(prefers-reduced-motion: reduce)').matches;
+    controls.minDistance = controls.minPolarAngle = 0;
+    controls.maxDistance = controls.maxAzimuthAngle = Infinity;
+    controls.minAzimuthAngle = -Infinity;
+    controls.maxPolarAngle = Math.PI;
+  }
+
+  private limit(start: StartCamera): void {
+    const { controls } = this;
+    const { sideways, bounds } = this.subject;
+    this.bounds = bounds(start);
+    controls.minDistance = this.bounds.nearest;
+    controls.maxDistance = this.bounds.farthest;
+    controls.minAzimuthAngle = controls.getAzimuthalAngle() - sideways;
+    controls.maxAzimuthAngle = controls.getAzimuthalAngle() + sideways;
     controls.minPolarAngle = controls.getPolarAngle() - UPWARDS;
     controls.maxPolarAngle = controls.getPolarAngle() + UPWARDS;
+  }
+
+  /** The visitor moved the camera: it stays where there is somebody to see. */
+  private confine(): void {
+    const { camera, controls, bounds } = this;
+    if (!bounds) return;
+    this.moved = true;
+    const slope = Math.tan(THREE.MathUtils.degToRad(camera.fov) / 2);
+    confine(camera.position, controls.target, bounds, slope * Math.min(1, camera.aspect));
+    camera.updateMatrixWorld();
   }
 
   private key(event: KeyboardEvent): void {
@@ -88,8 +150,8 @@ export class Orbit {
       ArrowRight: () => this.turn(this.camera.up, -KEY_STEP),
       ArrowUp: () => this.turn(this.right(), -KEY_STEP),
       ArrowDown: () => this.turn(this.right(), KEY_STEP),
-      '+': () => this.zoom(1 / KEY_ZOOM),
-      '-': () => this.zoom(KEY_ZOOM),
+      '+': () => this.zoom(this.centre(), 1 / KEY_ZOOM),
+      '-': () => this.zoom(this.centre(), KEY_ZOOM),
       Home: () => this.home(),
     };
     const move = moves[event.key];
@@ -108,7 +170,38 @@ export class Orbit {
     this.camera.position.copy(this.controls.target).add(offset);
   }
 
-  private zoom(factor: number): void {
-    this.camera.position.sub(this.controls.target).multiplyScalar(factor).add(this.controls.target);
+  /** Comes nearer by a factor under 1 to a point, which keeps its place in the picture. */
+  private zoom(fixed: THREE.Vector3, factor: number): void {
+    const { camera, controls, bounds } = this;
+    const { minDistance: nearest, maxDistance: farthest } = controls;
+    const distance = controls.getDistance();
+    const wanted = THREE.MathUtils.clamp(factor * distance, nearest, farthest) / distance;
+    const scaled = (point: THREE.Vector3, by: number) => point.clone().sub(fixed).multiplyScalar(by).add(fixed);
+    const allowed = bounds ? freeScale(wanted, (by) => scaled(camera.position, by), bounds) : wanted;
+    for (const point of [camera.position, controls.target]) point.copy(scaled(point, allowed));
+    controls.update();
+  }
+
+  /** Shifts camera and target alike. */
+  private move(by: THREE.Vector3): void {
+    this.camera.position.add(by);
+    this.controls.target.add(by);
+    this.controls.update();
+  }
+
+  /** What is at a place of the picture, as far away as what the camera looks at. */
+  private under([x, y]: Place): THREE.Vector3 {
+    const { camera, controls } = this;
+    camera.updateMatrixWorld();
+    const ahead = controls.target.clone().sub(camera.position);
+    const ray = new THREE.Vector3(x, y, 0).unproject(camera).sub(camera.position);
+    return ray.multiplyScalar(ahead.lengthSq() / ray.dot(ahead)).add(camera.position);
+  }
+
+  /** What keys zoom at: the face, or the middle of the picture where no face is seen. */
+  private centre(): THREE.Vector3 {
+    const { face } = this.subject;
+    const { x, y, z } = face?.clone().project(this.camera) ?? { x: 1, y: 1, z: 1 };
+    return (Math.max(Math.abs(x), Math.abs(y), z) < 1 ? face! : this.controls.target).clone();
   }
 }

@@ -1,9 +1,11 @@
 import { SparkRenderer } from '@sparkjsdev/spark';
 import * as THREE from 'three';
 import type { Manifest } from '../bundle/manifest.ts';
-import { AROUND, IN_FRONT, Orbit } from './orbit.ts';
+import { Orbit } from './orbit.ts';
+import { wholeBody } from './subject.ts';
 
 export const TICK = 1 / 30; // s between changes
+const LEAST_FREE = 0.4; // of the height: what covers more lies over the face
 const LEAST_ALPHA = 1 / 255; // a splat ends where its alpha falls under this
 
 /** What moves on stage: a head, a body. */
@@ -22,6 +24,7 @@ export class Stage {
   readonly spark: SparkRenderer;
   readonly orbit: Orbit;
   frames = 0; // drawn so far
+  private covered = 0; // pixels at the lower edge that controls lie on
   private readonly canvas: HTMLCanvasElement;
   private readonly actors: Actor[] = [];
   private lastTick = 0; // s, on the grid of ticks
@@ -35,7 +38,7 @@ export class Stage {
     this.renderer.setClearColor(new THREE.Color().setRGB(...manifest.background, THREE.SRGBColorSpace));
     this.spark = makeSpark(this.renderer, () => (this.dirty = true));
     this.scene.add(this.spark);
-    this.orbit = new Orbit(canvas, manifest.camera, manifest.body ? AROUND : IN_FRONT, () => (this.dirty = true));
+    this.orbit = new Orbit(canvas, wholeBody(manifest), () => (this.dirty = true));
     new ResizeObserver(() => this.fit()).observe(canvas);
     this.fit();
   }
@@ -44,6 +47,12 @@ export class Stage {
   add(actor: Actor): void {
     this.actors.push(actor);
     this.scene.add(...actor.objects);
+  }
+
+  /** Keeps faces clear of so many pixels at the lower edge. */
+  keepClear(pixels: number): void {
+    this.covered = pixels;
+    this.fit();
   }
 
   /** Starts drawing what the actors do. */
@@ -93,7 +102,7 @@ export class Stage {
     if (!width || !height) return;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
-    this.orbit.resize(width / height);
+    this.orbit.fit({ aspect: width / height, free: Math.max(LEAST_FREE, 1 - this.covered / height) });
     this.dirty = true;
   }
 }

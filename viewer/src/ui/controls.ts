@@ -39,7 +39,7 @@ export class Controls {
     this.bindTalk(conversation);
     document.addEventListener('keydown', (event) => {
       if (event.key === 'Escape') conversation.interrupt();
-      if (event.key === '/' && document.activeElement !== this.input) {
+      if (event.key === '/' && this.takesSlash(event)) {
         event.preventDefault();
         this.input.focus();
       }
@@ -73,6 +73,13 @@ export class Controls {
   /** Lets the visitor type at once. */
   focus(): void {
     this.input.focus();
+  }
+
+  /** Whether a slash leads to the text box: everywhere but inside a text that is being typed. */
+  private takesSlash({ target, ctrlKey, metaKey, altKey }: KeyboardEvent): boolean {
+    if (ctrlKey || metaKey || altKey) return false;
+    if (target === this.input) return this.input.value === '';
+    return !(target as Element).closest('textarea, [contenteditable], input:not([type=radio], [type=range])');
   }
 
   setTalking(held: boolean): void {

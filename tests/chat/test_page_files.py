@@ -1,0 +1,172 @@
+"""How the page's files travel: small where the browser takes it, kept where that is safe."""
+
+import gzip
+import os
+
+import httpx
+import pytest
+from fastapi import FastAPI
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from ico3d.chat import server
+
+SCRIPT, SHEET, PICTURE = "assets/index-C0ffee00.js", "assets/index-C0ffee00.css", "assets/x-1.png"
+TEXTS = {
+    "index.html": b"<!doctype html><title>A page</title>" * 9,
+    SCRIPT: b"export const answer = 42;\n" * 99,
+}
+ONLY_PLAIN = {SHEET: b"p{}", PICTURE: b"\x89PNG"}
+READERS = {None: bytes, "gzip": gzip.decompress, "br": lambda data: data[::-1]}
+FOR_EVER = "public, max-age=31536000, immutable"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """What Vite leaves, with stand-ins for brotli, which Python cannot read."""
+    folder = tmp_path_factory.mktemp("static")
+    (folder / "assets").mkdir()
+    for name, data in (TEXTS | ONLY_PLAIN).items():
+        (folder / name).write_bytes(data)
+    for name, data in TEXTS.items():
+        (folder / f"{name}.gz").write_bytes(gzip.compress(data))
+        (folder / f"{name}.br").write_bytes(data[::-1])
+    return folder
+
+
+@pytest.fixture
+def page(folder, monkeypatch):
+    return client(folder, monkeypatch)
+
+
+def client(folder, monkeypatch):
+    monkeypatch.setattr(server, "STATIC", folder)
+    app = FastAPI()
+    server.add_page(app)
+    return httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://page")
+
+
+async def raw(page, name, **headers):
+    """Status, headers and the bytes on the wire."""
+    asked = {
+        "Accept-Encoding": "",
+        **{key.replace("_", "-"): text for key, text in headers.items()},
+    }
+    async with page.stream("GET", f"/{name}", headers=asked) as answer:
+        return answer, b"".join([part async for part in answer.aiter_raw()])
+
+
+@pytest.mark.parametrize(
+    ("accepted", "coding"),
+    [
+        ("gzip, deflate, br, zstd", "br"),
+        ("gzip, deflate", "gzip"),
+        ("GZIP", "gzip"),
+        ("br;q=0.2, gzip;q=0.8", "gzip"),
+        ("br; q=0.0, gzip ; q=1", "gzip"),
+        ("br;q=0, gzip;q=0.000", None),
+        ("*", "br"),
+        ("br;q=0, *;q=0.5", "gzip"),
+        ("*;q=0", None),
+        ("identity", None),
+        ("deflate, zstd", None),
+        ("br;q=2, gzip;quality=1, x", None),
+        ("brr, xgzip", None),
+        ("", None),
+    ],
+)
+@pytest.mark.parametrize("name", TEXTS)
+async def test_the_browser_says_in_which_form_a_text_comes(page, name, accepted, coding):
+    answer, body = await raw(page, name, Accept_Encoding=accepted)
+    assert answer.status_code == 200
+    assert answer.headers.get("content-encoding") == coding
+    assert READERS[coding](body) == TEXTS[name]
+    assert answer.headers["vary"] == "Accept-Encoding"
+    assert answer.headers["content-length"] == str(len(body))
+    types = {"index.html": "text/html; charset=utf-8", SCRIPT: "text/javascript; charset=utf-8"}
+    assert answer.headers["content-type"] == types[name]
+
+
+@given(accepted=st.text("brgzipq=;,.*019 \t-x", max_size=40))
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+async def test_no_header_keeps_the_page_away(page, accepted):
+    answer, body = await raw(page, SCRIPT, Accept_Encoding=accepted)
+    assert answer.status_code == 200
+    coding = answer.headers.get("content-encoding")
+    assert coding is None or coding in accepted or "*" in accepted
+    assert READERS[coding](body) == TEXTS[SCRIPT]
+
+
+async def test_what_has_no_smaller_form_comes_plain(page):
+    for name, data in ONLY_PLAIN.items():
+        answer, body = await raw(page, name, Accept_Encoding="br, gzip")
+        assert (body, answer.headers.get("content-encoding")) == (data, None)
+        assert "vary" not in answer.headers
+
+
+async def test_names_with_hashes_are_kept_for_ever_and_the_index_is_asked_for_anew(page):
+    for name in (SCRIPT, SHEET, PICTURE):
+        answer, _ = await raw(page, name)
+        assert answer.headers["cache-control"] == FOR_EVER
+    for name in ("", "index.html"):
+        answer, body = await raw(page, name)
+        assert answer.headers["cache-control"] == "no-cache"
+        assert body == TEXTS["index.html"]
+    missing, _ = await raw(page, "assets/index-00000000.js")
+    assert missing.status_code == 404 and "cache-control" not in missing.headers
+
+
+async def test_a_form_that_the_browser_has_is_not_sent_again(page):
+    tags = set()
+    for accepted in ("", "gzip", "br"):
+        first, _ = await raw(page, "", Accept_Encoding=accepted)
+        tags.add(first.headers["etag"])
+        again, body = await raw(
+            page, "", Accept_Encoding=accepted, If_None_Match=f'"x", {first.headers["etag"]}'
+        )
+        assert (again.status_code, body) == (304, b"")
+        assert again.headers["vary"] == "Accept-Encoding"
+        assert again.headers["cache-control"] == "no-cache"
+    assert len(tags) == 3  # none may be taken for another
+
+
+async def test_another_page_of_the_same_size_and_second_is_another_page(tmp_path, monkeypatch):
+    answers = []
+    for version in ("a", "b"):
+        folder = tmp_path / version
+        folder.mkdir()
+        (folder / "index.html").write_text(f"<script src={version}>")
+        os.utime(folder / "index.html", (1.58e9, 1.58e9))  # as all files of a wheel
+        kept = {}
+        if answers:
+            told = answers[0].headers
+            kept = {"If_None_Match": told["etag"]}
+            kept |= {
+                "If_Modified_Since": told.get("last-modified", "Sun, 02 Feb 2020 00:00:00 GMT")
+            }
+        answer, body = await raw(client(folder, monkeypatch), "", **kept)
+        assert (answer.status_code, body) == (200, f"<script src={version}>".encode())
+        answers.append(answer)
+
+
+async def test_a_part_is_one_of_the_same_form(page):
+    whole, body = await raw(page, SCRIPT, Accept_Encoding="gzip")
+    part, piece = await raw(
+        page, SCRIPT, Accept_Encoding="gzip", Range="bytes=5-9", If_Range=whole.headers["etag"]
+    )
+    assert (part.status_code, piece) == (206, body[5:10])
+    other, everything = await raw(page, SCRIPT, Range="bytes=5-9", If_Range=whole.headers["etag"])
+    assert (other.status_code, everything) == (200, TEXTS[SCRIPT])
+
+
+async def test_compressed_files_have_no_address_of_their_own(page):
+    for suffix in (".gz", ".br"):
+        answer, _ = await raw(page, SCRIPT + suffix)
+        assert answer.status_code == 404
+
+
+async def test_a_page_that_was_built_without_them_is_served_plain(tmp_path, monkeypatch):
+    (tmp_path / "index.html").write_bytes(TEXTS["index.html"])
+    answer, body = await raw(client(tmp_path, monkeypatch), "", Accept_Encoding="br, gzip")
+    assert (answer.status_code, body) == (200, TEXTS["index.html"])
+    assert "content-encoding" not in answer.headers

@@ -1,0 +1,33 @@
+import * as THREE from 'three';
+import type { Manifest } from '../bundle/manifest.ts';
+import { boundsOf, boundsOfBody } from './bounds.ts';
+import { portrait, whole } from './framing.ts';
+import type { Subject } from './orbit.ts';
+import type { Sitter } from './sitter.ts';
+
+const FRONT = THREE.MathUtils.degToRad(75); // to either side: heads are recorded from the front
+const NARROWEST = 0.45; // width / height that still holds a whole body
+
+/** What the camera sees while nobody is on stage yet, and of a body whose head is nowhere told. */
+export function wholeBody({ camera, body }: Manifest): Subject {
+  const [low, high] = [body?.low ?? camera.target, body?.high ?? camera.target].map((corner) => new THREE.Vector3(...corner));
+  const box = new THREE.Box3(low, high);
+  return {
+    up: camera.up,
+    framing: whole(camera, NARROWEST),
+    bounds: () => boundsOfBody(box, camera),
+    sideways: Infinity,
+    face: null,
+  };
+}
+
+/** Somebody with a face. */
+export function person({ camera, body }: Manifest, sitter: Sitter): Subject {
+  return {
+    up: camera.up,
+    framing: portrait(sitter, camera.fov_y),
+    bounds: (start) => boundsOf(sitter, start, camera),
+    sideways: body ? Infinity : FRONT,
+    face: sitter.eyes,
+  };
+}

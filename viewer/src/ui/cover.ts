@@ -1,0 +1,31 @@
+import { byId } from './elements.ts';
+
+/**
+ * Tells how many pixels at the lower edge the controls and captions cover, whenever they cover more
+ * than before in a window of this size: what was there once comes again, and the picture must not
+ * jump each time. Notices do not count; they go.
+ */
+export function watchCover(changed: (pixels: number) => void): void {
+  const main = document.querySelector('main')!;
+  let size = '';
+  let most = 0;
+  const measure = () => {
+    const before = size;
+    size = `${innerWidth}x${innerHeight}`;
+    const tops = [...main.children].filter(isCover).map((child) => child.getBoundingClientRect().top);
+    const covered = Math.max(0, innerHeight - Math.min(innerHeight, ...tops));
+    if (size === before && covered <= most) return;
+    most = covered;
+    changed(most);
+  };
+  const observer = new ResizeObserver(measure);
+  for (const child of main.children) observer.observe(child);
+  observer.observe(byId('stage'));
+}
+
+/** Whether an element is seen and lies in the row of the face, not beside it. */
+function isCover(element: Element): boolean {
+  const { width, height } = element.getBoundingClientRect();
+  const seen = width > 0 && height > 0 && !element.matches('.gone');
+  return seen && element.id !== 'notices' && getComputedStyle(element).position !== 'fixed';
+}
