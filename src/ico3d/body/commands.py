@@ -56,10 +56,10 @@ class TrainBody:
         from ico3d.body.settings import settings_for
         from ico3d.body.train import BodyJob, plan_windows, train_body
         from ico3d.capture.capture import Capture
-        from ico3d.splat.device import computing_device
+        from ico3d.splat.device import decided
         from ico3d.training.changes import with_changes
 
-        device = self.device if self.ray else computing_device(self.device).type
+        device = self.device if self.ray else decided(self.device)
         runner = None if self.plan else runner_of(self.jobs, self.ray, device)
         settings = with_changes(settings_for(self.preset, self.method), self.set)
         job = BodyJob(self.method, self.seed, settings, device=device)

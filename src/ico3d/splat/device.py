@@ -44,6 +44,11 @@ def computing_device(wanted: DeviceName = "auto") -> torch.device:
     return CPU
 
 
+def decided(wanted: DeviceName) -> DeviceName:
+    """What becomes of a wish on this machine, for its other processes; errors as above."""
+    return "cuda" if computing_device(wanted).type == "cuda" else "cpu"
+
+
 def device_name(device: torch.device) -> str:
     """For people and files: `cpu`, or `cuda` with the name of the GPU."""
     return "cpu" if device.type == "cpu" else f"cuda ({torch.cuda.get_device_name(device)})"
