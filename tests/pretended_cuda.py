@@ -247,3 +247,18 @@ def compute_relocation(
         raise RuntimeError("gsplat: CUDA tensors are needed")
     with torch._C.DisableTorchFunction():
         return _mark(relocated(opacities, scales, ratios), True)
+
+
+@contextmanager
+def drawn(monkeypatch) -> Iterator[list[int]]:
+    """Gathers how many Gaussians each picture had that gsplat was asked for meanwhile."""
+    pictures: list[int] = []
+
+    def counting(means: Tensor, *arguments: Any, **options: Any) -> tuple[Tensor, Tensor, dict]:
+        if len(means) > 1:  # one alone tries the device
+            pictures.append(len(means))
+        return rasterization(means, *arguments, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(sys.modules["gsplat"], "rasterization", counting)
+        yield pictures

@@ -58,7 +58,9 @@ def _mattes(work, readings, video=None):
     image = np.repeat(100 * ones[..., None], 3, 2)
     for number in readings.frames:
         save_picture(work / "alpha" / f"{number}.png", 255 * ones)
-        save_picture(work / "parsing" / f"{number}.png", np.tile(np.uint8(FACE), (HEIGHT, WIDTH, 1)))
+        save_picture(
+            work / "parsing" / f"{number}.png", np.tile(np.uint8(FACE), (HEIGHT, WIDTH, 1))
+        )
         (work / "torso_imgs").mkdir(exist_ok=True)
         save_torso(work / "torso_imgs" / f"{number}.png", image, 0 * ones.astype(np.float32))
         save_picture(work / "gt_imgs" / f"{number}.jpg", image)
