@@ -2,8 +2,9 @@
 
     python bench/gpu.py --json gpu.json [--capture CAPTURE]
 
-Without a CUDA device the same is timed on the CPU, and parity is left out. Prints the table for
-docs/benchmarks.md, with the device's name. Exit status 1: the backends differ too much.
+Where CUDA does not work the same is timed on the CPU, and parity is left out; --device decides as
+for ico3d's verbs. Prints the table for docs/benchmarks.md, with the device's name. Exit status 1:
+the backends differ too much.
 """
 
 import json
@@ -22,9 +23,11 @@ import tyro
 
 from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera, look_at
+from ico3d.common.device import DeviceName
 from ico3d.head.model import HeadModel, HeadShape
 from ico3d.head.settings import PRESETS
 from ico3d.head.train import HeadJob, train_head
+from ico3d.splat.device import decided, device_name
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
@@ -131,19 +134,21 @@ class Bench:
         json: Where to write the figures.
         capture: Also trains a head on this one, the CPU preset with blendshapes.
         runs: Repetitions; medians are reported.
+        device: Where to compute.
     """
 
     json: Path
     capture: Path | None = None
     runs: int = 30
+    device: DeviceName = "auto"
 
     def run(self) -> int:
         """Measures, prints, writes; the exit status."""
-        device = "cuda" if torch.cuda.is_available() else "cpu"
-        name = f"{platform.machine()}, {os.cpu_count()} cores"
-        if device == "cuda":
-            name = torch.cuda.get_device_name()
-        figures: dict = {"device": f"{device}: {name}", "torch": torch.__version__}
+        device = decided(self.device)
+        name = device_name(torch.device(device))
+        if device == "cpu":
+            name = f"cpu ({platform.machine()}, {os.cpu_count()} cores)"
+        figures: dict = {"device": name, "torch": torch.__version__}
         figures["ms"] = raster_rows(device, self.runs) | head_rows(device, self.runs)
         if device == "cuda":
             figures["parity"] = parity()
@@ -164,7 +169,7 @@ class Bench:
     def _train(self, path: Path) -> float:
         job = HeadJob("blendshapes", "full", "builtin", 0, PRESETS["cpu"])
         with tempfile.TemporaryDirectory() as folder:
-            head = train_head(Capture.open(path), Path(folder), job)
+            head = train_head(Capture.open(path), Path(folder), job, device=self.device)
         return head.summary["train_seconds"]
 
 

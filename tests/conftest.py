@@ -1,5 +1,19 @@
 """What holds for all tests."""
 
+import pytest
+
+
+@pytest.fixture
+def cuda(monkeypatch):
+    """A machine with CUDA and gsplat, as far as errors of devices go; gives the device."""
+    from ico3d.splat.device import cuda_fault
+    from pretended_cuda import CUDA, pretended_cuda
+
+    cuda_fault.cache_clear()
+    with pretended_cuda(monkeypatch):
+        yield CUDA
+    cuda_fault.cache_clear()
+
 
 def pytest_make_parametrize_id(val: object) -> str | None:
     """Names bytes by their length: names made of content differ where content does.

@@ -109,7 +109,7 @@ def test_ctrl_c_and_errors_end_all_workers_and_spare_checkpoints(recorded, tmp_p
     second.folder.mkdir()
     (second.folder / "settings.json").write_text("{}")
     with pytest.raises(SettingsError, match="holds a run with another '"):
-        train_windows([first, second], Processes(2))
+        train_windows([first, second], Processes(2, True))
     assert not multiprocessing.active_children()
     assert saved_steps(first.folder) >= saved
 
@@ -133,7 +133,7 @@ def test_workers_end_with_the_one_who_started_them(recorded, tmp_path):
         "import sys; from pathlib import Path; from window_tasks import tasks;"
         "from ico3d.body.jobs import train_windows; from ico3d.body.processes import Processes;"
         "made = tasks(*map(Path, sys.argv[1:]), 'static', steps_per_frame=10_000);"
-        "train_windows(made[:1], Processes(1))"
+        "train_windows(made[:1], Processes(1, False))"
     )
     paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
     environment = {**os.environ, "PYTHONPATH": paths}
@@ -186,11 +186,11 @@ def test_a_gpu_for_each(monkeypatch):
     """By the names that the environment gives them; never two windows on one."""
     monkeypatch.setattr("torch.cuda.device_count", lambda: 2)
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "3,GPU-5")
-    assert Processes(2)._gpus == ["3", "GPU-5"]
+    assert Processes(2, True)._gpus == ["3", "GPU-5"]
     monkeypatch.delenv("CUDA_VISIBLE_DEVICES")
-    assert Processes(2)._gpus == ["0", "1"]
+    assert Processes(2, True)._gpus == ["0", "1"]
     with pytest.raises(SettingsError, match="give --jobs 2 or fewer"):
-        Processes(3)
+        Processes(3, True)
 
 
 @pytest.mark.parametrize(

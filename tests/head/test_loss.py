@@ -1,6 +1,7 @@
 """The loss: its parts, and the perceptual term with and without weights."""
 
 import dataclasses
+import json
 import logging
 
 import pytest
@@ -11,11 +12,22 @@ from ico3d.errors import ModelError
 from ico3d.head.loss import HeadLoss
 from ico3d.head.perceptual import WEIGHTS, PerceptualLoss
 from ico3d.head.settings import PRESETS
+from ico3d.head.train import HeadJob, train_head
+from ico3d.head.trainer import HeadTrainer
 from ico3d.head.views import Picture
 from ico3d.splat.losses import ssim
 from ico3d.splat.rendering import Drawing, Rendering
 
 PAPER = PRESETS["paper"]
+CPU = torch.device("cpu")
+SHORT = dataclasses.replace(
+    PRESETS["cpu"],
+    steps=5,
+    initial_gaussians=50,
+    perceptual_weight=0.1,
+    perceptual_from=1,
+    checkpoint_every=2,
+)
 
 
 def _rendering(image: torch.Tensor, alpha: torch.Tensor) -> Rendering:
@@ -31,7 +43,7 @@ def test_l1_ssim_and_alpha_are_weighted():
     image, target = _images()
     settings = dataclasses.replace(PAPER, steps=10, alpha_weight=0.5)
     alpha, mask = torch.full((16, 20), 0.25), torch.ones(16, 20)
-    loss = HeadLoss(settings)(_rendering(image, alpha), target, Picture(target, mask, None), 0)
+    loss = HeadLoss(settings, CPU)(_rendering(image, alpha), target, Picture(target, mask, None), 0)
     expected = 0.8 * (image - target).abs().mean() + 0.2 * (1 - ssim(image, target)) + 0.5 * 0.75
     torch.testing.assert_close(loss, expected)
 
@@ -43,7 +55,7 @@ def test_a_torso_counts_by_its_weight():
     torso[8:] = 1
     settings = dataclasses.replace(PAPER, steps=10, ssim_weight=0.0, torso_weight=0.25)
     rendering = _rendering(image, torch.ones(16, 20))
-    HeadLoss(settings)(rendering, target, Picture(target, None, torso), 0).backward()
+    HeadLoss(settings, CPU)(rendering, target, Picture(target, None, torso), 0).backward()
     slopes = image.grad.abs()  # of 0.8·L1 over 16·20·3 numbers
     torch.testing.assert_close(slopes[:8], torch.full((8, 20, 3), 0.8 / 960))
     torch.testing.assert_close(slopes[8:], torch.full((8, 20, 3), 0.25 * 0.8 / 960))
@@ -59,7 +71,7 @@ def models(tmp_path, monkeypatch):
 def test_without_weights_training_goes_on_with_one_warning(models, caplog):
     image, target = _images()
     with caplog.at_level(logging.WARNING):
-        loss = HeadLoss(PAPER)
+        loss = HeadLoss(PAPER, CPU)
     assert len(caplog.records) == 1
     assert WEIGHTS in caplog.text
     rendering = _rendering(image, torch.ones(16, 20))
@@ -84,7 +96,7 @@ def _write_weights(folder) -> None:
 def test_the_perceptual_term_starts_when_it_should(models):
     _write_weights(models)
     image, target = _images()
-    loss, rendering = HeadLoss(PAPER), _rendering(image, torch.ones(16, 20))
+    loss, rendering = HeadLoss(PAPER, CPU), _rendering(image, torch.ones(16, 20))
     picture = Picture(target, None, None)
     early, late = (loss(rendering, target, picture, step) for step in (9_999, 10_000))
     distance = PerceptualLoss()(image, target)
@@ -97,3 +109,41 @@ def test_other_weights_are_one_sentence(models):
     save_file({"features.0.weight": torch.zeros(1)}, models / WEIGHTS)
     with pytest.raises(ModelError, match="does not hold VGG-16 weights"):
         PerceptualLoss()
+
+
+@pytest.mark.parametrize("weights", [False, True])
+def test_a_head_says_whether_the_perceptual_term_was_there(weights, models, tiny, tmp_path, caplog):
+    """`head.json` records what was used, not what was wished for."""
+    if weights:
+        _write_weights(models)
+    job = HeadJob("blendshapes", "full", "builtin", 0, SHORT)
+    train_head(tiny, tmp_path / "head", job)
+    settings = json.loads((tmp_path / "head" / "head.json").read_text())["summary"]["settings"]
+    assert settings["perceptual_weight"] == (0.1 if weights else 0.0)
+    assert caplog.text.count("with weight 0") == (0 if weights else 1)
+
+
+@pytest.mark.parametrize("first", [False, True])
+def test_a_run_goes_on_with_the_terms_it_began_with(first, models, tiny, tmp_path, monkeypatch):
+    job = HeadJob("blendshapes", "full", "builtin", 0, SHORT)
+    if first:
+        _write_weights(models)
+    step = HeadTrainer.step
+
+    def dying_step(self, index):
+        if index == 3:
+            raise KeyboardInterrupt
+        return step(self, index)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(HeadTrainer, "step", dying_step)
+        with pytest.raises(KeyboardInterrupt):
+            train_head(tiny, tmp_path / "head", job)
+    if first:
+        (models / WEIGHTS).unlink()
+        with pytest.raises(ModelError, match="began with the perceptual term"):
+            train_head(tiny, tmp_path / "head", job)
+    else:
+        _write_weights(models)
+        head = train_head(tiny, tmp_path / "head", job)
+        assert head.summary["settings"]["perceptual_weight"] == 0

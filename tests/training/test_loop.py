@@ -38,6 +38,9 @@ class Walk:
     def tensors(self) -> dict[str, torch.Tensor]:
         return {"weight": self.weight, **self.optimiser.moments}
 
+    def place(self, name: str) -> torch.device:
+        return torch.device("cpu")
+
     def state(self) -> dict:
         return {"calls": self.calls}
 

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import tyro
 
+from ico3d.common.device import DeviceName
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -38,12 +40,14 @@ class Animate:
         capture: The body's recording: measure how the motion looks. A body is also drawn from the
             side of its first camera; without, as someone stands before it in a world with y up.
             Avatars and bundles know their front.
+        device: Where to compute: by default with CUDA where that works, else on the CPU.
     """
 
     model: tyro.conf.Positional[Path]
     out: Path | None = None
     contact_sheet: Path | None = None
     capture: Path | None = None
+    device: DeviceName = "auto"
 
     def run(self) -> None:
         """Finds, prints, writes and draws.
@@ -64,10 +68,11 @@ class Animate:
         from ico3d.capture.capture import Capture
         from ico3d.common.files import write_atomic
         from ico3d.errors import SettingsError
+        from ico3d.splat.device import computing_device
 
         if self.contact_sheet and self.contact_sheet.suffix.lower() not in PICTURES:
             raise SettingsError(f"{self.contact_sheet}: a contact sheet is NAME.jpg or NAME.png.")
-        person = open_person(self.model)
+        person = open_person(self.model, computing_device(self.device))
         capture = Capture.open(self.capture) if self.capture else None
         places = track(
             window_places(person), "measuring motion", len(person.windows), transient=True

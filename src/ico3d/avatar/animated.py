@@ -20,6 +20,7 @@ from ico3d.body.trained import TrainedBody
 from ico3d.bundle.animation import Animation
 from ico3d.bundle.format import Bundle
 from ico3d.errors import BundleError
+from ico3d.splat.device import CPU
 from ico3d.splat.gaussians import Gaussians
 
 
@@ -100,10 +101,12 @@ class BakedPerson:
 
     Attributes:
         bundle: The opened bundle.
+        device: Where its Gaussians are drawn.
         summary: Empty: a bundle does not say how its body was made.
     """
 
     bundle: Bundle
+    device: torch.device = CPU
     summary: dict = field(default_factory=dict)
 
     def __post_init__(self):
@@ -128,7 +131,7 @@ class BakedPerson:
 
     def window_gaussians(self, index: int, tau: float) -> Gaussians:
         """The Gaussians of a window."""
-        return window_gaussians(self.bundle.window(index), tau)
+        return window_gaussians(self.bundle.window(index), tau).to(self.device)
 
     @property
     def has_head(self) -> bool:
@@ -137,18 +140,22 @@ class BakedPerson:
 
     def body_gaussians(self, seconds: float) -> Gaussians:
         """The body alone."""
-        return body_gaussians(self.bundle, seconds)
+        return body_gaussians(self.bundle, seconds).to(self.device)
 
     def gaussians(self, seconds: float) -> Gaussians:
         """With an idle face, if there is a head."""
         head = self.bundle.manifest.head
         if head is None:
-            return body_gaussians(self.bundle, seconds)
-        return avatar_gaussians(self.bundle, seconds, head.idle_expression)
+            return body_gaussians(self.bundle, seconds).to(self.device)
+        return avatar_gaussians(self.bundle, seconds, head.idle_expression).to(self.device)
 
 
-def open_person(path: Path) -> Person:
+def open_person(path: Path, device: torch.device) -> Person:
     """Opens a model folder or a bundle.
+
+    Args:
+        path: See there.
+        device: Where its Gaussians shall be.
 
     Raises:
         ModelError: If a folder holds a damaged model.
@@ -156,9 +163,9 @@ def open_person(path: Path) -> Person:
             that makes no sense, or is for another body.
     """
     if (path / AVATAR).is_file():
-        avatar = TrainedAvatar.load(path)
+        avatar = TrainedAvatar.load(path).to(device)
         return TrainedPerson(avatar.body, avatar, read_animation(path, avatar.body))
     if (path / BODY).is_file():
-        body = TrainedBody.load(path)
+        body = TrainedBody.load(path).to(device)
         return TrainedPerson(body, None, read_animation(path, body))
-    return BakedPerson(Bundle.open(path))
+    return BakedPerson(Bundle.open(path), device)

@@ -118,7 +118,7 @@ def _turned(ring: Ring, facing: np.ndarray) -> Ring:
 @torch.no_grad()
 def _picture(person: Person, seconds: float, camera: Camera) -> np.ndarray:
     rgb = render(person.gaussians(seconds), [camera], torch.tensor(NEUTRAL)).rgb[0]
-    return rgb.clamp(0, 1).numpy()  # (H, W, 3)
+    return rgb.clamp(0, 1).cpu().numpy()  # (H, W, 3)
 
 
 def _quality(axes: "Axes", animation: Animation) -> None:

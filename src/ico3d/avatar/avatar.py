@@ -79,6 +79,12 @@ class TrainedAvatar:
         """Frames per second of the clip."""
         return self.body.fps
 
+    def to(self, device: torch.device) -> "TrainedAvatar":
+        """Moves head and body, and gives itself back."""
+        self.head.to(device)
+        self.body.to(device)
+        return self
+
     def expression(self, seconds: float) -> np.ndarray:
         """(B,) recorded expression at a time, linear between frames."""
         place = min(max(seconds * self.fps, 0.0), len(self.expressions) - 1.0)

@@ -109,7 +109,7 @@ def sample_logits(model: HeadModel, expressions: np.ndarray) -> np.ndarray:
     with torch.no_grad():
         for row, expression in zip(samples, expressions, strict=True):
             logits = model.logits(torch.from_numpy(np.asarray(expression, np.float32)))
-            row[:] = logits.clamp(-CLIP, CLIP).numpy()
+            row[:] = logits.clamp(-CLIP, CLIP).cpu().numpy()
     return samples
 
 
@@ -119,12 +119,15 @@ def megabytes_per_10k(head: BakedHead) -> float:
 
 
 def _geometry(model: HeadModel, kept: np.ndarray) -> dict[str, np.ndarray]:
-    quats = model.quats.detach().numpy()[kept]
+    means, quats, log_scales = (
+        parameter.detach().cpu().numpy()[kept]
+        for parameter in (model.means, model.quats, model.log_scales)
+    )
     quats = quats / np.maximum(np.linalg.norm(quats, axis=1, keepdims=True), 1e-12)
     return {
-        "means": np.ascontiguousarray(model.means.detach().numpy()[kept], np.float32),
+        "means": np.ascontiguousarray(means, np.float32),
         "quats": quats.astype(np.float16),
-        "scales": model.log_scales.detach().numpy()[kept].astype(np.float16),
+        "scales": log_scales.astype(np.float16),
     }
 
 

@@ -7,8 +7,12 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import tyro
 
+from ico3d.common.device import DeviceName
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    import torch
 
     from ico3d.avatar.body_bundle import WindowResult
     from ico3d.bundle.animation import Animation
@@ -38,6 +42,7 @@ class Bake:
         background: Splats that stand behind the person, in the same world: .spz or .ply.
         strip: Also write a picture here: recorded | exact | baked.
         force: Write the bundle although it breaks a bound, and play motion that looks bad.
+        device: Where to compute: by default with CUDA where that works, else on the CPU.
     """
 
     model: tyro.conf.Positional[Path]
@@ -51,6 +56,7 @@ class Bake:
     background: Path | None = None
     strip: Path | None = None
     force: bool = False
+    device: DeviceName = "auto"
 
     def run(self) -> None:
         """Bakes, measures, writes and checks the bundle.
@@ -85,6 +91,12 @@ class Bake:
     def _out(self) -> Path:
         return self.files[-1]
 
+    @property
+    def _place(self) -> "torch.device":
+        from ico3d.splat.device import computing_device
+
+        return computing_device(self.device)
+
     def _bake_head(self, report) -> None:
         from ico3d.avatar import baking, comparison, staging
         from ico3d.avatar.persona import load_persona
@@ -95,6 +107,7 @@ class Bake:
         self._check_rank()
         persona, notices = load_persona(self.persona), self._notices()
         head, capture = TrainedHead.load(self.model), Capture.open(self.files[0])
+        head.to(self._place)
         neutral = staging.background_colour(capture, 0)
         views = comparison.references(head, capture, neutral, baking.MEASURED_VIEWS)
         samples = recorded_samples(head, capture)
@@ -113,7 +126,7 @@ class Bake:
         if self.rank is not None:
             self._refuse("--rank is for heads: what a body keeps is chosen window by window.")
         persona, notices = self._body_persona(), self._notices()
-        body, capture = TrainedBody.load(self.model), self._capture(0)
+        body, capture = TrainedBody.load(self.model).to(self._place), self._capture(0)
         results = _watched(body_bundle.bake(body, capture), len(body.windows), report)
         if self.strip:
             _save_picture(body_bundle.strip(body, results, capture), self.strip)
@@ -128,7 +141,7 @@ class Bake:
 
         self._check_rank()
         persona, notices = load_persona(self.persona), self._notices()
-        avatar = TrainedAvatar.load(self.model)
+        avatar = TrainedAvatar.load(self.model).to(self._place)
         animation = whole_bundle.animation_of(self.model, avatar)
         head_capture, body_capture = self._capture(0), self._capture(1)
         samples, views = whole_bundle.head_samples(avatar, head_capture, persona)

@@ -31,7 +31,7 @@ class Reference:
     Attributes:
         camera: In canonical head space.
         expression: (B,) float32.
-        background: (3,) or (H, W, 3).
+        background: (3,) or (H, W, 3), on the device that draws.
         exact: What the exact model shows.
         truth: What was recorded, None where nothing was.
     """
@@ -142,7 +142,7 @@ def _reference(
 ) -> Reference:
     """Without a clean background, the person is cut out over the neutral colour."""
     picture = pictures.picture(view, _CPU)
-    behind, truth = pictures.background(view, _CPU), picture.image
+    behind, truth = pictures.background(view, _CPU), picture.image  # (H, W, 3)
     if behind is None:
         behind = torch.tensor(neutral)
         if picture.mask is not None:
@@ -158,7 +158,8 @@ def reference(
     background: torch.Tensor,
     truth: np.ndarray | None = None,
 ) -> Reference:
-    """What the exact head shows to a camera in canonical head space."""
+    """What the exact head shows to a camera in canonical head space, drawn where it is."""
+    background = background.to(head.model.device)
     with torch.no_grad():
         exact = _picture(head.model(expression), camera, background).astype(np.float16)
     return Reference(camera, expression.numpy(), background, exact, truth)
@@ -166,7 +167,8 @@ def reference(
 
 def _picture(gaussians: Gaussians, camera: Camera, background: torch.Tensor) -> np.ndarray:
     with torch.no_grad():
-        return render(gaussians, [camera], background).rgb[0].numpy()  # (H, W, 3)
+        drawn = render(gaussians.to(background.device), [camera], background)
+    return drawn.rgb[0].cpu().numpy()  # (H, W, 3)
 
 
 def _mean(values: Iterable[float]) -> float | None:

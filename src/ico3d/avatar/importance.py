@@ -36,7 +36,7 @@ def logit_importance(
         (N, 4) float32 with mean 1, at least a small share of it.
     """
     generator = torch.Generator().manual_seed(seed)
-    total = torch.zeros(len(model), 4)
+    total = torch.zeros(len(model), 4, device=model.device)
     for expression, camera in zip(expressions, cameras, strict=True):
         with torch.no_grad():
             logits = model.logits(expression)
@@ -46,8 +46,8 @@ def logit_importance(
         gaussians.means, gaussians.quats, gaussians.scales = (part.detach() for part in still)
         image = render(gaussians, [camera], background).rgb[0]  # (H, W, 3)
         signs = torch.randint(0, 2, image.shape, generator=generator) * 2 - 1
-        (gradient,) = torch.autograd.grad((image * signs).sum(), logits)
+        (gradient,) = torch.autograd.grad((image * signs.to(image)).sum(), logits)
         total += gradient.square()
-    importance = (total / len(cameras)).sqrt().numpy()
+    importance = (total / len(cameras)).sqrt().cpu().numpy()
     importance /= max(float(importance.mean()), 1e-12)
     return np.maximum(importance, _FLOOR).astype(np.float32)

@@ -89,7 +89,7 @@ def window_places(body: MovingBody) -> Iterator[np.ndarray]:
         shown = [body.window_gaussians(index, float(tau)) for tau in taus]
         opacities = torch.stack([gaussians.opacities for gaussians in shown]).mean(0)  # (N,)
         seen = opacities > SEEN if (opacities > SEEN).any() else opacities >= 0
-        yield torch.stack([gaussians.means[seen] for gaussians in shown]).numpy()
+        yield torch.stack([gaussians.means[seen] for gaussians in shown]).cpu().numpy()
 
 
 def read_animation(folder: Path, body: MovingBody) -> Animation | None:

@@ -116,16 +116,20 @@ def measure_window(
 def window_pair(
     body: MovingBody, index: int, baked: BakedWindow, head: HeadAt | None
 ) -> tuple[At, At]:
-    """The exact and the baked window at τ, each with the exact head on it, if there is one."""
+    """The exact and the baked window at τ, each with the exact head on it, if there is one.
+
+    Both are where the exact body is.
+    """
     span = body.windows[index]
 
     def together(gaussians: Gaussians, tau: float) -> Gaussians:
         frame = span.first + tau * (span.last - span.first)
         return gaussians if head is None else cat([gaussians, head(frame)])
 
+    device = body.window_gaussians(index, 0.0).means.device
     return (
-        lambda tau: together(body.window_gaussians(index, tau).to("cpu"), tau),
-        lambda tau: together(window_gaussians(baked, tau), tau),
+        lambda tau: together(body.window_gaussians(index, tau), tau),
+        lambda tau: together(window_gaussians(baked, tau).to(device), tau),
     )
 
 
@@ -154,7 +158,7 @@ def drawn(person: At, view: View) -> tuple[np.ndarray, np.ndarray]:
     """What a view shows of somebody: (H, W, 3) and alpha (H, W)."""
     with torch.no_grad():
         rendered = render(person(view.tau), [view.camera], view.background)
-    return rendered.rgb[0].numpy(), rendered.alpha[0].numpy()
+    return rendered.rgb[0].cpu().numpy(), rendered.alpha[0].cpu().numpy()
 
 
 def _mean(values: list[float]) -> float | None:

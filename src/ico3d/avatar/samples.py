@@ -95,7 +95,8 @@ def spoken_expressions(head: TrainedHead, texts: Sequence[str], seed: int = 0) -
 def lips_of(head: TrainedHead, samples: np.ndarray, rate: int) -> np.ndarray:
     """(T, 32) what a sound (S,) does to a head driven by speech, 25 rows per second."""
     assert head.adaptor is not None
-    features = torch.from_numpy(load_encoder(head.encoder).features(samples, rate))  # (T, D)
+    encoder = load_encoder(head.encoder)
+    features = torch.from_numpy(encoder.features(samples, rate, head.model.device))  # (T, D)
     with torch.no_grad():
         return head.adaptor.track(features).numpy()
 
@@ -115,7 +116,7 @@ def importance_of(head: TrainedHead, capture: Capture) -> np.ndarray:
 
 def cameras_around(model: HeadModel, count: int) -> list[Camera]:
     """Cameras in canonical head space, which looks along z, with all of the head in sight."""
-    means = model.means.detach().numpy()
+    means = model.means.detach().cpu().numpy()
     low, high = np.percentile(means, (0.5, 99.5), axis=0)  # (3,), (3,)
     middle, half = (low + high) / 2, np.linalg.norm(high - low) / 2
     away = half / np.sin(np.deg2rad(_FOV) / 2)

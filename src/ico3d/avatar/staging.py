@@ -137,7 +137,7 @@ def thumbnail(
     with torch.no_grad():
         picture = render(gaussians, [camera], torch.tensor(background)).rgb[0]  # (H, W, 3)
     buffer = io.BytesIO()
-    Image.fromarray((picture.clamp(0, 1) * 255 + 0.5).byte().numpy()).save(buffer, "PNG")
+    Image.fromarray((picture.clamp(0, 1) * 255 + 0.5).byte().cpu().numpy()).save(buffer, "PNG")
     return buffer.getvalue()
 
 

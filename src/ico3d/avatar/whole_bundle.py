@@ -182,10 +182,10 @@ def with_quality(
     """
     if capture is None:
         return replace(animation, quality=())
-    length = avatar.seconds
+    length, device = avatar.seconds, avatar.body.device
     quality = motion_quality.measure_motion(
         _pair(avatar, person)[1],
-        lambda tau: person.body_gaussians(tau * length),
+        lambda tau: person.body_gaussians(tau * length).to(device),
         capture,
         _span(avatar),
     )
@@ -271,10 +271,10 @@ def _span(avatar: TrainedAvatar) -> Window:
 
 def _pair(avatar: TrainedAvatar, person: BakedAvatar) -> tuple[measure_body.At, measure_body.At]:
     """The exact and the baked person at τ of the whole clip, with the recorded expression."""
-    length = avatar.seconds
+    length, device = avatar.seconds, avatar.body.device
     return (
         lambda tau: avatar.gaussians(tau * length),
-        lambda tau: person.gaussians(tau * length, avatar.expression(tau * length)),
+        lambda tau: person.gaussians(tau * length, avatar.expression(tau * length)).to(device),
     )
 
 

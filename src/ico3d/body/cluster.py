@@ -23,11 +23,12 @@ class RayCluster:
 
     capacity = None
 
-    def __init__(self, address: str):
+    def __init__(self, address: str, with_gpus: bool = True):
         """Connects.
 
         Args:
             address: Of the cluster: host:port, or "auto" on one of its machines.
+            with_gpus: Whether each window gets a GPU, where there are any.
 
         Raises:
             MissingExtraError: If Ray is not installed.
@@ -45,6 +46,7 @@ class RayCluster:
             raise SettingsError(
                 f"no Ray cluster answers at {address}: start one with ray start --head."
             ) from error
+        self._with_gpus = with_gpus
         self._needs: dict[str, int] = {}
         self._running: dict[Any, WindowTask] = {}
 
@@ -54,7 +56,7 @@ class RayCluster:
         Raises:
             SettingsError: If none can work.
         """
-        self._needs = share(self._ray.nodes(), windows)
+        self._needs = share(self._ray.nodes(), windows, self._with_gpus)
 
     def start(self, task: WindowTask) -> None:
         """Gives Ray a window to train."""
@@ -102,12 +104,13 @@ def _reach(address: str) -> None:
         socket.create_connection((host, int(port)), ANSWER).close()
 
 
-def share(nodes: Sequence[Mapping], windows: int) -> dict[str, int]:
+def share(nodes: Sequence[Mapping], windows: int, with_gpus: bool = True) -> dict[str, int]:
     """What each window gets of a cluster: a GPU where there are any, and its part of the cores.
 
     Args:
         nodes: As Ray describes them: whether "Alive", and their "Resources".
         windows: How many there are.
+        with_gpus: Whether GPUs are wanted.
 
     Returns:
         `num_cpus` and `num_gpus` for each, such that every node can take one.
@@ -119,7 +122,7 @@ def share(nodes: Sequence[Mapping], windows: int) -> dict[str, int]:
     resources = [held for held in resources if held.get("CPU", 0) >= 1]
     if not resources:
         raise SettingsError("the Ray cluster has no machine with cores to give.")
-    with_gpu = [held for held in resources if held.get("GPU", 0) >= 1]
+    with_gpu = [held for held in resources if with_gpus and held.get("GPU", 0) >= 1]
     if with_gpu:
         cores = min(held["CPU"] // held["GPU"] for held in with_gpu)
         return {"num_cpus": max(int(cores), 1), "num_gpus": 1}

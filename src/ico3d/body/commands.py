@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from ico3d.common.device import DeviceName
 from ico3d.errors import SettingsError
 
 if TYPE_CHECKING:
@@ -28,6 +29,8 @@ class TrainBody:
         preset: Settings of the paper, or sized for two CPU cores.
         set: Changes to the preset, as name=value (names: ico3d.body.settings.BodySettings).
         seed: All randomness follows from it.
+        device: Where to compute: by default with CUDA where that works, else on the CPU; machines
+            of a Ray cluster decide for themselves.
         jobs: Windows that train at once, each in a process of its own; with CUDA, as many as there
             are GPUs, at most.
         ray: Address of a Ray cluster that trains the windows, host:port or auto; the capture and
@@ -41,6 +44,7 @@ class TrainBody:
     preset: Literal["cpu", "paper"] = "cpu"
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     seed: int = 0
+    device: DeviceName = "auto"
     jobs: int = 1
     ray: str | None = None
     plan: bool = False
@@ -52,11 +56,13 @@ class TrainBody:
         from ico3d.body.settings import settings_for
         from ico3d.body.train import BodyJob, plan_windows, train_body
         from ico3d.capture.capture import Capture
+        from ico3d.splat.device import decided
         from ico3d.training.changes import with_changes
 
-        runner = None if self.plan else runner_of(self.jobs, self.ray)
+        device = self.device if self.ray else decided(self.device)
+        runner = None if self.plan else runner_of(self.jobs, self.ray, device)
         settings = with_changes(settings_for(self.preset, self.method), self.set)
-        job = BodyJob(self.method, self.seed, settings)
+        job = BodyJob(self.method, self.seed, settings, device=device)
         capture = Capture.open(self.capture)
         if self.plan:
             plan_windows(capture, job, self.out)
@@ -69,12 +75,13 @@ class TrainBody:
         )
 
 
-def runner_of(jobs: int, ray: str | None) -> "Runner | None":
+def runner_of(jobs: int, ray: str | None, device: str) -> "Runner | None":
     """Who trains the windows; None for this process.
 
     Args:
         jobs: Processes of this machine.
         ray: Address of a Ray cluster.
+        device: Where they compute: `cpu`, `cuda`, or `auto` for a cluster.
 
     Raises:
         SettingsError: If it cannot be.
@@ -89,5 +96,5 @@ def runner_of(jobs: int, ray: str | None) -> "Runner | None":
             "or more, and a Ray cluster decides by itself how many windows train at once."
         )
     if ray:
-        return partial(train_windows, crew=RayCluster(ray))
-    return partial(train_windows, crew=Processes(jobs)) if jobs > 1 else None
+        return partial(train_windows, crew=RayCluster(ray, device != "cpu"))
+    return partial(train_windows, crew=Processes(jobs, device != "cpu")) if jobs > 1 else None

@@ -84,6 +84,11 @@ class FineTuner:
         """Parameters and moments."""
         return self._learner.tensors()
 
+    def place(self, name: str) -> torch.device:
+        """All are where the model is."""
+        del name
+        return self.model.device
+
     def state(self) -> dict:
         """Nothing beside the tensors: randomness follows from the step's number."""
         return {}

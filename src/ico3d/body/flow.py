@@ -7,6 +7,7 @@ import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +22,9 @@ from ico3d.common.files import write_atomic
 from ico3d.errors import CaptureError
 from ico3d.splat.initial import in_pictures, spacing
 from ico3d.training.log import progress_bar
+
+if TYPE_CHECKING:
+    import torch
 
 HEIGHT = 320
 """Rows of the pictures that flow is estimated in; larger ones are made smaller."""
@@ -98,6 +102,7 @@ def clip_flow(
     folder: Path | None = None,
     span: Window | None = None,
     method: FlowMethod | None = None,
+    device: "torch.device | str" = "cpu",
 ) -> ClipFlow:
     """Measures what moves, in the pictures of up to 16 cameras that train.
 
@@ -106,13 +111,14 @@ def clip_flow(
         folder: Where results are kept, one file per camera, and found again.
         span: Which frames; else the whole clip.
         method: Estimates flow; else the best that is installed.
+        device: Where that computes, if it can.
 
     Raises:
         CaptureError: If no camera has two pictures on end.
         MissingExtraError: If no flow method is installed.
     """
     span = span or Window(0, capture.num_frames - 1)
-    method = method or best_method()
+    method = method or best_method(device)
     indices = _spread(capture)
     middle = focus([capture.cameras[index] for index in train_cameras(capture)])
     flows = []

@@ -4,12 +4,15 @@ import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from ico3d.capture import extras
 from ico3d.common.weights import model_folders
+
+if TYPE_CHECKING:
+    import torch
 
 RAFT_CHECKPOINTS = {
     "raft_large": "raft_large_C_T_SKHT_V2-ff5fadd5.pth",
@@ -74,18 +77,19 @@ def _one_thread(cv2: Any) -> Iterator[None]:
 class RaftFlow:
     """RAFT (Teed and Deng 2020) as torchvision has it."""
 
-    def __init__(self, builder: str, checkpoint: Path):
+    def __init__(self, builder: str, checkpoint: Path, device: "torch.device | str"):
         """Loads the weights.
 
         Args:
             builder: Name of torchvision's builder.
             checkpoint: Its state dictionary.
+            device: Where to compute.
         """
         import torch
         from torchvision.models import optical_flow
 
         self.name = checkpoint.stem
-        self._device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        self._device = device
         self._network = getattr(optical_flow, builder)(weights=None, progress=False)
         self._network.load_state_dict(torch.load(checkpoint, "cpu", weights_only=True))
         self._network.to(self._device).eval()
@@ -108,14 +112,17 @@ class RaftFlow:
         return flow[:, :height, :width].permute(1, 2, 0).cpu().numpy()  # (H, W, 2)
 
 
-def best_method() -> FlowMethod:
+def best_method(device: "torch.device | str" = "cpu") -> FlowMethod:
     """RAFT where torchvision and its weights are there (nothing is downloaded), else DIS.
+
+    Args:
+        device: Where RAFT computes; DIS knows the CPU only.
 
     Raises:
         MissingExtraError: If OpenCV is not installed either.
     """
     found = _raft()
-    return DisFlow() if found is None else RaftFlow(*found)
+    return DisFlow() if found is None else RaftFlow(*found, device)
 
 
 def _raft() -> tuple[str, Path] | None:

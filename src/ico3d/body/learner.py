@@ -159,17 +159,15 @@ class Learner:
 
     def restore(self, tensors: dict[str, Tensor]) -> None:
         """Takes back what `tensors` gave; what learned before learns again."""
-        device = self.model.device
         for name, tensor in tensors.items():
             part, _, rest = name.partition(".")
-            here = tensor if tensor.dim() == 0 else tensor.to(device)
             if part == "moments":
-                self.optimiser.moments[rest] = here
+                self.optimiser.moments[rest] = tensor
             elif part == "affine":
-                self.affine = here.requires_grad_(self.affine.requires_grad)
+                self.affine = tensor.requires_grad_(self.affine.requires_grad)
             elif part in ("gaussians", "shared"):
                 held = self.model.gaussians if part == "gaussians" else self.model.shared
-                held[rest] = here.requires_grad_(held[rest].requires_grad)
+                held[rest] = tensor.requires_grad_(held[rest].requires_grad)
 
     def _corrected(self, gaussians: Gaussians, camera: int) -> Gaussians:
         """The Gaussians in the colours of one camera."""

@@ -3,6 +3,7 @@
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
@@ -15,6 +16,9 @@ from ico3d.common.files import write_atomic
 from ico3d.errors import ModelError
 
 BLOCKS = "▁▂▃▄▅▆▇█"
+
+if TYPE_CHECKING:
+    import torch
 
 
 @dataclass(frozen=True)
@@ -57,20 +61,26 @@ class Plan:
         return float(sum(self.motion[window.first : window.last]))
 
 
-def make_plan(capture: Capture, settings: PlanSettings, folder: Path) -> Plan:
+def make_plan(
+    capture: Capture,
+    settings: PlanSettings,
+    folder: Path,
+    device: "torch.device | str" = "cpu",
+) -> Plan:
     """Measures how much moves and cuts the clip.
 
     Args:
         capture: The recording.
         settings: Where to cut.
         folder: Model folder; flow is kept in `flow/` below it, and found again.
+        device: Where motion is estimated, if the method can.
 
     Raises:
         CaptureError: If motion cannot be measured.
         MissingExtraError: If no flow method is installed.
         SettingsError: If the settings contradict one another.
     """
-    flow = clip_flow(capture, folder / "flow")
+    flow = clip_flow(capture, folder / "flow", device=device)
     windows = cut(flow.motion, settings.threshold, settings.shortest, settings.longest)
     sums = [np.nansum(one.energy) for one in flow.cameras]
     busiest = flow.cameras[int(np.argmax(sums))].index

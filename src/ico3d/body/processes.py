@@ -61,18 +61,19 @@ class Worker:
 
 
 class Processes:
-    """A `Crew` of processes: each has its share of the cores, and with CUDA a GPU of its own."""
+    """A `Crew` of processes: each has its share of the cores, and on CUDA a GPU of its own."""
 
-    def __init__(self, jobs: int):
+    def __init__(self, jobs: int, with_gpus: bool):
         """Starts nothing yet.
 
         Args:
             jobs: How many work at once.
+            with_gpus: Whether each gets a GPU.
 
         Raises:
             SettingsError: If there are fewer GPUs than that, but some.
         """
-        self._gpus = _gpus()
+        self._gpus = _gpus() if with_gpus else []
         if self._gpus and jobs > len(self._gpus):
             raise SettingsError(
                 f"{jobs} windows at once need a GPU each, and this machine has {len(self._gpus)}: "

@@ -20,7 +20,9 @@ from ico3d.body.trainer import BodyTrainer
 from ico3d.body.views import BodyViews
 from ico3d.body.windows import Window
 from ico3d.capture.capture import Capture
+from ico3d.common.device import DeviceName
 from ico3d.errors import ModelError
+from ico3d.splat.device import computing_device
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.run import RunFolder
 
@@ -39,6 +41,7 @@ class BodyJob:
         settings: How to train.
         companion: Where the Gaussians come from that the body is trained with, if any.
         continued: Folder of a body with the same windows to go on from, instead of from points.
+        device: Where to compute; decided by each process that trains. A run may go on elsewhere.
     """
 
     method: Method
@@ -46,6 +49,7 @@ class BodyJob:
     settings: BodySettings
     companion: CompanionSource | None = None
     continued: Path | None = None
+    device: DeviceName = "auto"
 
     def about(self, capture: Path) -> dict:
         """What a run of this job on a capture is known by, but for its settings."""
@@ -107,7 +111,7 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
 
     Raises:
         CaptureError: If the capture lacks something that is needed.
-        SettingsError: If the folder holds a run with other settings.
+        SettingsError: If the folder holds a run with other settings, or CUDA does not work.
         ModelError: If training diverges.
     """
     job, window = task.job, task.window
@@ -116,10 +120,10 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     if finished is not None:
         return finished["train_seconds"]
     capture = capture or Capture.open(task.capture)
-
-    companion = job.companion.open(_device()) if job.companion else None
-    begin = _begin(task, capture, companion)
-    begin.model.to(_device())
+    device = computing_device(job.device)
+    companion = job.companion.open(device) if job.companion else None
+    begin = _begin(task, capture, companion, device)
+    begin.model.to(device)
     pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
     seed = job.seed + 1_000 * task.index
     trainer = BodyTrainer(
@@ -137,7 +141,9 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     return seconds
 
 
-def _begin(task: WindowTask, capture: Capture, companion: Companion | None) -> Begin:
+def _begin(
+    task: WindowTask, capture: Capture, companion: Companion | None, device: torch.device
+) -> Begin:
     """What a window's training begins with."""
     job, window = task.job, task.window
     if job.continued is not None:
@@ -145,7 +151,8 @@ def _begin(task: WindowTask, capture: Capture, companion: Companion | None) -> B
         return continued_window(body.models[task.index], window, companion)
 
     def dynamic(points):
-        return dynamic_weights(points, capture, window, clip_flow(capture, task.flow))
+        flow = clip_flow(capture, task.flow, device=device)
+        return dynamic_weights(points, capture, window, flow)
 
     return begin_window(capture, window, job.method, job.settings, dynamic, job.seed, companion)
 
@@ -173,13 +180,14 @@ def finetune_window(
     model = load_window(trained / WINDOW_FILE)
     before = RunFolder(trained, about).finished()
     assert before is not None
-    model.to(_device())
-    previous.to(_device())
+    device = computing_device(job.device)
+    model.to(device)
+    previous.to(device)
     held_out = capture.split.test_cameras
     cameras = [camera for i, camera in enumerate(capture.cameras) if i not in held_out]
     pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
     seed = job.seed + 1_000 * task.index + 500
-    companion = job.companion.open(_device()) if job.companion else None
+    companion = job.companion.open(device) if job.companion else None
     tuner = FineTuner(
         model, previous, window, pictures, cameras, job.settings, before["extent"], seed, companion
     )
@@ -265,7 +273,7 @@ def plan_windows(capture: Capture, job: BodyJob, folder: Path) -> Plan:
     bounds = PlanSettings(
         settings.motion_threshold, settings.shortest_window, settings.longest_window
     )
-    plan = make_plan(capture, bounds, folder)
+    plan = make_plan(capture, bounds, folder, computing_device(job.device))
     if job.method in ONE_WINDOW:
         plan = replace(plan, windows=(Window(0, capture.num_frames - 1),))
     print_plan(plan, Console())
@@ -300,7 +308,3 @@ def _about(capture: Path, window: Window, job: BodyJob) -> dict:
     settings = asdict(job.settings)
     kept = {name: value for name, value in settings.items() if name not in FINETUNING}
     return job.about(capture) | asdict(window) | kept
-
-
-def _device() -> torch.device:
-    return torch.device("cuda" if torch.cuda.is_available() else "cpu")

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import torch
+
 from ico3d.body.model import WindowModel
 from ico3d.body.motions import motion_from
 from ico3d.body.settings import Method
@@ -84,6 +86,17 @@ class TrainedBody:
         index = self.window_at(seconds)
         tau = self.windows[index].tau(seconds * self.fps)
         return self.window_gaussians(index, min(max(tau, 0.0), 1.0))
+
+    @property
+    def device(self) -> torch.device:
+        """Where its windows are."""
+        return self.models[0].device
+
+    def to(self, device: torch.device) -> "TrainedBody":
+        """Moves all windows, and gives itself back."""
+        for model in self.models:
+            model.to(device)
+        return self
 
     def save(self, folder: Path, files: Sequence[str], about: str = ABOUT) -> None:
         """Writes `body.json` or its like, which names the windows' files in the folder."""

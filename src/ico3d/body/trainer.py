@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 
+import torch
 from torch import Tensor
 
 from ico3d.body.companion import Companion
@@ -74,6 +75,11 @@ class BodyTrainer:
         gathered = {f"density.{name}": t for name, t in self._strategy.tensors().items()}
         return self._learner.tensors() | gathered
 
+    def place(self, name: str) -> torch.device:
+        """All are where the model is."""
+        del name
+        return self.model.device
+
     def state(self) -> dict:
         """Nothing beside the tensors: randomness follows from the step's number."""
         return {}
@@ -84,7 +90,7 @@ class BodyTrainer:
         self._learner.restore(tensors)
         prefix = "density."
         gathered = {n.removeprefix(prefix): t for n, t in tensors.items() if n.startswith(prefix)}
-        self._strategy.restore({n: t.to(self.model.device) for n, t in gathered.items()})
+        self._strategy.restore(gathered)
 
     def _penalties(self) -> Tensor:
         """What density control and the planes' regularisers add to the loss."""

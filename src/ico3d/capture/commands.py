@@ -11,6 +11,7 @@ from ico3d.capture.multiview.commands import Import as Import
 from ico3d.capture.multiview.commands import Masks as Masks
 from ico3d.capture.multiview.commands import Resize as Resize
 from ico3d.capture.synthetic.command import Synthetic as Synthetic
+from ico3d.common.device import DeviceName
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,8 @@ class Portrait:
         refine: Correct the poses by the pictures of the whole head, a minute or more.
         consent: What the person agreed to; goes into the avatar's manifest.
         licence: Licence of the recording; likewise.
+        device: Where the poses are corrected: by default with CUDA where that works, else on the
+            CPU.
     """
 
     video: Annotated[Path, tyro.conf.Positional]
@@ -37,13 +40,15 @@ class Portrait:
     refine: bool = True
     consent: str = "not stated"
     licence: str = "not stated"
+    device: DeviceName = "auto"
 
     def run(self) -> None:
         """Runs it."""
         from ico3d.capture.portrait import PortraitSettings, track_portrait
 
         focal = None if self.intrinsics == "estimated" else self.intrinsics
-        settings = PortraitSettings(self.size, focal, self.refine, self.consent, self.licence)
+        about = (self.consent, self.licence)
+        settings = PortraitSettings(self.size, focal, self.refine, *about, self.device)
         track_portrait(self.video, self.out, settings)
 
 

@@ -16,6 +16,8 @@ from rich.progress import track as progress
 from torch import Tensor, nn
 
 from ico3d.common.camera import Camera
+from ico3d.common.device import DeviceName
+from ico3d.splat.device import computing_device
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.initial import resampled, spacing
 from ico3d.splat.losses import photometric
@@ -113,6 +115,7 @@ def refine_poses(
     camera: Camera,
     background: np.ndarray,
     look: Callable[[int], Look],
+    device: DeviceName = "auto",
     seed: int = 0,
 ) -> Refined:
     """Corrects poses by what the pictures show.
@@ -123,22 +126,23 @@ def refine_poses(
         camera: Takes all pictures, from the origin of the space that `poses` lead to.
         background: (H, W, 3) what it sees without the person.
         look: Gives the picture of a pose by its place.
+        device: Where to compute.
         seed: Order of the pictures and choice of the points.
 
     Returns:
         Poses in the same canonical space: what all corrections have in common is taken out.
     """
     rng = np.random.default_rng(seed)
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    cloud = Cloud(points, len(poses), rng).to(device)
-    behind = torch.from_numpy(background).to(device)
+    place = computing_device(device)
+    cloud = Cloud(points, len(poses), rng).to(place)
+    behind = torch.from_numpy(background).to(place)
     steps = int(np.clip(VISITS * len(poses), *STEPS))
     fit = _Fit(cloud, steps)
     order = np.concatenate([rng.permutation(len(poses)) for _ in range(-(-steps // len(poses)))])
     for step in progress(range(steps), "refining the poses", console=console):
         frame = int(order[step])
         seen = look(frame)
-        image, head = (torch.from_numpy(part).to(device) for part in (seen.image, seen.head))
+        image, head = (torch.from_numpy(part).to(place) for part in (seen.image, seen.head))
         picture = render(cloud(frame), [camera.moved(poses[frame])], behind).rgb[0]
         explained = image + head[..., None] * (picture - image)  # (H, W, 3)
         fit.update(photometric(explained[None], image[None]), step)

@@ -36,6 +36,7 @@ from ico3d.capture.portrait_files import (
 from ico3d.capture.surface import face_points, silhouette_points
 from ico3d.capture.video import Video, open_video, read_sound
 from ico3d.common.camera import Camera
+from ico3d.common.device import DeviceName
 from ico3d.common.weights import model_file
 from ico3d.errors import CaptureError
 
@@ -57,6 +58,7 @@ class PortraitSettings:
         refine: Whether poses are corrected by the pictures of the whole head.
         consent: What the person agreed to.
         licence: Licence of the recording.
+        device: Where poses are corrected.
     """
 
     size: int = 512
@@ -64,6 +66,7 @@ class PortraitSettings:
     refine: bool = True
     consent: str = "not stated"
     licence: str = "not stated"
+    device: DeviceName = "auto"
 
 
 @dataclass
@@ -102,6 +105,7 @@ def track_portrait(video: Path, out: Path, settings: PortraitSettings) -> None:
 
     Raises:
         CaptureError: If `out` exists, or the video cannot be read or shows no face.
+        SettingsError: If poses shall be corrected with CUDA, and it does not work.
         MissingExtraError: If MediaPipe is not installed.
         MissingModelError: If the face model is not there.
     """
@@ -109,6 +113,10 @@ def track_portrait(video: Path, out: Path, settings: PortraitSettings) -> None:
         raise CaptureError(f"{out} exists already: remove it or choose another folder.")
     model = model_file("face_landmarker.task", "tracking a portrait")
     opened = open_video(video, settings.size)
+    if settings.refine:
+        from ico3d.splat.device import computing_device
+
+        computing_device(settings.device)  # better known now than after the tracking
     out.parent.mkdir(parents=True, exist_ok=True)
     work = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
     try:
@@ -135,7 +143,11 @@ def _write(work: Path, video: Video, model: Path, settings: PortraitSettings) ->
     np.save(work / "points.npy", points)
     poses = track.poses()
     if settings.refine:
-        poses = _refined(work, readings, track, points)
+        try:
+            poses = _refined(work, readings, track, points, settings.device)
+        except Exception as error:  # of many kinds: drivers, compilers, memory
+            reason = str(error).strip().split("\n")[0]
+            notes.append(f"poses by landmarks only: refining failed ({reason or type(error)})")
     save_transforms(work, track.focal, track.center.tolist(), readings.frames, poses)
     sound = read_sound(video.path)
     if sound is None:
@@ -295,7 +307,7 @@ def _camera(track: tracking.Track, width: int, height: int) -> Camera:
 
 
 def _refined(
-    work: Path, readings: Readings, track: tracking.Track, points: np.ndarray
+    work: Path, readings: Readings, track: tracking.Track, points: np.ndarray, device: DeviceName
 ) -> np.ndarray:
     """Poses (F, 4, 4) that the pictures agree with, hair and all."""
     from ico3d.capture.photometric import Look, refine_poses
@@ -318,7 +330,7 @@ def _refined(
         return Look(small(image), small(grown.astype(np.uint8) * 255))
 
     camera = _camera(track, *size)
-    refined = refine_poses(track.poses(), points, camera, small(plate), look)
+    refined = refine_poses(track.poses(), points, camera, small(plate), look, device)
     console.print(
         f"poses refined by {refined.turn:.2f}° and {1000 * refined.shift:.1f} mm on average"
     )

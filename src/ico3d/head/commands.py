@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 import tyro
 
+from ico3d.common.device import DeviceName
+
 
 @dataclass(frozen=True)
 class TrainHead:
@@ -21,6 +23,7 @@ class TrainHead:
         set: Changes to the preset, as name=value (names: ico3d.head.settings.HeadSettings).
         encoder: Speech encoder for speech-driven heads: builtin, ave (SyncTalk's) or hubert.
         seed: All randomness follows from it.
+        device: Where to compute: by default with CUDA where that works, else on the CPU.
         watch: Shows the training in the browser while it lasts.
         watch_port: Where, on this machine only; the next free port where it is taken.
     """
@@ -33,6 +36,7 @@ class TrainHead:
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     encoder: str = "builtin"
     seed: int = 0
+    device: DeviceName = "auto"
     watch: bool = False
     watch_port: int = 8080
 
@@ -47,6 +51,6 @@ class TrainHead:
         settings = PRESETS[self.preset].with_changes(self.set)
         job = HeadJob(self.inputs, self.variant, self.encoder, self.seed, settings)
         port = self.watch_port if self.watch else None
-        head = train_head(Capture.open(self.capture), self.out, job, port)
+        head = train_head(Capture.open(self.capture), self.out, job, port, self.device)
         seconds = head.summary["train_seconds"]
         Console().print(f"{self.out}: {len(head.model)} Gaussians, trained in {seconds:.0f} s.")

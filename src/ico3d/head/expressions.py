@@ -114,8 +114,8 @@ def eye_track(capture: Capture) -> Tensor:
     return torch.from_numpy(np.stack(rows).astype(np.float32))  # type: ignore[arg-type]
 
 
-def speech_features(capture: Capture, encoder: FrozenEncoder) -> np.ndarray:
-    """The features (T, D) of a capture's sound, 25 rows/s.
+def speech_features(capture: Capture, encoder: FrozenEncoder, device: torch.device) -> np.ndarray:
+    """The features (T, D) of a capture's sound, 25 rows/s, computed on a device.
 
     Raises:
         CaptureError: If the capture has no sound.
@@ -125,4 +125,4 @@ def speech_features(capture: Capture, encoder: FrozenEncoder) -> np.ndarray:
         raise CaptureError(
             f"{capture.path} has no sound: train with --inputs blendshapes, or add a recording."
         )
-    return encoder.features(sound.samples, sound.rate)
+    return encoder.features(sound.samples, sound.rate, device)

@@ -2,10 +2,12 @@
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 
+import torch
 from torch import Tensor
 
-from ico3d.errors import MissingModelError
+from ico3d.errors import MissingModelError, ModelError
 from ico3d.head.settings import HeadSettings
 from ico3d.head.views import Picture
 from ico3d.splat.losses import l1, ssim
@@ -15,14 +17,40 @@ log = logging.getLogger(__name__)
 
 
 class HeadLoss:
-    """λ_1·L1 + λ_s·(1 − SSIM) + λ_p·VGG, and a term on alpha where masks exist."""
+    """λ_1·L1 + λ_s·(1 − SSIM) + λ_p·VGG, and a term on alpha where masks exist.
 
-    def __init__(self, settings: HeadSettings):
-        """Looks for VGG weights when the perceptual term is wanted; warns when there are none."""
-        self._settings = settings
+    Attributes:
+        settings: What is really used.
+    """
+
+    def __init__(self, settings: HeadSettings, device: torch.device):
+        """Looks for VGG weights when the perceptual term is wanted; warns when there are none.
+
+        Args:
+            settings: The weights; that of the perceptual term counts as 0 without VGG's.
+            device: Where the pictures will be.
+        """
         self._perceptual: Callable[[Tensor, Tensor], Tensor] | None = None
         if settings.perceptual_weight and settings.steps > settings.perceptual_from:
-            self._perceptual = _perceptual_term()
+            self._perceptual = _perceptual_term(device)
+            if self._perceptual is None:
+                settings = replace(settings, perceptual_weight=0.0)
+        self.settings = settings
+
+    def go_on(self, perceptual_weight: float) -> None:
+        """Goes on as an interrupted run began, with the perceptual term or without it.
+
+        Raises:
+            ModelError: If the run had it, and VGG's weights are not there any more.
+        """
+        if perceptual_weight and not self.settings.perceptual_weight:
+            raise ModelError(
+                "this run began with the perceptual term, and the weights of VGG are not there "
+                "any more: put them back, or train into another folder."
+            )
+        if not perceptual_weight:
+            self._perceptual = None
+            self.settings = replace(self.settings, perceptual_weight=0.0)
 
     def __call__(self, rendering: Rendering, target: Tensor, picture: Picture, step: int) -> Tensor:
         """The loss of one picture.
@@ -36,7 +64,7 @@ class HeadLoss:
         Returns:
             A scalar.
         """
-        settings = self._settings
+        settings = self.settings
         image = rendering.rgb  # (1, H, W, 3)
         if settings.torso_weight != 1 and picture.torso is not None:
             ignored = ((1 - settings.torso_weight) * picture.torso)[..., None]  # (H, W, 1)
@@ -50,12 +78,12 @@ class HeadLoss:
         return loss
 
 
-def _perceptual_term() -> Callable[[Tensor, Tensor], Tensor] | None:
+def _perceptual_term(device: torch.device) -> Callable[[Tensor, Tensor], Tensor] | None:
     """The VGG term, or None, with a warning, where its weights are not installed."""
     from ico3d.head.perceptual import PerceptualLoss
 
     try:
-        return PerceptualLoss()
+        return PerceptualLoss().to(device)
     except MissingModelError as error:
-        log.warning("training goes on without the perceptual term: %s", error)
+        log.warning("training goes on without the perceptual term, with weight 0: %s", error)
         return None

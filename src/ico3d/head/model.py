@@ -108,6 +108,11 @@ class HeadModel(nn.Module):
         """The number of Gaussians."""
         return self.means.shape[0]
 
+    @property
+    def device(self) -> torch.device:
+        """Where its tensors lie."""
+        return self.means.device
+
     def resize(self, num_gaussians: int) -> None:
         """Makes room for another number of Gaussians; their values are to be set afterwards."""
         for name, axis in GAUSSIAN_AXES.items():
@@ -120,7 +125,8 @@ class HeadModel(nn.Module):
         """The head with this expression.
 
         Args:
-            expression: (B,).
+            expression: (B,), on any device, as in all methods: sound and captures give it on
+                the CPU.
 
         Returns:
             Gaussians in canonical head space.
@@ -137,8 +143,8 @@ class HeadModel(nn.Module):
 
     def row_weights(self, expression: Tensor) -> Tensor:
         """(R,) weights of the basis rows: the expression (B,) with 1 for the bias."""
-        one = torch.ones(1, dtype=self.basis.dtype, device=self.basis.device)
-        return torch.cat([expression, one]) if self.shape.blends else one
+        one = torch.ones(1, dtype=self.basis.dtype, device=self.device)
+        return torch.cat([expression.to(self.device), one]) if self.shape.blends else one
 
     def decode(self, features: Tensor, expression: Tensor) -> Tensor:
         """φ: features (N, w) of an expression (B,) to logits (N, 4)."""
@@ -154,7 +160,7 @@ class HeadModel(nn.Module):
         """What φ's last layer takes in (N, hidden); arguments as for `decode`."""
         parts = [features, self.encoded_positions()]
         if not self.shape.blends:
-            parts.append(expression.expand(len(self), -1))  # (N, B)
+            parts.append(expression.to(self.device).expand(len(self), -1))  # (N, B)
         return nn.functional.leaky_relu(self.trunk(torch.cat(parts, 1)), 0.01)  # (N, hidden)
 
     def encoded_positions(self) -> Tensor:

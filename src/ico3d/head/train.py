@@ -9,6 +9,7 @@ import torch
 
 from ico3d.capture.canonical import canonical_landmarks
 from ico3d.capture.capture import Capture
+from ico3d.common.device import DeviceName
 from ico3d.common.expression import EyeRange, eye_range
 from ico3d.errors import CaptureError
 from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack, SpeechTrack, speech_features
@@ -20,6 +21,7 @@ from ico3d.head.trainer import HeadTrainer
 from ico3d.head.watch import WatchedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
+from ico3d.splat.device import computing_device
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.run import RunFolder
 from ico3d.training.watch import LivePage
@@ -45,7 +47,11 @@ class HeadJob:
 
 
 def train_head(
-    capture: Capture, folder: Path, job: HeadJob, watch_port: int | None = None
+    capture: Capture,
+    folder: Path,
+    job: HeadJob,
+    watch_port: int | None = None,
+    device: DeviceName = "auto",
 ) -> TrainedHead:
     """Trains a head, or goes on with an interrupted run of the same settings.
 
@@ -54,13 +60,14 @@ def train_head(
         folder: Model folder; also holds metrics and checkpoints.
         job: What to train.
         watch_port: Where a page shows the training while it lasts; None for nowhere.
+        device: Where to compute; a run may go on elsewhere.
 
     Returns:
         The trained head, as the folder now holds it.
 
     Raises:
         CaptureError: If the capture lacks something that is needed.
-        SettingsError: If the folder holds a run with other settings.
+        SettingsError: If the folder holds a run with other settings, or CUDA does not work.
         ModelError: If training diverges.
         MissingExtraError: If it is to be watched and viser is not installed.
     """
@@ -69,11 +76,12 @@ def train_head(
     run = RunFolder(folder, about)
     if run.finished() is not None:
         return TrainedHead.load(folder)
+    place = computing_device(device)
     torch.manual_seed(job.seed)  # layers draw their weights
-    track, adaptor, encoder = _inputs(capture, job)
+    track, adaptor, encoder = _inputs(capture, job, place)
     rng = np.random.default_rng(job.seed)
     model = initial_head(capture, job.settings, job.variant, track.size, rng)
-    model.to("cuda" if torch.cuda.is_available() else "cpu")
+    model.to(place)
     trainer = HeadTrainer(capture, model, track, adaptor, job.settings, job.seed)
     every = job.settings.checkpoint_every
     loop = LoopSettings(job.settings.steps, checkpoint_every=every, label="head")
@@ -83,7 +91,7 @@ def train_head(
     summary = {
         "train_seconds": seconds,
         "capture": capture.provenance,
-        "settings": asdict(job.settings),
+        "settings": asdict(trainer.settings),
     }
     landmarks = canonical_landmarks(capture)
     eyes = _eyes(capture, track)
@@ -110,7 +118,7 @@ def _page(
 
 
 def _inputs(
-    capture: Capture, job: HeadJob
+    capture: Capture, job: HeadJob, device: torch.device
 ) -> tuple[ExpressionTrack, SpeechAdaptor | None, tuple[str, str]]:
     """What drives the head; for speech the adaptor to train and the encoder's name and sha256."""
     if job.inputs == "blendshapes":
@@ -121,6 +129,6 @@ def _inputs(
             track.at(frame)  # a frame without is better found now than after an hour
         return track, None, ("", "")
     encoder = load_encoder(job.encoder)
-    features = speech_features(capture, encoder)  # (T, D)
+    features = speech_features(capture, encoder, device)  # (T, D)
     adaptor = SpeechAdaptor(encoder.size, encoder.vectors)
     return SpeechTrack(capture, features, adaptor), adaptor, (encoder.name, encoder.sha256)

@@ -50,6 +50,11 @@ class TrainedHead:
     landmarks: np.ndarray | None = None
     eyes: EyeRange = field(default_factory=EyeRange)
 
+    def to(self, device: torch.device) -> "TrainedHead":
+        """Moves the Gaussians, and gives itself back; the adaptor stays on the CPU."""
+        self.model.to(device)
+        return self
+
     def track(self, capture: Capture) -> ExpressionTrack:
         """The expressions that drive this head through a capture.
 
@@ -65,14 +70,16 @@ class TrainedHead:
                 f"this head was trained with another speech encoder '{self.encoder}' "
                 f"({self.encoder_sha256[:12]}, not {encoder.sha256[:12]}): train it again."
             )
-        return SpeechTrack(capture, speech_features(capture, encoder), self.adaptor)
+        features = speech_features(capture, encoder, self.model.device)  # (T, D)
+        return SpeechTrack(capture, features, self.adaptor)
 
     def neutral(self) -> np.ndarray:
         """(B,) float32: silence, with open eyes and brows at rest."""
         if self.adaptor is None:
             return np.zeros(self.model.shape.expression_size, np.float32)
         silence = np.zeros(16_000 * SILENCE, np.float32)
-        features = torch.from_numpy(load_encoder(self.encoder).features(silence, 16_000))
+        encoder = load_encoder(self.encoder)
+        features = torch.from_numpy(encoder.features(silence, 16_000, self.model.device))
         with torch.no_grad():
             rows = self.adaptor.track(features)  # (T, 32)
         return np.concatenate([rows[len(rows) // 2].numpy(), np.array(self.eyes.rest, np.float32)])

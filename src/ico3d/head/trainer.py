@@ -21,6 +21,7 @@ from ico3d.splat.render import render
 from ico3d.training.acceleration import accelerated
 from ico3d.training.optimiser import Optimiser
 
+CPU = torch.device("cpu")
 GEOMETRY = ("means", "quats", "log_scales")
 
 FEW_FRAMES = 100
@@ -61,18 +62,23 @@ class HeadTrainer:
             raise CaptureError(f"{capture.path} has no picture among its training frames.")
         few = FEW_FRAMES / len(capture.split.train)
         self._weight_decay = settings.basis_weight_decay * few**4
-        self._loss = HeadLoss(settings)
+        self._loss = HeadLoss(settings, model.device)
         self._optimiser = Optimiser(settings.optimiser)
         self._density = HeadDensity(settings, seed)
         self._decode = accelerated(
-            model.decode, model.means.device, settings.mixed_precision, settings.compile
+            model.decode, model.device, settings.mixed_precision, settings.compile
         )
         model.basis.requires_grad_(False)
+
+    @property
+    def settings(self) -> HeadSettings:
+        """How it is really trained: without weights of VGG there is no perceptual term."""
+        return self._loss.settings
 
     def step(self, index: int) -> Mapping[str, float]:
         """Renders one picture and learns from the difference."""
         view = self._view(index)
-        picture = self._pictures.picture(view, self.model.means.device)
+        picture = self._pictures.picture(view, self.model.device)
         background, target = self._staged(view, picture, index)
         expression = self._expression(view)  # (B,)
         features = self._features(expression)  # (N, w)
@@ -96,13 +102,18 @@ class HeadTrainer:
         named |= {f"moments.{name}": value for name, value in self._optimiser.moments.items()}
         return named | {f"density.{name}": t for name, t in self._density.tensors().items()}
 
+    def place(self, name: str) -> torch.device:
+        """With the head, but for the adaptor, which sees two rows of sound at a time: CPU."""
+        about_adaptor = name.startswith(("adaptor.", "moments.adaptor."))
+        return CPU if about_adaptor else self.model.device
+
     def state(self) -> dict:
-        """Nothing beside the tensors: randomness follows from the step's number."""
-        return {}
+        """The weight of the perceptual term; randomness follows from the step's number."""
+        return {"perceptual_weight": self.settings.perceptual_weight}
 
     def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
-        """Takes back what `tensors` gave."""
-        del state
+        """Takes back what `tensors` and `state` gave."""
+        self._loss.go_on(state.get("perceptual_weight", self.settings.perceptual_weight))
         self.model.resize(tensors["model.means"].shape[0])
         self.model.load_state_dict(_below("model.", tensors))
         if self.adaptor is not None:
@@ -136,7 +147,7 @@ class HeadTrainer:
 
     def _expression(self, view: View) -> Tensor:
         """The expression (B,) of a view's frame, on the model's device."""
-        return self._track.at(view.frame).to(self.model.means.device)
+        return self._track.at(view.frame).to(self.model.device)
 
     def _features(self, expression: Tensor) -> Tensor:
         """Blended features that keep their gradient: the basis learns from it."""

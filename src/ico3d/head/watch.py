@@ -56,11 +56,11 @@ class WatchedHead:
         expression = self._expression(frame).clone()
         for name, value in values.items():
             expression[self._inputs[name]] = value
-        return self._model(expression.to(self._model.means.device))
+        return self._model(expression)
 
     @torch.no_grad()
     def pictures(self, frame: int) -> tuple[Tensor, Tensor]:
-        """(H, W, 3) each: recorded and rendered."""
+        """(H, W, 3) each, on the CPU: recorded and rendered."""
         camera, recorded = self._recorded(frame)
         background = self._capture.background(camera)
         mask = self._capture.mask(camera, self._numbers[frame])
@@ -69,7 +69,7 @@ class WatchedHead:
             cut = torch.from_numpy(mask)[..., None]  # (H, W, 1)
             recorded = cut * recorded + (1 - cut) * behind
         rendered = render(self.gaussians(frame, {}), [self._view(frame, camera)], behind).rgb[0]
-        return recorded, rendered
+        return recorded, rendered.cpu()
 
     def _recorded(self, frame: int) -> tuple[int, Tensor]:
         """The first camera that has a frame, and its picture; black where none has it."""

@@ -1,6 +1,5 @@
 """Measuring a trained body: pictures by the cameras that trained nothing, at all moments."""
 
-import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -20,6 +19,8 @@ from ico3d.measure.flicker import border_flicker, novel_cameras
 from ico3d.measure.lpips import lpips
 from ico3d.measure.metrics import moving_pixels, psnr, psnr_moving
 from ico3d.measure.scores import Scores, add_picture, write_pictures
+from ico3d.measure.stopwatch import Stopwatch
+from ico3d.splat.device import CPU
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
@@ -38,26 +39,25 @@ class Drawn(Protocol):
 class BodyRenderer:
     """Renders somebody at the frames of a capture."""
 
-    def __init__(self, drawn: Drawn, capture: Capture):
-        """Binds them to the capture's clock and clean plates."""
-        self._drawn, self._capture = drawn, capture
+    def __init__(self, drawn: Drawn, capture: Capture, device: torch.device):
+        """Binds them, who are on a device, to the capture's clock and clean plates."""
+        self._drawn, self._capture, self.device = drawn, capture, device
         self._plate = lru_cache(1)(self._read_plate)
-        self.seconds: list[float] = []
+        self.watch = Stopwatch(device)
 
     @torch.no_grad()
     def picture(self, camera: int, frame: int) -> np.ndarray:
         """(H, W, 3) the body over the clean plate, else over black; clipped to [0, 1]."""
         behind = self._plate(camera)
         seen = self._capture.cameras[camera]
-        begin = time.perf_counter()
-        gaussians = self._drawn.gaussians(frame / self._capture.fps)
-        rgb = render(gaussians, [seen], behind).rgb[0].clamp(0, 1).cpu()
-        self.seconds.append(time.perf_counter() - begin)
-        return rgb.numpy()
+        with self.watch.picture():
+            gaussians = self._drawn.gaussians(frame / self._capture.fps)
+            rgb = render(gaussians, [seen], behind).rgb[0]
+        return rgb.clamp(0, 1).cpu().numpy()
 
     def _read_plate(self, camera: int) -> torch.Tensor | None:
         found = self._capture.background(camera)
-        return None if found is None else torch.from_numpy(found)
+        return None if found is None else torch.from_numpy(found).to(self.device)
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def evaluate_body(
     within 3 pixels of them.
 
     Args:
-        body: The trained body.
+        body: The trained body; it is drawn where it is.
         capture: Where truth comes from.
         cameras: Those to measure with; by default the capture's test cameras.
         frames: Those to measure; by default all that the body shows.
@@ -138,7 +138,7 @@ def evaluate_body(
     """
     cameras = _test_cameras(capture) if cameras is None else cameras
     frames = _shown(body, capture) if frames is None else frames
-    renderer = BodyRenderer(drawn or body, capture)
+    renderer = BodyRenderer(drawn or body, capture, body.device)
     found = _measured(renderer, capture, cameras, frames, images)
     if not found:
         raise CaptureError(f"{capture.path} has no picture in the frames to measure.")
@@ -148,7 +148,7 @@ def evaluate_body(
     )
     result["flicker"] = float(np.mean(borders)) if borders else None
     result["num_gaussians"] = sum(map(len, body.models))
-    result["ms_per_frame"] = float(np.median(renderer.seconds) * 1000)
+    result |= renderer.watch.figures()
     result["train_seconds"] = body.summary.get("train_seconds")
     result["per_window"] = _per_window(found, spans or body.windows)
     result["per_border"] = [
@@ -201,24 +201,27 @@ def _measured(
         if truth is None:
             continue
         predicted = renderer.picture(camera, frame)
-        found[camera, frame] = picture_scores(predicted, truth)
+        found[camera, frame] = picture_scores(predicted, truth, renderer.device)
         if images is not None:
             view = View(camera, frame, capture.cameras[camera])
             write_pictures(images, view, predicted, truth.picture, truth.mask)
     return found
 
 
-def picture_scores(predicted: np.ndarray, truth: Truth) -> PictureScores:
+def picture_scores(
+    predicted: np.ndarray, truth: Truth, device: torch.device = CPU
+) -> PictureScores:
     """What one picture is worth.
 
     Args:
         predicted: (H, W, 3) in [0, 1].
         truth: What it should be.
+        device: Where LPIPS is computed.
     """
     scores = Scores({name: [] for name in QUALITY})
     if truth.whole:
         add_picture(scores, predicted, truth.picture)
-        scores.add("lpips", lpips(predicted, truth.picture))
+        scores.add("lpips", lpips(predicted, truth.picture, device))
     if truth.mask is not None and truth.mask.any():
         box = _box(truth.mask)
         seen, true, mask = predicted[box], truth.picture[box], truth.mask[box]

@@ -17,7 +17,9 @@ from ico3d.body.trained import UNTUNED, TrainedBody
 from ico3d.body.windows import Window
 from ico3d.capture.capture import Capture, all_frames
 from ico3d.capture.synthetic.recording import Recording, record
+from ico3d.common.device import DeviceName
 from ico3d.measure.body import evaluate_body
+from ico3d.splat.device import computing_device
 from ico3d.training.changes import with_changes
 
 SCORES = ("psnr_mask", "psnr_moving", "psnr", "ssim", "flicker", "num_gaussians", "train_seconds")
@@ -37,6 +39,7 @@ class Terms:
         windows: As SWinGS++ is trained in, and as all are reported on.
         changes: To the cpu preset of every method, as name=value.
         finetune: Whether SWinGS++ is fine-tuned in the end.
+        device: Where to compute.
     """
 
     capture: Path
@@ -45,6 +48,7 @@ class Terms:
     windows: tuple[Window, ...]
     changes: tuple[str, ...]
     finetune: bool
+    device: DeviceName = "auto"
 
     def settings(self, method: Method) -> BodySettings:
         """The settings of a method.
@@ -88,7 +92,8 @@ class Trial:
             after fine-tuning, where there was one.
         """
         capture = open_clip(self.terms.capture, self.terms.frames)
-        job = BodyJob(self.method, self.seed, self.terms.settings(self.method))
+        settings, device = self.terms.settings(self.method), self.terms.device
+        job = BodyJob(self.method, self.seed, settings, device=device)
         # Optical flow is the same for all, and was measured to cut the windows.
         copytree(self.terms.folder / "flow", self.folder / "flow", dirs_exist_ok=True)
         body = train_body(capture, self.folder, job)
@@ -98,6 +103,7 @@ class Trial:
         return {"seed": self.seed} | before | {"tuned": self._scores(body, capture)}
 
     def _scores(self, body: TrainedBody, capture: Capture) -> dict:
+        body.to(computing_device(self.terms.device))
         found = evaluate_body(body, capture, spans=self.terms.windows)
         lists = {
             f"{name}_per_window": [entry[name] for entry in found["per_window"]]
@@ -148,14 +154,19 @@ def open_clip(path: Path, frames: int | None) -> Capture:
 
 
 def terms_for(
-    capture: Path, frames: int | None, folder: Path, changes: Sequence[str], finetune: bool
+    capture: Path,
+    frames: int | None,
+    folder: Path,
+    changes: Sequence[str],
+    finetune: bool,
+    device: DeviceName = "auto",
 ) -> Terms:
     """Cuts the clip into windows, once for all trials."""
     clip = open_clip(capture, frames)
     named = folder / (f"{clip.num_frames}-frames")
-    job = BodyJob(OURS, 0, _settings(OURS, tuple(changes)))
+    job = BodyJob(OURS, 0, _settings(OURS, tuple(changes)), device=device)
     windows = plan_windows(clip, job, named).windows
-    return Terms(capture, frames, named, windows, tuple(changes), finetune)
+    return Terms(capture, frames, named, windows, tuple(changes), finetune, device)
 
 
 def _settings(method: Method, changes: tuple[str, ...]) -> BodySettings:

@@ -6,7 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from ico3d.common.device import DeviceName
+
 if TYPE_CHECKING:
+    import torch
+
     from ico3d.capture.capture import Capture
 
 
@@ -24,6 +28,7 @@ class Evaluate:
             test cameras, or by all cameras.
         plots: Of bodies: folder for PSNR over frames and by camera, as pictures.
         untuned: Of bodies: measure the windows as they were before temporal fine-tuning.
+        device: Where to compute: by default with CUDA where that works, else on the CPU.
     """
 
     model: tyro.conf.Positional[Path]
@@ -33,6 +38,7 @@ class Evaluate:
     frames: Literal["test", "all"] = "test"
     plots: Path | None = None
     untuned: bool = False
+    device: DeviceName = "auto"
 
     def run(self) -> None:
         """Prints the metrics, writes what was asked for."""
@@ -50,30 +56,33 @@ class Evaluate:
         for name, value in metrics.items():
             if isinstance(value, list):
                 continue  # parts of the whole: for the file
-            console.print(f"{name:16} {'not measured' if value is None else f'{value:.5g}'}")
+            shown = f"{value:.5g}" if isinstance(value, int | float) else value
+            console.print(f"{name:16} {'not measured' if value is None else shown}")
 
     def _metrics(self, capture: "Capture") -> dict:
         """Measures what the folder holds: a scene, a whole person, a body, else a head."""
         from ico3d.avatar.avatar import ABOUT as AVATAR
         from ico3d.body.trained import ABOUT as BODY
         from ico3d.scene.trained import ABOUT as SCENE
+        from ico3d.splat.device import computing_device
 
+        device = computing_device(self.device)
         if (self.model / SCENE).is_file():
             from ico3d.measure.scene import evaluate_scene
             from ico3d.scene.trained import TrainedScene
 
-            scene = TrainedScene.load(self.model)
+            scene = TrainedScene.load(self.model).to(device)
             return evaluate_scene(scene, capture, self.frames, self.images)
         if (self.model / AVATAR).is_file() or (self.model / BODY).is_file():
-            return self._body(capture, (self.model / AVATAR).is_file())
+            return self._body(capture, (self.model / AVATAR).is_file(), device)
         from ico3d.head.trained import TrainedHead
         from ico3d.measure.evaluate import evaluate_head
 
-        head = TrainedHead.load(self.model)
+        head = TrainedHead.load(self.model).to(device)
         frames = capture.split.test if self.frames == "test" else range(capture.num_frames)
         return evaluate_head(head, capture, frames, self.images)
 
-    def _body(self, capture: "Capture", with_head: bool) -> dict:
+    def _body(self, capture: "Capture", with_head: bool, device: "torch.device") -> dict:
         from dataclasses import replace
 
         from ico3d.avatar.avatar import BODY, TrainedAvatar
@@ -82,8 +91,10 @@ class Evaluate:
         from ico3d.measure.body_plots import plot_body
 
         folder = self.model / BODY if with_head else self.model
-        body = TrainedBody.load(folder, UNTUNED if self.untuned else ABOUT)
-        drawn = replace(TrainedAvatar.load(self.model), body=body) if with_head else body
+        body = TrainedBody.load(folder, UNTUNED if self.untuned else ABOUT).to(device)
+        drawn = body
+        if with_head:
+            drawn = replace(TrainedAvatar.load(self.model), body=body).to(device)
         cameras = range(len(capture.cameras)) if self.frames == "all" else None
         metrics = evaluate_body(body, capture, cameras, images=self.images, drawn=drawn)
         if self.plots is not None:
@@ -230,6 +241,7 @@ class BenchBody:
         finetune: Fine-tune SWinGS++ in the end, and measure before and after; the table shows it
             as it was before.
         set: Changes to the cpu preset of all methods, as name=value.
+        device: Where to compute: by default with CUDA where that works, else on the CPU.
         jobs: Trainings at a time; they share the cores.
         json: File for the figures.
     """
@@ -242,6 +254,7 @@ class BenchBody:
     frames: int | None = None
     finetune: bool = False
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
+    device: DeviceName = "auto"
     jobs: int = 1
     json: Path | None = None
 
@@ -257,10 +270,16 @@ class BenchBody:
 
         from ico3d.common.files import write_atomic
         from ico3d.measure import body_bench, body_tables
+        from ico3d.splat.device import decided
 
         console = Console()
         terms = body_bench.terms_for(
-            self._recording(), self.frames, self.folder, self.set, self.finetune
+            self._recording(),
+            self.frames,
+            self.folder,
+            self.set,
+            self.finetune,
+            decided(self.device),
         )
         trials = [
             body_bench.Trial(method, seed, terms)

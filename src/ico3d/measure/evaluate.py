@@ -1,6 +1,5 @@
 """Measuring a trained head on frames of a capture."""
 
-import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from ico3d.head.views import PictureCache, View, view_of
 from ico3d.measure.lips import LandmarkReader, landmark_reader, lip_correlation, lip_gap, lip_lag_ms
 from ico3d.measure.metrics import lmd, psnr, psnr_mouth
 from ico3d.measure.scores import Scores, add_picture, write_pictures
+from ico3d.measure.stopwatch import Stopwatch
 from ico3d.splat.render import render
 
 FACING = np.array([0.0, 0.0, 1.0])
@@ -30,26 +30,25 @@ class HeadRenderer:
         self._head = head
         self._track: ExpressionTrack = head.track(capture)
         self._pictures = PictureCache(capture, 0)
-        self.seconds: list[float] = []
+        self.watch = Stopwatch(head.model.device)
 
     @torch.no_grad()
     def picture(self, view: View) -> np.ndarray:
         """(H, W, 3) the head over the capture's background, clipped to [0, 1]."""
         expression = self._track.at(view.frame)
-        background = self._pictures.background(view, expression.device)
-        begin = time.perf_counter()
-        rendering = render(self._head.model(expression), [view.camera], background)
-        self.seconds.append(time.perf_counter() - begin)
-        return rendering.rgb[0].clamp(0, 1).numpy()
+        background = self._pictures.background(view, self._head.model.device)
+        with self.watch.picture():
+            rendering = render(self._head.model(expression), [view.camera], background)
+        return rendering.rgb[0].clamp(0, 1).cpu().numpy()
 
 
 def evaluate_head(
     head: TrainedHead, capture: Capture, frames: Sequence[int], images: Path | None
-) -> dict[str, float | None]:
+) -> dict[str, float | str | None]:
     """All metrics of design section 2.
 
     Args:
-        head: The trained head.
+        head: The trained head; it is drawn where its model is.
         capture: Where truth comes from; it may be another one than the head was trained on.
         frames: Consecutive frames to measure.
         images: Folder for pictures, or None.
@@ -62,10 +61,11 @@ def evaluate_head(
     """
     renderer = HeadRenderer(head, capture)
     scores = _quality(renderer, capture, frames, images)
+    result: dict[str, float | str | None]
     result = {"psnr": None, "psnr_mask": None, "psnr_mouth": None, "ssim": None, **scores.means()}
     result |= _lips(renderer, capture, frames)
     result["num_gaussians"] = len(head.model)
-    result["ms_per_frame"] = float(np.median(renderer.seconds) * 1000)
+    result |= renderer.watch.figures()
     result["train_seconds"] = head.summary.get("train_seconds")
     return result
 

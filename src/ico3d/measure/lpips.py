@@ -12,6 +12,7 @@ from torch import Tensor, nn
 from ico3d.common.weights import model_file
 from ico3d.errors import MissingModelError, ModelError
 from ico3d.head.perceptual import DEVIATION, MEAN, WEIGHTS, vgg_layers
+from ico3d.splat.device import CPU
 
 LINEAR = "lpips_vgg.safetensors"
 """The learnt weights of channels, (1, C, 1, 1) each, under the names of version 0.1 of the authors'
@@ -48,7 +49,7 @@ class Lpips(nn.Module):
             raise ModelError(
                 f"{paths[0]} and {paths[1]} do not hold the weights of LPIPS: {error}."
             ) from error
-        self._weights = weights  # (C,) each
+        self.linear = nn.ParameterList(weights)  # (C,) each
         self.requires_grad_(False)
 
     @torch.no_grad()
@@ -63,23 +64,30 @@ class Lpips(nn.Module):
             if index in TAPS:
                 unit = values / (values.norm(dim=1, keepdim=True) + 1e-10)  # (2, C, h, w)
                 squares = (unit[0] - unit[1]).square().mean((1, 2))  # (C,)
-                total += float(self._weights[TAPS.index(index)] @ squares)
+                total += float(self.linear[TAPS.index(index)] @ squares)
         return total
 
 
 @cache
-def _installed() -> Callable[[Tensor, Tensor], float] | None:
-    """LPIPS, or None after one warning."""
+def _installed(device: torch.device) -> Callable[[Tensor, Tensor], float] | None:
+    """LPIPS on a device, or None after one warning."""
     try:
-        return Lpips()
+        return Lpips().to(device)
     except MissingModelError as error:
         log.warning("measuring goes on without LPIPS: %s", error)
         return None
 
 
-def lpips(predicted: np.ndarray, truth: np.ndarray) -> float | None:
-    """LPIPS of two pictures (H, W, 3) in [0, 1], or None where its weights are not installed."""
-    measure = _installed()
+def lpips(predicted: np.ndarray, truth: np.ndarray, device: torch.device = CPU) -> float | None:
+    """LPIPS of two pictures, or None where its weights are not installed.
+
+    Args:
+        predicted: (H, W, 3) in [0, 1].
+        truth: (H, W, 3) in [0, 1].
+        device: Where to compute.
+    """
+    measure = _installed(device)
     if measure is None:
         return None
-    return measure(torch.from_numpy(predicted).float(), torch.from_numpy(truth).float())
+    pair = (torch.from_numpy(picture).float().to(device) for picture in (predicted, truth))
+    return measure(*pair)

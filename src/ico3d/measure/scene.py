@@ -1,6 +1,5 @@
 """Measuring a static scene: the floor that every model of somebody who moves must beat."""
 
-import time
 from pathlib import Path
 from typing import Literal
 
@@ -13,6 +12,7 @@ from ico3d.capture.pictures import View
 from ico3d.errors import CaptureError
 from ico3d.measure.metrics import psnr
 from ico3d.measure.scores import Scores, add_picture, write_pictures
+from ico3d.measure.stopwatch import Stopwatch
 from ico3d.scene.trained import TrainedScene
 from ico3d.scene.views import SceneViews
 from ico3d.splat.render import render
@@ -20,14 +20,14 @@ from ico3d.splat.render import render
 
 def evaluate_scene(
     trained: TrainedScene, capture: Capture, which: Literal["test", "all"], images: Path | None
-) -> dict[str, float | None]:
+) -> dict[str, float | str | None]:
     """Picture metrics, with the meaning they have for heads.
 
     A person is rendered over the capture's clean plates. `psnr_background` looks at what is not the
     person; without plates a background has nothing else to be measured by.
 
     Args:
-        trained: The scene.
+        trained: The scene; it is drawn where it is.
         capture: Where truth comes from; it may be another one than the scene was trained on.
         which: The test views of a capture (`SceneViews.test`), or all views.
         images: Folder for pictures, or None.
@@ -63,7 +63,7 @@ def evaluate_scene(
             write_pictures(images, view, predicted, truth, person)
     return scores.means() | {
         "num_gaussians": len(trained.scene),
-        "ms_per_frame": float(np.median(renderer.seconds) * 1000),
+        **renderer.watch.figures(),
         "train_seconds": trained.summary.get("train_seconds"),
     }
 
@@ -74,16 +74,17 @@ class SceneRenderer:
     def __init__(self, trained: TrainedScene, views: SceneViews):
         """Binds the scene to the capture whose plates a person stands before."""
         self._trained, self._views = trained, views
-        self.seconds: list[float] = []
+        self.watch = Stopwatch(trained.scene.device)
 
     @torch.no_grad()
     def picture(self, view: View) -> np.ndarray:
         """(H, W, 3), clipped to [0, 1]."""
         behind = self._views.plate(view) if self._trained.only == "person" else None
-        begin = time.perf_counter()
-        rendering = render(self._trained.scene.gaussians(), [view.camera], behind)
-        self.seconds.append(time.perf_counter() - begin)
-        return rendering.rgb[0].clamp(0, 1).numpy()
+        if behind is not None:
+            behind = behind.to(self._trained.scene.device)
+        with self.watch.picture():
+            rendering = render(self._trained.scene.gaussians(), [view.camera], behind)
+        return rendering.rgb[0].clamp(0, 1).cpu().numpy()
 
     def shows_all(self, view: View, person: np.ndarray | None) -> bool:
         """Whether the whole picture is known: a person needs a plate, a background nobody."""

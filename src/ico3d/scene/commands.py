@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 import tyro
 
+from ico3d.common.device import DeviceName
+
 
 @dataclass(frozen=True)
 class TrainStatic:
@@ -23,6 +25,7 @@ class TrainStatic:
         preset: Settings of 3DGS, or sized for two CPU cores.
         set: Changes to the preset, as name=value (names: ico3d.scene.settings.SceneSettings).
         seed: All randomness follows from it.
+        device: Where to compute: by default with CUDA where that works, else on the CPU.
         export: A file for other tools: .ply (lossless) or .spz (small; for scenes of avatars).
     """
 
@@ -34,6 +37,7 @@ class TrainStatic:
     preset: Literal["cpu", "paper"] = "cpu"
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     seed: int = 0
+    device: DeviceName = "auto"
     export: Path | None = None
 
     def run(self) -> None:
@@ -50,7 +54,7 @@ class TrainStatic:
             check_writable(self.export)
         settings = with_changes(PRESETS[self.preset, self.strategy], self.set)
         job = SceneJob(self.only, self.frames, self.strategy, self.seed, settings)
-        trained = train_scene(Capture.open(self.capture), self.out, job)
+        trained = train_scene(Capture.open(self.capture), self.out, job, self.device)
         if self.export is not None:
             write_gaussians(self.export, trained.scene.raw())
         seconds = trained.summary["train_seconds"]

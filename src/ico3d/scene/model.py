@@ -49,6 +49,11 @@ class StaticScene:
         """The degree of the harmonics."""
         return harmonics.degree_of(1 + self.parameters["f_rest"].shape[1])
 
+    @property
+    def device(self) -> torch.device:
+        """Where its parameters lie."""
+        return self.parameters["means"].device
+
     def to(self, device: torch.device) -> None:
         """Moves the parameters."""
         self.parameters = {name: value.to(device) for name, value in self.parameters.items()}

@@ -4,6 +4,8 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
+import torch
+
 from ico3d.common.files import write_atomic
 from ico3d.errors import ModelError
 from ico3d.scene.model import StaticScene
@@ -31,6 +33,11 @@ class TrainedScene:
     frames: Frames
     space: Space
     summary: dict
+
+    def to(self, device: torch.device) -> "TrainedScene":
+        """Moves the scene, and gives itself back."""
+        self.scene.to(device)
+        return self
 
     def save(self, folder: Path) -> None:
         """Writes `scene.safetensors` and `scene.json` into a folder."""

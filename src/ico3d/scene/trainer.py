@@ -90,6 +90,11 @@ class SceneTrainer:
         named |= {f"moments.{name}": value for name, value in self._optimiser.moments.items()}
         return named | {f"density.{name}": t for name, t in self._strategy.tensors().items()}
 
+    def place(self, name: str) -> torch.device:
+        """All are where the scene is."""
+        del name
+        return self.scene.device
+
     def state(self) -> dict:
         """Nothing beside the tensors: randomness follows from the step's number."""
         return {}
@@ -97,11 +102,10 @@ class SceneTrainer:
     def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
         """Takes back what `tensors` gave."""
         del state
-        device = self.scene.parameters["means"].device
         parts: dict[str, dict[str, Tensor]] = {"scene": {}, "moments": {}, "density": {}}
         for name, tensor in tensors.items():
             part, _, rest = name.partition(".")
-            parts[part][rest] = tensor if tensor.dim() == 0 else tensor.to(device)
+            parts[part][rest] = tensor
         self.scene = StaticScene({n: t.requires_grad_() for n, t in parts["scene"].items()})
         self._optimiser.moments = parts["moments"]
         self._strategy.restore(parts["density"])
@@ -117,7 +121,7 @@ class SceneTrainer:
     def _example(self, view: View, index: int) -> Example:
         """What a view asks for, on the scene's device; a person stands before a random colour."""
         color = np.random.default_rng([self._seed, index, 1]).random(3)
-        return self._views.example(view, color).to(self.scene.parameters["means"].device)
+        return self._views.example(view, color).to(self.scene.device)
 
     def _loss(self, rendering: Rendering, example: Example) -> Tensor:
         """(1 − λ)·L1 + λ·(1 − SSIM) over the pixels that count."""

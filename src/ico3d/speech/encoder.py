@@ -24,6 +24,7 @@ EncoderName = Literal["builtin", "ave", "hubert"]
 BUILTIN_FILE = Path(__file__).parent / "data" / "encoder.safetensors"
 AVE_FILE = TABLE["ave"].files[0].name
 
+CPU = torch.device("cpu")
 _BATCH = {"mel": 256, "sound": 8}  # windows at once
 
 
@@ -48,26 +49,30 @@ class FrozenEncoder:
     vectors: int = 1
 
     @torch.no_grad()
-    def features(self, samples: np.ndarray, rate: int) -> np.ndarray:
+    def features(self, samples: np.ndarray, rate: int, device: torch.device = CPU) -> np.ndarray:
         """Features of a whole sound.
 
         Args:
             samples: (S,) in [-1, 1].
             rate: Samples per second.
+            device: Where to compute them.
 
         Returns:
             (T, D) float32; row i belongs to time i/25 s, T ≥ ⌊25·seconds⌋ + 1.
         """
         if self.input == "mel":
-            return self._run(mel_windows(samples, rate)[:, None])
+            return self._run(mel_windows(samples, rate)[:, None], device)
         blocks, count = sound_blocks(samples, rate)
-        return self._run(blocks).reshape(-1, self.size)[:count]
+        return self._run(blocks, device).reshape(-1, self.size)[:count]
 
-    def _run(self, windows: np.ndarray) -> np.ndarray:
+    def _run(self, windows: np.ndarray, device: torch.device) -> np.ndarray:
         """What the network says about windows (n, …)."""
-        device = next(self.network.parameters()).device
         batches = torch.from_numpy(windows).split(_BATCH[self.input])
-        return torch.cat([self.network(batch.to(device)).cpu() for batch in batches]).numpy()
+        self.network.to(device)
+        try:
+            return torch.cat([self.network(batch.to(device)).cpu() for batch in batches]).numpy()
+        finally:
+            self.network.to(CPU)  # it is shared, and exported from there
 
 
 def load_encoder(name: str = "builtin") -> FrozenEncoder:

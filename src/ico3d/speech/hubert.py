@@ -62,8 +62,7 @@ def load_network(folder: Path) -> Hubert:
         raise ModelError(f"{folder} does not hold HuBERT: it lacks {missing[0]}.")
     if model.config.conv_stride[0] != 5 or model.config.num_feat_extract_layers != 7:
         raise ModelError(f"{folder} holds a HuBERT that does not give 50 vectors per second.")
-    network = Hubert(model)
-    return network.to("cuda" if torch.cuda.is_available() else "cpu")
+    return Hubert(model)
 
 
 def weight_file(folder: Path) -> Path:
@@ -80,13 +79,12 @@ def weight_file(folder: Path) -> Path:
 
 def export_hubert(network: Hubert) -> bytes:
     """An ONNX model from `sound` (1, SIZE) to `features` (5, 2·H)."""
-    device = next(network.parameters()).device
     file = io.BytesIO()
     with warnings.catch_warnings():
         # The newer exporter needs a further package and takes 15 times as long for the same graph.
         warnings.simplefilter("ignore")
         torch.onnx.export(
-            nn.Sequential(network.cpu(), nn.Flatten(0, 1)).eval(),
+            nn.Sequential(network, nn.Flatten(0, 1)).eval(),
             (torch.zeros(1, SIZE),),
             file,  # type: ignore[arg-type]
             dynamo=False,
@@ -94,5 +92,4 @@ def export_hubert(network: Hubert) -> bytes:
             input_names=["sound"],
             output_names=["features"],
         )
-    network.to(device)
     return file.getvalue()

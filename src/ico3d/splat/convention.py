@@ -2,6 +2,10 @@
 
 from math import exp
 
+GSPLAT = (1, 5, 3), (1, 6)
+"""The first version of gsplat that draws by these numbers, and the first that does not any more:
+1.6 bounds alpha by 0.99 and the low-pass's share of opacity from below."""
+
 BLUR = 0.3
 """Low-pass added to both diagonal entries of the 2D covariance, pixels squared."""
 

@@ -1,5 +1,7 @@
 """The CUDA side of `splat.render`: gsplat under the same contract."""
 
+import re
+import sys
 from collections.abc import Sequence
 
 import numpy as np
@@ -7,8 +9,8 @@ import torch
 from torch import Tensor
 
 from ico3d.common.camera import Camera
-from ico3d.errors import MissingExtraError
-from ico3d.splat.convention import BLUR, NEAR
+from ico3d.errors import MissingExtraError, SettingsError
+from ico3d.splat.convention import BLUR, GSPLAT, NEAR
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.rendering import Drawing, RenderInfo
 
@@ -18,12 +20,32 @@ def _rasterization():
 
     Raises:
         MissingExtraError: If gsplat is not installed.
+        SettingsError: If it is of a version that draws otherwise.
     """
     try:
-        from gsplat import rasterization
+        import gsplat
     except ImportError as error:
         raise MissingExtraError("gsplat", "cuda", "rendering on a CUDA device") from error
-    return rasterization
+    version = str(gsplat.__version__)
+    numbers = tuple(map(int, re.findall(r"\d+", version)[:3]))
+    oldest, newest = GSPLAT
+    if not oldest <= numbers < newest:
+        bounds = (".".join(map(str, bound)) for bound in GSPLAT)
+        raise SettingsError(
+            "gsplat {} is installed, which draws otherwise than ico3d's CPU rasteriser: it takes "
+            "{} or newer and older than {}; pip install 'ico3d[cuda]' installs one.".format(
+                version, *bounds
+            )
+        )
+    return gsplat.rasterization
+
+
+def _not_compiled() -> SettingsError:
+    """What to say where gsplat lacks the kernels that it compiles at first use."""
+    return SettingsError(
+        "gsplat is installed without its compiled part: it needs CUDA's compiler nvcc, of the "
+        f"version that torch was built with ({torch.version.cuda})."
+    )
 
 
 def _empty(colors: Tensor, cameras: Sequence[Camera]) -> Drawing:
@@ -59,6 +81,7 @@ def draw_gaussians(
 
     Raises:
         MissingExtraError: If gsplat is not installed.
+        SettingsError: If it cannot be used.
     """
     width, height = cameras[0].width, cameras[0].height
     if len(gaussians) == 0 or width * height == 0:
@@ -85,7 +108,12 @@ def draw_gaussians(
             absgrad=absgrad,
         )
 
-    rgb, alpha, meta = rasterise("RGB")  # (C, H, W, 3), (C, H, W, 1)
+    try:
+        rgb, alpha, meta = rasterise("RGB")  # (C, H, W, 3), (C, H, W, 1)
+    except (AttributeError, ImportError) as error:
+        if getattr(sys.modules.get("gsplat.cuda._backend"), "_C", None) is None:
+            raise _not_compiled() from error
+        raise
     if meta["means2d"].requires_grad:
         meta["means2d"].retain_grad()
     radii = meta["radii"]  # (C, N, 2) or, in older versions, (C, N)

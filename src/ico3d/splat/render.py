@@ -50,6 +50,7 @@ def render(
     Raises:
         ValueError: If cameras differ in size, there is none, or a shape does not fit.
         MissingExtraError: If the tensors are on a CUDA device and gsplat is not installed.
+        SettingsError: If gsplat is there and cannot be used.
     """
     _check(gaussians, cameras, background)
     poses = _poses(cameras, world_to_camera)

@@ -1,10 +1,11 @@
 """Checkpoints: one safetensors file with tensors and a JSON state, written atomically."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor
@@ -28,6 +29,17 @@ def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict]:
     with _opened(path) as file:
         state = json.loads((file.metadata() or {})["state"])
         return {name: file.get_tensor(name) for name in file.keys()}, state  # noqa: SIM118
+
+
+def placed(tensors: dict[str, Tensor], place: Callable[[str], torch.device]) -> dict[str, Tensor]:
+    """What a checkpoint held, each tensor where `place` says that one of its name belongs.
+
+    Whole numbers stay on the CPU: they count, and the optimiser reads them at every step.
+    """
+    return {
+        name: tensor.to(place(name)) if tensor.is_floating_point() else tensor
+        for name, tensor in tensors.items()
+    }
 
 
 def load_state(path: Path) -> dict:

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+import torch
 from torch import Tensor
 
+from ico3d.training.checkpoint import placed
 from ico3d.training.finite import NotFiniteError, check_finite
 from ico3d.training.log import MetricsLog, progress_bar, readable
 from ico3d.training.run import RunFolder, checkpoint_state
@@ -20,6 +22,10 @@ class Trainee(Protocol):
     All randomness of a step must follow from the seed and the step's number, so that a resumed
     run repeats the uninterrupted one.
     """
+
+    def place(self, name: str) -> torch.device:
+        """Where one of its tensors belongs: with the parameter that it is, or is about."""
+        ...
 
     def step(self, index: int) -> Mapping[str, float | Tensor]:
         """Does optimisation step `index`; returns its numbers, `loss` among them."""
@@ -34,7 +40,7 @@ class Trainee(Protocol):
         ...
 
     def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
-        """Takes back what `tensors` and `state` gave."""
+        """Takes back what `tensors` and `state` gave; each tensor is at its place."""
         ...
 
 
@@ -126,7 +132,7 @@ def _resume(trainee: Trainee, run: RunFolder) -> tuple[int, float]:
     if checkpoint is None:
         return 0, 0.0
     tensors, state = checkpoint
-    trainee.restore(tensors, state["trainee"])
+    trainee.restore(placed(tensors, trainee.place), state["trainee"])
     return state["step"], state["seconds"]
 
 

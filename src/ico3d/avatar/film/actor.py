@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import torch
 
 from ico3d.avatar import baking, body_bundle, staging
 from ico3d.avatar.avatar import TrainedAvatar
@@ -24,6 +25,7 @@ from ico3d.bundle.manifest import CameraInfo
 from ico3d.capture.capture import Capture
 from ico3d.common.expression import SPEECH_SIZE
 from ico3d.speech.runtime import open_speech
+from ico3d.splat.device import CPU
 from ico3d.splat.gaussians import Gaussians
 
 Draw = Callable[[float, np.ndarray], Gaussians]
@@ -113,19 +115,20 @@ def _swaying_head(bundle: Bundle) -> tuple[Draw, float]:
     return draw, seconds
 
 
-def avatar_actor(folder: Path, capture: Capture | None) -> Actor:
+def avatar_actor(folder: Path, capture: Capture | None, device: torch.device = CPU) -> Actor:
     """The exact person of a folder that `ico3d assemble` wrote.
 
     Args:
         folder: See there.
         capture: The body's recording says which way is up; y is where there is none.
+        device: Where the person shall be.
     """
-    avatar = TrainedAvatar.load(folder)
+    avatar = TrainedAvatar.load(folder).to(device)
     points = extent(avatar)
     low, high = points.min(0), points.max(0)
     view = body_bundle.standing_camera(low, high, capture, front_of(avatar))
     moments = np.linspace(0, avatar.seconds, MOMENTS)
-    face = [avatar.head_gaussians(float(moment)).means.numpy() for moment in moments]
+    face = [avatar.head_gaussians(float(moment)).means.cpu().numpy() for moment in moments]
     background = staging.background_colour(capture, 0) if capture else staging.NEUTRAL
     head = avatar.head
     driven = head.adaptor is not None

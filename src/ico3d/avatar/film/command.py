@@ -7,7 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from ico3d.common.device import DeviceName
+
 if TYPE_CHECKING:
+    import torch
+
     from ico3d.avatar.film.actor import Actor
     from ico3d.avatar.film.film import Moving
     from ico3d.capture.capture import Capture, Sound
@@ -43,6 +47,7 @@ class Render:
         background: Colour behind the person, as in HTML: a name or #rrggbb; by default the
             bundle's own, else a light grey.
         seed: Of blinks and gestures.
+        device: Where to compute: by default with CUDA where that works, else on the CPU.
     """
 
     model: tyro.conf.Positional[Path]
@@ -55,6 +60,7 @@ class Render:
     size: Annotated[tuple[int, ...], tyro.conf.arg(metavar="W [H]")] = (540, 960)
     background: str | None = None
     seed: int = 0
+    device: DeviceName = "auto"
 
     def run(self) -> None:
         """Renders and writes the video.
@@ -70,16 +76,17 @@ class Render:
 
         from ico3d.avatar.film.film import pictures
         from ico3d.avatar.film.video import write_video
+        from ico3d.splat.device import computing_device
 
-        background = self._checked()
+        background, device = self._checked(), computing_device(self.device)
         sound = self._sound()
-        person, actor = self._person(sound)
+        person, actor = self._person(sound, device)
         if background is None:
             background = GREY if actor is None else actor.background
         seconds = self.seconds if sound is None else person.seconds
         cameras = self._cameras(person, actor, max(1, round(seconds * self.fps)))
         backdrop = None if actor is None else actor.backdrop
-        seen: Iterable = pictures(person, cameras, self.fps, background, backdrop)
+        seen: Iterable = pictures(person, cameras, self.fps, background, backdrop, device)
         shown = track(seen, "filming", len(cameras), transient=True)
         write_video(self.out, shown, self._sides, self.fps, sound)
         Console().print(f"{self.out}: {len(cameras)} pictures at {self.fps:g} per second.")
@@ -120,7 +127,9 @@ class Render:
             raise SettingsError(f"--audio: there is no sound in {self.audio}.")
         return sound
 
-    def _person(self, sound: "Sound | None") -> tuple["Moving", "Actor | None"]:
+    def _person(
+        self, sound: "Sound | None", device: "torch.device"
+    ) -> tuple["Moving", "Actor | None"]:
         """Who is filmed, and, but for bodies of their own, how they talk and where they stand."""
         from ico3d.avatar.avatar import ABOUT as AVATAR
         from ico3d.avatar.film import actor, performance
@@ -133,11 +142,11 @@ class Render:
 
         path = bundle_path(self.model)
         if path.is_dir() and (path / AVATAR).is_file():
-            found = actor.avatar_actor(path, self._opened_capture())
+            found = actor.avatar_actor(path, self._opened_capture(), device)
         elif path.is_dir() and not (path / MANIFEST).is_file():
             if sound is not None and (path / BODY).is_file():
                 raise SettingsError(f"{path} is a body alone, which does not talk: no --audio.")
-            return TrainedBody.load(path), None
+            return TrainedBody.load(path).to(device), None
         else:
             found = actor.bundle_actor(Bundle.open(path))
         if sound is not None:

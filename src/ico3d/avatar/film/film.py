@@ -7,6 +7,7 @@ import numpy as np
 import torch
 
 from ico3d.common.camera import Camera
+from ico3d.splat.device import CPU
 from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
 
@@ -56,6 +57,7 @@ def pictures(
     fps: float,
     background: Sequence[float],
     backdrop: Gaussians | None = None,
+    device: torch.device = CPU,
 ) -> Iterator[np.ndarray]:
     """What the cameras see one after the other while time runs, back and forth through the clip.
 
@@ -65,14 +67,14 @@ def pictures(
         fps: Pictures per second.
         background: (3,) colour in [0, 1].
         backdrop: What stands behind the person, in the world.
+        device: Where they are drawn.
 
     Yields:
         (H, W, 3) uint8.
     """
     behind = torch.tensor(background)
+    around = [] if backdrop is None else [backdrop.to(device)]
     for number, camera in enumerate(cameras):
-        gaussians = person.gaussians(back_and_forth(number / fps, person.seconds))
-        if backdrop is not None:
-            gaussians = cat([gaussians, backdrop])
-        rgb = render(gaussians, [camera], behind).rgb[0].clamp(0, 1)  # (H, W, 3)
+        shown = person.gaussians(back_and_forth(number / fps, person.seconds)).to(device)
+        rgb = render(cat([shown, *around]), [camera], behind).rgb[0].clamp(0, 1)  # (H, W, 3)
         yield (rgb * 255 + 0.5).to(torch.uint8).cpu().numpy()

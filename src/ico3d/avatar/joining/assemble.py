@@ -28,8 +28,10 @@ from ico3d.body.settings import BodySettings
 from ico3d.body.train import BodyJob, Runner, train_body
 from ico3d.capture.canonical import canonical_landmarks
 from ico3d.capture.capture import Capture
+from ico3d.common.device import DeviceName
 from ico3d.errors import CaptureError, ModelError, SettingsError
 from ico3d.head.trained import TrainedHead
+from ico3d.splat.device import computing_device
 from ico3d.training.checkpoint import save_tensors
 from ico3d.training.run import RunFolder
 
@@ -81,6 +83,7 @@ class Assembly:
         body: How the body is trained.
         seed: All randomness follows from it.
         continued: Folder of a body that was trained without the head, to go on from.
+        device: Where to compute; a run may go on elsewhere.
     """
 
     head: Path
@@ -88,6 +91,7 @@ class Assembly:
     body: BodySettings
     seed: int
     continued: Path | None = None
+    device: DeviceName = "auto"
 
     def about(self, capture: Path) -> dict:
         """What a run of it is known by."""
@@ -130,7 +134,7 @@ def assemble(
         return TrainedAvatar.load(folder)
     source = HeadSource(folder.resolve(), assembly.joining.border_points, assembly.joining.pruning)
     continued = assembly.continued and assembly.continued.resolve()
-    job = BodyJob("swings++", assembly.seed, assembly.body, source, continued)
+    job = BodyJob("swings++", assembly.seed, assembly.body, source, continued, assembly.device)
     body = train_body(capture, folder / BODY, job, runner)
     placement, expressions = load_placement(folder / PLACEMENT)
     head = TrainedHead.load(folder / HEAD)
@@ -141,6 +145,7 @@ def assemble(
         "train_seconds": body.summary["train_seconds"],
     }
     avatar = TrainedAvatar(head, body, placement, expressions, summary)
+    avatar.to(computing_device(assembly.device))
     avatar = replace(avatar, summary=summary | measured(avatar, capture, say))
     avatar.save(folder)
     run.finish(avatar.summary)
@@ -154,7 +159,7 @@ def place_head(capture: Capture, folder: Path, assembly: Assembly, say: Say) -> 
     region = HeadRegion.around(landmarks)
     placement = align(capture, landmarks, say)
     seam = near_border(head, region, SEAM_REACH)
-    head = cropped(head, region)
+    head = cropped(head, region).to(computing_device(assembly.device))
     expressions = recorded_expressions(head, capture, head.neutral())
     if assembly.joining.match_colors:
         _match_colors(head, capture, placement, expressions, assembly, say)

@@ -13,6 +13,7 @@ from ico3d.avatar.joining.similarity import moved
 from ico3d.capture.capture import Capture
 from ico3d.errors import ModelError
 from ico3d.head.trained import TrainedHead
+from ico3d.splat.device import CPU
 from ico3d.splat.render import render
 
 PICTURES = 12
@@ -21,18 +22,19 @@ LEAST_HEIGHT = 256
 MARK = (0.1, 1.0, 0.3)
 
 
-def write_checks(folder: Path, capture: Capture, out: Path) -> None:
+def write_checks(folder: Path, capture: Capture, out: Path, device: torch.device = CPU) -> None:
     """Writes `FRAME_CAMERA.png`: recorded | the head drawn over it | landmarks over it.
 
     Args:
         folder: The avatar's folder; its head is placed already.
         capture: Of the body.
         out: Where to write.
+        device: Where to draw.
 
     Raises:
         CaptureError: If no camera sees the face.
     """
-    head = TrainedHead.load(folder / HEAD)
+    head = TrainedHead.load(folder / HEAD).to(device)
     placement, expressions = load_placement(folder / PLACEMENT)
     if head.landmarks is None:
         raise ModelError(f"{folder / HEAD} has no landmarks: assemble the avatar again.")
@@ -43,7 +45,7 @@ def write_checks(folder: Path, capture: Capture, out: Path) -> None:
         where = placement.world_from_head(view.frame)
         with torch.no_grad():
             drawn = head.model(torch.from_numpy(expressions[view.frame])).transform(where)
-            over = render(drawn, [view.camera], view.image).rgb[0].numpy()
+            over = render(drawn, [view.camera], view.image).rgb[0].cpu().numpy()
         marked = _marked(view, moved(where, head.landmarks))
         row = np.hstack([view.image.numpy(), over, marked])
         name = f"{view.frame:06d}_{capture.cameras[view.camera_index].name}.png"

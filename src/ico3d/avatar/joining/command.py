@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from ico3d.common.device import DeviceName
+
 if TYPE_CHECKING:
     from ico3d.avatar.joining.assemble import Assembly
 
@@ -28,6 +30,8 @@ class Assemble:
             ico3d.body.settings.BodySettings).
         check: Write pictures here that show the head drawn over the body's recordings.
         seed: All randomness follows from it.
+        device: Where to compute: by default with CUDA where that works, else on the CPU; machines
+            of a Ray cluster decide for themselves.
         jobs: Windows that train at once, each in a process of its own.
         ray: Address of a Ray cluster that trains the windows, host:port or auto.
     """
@@ -40,6 +44,7 @@ class Assemble:
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     check: Path | None = None
     seed: int = 0
+    device: DeviceName = "auto"
     jobs: int = 1
     ray: str | None = None
 
@@ -49,19 +54,22 @@ class Assemble:
         Raises:
             Ico3dError: If head and capture lack something or do not fit.
         """
+        import torch
         from rich.console import Console
 
         from ico3d.avatar.joining import assemble
         from ico3d.avatar.joining.checking import write_checks
         from ico3d.body.commands import runner_of
         from ico3d.capture.capture import Capture
+        from ico3d.splat.device import decided
 
         console, capture = Console(), Capture.open(self.capture)
-        runner = runner_of(self.jobs, self.ray)
+        device = decided(self.device)
+        runner = runner_of(self.jobs, self.ray, self.device if self.ray else device)
         assembly = self._assembly()
         assemble.prepare(capture, self.out, assembly, console.print)
         if self.check:
-            write_checks(self.out, capture, self.check)
+            write_checks(self.out, capture, self.check, torch.device(device))
             console.print(f"{self.check}: the head over {capture.path}.")
         avatar = assemble.assemble(capture, self.out, assembly, console.print, runner)
         console.print(
@@ -93,4 +101,5 @@ class Assemble:
                 warmup_steps=0,
             )
         joining = with_changes(JoiningSettings(), ours)
-        return Assembly(self.head, joining, with_changes(body, theirs), self.seed, self.body)
+        changed = with_changes(body, theirs)
+        return Assembly(self.head, joining, changed, self.seed, self.body, self.device)

@@ -1,7 +1,7 @@
 """Pictures of a body's capture in which the face is seen."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -48,6 +48,11 @@ class FaceView:
     image: Tensor
     mask: Tensor
     steady: Tensor
+
+    def to(self, device: torch.device) -> "FaceView":
+        """The same on another device."""
+        names = ("image", "mask", "steady")
+        return replace(self, **{name: getattr(self, name).to(device) for name in names})
 
 
 def face_views(

@@ -67,6 +67,7 @@ def recolour(
     """
     frozen = _Frozen(model, placement, expressions)
     layer = _Relit(model.color_branch)
+    views = [view.to(model.device) for view in views]
     roughness = _roughness(model, [frozen.at(frame)[0] for frame in _some(views)])
     optimiser = torch.optim.Adam(layer.parameters(), settings.rate)
     decay = torch.optim.lr_scheduler.ExponentialLR(optimiser, 0.1 ** (1 / settings.steps))
@@ -89,7 +90,8 @@ def color_difference(
 ) -> float:
     """Mean absolute difference of head and pictures where the head covers them."""
     frozen = _Frozen(model, placement, expressions)
-    return float(np.mean([_difference(model.color_branch, frozen, view) for view in views]))
+    moved = (view.to(model.device) for view in views)
+    return float(np.mean([float(_difference(model.color_branch, frozen, v)) for v in moved]))
 
 
 class _Relit(nn.Module):
@@ -98,9 +100,9 @@ class _Relit(nn.Module):
     def __init__(self, layer: nn.Linear):
         super().__init__()
         self._weight, self._bias = layer.weight.detach().clone(), layer.bias.detach().clone()
-        self.tint = nn.Parameter(torch.zeros(3, 3))
+        self.tint = nn.Parameter(self._weight.new_zeros(3, 3))
         self.local = nn.Parameter(torch.zeros_like(self._weight))  # (3, hidden)
-        self.offset = nn.Parameter(torch.zeros(3))
+        self.offset = nn.Parameter(self._weight.new_zeros(3))
 
     def forward(self, hidden: Tensor) -> Tensor:
         """(N, 3) logits of colours."""
@@ -127,10 +129,10 @@ def _roughness(model: HeadModel, hidden: Sequence[Tensor]) -> Tensor:
         model: Where the Gaussians are.
         hidden: (N, hidden) what the layer takes in, by frame.
     """
-    means = model.means.detach().numpy()
+    means = model.means.detach().cpu().numpy()
     _, nearest = KDTree(means).query(means, k=min(1 + NEIGHBOURS, len(means)))  # (N, 1 + K)
-    others = torch.from_numpy(np.asarray(nearest)[:, 1:])  # (N, K)
-    total = torch.zeros(hidden[0].shape[1], hidden[0].shape[1])
+    others = torch.from_numpy(np.asarray(nearest)[:, 1:]).to(model.device)  # (N, K)
+    total = hidden[0].new_zeros(hidden[0].shape[1], hidden[0].shape[1])
     for values in hidden:
         for neighbour in others.T:
             step = values - values[neighbour]  # (N, hidden)

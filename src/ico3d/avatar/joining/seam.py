@@ -44,10 +44,11 @@ def gap(
         world_from_head: (4, 4) where the head is.
         region: Of the head's model.
     """
+    drawn, (head, body) = (head, body), (head.to("cpu"), body.to("cpu"))
     local = moved(np.linalg.inv(world_from_head), head.means.double().numpy())  # (N, 3)
     depth = region.depth(local)
     rim = (depth > 0) & (depth < RIM)
-    rim[rim] = _seen_from_outside(head, torch.from_numpy(rim), body)
+    rim[rim] = _seen_from_outside(*drawn)[rim]
     solid = body.opacities > OPAQUE
     if not rim.any() or not solid.any():
         return None
@@ -57,12 +58,12 @@ def gap(
     return float(np.median(opening[-max(len(opening) // 100, 1) :]))
 
 
-def _seen_from_outside(head: Gaussians, chosen: torch.Tensor, body: Gaussians) -> np.ndarray:
-    """(R,) bool: which of the chosen Gaussians of a head (N,) are seen by cameras around it."""
-    middle = head.means.mean(0).double().numpy()
+def _seen_from_outside(head: Gaussians, body: Gaussians) -> np.ndarray:
+    """(N,) bool: which Gaussians of a head are seen by cameras around it."""
+    middle = head.means.mean(0).double().cpu().numpy()
     cameras = [_looking_at(middle, angle) for angle in np.arange(AROUND) * 2 * np.pi / AROUND]
     given = contributions(cat([head, body]), cameras)[:, : len(head)]  # (C, N)
-    return (given.max(0).values[chosen] > OPAQUE).numpy()
+    return (given.max(0).values > OPAQUE).cpu().numpy()
 
 
 def _looking_at(middle: np.ndarray, angle: float) -> Camera:
@@ -124,7 +125,7 @@ def _scores_of(avatar: TrainedAvatar, view: FaceView) -> tuple[float, float, flo
     """Squared errors of the face and the border, and the step of colour; None without a border."""
     seconds = view.frame / avatar.fps
     head, body = avatar.head_gaussians(seconds), avatar.body.gaussians(seconds)
-    drawn = render(cat([body, head]), [view.camera], view.image).rgb[0].numpy()  # (H, W, 3)
+    drawn = render(cat([body, head]), [view.camera], view.image).rgb[0].cpu().numpy()  # (H, W, 3)
     inner, outer, face = _bands(_share(head, body, view), view.mask.numpy() > CERTAIN)
     if not inner.any() or not outer.any() or not face.any():
         return None
@@ -139,7 +140,7 @@ def _share(head: Gaussians, body: Gaussians, view: FaceView) -> np.ndarray:
     """(H, W) how much of each pixel is head."""
     white, black = torch.ones_like(head.means), torch.zeros_like(body.means)
     marked = cat([replace(body, colors=black), replace(head, colors=white)])
-    return render(marked, [view.camera]).rgb[0, :, :, 0].numpy()
+    return render(marked, [view.camera]).rgb[0, :, :, 0].cpu().numpy()
 
 
 def _bands(share: np.ndarray, person: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,0 +1,60 @@
+"""A head is put on a body where CUDA is."""
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted_person import FRAMES, PlantedPerson, face, planted_head
+from test_assemble import assembly_of
+from test_recolour import SETTINGS, parts_of
+
+from ico3d.avatar.avatar import TrainedAvatar
+from ico3d.avatar.joining.assemble import assemble
+from ico3d.avatar.joining.checking import write_checks
+from ico3d.avatar.joining.face_views import face_views
+from ico3d.avatar.joining.recolour import color_difference, recolour
+from ico3d.avatar.joining.region import HeadRegion
+from ico3d.avatar.joining.seam import seam_scores
+from pretended_cuda import drawn, is_moved
+
+
+def test_colours_are_matched(cuda, head, abroad):
+    """To the same as on the CPU."""
+    placement, expressions, views, tested = parts_of(abroad, head)
+    other = copy.deepcopy(head.model).requires_grad_(False).to(cuda)
+    head.model.requires_grad_(False)
+    quick = replace(SETTINGS, steps=20)
+    recolour(head.model, placement, expressions, views, quick)
+    recolour(other, placement, expressions, views, quick)
+    assert is_moved(other.color_branch.weight)
+    here = color_difference(head.model, placement, expressions, tested)
+    there = color_difference(other, placement, expressions, tested)
+    assert there == pytest.approx(here, rel=0.02)
+
+
+def test_an_avatar_is_assembled_and_measured(cuda, tmp_path, monkeypatch):
+    """Head, windows, pictures to check, and the seam."""
+    capture, said = PlantedPerson.elsewhere(tmp_path / "capture"), []
+    (tmp_path / "head").mkdir()
+    planted_head().save(tmp_path / "head")
+    assembly = assembly_of(tmp_path / "head", color_steps=10)
+    small = replace(assembly.body, steps_per_frame=2, warmup_steps=2, checkpoint_every=9)
+    assembly = replace(assembly, body=small, device="cuda")
+    with drawn(monkeypatch) as pictures:
+        avatar = assemble(capture, tmp_path / "out", assembly, said.append)
+        assert len(pictures) > 2 * FRAMES + 10
+        before = len(pictures)
+        write_checks(tmp_path / "out", capture, tmp_path / "check", cuda)
+        assert len(pictures) > before
+    assert is_moved(avatar.head.model.means) and is_moved(avatar.gaussians(0.0).means)
+    assert np.isfinite(avatar.summary["psnr_face"]) and "gap_mm" in avatar.summary
+    _same_scores(TrainedAvatar.load(tmp_path / "out"), avatar, capture)
+
+
+def _same_scores(here: TrainedAvatar, there: TrainedAvatar, capture) -> None:
+    """Of the seam, on either device."""
+    region = HeadRegion.around(face())
+    views = face_views(capture, here.placement, region, face(), most=2)
+    ours, theirs = (seam_scores(avatar, views) for avatar in (there, here))
+    assert ours.psnr_face == pytest.approx(theirs.psnr_face, abs=1e-2)

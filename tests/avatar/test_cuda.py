@@ -1,0 +1,103 @@
+"""Baking, films and animations of exact models that are on CUDA."""
+
+import copy
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pretended_cuda import drawn
+
+sys.path.insert(0, str(Path(__file__).parent))
+from whole_person import WholeFilmed, head_recording, write_whole_person
+
+from ico3d.avatar import baking, body_bundle, comparison, whole_bundle
+from ico3d.avatar.bake_head import BakeSettings
+from ico3d.avatar.film.camera_path import orbit, ring_around
+from ico3d.avatar.film.film import extent, pictures
+from ico3d.avatar.keyframes import Motion
+from ico3d.avatar.samples import recorded_samples
+from ico3d.body.trained import TrainedBody
+from ico3d.bundle.format import Bundle
+from ico3d.capture.capture import Capture
+from ico3d.cli import main
+
+QUICK = BakeSettings(hidden=32, augmented=20, steps=40)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """An avatar's folder."""
+    folder = tmp_path_factory.mktemp("whole") / "avatar"
+    write_whole_person(folder)
+    return folder
+
+
+def test_a_head_is_baked(cuda, blendshape_head):
+    """From the same samples, to the same loss."""
+    head, capture = blendshape_head
+    capture.head = copy.deepcopy(head)
+
+    def baked():
+        views = comparison.references(head, capture, (0.5, 0.5, 0.5), 3)
+        samples = recorded_samples(head, capture)
+        return samples, baking.bake(head, views, samples, 4, [].append, QUICK)
+
+    here, there = baked(), (head.model.to(cuda), baked())[1]
+    np.testing.assert_allclose(there[0].importance, here[0].importance, rtol=1e-3)
+    assert there[1].head.num_gaussians == here[1].head.num_gaussians
+    assert there[1].loss.psnr_exact == pytest.approx(here[1].loss.psnr_exact, abs=1e-2)
+    assert there[1].loss.psnr_baked == pytest.approx(here[1].loss.psnr_baked, abs=1e-2)
+
+
+def test_a_body_is_baked(cuda, folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(body_bundle, "SHAPES", body_bundle.SHAPES[:1])
+    body = TrainedBody.load(folder / "body")
+    here = list(body_bundle.bake(body, None))
+    for model in body.models:
+        model.to(cuda)
+    there = list(body_bundle.bake(body, None))
+    for ours, theirs in zip(there, here, strict=True):
+        wanted = theirs.loss.psnr_baked_vs_exact
+        assert ours.loss.psnr_baked_vs_exact == pytest.approx(wanted, abs=1e-2)
+    assert body_bundle.strip(body, there, None).shape[1] == 512
+
+
+def test_a_body_is_filmed_and_animated(cuda, folder):
+    body = TrainedBody.load(folder / "body")
+    cameras = orbit(ring_around(extent(body)), extent(body), 3, 32, 48)
+    here, speeds = list(pictures(body, cameras, 10, (1, 1, 1))), Motion.of(body).speeds
+    for model in body.models:
+        model.to(cuda)
+    np.testing.assert_allclose(Motion.of(body).speeds, speeds, rtol=1e-3)
+    for one, other in zip(pictures(body, cameras, 10, (1, 1, 1)), here, strict=True):
+        np.testing.assert_allclose(one, other, atol=1)
+
+
+def _run(*words) -> None:
+    assert main([*map(str, words), "--device", "cuda"]) == 0
+
+
+def test_the_verbs_bake_film_and_animate_there(cuda, folder, tmp_path, monkeypatch):
+    """Also what is a bundle already."""
+    person = whole_bundle.TrainedAvatar.load(folder)
+    recordings = {"head": head_recording(tmp_path), "body": WholeFilmed(person, tmp_path)}
+    monkeypatch.setattr(Capture, "open", lambda path: recordings[Path(path).name])
+    monkeypatch.setattr(baking, "BakeSettings", lambda: QUICK)
+    monkeypatch.setattr(baking, "MEASURED_VIEWS", 4)
+    monkeypatch.setattr(body_bundle, "SHAPES", body_bundle.SHAPES[:1])
+    bundle, film = tmp_path / "a.ico3d", tmp_path / "a.mp4"
+    bake = ("bake", folder, "head", "body", bundle, "--rank", 4, "--force")
+    commands = {
+        "an avatar is baked": (*bake, "--strip", tmp_path / "strip.png"),
+        "an avatar is filmed": ("render", folder, film, "--size", 32, "--seconds", 0.1),
+        "a bundle is filmed": ("render", bundle, film, "--size", 32, "--seconds", 0.1),
+        "an avatar is animated": ("animate", folder, "--contact-sheet", tmp_path / "a.png"),
+        "a bundle is animated": ("animate", bundle, "--contact-sheet", tmp_path / "b.png"),
+    }
+    for what, words in commands.items():
+        with drawn(monkeypatch) as there:
+            _run(*words)
+        assert there, what
+    assert Bundle.open(bundle).manifest.is_whole

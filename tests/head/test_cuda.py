@@ -1,0 +1,83 @@
+"""Heads are trained, and go on being trained, where CUDA is."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import save_file
+
+from ico3d.head.expressions import BlendshapeTrack
+from ico3d.head.initial import initial_head
+from ico3d.head.perceptual import CHANNELS, WEIGHTS, vgg_layers
+from ico3d.head.settings import PRESETS
+from ico3d.head.train import HeadJob, train_head
+from ico3d.head.trainer import HeadTrainer
+from ico3d.head.watch import WatchedHead
+from ico3d.training.watch import _side_by_side
+from pretended_cuda import is_moved
+
+SETTINGS = dataclasses.replace(
+    PRESETS["cpu"],
+    steps=16,
+    initial_gaussians=200,
+    max_gaussians=400,
+    densify_from=6,
+    densify_every=6,
+    densify_until=16,
+    densify_gradient=1e-5,
+    checkpoint_every=8,
+)
+
+
+def _job(inputs="blendshapes", variant="full", **changes) -> HeadJob:
+    return HeadJob(inputs, variant, "builtin", 0, dataclasses.replace(SETTINGS, **changes))
+
+
+@pytest.fixture
+def vgg(tmp_path, monkeypatch):
+    """Random weights of the network that compares pictures."""
+    torch.manual_seed(0)
+    values = {f"features.{name}": v for name, v in vgg_layers(CHANNELS).state_dict().items()}
+    save_file(values, tmp_path / WEIGHTS)
+    monkeypatch.setenv("ICO3D_MODELS", str(tmp_path))
+
+
+@pytest.mark.parametrize("variant", ["full", "no-mlp", "no-blending"])
+def test_every_variant_trains_there(cuda, tiny, tmp_path, variant):
+    head = train_head(tiny, tmp_path, _job(variant=variant))
+    assert is_moved(head.model.means) and is_moved(head.model.basis)
+
+
+def test_a_perceptual_term_looks_at_pictures_there(cuda, vgg, tiny, tmp_path):
+    """The paper's preset turns it on at step 10,000."""
+    head = train_head(tiny, tmp_path, _job(perceptual_weight=0.1, perceptual_from=2, steps=4))
+    assert is_moved(head.model.means)
+
+
+def test_it_is_watched_there(cuda, tiny):
+    """What a page shows of it can leave the device."""
+    model = initial_head(tiny, SETTINGS, "full", 3, np.random.default_rng(0)).to(cuda)
+    watched = WatchedHead(tiny, model, BlendshapeTrack(tiny, tiny.blendshape_names))
+    assert is_moved(watched.gaussians(0, watched.values(0)).colors)
+    assert _side_by_side(*watched.pictures(0)).shape == (48, 96, 3)
+
+
+@pytest.mark.parametrize("inputs", ["blendshapes", "speech"])
+def test_an_interrupted_run_goes_on_there(cuda, tiny, tmp_path, inputs, monkeypatch):
+    """To what it would have become; moments and density statistics lie where parameters do."""
+    whole = train_head(tiny, tmp_path / "whole", _job(inputs))
+    step = HeadTrainer.step
+
+    def dying_step(self, index):
+        if index == 10:
+            raise KeyboardInterrupt
+        return step(self, index)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(HeadTrainer, "step", dying_step)
+        with pytest.raises(KeyboardInterrupt):
+            train_head(tiny, tmp_path / "parts", _job(inputs))
+    resumed = train_head(tiny, tmp_path / "parts", _job(inputs))
+    for name, value in whole.model.state_dict().items():
+        assert torch.equal(resumed.model.state_dict()[name], value), name

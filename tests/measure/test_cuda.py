@@ -1,0 +1,88 @@
+"""What is measured is drawn where the model is, and says so."""
+
+import copy
+import json
+
+import numpy as np
+import pytest
+from moving_capture import MovingCapture
+from test_evaluate import Offset, _head
+from test_lpips import folder, look_again  # noqa: F401 (fixtures)
+from test_scene import Offset as OffsetScene
+from test_scene import _trained
+from test_train import job
+
+from ico3d.body.train import train_body
+from ico3d.capture.capture import Capture
+from ico3d.cli import main
+from ico3d.measure import lpips as room
+from ico3d.measure.body import evaluate_body
+from ico3d.measure.evaluate import evaluate_head
+from ico3d.measure.scene import evaluate_scene
+from pretended_cuda import drawn
+
+
+def _same(found: dict, wanted: dict) -> None:
+    """What was measured on either device, but for how long it took."""
+    assert found.keys() == wanted.keys()
+    for name in wanted.keys() - {"ms_per_frame", "device"}:
+        if isinstance(wanted[name], float):
+            assert found[name] == pytest.approx(wanted[name], rel=1e-3), name
+
+
+@pytest.fixture
+def no_models(tmp_path, monkeypatch):
+    monkeypatch.setenv("ICO3D_MODELS", str(tmp_path))
+    monkeypatch.setenv("HOME", str(tmp_path))
+
+
+def test_a_head(cuda, no_models, tmp_path):
+    head = _head()
+    capture = Offset(tmp_path, copy.deepcopy(head))
+    here = evaluate_head(head, capture, (3, 4, 5), None)
+    head.model.to(cuda)
+    there = evaluate_head(head, capture, (3, 4, 5), tmp_path / "pictures")
+    _same(there, here)
+    assert (here["device"], there["device"]) == ("cpu", "cuda (Pretended)")
+
+
+def test_a_body(cuda, no_models, tmp_path):
+    capture = MovingCapture(tmp_path / "capture")
+    body = train_body(capture, tmp_path / "body", job("spacetime"))  # loaded: on the CPU
+    here = evaluate_body(body, capture, frames=(0, 3))
+    for model in body.models:
+        model.to(cuda)
+    there = evaluate_body(body, capture, frames=(0, 3), images=tmp_path / "pictures")
+    _same(there, here)
+    assert (here["device"], there["device"]) == ("cpu", "cuda (Pretended)")
+
+
+@pytest.mark.parametrize("only", ["all", "person"])
+def test_a_scene(cuda, tmp_path, only):
+    scene = _trained(only)
+    capture = OffsetScene(tmp_path, copy.deepcopy(scene), plate=0.5)
+    here = evaluate_scene(scene, capture, "test", None)
+    scene.scene.to(cuda)
+    there = evaluate_scene(scene, capture, "test", tmp_path / "pictures")
+    _same(there, here)
+    assert (here["device"], there["device"]) == ("cpu", "cuda (Pretended)")
+
+
+def test_lpips_looks_there(cuda, folder, monkeypatch):  # noqa: F811
+    monkeypatch.setenv("ICO3D_MODELS", str(folder[0]))
+    a, b = np.random.default_rng(1).random((2, 32, 40, 3)).astype(np.float32)
+    assert room.lpips(a, b, cuda) == pytest.approx(room.lpips(a, b), rel=1e-5)
+
+
+@pytest.mark.parametrize("device", ["auto", "cuda", "cpu"])
+def test_the_verb(cuda, no_models, tmp_path, monkeypatch, device):
+    head = _head()
+    (tmp_path / "head").mkdir()
+    head.save(tmp_path / "head")
+    monkeypatch.setattr(Capture, "open", lambda path: Offset(tmp_path, copy.deepcopy(head)))
+    words = ["evaluate", tmp_path / "head", "capture", "--json", tmp_path / "a.json"]
+    with drawn(monkeypatch) as pictures:
+        assert main([*map(str, words), "--device", device]) == 0
+    assert (len(pictures) > 0) == (device != "cpu")
+    figures = json.loads((tmp_path / "a.json").read_text())
+    assert figures["device"] == ("cpu" if device == "cpu" else "cuda (Pretended)")
