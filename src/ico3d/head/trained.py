@@ -65,7 +65,8 @@ class TrainedHead:
                 f"this head was trained with another speech encoder '{self.encoder}' "
                 f"({self.encoder_sha256[:12]}, not {encoder.sha256[:12]}): train it again."
             )
-        return SpeechTrack(capture, speech_features(capture, encoder), self.adaptor)
+        features = speech_features(capture, encoder)
+        return SpeechTrack(capture, features, self.adaptor, needs_eyes=any(self.eyes.most))
 
     def neutral(self) -> np.ndarray:
         """(B,) float32: silence, with open eyes and brows at rest."""
