@@ -101,7 +101,8 @@ class LandmarkReader:
         face = self._reader.read((np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8))
         if face is not None:
             return face.landmarks[MULTI_PIE]
-        for part in [] if mask is None else search(*picture.shape[:2], mask):
+        height, width = picture.shape[:2]
+        for part in [] if mask is None else search(height, width, mask):
             face = self._reader.read(part.cut(np.clip(picture, 0, 1)))
             if face is not None:
                 return part.whole(face.landmarks)[MULTI_PIE]
