@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from moving_ball import AXES, BALL
 
-from ico3d.body.initial import initial_points, point_colors, visible
+from ico3d.body.initial import initial_points, point_colors
+from ico3d.capture.coverage import visible
 from ico3d.errors import CaptureError
 
 

@@ -24,6 +24,12 @@ def faces():
     return _module("faces")
 
 
+@pytest.fixture(scope="session")
+def two_balls():
+    """A person of two balls, and who sees what of them."""
+    return _module("two_balls")
+
+
 @pytest.fixture
 def folder(tmp_path, layout):
     """A talking-portrait folder without faults."""

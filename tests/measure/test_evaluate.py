@@ -2,6 +2,7 @@
 
 import json
 import logging
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,17 +15,19 @@ from ico3d.errors import CaptureError
 from ico3d.head.model import HeadModel, HeadShape
 from ico3d.head.trained import TrainedHead
 from ico3d.head.views import view_of
+from ico3d.measure import evaluate
 from ico3d.measure.evaluate import evaluate_head, most_frontal_camera
+from ico3d.measure.metrics import mouth_box
 from ico3d.splat.render import render
 
 SIZE, ERROR = 32, 0.1
 
 
-def _head() -> TrainedHead:
+def _head(size=1.0) -> TrainedHead:
     torch.manual_seed(0)
     model = HeadModel(HeadShape(2, "no-mlp"), 40)
-    model.means.data = 0.1 * torch.randn(40, 3)
-    model.log_scales.data.fill_(-3)
+    model.means.data = size * 0.1 * torch.randn(40, 3)
+    model.log_scales.data.fill_(-3 + np.log(size))
     model.basis.data[:, :, :3] = torch.randn(3, 40, 3) - 1
     return TrainedHead(model, "blendshapes", ("a", "b"), "", "", None, {"train_seconds": 7.0})
 
@@ -63,11 +66,57 @@ class Offset(Capture):
             picture = render(gaussians, [view_of(self, camera, frame).camera]).rgb[0]
         return (picture + ERROR).numpy()
 
+    def background(self, camera):
+        return np.zeros((SIZE, SIZE, 3), np.float32)
+
     def mask(self, camera, frame):
         return np.eye(SIZE, dtype=np.float32)
 
     def landmarks(self, camera, frame):
         return np.stack(np.meshgrid(np.arange(10, 22), np.arange(10, 16)), -1).reshape(-1, 2)[:68]
+
+
+class BeforeCurtain(Offset):
+    """The person, lighter by `ERROR`, before a curtain that no clean plate shows."""
+
+    def background(self, camera):
+        return None
+
+    def _rendered(self, camera, frame):
+        weights = self.blendshapes(frame)
+        with torch.no_grad():
+            gaussians = self._head.model(torch.tensor([weights[2], weights[0]]))
+            return render(gaussians, [view_of(self, camera, frame).camera], torch.full((3,), 0.5))
+
+    def mask(self, camera, frame):
+        return (self._rendered(camera, frame).alpha[0] > 0).float().numpy()
+
+    def image(self, camera, frame):
+        person = self.mask(camera, frame)[..., None]
+        curtain = np.array([0.9, 0.1, 0.0], np.float32)
+        return (
+            person * (self._rendered(camera, frame).rgb[0].numpy() + ERROR) + (1 - person) * curtain
+        )
+
+    def landmarks(self, camera, frame):
+        return None
+
+
+class Reader:
+    """Sees a mouth in every picture that was recorded, and remembers which."""
+
+    def __init__(self):
+        self.seen = []
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *details):
+        pass
+
+    def read(self, picture, mask=None):
+        self.seen.append(picture)
+        return Offset.landmarks(None, 0, 0)
 
 
 @pytest.fixture
@@ -89,6 +138,44 @@ def test_metrics_of_a_known_error(tmp_path, no_models, caplog):
     assert [scores[key] for key in ("lmd", "lip_correlation", "lip_lag_ms")] == [None] * 3
     assert "lips are not measured" in caplog.text
     json.dumps(scores, allow_nan=False)
+
+
+def test_without_a_clean_plate_the_curtain_is_not_compared(tmp_path, no_models):
+    head = _head(0.4)
+    capture = BeforeCurtain(tmp_path, head)
+    scores = evaluate_head(head, capture, (3, 4, 5), tmp_path / "images")
+    share = np.mean([capture.mask(c, f).mean() for f in (3, 4, 5) for c in (0, 1)])
+    assert 0.05 < share < 0.9
+    assert scores["psnr_mask"] == pytest.approx(20.0, abs=1e-3)
+    # over one grey in both pictures: nothing but the person differs
+    assert scores["psnr"] == pytest.approx(20 - 10 * np.log10(share), abs=0.5)
+    truth = np.asarray(Image.open(tmp_path / "images" / "gt" / "front" / "000003.png"))
+    assert (truth[capture.mask(1, 3) == 0] == 128).all()
+
+
+def test_a_mouth_without_landmarks_is_found_in_the_recorded_picture(tmp_path, monkeypatch):
+    head, reader = _head(0.4), Reader()
+    monkeypatch.setattr(evaluate, "landmark_reader", lambda: reader)
+    capture = BeforeCurtain(tmp_path, head)
+    scores = evaluate_head(head, capture, (3, 4, 5), None)
+    box = mouth_box(Offset.landmarks(None, 0, 0), SIZE, SIZE)
+    shares = [capture.mask(c, f)[box].mean() for f in (3, 4, 5) for c in (0, 1)]
+    expected = np.mean([20 - 10 * np.log10(share) for share in shares])
+    assert scores["psnr_mouth"] == pytest.approx(expected, abs=1e-3)
+    np.testing.assert_array_equal(reader.seen[0], capture.image(0, 3))
+
+
+def test_cameras_that_see_no_face_are_not_asked_for_one(tmp_path, monkeypatch, caplog):
+    head, reader = _head(0.4), Reader()
+    monkeypatch.setattr(evaluate, "landmark_reader", lambda: reader)
+    capture = BeforeCurtain(tmp_path, head)
+    behind = look_at(np.array([0.1, 0.0, -0.7]), np.zeros(3))
+    capture.cameras = tuple(replace(c, world_to_camera=behind) for c in capture.cameras)
+    reader.read = lambda picture, mask=None: None
+    scores = evaluate_head(head, capture, (3, 4, 5), None)
+    assert scores["psnr_mouth"] is None and reader.seen == []
+    (told,) = [record for record in caplog.records if "not measured" in record.getMessage()]
+    assert "psnr_mouth, lmd, lip_correlation" in told.getMessage()
 
 
 def test_pictures_lie_where_anybody_can_score_them(tmp_path, no_models):

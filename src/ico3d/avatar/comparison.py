@@ -13,7 +13,7 @@ from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
 from ico3d.head.trained import TrainedHead
-from ico3d.head.views import PictureCache, View
+from ico3d.head.views import PictureCache, View, staged
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
@@ -62,7 +62,7 @@ def references(
     chosen = (
         {frames[i] for i in np.linspace(0, len(frames) - 1, count).astype(int)} if frames else {}
     )
-    views = list(pictures.views(sorted(chosen)))[: 4 * count]
+    views = pictures.views(sorted(chosen))[: 4 * count]
     if not views:
         raise CaptureError(f"{capture.path}: no test frame has a picture to measure baking with.")
     spread = np.unique(np.linspace(0, len(views) - 1, count).astype(int))
@@ -142,12 +142,8 @@ def _reference(
 ) -> Reference:
     """Without a clean background, the person is cut out over the neutral colour."""
     picture = pictures.picture(view, _CPU)
-    behind, truth = pictures.background(view, _CPU), picture.image  # (H, W, 3)
-    if behind is None:
-        behind = torch.tensor(neutral)
-        if picture.mask is not None:
-            mask = picture.mask[..., None]  # (H, W, 1)
-            truth = truth * mask + behind * (1 - mask)
+    plate = pictures.background(view, _CPU)
+    behind, truth = staged(picture, plate, torch.tensor(neutral))
     return reference(head, view.camera, expression, behind, truth.numpy().astype(np.float16))
 
 

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ico3d.body.flow_methods import FlowMethod, best_method, opencv
-from ico3d.body.initial import HIDING, visible
+from ico3d.body.initial import HIDING
 from ico3d.body.windows import Window
 from ico3d.capture.capture import Capture
+from ico3d.capture.coverage import visible
 from ico3d.capture.hull import focus
 from ico3d.capture.pictures import train_cameras
 from ico3d.common.camera import Camera

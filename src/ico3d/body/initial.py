@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ico3d.capture.capture import Capture
+from ico3d.capture.coverage import visible
 from ico3d.capture.hull import Silhouette, looked_at, visual_hull
 from ico3d.capture.pictures import train_cameras
 from ico3d.common.camera import Camera
@@ -142,23 +143,6 @@ def point_colors(points: np.ndarray, capture: Capture, frame: int) -> np.ndarray
         return np.full((len(points), 3), 0.5, np.float32)
     median = np.nanmedian(seen[:, known], axis=0)  # (K, 3)
     return median[KDTree(points[known]).query(points)[1]]
-
-
-def visible(points: np.ndarray, camera: Camera, gap: float) -> np.ndarray:
-    """(P,) bool: which surface points (P, 3) no others hide from a camera.
-
-    The points themselves are the z-buffer, in cells of the picture as large as `gap` is there; a
-    point is hidden if another in its cell is nearer by more than `gap` metres.
-    """
-    pixels, depths = camera.project(points)  # (P, 2), (P,)
-    cell = gap * camera.intrinsics[0, 0] / max(float(np.median(depths)), gap)
-    inside = (depths > 0) & np.isfinite(pixels).all(1)
-    _, cells = np.unique(np.floor(pixels[inside] / cell), axis=0, return_inverse=True)
-    nearest = np.full(cells.max(initial=-1) + 1, np.inf)
-    np.minimum.at(nearest, cells, depths[inside])
-    found = np.zeros(len(points), bool)
-    found[inside] = depths[inside] <= nearest[cells] + gap
-    return found
 
 
 def _on_person(

@@ -1,5 +1,7 @@
 """The surface of a head from masks alone."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ico3d.capture.capture import Capture
@@ -19,11 +21,27 @@ def head_hull(capture: Capture, frame: int) -> np.ndarray | None:
     Returns:
         (P, 3) in canonical head space, metres; None where poses, masks or a hull are lacking.
     """
-    order = sorted(range(capture.num_frames), key=lambda other: (abs(other - frame), other))
-    posed = [other for other in order if capture.world_from_head(other) is not None]
-    found = (_silhouette(capture, camera, posed) for camera in range(len(capture.cameras)))
-    hull = visual_hull([seen for seen in found if seen is not None], EDGE)
+    seen = head_silhouettes(capture, frame, range(capture.num_frames))
+    hull = visual_hull(list(seen.values()), EDGE)
     return None if hull is None else hull.surface
+
+
+def head_silhouettes(capture: Capture, frame: int, among: Sequence[int]) -> dict[int, Silhouette]:
+    """Each camera's mask nearest in time to a frame, as seen from canonical head space.
+
+    Args:
+        capture: With masks and head poses.
+        frame: Which.
+        among: Frames whose masks may be taken.
+
+    Returns:
+        By the camera's number, for cameras that have a mask of a frame with a head pose.
+    """
+    order = sorted(among, key=lambda other: (abs(other - frame), other))
+    posed = [other for other in order if capture.world_from_head(other) is not None]
+    cameras = range(len(capture.cameras))
+    found = {camera: _silhouette(capture, camera, posed) for camera in cameras}
+    return {camera: seen for camera, seen in found.items() if seen is not None}
 
 
 def _silhouette(capture: Capture, camera: int, frames: list[int]) -> Silhouette | None:

@@ -1,5 +1,6 @@
 """Density control of a head: what splat plans, carried out on model and moments."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -21,7 +22,17 @@ from ico3d.training.optimiser import Optimiser
 
 CLONE_BELOW = 0.01
 PRUNE_ABOVE = 0.1
-"""Sizes relative to the head box, as 3DGS has them relative to the scene."""
+"""Sizes relative to the box of what begins, as 3DGS has them relative to the scene."""
+
+
+def bound_scales(model: HeadModel) -> None:
+    """Keeps every Gaussian as small as density control leaves them, in place.
+
+    Density control ends before training does: a Gaussian that nothing else helps would then grow
+    into a beam, which shows from where no camera stood.
+    """
+    largest = PRUNE_ABOVE * model.shape.box_size
+    model.log_scales.data.clamp_(max=math.log(largest))
 
 
 @dataclass(frozen=True)

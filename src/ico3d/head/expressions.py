@@ -1,6 +1,8 @@
 """From a capture to the expression of each of its frames."""
 
 import logging
+from functools import cache
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -82,11 +84,25 @@ class SpeechTrack:
 
     size = SPEECH_SIZE + len(EYE_NAMES)
 
-    def __init__(self, capture: Capture, features: np.ndarray, adaptor: SpeechAdaptor):
-        """Binds the capture's eyes, its speech features (T, D) at 25 rows/s and an adaptor."""
+    def __init__(
+        self,
+        capture: Capture,
+        features: np.ndarray,
+        adaptor: SpeechAdaptor,
+        needs_eyes: bool = True,
+    ):
+        """Binds what drives a head through a capture.
+
+        Args:
+            capture: Gives eye values and frame rate.
+            features: (T, D) speech features, 25 rows/s.
+            adaptor: Turns them into speech values.
+            needs_eyes: Whether missing eye values are worth a warning: the eyes of a head that
+                was trained without any do not move.
+        """
         self._adaptor = adaptor
         self._fps = capture.fps
-        self.eyes = eye_track(capture)  # (F, 7)
+        self.eyes = eye_track(capture, needs_eyes)  # (F, 7)
         self._features = torch.from_numpy(features)
 
     def at(self, frame: int) -> Tensor:
@@ -100,18 +116,27 @@ class SpeechTrack:
         return torch.cat([speech, self.eyes[frame]])
 
 
-def eye_track(capture: Capture) -> Tensor:
-    """The seven eye values (F, 7) of all frames; 0, with a warning, where there are none."""
+def eye_track(capture: Capture, needed: bool = True) -> Tensor:
+    """The seven eye values (F, 7) of all frames; 0, with a warning if needed, where none are."""
     rows = [capture.eyes(frame) for frame in range(capture.num_frames)]
     lacking = [frame for frame, row in enumerate(rows) if row is None or not np.isfinite(row).all()]
-    if lacking:
-        log.warning(
-            "%s: %d frames have no eye values (first: %d); they count as open eyes.",
-            capture.path, len(lacking), lacking[0],
-        )  # fmt: skip
+    if lacking and needed:
+        _say_eyes_are_missing(capture.path, len(lacking), len(rows), lacking[0])
     for frame in lacking:
         rows[frame] = np.zeros(len(EYE_NAMES), np.float32)
     return torch.from_numpy(np.stack(rows).astype(np.float32))  # type: ignore[arg-type]
+
+
+@cache
+def _say_eyes_are_missing(path: Path, lacking: int, frames: int, first: int) -> None:
+    """One warning for each recording, however often its expressions are read."""
+    if lacking == frames:
+        log.warning("%s has no eye values: eyes and brows will not move.", path)
+    else:
+        log.warning(
+            "%s: %d of %d frames have no eye values (first: %d); they count as open eyes.",
+            path, lacking, frames, first,
+        )  # fmt: skip
 
 
 def speech_features(capture: Capture, encoder: FrozenEncoder, device: torch.device) -> np.ndarray:

@@ -71,7 +71,7 @@ class TrainedHead:
                 f"({self.encoder_sha256[:12]}, not {encoder.sha256[:12]}): train it again."
             )
         features = speech_features(capture, encoder, self.model.device)  # (T, D)
-        return SpeechTrack(capture, features, self.adaptor)
+        return SpeechTrack(capture, features, self.adaptor, needs_eyes=any(self.eyes.most))
 
     def neutral(self) -> np.ndarray:
         """(B,) float32: silence, with open eyes and brows at rest."""

@@ -9,12 +9,12 @@ from torch import Tensor
 from ico3d.capture.capture import Capture
 from ico3d.errors import CaptureError
 from ico3d.head.basis import update_basis
-from ico3d.head.density import HeadDensity, Sampled
+from ico3d.head.density import HeadDensity, Sampled, bound_scales
 from ico3d.head.expressions import ExpressionTrack
 from ico3d.head.loss import HeadLoss
 from ico3d.head.model import HeadModel
 from ico3d.head.settings import HeadSettings
-from ico3d.head.views import Picture, PictureCache, View
+from ico3d.head.views import Picture, PictureCache, View, staged
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.density import contributions
 from ico3d.splat.render import render
@@ -57,7 +57,7 @@ class HeadTrainer:
         self.model, self.adaptor = model, adaptor
         self._track, self._settings, self._seed = track, settings, seed
         self._pictures = PictureCache(capture, settings.cache_gib)
-        self._views = list(self._pictures.views(capture.split.train))
+        self._views = self._pictures.views(capture.split.train)
         if not self._views:
             raise CaptureError(f"{capture.path} has no picture among its training frames.")
         few = FEW_FRAMES / len(capture.split.train)
@@ -132,18 +132,11 @@ class HeadTrainer:
     def _staged(self, view: View, picture: Picture, index: int) -> tuple[Tensor, Tensor]:
         """What to render over, and the picture over the same.
 
-        The capture's own background; without one, the person cut out over a random colour, so
-        that no Gaussian can pass for background.
+        Without a clean background, that is a random colour: no Gaussian can pass for background.
         """
-        background = self._pictures.background(view, picture.image.device)
-        if background is not None:
-            return background, picture.image
-        if picture.mask is None:
-            return torch.zeros(3).to(picture.image), picture.image
         rng = np.random.default_rng([self._seed, index, 1])
-        color = torch.from_numpy(rng.random(3)).to(picture.image)
-        mask = picture.mask[..., None]  # (H, W, 1)
-        return color, picture.image * mask + color * (1 - mask)
+        plate = self._pictures.background(view, picture.image.device)
+        return staged(picture, plate, torch.from_numpy(rng.random(3)))
 
     def _expression(self, view: View) -> Tensor:
         """The expression (B,) of a view's frame, on the model's device."""
@@ -178,6 +171,7 @@ class HeadTrainer:
                 rate = rates[name if name in GEOMETRY else "mlp"]
                 self._optimiser.update(name, parameter, parameter.grad, rate)
                 parameter.grad = None
+        bound_scales(self.model)
         self._update_adaptor(rates["adaptor"])
 
     def _update_adaptor(self, rate: float) -> None:

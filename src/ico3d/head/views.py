@@ -1,6 +1,7 @@
 """The pictures a head is trained on or measured with."""
 
-from collections.abc import Iterator, Sequence
+import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,11 @@ from ico3d.capture.capture import Capture
 from ico3d.capture.pictures import LayerCache, Layers
 from ico3d.capture.pictures import View as View
 from ico3d.errors import CaptureError
+
+log = logging.getLogger(__name__)
+
+GREY = 0.5
+"""Behind a person who is cut out to be measured or shown."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +32,30 @@ class Picture:
     image: Tensor
     mask: Tensor | None
     torso: Tensor | None
+
+
+def staged(
+    picture: Picture, plate: Tensor | None, color: Tensor | None = None
+) -> tuple[Tensor, Tensor]:
+    """What to render over, and the picture over the same: so the two compare.
+
+    Args:
+        picture: What was recorded.
+        plate: (H, W, 3) what the camera sees without the person, where that is known.
+        color: (3,) what a person is cut out over where it is not; grey by default.
+
+    Returns:
+        The plate and the picture as it is; without a plate, the colour, and the person over it as
+        the mask cuts it out; without a mask either, black and the picture as it is.
+    """
+    image = picture.image
+    if plate is not None:
+        return plate, image
+    if picture.mask is None:
+        return image.new_zeros(3), image
+    behind = image.new_full((3,), GREY) if color is None else color.to(image)
+    mask = picture.mask[..., None]  # (H, W, 1)
+    return behind, image * mask + behind * (1 - mask)
 
 
 def head_pose(capture: Capture, frame: int) -> np.ndarray:
@@ -58,20 +88,30 @@ class PictureCache:
         self._backgrounds: dict[int, Tensor | None] = {}
         self._cache = LayerCache(self._read, budget_gib)
 
-    def views(self, frames: Sequence[int]) -> Iterator[View]:
-        """All views of these frames that were recorded, frame by frame."""
+    def views(self, frames: Sequence[int]) -> list[View]:
+        """All views of these frames that were recorded, frame by frame.
+
+        Where a mask or a clean background tells the person from what is behind in some of them, the
+        others are left out: they would show what is behind as a part of the person.
+        """
+        told, untold = [], []
         for frame in frames:
             for camera in range(len(self._capture.cameras)):
-                if self._cache.layers(camera, frame) is not None:
-                    yield view_of(self._capture, camera, frame)
+                layers = self._cache.layers(camera, frame)
+                if layers is not None:
+                    tells = layers[1] is not None or self._plate(camera) is not None
+                    (told if tells else untold).append(view_of(self._capture, camera, frame))
+        if told and untold:
+            log.warning(
+                "%s: %d of %d pictures are left out, as they have neither a mask nor a clean "
+                "background.", self._capture.path, len(untold), len(told) + len(untold),
+            )  # fmt: skip
+        return told or untold
 
     def background(self, view: View, device: torch.device) -> Tensor | None:
         """(H, W, 3) what the view's camera sees without the person, where that is known."""
-        index = view.camera_index
-        if index not in self._backgrounds:
-            found = self._capture.background(index)
-            self._backgrounds[index] = None if found is None else torch.from_numpy(found).to(device)
-        return self._backgrounds[index]
+        plate = self._plate(view.camera_index)
+        return None if plate is None else plate.to(device)
 
     def picture(self, view: View, device: torch.device) -> Picture:
         """What a recorded view shows."""
@@ -86,6 +126,13 @@ class PictureCache:
         )
         assert image is not None
         return Picture(image, mask, torso)
+
+    def _plate(self, camera: int) -> Tensor | None:
+        """(H, W, 3) what a camera sees without the person."""
+        if camera not in self._backgrounds:
+            found = self._capture.background(camera)
+            self._backgrounds[camera] = None if found is None else torch.from_numpy(found)
+        return self._backgrounds[camera]
 
     def _read(self, camera: int, frame: int) -> Layers | None:
         """Picture, mask and torso."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -10,7 +11,7 @@ from ico3d.common.camera import Camera
 from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
 from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack
 from ico3d.head.model import HeadModel
-from ico3d.head.views import head_pose
+from ico3d.head.views import Picture, head_pose, staged
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 from ico3d.training.watch import Slider
@@ -20,9 +21,6 @@ SAMPLES = 100
 """Frames that decide which inputs get a slider, and how far it goes."""
 STILL = 1e-3
 """Inputs whose standard deviation is less get none."""
-
-GREY = 0.5
-"""What is behind a person who was cut out."""
 
 
 class WatchedHead:
@@ -62,14 +60,11 @@ class WatchedHead:
     def pictures(self, frame: int) -> tuple[Tensor, Tensor]:
         """(H, W, 3) each, on the CPU: recorded and rendered."""
         camera, recorded = self._recorded(frame)
-        background = self._capture.background(camera)
-        mask = self._capture.mask(camera, self._numbers[frame])
-        behind = torch.full((3,), GREY) if background is None else torch.from_numpy(background)
-        if background is None and mask is not None:
-            cut = torch.from_numpy(mask)[..., None]  # (H, W, 1)
-            recorded = cut * recorded + (1 - cut) * behind
+        plate = _tensor(self._capture.background(camera))
+        mask = _tensor(self._capture.mask(camera, self._numbers[frame]))
+        behind, cut = staged(Picture(recorded, mask, None), plate)
         rendered = render(self.gaussians(frame, {}), [self._view(frame, camera)], behind).rgb[0]
-        return recorded, rendered.cpu()
+        return cut, rendered.cpu()
 
     def _recorded(self, frame: int) -> tuple[int, Tensor]:
         """The first camera that has a frame, and its picture; black where none has it."""
@@ -101,6 +96,10 @@ class WatchedHead:
             Slider(name, round(float(values.min()), 3), round(float(values.max()), 3))
             for name, values in columns.items()
         ]
+
+
+def _tensor(layer: np.ndarray | None) -> Tensor | None:
+    return None if layer is None else torch.from_numpy(layer)
 
 
 def _named_inputs(model: HeadModel, track: ExpressionTrack) -> dict[str, int]:

@@ -84,12 +84,29 @@ class LandmarkReader:
     def __exit__(self, *details) -> None:
         self._reader.__exit__(*details)
 
-    def read(self, picture: np.ndarray) -> np.ndarray | None:
-        """Landmarks (68, 2) in a picture (H, W, 3) in [0, 1], or None where no face is seen."""
+    def read(self, picture: np.ndarray, mask: np.ndarray | None = None) -> np.ndarray | None:
+        """The landmarks of the face in a picture.
+
+        Args:
+            picture: (H, W, 3) in [0, 1].
+            mask: (H, W) the person, in whose parts a face is looked for that is small in the
+                picture; None looks at the whole picture only.
+
+        Returns:
+            (68, 2) pixels, or None where no face is seen.
+        """
+        from ico3d.capture.headtrack.crops import search
         from ico3d.capture.multipie import MULTI_PIE
 
         face = self._reader.read((np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8))
-        return None if face is None else face.landmarks[MULTI_PIE]
+        if face is not None:
+            return face.landmarks[MULTI_PIE]
+        height, width = picture.shape[:2]
+        for part in [] if mask is None else search(height, width, mask):
+            face = self._reader.read(part.cut(np.clip(picture, 0, 1)))
+            if face is not None:
+                return part.whole(face.landmarks)[MULTI_PIE]
+        return None
 
 
 def landmark_reader() -> LandmarkReader | None:
@@ -97,5 +114,8 @@ def landmark_reader() -> LandmarkReader | None:
     try:
         return LandmarkReader()
     except (MissingExtraError, MissingModelError) as error:
-        log.warning("lips are not measured: %s", error)
+        log.warning(
+            "lips are not measured, nor mouths in pictures without landmarks of their own: %s",
+            error,
+        )
         return None
