@@ -20,11 +20,11 @@ from ico3d.avatar.joining.companion import SEAM, HeadSource
 from ico3d.avatar.joining.cropping import cropped, near_border
 from ico3d.avatar.joining.driving import head_poses, recorded_expressions
 from ico3d.avatar.joining.face_views import face_views
-from ico3d.avatar.joining.found_face import face_seeker
+from ico3d.avatar.joining.found_placement import found_in_pictures
 from ico3d.avatar.joining.recolour import RecolourSettings, color_difference, recolour
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.seam import largest_gap, seam_scores
-from ico3d.avatar.joining.similarity import canonical_from_head, scale_of
+from ico3d.avatar.joining.similarity import canonical_from_head, fit_in_words
 from ico3d.body.settings import BodySettings
 from ico3d.body.train import BodyJob, Runner, train_body
 from ico3d.capture.canonical import canonical_landmarks
@@ -150,14 +150,14 @@ def assemble(
 
 def place_head(capture: Capture, folder: Path, assembly: Assembly, say: Say) -> None:
     """Aligns the head, crops it and matches its colours; writes its part of the folder."""
-    head, there = TrainedHead.load(assembly.head), None
+    head, placement = TrainedHead.load(assembly.head), None
     if head.landmarks is None:
-        head, there = _with_found_face(head, capture, assembly.head, say)
+        head, placement = found_in_pictures(head, capture, assembly.head, say)
     else:
         say("face: where the landmarks of both recordings have it.")
     landmarks = _landmarks(head, assembly.head)
     region = HeadRegion.around(landmarks)
-    placement = align(capture, landmarks, say, there)
+    placement = placement or align(capture, landmarks, say)
     seam = near_border(head, region, SEAM_REACH)
     head = cropped(head, region)
     expressions = recorded_expressions(head, capture, head.neutral())
@@ -169,61 +169,25 @@ def place_head(capture: Capture, folder: Path, assembly: Assembly, say: Say) -> 
     save_tensors(folder / SEAM, {"seam": torch.from_numpy(seam)}, {})
 
 
-def _with_found_face(
-    head: TrainedHead, capture: Capture, folder: Path, say: Say
-) -> tuple[TrainedHead, np.ndarray | None]:
-    """A head that knows its face, found in pictures drawn of it, and the body's found likewise.
-
-    Args:
-        head: Whose capture had no landmarks.
-        capture: Of the body.
-        folder: The head's, for messages.
-        say: Told how well the pictures agree.
-
-    Returns:
-        The head with landmarks, and the (68, 3) of the body in the space of its head poses; None
-        where the body's pictures do not show the face well enough.
-    """
-    poses = head_poses(capture)
-    with torch.no_grad(), face_seeker() as seeker:
-        drawn = seeker.of_head(head.model(torch.from_numpy(head.neutral())), folder)
-        recorded = seeker.of_body(capture, poses)
-    theirs = (
-        "the pictures of the body do not show it well enough: its recording's landmarks stand in"
-        if recorded is None
-        else f"the body's in {recorded.views} pictures of {recorded.moments} moments, within "
-        f"{1e3 * recorded.apart:.1f} mm"
-    )
-    say(
-        f"face: the head has no landmarks; found in {drawn.views} of {drawn.looks} views drawn of "
-        f"it, which agree within {1e3 * drawn.apart:.1f} mm; {theirs}."
-    )
-    there = None if recorded is None else recorded.landmarks
-    return replace(head, landmarks=drawn.landmarks), there
-
-
-def align(
-    capture: Capture, landmarks: np.ndarray, say: Say, there: np.ndarray | None = None
-) -> Placement:
+def align(capture: Capture, landmarks: np.ndarray, say: Say) -> Placement:
     """Where the head is in the world of the body's capture.
 
     Args:
         capture: Of the body.
         landmarks: (68, 3) in the space of the head's model.
         say: Told how well they fit.
-        there: (68, 3) in the space of the head poses; by default what the capture says.
 
     Raises:
         CaptureError: If the capture has no head poses, or no landmarks to compare.
     """
     poses = head_poses(capture)
-    there = canonical_landmarks(capture) if there is None else there
+    there = canonical_landmarks(capture)
     if there is None:
         raise CaptureError(
             f"{capture.path} has no landmarks of the face: find them with ico3d capture track."
         )
     matrix, rest = canonical_from_head(there, landmarks)
-    say(f"head on body: landmarks agree within {1e3 * rest:.1f} mm, scale {scale_of(matrix):.4f}.")
+    say(fit_in_words(matrix, rest))
     return Placement(matrix, poses)
 
 

@@ -54,18 +54,21 @@ class FoundFace:
     """Landmarks, and how sure they are.
 
     Attributes:
-        landmarks: (68, 3) Multi-PIE landmarks in canonical head space.
+        marks: Moment to its (68, 3) Multi-PIE landmarks in canonical head space.
         apart: Root mean square distance by which rays of the views pass by nose, eyes and lips.
         views: Pictures that agree.
         looks: Pictures that were looked at.
-        moments: How many moments they show.
     """
 
-    landmarks: np.ndarray
+    marks: dict[int, np.ndarray]
     apart: float
     views: int
     looks: int
-    moments: int
+
+    @property
+    def landmarks(self) -> np.ndarray:
+        """(68, 3) of all moments: medians."""
+        return np.median(list(self.marks.values()), axis=0)
 
 
 class FaceSeeker:
@@ -112,7 +115,7 @@ class FaceSeeker:
                 scale_of(place) * _apart(studio, head),
             )
             place = place @ self._fit(head.points)
-        return FoundFace(marks, apart, len(head.faces), len(cameras), 1)
+        return FoundFace({0: marks}, apart, len(head.faces), len(cameras))
 
     def of_body(self, capture: Capture, poses: np.ndarray) -> FoundFace | None:
         """The face of a recorded person, in the space of the head poses.
@@ -127,27 +130,23 @@ class FaceSeeker:
         Raises:
             CaptureError: If the face does not move as the head poses do.
         """
-        found, last = [], None
+        marks, views, aparts, last = {}, 0, [], None
         with closing(Finder(lambda: capture, self._canonical, [self._reader])) as finder:
             for frame in spread(capture.num_frames, FRAMES):
                 before = None if last is None else _carried(last, poses[frame])
                 head = finder.find(frame, before)
-                if head is not None:
-                    last = _carried(head, np.linalg.inv(poses[frame]))
-                    found.append((last.points[MULTI_PIE], len(head.faces), _apart(capture, head)))
-        if not found:
+                if head is None:
+                    continue
+                last = _carried(head, np.linalg.inv(poses[frame]))
+                marks[frame] = last.points[MULTI_PIE]
+                aparts.append(_apart(capture, head))
+                views += len(head.faces)
+        if not marks:
             return None
-        marks, views, aparts = (np.array(column) for column in zip(*found, strict=True))
-        mean = np.median(marks, axis=0)  # (68, 3)
-        stray = float(np.median(np.linalg.norm(marks - mean, axis=-1)[:, list(STEADY)]))
-        if stray > STRAYING:
-            raise CaptureError(
-                f"{capture.path}: the face is found {1e3 * stray:.0f} mm from where the head poses "
-                "take it: find them anew with ico3d capture track."
-            )
-        looks = len(found) * len(capture.cameras)
         apart = float(np.sqrt(np.square(aparts).mean()))
-        return FoundFace(mean, apart, int(views.sum()), looks, len(found))
+        found = FoundFace(marks, apart, views, len(marks) * len(capture.cameras))
+        _check_motion(capture, found)
+        return found
 
     def _fit(self, points: np.ndarray) -> np.ndarray:
         """(4, 4) similarity that takes the canonical face to points (468, 3)."""
@@ -166,6 +165,21 @@ def face_seeker() -> Iterator[FaceSeeker]:
     model = model_file("face_landmarker.task", PURPOSE)
     with FaceReader(model) as reader:
         yield FaceSeeker(reader, canonical_face(model))
+
+
+def _check_motion(capture: Capture, found: FoundFace) -> None:
+    """Whether a face moves as the head poses do.
+
+    Raises:
+        CaptureError: If not.
+    """
+    away = np.linalg.norm(np.stack([*found.marks.values()]) - found.landmarks, axis=-1)  # (F, 68)
+    stray = float(np.median(away[:, list(STEADY)]))
+    if stray > STRAYING:
+        raise CaptureError(
+            f"{capture.path}: the face is found {1e3 * stray:.0f} mm from where the head poses "
+            "take it: find them anew with ico3d capture track."
+        )
 
 
 def _doubt(folder: Path, best: FoundFace | None) -> str:
