@@ -20,10 +20,11 @@ from ico3d.avatar.joining.companion import SEAM, HeadSource
 from ico3d.avatar.joining.cropping import cropped, near_border
 from ico3d.avatar.joining.driving import head_poses, recorded_expressions
 from ico3d.avatar.joining.face_views import face_views
+from ico3d.avatar.joining.found_placement import found_in_pictures
 from ico3d.avatar.joining.recolour import RecolourSettings, color_difference, recolour
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.seam import largest_gap, seam_scores
-from ico3d.avatar.joining.similarity import canonical_from_head
+from ico3d.avatar.joining.similarity import canonical_from_head, fit_in_words
 from ico3d.body.settings import BodySettings
 from ico3d.body.train import BodyJob, Runner, train_body
 from ico3d.capture.canonical import canonical_landmarks
@@ -154,10 +155,14 @@ def assemble(
 
 def place_head(capture: Capture, folder: Path, assembly: Assembly, say: Say) -> None:
     """Aligns the head, crops it and matches its colours; writes its part of the folder."""
-    head = TrainedHead.load(assembly.head)
+    head, placement = TrainedHead.load(assembly.head), None
+    if head.landmarks is None:
+        head, placement = found_in_pictures(head, capture, assembly.head, say)
+    else:
+        say("face: where the landmarks of both recordings have it.")
     landmarks = _landmarks(head, assembly.head)
     region = HeadRegion.around(landmarks)
-    placement = align(capture, landmarks, say)
+    placement = placement or align(capture, landmarks, say)
     seam = near_border(head, region, SEAM_REACH)
     head = cropped(head, region).to(computing_device(assembly.device))
     expressions = recorded_expressions(head, capture, head.neutral())
@@ -187,8 +192,7 @@ def align(capture: Capture, landmarks: np.ndarray, say: Say) -> Placement:
             f"{capture.path} has no landmarks of the face: find them with ico3d capture track."
         )
     matrix, rest = canonical_from_head(there, landmarks)
-    scale = np.cbrt(np.linalg.det(matrix[:3, :3]))
-    say(f"head on body: landmarks agree within {1e3 * rest:.1f} mm, scale {scale:.4f}.")
+    say(fit_in_words(matrix, rest))
     return Placement(matrix, poses)
 
 
@@ -242,7 +246,6 @@ def _match_colors(
 def _landmarks(head: TrainedHead, folder: Path) -> np.ndarray:
     if head.landmarks is None:
         raise ModelError(
-            f"{folder} does not say where the face of its head is: its capture had no landmarks, "
-            "or an earlier version trained it; train it again with ico3d train head."
+            f"{folder} does not say where the face of its head is: assemble the avatar again."
         )
     return head.landmarks

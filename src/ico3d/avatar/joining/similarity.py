@@ -88,5 +88,16 @@ def moved(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
+def scale_of(matrix: np.ndarray) -> float:
+    """The scale of a (4, 4) similarity."""
+    return float(np.cbrt(np.linalg.det(matrix[:3, :3])))
+
+
+def fit_in_words(matrix: np.ndarray, rest: float) -> str:
+    """What `canonical_from_head` found, as the log says it."""
+    size = scale_of(matrix)
+    return f"head on body: landmarks agree within {1e3 * rest:.1f} mm, scale {size:.4f}."
+
+
 def _distances(matrix: np.ndarray, target: np.ndarray, source: np.ndarray) -> np.ndarray:
     return np.linalg.norm(moved(matrix, source) - target, axis=1)  # (P,)

@@ -60,16 +60,21 @@ class Finder:
         disagreements: How often cameras showed faces, but no two of them the same one.
     """
 
-    def __init__(self, source: Path, canonical: CanonicalFace, readers: Sequence[FaceReader]):
+    def __init__(
+        self,
+        open_capture: Callable[[], Capture],
+        canonical: CanonicalFace,
+        readers: Sequence[FaceReader],
+    ):
         """Opens the capture once for each camera: their videos are decoded side by side.
 
         Args:
-            source: A capture of any format.
+            open_capture: Gives the capture; one that is open already, where there is one reader.
             canonical: MediaPipe's face.
             readers: One for each thread.
         """
-        self.capture = Capture.open(source)
-        self._opened = [Capture.open(source) for _ in self.capture.cameras]
+        self.capture = open_capture()
+        self._opened = [open_capture() for _ in self.capture.cameras]
         self._canonical, self._normals = canonical, vertex_normals(canonical)
         self._opposite = opposite_vertices(canonical)
         self._readers: SimpleQueue[FaceReader] = SimpleQueue()
@@ -203,7 +208,9 @@ class Finder:
 
 
 @contextmanager
-def finder(source: Path, canonical: CanonicalFace, model: Path, workers: int) -> Iterator[Finder]:
+def finder(
+    open_capture: Callable[[], Capture], canonical: CanonicalFace, model: Path, workers: int
+) -> Iterator[Finder]:
     """A finder whose models are closed in the end.
 
     Raises:
@@ -211,11 +218,11 @@ def finder(source: Path, canonical: CanonicalFace, model: Path, workers: int) ->
     """
     with ExitStack() as stack:
         readers = [stack.enter_context(FaceReader(model)) for _ in range(workers)]
-        found = Finder(source, canonical, readers)
+        found = Finder(open_capture, canonical, readers)
         stack.callback(found.close)
         if len(found.capture.cameras) < 2:
             raise CaptureError(
-                f"{source} has one camera, and a place in space takes two; "
+                f"{found.capture.path} has one camera, and a place in space takes two; "
                 "ico3d capture portrait tracks videos of one camera."
             )
         yield found

@@ -59,7 +59,7 @@ def track_head(source: Path, workers: int) -> tuple[HeadTrack, Report]:
     """
     model = model_file("face_landmarker.task", PURPOSE)
     canonical = canonical_face(model)
-    with finder(source, canonical, model, workers) as found:
+    with finder(lambda: Capture.open(source), canonical, model, workers) as found:
         capture, heads, last = found.capture, {}, None
         with shown("finding the head", capture.num_frames) as advance:
             for frame in range(capture.num_frames):

@@ -1,0 +1,124 @@
+"""Roughly where the face of a head model is, whichever way the head is turned."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ico3d.avatar.joining.drawn_head import DrawnHead
+from ico3d.avatar.joining.similarity import moved, scale_of
+from ico3d.capture.face import MESH_LANDMARKS, CanonicalFace, FaceReader
+from ico3d.capture.headtrack.crops import Part, search
+from ico3d.capture.headtrack.shape import similarity_fit
+from ico3d.common.camera import Camera, look_at
+from ico3d.splat.gaussians import Gaussians
+
+DIRECTIONS, ROLLS = 40, (0, 90, -90, 180)
+"""Of looks: evenly over a sphere, and degrees about each; faces are found up to 45° off."""
+PIXELS, AWAY, WIDE = 512, 5.0, 2.4
+"""Of a look: size of its picture, and distance and width in radii of the head."""
+OPAQUE, MOST = 0.3, 0.9
+"""Opacity from which a Gaussian counts, and which part of those the radius holds."""
+CERTAIN = 0.5
+SHAPED = 0.008
+"""Metres, on a face of the usual size, by which what is drawn may stray from a face's shape. Wrong
+faces, such as one upside down, stray by 12 mm and more."""
+LEAST_HELD = 1e-3
+"""Weight of landmarks that MediaPipe does not align heads by."""
+LEAST_SEEN = 0.8
+"""Part of the landmarks that must lie on something opaque."""
+
+
+def first_looks(
+    gaussians: Gaussians, canonical: CanonicalFace, reader: FaceReader
+) -> Iterator[np.ndarray]:
+    """Places where something looks like a face, likely ones first.
+
+    Args:
+        gaussians: The head; the face may look anywhere, and the unit is not known.
+        canonical: MediaPipe's face.
+        reader: Of faces in pictures.
+
+    Yields:
+        (4, 4) similarities from the space of the canonical face to that of the head.
+    """
+    solid = gaussians.means[gaussians.opacities > OPAQUE].detach().double().cpu().numpy()  # (S, 3)
+    if not len(solid):
+        return
+    middle = np.median(solid, axis=0)
+    radius = float(np.quantile(np.linalg.norm(solid - middle, axis=1), MOST))
+    studio = DrawnHead(gaussians, _cameras(middle, radius))
+    doubtful = []
+    for look in range(len(studio.cameras)):
+        found = _look(studio, look, canonical, reader)
+        if found is None:
+            continue
+        away, place = found
+        if away < SHAPED:
+            yield place
+        else:
+            doubtful.append((away, look, place))
+    yield from (place for *_, place in sorted(doubtful, key=lambda found: found[:2]))
+
+
+def _look(
+    studio: DrawnHead, number: int, canonical: CanonicalFace, reader: FaceReader
+) -> tuple[float, np.ndarray] | None:
+    """The face that one picture shows: how far it strays from a face's shape, and its place."""
+    drawn = studio.drawn(number)
+    image, alpha = drawn.rgb[0].clamp(0, 1).cpu().numpy(), drawn.alpha[0].cpu().numpy()
+    for part in _large(search(PIXELS, PIXELS, alpha)):
+        face = reader.read(part.cut(image))
+        if face is not None:
+            pixels = part.whole(face.landmarks[:MESH_LANDMARKS])  # (468, 2)
+            depth = drawn.depth[0].cpu().numpy()
+            return _placed(studio.cameras[number], pixels, depth, alpha, canonical)
+    return None
+
+
+def _cameras(middle: np.ndarray, radius: float) -> list[Camera]:
+    """All around; first those that see the face where a canonical head space has it."""
+    focal = PIXELS * AWAY / WIDE
+    intrinsics = np.array([[focal, 0, PIXELS / 2], [0, focal, PIXELS / 2], [0, 0, 1]])
+    cameras = []
+    for roll in ROLLS:
+        for way in _sphere(DIRECTIONS):
+            turn = Rotation.from_rotvec(np.radians(roll) * way)
+            pose = look_at(middle + AWAY * radius * way, middle, turn.apply([0.0, 1.0, 0.0]))
+            cameras.append(Camera(PIXELS, PIXELS, intrinsics, pose))
+    return cameras
+
+
+def _sphere(count: int) -> np.ndarray:
+    """(count, 3) unit vectors, evenly spread (Fibonacci's spiral) about z, which is the first."""
+    along = 1 - 2 * np.arange(count) / (count - 1)
+    angle = np.arange(count) * np.pi * (3 - np.sqrt(5))
+    across = np.sqrt(1 - along**2)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), along], 1)
+
+
+def _large(parts: list[Part]) -> list[Part]:
+    """Those parts of a picture that are half of the largest at least: a head is mostly face."""
+    largest = max((part.side for part in parts), default=0)
+    return [part for part in parts if part.side >= largest // 2]
+
+
+def _placed(
+    camera: Camera,
+    pixels: np.ndarray,
+    depth: np.ndarray,
+    alpha: np.ndarray,
+    canonical: CanonicalFace,
+) -> tuple[float, np.ndarray] | None:
+    """The canonical face on what is drawn at pixels (468, 2); None where there is too little."""
+    columns, rows = np.floor(pixels).astype(int).clip(0, PIXELS - 1).T
+    seen = alpha[rows, columns] > CERTAIN  # (468,)
+    if seen.mean() < LEAST_SEEN:
+        return None
+    ends = np.append(pixels, np.ones((len(pixels), 1)), 1)  # (468, 3)
+    local = ends @ np.linalg.inv(camera.intrinsics).T * depth[rows, columns, None]
+    points = moved(camera.camera_to_world, local)
+    weights = np.maximum(canonical.rigidity, LEAST_HELD) * seen
+    place = similarity_fit(canonical.vertices, points[None], weights)[0]
+    away = np.linalg.norm(moved(place, canonical.vertices) - points, axis=1)
+    return float(np.average(away, weights=weights) / scale_of(place)), place
