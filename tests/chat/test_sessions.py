@@ -2,14 +2,15 @@
 
 import asyncio
 import threading
+from dataclasses import replace
 
-import pytest
+from websockets.asyncio.client import connect
 
-from ico3d.chat.protocol import Answer, Error, Speech, State, Stop, Text
-from ico3d.chat.settings import ChatSettings
+from ico3d.chat.codec import decode_server, encode
+from ico3d.chat.protocol import VERSION, Answer, Error, Hello, Speech, State, Stop, Text
 from ico3d.measure.page import open_page
 
-from .conftest import serving
+from .conftest import OFFLINE, serving
 
 
 async def dropped(page):
@@ -120,15 +121,51 @@ async def test_an_expired_session_starts_anew(bundle):
         await again.close()
 
 
-async def test_there_is_room_for_so_many_only(bundle):
-    async with serving(bundle, ChatSettings(max_sessions=1)) as (url, sessions):
-        page, _ = await open_page(url, microphone=False)
-        with pytest.raises(TimeoutError):
-            await asyncio.wait_for(open_page(url, microphone=False), 2)
-        assert len(sessions) == 1
-        await page.close()
+async def refusal(url, session=None):
+    """What a page is told that finds no place, and the code that closes its connection."""
+    async with connect(url.replace("http", "ws") + "ws") as wire:
+        await wire.send(encode(Hello(VERSION, session, -1)))
+        error = decode_server(await asyncio.wait_for(wire.recv(), 10))
+        await wire.wait_closed()
+    assert isinstance(error, Error) and error.fatal and error.again
+    return error.message, wire.close_code
+
+
+async def test_a_dropped_visitor_keeps_his_place(bundle):
+    async with serving(bundle, replace(OFFLINE, max_sessions=2)) as (url, sessions):
+        (first, welcome), (second, _) = [await open_page(url, microphone=False) for _ in "12"]
+        assert await refusal(url) == ("all places are taken: try again in a minute.", 1013)
+        await dropped(first)
         await asyncio.sleep(0.2)
-        again, _ = await open_page(url, microphone=False)  # the one that left makes room
-        assert len(sessions) == 1
-        assert not again.messages(Error)
+        for _ in range(3):
+            assert (await refusal(url))[1] == 1013
+        again, resumed = await open_page(url, welcome.session, -1, microphone=False)
+        assert resumed.resumed and len(sessions) == 2
+        await asyncio.gather(again.close(), second.close())
+
+
+async def test_a_place_is_kept_for_so_long_and_then_given_away(bundle):
+    settings = replace(OFFLINE, max_sessions=1)
+    async with serving(bundle, settings, resume_seconds=0.3) as (url, sessions):
+        page, welcome = await open_page(url, microphone=False)
+        await dropped(page)
+        await emptied(sessions)
+        other, _ = await open_page(url, microphone=False)
+        message, code = await refusal(url, welcome.session)
+        assert "kept for 0.3 s and then given away" in message and code == 1013
+        await other.close()
+        await emptied(sessions)
+        again, begun = await open_page(url, welcome.session, -1, microphone=False)
+        assert not begun.resumed
         await again.close()
+
+
+async def test_who_leaves_makes_room_at_once(bundle):
+    async with serving(bundle, replace(OFFLINE, max_sessions=1)) as (url, sessions):
+        for code in (1000, 1001):  # the visitor chose to; the tab was closed or loaded anew
+            page, _ = await open_page(url, microphone=False)
+            await page._socket.close(code)
+            await page.close()
+            async with asyncio.timeout(2):
+                while len(sessions):
+                    await asyncio.sleep(0.02)

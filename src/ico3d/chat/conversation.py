@@ -24,7 +24,7 @@ from ico3d.chat.face import Face
 from ico3d.chat.frames import TypedFrame, Utterances
 from ico3d.chat.gestures import Gestures
 from ico3d.chat.listener import Captions, PageInput
-from ico3d.chat.memory import remembering
+from ico3d.chat.memory import forget, remembering
 from ico3d.chat.modules.mouth import RemoteMouth
 from ico3d.chat.monitor import Visitor
 from ico3d.chat.page import Page
@@ -167,7 +167,11 @@ class Conversation:
     async def _all_stopped(self, _: PipelineWorker, question: TypedFrame) -> None:
         """Any sooner, the question would stand before the words that it interrupts."""
         self._context.add_message({"role": "user", "content": question.text})
+        forget(self._context, self._avatar.settings.memory)
         await self._input.answer(question)
+
+    async def _answered(self, *_: object) -> None:
+        forget(self._context, self._avatar.settings.memory)
 
     def _pipeline(self, parts: Parts) -> Pipeline:
         settings, face = self._avatar.settings, make_face(self._avatar)
@@ -176,6 +180,7 @@ class Conversation:
         chosen = strategies(parts.turn, turns, trusted, self._speaker.hush, self._now)
         self._context.set_tools(self._functions(parts.language, face))
         user, assistant = aggregators(chosen, settings, parts.language, self._context)
+        assistant.add_event_handler("on_assistant_turn_stopped", self._answered)
         return Pipeline(
             [
                 self._input,

@@ -1,10 +1,12 @@
 """What a language model still knows of a long conversation: its end, and a summary of the rest."""
 
+from pipecat.processors.aggregators.llm_context import LLMContext
 from pipecat.processors.aggregators.llm_response_universal import LLMAssistantAggregatorParams
 from pipecat.processors.frame_processor import FrameProcessor
 from pipecat.services.llm_service import LLMService
 from pipecat.utils.context.llm_context_summarization import (
     LLMAutoContextSummarizationConfig,
+    LLMContextSummarizationUtil,
     LLMContextSummaryConfig,
 )
 
@@ -12,6 +14,7 @@ from ico3d.chat.settings import Memory
 
 KEPT = 4  # latest messages, word by word
 SHARE = 4  # of the budget, one part in so many is the summary's
+MOST = 2  # times the budget after which the oldest is forgotten, summary or none
 SLOWEST = 60.0  # s for a summary, which is made beside the conversation
 PROMPT = (
     "Summarise this conversation between a visitor and yourself for your own memory. Keep every "
@@ -28,7 +31,7 @@ def remembering(memory: Memory, language: FrameProcessor) -> LLMAssistantAggrega
 
     Args:
         memory: How much may be kept.
-        language: The model; the offline one cannot summarise and needs nothing that was said.
+        language: The model; the offline one cannot summarise (`forget` does for it).
     """
     summary = LLMContextSummaryConfig(
         target_context_tokens=memory.tokens // SHARE,
@@ -45,3 +48,25 @@ def remembering(memory: Memory, language: FrameProcessor) -> LLMAssistantAggrega
             summary_config=summary,
         ),
     )
+
+
+def forget(context: LLMContext, memory: Memory) -> None:
+    """Drops the oldest questions with their answers where no summary has made a talk shorter.
+
+    The offline model cannot make one, and one that is to be made may fail every time.
+
+    Args:
+        context: What the model knows of the talk; the latest question always stays.
+        memory: How much may be kept.
+    """
+    while LLMContextSummarizationUtil.estimate_context_tokens(context) > MOST * memory.tokens:
+        messages = context.get_messages()
+        questions = [i for i, m in enumerate(messages) if i and is_question(m)]
+        if not questions:
+            return
+        context.set_messages(messages[questions[0] :])
+
+
+def is_question(message: object) -> bool:
+    """Whether a message is the visitor's; a tool's result must not lose the call before it."""
+    return isinstance(message, dict) and message.get("role") == "user"

@@ -97,11 +97,11 @@ def set_up_log(verbose: bool) -> None:
     logger.remove()
     if verbose:
         logger.add(sys.stderr, level="DEBUG")
-        logging.basicConfig(level=logging.INFO, force=True)
+        logging.basicConfig(level=logging.INFO)
         return
     log = OperatorLog()
     logger.add(log.take, level="WARNING", format="{message}")
-    logging.basicConfig(handlers=[StandardHandler(log)], level=logging.WARNING, force=True)
+    logging.getLogger().addHandler(StandardHandler(log))
 
 
 def constant_part(path: str, line: int) -> str:
