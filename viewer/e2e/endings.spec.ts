@@ -108,9 +108,9 @@ test('a microphone whose worklet does not load is shown as closed, and is', asyn
   });
   await page.click('#microphone');
   await page.waitForSelector('#notices p');
-  expect(await page.textContent('#notices')).toBe('The microphone could not be started; try again, or type instead.');
-  expect(await pressed(browser)).toBe('false');
   expect(await microphones(page)).toEqual(['ended']);
+  expect(await pressed(browser)).toBe('false');
+  expect(await page.textContent('#notices')).toBe('The microphone could not be started; try again, or type instead.');
 
   await page.dblclick('#microphone');
   await page.waitForFunction(() => document.getElementById('microphone')!.ariaPressed === 'true');

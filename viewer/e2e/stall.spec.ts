@@ -3,7 +3,7 @@ import { afterAll, beforeAll, expect, test } from 'vitest';
 import { MICROPHONE_CHUNK, MICROPHONE_RATE } from '../src/protocol.ts';
 import type { Browser } from '../support/browser.ts';
 import { runPython } from '../support/python.ts';
-import { pauseDrawing, type Heard } from '../support/recorder.ts';
+import { pauseDrawing, readRecord, type Heard } from '../support/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
 import { ChatServer } from '../support/server.ts';
 import { StallingLine } from '../support/stalling.ts';
@@ -42,39 +42,40 @@ test('a network that stalls while the microphone is open brings no old sound, an
   const now = () => page.evaluate(() => performance.now());
   line.stall();
   const stalled = await now();
-  await page.locator('#notices p').waitFor();
-  expect(await page.locator('#notices').textContent()).toBe('The network has stalled: what you say now may not be heard.');
-  await page.waitForTimeout(STALL - ((await now()) - stalled));
-  expect(await page.locator('#state').textContent()).toBe('Connecting …');
+  await page.waitForTimeout(STALL / 2);
+  const [state, notice] = [await page.textContent('#state'), await page.textContent('#notices')];
+  await page.waitForTimeout(STALL / 2);
   const flowed = await now();
   line.flow();
-  const understood = await until(
-    browser,
-    ({ received }) => received.some(({ type, at, final }) => type === 'transcript' && final && at > flowed + 1000),
-    30_000,
-  );
-  const { microphone } = understood;
+  await page.waitForTimeout(1000);
+  const { microphone } = await readRecord(page);
   const during = microphone.filter(({ at }) => at > stalled && at < flowed);
   const after = microphone.filter(({ at }) => at > flowed);
   const late = after.filter((chunk) => recorded(chunk, microphone) < flowed);
   const old = ((during.length + late.length) * MICROPHONE_CHUNK) / MICROPHONE_RATE;
   console.log(`of ${STALL / 1000} s ${during.length} chunks were sent meanwhile and ${late.length} late: ${old.toFixed(2)} s of old sound`);
   expect(old).toBeLessThan(1.1);
+  expect([state, notice]).toEqual(['Connecting …', 'The network has stalled: what you say now may not be heard.']);
+
+  const understood = await until(
+    browser,
+    ({ received }) => received.some(({ type, at, final }) => type === 'transcript' && final && at > flowed + 1000),
+    30_000,
+  );
   expect(understood.received.filter(({ type }) => type === 'error')).toEqual([]);
   expect(await page.locator('#overlay').getAttribute('class')).toBe('gone');
   expect(await page.locator('#microphone').getAttribute('aria-pressed')).toBe('true');
 
   // What is numbered was recorded then: live chunks leave the page as long after their sample as before.
   const delay = (chunks: Heard[]) => quantile(chunks.map(({ at, sample }) => at - (1000 * sample) / MICROPHONE_RATE), 0.5);
+  const live = understood.microphone.filter(({ at }) => at > flowed + 1000);
   const before = microphone.filter(({ at }) => at < stalled);
-  expect(Math.abs(delay(after.slice(-60)) - delay(before))).toBeLessThan(100);
+  expect(Math.abs(delay(live.slice(-60)) - delay(before))).toBeLessThan(100);
 
-  const answers = understood.received.filter(({ type }) => type === 'speech').map(({ utterance }) => utterance as number);
   await page.click('#microphone');
   await page.fill('#text', 'Who are you?');
   await page.keyboard.press('Enter');
   await until(browser, ({ received }) => received.some(({ type, text }) => type === 'answer' && text === 'I am Stella.'), 30_000);
-  expect(answers.length).toBeGreaterThan(0);
   const { sockets } = await page.evaluate(() => ({ sockets: window.record!.sockets.length }));
   expect(sockets).toBe(1);
 });

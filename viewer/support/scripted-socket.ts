@@ -7,7 +7,6 @@ export type Sent = { type: string; at: number } & Record<string, unknown>;
 export class ScriptedSocket {
   static all: ScriptedSocket[] = [];
   binaryType = '';
-  bufferedAmount = 0;
   onopen: (() => void) | null = null;
   onmessage: ((event: { data: string }) => void) | null = null;
   onclose: ((event: { code: number }) => void) | null = null;

@@ -23,7 +23,7 @@ PAUSE = 1.0  # s without sound after which a backlog may follow
 CATCH_UP = 2.0  # times real time at which sound may arrive and still be used
 JITTER, BACKLOG = 1.0, 0.1  # s of sound that may come at once, and that may after a pause
 SETTLED = 0.2  # s of sound: how far the balance falls at most, so how soon a backlog is over
-KEPT = 1.0  # s of a backlog's latest sound that are still used
+KEPT = 5.0  # s of a backlog's latest sound that are still used: a question and how it began
 
 
 class Bucket:
@@ -83,7 +83,7 @@ class Limits:
 
 
 class Inlet:
-    """Lets sound in as it arrives; of a backlog, only the latest second.
+    """Lets sound in as it arrives; of a backlog, only the latest seconds.
 
     What a network held back for many seconds comes much faster than it was said. To answer it
     would be to answer the past, so it waits until sound comes in time again, and the oldest of
