@@ -117,7 +117,7 @@ class SphinxRecognition(STTService):
 
     async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame | None, None]:
         """Queues sound; transcripts come from the task that decodes it."""
-        if self._hearing:
+        if self._hearing and audio:
             await self._listen(audio)
         else:
             self._before = (self._before + audio)[-2 * int(LEAD_IN * MICROPHONE_RATE) :]
