@@ -3,6 +3,7 @@
 import asyncio
 import io
 import wave
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,7 +21,8 @@ from pipecat.tests.utils import SleepFrame, run_test
 from pipecat.utils.time import time_now_iso8601
 
 from ico3d.chat.protocol import Answer, Transcript
-from ico3d.chat.services import choose
+from ico3d.chat.services import Service, choose
+from ico3d.chat.services.provider import Provider
 from ico3d.chat.services.recognition import openai, sphinx, whisper
 from ico3d.chat.services.recognition.segments import BLANK, Segments
 from ico3d.chat.settings import ChatSettings, Choice
@@ -29,7 +31,7 @@ from ico3d.errors import SettingsError
 from ico3d.measure.page import open_page
 
 from .conftest import serving
-from .test_recognition import Script, Scripted, scripted
+from .test_recognition import Script, Scripted, silent
 
 RATE = 16_000
 MINUTES = 10
@@ -122,10 +124,8 @@ async def test_the_words_of_all_pieces_are_one_turn(bundle, question):
     pieces = ("What", "is", "your", "name?", "", "", "")
 
     def adapt(avatar):
-        adapted = scripted(0.3, *pieces)(avatar)
-        listener = adapted.services.recognition
-        listener.provider.__dict__["make"] = lambda script, _: Cut(script)
-        return adapted
+        listener = Service(Provider("cut", Script, lambda s, _: Cut(s)), Script(0.3, pieces))
+        return silent(replace(avatar, services=replace(avatar.services, recognition=listener)))
 
     async with serving(bundle, adapt=adapt) as (url, _):
         page, _ = await open_page(url)
