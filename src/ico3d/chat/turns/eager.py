@@ -13,6 +13,8 @@ from ico3d.chat.protocol import MICROPHONE_RATE
 SOON = 0.09  # s of silence after which a voice may well have ended
 SURE = 0.2  # a verdict this near to one half is asked for again
 LAST = MICROPHONE_RATE * 32 // 1000  # samples of silence that are taken to go on
+TIDY = 64  # pieces of sound after which old ones are forgotten
+MOST_PIECES = 1000  # a page sends at most 100 a second
 
 Verdict = tuple[EndOfTurnState, MetricsData | None]
 
@@ -35,6 +37,23 @@ class EagerSmartTurn(LocalSmartTurnAnalyzerV3):
         super().__init__(**kwargs)
         self._pause = pause
         self._early: asyncio.Future[Verdict] | None = None
+
+    def append_audio(self, buffer: bytes, is_speech: bool) -> EndOfTurnState:
+        """Takes more sound; pipecat keeps a voice from its beginning, however long it lasts."""
+        state = super().append_audio(buffer, is_speech)
+        if len(self._audio_buffer) % TIDY == 0:
+            self._audio_buffer = self._latest(self._audio_buffer)
+        return state
+
+    def _latest(self, pieces: list[tuple[float, np.ndarray]]) -> list[tuple[float, np.ndarray]]:
+        """The pieces of sound that the model may still be given."""
+        most = int((self.params.max_duration_secs + self._pause) * MICROPHONE_RATE)
+        kept = 0
+        for count, (_, sound) in enumerate(reversed(pieces), 1):
+            kept += len(sound)
+            if kept >= most or count >= MOST_PIECES:
+                return pieces[-count:]
+        return pieces
 
     def listen(self, silence: float) -> None:
         """Follows the voice: for how many seconds it has been silent."""

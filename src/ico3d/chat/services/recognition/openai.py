@@ -8,6 +8,7 @@ from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.chat.keys import check_key
 from ico3d.chat.services.provider import Context, lacks_server
+from ico3d.chat.services.recognition.segments import LONGEST_SPEECH, check_longest_speech
 
 WHERE = "chat settings: recognition 'openai'"
 KNOCK = 0.3  # s that a server may take to accept a connection
@@ -25,6 +26,8 @@ class Settings:
             this machine.
         language: Code of the language that is spoken, such as `de`; empty: the server tells.
         timeout: Seconds after which a transcript is given up, one retry included.
+        longest_speech: Seconds of unbroken speech that are recognised at once, 5 to 300; what goes
+            on longer is cut at a quiet place, and the pieces make one turn.
     """
 
     url: str = ""
@@ -32,14 +35,16 @@ class Settings:
     key_variable: str = ""
     language: str = ""
     timeout: float = 8.0
+    longest_speech: float = LONGEST_SPEECH
 
     def __post_init__(self):
-        """Checks where the key would go.
+        """Checks where the key would go, and ranges.
 
         Raises:
-            SettingsError: If it must not go there.
+            SettingsError: If the key must not go there, or speech is cut too soon or too late.
         """
         check_key(self.url, self.key_variable, WHERE)
+        check_longest_speech(self.longest_speech, WHERE)
 
 
 def hindrance(settings: Settings) -> str:

@@ -58,4 +58,4 @@ class OpenAIRecognition(Segments, Transcriptions):
 
     def __init__(self, options: Settings):
         """A recogniser as the settings say."""
-        super().__init__(options.timeout, options=options)
+        super().__init__(options.timeout, options.longest_speech, options=options)

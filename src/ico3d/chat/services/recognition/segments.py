@@ -4,9 +4,11 @@ import asyncio
 import contextlib
 from collections.abc import AsyncGenerator
 
+import numpy as np
 from pipecat.frames.frames import (
     ErrorFrame,
     Frame,
+    InputAudioRawFrame,
     InterimTranscriptionFrame,
     TranscriptionFrame,
     VADUserStoppedSpeakingFrame,
@@ -16,8 +18,17 @@ from pipecat.services.stt_service import SegmentedSTTService, STTService
 from pipecat.utils.errors import ErrorCategory
 from pipecat.utils.time import time_now_iso8601
 
+from ico3d.errors import SettingsError
+
 BLANK = " "
 """Final transcript of speech without words: it ends a turn and adds nothing to the question."""
+LONGEST_SPEECH = 30.0  # s of unbroken speech; a television never pauses
+SHORTEST_CUT, LONGEST_CUT = 5.0, 300.0  # s that it may be set to
+SEARCHED, MOMENT = (
+    5.0,
+    0.1,
+)  # s before the cut in which a quiet moment is looked for, and its length
+MOST_WAITING = 5  # cut stretches without a transcript; further ones are given up
 SIGN_OF_LIFE = 0.5  # s; pipecat gives up a turn of which nothing is heard for much longer
 
 
@@ -26,23 +37,50 @@ def blank() -> TranscriptionFrame:
     return TranscriptionFrame(BLANK, "", time_now_iso8601(), finalized=True)
 
 
+def check_longest_speech(seconds: float, where: str) -> None:
+    """Checks a setting.
+
+    Raises:
+        SettingsError: If it makes no sense.
+    """
+    if not SHORTEST_CUT <= seconds <= LONGEST_CUT:
+        raise SettingsError(
+            f"{where}: longest_speech must be {SHORTEST_CUT:g} to {LONGEST_CUT:g} seconds."
+        )
+
+
+def quiet_place(pcm: bytes | bytearray, rate: int) -> int:
+    """Where speech is cut: bytes of PCM16 before its quietest moment among the last seconds."""
+    samples = np.frombuffer(pcm, np.int16)
+    moment, searched = int(MOMENT * rate), min(int(SEARCHED * rate), len(samples) // 2)
+    count = searched // moment
+    if count == 0:
+        return len(pcm)
+    begin = len(samples) - count * moment
+    power = (samples[begin:].reshape(count, moment).astype(np.float32) ** 2).mean(axis=1)
+    return 2 * (begin + int(power.argmin()) * moment + moment // 2)
+
+
 class Segments(SegmentedSTTService):
     """Answers each stretch of speech with one final transcript, and is waited for until then.
 
     Put it before one of pipecat's segmented services among the bases of a class. Left alone those
     would say nothing where they heard nothing, so that a turn of noise ends only by a time-out;
     that same time-out would end a turn while a slow transcript is under way; and of two stretches
-    in the works the first transcript would end the turn without the second.
+    in the works the first transcript would end the turn without the second. And what is said
+    without a pause would be kept until there is one: here it is cut at a quiet place.
     """
 
-    def __init__(self, longest: float, **options):
+    def __init__(self, longest: float, longest_speech: float = LONGEST_SPEECH, **options):
         """A service.
 
         Args:
             longest: Seconds that a transcript may take at most.
+            longest_speech: Seconds of unbroken speech after which it is cut.
             options: Of pipecat's service.
         """
         super().__init__(ttfs_p99_latency=longest, **options)
+        self._longest_speech = longest_speech
         self._unanswered = 0  # stretches of speech
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
@@ -50,6 +88,25 @@ class Segments(SegmentedSTTService):
         if isinstance(frame, VADUserStoppedSpeakingFrame):
             self._unanswered += 1
         await super().process_frame(frame, direction)
+
+    async def process_audio_frame(self, frame: InputAudioRawFrame, direction: FrameDirection):
+        """Takes more sound; speech that goes on and on is handed over piece by piece."""
+        await super().process_audio_frame(frame, direction)
+        most = int(self._longest_speech * self.sample_rate) * 2
+        while self._user_speaking and len(self._audio_buffer) >= most:
+            await self._hand_over(quiet_place(self._audio_buffer[:most], self.sample_rate))
+
+    async def _hand_over(self, length: int) -> None:
+        """Has so many bytes of what is being said transcribed; the rest belongs to what follows."""
+        rest = self._audio_buffer[length:]
+        if self._unanswered < MOST_WAITING:
+            del self._audio_buffer[length:]
+            self._unanswered += 1
+            await self._handle_user_stopped_speaking(VADUserStoppedSpeakingFrame())
+            self._user_speaking = True
+        else:
+            await self.push_error("the recogniser is slower than the visitor speaks.")
+        self._audio_buffer = rest
 
     async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame | None, None]:
         """Transcribes a stretch of speech; gives a signal from time to time until it is done."""

@@ -9,6 +9,7 @@ from typing import Any
 from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.chat.services.provider import Context, lacks_package
+from ico3d.chat.services.recognition.segments import LONGEST_SPEECH, check_longest_speech
 from ico3d.common.weights import TABLE, cached
 from ico3d.errors import MissingExtraError, MissingModelError, SettingsError
 
@@ -33,12 +34,23 @@ class Settings:
         device: `cuda`, `cpu`, or `auto`: CUDA where there is a device.
         precision: CTranslate2's type of computation, such as `int8`; `auto` takes `float16` on
             CUDA and `int8` on a CPU.
+        longest_speech: Seconds of unbroken speech that are recognised at once, 5 to 300; what goes
+            on longer is cut at a quiet place, and the pieces make one turn.
     """
 
     model: str = AUTO
     language: str = ""
     device: str = AUTO
     precision: str = AUTO
+    longest_speech: float = LONGEST_SPEECH
+
+    def __post_init__(self):
+        """Checks ranges.
+
+        Raises:
+            SettingsError: If speech is cut too soon or too late.
+        """
+        check_longest_speech(self.longest_speech, "chat settings: recognition 'whisper'")
 
 
 def hindrance(settings: Settings) -> str:
@@ -75,7 +87,7 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
     language = settings.language or ("en" if settings.model in ENGLISH else None)
     if language is not None and language not in model.supported_languages:
         raise SettingsError(f"Whisper '{folder.name}' does not know the language '{language}'.")
-    return WhisperRecognition(model, language)
+    return WhisperRecognition(model, language, settings.longest_speech)
 
 
 def find(settings: Settings) -> Path:

@@ -4,7 +4,7 @@ from typing import Any
 
 from pipecat.services.whisper.stt import WhisperSTTService
 
-from ico3d.chat.services.recognition.segments import Segments
+from ico3d.chat.services.recognition.segments import LONGEST_SPEECH, Segments
 
 LONGEST = 30.0  # s; a small machine with a long speech
 
@@ -28,11 +28,11 @@ class Listener:
 class WhisperRecognition(Segments, WhisperSTTService):
     """Whisper for one session."""
 
-    def __init__(self, model: Any, language: str | None):
+    def __init__(self, model: Any, language: str | None, longest_speech: float = LONGEST_SPEECH):
         """A recogniser around a shared `faster_whisper.WhisperModel`."""
         self._shared = model
         settings = WhisperSTTService.Settings(model="shared", language=language)
-        super().__init__(LONGEST, settings=settings)
+        super().__init__(LONGEST, longest_speech, settings=settings)
 
     def _load(self):
         # pipecat would load one for each session
