@@ -4,9 +4,11 @@ import asyncio
 import time
 
 import pytest
+from pipecat.frames.frames import LLMContextFrame, LLMTextFrame
 from pipecat.processors.aggregators.llm_context import LLMContext
 
 from ico3d.bundle.persona import Persona
+from ico3d.chat.modules.headless import run
 from ico3d.chat.protocol import Answer, Interrupt, Speech, Stop, Text
 from ico3d.chat.services import choose, chosen
 from ico3d.chat.services.language import PROVIDERS, qwen
@@ -142,3 +144,19 @@ def test_it_is_the_best_only_where_its_weights_are(folder, tmp_path, monkeypatch
     assert qwen.hindrance(qwen.Settings()) == ""
     only = {name: PROVIDERS[name] for name in ("qwen", "persona-notes")}
     assert chosen(only, Choice(), "language").provider.title == "a model in this process"
+
+
+@pytest.mark.parametrize("opened", [False, True])
+async def test_its_thoughts_are_not_said(tmp_path, opened):
+    from ico3d.chat.services.language.in_process import load
+
+    thought = "Hmm who asks ◁/think▷"  # all words of a tiny model must differ, marks too
+    write_tiny_qwen(tmp_path, (thought if opened else f"<reasoning>{thought}") + ANSWER)
+    if opened:  # by the template, as that of some families does
+        tokenizer = load(str(tmp_path)).tokenizer
+        tokenizer.chat_template += "{% if add_generation_prompt %}<reasoning>\n{% endif %}"
+        assert load(str(tmp_path)).opens
+    made = choose(settings_of(tmp_path)).language.make(CONTEXT)
+    asked = LLMContextFrame(LLMContext([{"role": "user", "content": "who are you?"}]))
+    said = [frame.text async for frame in run(made, [asked], 60) if isinstance(frame, LLMTextFrame)]
+    assert "".join(said).strip() == ANSWER
