@@ -111,7 +111,7 @@ export interface TalkMessage {
 /** What the browser's recogniser understood, where `welcome` asked for it. */
 export interface HeardMessage {
   type: "heard";
-  /** Counts up by one behind each final text; as long as it stays, a text replaces the one before. */
+  /** Counts up behind each final text; while it stays, a text replaces the last one. */
   result: number;
   /** All words of this result so far. */
   text: string;

@@ -59,7 +59,7 @@ class OperatorLog:
         name, place = record["name"] or "", (record["name"], record["function"])
         if name.startswith(OWN):
             self.write(record["level"].name, record["message"])
-        elif place not in TOLD:
+        elif place not in TOLD and record["function"] != "<module>":  # a package that is missing
             said = constant_part(record["file"].path, record["line"])
             exception = record["exception"]
             self.write(

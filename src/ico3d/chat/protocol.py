@@ -1,6 +1,6 @@
 """The vocabulary of the wire: every message between page and server, and the limits.
 
-This file is the one source: `codec.py` reads the annotations to encode, decode and check, and
+`codec.py` encodes, decodes and checks by the annotations in this file, the one source, and
 `python -m ico3d.chat.protocol_typescript` writes `viewer/src/protocol.ts` from them.
 """
 
@@ -127,8 +127,7 @@ class Heard:
     """What the browser's recogniser understood, where `welcome` asked for it.
 
     Attributes:
-        result: Counts up by one behind each final text; as long as it stays, a text replaces the
-            one before.
+        result: Counts up behind each final text; while it stays, a text replaces the last one.
         text: All words of this result so far.
         final: Whether they stay as they are.
     """
