@@ -36,6 +36,7 @@ def node(alive=True, **resources):
 def test_shares(nodes, windows, cores, gpus):
     """A GPU where there are any, and cores so that each machine can take a window."""
     assert share(nodes, windows) == {"num_cpus": cores, "num_gpus": gpus}
+    assert share(nodes, windows, with_gpus=False)["num_gpus"] == 0
 
 
 def test_nobody_can_work():

@@ -12,12 +12,12 @@ from ico3d.body.settings import settings_for
 from ico3d.body.train import BodyJob, train_body
 from ico3d.body.trainer import BodyTrainer
 
-DEATHS = {BodyTrainer: 13, FineTuner: 4}
+DEATHS = {BodyTrainer: 8, FineTuner: 4}
 """Steps before which a run is interrupted."""
 
 
 def _job(method: str, **changes) -> BodyJob:
-    small = TINY | {"steps_per_frame": 3, "checkpoint_every": 3, "color_correction": True}
+    small = TINY | {"steps_per_frame": 2, "checkpoint_every": 3, "color_correction": True}
     return BodyJob(method, 0, replace(settings_for("cpu", method), **(small | changes)))
 
 

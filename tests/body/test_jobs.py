@@ -191,6 +191,7 @@ def test_a_gpu_for_each(monkeypatch):
     assert Processes(2, True)._gpus == ["0", "1"]
     with pytest.raises(SettingsError, match="give --jobs 2 or fewer"):
         Processes(3, True)
+    assert Processes(3, False)._gpus == []  # --device cpu
 
 
 @pytest.mark.parametrize(

@@ -63,7 +63,7 @@ class Worker:
 class Processes:
     """A `Crew` of processes: each has its share of the cores, and on CUDA a GPU of its own."""
 
-    def __init__(self, jobs: int, with_gpus: bool):
+    def __init__(self, jobs: int, with_gpus: bool = True):
         """Starts nothing yet.
 
         Args:
