@@ -111,19 +111,20 @@ class Capture(ABC):
 
     @staticmethod
     def open(path: Path | str) -> "Capture":
-        """Opens a capture, whatever its format.
+        """Opens a capture, whatever its format, with the head that was tracked in it.
 
         Raises:
             CaptureError: If there is none, or the format is not recognised, or it is damaged.
         """
         from ico3d.capture.formats import FORMATS
+        from ico3d.capture.headtrack.tracked import with_track
 
         path = Path(path)
         if not path.exists():
             raise CaptureError(f"there is no capture at {path}.")
         for recognises, reader in FORMATS:
             if recognises(path):
-                return reader(path)
+                return with_track(reader(path))
         raise CaptureError(
             f"{path} is in no format known here: expected a talking-portrait folder "
             "(transforms_train.json), a synthetic capture (capture.json), a multiview folder "

@@ -1,5 +1,6 @@
 """What the tests of joining share."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -8,6 +9,11 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from planted_person import PlantedPerson, planted_head
+
+from ico3d.bundle import packaged
+
+SHARED = Path(__file__).resolve().parents[4] / "shared" / "models"
+MODELS = Path(os.environ.get("ICO3D_MODELS", SHARED))
 
 
 @pytest.fixture
@@ -26,3 +32,19 @@ def person(tmp_path):
 def abroad(tmp_path):
     """A recording of the whole person elsewhere: another world, scale and light."""
     return PlantedPerson.elsewhere(tmp_path / "abroad")
+
+
+@pytest.fixture
+def face_model(monkeypatch):
+    """MediaPipe and its model."""
+    pytest.importorskip("mediapipe")
+    if not (MODELS / "face_landmarker.task").is_file():
+        pytest.skip("face_landmarker.task is not here: set ICO3D_MODELS")
+    monkeypatch.setenv("ICO3D_MODELS", str(MODELS))
+
+
+@pytest.fixture
+def packaged_demo():
+    """The avatar that comes in the package."""
+    if not packaged.FILE.is_file():
+        pytest.skip("no packaged avatar")

@@ -6,7 +6,11 @@ import numpy as np
 import torch
 from scipy.spatial.transform import Rotation
 
+from ico3d.avatar.avatar import HEAD, PLACEMENT, load_placement
+from ico3d.avatar.joining.assemble import Assembly, JoiningSettings
+from ico3d.avatar.joining.similarity import moved
 from ico3d.avatar.render_bundle import BakedAvatar
+from ico3d.body.settings import settings_for
 from ico3d.bundle import packaged
 from ico3d.bundle.evaluate import logits
 from ico3d.bundle.format import Bundle
@@ -52,6 +56,14 @@ def head_abroad() -> TrainedHead:
     return TrainedHead(model.requires_grad_(False), "blendshapes", names, "", "", None, {})
 
 
+def saved(head: TrainedHead, folder: Path) -> Assembly:
+    """What to assemble of a head, whose folder this writes."""
+    folder.mkdir()
+    head.save(folder)
+    plain = JoiningSettings(match_colors=False)
+    return Assembly(folder, plain, settings_for("cpu", "swings++"), 0)
+
+
 class FilmedDemo(Capture):
     """Cameras in front of the demo's face; nobody has marked it."""
 
@@ -89,3 +101,14 @@ class FilmedDemo(Capture):
         person = self._person.gaussians(MOMENTS[frame], self._rest)
         wall = torch.tensor([0.5, 0.6, 0.7])
         return render(person, [self.cameras[camera]], wall).rgb[0].clamp(0, 1).numpy()
+
+
+def away(capture: FilmedDemo, folder: Path) -> float:
+    """Metres (mean over the Gaussians and frames) from where the head is to where it was put."""
+    placement, _ = load_placement(folder / PLACEMENT)
+    means = TrainedHead.load(folder / HEAD).model.means.detach().numpy().astype(float)
+    apart = []
+    for frame in range(capture.num_frames):
+        truth = capture.true_world_from_head(frame) @ np.linalg.inv(ABROAD)
+        apart += [moved(placement.world_from_head(frame), means) - moved(truth, means)]
+    return float(np.linalg.norm(apart, axis=-1).mean())

@@ -211,9 +211,6 @@ def test_what_is_missing_is_said(person, head, tmp_path):
     with pytest.raises(CaptureError, match="no landmarks of the face: find them with ico3d capt"):
         align(person, face(), print)
     (tmp_path / "head").mkdir()
-    replace(head, landmarks=None).save(tmp_path / "head")
-    with pytest.raises(ModelError, match="does not say where the face of its head is"):
-        assemble(person, tmp_path / "a", assembly_of(tmp_path / "head"), print)
     person.landmarks_3d = lambda frame: face()
     plain = HeadModel(HeadShape(len(NAMES), "no-mlp"), 40)
     region = HeadRegion.around(face())

@@ -144,10 +144,15 @@ def test_cameras_in_wrong_places_are_told_from_faces_that_are_not_there(head, tm
     assert "no two agree on where one is" in capsys.readouterr().err
 
 
-def test_other_captures_are_pointed_to_resize(head, capsys):
+def test_captures_of_other_formats_are_tracked_as_they_are(head, tmp_path):
+    """One by our own studio: its true head gives way to the one that was found."""
     truth, _ = head
-    assert main(["capture", "track", str(truth.path)]) == 1
-    assert "make one with ico3d capture resize" in capsys.readouterr().err
+    copy = shutil.copytree(truth.path, tmp_path / "copy")
+    assert main(["capture", "track", str(copy)]) == 0
+    found = Capture.open(copy)
+    assert found.kind == "synthetic" and (copy / NAME).is_file()
+    degrees, metres = _agreement(truth, found)
+    assert 0 < degrees.max() < 2.0 and 0 < metres.max() < 0.005
 
 
 def test_the_name_of_the_sheet_is_looked_at_first(head, capsys):

@@ -19,10 +19,11 @@ class Track:
 
     MediaPipe reads the face in every camera that sees it; what the cameras agree on becomes one
     rigid head that moves through the recording. Writes tracking.safetensors into the folder,
-    anew at each run.
+    or beside the file, that holds the recording, anew at each run; from then on the recording has
+    that head.
 
     Attributes:
-        folder: A multiview folder; ico3d capture resize makes one of any capture.
+        folder: A recording by several cameras, of any format.
         check: A contact sheet to draw, .jpg or .png.
         workers: Threads.
     """
@@ -35,7 +36,7 @@ class Track:
         """Runs it.
 
         Raises:
-            CaptureError: If the folder is no multiview recording, or no two cameras see a face.
+            CaptureError: If no two cameras see a face, or nothing can be written there.
             MissingExtraError: If MediaPipe or SciPy is not installed.
             MissingModelError: If MediaPipe's face model is not there.
             SettingsError: If the contact sheet's name is not that of a picture.
@@ -44,7 +45,7 @@ class Track:
 
         from ico3d.capture.capture import Capture
         from ico3d.capture.headtrack.sheet import check_name, write_sheet
-        from ico3d.errors import CaptureError, MissingExtraError
+        from ico3d.errors import MissingExtraError
 
         try:
             from ico3d.capture.headtrack.tracker import track_head
@@ -52,15 +53,10 @@ class Track:
             raise MissingExtraError(error.name or "scipy", "train", "tracking a head") from None
 
         capture = Capture.open(self.folder)
-        if capture.kind != "multiview":
-            raise CaptureError(
-                f"{self.folder} is a {capture.kind} capture, and tracks are kept in multiview "
-                f"folders: make one with ico3d capture resize {self.folder} OUT."
-            )
         if self.check is not None:
             check_name(self.check)
         track, report = track_head(self.folder, self.workers)
-        written = track.write(self.folder)
+        written = track.write(capture.path)
         if self.check is not None:
             write_sheet(capture, track, self.check)
         say = Console(stderr=True).print

@@ -1,4 +1,4 @@
-"""The file `tracking.safetensors` of a multiview folder: `docs/captures-multiview.md`."""
+"""The file of a tracked head, `tracking.safetensors`: `docs/captures-multiview.md`."""
 
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -8,6 +8,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from ico3d.capture.expressions import BLENDSHAPES
+from ico3d.capture.finding import Finding
 from ico3d.common.expression import EYE_NAMES
 from ico3d.common.files import write_atomic
 from ico3d.errors import CaptureError
@@ -45,28 +46,56 @@ class HeadTrack:
         edges = np.flatnonzero(np.diff(np.concatenate([[1], self.tracked.astype(int), [1]])))
         return [(int(start), int(stop) - 1) for start, stop in edges.reshape(-1, 2)]
 
-    def write(self, folder: Path) -> Path:
-        """Writes the file into a folder, whole or not at all."""
+    def finding(self) -> Finding:
+        """Which frames are interpolated."""
+        found = self.gaps
+        if not found:
+            return Finding("head", "ok", f"tracked in all {len(self.views)} frames")
+        longest = max(found, key=lambda gap: gap[1] - gap[0])
+        text = (
+            f"interpolated in {int((~self.tracked).sum())} of {len(self.views)} frames, "
+            f"longest from {longest[0]} to {longest[1]}"
+        )
+        return Finding("head", "warn", text)
+
+    def write(self, recording: Path) -> Path:
+        """Writes the file of a recording, whole or not at all.
+
+        Raises:
+            CaptureError: If nothing can be written where the recording lies.
+        """
         arrays = {f.name: np.ascontiguousarray(getattr(self, f.name)) for f in fields(self)}
-        write_atomic(folder / NAME, save(arrays))
-        return folder / NAME
+        file = track_file(recording)
+        try:
+            write_atomic(file, save(arrays))
+        except OSError as error:
+            raise CaptureError(
+                f"{file} cannot be written ({error.strerror}): a track lies with its recording; "
+                f"make one of your own with ico3d capture resize {recording} OUT."
+            ) from error
+        return file
 
 
-def read_track(folder: Path, num_frames: int, num_cameras: int) -> HeadTrack | None:
-    """Reads the file of a folder.
+def track_file(recording: Path) -> Path:
+    """Where the track of a recording lies: in its folder, or beside it where that is a file."""
+    return recording / NAME if recording.is_dir() else recording.with_suffix(f".{NAME}")
+
+
+def read_track(recording: Path, num_frames: int, num_cameras: int) -> HeadTrack | None:
+    """Reads the track of a recording.
 
     Args:
-        folder: A multiview folder.
+        recording: The `path` of its capture.
         num_frames: Its frames.
         num_cameras: Its cameras.
 
     Returns:
-        The track, or None where the folder has none.
+        The track, or None where there is none.
 
     Raises:
         CaptureError: If the file is damaged or belongs to another recording.
     """
-    file = folder / NAME
+    file = track_file(recording)
     if not file.is_file():
         return None
     mend = "delete it and run ico3d capture track again"

@@ -9,7 +9,7 @@ from ico3d.capture.decoding import unit
 from ico3d.capture.expressions import BLENDSHAPES
 from ico3d.capture.finding import Finding, missing_and_damaged
 from ico3d.capture.head_surface import head_hull
-from ico3d.capture.headtrack.track_file import HeadTrack, read_track
+from ico3d.capture.headtrack.track_file import read_track
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import read_description
 from ico3d.capture.multiview.files import RecordedFiles
@@ -139,7 +139,7 @@ class MultiviewCapture(Capture):
             text = f"none yet: ico3d capture masks {self.path} makes them from the clean plates"
             findings.append(Finding("mask files", "warn", text))
         if self._track is not None:
-            findings.append(_gaps_of(self._track))
+            findings.append(self._track.finding())
         return findings
 
     def _inspect_pictures(self) -> Finding:
@@ -176,16 +176,3 @@ class MultiviewCapture(Capture):
         if not 0 <= frame < self.num_frames:
             raise CaptureError(f"{self.path} has frames 0 to {self.num_frames - 1}, not {frame}.")
         return frame
-
-
-def _gaps_of(track: HeadTrack) -> Finding:
-    """Which frames of a tracked head are interpolated."""
-    found = track.gaps
-    if not found:
-        return Finding("head", "ok", f"tracked in all {len(track.views)} frames")
-    longest = max(found, key=lambda gap: gap[1] - gap[0])
-    text = (
-        f"interpolated in {int((~track.tracked).sum())} of {len(track.views)} frames, "
-        f"longest from {longest[0]} to {longest[1]}"
-    )
-    return Finding("head", "warn", text)

@@ -7,10 +7,10 @@ import numpy as np
 
 from ico3d.capture.capture import Capture
 from ico3d.capture.headtrack.track_file import NAME as TRACK
+from ico3d.capture.headtrack.track_file import track_file
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import Description, Place
 from ico3d.capture.multiview.parallel import View, each_camera
-from ico3d.capture.multiview.reader import MultiviewCapture
 from ico3d.capture.multiview.writing import new_folder
 from ico3d.capture.portrait_files import save_picture
 from ico3d.capture.resized import ResizedCapture
@@ -87,8 +87,8 @@ def _write_rest(capture: ResizedCapture, work: Path) -> None:
     sound = capture.audio()
     if sound is not None:
         soundfile.write(work / "audio.wav", sound.samples, sound.rate)
-    track = capture.path / TRACK
-    if capture.kind == MultiviewCapture.kind and track.is_file():
+    track = track_file(capture.path)
+    if track.is_file():
         shutil.copyfile(track, work / TRACK)  # in metres, whatever the size of the pictures
     if capture.split.test:
         return  # a head: its points lie in its own head space, tracking will find another
