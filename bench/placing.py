@@ -81,7 +81,7 @@ class Placing:
         recording, body = Capture.open(folder / "head"), Capture.open(folder / "body")
         head = self._trained(recording, folder / "model", seed)
         said: list[str] = []
-        found, placement = found_in_pictures(head, body, folder, said.append)
+        found, placement = found_in_pictures(head, body, folder, said.append, torch.device("cpu"))
         assert found.landmarks is not None and placement is not None, said
         drawn = cropped(found, HeadRegion.around(found.landmarks)).model.means.detach().numpy()
         truth = drawn.astype(float), canonical_landmarks(recording)

@@ -5,14 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 from planted_person import FRAMES, PlantedPerson, face, planted_head
 from test_assemble import assembly_of
 from test_recolour import SETTINGS, parts_of
 
-from ico3d.avatar.avatar import TrainedAvatar
+from ico3d.avatar.avatar import Placement, TrainedAvatar
 from ico3d.avatar.joining.assemble import assemble
 from ico3d.avatar.joining.checking import write_checks
+from ico3d.avatar.joining.drawn_head import DrawnHead
 from ico3d.avatar.joining.face_views import face_views
+from ico3d.avatar.joining.found_placement import OverRecording, head_poses
 from ico3d.avatar.joining.recolour import color_difference, recolour
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.seam import seam_scores
@@ -50,6 +53,21 @@ def test_an_avatar_is_assembled_and_measured(cuda, tmp_path, monkeypatch):
     assert is_moved(avatar.head.model.means) and is_moved(avatar.gaussians(0.0).means)
     assert np.isfinite(avatar.summary["psnr_face"]) and "gap_mm" in avatar.summary
     _same_scores(TrainedAvatar.load(tmp_path / "out"), avatar, capture)
+
+
+def test_a_head_without_landmarks_is_drawn(cuda, tmp_path):
+    """For the search of its face: alone, and into recorded pictures."""
+    capture = PlantedPerson.elsewhere(tmp_path)
+    model = planted_head().model
+    neutral = model(torch.zeros(10))
+    placement = Placement(capture.canonical_from_head, head_poses(capture))
+    pictures = {}
+    for place in (torch.device("cpu"), cuda):
+        there = neutral.to(place)
+        alone = DrawnHead(there, capture.cameras[:1]).image(0, 0)
+        pictures[place.type] = alone, OverRecording(capture, there, placement).image(0, 1)
+    for here, there in zip(*pictures.values(), strict=True):
+        np.testing.assert_allclose(there, here, atol=1e-5)
 
 
 def _same_scores(here: TrainedAvatar, there: TrainedAvatar, capture) -> None:

@@ -155,16 +155,17 @@ def assemble(
 
 def place_head(capture: Capture, folder: Path, assembly: Assembly, say: Say) -> None:
     """Aligns the head, crops it and matches its colours; writes its part of the folder."""
+    device = computing_device(assembly.device)
     head, placement = TrainedHead.load(assembly.head), None
     if head.landmarks is None:
-        head, placement = found_in_pictures(head, capture, assembly.head, say)
+        head, placement = found_in_pictures(head, capture, assembly.head, say, device)
     else:
         say("face: where the landmarks of both recordings have it.")
     landmarks = _landmarks(head, assembly.head)
     region = HeadRegion.around(landmarks)
     placement = placement or align(capture, landmarks, say)
     seam = near_border(head, region, SEAM_REACH)
-    head = cropped(head, region).to(computing_device(assembly.device))
+    head = cropped(head, region).to(device)
     expressions = recorded_expressions(head, capture, head.neutral())
     if assembly.joining.match_colors:
         _match_colors(head, capture, placement, expressions, assembly, say)

@@ -36,7 +36,7 @@ class DrawnHead(Capture):
 
     def drawn(self, camera: int) -> Rendering:
         """The picture (1, H, W) of a camera with its depth."""
-        wall = torch.full((3,), BEHIND)
+        wall = self.gaussians.means.new_full((3,), BEHIND)
         with torch.no_grad():
             return render(self.gaussians, [self.cameras[camera]], wall)
 

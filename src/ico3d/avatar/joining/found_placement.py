@@ -43,7 +43,8 @@ class OverRecording(Capture):
             return None
         there = self._gaussians.transform(self._placement.world_from_head(frame))
         with torch.no_grad():
-            drawn = render(there, [self.cameras[camera]], torch.from_numpy(image))
+            behind = torch.from_numpy(image).to(there.means.device)
+            drawn = render(there, [self.cameras[camera]], behind)
         return drawn.rgb[0].clamp(0, 1).cpu().numpy()
 
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
@@ -52,7 +53,11 @@ class OverRecording(Capture):
 
 
 def found_in_pictures(
-    head: TrainedHead, capture: Capture, folder: Path, say: Callable[[str], None]
+    head: TrainedHead,
+    capture: Capture,
+    folder: Path,
+    say: Callable[[str], None],
+    device: torch.device,
 ) -> tuple[TrainedHead, Placement | None]:
     """Finds the face of a head in pictures drawn of it, and puts it where the body's is found.
 
@@ -61,6 +66,7 @@ def found_in_pictures(
         capture: Of the body.
         folder: The head's, for messages.
         say: Told how well the pictures agree.
+        device: Where the head is drawn.
 
     Returns:
         The head with landmarks, and where it is; None where no pictures of the body show its face
@@ -75,14 +81,14 @@ def found_in_pictures(
     poses = head_poses(capture)
     with torch.no_grad(), face_seeker() as seeker:
         neutral = torch.from_numpy(head.neutral())
-        drawn = seeker.of_head(head.model(neutral), folder)
+        drawn = seeker.of_head(head.model(neutral).to(device), folder)
         recorded = seeker.of_body(capture, poses)
         known = replace(head, landmarks=drawn.landmarks)
         say(_in_words(drawn, recorded))
         if recorded is None:
             return known, None
         matrix, rest = canonical_from_head(recorded.landmarks, drawn.landmarks)
-        shown = cropped(known, HeadRegion.around(drawn.landmarks)).model(neutral)
+        shown = cropped(known, HeadRegion.around(drawn.landmarks)).model(neutral).to(device)
         first = Placement(matrix, poses)
         matrix, rest = _compared(seeker, capture, recorded, shown, first) or (matrix, rest)
     say(fit_in_words(matrix, rest))
