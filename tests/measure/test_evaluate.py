@@ -175,7 +175,7 @@ def test_cameras_that_see_no_face_are_not_asked_for_one(tmp_path, monkeypatch, c
     scores = evaluate_head(head, capture, (3, 4, 5), None)
     assert scores["psnr_mouth"] is None and reader.seen == []
     (told,) = [record for record in caplog.records if "not measured" in record.getMessage()]
-    assert "psnr_mouth, lmd, lip_correlation" in told.getMessage()
+    assert "psnr_mouth, lmd, lip_correlation, lip_lag_ms" in told.getMessage()
 
 
 def test_pictures_lie_where_anybody_can_score_them(tmp_path, no_models):

@@ -122,7 +122,8 @@ def _quality(
 
 def _say_why(result: dict[str, float | str | None], capture: Capture) -> None:
     """Warns where the faces seen did not suffice for a metric."""
-    lacking = [key for key in ("psnr_mouth", "lmd", "lip_correlation") if result[key] is None]
+    keys = ("psnr_mouth", "lmd", "lip_correlation", "lip_lag_ms")
+    lacking = [key for key in keys if result[key] is None]
     if lacking:
         log.warning(
             "%s: not measured: %s, as too few pictures of these frames show a face, recorded and "
