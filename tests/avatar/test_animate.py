@@ -42,7 +42,7 @@ def test_what_is_found_is_written_and_drawn(avatar, tmp_path, capsys):
 
 
 def test_gestures_that_look_bad_are_refused(avatar, tmp_path, capsys, monkeypatch):
-    person = open_person(avatar).avatar
+    person = open_person(avatar, CPU).avatar
     capture = WholeFilmed(person, tmp_path / "body")
     picture = capture.image
 

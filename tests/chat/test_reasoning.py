@@ -85,6 +85,26 @@ async def test_only_the_answer_is_spoken_and_remembered(bundle, form):
     assert script.requests[1]["messages"][-2] == {"role": "assistant", "content": SAID}
 
 
+@pytest.mark.parametrize("form", ["plain", "only closed", "tags", "reasoning"])
+async def test_a_warm_model_is_heard_while_it_answers(bundle, form):
+    """The first answer need not be whole before it is given out."""
+    forms = FORMS | {"plain": ["Hello."]}
+    answers = iter([forms[form], [*forms[form], " And", 1.5, " you?"]])
+    script = Script(lambda body: next(answers))
+    async with running(script.app()) as port:
+        asked = openai.Settings(f"http://127.0.0.1:{port}/v1", "tiny")
+        await openai.make(asked, CONTEXT).warm_up()
+        async with serving(bundle, settings_for(port), persona=ADA) as (url, _):
+            page, _ = await open_page(url, microphone=False)
+            await page.send(Text("who are you?"))
+            first, _ = await page.wait(Answer, where=lambda m: m.utterance == 0)
+            last, _ = await page.wait(End, where=lambda m: m.utterance == 0)
+            assert last - first > 1.0
+            await page.close()
+    assert len(script.requests) == 2
+    assert script.requests[0]["messages"][-1]["role"] == "user"
+
+
 @pytest.mark.parametrize("parts", [["<think>", HMM], [Thought(HMM)], [HMM, "</think>"]])
 async def test_thoughts_without_an_answer_are_apologised_for(bundle, parts):
     async with talking(bundle, Script(lambda body: parts).app()) as page:

@@ -49,7 +49,7 @@ class Serve:
         from ico3d.bundle.persona import read_persona
         from ico3d.chat import server
         from ico3d.chat.monitor import Monitor, TurnLog
-        from ico3d.chat.parts import make_parts
+        from ico3d.chat.parts import make_parts, warm_up
         from ico3d.chat.services.offers import offers
         from ico3d.chat.sessions import Sessions
         from ico3d.chat.settings import read_settings
@@ -61,14 +61,15 @@ class Serve:
         bundle = Bundle.open(self.bundle)
         avatar = server.open_avatar(bundle, settings, persona) if bundle.manifest.head else None
         sessions = Sessions(avatar, monitor=monitor) if avatar else None
-        services = make_parts(avatar).services if avatar else None  # loads what they need, too
+        parts = make_parts(avatar) if avatar else None  # loads what they need, too
         app = server.make_app(bundle, avatar, self.host, sessions)
         url = server.address(listener)
         listener.listen()  # whoever reads the address and comes at once is served in a moment
         print(f"{(persona or bundle.manifest.persona).name} is at {url} (Ctrl+C ends)")
-        if avatar:
+        if avatar and parts:
+            warm_up(parts)
             offered = offers(settings, avatar.persona.voice)
-            print("\n".join(described(services, offered)))
+            print("\n".join(described(parts.services, offered)))
         if not (server.STATIC / "index.html").is_file():
             print("The page is not built: run `make viewer`.", file=sys.stderr)
         sys.stdout.flush()

@@ -6,18 +6,21 @@ and models loaded, so while visitors talk it happens in threads of its own.
 
 import asyncio
 import contextlib
+import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
+from loguru import logger
 from pipecat.audio.turn.smart_turn.base_smart_turn import SmartTurnParams
 from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.bundle.animation import Animation
 from ico3d.bundle.manifest import HeadInfo, Persona
 from ico3d.chat import protocol
+from ico3d.chat.failures import cause
 from ico3d.chat.services import Chosen, Service
-from ico3d.chat.services.provider import Context
+from ico3d.chat.services.provider import Context, WarmsUp
 from ico3d.chat.settings import ChatSettings
 from ico3d.chat.turns.detector import Ear
 from ico3d.chat.turns.eager import EagerSmartTurn
@@ -25,6 +28,7 @@ from ico3d.chat.workers import Workers
 from ico3d.errors import Ico3dError, ServiceError
 from ico3d.speech.runtime import SpeechModel
 
+SLOWEST = 120.0  # s for a first answer, for which a server may load its model
 AT_ONCE = 8  # conversations whose parts are made side by side
 
 _threads = ThreadPoolExecutor(AT_ONCE, "making")  # the loop's own have conversations to serve
@@ -98,6 +102,19 @@ def make_parts(avatar: Avatar) -> Parts:
         return Parts(
             ear, turn, **made, services=services.described(), dictation=services.dictation()
         )
+
+
+def warm_up(parts: Parts) -> None:
+    """Lets a language model on a server answer once, in a thread, before visitors ask."""
+
+    def ask(model: WarmsUp) -> None:
+        try:
+            asyncio.run(asyncio.wait_for(model.warm_up(), SLOWEST))
+        except Exception as error:  # a visitor's question may fare better
+            logger.warning(f"language did not answer a first question: {cause(error)}")
+
+    if isinstance(parts.language, WarmsUp):
+        threading.Thread(target=ask, args=(parts.language,), daemon=True).start()
 
 
 async def make_aside(avatar: Avatar) -> Parts:

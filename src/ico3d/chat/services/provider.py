@@ -4,7 +4,7 @@ import importlib.util
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from pipecat.processors.frame_processor import FrameProcessor
 
@@ -14,6 +14,15 @@ from ico3d.bundle.persona import Persona
 from ico3d.chat.keys import OPENAI_KEY, key_for
 from ico3d.common.weights import model_of
 from ico3d.errors import MissingModelError, SettingsError
+
+
+@runtime_checkable
+class WarmsUp(Protocol):
+    """A service that is quicker once it has answered."""
+
+    async def warm_up(self) -> None:
+        """Asks for something before visitors come."""
+        ...
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,8 @@ COMPLETE = ("stop", "tool_calls", "function_call")
 """Why an answer ended that was not cut off."""
 _opens: dict[tuple[str, str], bool] = {}
 """By server and model: whether its chat template opens a thought, so that a stream holds only the
-end of it. One answer tells; of a model that is not in here the first is given out when it is whole.
+end of it. One answer tells (`warm_up` asks for one); of a model that is not in here the first is
+given out when it is whole.
 """
 _summarising: ContextVar[bool] = ContextVar("summarising", default=False)
 
@@ -108,6 +109,34 @@ class CompatibleModel(OpenAILLMService):
         if end == "length" and opens and not thoughts.begun:
             return  # it was cut off within its thoughts
         await self._tell(thoughts.finish())
+        self._learn(thoughts, end)
+
+    async def warm_up(self) -> None:
+        """Asks for a word before visitors come.
+
+        A server loads its model with the first question, and the answer tells whether answers of
+        this model can be given out while they come.
+
+        Raises:
+            OpenAIError: If the server does not answer.
+        """
+        if self._place in _opens:
+            return
+        thoughts, end = Thoughts(None), None
+        greeting = LLMContext([{"role": "user", "content": "Say hello."}])
+        async with contextlib.aclosing(_closing(await self._asked(greeting))) as chunks:
+            async for chunk in chunks:
+                for choice in chunk.choices or []:
+                    end = choice.finish_reason or end
+                    if choice.delta and field_of(choice.delta):
+                        thoughts.separate()
+                    if choice.delta and choice.delta.content:
+                        thoughts.push(choice.delta.content)
+        thoughts.finish()
+        self._learn(thoughts, end)
+
+    def _learn(self, thoughts: Thoughts, end: str | None) -> None:
+        """What a whole answer tells of the model."""
         if thoughts.lone:
             _opens[self._place] = True
         elif thoughts.begun and end in COMPLETE:
