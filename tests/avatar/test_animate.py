@@ -11,6 +11,7 @@ from ico3d.avatar.animated import open_person
 from ico3d.bundle.animation import Action, Animation, Rest
 from ico3d.capture.capture import Capture
 from ico3d.cli import main
+from ico3d.splat.device import CPU
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "bundle"))
 sys.path.insert(0, str(Path(__file__).parent))

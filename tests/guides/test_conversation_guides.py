@@ -75,7 +75,7 @@ def visited(monkeypatch, capsys):
 
     def described(avatar):
         """Guides choose services that are not on every machine: they are named and not made."""
-        return SimpleNamespace(services=avatar.services.described())
+        return SimpleNamespace(services=avatar.services.described(), language=None)
 
     monkeypatch.setattr("ico3d.chat.parts.make_parts", described)
     made = server.make_server
