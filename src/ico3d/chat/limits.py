@@ -87,8 +87,8 @@ class Inlet:
 
     What a network held back for many seconds comes much faster than it was said. To answer it
     would be to answer the past, so it waits until sound comes in time again, and the oldest of
-    it is dropped. Whether sound is in time is told by its rate alone: pages count its samples on
-    from where they stopped sending, so a gap in time shows neither there nor anywhere else.
+    it is dropped. Whether sound is in time is told by its rate alone: the numbers of its samples
+    are no clock, for they stand still while the visitor's button is up.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic):

@@ -110,8 +110,10 @@ class PictureCache:
 
     def background(self, view: View, device: torch.device) -> Tensor | None:
         """(H, W, 3) what the view's camera sees without the person, where that is known."""
-        plate = self._plate(view.camera_index)
-        return None if plate is None else plate.to(device)
+        index, plate = view.camera_index, self._plate(view.camera_index)
+        if plate is not None and plate.device != device:  # every step wants it there
+            plate = self._backgrounds[index] = plate.to(device)
+        return plate
 
     def picture(self, view: View, device: torch.device) -> Picture:
         """What a recorded view shows."""
