@@ -45,7 +45,7 @@ voice = 20.0
 
 def echoing():
     """A server of all three kinds that puts what it was asked into what it refuses."""
-    app, languages = FastAPI(), iter([None, 401])
+    app = FastAPI()
 
     def refusal(status, said):
         return JSONResponse(
@@ -55,8 +55,8 @@ def echoing():
     @app.post("/v1/chat/completions")
     async def chat(request: Request):
         body = await request.json()
-        if status := next(languages):
-            return refusal(status, body["messages"])
+        if "far" in str(body["messages"][-1]["content"]):
+            return refusal(401, body["messages"])
         lines = [chunk({"content": f"You said {MARKER}."}), chunk({}, "stop"), "data: [DONE]\n\n"]
         return Response("".join(lines), media_type="text/event-stream")
 

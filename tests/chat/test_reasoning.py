@@ -16,6 +16,7 @@ from ico3d.chat.modules.headless import run
 from ico3d.chat.protocol import Answer, End, State, Text
 from ico3d.chat.services import choose
 from ico3d.chat.services.language import PROVIDERS, local, openai
+from ico3d.chat.services.language.reasoning import Parts, Thoughts
 from ico3d.chat.services.provider import Context
 from ico3d.chat.settings import ChatSettings, Choice, Patience
 from ico3d.chat.supervision.apologies import APOLOGIES
@@ -103,6 +104,40 @@ async def test_a_warm_model_is_heard_while_it_answers(bundle, form):
             await page.close()
     assert len(script.requests) == 2
     assert script.requests[0]["messages"][-1]["role"] == "user"
+
+
+SPOKEN = {
+    "thoughts about the tag": ["<think>They ask about <think> tags.</think>Those mark thoughts."],
+    "an element": ["Those mark thoughts.", " Give a <reason>late</reason> element."],
+    "an analysis": ["Those mark thoughts.", " The <analysis> element has a child."],
+}
+
+
+@pytest.mark.parametrize("form", SPOKEN)
+def test_an_answer_may_speak_of_such_tags(form):
+    text = "".join(SPOKEN[form])
+    said = "Those mark thoughts." if "thoughts about" in form else text
+    for size in (1, 7, len(text)):
+        thoughts, parts = Thoughts(), Parts()
+        for at in range(0, len(text), size):
+            parts += thoughts.push(text[at : at + size])
+        assert (parts + thoughts.finish()).said == said
+    cut = Thoughts()
+    cut.push(SPOKEN["thoughts about the tag"][0][:-10])
+    assert cut.finish(complete=False).said == ""  # nobody knows how it would have gone on
+
+
+async def test_one_answer_with_a_lone_tag_changes_nothing_for_those_after(bundle):
+    answers = iter(
+        [["Hello."], ["Write </think> at its end."], ["I am Ada.", " And", 1.5, " you?"]]
+    )
+    async with talking(bundle, Script(lambda body: next(answers)).app()) as page:
+        await ask(page, 0)
+        await ask(page, 1)
+        await page.send(Text("who are you?"))
+        first, _ = await page.wait(Answer, where=lambda m: m.utterance == 2)
+        last, _ = await page.wait(End, where=lambda m: m.utterance == 2)
+        assert last - first > 1.0
 
 
 @pytest.mark.parametrize("parts", [["<think>", HMM], [Thought(HMM)], [HMM, "</think>"]])

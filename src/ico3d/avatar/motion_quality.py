@@ -48,7 +48,8 @@ def measure_motion(
         watch: Shows the progress.
 
     Returns:
-        One value for each frame; none at all where the recording has no picture of them.
+        One value for each frame; none at all where the recording has no picture of them that a
+        mask or a clean plate tells from what is behind.
 
     Raises:
         CaptureError: If it is the recording of another clip.
@@ -60,16 +61,36 @@ def measure_motion(
         )
     looking = measuring_cameras(capture)
     cameras = [looking[i] for i in spread(len(looking), MOST_CAMERAS)]
-    values = {}
-    for frame in watch(spread(clip.last + 1, MOST_FRAMES)):
-        views = (recorded_view(capture, camera, frame, clip) for camera in cameras)
-        found = [_worst_part(whole, body, view) for view in views if view is not None]
-        if judged := [value for value in found if value is not None]:
-            values[frame] = float(np.mean(judged))
-    if not values:
+    looked = spread(clip.last + 1, MOST_FRAMES)
+    values = np.full((len(looked), len(cameras)), np.nan)
+    for row, frame in enumerate(watch(looked)):
+        for column, camera in enumerate(cameras):
+            view = _judged_view(capture, camera, frame, clip)
+            if view is not None:
+                values[row, column] = _worst_part(whole, body, view)
+    return _over_cameras(values, looked, clip.last + 1)
+
+
+def _judged_view(capture: Capture, camera: int, frame: int, clip: Span) -> View | None:
+    """A recorded picture; None where nothing tells the person from what is behind."""
+    told = capture.background(camera) is not None or capture.mask(camera, frame) is not None
+    return recorded_view(capture, camera, frame, clip) if told else None
+
+
+def _over_cameras(values: np.ndarray, frames: list[int], count: int) -> tuple[float, ...]:
+    """Means over cameras (S, C) at some frames, for all of `count` frames; may be none.
+
+    Cameras see different sides, in other light: each is compared with its own median, so that a
+    frame is no better or worse for which of them took it.
+    """
+    known = ~np.isnan(values)  # (S, C)
+    values = values[:, known.any(axis=0)]  # (S, C'): cameras that took something
+    some = known.any(axis=1)  # (S,)
+    if not some.any():
         return ()
-    frames = np.arange(clip.last + 1)
-    between = np.interp(frames, list(values), list(values.values()))  # (F,)
+    usual = np.nanmedian(values, axis=0)  # (C',)
+    means = np.nanmean(values[some] - usual, axis=1) + usual.mean()  # (S',)
+    between = np.interp(np.arange(count), np.array(frames)[some], means)  # (count,)
     return tuple(round(float(value), 2) for value in between)
 
 
@@ -134,14 +155,14 @@ def _spans(frames: list[int]) -> str:
     return ", ".join(str(a) if a == b else f"{a} to {b}" for a, b in ends)
 
 
-def _worst_part(whole: At, body: At | None, view: View) -> float | None:
-    """PSNR of the part that is worst; None where too little of the person is seen."""
+def _worst_part(whole: At, body: At | None, view: View) -> float:
+    """PSNR of the part that is worst; NaN where too little of the person is seen."""
     picture = drawn(whole, view)[0]  # (H, W, 3)
     assert view.truth is not None
     mask = np.ones(picture.shape[:2]) if view.mask is None else view.mask.astype(float)  # (H, W)
     rows = np.flatnonzero(mask.max(axis=1) > 0.5)
     if len(rows) == 0:
-        return None
+        return np.nan
     if body is not None:
         mask = mask * (np.abs(picture - drawn(body, view)[0]).max(axis=2) <= _FACE)
     side = max(3, round(PART * (rows[-1] + 1 - rows[0])))
@@ -149,5 +170,5 @@ def _worst_part(whole: At, body: At | None, view: View) -> float | None:
     errors, weights = (uniform_filter(values, side) for values in (squares * mask, mask))
     parts = weights > COVERED
     if not parts.any():
-        return None
+        return np.nan
     return float(-10 * np.log10(max((errors[parts] / weights[parts]).max(), 1e-10)))

@@ -9,14 +9,13 @@ import wave
 from dataclasses import dataclass
 from pathlib import Path
 
-LOWEST_RATE, HIGHEST_RATE = (
-    4_000,
-    384_000,
-)  # samples per second
+LOWEST_RATE, HIGHEST_RATE = 4_000, 384_000  # samples per second
 MOST_CHANNELS = 64
 MOST_BYTES = 2 << 30  # of decoded samples
 RECORDING = 2 * 3600.0  # s of a recording that someone made on purpose
 REQUEST = 600.0  # s of a sound that another machine sends, or of one that it is asked for
+WAV_ERRORS = (wave.Error, EOFError, RuntimeError)
+"""What `wave` raises for damaged files: the last where one part claims more than another holds."""
 _WAV = struct.Struct("<4s4x4s4s4xHHI6xH")  # up to the width of a sample, of a plain WAV file
 
 

@@ -70,6 +70,13 @@ def _whole_person(
     reach = max(REACH * float(np.quantile(spacing(surface), 0.9)), LEAST_REACH)
     gap = find_gap(surface, _moments(capture), reach)
     if len(gap.points) < 4:
+        if gap.share:
+            log.warning(
+                "%s: the surface points leave out %.0f %% of the person, and the masks do not "
+                "agree on where that is: what lies beyond the points will be blurred.",
+                capture.path,
+                100 * gap.share,
+            )
         return resampled(surface, count, rng)
     log.info(
         "%s: the surface points leave out %.0f %% of the person, who begins there on the masks.",
@@ -87,9 +94,8 @@ def _moments(capture: Capture) -> list[Moment]:
     for place in spread(len(train), MOMENTS):
         first = min(max(place - NEAREST // 2, 0), max(len(train) - NEAREST, 0))
         seen = head_silhouettes(capture, train[place], train[first : first + NEAREST])
-        if not seen:
-            return found  # no masks about one moment: most likely there are none at all
-        found.append(seen)
+        if seen:
+            found.append(seen)
     return found
 
 

@@ -18,6 +18,7 @@ from ico3d.head.model import HeadModel, Variant
 from ico3d.head.settings import HeadSettings
 from ico3d.head.trained import Inputs, TrainedHead
 from ico3d.head.trainer import HeadTrainer
+from ico3d.head.views import poses_digest
 from ico3d.head.watch import WatchedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
@@ -91,6 +92,7 @@ def train_head(
     summary = {
         "train_seconds": seconds,
         "capture": capture.provenance,
+        "recording": {"path": str(capture.path.resolve()), "poses": poses_digest(capture)},
         "settings": asdict(trainer.settings),
     }
     landmarks = canonical_landmarks(capture)

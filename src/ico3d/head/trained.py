@@ -14,6 +14,7 @@ from ico3d.common.files import write_atomic
 from ico3d.errors import ModelError
 from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack, SpeechTrack, speech_features
 from ico3d.head.model import HeadModel
+from ico3d.head.views import poses_digest
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.training.checkpoint import load_tensors, save_tensors
@@ -60,8 +61,16 @@ class TrainedHead:
 
         Raises:
             CaptureError: If the capture lacks the sound or the blendshapes this head needs.
-            ModelError: If the speech encoder is not the one it was trained with.
+            ModelError: If the speech encoder is not the one it was trained with, or its recording
+                now has other head poses than it was trained with.
         """
+        trained_on = self.summary.get("recording", {})
+        same = trained_on.get("path") == str(capture.path.resolve())
+        if same and trained_on.get("poses") != poses_digest(capture):
+            raise ModelError(
+                f"the head poses of {capture.path} have changed since this head was trained with "
+                "them (a track was made or removed): train it again."
+            )
         if self.adaptor is None:
             return BlendshapeTrack(capture, self.blendshape_names)
         encoder = load_encoder(self.encoder)

@@ -7,14 +7,14 @@ import torch
 from torch import Tensor
 
 from ico3d.capture.capture import Capture
-from ico3d.errors import CaptureError
+from ico3d.errors import CaptureError, SettingsError
 from ico3d.head.basis import update_basis
 from ico3d.head.density import HeadDensity, Sampled, bound_scales
 from ico3d.head.expressions import ExpressionTrack
 from ico3d.head.loss import HeadLoss
 from ico3d.head.model import HeadModel
 from ico3d.head.settings import HeadSettings
-from ico3d.head.views import Picture, PictureCache, View, staged
+from ico3d.head.views import Picture, PictureCache, View, poses_digest, staged
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.density import contributions
 from ico3d.splat.render import render
@@ -24,6 +24,8 @@ from ico3d.training.optimiser import Optimiser
 CPU = torch.device("cpu")
 GEOMETRY = ("means", "quats", "log_scales")
 
+LEAST_TOLD = 0.5
+"""Share of the pictures that must tell the person from what is behind, if any does."""
 FEW_FRAMES = 100
 """Training frames that `basis_weight_decay` is meant for."""
 SAMPLES = 16
@@ -51,17 +53,22 @@ class HeadTrainer:
         """Finds the recorded views of the training frames.
 
         Raises:
-            CaptureError: If there is no picture to train on.
+            CaptureError: If there is no picture to train on, or too few have a mask.
             SettingsError: If the model shall be compiled and there is no compiler.
         """
         self.model, self.adaptor = model, adaptor
         self._track, self._settings, self._seed = track, settings, seed
         self._pictures = PictureCache(capture, settings.cache_gib)
-        self._views = self._pictures.views(capture.split.train)
+        self._views = self._pictures.views(capture.split.train, LEAST_TOLD)
         if not self._views:
             raise CaptureError(f"{capture.path} has no picture among its training frames.")
         few = FEW_FRAMES / len(capture.split.train)
         self._weight_decay = settings.basis_weight_decay * few**4
+        shape = model.shape
+        self._space = {
+            "box": [*map(float, shape.box_center), float(shape.box_size)],
+            "poses": poses_digest(capture),
+        }
         self._loss = HeadLoss(settings, model.device)
         self._optimiser = Optimiser(settings.optimiser)
         self._density = HeadDensity(settings, seed)
@@ -108,11 +115,20 @@ class HeadTrainer:
         return CPU if about_adaptor else self.model.device
 
     def state(self) -> dict:
-        """The weight of the perceptual term; randomness follows from the step's number."""
-        return {"perceptual_weight": self.settings.perceptual_weight}
+        """The weight of the perceptual term, and the space; randomness follows from the step."""
+        return {"perceptual_weight": self.settings.perceptual_weight, "space": self._space}
 
     def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
-        """Takes back what `tensors` and `state` gave."""
+        """Takes back what `tensors` and `state` gave.
+
+        Raises:
+            SettingsError: If it was begun in another space: weights would not fit their places.
+        """
+        if state.get("space") != self._space:
+            raise SettingsError(
+                "the run was begun by an earlier version, or the recording's points, masks or head "
+                "poses have changed since: train in an empty folder."
+            )
         self._loss.go_on(state.get("perceptual_weight", self.settings.perceptual_weight))
         self.model.resize(tensors["model.means"].shape[0])
         self.model.load_state_dict(_below("model.", tensors))

@@ -1,5 +1,6 @@
 """The pictures a head is trained on or measured with."""
 
+import hashlib
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,10 +12,13 @@ from torch import Tensor
 from ico3d.capture.capture import Capture
 from ico3d.capture.pictures import LayerCache, Layers
 from ico3d.capture.pictures import View as View
+from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 
 log = logging.getLogger(__name__)
 
+COMPARED = 16
+"""Head poses that tell one head space from another."""
 GREY = 0.5
 """Behind a person who is cut out to be measured or shown."""
 
@@ -73,6 +77,15 @@ def head_pose(capture: Capture, frame: int) -> np.ndarray:
     return pose
 
 
+def poses_digest(capture: Capture) -> str:
+    """Tells head spaces of a recording apart: a hash of some of its head poses."""
+    digest = hashlib.sha256()
+    for frame in spread(capture.num_frames, COMPARED):
+        pose = capture.world_from_head(frame)
+        digest.update(b"none" if pose is None else np.round(pose, 5).astype("<f8").tobytes())
+    return digest.hexdigest()
+
+
 def view_of(capture: Capture, camera: int, frame: int) -> View:
     """The view of a frame by a camera, whether it was recorded or not."""
     moved = capture.cameras[camera].moved(head_pose(capture, frame))
@@ -88,11 +101,18 @@ class PictureCache:
         self._backgrounds: dict[int, Tensor | None] = {}
         self._cache = LayerCache(self._read, budget_gib)
 
-    def views(self, frames: Sequence[int]) -> list[View]:
+    def views(self, frames: Sequence[int], least: float = 0.0) -> list[View]:
         """All views of these frames that were recorded, frame by frame.
 
         Where a mask or a clean background tells the person from what is behind in some of them, the
         others are left out: they would show what is behind as a part of the person.
+
+        Args:
+            frames: Whose views.
+            least: Share of the recorded views that must not be left out.
+
+        Raises:
+            CaptureError: If too many would be left out.
         """
         told, untold = [], []
         for frame in frames:
@@ -101,6 +121,11 @@ class PictureCache:
                 if layers is not None:
                     tells = layers[1] is not None or self._plate(camera) is not None
                     (told if tells else untold).append(view_of(self._capture, camera, frame))
+        if told and len(told) < least * (len(told) + len(untold)):
+            raise CaptureError(
+                f"{self._capture.path}: only {len(told)} of {len(told) + len(untold)} pictures "
+                "have a mask or a clean background: make masks for all, or remove those of a few."
+            )
         if told and untold:
             log.warning(
                 "%s: %d of %d pictures are left out, as they have neither a mask nor a clean "

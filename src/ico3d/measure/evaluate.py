@@ -110,11 +110,12 @@ def _quality(
         truth, predicted = target.numpy(), renderer.picture(view, behind)
         add_picture(scores, predicted, truth)
         scores.add("psnr_mask", None if measured is None else psnr(predicted, truth, measured))
-        landmarks = capture.landmarks(view.camera_index, view.frame)
-        if landmarks is None and reader is not None and squareness(view.camera) > SHOWS_MOUTH:
-            landmarks = reader.read(recorded, person)
-        mouth = None if landmarks is None else psnr_mouth(predicted, truth, landmarks)
-        scores.add("psnr_mouth", mouth)
+        if squareness(view.camera) > SHOWS_MOUTH:
+            landmarks = capture.landmarks(view.camera_index, view.frame)
+            if landmarks is None and reader is not None:
+                landmarks = reader.read(recorded, person)
+            mouth = None if landmarks is None else psnr_mouth(predicted, truth, landmarks)
+            scores.add("psnr_mouth", mouth)
         if images is not None:
             write_pictures(images, view, predicted, truth, measured)
     return scores

@@ -9,7 +9,7 @@ import numpy as np
 from ico3d.capture.sound import check_claim
 from ico3d.chat.protocol import MICROPHONE_RATE
 from ico3d.common.espeak import synthesize
-from ico3d.common.sound import open_claim
+from ico3d.common.sound import WAV_ERRORS, open_claim
 from ico3d.errors import CaptureError
 
 QUESTIONS = ("Who are you?", "What can you do?", "Tell me about yourself.", "How do you work?")
@@ -68,7 +68,7 @@ def read_recording(path: Path) -> np.ndarray:
                 raise CaptureError(f"{path}: must be PCM16, mono, 16 kHz.")
             check_claim(path, open_claim(file, path.stat().st_size))
             data = file.readframes(file.getnframes())
-    except (OSError, EOFError, wave.Error) as error:
+    except (OSError, *WAV_ERRORS) as error:
         raise CaptureError(f"{path}: cannot be read as WAV ({error}).") from error
     samples = np.frombuffer(data, np.int16)
     if not samples.any():

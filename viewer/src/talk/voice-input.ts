@@ -27,7 +27,6 @@ export class VoiceInput {
   private state: MicrophoneState = 'closed'; // open: what it hears is sent
   private held = false; // the button to talk is
   private talking = false; // and the server was told
-  private releasing = false; // it has yet to be told of the end
   private closing: ReturnType<typeof setTimeout> | undefined;
 
   /** @param heard what leaves the loudspeaker at a moment of the performance clock */
@@ -76,7 +75,7 @@ export class VoiceInput {
     this.held = false;
     if (!this.talking) return;
     this.talking = false;
-    this.releasing = !this.send({ type: 'talk', pressed: false });
+    this.send({ type: 'talk', pressed: false });
     this.settle(KEPT_OPEN);
   }
 
@@ -97,9 +96,8 @@ export class VoiceInput {
   /** The line is up. */
   welcome(message: WelcomeMessage): void {
     this.ended = false;
-    const missed = message.resumed ? this.releasing : this.talking; // what the server does not know
-    if (missed) this.send({ type: 'talk', pressed: this.talking });
-    this.releasing = false;
+    // What was sent may have been lost with the line: the server is told where the button is.
+    if (message.resumed || this.talking) this.send({ type: 'talk', pressed: this.talking });
     this.listening.welcome(message);
   }
 

@@ -45,6 +45,7 @@ class Track:
 
         from ico3d.capture.capture import Capture
         from ico3d.capture.headtrack.sheet import check_name, write_sheet
+        from ico3d.capture.headtrack.track_file import check_writable
         from ico3d.errors import MissingExtraError
 
         try:
@@ -55,6 +56,7 @@ class Track:
         capture = Capture.open(self.folder)
         if self.check is not None:
             check_name(self.check)
+        check_writable(capture.path)
         track, report = track_head(self.folder, self.workers)
         written = track.write(capture.path)
         if self.check is not None:

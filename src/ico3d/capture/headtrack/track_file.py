@@ -1,5 +1,6 @@
 """The file of a tracked head, `tracking.safetensors`: `docs/captures-multiview.md`."""
 
+import os
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -69,11 +70,25 @@ class HeadTrack:
         try:
             write_atomic(file, save(arrays))
         except OSError as error:
-            raise CaptureError(
-                f"{file} cannot be written ({error.strerror}): a track lies with its recording; "
-                f"make one of your own with ico3d capture resize {recording} OUT."
-            ) from error
+            raise _unwritable(recording, error.strerror) from error
         return file
+
+
+def check_writable(recording: Path) -> None:
+    """Checks before hours of tracking that the track can be written.
+
+    Raises:
+        CaptureError: If nothing can be written where the recording lies.
+    """
+    if not os.access(track_file(recording).parent, os.W_OK):
+        raise _unwritable(recording, "Read-only")
+
+
+def _unwritable(recording: Path, why: str | None) -> CaptureError:
+    return CaptureError(
+        f"{track_file(recording)} cannot be written ({why}): a track lies with its recording; "
+        f"make one of your own with ico3d capture resize {recording} OUT."
+    )
 
 
 def track_file(recording: Path) -> Path:

@@ -12,7 +12,7 @@ from safetensors.numpy import load
 from ico3d.capture.capture import Capture, Sound, all_frames, last_eleventh
 from ico3d.capture.sound import check_claim
 from ico3d.common.camera import Camera
-from ico3d.common.sound import open_claim
+from ico3d.common.sound import WAV_ERRORS, open_claim
 from ico3d.errors import CaptureError
 
 FORMAT, VERSION = "ico3d-synthetic", 2
@@ -90,7 +90,7 @@ class SyntheticCapture(Capture):
                     raise CaptureError(f"the sound {file} is not mono with 16 bits.")
                 check_claim(file, open_claim(sound, file.stat().st_size))
                 rate, data = sound.getframerate(), sound.readframes(sound.getnframes())
-        except (OSError, EOFError, wave.Error) as error:
+        except (OSError, *WAV_ERRORS) as error:
             raise CaptureError(f"the sound {file} is missing or damaged: record again.") from error
         return Sound(np.frombuffer(data, "<i2").astype(np.float32) / 32767, rate)
 

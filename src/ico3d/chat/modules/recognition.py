@@ -19,7 +19,7 @@ from pipecat.frames.frames import (
 
 from ico3d.chat.modules.headless import Spares, run
 from ico3d.chat.protocol import MICROPHONE_CHUNK, MICROPHONE_RATE
-from ico3d.common.sound import REQUEST, fault, open_claim
+from ico3d.common.sound import REQUEST, WAV_ERRORS, fault, open_claim
 from ico3d.errors import ProtocolError
 from ico3d.speech.mel import resampling_stream
 
@@ -83,7 +83,7 @@ def read_wav(file: BinaryIO) -> np.ndarray:
     try:
         with wave.open(file, "rb") as sound:
             pieces = list(_pieces(sound, size))
-    except (wave.Error, EOFError) as error:
+    except WAV_ERRORS as error:
         raise ProtocolError(f"the file is no WAV file of PCM samples ({error}).") from None
     pcm = np.concatenate(pieces)
     if len(pcm) == 0:

@@ -108,7 +108,7 @@ class CompatibleModel(OpenAILLMService):
                 yield chunk
         if end == "length" and opens and not thoughts.begun:
             return  # it was cut off within its thoughts
-        await self._tell(thoughts.finish())
+        await self._tell(thoughts.finish(end != "length"))
         self._learn(thoughts, end)
 
     async def warm_up(self) -> None:
@@ -136,9 +136,9 @@ class CompatibleModel(OpenAILLMService):
         self._learn(thoughts, end)
 
     def _learn(self, thoughts: Thoughts, end: str | None) -> None:
-        """What a whole answer tells of the model."""
+        """What a whole answer tells of a model that is new: a later one may speak of such tags."""
         if thoughts.lone:
-            _opens[self._place] = True
+            _opens.setdefault(self._place, True)
         elif thoughts.begun and end in COMPLETE:
             _opens.setdefault(self._place, False)
 

@@ -15,6 +15,8 @@ _NAMES = (
     *("think", "thinking", "thought", "thoughts", "reason", "reasoning", "reflection"),
     *("analysis", "scratchpad", "seed:think", "internal_monologue"),
 )
+_WORDS = re.compile(r"</?(?:thoughts?|reason|reflection|analysis)\b", re.IGNORECASE)
+"""Such names also stand for other things: within an answer they are text."""
 _TAG = rf"(?:{'|'.join(_NAMES)})(?:\s[^<>]*)?>"
 _OPENERS = (
     rf"<{_TAG}",
@@ -80,8 +82,10 @@ class Thoughts:
         self.opened, self.lone, self.begun = opened, False, False
         self._depth = 1 if opened else 0
         self._rest = ""  # may be the beginning of a mark
+        self._after = ""  # what came since a thought ended within another
         self._held = ""  # an answer, or a thought whose end will show what it was
         self._fresh = True  # nothing has come, white space aside
+        self._closed = False  # a thought has ended
 
     def push(self, text: str) -> Parts:
         """Takes some more of the text; gives what is known of it."""
@@ -90,10 +94,14 @@ class Thoughts:
         for mark in _MARK.finditer(text):
             parts += self._take(text[at : mark.start()])
             at = mark.end()
-            if mark["open"]:
+            if self.begun and not self._depth and _WORDS.match(mark[0]):
+                parts += self._take(mark[0])
+            elif mark["open"]:
                 self._open()
             elif self._depth:
                 self._depth = 0 if mark["final"] else self._depth - (mark["close"] is not None)
+                self._after = ""
+                self._closed = self._closed or mark["close"] is not None
             elif mark["close"]:
                 parts = Parts("", parts.thought + self._held + parts.said)
                 self._held, self.opened, self.lone = "", False, True
@@ -108,15 +116,26 @@ class Thoughts:
             self.opened = False
         return Parts(self._spoken(held))
 
-    def finish(self) -> Parts:
-        """The end of the text; the rest of it."""
+    def finish(self, complete: bool = True) -> Parts:
+        """The end of the text; the rest of it.
+
+        A thought may speak of such marks. So where all of a text would be thoughts although some
+        of them ended, the answer is what came after the last end.
+
+        Args:
+            complete: Whether the model came to its end, and was not cut off.
+        """
         rest, self._rest = self._take(self._rest), ""
-        return self.separate() + rest
+        parts = self.separate() + rest
+        if complete and self._depth and not self.begun:
+            parts += Parts(self._spoken(self._after))
+        return parts
 
     def _take(self, text: str) -> Parts:
         """Text without marks."""
         self._fresh = self._fresh and not text.strip()
         if self._depth:
+            self._after += text if self._closed else ""
             return Parts("", text)
         if self.opened is None:
             self._held += text
