@@ -104,6 +104,34 @@ def test_frames_without_a_picture_lie_between_their_neighbours(recorded, monkeyp
     assert measure_motion(trained.whole, None, capture, CLIP) == ()
 
 
+def test_a_picture_without_a_mask_judges_nothing(recorded, monkeypatch):
+    """What is behind would be compared with nothing."""
+    person, capture = recorded
+    trained = Trained(person, ARM, range(0))
+    views = [(camera, frame) for camera in range(5) for frame in range(23)]
+    pictures = {view: (capture.image(*view), capture.mask(*view)) for view in views}
+    monkeypatch.setattr(capture, "background", lambda camera: None)
+    monkeypatch.setattr(capture, "image", lambda *view: pictures[view][0])
+    monkeypatch.setattr(capture, "mask", lambda c, f: None if f == 9 else pictures[c, f][1])
+    quality = measure_motion(trained.whole, None, capture, CLIP)
+    assert np.ptp(quality) < FAR_BELOW
+    monkeypatch.setattr(capture, "mask", lambda camera, frame: None)
+    assert measure_motion(trained.whole, None, capture, CLIP) == ()
+
+
+def test_a_dark_camera_that_misses_frames_refuses_nothing(recorded, monkeypatch):
+    person, capture = recorded
+    trained, picture = Trained(person, ARM, range(0)), capture.image
+
+    def image(camera, frame):
+        if camera == 0 and 8 <= frame <= 10:
+            return None
+        return picture(camera, frame) * (1.0 if camera == 0 else 0.8)
+
+    monkeypatch.setattr(capture, "image", image)
+    assert np.ptp(measure_motion(trained.whole, None, capture, CLIP)) < FAR_BELOW
+
+
 def test_the_recording_of_another_clip_is_refused(recorded):
     person, capture = recorded
     with pytest.raises(CaptureError, match="has 23 frames, the body 24"):

@@ -8,6 +8,7 @@ import torch
 from two_balls import HEAD, TRUNK, TwoBalls, seen_by
 
 from ico3d.common.camera import look_at
+from ico3d.errors import CaptureError
 from ico3d.head.initial import initial_head
 from ico3d.head.model import HeadModel, HeadShape
 from ico3d.head.settings import PRESETS
@@ -90,6 +91,34 @@ def test_pictures_without_a_mask_do_not_teach_the_curtain(capture, monkeypatch, 
     assert "8 of 18 pictures are left out" in caplog.text
     monkeypatch.setattr(TwoBalls, "mask", lambda *_: None)
     assert len(PictureCache(capture, 0).views(range(4, 7))) == 18
+
+
+def test_masks_that_begin_late_are_found_all_the_same(capture, monkeypatch):
+    whole = TwoBalls.mask
+    late = lambda self, c, f: whole(self, c, f) if f >= 20 else None  # noqa: E731
+    monkeypatch.setattr(TwoBalls, "mask", late)
+    model = initial_head(capture, SETTINGS, "full", 1, np.random.default_rng(0))
+    assert float((model.means.detach().norm(dim=1) > 1.2 * HEAD).float().mean()) > 0.4
+
+
+def test_masks_that_contradict_each_other_are_said(capture, monkeypatch, caplog):
+    def mask(self, camera, frame):  # half of the cameras were masked for the head alone
+        shown, _ = seen_by(self.cameras[camera], self.world_from_head(frame))
+        return ((shown == 0) if camera % 2 else (shown >= 0)).astype(np.float32)
+
+    monkeypatch.setattr(TwoBalls, "mask", mask)
+    initial_head(capture, SETTINGS, "full", 1, np.random.default_rng(0))
+    assert "and the masks do not agree on where that is" in caplog.text
+
+
+def test_a_training_on_few_masked_pictures_is_refused(capture, tmp_path, monkeypatch):
+    whole = TwoBalls.mask
+    monkeypatch.setattr(
+        TwoBalls, "mask", lambda self, c, f: whole(self, c, f) if (c, f) == (0, 0) else None
+    )
+    job = HeadJob("blendshapes", "full", "builtin", 0, SETTINGS)
+    with pytest.raises(CaptureError, match="only 1 of 180 pictures have a mask"):
+        train_head(capture, tmp_path, job)
 
 
 def test_no_gaussian_outgrows_what_density_control_allows():

@@ -81,6 +81,36 @@ def test_a_killed_run_resumes_to_the_same_weights(tiny, tmp_path, inputs, monkey
             assert torch.equal(resumed.adaptor.state_dict()[name], value), name
 
 
+def test_a_run_and_its_head_know_their_space(tiny, tmp_path, monkeypatch):
+    """The recording's head poses or points may become others: weights would not fit."""
+    job = _job(steps=40, checkpoint_every=10)
+    step = HeadTrainer.step
+
+    def dying_step(self, index):
+        if index == 25:
+            raise KeyboardInterrupt
+        return step(self, index)
+
+    monkeypatch.setattr(HeadTrainer, "step", dying_step)
+    with pytest.raises(KeyboardInterrupt):
+        train_head(tiny, tmp_path / "head", job)
+    monkeypatch.setattr(HeadTrainer, "step", step)
+    with monkeypatch.context() as patch:
+        patch.setattr(tiny, "points", lambda frame=0: 1.1 * type(tiny).points(tiny))
+        with pytest.raises(SettingsError, match="have changed since: train in an empty folder"):
+            train_head(tiny, tmp_path / "head", job)
+    head = train_head(tiny, tmp_path / "head", job)  # nothing was lost
+    head.track(tiny)
+    moved = np.eye(4)
+    moved[1, 3] = 0.02
+    with monkeypatch.context() as patch:
+        patch.setattr(tiny, "world_from_head", lambda frame: moved)
+        with pytest.raises(ModelError, match="have changed since this head was trained"):
+            head.track(tiny)
+        patch.setattr(tiny, "path", tmp_path / "another")  # which may have poses of its own
+        head.track(tiny)
+
+
 def test_a_saved_head_gives_the_same_expressions_and_gaussians(tiny, tmp_path):
     head = train_head(tiny, tmp_path / "model", _job("speech", steps=30))
     loaded = TrainedHead.load(tmp_path / "model")

@@ -243,6 +243,17 @@ test('a button that is let go while the line is down is not held when it is up a
   expect(ScriptedSocket.last.of('talk')).toMatchObject([{ pressed: false }]);
 });
 
+test('a release that was lost with the line is told again', async () => {
+  await open();
+  await conversation.press();
+  await sound(3000, false); // nothing is acknowledged any more
+  conversation.release();
+  ScriptedSocket.last.drop();
+  await pass(300);
+  ScriptedSocket.last.welcome({ resumed: true });
+  expect(ScriptedSocket.last.of('talk')).toMatchObject([{ pressed: false }]);
+});
+
 test('the page says when the network loses what is said', async () => {
   await open();
   await sound(3000, false);

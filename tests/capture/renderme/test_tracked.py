@@ -8,7 +8,7 @@ import pytest
 from ico3d.capture.capture import Capture
 from ico3d.capture.expressions import BLENDSHAPES
 from ico3d.capture.headtrack import tracker
-from ico3d.capture.headtrack.track_file import HeadTrack
+from ico3d.capture.headtrack.track_file import HeadTrack, check_writable
 from ico3d.capture.multiview.resizing import resize_capture
 from ico3d.cli import main
 from ico3d.errors import CaptureError
@@ -101,3 +101,6 @@ def test_where_nothing_can_be_written(plain):
     own = Capture.open(plain)
     with pytest.raises(CaptureError, match=r"cannot be written .*with ico3d capture resize"):
         track_of(own).write(plain / "deeper" / "0026.smc")
+    with pytest.raises(CaptureError, match=r"cannot be written .*with ico3d capture resize"):
+        check_writable(plain / "deeper" / "0026.smc")  # before anything is tracked
+    check_writable(own.path)

@@ -109,6 +109,13 @@ def test_no_header_makes_sound_large(rate, channels, bits, claimed, payload):
         assert abs(len(pcm) - frames * RATE / rate) <= 2
 
 
+def test_a_part_that_claims_more_than_the_file_is_refused():
+    data = bytearray(wav(RATE, 1, 16, 3200, bytes(3200)))
+    data[4:8], data[16:20] = (500).to_bytes(4, "little"), (0x1020).to_bytes(4, "little")
+    with pytest.raises(ProtocolError, match="no WAV file"):
+        read_wav(io.BytesIO(bytes(data)))
+
+
 def test_a_file_that_claims_more_than_it_holds_is_read():
     pcm = read_wav(io.BytesIO(wav(RATE, 1, 16, 0xFFFFFFFE, bytes(3200))))
     assert len(pcm) == 1600
