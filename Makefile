@@ -27,8 +27,8 @@ page: src/ico3d/chat/static/index.html
 
 unit: $(VENV)/.develop src/ico3d/chat/static/index.html
 	# one thread each: tiny problems lose more by waiting for one another than they gain;
-	# two files at a time: talking with an avatar is mostly waiting
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(PY) -m pytest -n 2 --dist loadfile --durations 15
+	# three files at a time on two cores: talking with an avatar is mostly waiting
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(PY) -m pytest -n 3 --dist loadfile --no-loadscope-reorder --durations 15
 
 e2e: $(VENV)/.develop src/ico3d/chat/static/index.html
 	cd viewer && npm run --silent e2e

@@ -15,6 +15,12 @@ def cuda(monkeypatch):
     cuda_fault.cache_clear()
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files with slow tests come first: begun last, they would keep one process long alone."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
+
+
 def pytest_make_parametrize_id(val: object) -> str | None:
     """Names bytes by their length: names made of content differ where content does.
 

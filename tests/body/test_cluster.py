@@ -16,6 +16,8 @@ from ico3d.errors import MissingExtraError, SettingsError
 from ico3d.training.log import METRICS
 from ico3d.training.run import CHECKPOINT
 
+pytestmark = pytest.mark.slow
+
 
 def node(alive=True, **resources):
     """A machine as Ray describes it."""

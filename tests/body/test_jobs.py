@@ -21,6 +21,8 @@ from ico3d.training.finite import NotFiniteError
 from ico3d.training.loop import saved_steps
 from ico3d.training.run import CHECKPOINT
 
+pytestmark = pytest.mark.slow
+
 
 class Disturbed(Processes):
     """Processes to one of which something happens as soon as it has a checkpoint."""

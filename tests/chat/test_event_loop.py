@@ -18,6 +18,8 @@ from ico3d.measure.page import open_page
 
 from .conftest import OFFLINE, serving
 
+pytestmark = pytest.mark.slow
+
 LONGEST = 0.1  # s that the event loop may pause for longer than a thread that does nothing
 TRIES = 3  # a busy machine pauses now and then; what blocks does so every time
 BEAT = 0.005  # s

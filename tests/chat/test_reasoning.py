@@ -28,6 +28,8 @@ from .modules.serving import service_app
 from .modules.serving import serving as serving_app
 from .scripted_server import Script, Thought, running
 
+pytestmark = pytest.mark.slow
+
 ADA = Persona("Ada")
 CONTEXT = Context(ADA, None, None)
 SORRY = APOLOGIES["en"]["language"].split(". ")[0] + "."

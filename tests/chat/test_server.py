@@ -29,6 +29,8 @@ from ico3d.measure.page import open_page
 
 from .conftest import serving
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize(
     ("host", "origin", "own"),

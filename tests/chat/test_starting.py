@@ -23,6 +23,8 @@ from ico3d.measure.page import open_page
 from .conftest import OFFLINE, free_port, serving
 from .test_event_loop import first_message
 
+pytestmark = pytest.mark.slow
+
 UNREADY = "the avatar cannot talk now: something on the server does not start. Try again later."
 KINDS = ("recognition", "language", "voice")
 

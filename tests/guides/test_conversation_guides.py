@@ -31,6 +31,8 @@ from ico3d.common.espeak import synthesize
 from ico3d.common.weights import weights_named
 from ico3d.errors import BundleError, SettingsError
 
+pytestmark = pytest.mark.slow
+
 
 def _module(name):
     """A file beside this one."""

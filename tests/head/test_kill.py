@@ -11,6 +11,8 @@ import pytest
 from safetensors.torch import load_file
 from train_tiny import SETTINGS, train_tiny
 
+pytestmark = pytest.mark.slow
+
 KILLS = 5
 """Every second one comes while a checkpoint is being written."""
 

@@ -16,6 +16,8 @@ from ico3d.measure import body_bench
 from ico3d.measure.body_bench import Terms, Trial, mean, run_trials, summary
 from ico3d.measure.commands import BenchBody
 
+pytestmark = pytest.mark.slow
+
 METHODS = ("swings++", "swings", "4dgs", "spacetime", "freetime", "static")
 WINDOWS = (Window(0, 13), Window(13, 26), Window(26, 40))
 TINY = (

@@ -12,6 +12,8 @@ from ico3d.errors import SettingsError
 from ico3d.measure.crowd import SCRIPT, Visit, ahead, figures, measure, tone_of
 from ico3d.measure.scripted import tone
 
+pytestmark = pytest.mark.slow
+
 ROWS = np.zeros((1, 39), np.float16)
 
 

@@ -1,6 +1,7 @@
 import { afterAll, beforeAll, expect, test } from 'vitest';
 import { Browser } from '../support/browser.ts';
 import { feed, noise } from '../support/feeder.ts';
+import { lookAsBundled } from '../support/pictures.ts';
 import { runPython } from '../support/python.ts';
 import { scratchFolder } from '../support/scratch.ts';
 import { servePage } from '../support/static.ts';
@@ -20,7 +21,7 @@ beforeAll(async () => {
   runPython('phase_bundle.py', folder);
   server = await servePage(folder);
   browser = await Browser.launch({ width: SIZE, height: SIZE });
-  await browser.open(server.url);
+  await lookAsBundled(await browser.open(server.url), folder);
   await browser.page.evaluate(`window.noise = ${noise.toString()}`);
   await tap(browser.page);
   await watch();

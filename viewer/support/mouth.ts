@@ -1,4 +1,5 @@
 import type { Page } from 'playwright-core';
+import type { Manifest } from '../src/bundle/manifest.ts';
 
 /** The speech in the face's expression at one moment. */
 export interface Sight {
@@ -13,6 +14,7 @@ export interface Picture {
 }
 
 const PICTURE_EVERY = 400; // ms: software rendering takes its share of the processor from recogniser and voice
+const SETTLING = 1000; // ms
 
 declare global {
   interface Window {
@@ -25,9 +27,12 @@ declare global {
  * and then; no others are drawn.
  */
 export function watchMouth(page: Page): Promise<void> {
-  return page.evaluate((every) => {
+  return page.evaluate(async ([every, settling]) => {
     const FEATURES = 32; // of speech; those of the eyes follow
     const { stage, head } = window.ico3d!;
+    const { camera: start } = (await (await fetch('bundle/manifest.json')).json()) as Manifest;
+    stage.orbit.look(start); // from there on nothing moves the camera
+    await new Promise((resolve) => setTimeout(resolve, settling)); // splats are sorted aside
     const record: NonNullable<Window['mouth']> = { sights: [], pictures: [] };
     window.mouth = record;
     const gl = stage.renderer.getContext();
@@ -75,7 +80,7 @@ export function watchMouth(page: Page): Promise<void> {
       record.sights.push({ at, speech: Math.hypot(...rest.subarray(0, FEATURES).map((value, i) => value - expression[i]!)) });
       if (at - (record.pictures.at(-1)?.at ?? 0) > every) record.pictures.push({ at, change: change() });
     }, 33);
-  }, PICTURE_EVERY);
+  }, [PICTURE_EVERY, SETTLING] as const);
 }
 
 /** Everything watched so far. */

@@ -2,6 +2,7 @@ import { createReadStream, existsSync } from 'node:fs';
 import { createServer, type Server } from 'node:http';
 import type { AddressInfo } from 'node:net';
 import { extname, join } from 'node:path';
+import type { Duplex } from 'node:stream';
 import { REPOSITORY } from './python.ts';
 
 const BUILD = join(REPOSITORY, 'src/ico3d/chat/static');
@@ -13,7 +14,7 @@ const TYPES: Record<string, string> = {
   '.png': 'image/png',
 };
 
-/** Serves the built page with a bundle's folder, without a conversation. */
+/** Serves the built page with a bundle's folder; a conversation is always about to begin. */
 export async function servePage(bundle: string): Promise<{ url: string; close: () => void }> {
   const server: Server = createServer((request, response) => {
     const { pathname } = new URL(request.url!, 'http://localhost');
@@ -27,7 +28,13 @@ export async function servePage(bundle: string): Promise<{ url: string; close: (
     response.writeHead(200, { 'content-type': TYPES[extname(file)] ?? 'application/octet-stream' });
     createReadStream(file).pipe(response);
   });
+  const lines: Duplex[] = []; // never answered: a page that hears of none gives up after a while
+  server.on('upgrade', (_, line) => lines.push(line));
   await new Promise<void>((resolve) => server.listen(0, '127.0.0.1', resolve));
   const { port } = server.address() as AddressInfo;
-  return { url: `http://127.0.0.1:${port}/`, close: () => server.close() };
+  const close = () => {
+    server.close();
+    for (const line of lines) line.destroy();
+  };
+  return { url: `http://127.0.0.1:${port}/`, close };
 }

@@ -4,6 +4,7 @@ import type { Matrix } from '../protocol.ts';
 export class ExpressionTrack {
   private readonly rows: Float32Array[] = [];
   private readonly fps: number;
+  private first = Infinity; // row that is known; a page may join an utterance late
 
   constructor(fps: number) {
     this.fps = fps;
@@ -11,6 +12,7 @@ export class ExpressionTrack {
 
   /** Adds rows from index `first` on. */
   add(first: number, { rows, columns, values }: Matrix): void {
+    this.first = Math.min(this.first, first);
     for (let i = 0; i < rows; i++) this.rows[first + i] = values.subarray(i * columns, (i + 1) * columns);
   }
 
@@ -21,7 +23,7 @@ export class ExpressionTrack {
   /** The expression at a time of the sound, between rows linearly, held beyond the ends. */
   at(seconds: number, out: Float32Array): void {
     const last = this.rows.length - 1;
-    const row = Math.min(Math.max(seconds * this.fps, 0), last);
+    const row = Math.min(Math.max(seconds * this.fps, this.first), last);
     const index = Math.floor(row);
     const before = this.rows[index]!;
     const after = this.rows[Math.min(index + 1, last)]!;
