@@ -12,6 +12,14 @@ const matrix = (...rows: number[][]) => ({
   values: Float32Array.from(rows.flat()),
 });
 
+test('an expression track that was joined late holds its first row before that', () => {
+  const track = new ExpressionTrack(FPS);
+  track.add(2, matrix([3, 0], [5, 2]));
+  const out = new Float32Array(2);
+  track.at(0, out);
+  expect([...out]).toEqual([3, 0]);
+});
+
 describe('an expression track', () => {
   const track = new ExpressionTrack(FPS);
   track.add(0, matrix([0, 10], [1, 20]));
