@@ -58,21 +58,25 @@ def test_expressions_are_learnt_where_a_static_head_cannot(tiny, tmp_path):
     assert scores["no-blending"] > scores["static"]
 
 
+def _train_until(step: int, monkeypatch, capture, folder, job) -> None:
+    """A training that is interrupted before a step."""
+    whole_step = HeadTrainer.step
+
+    def dying_step(self, index):
+        if index == step:
+            raise KeyboardInterrupt
+        return whole_step(self, index)
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(HeadTrainer, "step", dying_step)
+        train_head(capture, folder, job)
+
+
 @pytest.mark.parametrize("inputs", ["blendshapes", "speech"])
 def test_a_killed_run_resumes_to_the_same_weights(tiny, tmp_path, inputs, monkeypatch):
     job = _job(inputs, steps=60, checkpoint_every=25, densify_from=10, densify_every=10)
     whole = train_head(tiny, tmp_path / "whole", job)
-    step = HeadTrainer.step
-
-    def dying_step(self, index):
-        if index == 55:
-            raise KeyboardInterrupt
-        return step(self, index)
-
-    monkeypatch.setattr(HeadTrainer, "step", dying_step)
-    with pytest.raises(KeyboardInterrupt):
-        train_head(tiny, tmp_path / "parts", job)
-    monkeypatch.setattr(HeadTrainer, "step", step)
+    _train_until(55, monkeypatch, tiny, tmp_path / "parts", job)
     resumed = train_head(tiny, tmp_path / "parts", job)
     for name, value in whole.model.state_dict().items():
         assert torch.equal(resumed.model.state_dict()[name], value), name
@@ -84,17 +88,7 @@ def test_a_killed_run_resumes_to_the_same_weights(tiny, tmp_path, inputs, monkey
 def test_a_run_and_its_head_know_their_space(tiny, tmp_path, monkeypatch):
     """The recording's head poses or points may become others: weights would not fit."""
     job = _job(steps=40, checkpoint_every=10)
-    step = HeadTrainer.step
-
-    def dying_step(self, index):
-        if index == 25:
-            raise KeyboardInterrupt
-        return step(self, index)
-
-    monkeypatch.setattr(HeadTrainer, "step", dying_step)
-    with pytest.raises(KeyboardInterrupt):
-        train_head(tiny, tmp_path / "head", job)
-    monkeypatch.setattr(HeadTrainer, "step", step)
+    _train_until(25, monkeypatch, tiny, tmp_path / "head", job)
     with monkeypatch.context() as patch:
         patch.setattr(tiny, "points", lambda frame=0: 1.1 * type(tiny).points(tiny))
         with pytest.raises(SettingsError, match="have changed since: train in an empty folder"):

@@ -65,16 +65,15 @@ def measure_motion(
     values = np.full((len(looked), len(cameras)), np.nan)
     for row, frame in enumerate(watch(looked)):
         for column, camera in enumerate(cameras):
-            view = _judged_view(capture, camera, frame, clip)
-            if view is not None:
+            view = recorded_view(capture, camera, frame, clip)
+            if view is not None and _is_told(view):
                 values[row, column] = _worst_part(whole, body, view)
     return _over_cameras(values, looked, clip.last + 1)
 
 
-def _judged_view(capture: Capture, camera: int, frame: int, clip: Span) -> View | None:
-    """A recorded picture; None where nothing tells the person from what is behind."""
-    told = capture.background(camera) is not None or capture.mask(camera, frame) is not None
-    return recorded_view(capture, camera, frame, clip) if told else None
+def _is_told(view: View) -> bool:
+    """Whether a mask or a clean plate tells the person from what is behind."""
+    return view.mask is not None or view.background.ndim == 3
 
 
 def _over_cameras(values: np.ndarray, frames: list[int], count: int) -> tuple[float, ...]:
