@@ -14,11 +14,12 @@ from pathlib import Path
 import numpy as np
 import tyro
 
-from ico3d.avatar import baking, comparison, staging
-from ico3d.avatar.bake_head import BakeSettings, HeadBaker, megabytes_per_10k
-from ico3d.avatar.samples import recorded_samples
-from ico3d.capture.capture import Capture
-from ico3d.head.trained import TrainedHead
+from ico3d.avatar import staging
+from ico3d.avatar.baking import head_bundle, head_cost
+from ico3d.avatar.baking.samples import recorded_samples
+from ico3d.avatar.baking.shader_head import BakeSettings, HeadBaker, megabytes_per_10k
+from ico3d.capture.formats import open_capture
+from ico3d.head.model_folder import TrainedHead
 
 
 @dataclass(frozen=True)
@@ -39,9 +40,9 @@ class Bench:
 
     def run(self) -> None:
         """Prints, and writes, one row per weighting and rank."""
-        head, capture = TrainedHead.load(self.model), Capture.open(self.capture)
+        head, capture = TrainedHead.load(self.model), open_capture(self.capture)
         neutral = staging.background_colour(capture, 0)
-        views = comparison.references(head, capture, neutral, baking.MEASURED_VIEWS)
+        views = head_cost.references(head, capture, neutral, head_bundle.MEASURED_VIEWS)
         samples = recorded_samples(head, capture)
         expressions, importance = samples.expressions, samples.importance
         rows = []
@@ -51,7 +52,7 @@ class Bench:
             seconds = time.perf_counter() - start
             for rank in self.ranks:
                 baked = baker.baked(rank)
-                loss = asdict(comparison.measure(baked, views))
+                loss = asdict(head_cost.measure(baked, views))
                 row = {"weights": name, "rank": rank, **loss, "fit_seconds": round(seconds, 1)}
                 rows.append(row | {"mb_per_10k": round(megabytes_per_10k(baked), 3)})
                 print(" ".join(f"{key} {value}" for key, value in rows[-1].items()), flush=True)

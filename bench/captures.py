@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import tyro
 
-from ico3d.capture.capture import Capture
+from ico3d.capture.formats import open_capture
 from ico3d.capture.resized import ResizedCapture
 
 
@@ -36,7 +36,7 @@ class Bench:
     def run(self) -> None:
         """Prints, and writes, one line."""
         begin = time.perf_counter()
-        capture = Capture.open(self.capture)
+        capture = open_capture(self.capture)
         opened = time.perf_counter() - begin
         if self.height:
             capture = ResizedCapture(capture, self.height)

@@ -33,10 +33,10 @@ from pipecat.processors.aggregators.llm_text_processor import LLMTextProcessor  
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor  # noqa: E402
 from pipecat.workers.runner import WorkerRunner  # noqa: E402
 
-from ico3d.chat.protocol import SPEECH_RATE  # noqa: E402
 from ico3d.chat.services.voice import espeak  # noqa: E402
 from ico3d.chat.services.voice.clauses import ClauseProcessor  # noqa: E402
 from ico3d.chat.services.voice.pieces import PieceVoice  # noqa: E402
+from ico3d.chat.wire.protocol import SPEECH_RATE  # noqa: E402
 
 TOKEN = 4  # characters
 SPEEDS = (10, 20, 50)  # tokens per second: a small model on a CPU to a served one on a GPU

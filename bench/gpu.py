@@ -22,12 +22,12 @@ import torch
 import tyro
 from torch import Tensor
 
-from ico3d.capture.capture import Capture
+from ico3d.capture.formats import open_capture
 from ico3d.common.camera import Camera, look_at
 from ico3d.common.device import DeviceName
 from ico3d.head.model import HeadModel, HeadShape
 from ico3d.head.settings import PRESETS
-from ico3d.head.train import HeadJob, train_head
+from ico3d.head.train_head import HeadJob, train_head
 from ico3d.splat.device import decided, device_name
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
@@ -179,7 +179,7 @@ class Bench:
     def _train(self, path: Path) -> float:
         job = HeadJob("blendshapes", "full", "builtin", 0, PRESETS["cpu"])
         with tempfile.TemporaryDirectory() as folder:
-            head = train_head(Capture.open(path), Path(folder), job, device=self.device)
+            head = train_head(open_capture(path), Path(folder), job, device=self.device)
         return head.summary["train_seconds"]
 
 

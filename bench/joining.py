@@ -25,7 +25,7 @@ from ico3d.avatar.joining.region import HeadRegion
 from ico3d.body.settings import settings_for
 from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera
-from ico3d.measure.body_bench import open_clip
+from ico3d.measure.methods.bench import open_clip
 from ico3d.splat.render import render
 from ico3d.training.changes import with_changes
 

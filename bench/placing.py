@@ -24,12 +24,13 @@ from ico3d.avatar.joining.cropping import cropped
 from ico3d.avatar.joining.found_placement import found_in_pictures
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.similarity import moved
-from ico3d.capture.canonical import canonical_landmarks
 from ico3d.capture.capture import Capture
+from ico3d.capture.face.canonical import canonical_landmarks
+from ico3d.capture.formats import open_capture
 from ico3d.capture.resized import ResizedCapture
+from ico3d.head.model_folder import TrainedHead
 from ico3d.head.settings import PRESETS
-from ico3d.head.train import HeadJob, train_head
-from ico3d.head.trained import TrainedHead
+from ico3d.head.train_head import HeadJob, train_head
 
 SHOTS = {
     "head": (0, "--rig bust --light studio --cameras 8 --frames 176 --size 224"),
@@ -78,7 +79,7 @@ class Placing:
         for name, (later, shot) in SHOTS.items():
             if not (folder / name / "capture.json").exists():
                 _record(subject, folder / name, seed + later, shot)
-        recording, body = Capture.open(folder / "head"), Capture.open(folder / "body")
+        recording, body = open_capture(folder / "head"), open_capture(folder / "body")
         head = self._trained(recording, folder / "model", seed)
         said: list[str] = []
         found, placement = found_in_pictures(head, body, folder, said.append, torch.device("cpu"))

@@ -18,7 +18,7 @@ from smc_files import write_renderme_fits
 from smc_line import timed
 
 from ico3d.bundle.format import Bundle
-from ico3d.capture.capture import Capture
+from ico3d.capture.formats import open_capture
 
 FPS = 30
 LEAST = 30.0
@@ -79,7 +79,7 @@ class RenderMeHead:
             who = ("--subject", self.subject, "--no-lively")
             timed("capture synthetic", studio, *who, *row, *more)
         if not files.exists():
-            write_renderme_fits(Capture.open(studio), files, "0001_e0")
+            write_renderme_fits(open_capture(studio), files, "0001_e0")
         return files
 
 

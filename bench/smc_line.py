@@ -19,7 +19,7 @@ import tyro
 from smc_files import write_dna, write_renderme
 
 from ico3d.bundle.format import Bundle
-from ico3d.capture.capture import Capture
+from ico3d.capture.formats import open_capture
 
 FPS = 15
 LIMIT = 40.0
@@ -108,7 +108,7 @@ class Line:
                 who = ("--subject", self.subject, "--seed", self.seed)
                 timed("capture synthetic", recorded, *who, *row, *more)
             if not folder.exists():
-                write(Capture.open(recorded), folder, name)
+                write(open_capture(recorded), folder, name)
         return files
 
 

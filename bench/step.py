@@ -17,11 +17,11 @@ import torch
 import tyro
 from torch.profiler import ProfilerActivity, profile
 
-from ico3d.capture.capture import Capture
+from ico3d.capture.formats import open_capture
 from ico3d.head.expressions import BlendshapeTrack
-from ico3d.head.initial import initial_head
+from ico3d.head.initial_gaussians import initial_head
+from ico3d.head.optimise import HeadTrainer
 from ico3d.head.settings import PRESETS
-from ico3d.head.trainer import HeadTrainer
 
 PARTS = {
     "projection": ("Project",),
@@ -67,7 +67,7 @@ class Bench:
             self.json.write_text(json.dumps(figures, indent=1))
 
     def _trainer(self) -> HeadTrainer:
-        capture = Capture.open(self.capture)
+        capture = open_capture(self.capture)
         settings = PRESETS["cpu"]
         settings = replace(settings, initial_gaussians=self.gaussians, max_gaussians=self.gaussians)
         track = BlendshapeTrack(capture, capture.blendshape_names or ())

@@ -7,7 +7,7 @@ import pytest
 def cuda(monkeypatch):
     """A machine with CUDA and gsplat, as far as errors of devices go; gives the device."""
     from ico3d.splat.device import cuda_fault
-    from pretended_cuda import CUDA, pretended_cuda
+    from support.pretended_cuda import CUDA, pretended_cuda
 
     cuda_fault.cache_clear()
     with pretended_cuda(monkeypatch):

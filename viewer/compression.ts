@@ -6,7 +6,7 @@ import type { Plugin } from 'vite';
 
 const TEXT = new Set(['.css', '.html', '.js', '.json', '.svg', '.wasm']);
 
-/** Ways to write a file smaller, by the suffix under which `ico3d/chat/page_files.py` looks for it. */
+/** Ways to write a file smaller, by the suffix under which `ico3d/chat/serving/page_files.py` looks for it. */
 const ENCODINGS: Record<string, (file: Buffer) => Promise<Buffer>> = {
   '.br': (file) => promisify(brotliCompress)(file, { params: { [constants.BROTLI_PARAM_SIZE_HINT]: file.length } }),
   '.gz': (file) => promisify(gzip)(file, { level: 9 }),

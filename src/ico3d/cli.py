@@ -21,11 +21,19 @@ class Verb:
 VERBS: dict[str, Verb] = {
     "demo": Verb("ico3d.chat.commands", "Demo", "talk with the avatar that comes in the package"),
     "capture portrait": Verb("ico3d.capture.commands", "Portrait", "track a talking-head video"),
-    "capture synthetic": Verb("ico3d.capture.commands", "Synthetic", "record a synthetic person"),
-    "capture import": Verb("ico3d.capture.commands", "Import", "take over COLMAP or nerfstudio"),
-    "capture masks": Verb("ico3d.capture.commands", "Masks", "cut people out by clean plates"),
-    "capture track": Verb("ico3d.capture.commands", "Track", "find the head in many cameras"),
-    "capture resize": Verb("ico3d.capture.commands", "Resize", "write it with smaller pictures"),
+    "capture synthetic": Verb("ico3d.studio.command", "Synthetic", "record a synthetic person"),
+    "capture import": Verb(
+        "ico3d.capture.multiview.commands", "Import", "take over COLMAP or nerfstudio"
+    ),
+    "capture masks": Verb(
+        "ico3d.capture.multiview.commands", "Masks", "cut people out by clean plates"
+    ),
+    "capture track": Verb(
+        "ico3d.capture.headtrack.command", "Track", "find the head in many cameras"
+    ),
+    "capture resize": Verb(
+        "ico3d.capture.multiview.commands", "Resize", "write it with smaller pictures"
+    ),
     "capture check": Verb("ico3d.capture.commands", "Check", "check it, draw a contact sheet"),
     "train head": Verb("ico3d.head.commands", "TrainHead", "train HeadGaS++ on a capture"),
     "train static": Verb("ico3d.scene.commands", "TrainStatic", "train a scene that stands still"),
@@ -33,8 +41,8 @@ VERBS: dict[str, Verb] = {
     "train speech": Verb("ico3d.speech.commands", "TrainSpeech", "train the speech encoder"),
     "assemble": Verb("ico3d.avatar.joining.command", "Assemble", "put a head on a person's body"),
     "evaluate": Verb("ico3d.measure.commands", "Evaluate", "measure a model on held-out frames"),
-    "animate": Verb("ico3d.avatar.animate", "Animate", "find a body's rest and gestures"),
-    "bake": Verb("ico3d.avatar.commands", "Bake", "make the bundle that browsers play"),
+    "animate": Verb("ico3d.avatar.animation.command", "Animate", "find a body's rest and gestures"),
+    "bake": Verb("ico3d.avatar.baking.command", "Bake", "make the bundle that browsers play"),
     "bundle info": Verb("ico3d.bundle.commands", "Info", "check a bundle, say what is in it"),
     "render": Verb("ico3d.avatar.film.command", "Render", "film a person who talks or moves"),
     "convert": Verb("ico3d.splat.commands", "Convert", "convert files of 3D Gaussians"),
@@ -43,16 +51,16 @@ VERBS: dict[str, Verb] = {
     "weights fetch": Verb("ico3d.common.commands", "FetchWeights", "download some of them"),
     "weights onnx": Verb("ico3d.speech.commands", "ExportEncoder", "make an encoder servable"),
     "serve-module": Verb(
-        "ico3d.chat.modules.commands", "ServeModule", "serve one part of the conversation"
+        "ico3d.chat.remote.commands", "ServeModule", "serve one part of the conversation"
     ),
     "bench body": Verb("ico3d.measure.commands", "BenchBody", "compare methods for bodies"),
     "bench expression": Verb("ico3d.measure.commands", "BenchExpression", "measure the mouth"),
     "bench raster": Verb("ico3d.measure.commands", "BenchRaster", "time the rasteriser"),
     "bench chat": Verb(
-        "ico3d.measure.chat_commands", "BenchChat", "time answers and interruptions"
+        "ico3d.measure.talking.commands", "BenchChat", "time answers and interruptions"
     ),
     "bench sessions": Verb(
-        "ico3d.measure.chat_commands", "BenchSessions", "let many visitors talk at once"
+        "ico3d.measure.talking.commands", "BenchSessions", "let many visitors talk at once"
     ),
 }
 

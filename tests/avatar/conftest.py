@@ -7,12 +7,12 @@ import numba
 import pytest
 import torch
 
-from ico3d.avatar import baking, comparison
-from ico3d.avatar.bake_head import BakeSettings
-from ico3d.avatar.persona import load_persona
-from ico3d.avatar.samples import recorded_samples
+from ico3d.avatar.baking import head_bundle, head_cost
+from ico3d.avatar.baking.persona import load_persona
+from ico3d.avatar.baking.samples import recorded_samples
+from ico3d.avatar.baking.shader_head import BakeSettings
 from ico3d.bundle.format import Bundle
-from ico3d.head.trained import TrainedHead
+from ico3d.head.model_folder import TrainedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
 
@@ -60,10 +60,12 @@ def baked(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("planted")
     make = _speech_head if request.param == "speech" else _blendshape_head
     head, capture = make(folder)
-    views = comparison.references(head, capture, (0.5, 0.5, 0.5), 6)
+    views = head_cost.references(head, capture, (0.5, 0.5, 0.5), 6)
     quick = BakeSettings(hidden=64, augmented=100, steps=300)
     samples = recorded_samples(head, capture)
-    result = baking.bake(head, views, samples, 8, [].append, quick)
+    result = head_bundle.bake(head, views, samples, 8, [].append, quick)
     out = folder / "planted.ico3d"
-    baking.write(out, "Planted", result, samples, head, capture, load_persona(None), "A notice.")
+    head_bundle.write(
+        out, "Planted", result, samples, head, capture, load_persona(None), "A notice."
+    )
     return head, capture, Bundle.open(out)

@@ -9,7 +9,7 @@ from ico3d.capture.capture import Capture, Sound, last_eleventh
 from ico3d.common.camera import Camera, look_at
 from ico3d.common.expression import EyeRange, eye_range
 from ico3d.head.model import HeadModel, HeadShape
-from ico3d.head.trained import TrainedHead
+from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.render import render
 
 SIZE, FRAMES, COUNT = 48, 66, 300

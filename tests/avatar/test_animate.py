@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from ico3d.avatar.animated import open_person
+from ico3d.avatar.animation.animated import open_person
 from ico3d.bundle.animation import Action, Animation, Rest
-from ico3d.capture.capture import Capture
 from ico3d.cli import main
 from ico3d.splat.device import CPU
+from support.captures import open_with
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "bundle"))
 sys.path.insert(0, str(Path(__file__).parent))
@@ -51,7 +51,7 @@ def test_gestures_that_look_bad_are_refused(avatar, tmp_path, capsys, monkeypatc
         return picture(camera, 0)[::-1].copy() if 9 <= frame <= 10 else picture(camera, frame)
 
     monkeypatch.setattr(capture, "image", image)
-    monkeypatch.setattr(Capture, "open", lambda path: capture)
+    open_with(monkeypatch, lambda path: capture)
     asked = Animation(15.0, FRAMES, Rest(1, 5), (Action(7, 0.5), Action(9, 1.0), Action(12, 0.8)))
     (avatar / "animation.json").write_bytes(asked.to_bytes())
     out, sheet = tmp_path / "animation.json", tmp_path / "sheet.png"

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import torch
 
-from ico3d.avatar import body_bundle, measure_body
-from ico3d.avatar.bake_body import Shape, WindowBaker, aligned
+from ico3d.avatar.baking import body_bundle, body_cost
+from ico3d.avatar.baking.shader_body import Shape, WindowBaker, aligned
 from ico3d.avatar.render_bundle import body_gaussians, render_body, visitor_camera, window_gaussians
-from ico3d.body.formulas import SPACETIME
-from ico3d.body.model import WindowModel
-from ico3d.body.trained import TrainedBody, save_window
-from ico3d.body.windows import Window
+from ico3d.body.model_folder import TrainedBody, save_window
+from ico3d.body.motion.formulas import SPACETIME
+from ico3d.body.motion.window_model import WindowModel
+from ico3d.body.planning.windows import Window
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import Loss, Persona
 from ico3d.capture.capture import Capture, all_frames
@@ -113,13 +113,13 @@ def test_the_baked_window_is_the_exact_one_also_between_sampled_times(person, in
 
 def test_a_higher_rank_is_better_and_larger(person):
     baker = WindowBaker(person, 1)
-    probes = measure_body.probe_views(
-        measure_body.ring_of_cameras(np.array([-0.5, 0, -0.5]), np.array([0.5, 1.8, 0.5])),
+    probes = body_cost.probe_views(
+        body_cost.ring_of_cameras(np.array([-0.5, 0, -0.5]), np.array([0.5, 1.8, 0.5])),
         person.windows[1],
         6,
     )
     windows = [baker.baked(Shape(1, ranks)) for ranks in ((1, 1, 1), (3, 2, 1), (5, 3, 2))]
-    losses = [measure_body.measure_window(person, 1, w, [], probes) for w in windows]
+    losses = [body_cost.measure_window(person, 1, w, [], probes) for w in windows]
     likeness = [loss.psnr_baked_vs_exact or 0.0 for loss in losses]
     assert likeness[0] + 3 < likeness[1] < likeness[2] - 1
     sizes = [len(window.to_bytes("w")) for window in windows]

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import torch
 
-from ico3d.avatar import baking, comparison
-from ico3d.avatar.bake_head import CLIP, BakeSettings, HeadBaker
-from ico3d.avatar.persona import load_persona
+from ico3d.avatar.baking import head_bundle, head_cost
+from ico3d.avatar.baking.persona import load_persona
+from ico3d.avatar.baking.shader_head import CLIP, BakeSettings, HeadBaker
 from ico3d.avatar.render_bundle import render_bundle
 from ico3d.bundle.evaluate import logits
 from ico3d.bundle.manifest import Loss
@@ -43,9 +43,9 @@ def test_baked_logits_are_the_exact_ones(blendshape_head):
 
 def test_a_higher_rank_is_better_and_larger(blendshape_head):
     head, capture = blendshape_head
-    views = comparison.references(head, capture, (0.5, 0.5, 0.5), 6)
+    views = head_cost.references(head, capture, (0.5, 0.5, 0.5), 6)
     maker = baker(head, capture)
-    losses = [comparison.measure(maker.baked(rank), views) for rank in (1, 4, 16)]
+    losses = [head_cost.measure(maker.baked(rank), views) for rank in (1, 4, 16)]
     likeness = [loss.psnr_baked_vs_exact or 0.0 for loss in losses]
     assert likeness[0] + 2 < likeness[1] < likeness[2]
 
@@ -68,11 +68,11 @@ def test_one_seed_gives_one_bundle(blendshape_head):
 def test_measured_pictures_are_the_noise_apart(blendshape_head):
     """The exact model made the pictures, so its PSNR is that of the noise: −20·log10 σ."""
     head, capture = blendshape_head
-    views = comparison.references(head, capture, (0.5, 0.5, 0.5), 6)
-    loss = comparison.measure(baker(head, capture).baked(16), views)
+    views = head_cost.references(head, capture, (0.5, 0.5, 0.5), 6)
+    loss = head_cost.measure(baker(head, capture).baked(16), views)
     assert loss.psnr_exact == pytest.approx(-20 * np.log10(0.03), abs=0.3)
     assert loss.psnr_baked == pytest.approx(loss.psnr_exact, abs=0.3)
-    assert comparison.strip(baker(head, capture).baked(2), views, 2).shape == (96, 144, 3)
+    assert head_cost.strip(baker(head, capture).baked(2), views, 2).shape == (96, 144, 3)
 
 
 @pytest.mark.parametrize(
@@ -85,11 +85,11 @@ def test_measured_pictures_are_the_noise_apart(blendshape_head):
     ],
 )
 def test_bounds(loss, megabytes, good):
-    result = baking.BakedResult(random_head(5, rank=2), loss, megabytes)
+    result = head_bundle.BakedResult(random_head(5, rank=2), loss, megabytes)
     assert result.acceptable is good
     if not good:
         with pytest.raises(BundleError, match="--force"):
-            baking.check(result)
+            head_bundle.check(result)
 
 
 def speaks(baked):
@@ -123,7 +123,7 @@ def test_a_rendered_bundle_looks_like_the_exact_head(baked):
         capture.background(camera),
         capture.world_from_head(frame),
     )
-    assert comparison.psnr(picture, capture.image(camera, frame)) > 27  # the noise is 30 dB
+    assert head_cost.psnr(picture, capture.image(camera, frame)) > 27  # the noise is 30 dB
 
 
 def test_the_bundles_speech_graph_speaks_the_adaptors_language(baked):
@@ -155,7 +155,7 @@ def test_what_drives_an_avatar_stays_within_what_was_recorded(baked):
     head, capture, _ = speaks(baked)
     recorded = expressions(head, capture, capture.split.train)
     exact = baker(head, capture).baked(8)
-    driven = baking.driven(exact, head)
+    driven = head_bundle.driven(exact, head)
     for row in recorded[::9]:
         np.testing.assert_allclose(
             logits(driven, driving(head, row)), logits(exact, row), atol=1e-4

@@ -7,21 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pretended_cuda import drawn
+from support.pretended_cuda import drawn
 
 sys.path.insert(0, str(Path(__file__).parent))
 from whole_person import WholeFilmed, head_recording, write_whole_person
 
-from ico3d.avatar import baking, body_bundle, comparison, whole_bundle
-from ico3d.avatar.bake_head import BakeSettings
+from ico3d.avatar.animation.keyframes import Motion
+from ico3d.avatar.baking import body_bundle, head_bundle, head_cost, person_bundle
+from ico3d.avatar.baking.samples import recorded_samples
+from ico3d.avatar.baking.shader_head import BakeSettings
 from ico3d.avatar.film.camera_path import orbit, ring_around
 from ico3d.avatar.film.film import extent, pictures
-from ico3d.avatar.keyframes import Motion
-from ico3d.avatar.samples import recorded_samples
-from ico3d.body.trained import TrainedBody
+from ico3d.body.model_folder import TrainedBody
 from ico3d.bundle.format import Bundle
-from ico3d.capture.capture import Capture
 from ico3d.cli import main
+from support.captures import open_with
 
 QUICK = BakeSettings(hidden=32, augmented=20, steps=40)
 
@@ -40,9 +40,9 @@ def test_a_head_is_baked(cuda, blendshape_head):
     capture.head = copy.deepcopy(head)
 
     def baked():
-        views = comparison.references(head, capture, (0.5, 0.5, 0.5), 3)
+        views = head_cost.references(head, capture, (0.5, 0.5, 0.5), 3)
         samples = recorded_samples(head, capture)
-        return samples, baking.bake(head, views, samples, 4, [].append, QUICK)
+        return samples, head_bundle.bake(head, views, samples, 4, [].append, QUICK)
 
     here, there = baked(), (head.model.to(cuda), baked())[1]
     np.testing.assert_allclose(there[0].importance, here[0].importance, rtol=1e-3)
@@ -81,11 +81,11 @@ def _run(*words) -> None:
 
 def test_the_verbs_bake_film_and_animate_there(cuda, folder, tmp_path, monkeypatch):
     """Also what is a bundle already."""
-    person = whole_bundle.TrainedAvatar.load(folder)
+    person = person_bundle.TrainedAvatar.load(folder)
     recordings = {"head": head_recording(tmp_path), "body": WholeFilmed(person, tmp_path)}
-    monkeypatch.setattr(Capture, "open", lambda path: recordings[Path(path).name])
-    monkeypatch.setattr(baking, "BakeSettings", lambda: QUICK)
-    monkeypatch.setattr(baking, "MEASURED_VIEWS", 4)
+    open_with(monkeypatch, lambda path: recordings[Path(path).name])
+    monkeypatch.setattr(head_bundle, "BakeSettings", lambda: QUICK)
+    monkeypatch.setattr(head_bundle, "MEASURED_VIEWS", 4)
     monkeypatch.setattr(body_bundle, "SHAPES", body_bundle.SHAPES[:1])
     bundle, film = tmp_path / "a.ico3d", tmp_path / "a.mp4"
     bake = ("bake", folder, "head", "body", bundle, "--rank", 4, "--force")

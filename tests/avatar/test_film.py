@@ -18,9 +18,9 @@ from ico3d.avatar.film.camera_path import orbit, read_key_cameras, ring_around, 
 from ico3d.avatar.film.command import Render
 from ico3d.avatar.film.film import back_and_forth, extent, pictures
 from ico3d.avatar.film.video import write_video
-from ico3d.capture.capture import Capture
 from ico3d.common.camera import look_at
 from ico3d.errors import CaptureError, ModelError, SettingsError
+from support.captures import open_with
 
 WIDTH, HEIGHT = 64, 96
 
@@ -186,7 +186,7 @@ def test_the_verb_films_a_body(tmp_path, capture, capsys):
 
 
 def test_the_verb_takes_paths_and_captures(tmp_path, capture, monkeypatch):
-    monkeypatch.setattr(Capture, "open", MovingCapture)
+    open_with(monkeypatch, MovingCapture)
     still_body(capture, tmp_path / "body")
     path = _file(tmp_path, {"eye": [0, 0, 3], "target": [0, 0, 0]})
     for name, arguments in {"a": {"path": str(path)}, "b": {"capture": tmp_path}}.items():

@@ -3,7 +3,7 @@
 import numpy as np
 import torch
 
-from ico3d.avatar.importance import logit_importance
+from ico3d.avatar.baking.importance import logit_importance
 from ico3d.splat.render import render
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ico3d.avatar.keyframes import Motion, find_actions, find_animation, find_rest
+from ico3d.avatar.animation.keyframes import Motion, find_actions, find_animation, find_rest
 from ico3d.bundle.animation import Rest
 from ico3d.splat.gaussians import Gaussians
 

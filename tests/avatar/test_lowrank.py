@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from ico3d.avatar.distil import augmented, distil
-from ico3d.avatar.lowrank import factorise
-from ico3d.avatar.quantise import quantise
+from ico3d.avatar.baking.distil import augmented, distil
+from ico3d.avatar.baking.lowrank import factorise
+from ico3d.avatar.baking.quantise import quantise
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ico3d.avatar.motion_clusters import Channel, components, group
+from ico3d.avatar.baking.motion_clusters import Channel, components, group
 
 STEPS, EACH = 15, 40
 

@@ -12,9 +12,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 from moving_body import MovingPerson, Span
 from test_bake_body import FilmedPerson
 
-from ico3d.avatar.animate import table
-from ico3d.avatar.keyframes import Motion
-from ico3d.avatar.motion_quality import (
+from ico3d.avatar.animation.command import table
+from ico3d.avatar.animation.keyframes import Motion
+from ico3d.avatar.animation.motion_quality import (
     FAR_BELOW,
     in_words,
     least_quality,

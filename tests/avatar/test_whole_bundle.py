@@ -16,18 +16,18 @@ from random_bundle import random_head
 from test_bake_body import NOISE, SIZE
 from whole_person import FPS, FRAMES, NECK, WholeFilmed, head_recording, write_whole_person
 
-from ico3d.avatar import baking, whole_bundle
-from ico3d.avatar.bake_head import BakeSettings
-from ico3d.avatar.comparison import psnr
-from ico3d.avatar.persona import load_persona
+from ico3d.avatar.baking import head_bundle, person_bundle
+from ico3d.avatar.baking.head_cost import psnr
+from ico3d.avatar.baking.persona import load_persona
+from ico3d.avatar.baking.shader_head import BakeSettings
 from ico3d.avatar.render_bundle import avatar_gaussians, baked_gaussians, visitor_camera
 from ico3d.bundle.animation import Animation, Rest
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import Loss
-from ico3d.capture.capture import Capture
 from ico3d.cli import main
 from ico3d.errors import BundleError
 from ico3d.splat.render import render
+from support.captures import open_with
 
 QUICK = BakeSettings(hidden=64, augmented=100, steps=300)
 
@@ -45,8 +45,8 @@ def baked(avatar, tmp_path_factory):
     out = tmp_path_factory.mktemp("baked")
     recordings = {"head": head_recording(out / "head"), "body": WholeFilmed(person, out / "body")}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Capture, "open", lambda path: recordings[Path(path).name])
-        patch.setattr(baking, "BakeSettings", lambda: QUICK)
+        open_with(patch, lambda path: recordings[Path(path).name])
+        patch.setattr(head_bundle, "BakeSettings", lambda: QUICK)
         words = [folder, "head", "body", out / "a.ico3d", "--strip", out / "strip.png"]
         assert main(["bake", *map(str, words), "--rank", "16", "--name", "Both", "--force"]) == 0
     return Bundle.open(out / "a.ico3d"), out / "strip.png", person, recordings["body"]
@@ -112,7 +112,7 @@ def test_the_strip_shows_recorded_exact_and_baked(baked):
 def test_a_head_moves_as_gaussians_do(avatar):
     head, similarity = random_head(40), avatar[1].placement.canonical_from_head
     face = np.linspace(-1, 1, 39)
-    moved = baked_gaussians(whole_bundle.moved_head(head, similarity), face)
+    moved = baked_gaussians(person_bundle.moved_head(head, similarity), face)
     expected = baked_gaussians(head, face).transform(similarity)
     torch.testing.assert_close(moved.means, expected.means)
     torch.testing.assert_close(moved.scales, expected.scales, rtol=4e-3, atol=0)
@@ -125,7 +125,7 @@ def test_without_a_recording_voices_say_how_the_face_moves(avatar):
     person = avatar[1]
     persona = load_persona(None)
     few = type(persona)(persona.name, persona.greeting, persona.notes[:2])
-    samples, views = whole_bundle.head_samples(person, None, few)
+    samples, views = person_bundle.head_samples(person, None, few)
     assert samples.expressions.shape[1] == 39 and len(samples.expressions) > FRAMES + 50
     lids = samples.expressions[FRAMES:, 32 + 5]
     assert lids.max() > 0.9  # somebody blinks, but not farther than the person ever did
@@ -137,23 +137,23 @@ def test_without_a_recording_voices_say_how_the_face_moves(avatar):
 
 def test_an_edited_animation_is_taken(avatar, tmp_path):
     folder, person = avatar
-    found = whole_bundle.animation_of(folder, person)
+    found = person_bundle.animation_of(folder, person)
     assert (found.num_frames, found.fps) == (FRAMES, FPS)
     edited = Animation(FPS, FRAMES, Rest(2, 5), ())
     shutil.copytree(folder, tmp_path / "avatar")
     (tmp_path / "avatar" / "animation.json").write_bytes(edited.to_bytes())
-    assert whole_bundle.animation_of(tmp_path / "avatar", person) == edited
+    assert person_bundle.animation_of(tmp_path / "avatar", person) == edited
     (tmp_path / "avatar" / "animation.json").write_text(json.dumps({"version": 1}))
     with pytest.raises(BundleError, match=r"animation\.json"):
-        whole_bundle.animation_of(tmp_path / "avatar", person)
+        person_bundle.animation_of(tmp_path / "avatar", person)
 
 
 def test_what_costs_too_much_is_refused(baked):
-    result = whole_bundle.WholeResult(None, [], np.zeros(39), Loss(30.0, 29.8, 40.0))
-    whole_bundle.check(result)
-    bad = whole_bundle.WholeResult(None, [], np.zeros(39), Loss(30.0, 29.6, 40.0))
+    result = person_bundle.WholeResult(None, [], np.zeros(39), Loss(30.0, 29.8, 40.0))
+    person_bundle.check(result)
+    bad = person_bundle.WholeResult(None, [], np.zeros(39), Loss(30.0, 29.6, 40.0))
     with pytest.raises(BundleError, match="whole person too much"):
-        whole_bundle.check(bad)
+        person_bundle.check(bad)
 
 
 def test_too_many_files_are_refused(avatar, capsys):

@@ -9,13 +9,13 @@ from planted import PlantedCapture, planted_eyes, planted_model
 from test_bake_body import FilmedPerson
 
 from ico3d.avatar.avatar import BODY, Placement, TrainedAvatar
-from ico3d.avatar.samples import training_expressions
-from ico3d.body.formulas import SPACETIME
-from ico3d.body.model import WindowModel
-from ico3d.body.trained import TrainedBody, save_window
-from ico3d.body.windows import Window
+from ico3d.avatar.baking.samples import training_expressions
+from ico3d.body.model_folder import TrainedBody, save_window
+from ico3d.body.motion.formulas import SPACETIME
+from ico3d.body.motion.window_model import WindowModel
+from ico3d.body.planning.windows import Window
 from ico3d.common.expression import EyeRange
-from ico3d.head.trained import TrainedHead
+from ico3d.head.model_folder import TrainedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
 

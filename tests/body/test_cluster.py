@@ -10,8 +10,8 @@ import pytest
 from test_jobs import wait_for
 from window_tasks import CHECKPOINT_EVERY, step_gone_on_from, tasks
 
-from ico3d.body.cluster import RayCluster, share
-from ico3d.body.jobs import train_windows
+from ico3d.body.workers.cluster import RayCluster, share
+from ico3d.body.workers.jobs import train_windows
 from ico3d.errors import MissingExtraError, SettingsError
 from ico3d.training.log import METRICS
 from ico3d.training.run import CHECKPOINT

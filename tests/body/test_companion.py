@@ -10,15 +10,15 @@ from test_trainer import SMALL, WINDOW
 from window_parts import canonical
 
 from ico3d.body.companion import MOMENTS, PRUNE_EVERY, Pruning
-from ico3d.body.finetune import FineTuner
-from ico3d.body.formulas import FREETIME, Still
-from ico3d.body.model import WindowModel
+from ico3d.body.motion.formulas import FREETIME, Still
+from ico3d.body.motion.window_model import WindowModel
+from ico3d.body.planning.windows import Window
 from ico3d.body.settings import settings_for
-from ico3d.body.start import begin_window, continued_window
-from ico3d.body.train import BodyJob, train_body
-from ico3d.body.trainer import BodyTrainer
-from ico3d.body.views import BodyViews
-from ico3d.body.windows import Window
+from ico3d.body.training.finetune_window import FineTuner
+from ico3d.body.training.optimise_window import BodyTrainer
+from ico3d.body.training.prepare_window import begin_window, continued_window
+from ico3d.body.training.train_clip import BodyJob, train_body
+from ico3d.body.training.views import BodyViews
 from ico3d.errors import ModelError, SettingsError
 from ico3d.splat.density import Population
 from ico3d.splat.gaussians import Gaussians, cat

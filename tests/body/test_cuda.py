@@ -7,10 +7,10 @@ import torch
 from moving_capture import MovingCapture
 from test_train import TINY
 
-from ico3d.body.finetune import FineTuner
 from ico3d.body.settings import settings_for
-from ico3d.body.train import BodyJob, train_body
-from ico3d.body.trainer import BodyTrainer
+from ico3d.body.training.finetune_window import FineTuner
+from ico3d.body.training.optimise_window import BodyTrainer
+from ico3d.body.training.train_clip import BodyJob, train_body
 
 DEATHS = {BodyTrainer: 8, FineTuner: 4}
 """Steps before which a run is interrupted."""

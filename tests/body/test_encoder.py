@@ -6,7 +6,7 @@ import numba
 import pytest
 import torch
 
-from ico3d.body.encoder import (
+from ico3d.body.motion.encoder import (
     EncoderShape,
     encode,
     initial_planes,

@@ -8,11 +8,11 @@ import torch
 from moving_capture import MovingCapture
 from test_trainer import SMALL, trainer_of
 
-from ico3d.body.finetune import FineTuner, around
-from ico3d.body.model import CANONICAL
+from ico3d.body.motion.window_model import CANONICAL
+from ico3d.body.planning.windows import Window
 from ico3d.body.settings import settings_for
-from ico3d.body.views import MARGIN, BodyViews
-from ico3d.body.windows import Window
+from ico3d.body.training.finetune_window import FineTuner, around
+from ico3d.body.training.views import MARGIN, BodyViews
 from ico3d.splat.initial import in_pictures
 from ico3d.splat.render import render
 

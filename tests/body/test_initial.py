@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from moving_ball import AXES, BALL
 
-from ico3d.body.initial import initial_points, point_colors
-from ico3d.capture.coverage import visible
+from ico3d.body.training.surface_points import initial_points, point_colors
+from ico3d.capture.surface.coverage import visible
 from ico3d.errors import CaptureError
 
 

@@ -14,8 +14,8 @@ import pytest
 from window_tasks import CHECKPOINT_EVERY, step_gone_on_from, tasks
 
 from ico3d.body.commands import TrainBody
-from ico3d.body.jobs import RETRIES, Lost, train_windows
-from ico3d.body.processes import Processes, Worker
+from ico3d.body.workers.jobs import RETRIES, Lost, train_windows
+from ico3d.body.workers.processes import Processes, Worker
 from ico3d.errors import CaptureError, MissingExtraError, ModelError, SettingsError
 from ico3d.training.finite import NotFiniteError
 from ico3d.training.loop import saved_steps
@@ -133,7 +133,8 @@ def test_workers_end_with_the_one_who_started_them(recorded, tmp_path):
     """Even if that is killed: nobody would stop them, and who comes next writes the same files."""
     command = (
         "import sys; from pathlib import Path; from window_tasks import tasks;"
-        "from ico3d.body.jobs import train_windows; from ico3d.body.processes import Processes;"
+        "from ico3d.body.workers.jobs import train_windows;"
+        "from ico3d.body.workers.processes import Processes;"
         "made = tasks(*map(Path, sys.argv[1:]), 'static', steps_per_frame=10_000);"
         "train_windows(made[:1], Processes(1, False))"
     )

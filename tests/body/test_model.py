@@ -8,15 +8,15 @@ import pytest
 import torch
 from window_parts import ENCODED, POSITIONAL, canonical
 
-from ico3d.body.deformation import GRID, MLP
-from ico3d.body.encoder import EncoderShape
-from ico3d.body.formulas import FREETIME, SPACETIME, Still
-from ico3d.body.model import WindowModel, activated
-from ico3d.body.motions import motion_from
+from ico3d.body.motion.deformation import GRID, MLP
+from ico3d.body.motion.encoder import EncoderShape
+from ico3d.body.motion.formulas import FREETIME, SPACETIME, Still
+from ico3d.body.motion.opening import motion_from
+from ico3d.body.motion.tunable import MlpShape
+from ico3d.body.motion.window_model import WindowModel, activated
+from ico3d.body.planning.windows import Window
 from ico3d.body.settings import settings_for
-from ico3d.body.start import PADDING, deformation
-from ico3d.body.tunable import MlpShape
-from ico3d.body.windows import Window
+from ico3d.body.training.prepare_window import PADDING, deformation
 
 MOTIONS = [Still(), SPACETIME, FREETIME, ENCODED, POSITIONAL]
 

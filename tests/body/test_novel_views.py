@@ -8,7 +8,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.linalg import expm
 from scipy.spatial.transform import RigidTransform
 
-from ico3d.body.novel_views import mean_pose, novel_camera, se3_exp, se3_log
+from ico3d.body.training.novel_views import mean_pose, novel_camera, se3_exp, se3_log
 from ico3d.common.camera import Camera, look_at
 
 MIDDLE = np.array([0.2, 1.0, -0.3])

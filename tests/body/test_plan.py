@@ -7,9 +7,9 @@ import pytest
 from PIL import Image
 from rich.console import Console
 
-from ico3d.body.plan import PlanSettings, load_plan, make_plan, print_plan, save_plan
-from ico3d.body.plan_picture import draw_plan
-from ico3d.body.windows import Window
+from ico3d.body.planning.plan import PlanSettings, load_plan, make_plan, print_plan, save_plan
+from ico3d.body.planning.plan_picture import draw_plan
+from ico3d.body.planning.windows import Window
 from ico3d.errors import ModelError
 
 HEIGHTS = np.cumsum([0, *[0.0] * 4, *[0.1] * 3, *[0.0] * 3, *[-0.12] * 2])

@@ -7,10 +7,10 @@ import pytest
 import torch
 from moving_capture import FRAMES, MovingCapture
 
+from ico3d.body.model_folder import TrainedBody
+from ico3d.body.planning.windows import Window
 from ico3d.body.settings import settings_for
-from ico3d.body.train import BodyJob, train_body
-from ico3d.body.trained import TrainedBody
-from ico3d.body.windows import Window
+from ico3d.body.training.train_clip import BodyJob, train_body
 from ico3d.errors import SettingsError
 
 TINY = {

@@ -7,12 +7,12 @@ import pytest
 import torch
 from moving_capture import MovingCapture
 
-from ico3d.body.learner import Learner
+from ico3d.body.planning.windows import Window
 from ico3d.body.settings import settings_for
-from ico3d.body.start import begin_window
-from ico3d.body.trainer import BodyTrainer
-from ico3d.body.views import BodyViews
-from ico3d.body.windows import Window
+from ico3d.body.training.optimise_window import BodyTrainer
+from ico3d.body.training.picture_step import Learner
+from ico3d.body.training.prepare_window import begin_window
+from ico3d.body.training.views import BodyViews
 from ico3d.splat.losses import ssim
 from ico3d.splat.render import render
 

@@ -6,7 +6,7 @@ import numba
 import pytest
 import torch
 
-from ico3d.body.tunable import MlpShape, initial_weights, positional_encoding, tunable_mlp
+from ico3d.body.motion.tunable import MlpShape, initial_weights, positional_encoding, tunable_mlp
 from ico3d.errors import SettingsError
 
 SHAPE = MlpShape(inputs=16)

@@ -5,7 +5,7 @@ import pytest
 import torch
 from moving_capture import MovingCapture
 
-from ico3d.body.views import MARGIN, BodyViews
+from ico3d.body.training.views import MARGIN, BodyViews
 from ico3d.errors import CaptureError
 
 CPU = torch.device("cpu")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ico3d.body.windows import Window, cut
+from ico3d.body.planning.windows import Window, cut
 from ico3d.errors import SettingsError
 
 

@@ -2,9 +2,9 @@
 
 import torch
 
-from ico3d.body.deformation import Deformation
-from ico3d.body.encoder import EncoderShape
-from ico3d.body.tunable import MlpShape
+from ico3d.body.motion.deformation import Deformation
+from ico3d.body.motion.encoder import EncoderShape
+from ico3d.body.motion.tunable import MlpShape
 
 ENCODED = Deformation(
     (0.0, 1.0, 0.0), (1.0, 1.0, 0.5), MlpShape(8, 6, 2), EncoderShape((4,), 3, 8), 0

@@ -6,9 +6,9 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+from ico3d.body.planning.windows import Window
 from ico3d.body.settings import settings_for
-from ico3d.body.train import BodyJob, WindowTask, train_window
-from ico3d.body.windows import Window
+from ico3d.body.training.train_clip import BodyJob, WindowTask, train_window
 
 WINDOWS = (Window(0, 3), Window(3, 6), Window(6, 8))
 STEPS_PER_FRAME = 15

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ico3d.capture.coverage import find_gap
-from ico3d.capture.hull import Silhouette
+from ico3d.capture.surface.coverage import find_gap
+from ico3d.capture.surface.hull import Silhouette
 
 SIZE, REACH = 96, 0.02
 PIXEL = 0.44 / SIZE

@@ -1,13 +1,13 @@
 import numpy as np
 from PIL import Image
 
-from ico3d.capture.capture import Capture
-from ico3d.capture.check import examine
+from ico3d.capture.checking.check import examine
+from ico3d.capture.formats import open_capture
 from ico3d.cli import main
 
 
 def _levels(folder):
-    return {finding.what: finding for finding in examine(Capture.open(folder))}
+    return {finding.what: finding for finding in examine(open_capture(folder))}
 
 
 def test_a_sound_capture_has_no_errors_and_a_contact_sheet(folder, capsys):

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ico3d.capture import photometric
-from ico3d.capture.capture import Capture
-from ico3d.capture.check import examine
+from ico3d.capture.checking.check import examine
+from ico3d.capture.formats import open_capture
+from ico3d.capture.portrait import photometric_poses
 from ico3d.cli import main
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
@@ -26,7 +26,7 @@ def model(monkeypatch):
     if not (folder / "face_landmarker.task").is_file():
         pytest.skip("face_landmarker.task is not here")
     monkeypatch.setenv("ICO3D_MODELS", str(folder))
-    monkeypatch.setattr(photometric, "STEPS", (30, 30))  # its own test tells whether it helps
+    monkeypatch.setattr(photometric_poses, "STEPS", (30, 30))  # its own test tells whether it helps
 
 
 def _faceless(path: Path, frames: int = 6) -> Path:
@@ -82,7 +82,7 @@ def test_frames_without_a_face_and_without_sound(tmp_path, capfd):
     said = " ".join(capfd.readouterr().err.split())
     assert "3 of 30 frames show no face and are left out (frames 11, 12, 13)" in said
     assert "no sound" in said
-    capture = Capture.open(tmp_path / "out")
+    capture = open_capture(tmp_path / "out")
     assert capture.num_frames == 30 and capture.audio() is None
     assert [f for f in range(30) if capture.image(0, f) is None] == [11, 12, 13]
     assert len(capture.split.train) == 24 and capture.split.test == (27, 28, 29)
@@ -101,4 +101,4 @@ def test_truncated_video(tmp_path, capfd):
     data = whole.read_bytes()
     whole.write_bytes(data[: len(data) * 2 // 3])
     assert _capture(whole, tmp_path / "out") == 0
-    assert 8 < Capture.open(tmp_path / "out").num_frames < 24
+    assert 8 < open_capture(tmp_path / "out").num_frames < 24

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from ico3d.capture.multipie import (
+from ico3d.capture.face.landmarks import (
     CHIN,
     FACE_OVAL,
     FOREHEAD,
@@ -11,7 +11,7 @@ from ico3d.capture.multipie import (
     OUTER_LIPS,
     SIDES,
 )
-from ico3d.capture.plate import clean_plate, filled, mismatch
+from ico3d.capture.portrait.plate import clean_plate, filled, mismatch
 
 cv2 = pytest.importorskip("cv2")
 
@@ -85,12 +85,12 @@ def _face():
 
 
 def test_person_is_cut_out_and_parsed():
-    from ico3d.capture import matting, parsing
+    from ico3d.capture.portrait import cutout, parsing
 
     image, truth = _scene()
     images, faces = [image] * 4, np.stack([_face()] * 4)
-    models = matting.learn([matting.working(i) for i in images], faces)
-    alpha = matting.cut(image, faces[0], models)
+    models = cutout.learn([cutout.working(i) for i in images], faces)
+    alpha = cutout.cut(image, faces[0], models)
     both = ((alpha > 0.5) & truth).sum() / ((alpha > 0.5) | truth).sum()
     assert both > 0.95
     colours = parsing.learn_colours(images, [alpha] * 4, faces)
@@ -108,7 +108,7 @@ def test_person_is_cut_out_and_parsed():
 
 
 def test_silhouette_points_project_into_the_silhouette():
-    from ico3d.capture.surface import silhouette_points
+    from ico3d.capture.surface.first_points import silhouette_points
     from ico3d.common.camera import Camera
 
     lens = np.array([[300.0, 0, 40], [0, 300.0, 30], [0, 0, 1]])

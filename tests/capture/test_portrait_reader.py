@@ -9,22 +9,23 @@ from hypothesis import strategies as st
 from scipy.io import wavfile
 from scipy.spatial.transform import Rotation
 
-from ico3d.capture.capture import EYE_NAMES, Capture
-from ico3d.capture.expressions import BLENDSHAPES
-from ico3d.capture.portrait_files import camera_to_world, save_transforms
+from ico3d.capture.capture import EYE_NAMES
+from ico3d.capture.face.expressions import BLENDSHAPES
+from ico3d.capture.formats import open_capture
+from ico3d.capture.portrait.files import camera_to_world, save_transforms
 from ico3d.errors import CaptureError
 
 
 def _fails(folder: Path, *words: str) -> None:
     with pytest.raises(CaptureError) as error:
-        Capture.open(folder)
+        open_capture(folder)
     message = str(error.value)
     assert all(word in message for word in words), message
     assert "\n" not in message
 
 
 def test_what_a_folder_of_other_tools_holds(folder):
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     assert (capture.kind, capture.fps, capture.num_frames) == ("portrait", 25.0, 22)
     assert capture.split.train == tuple(range(20)) and capture.split.test == (20, 21)
     image = capture.image(0, 3)
@@ -38,7 +39,7 @@ def test_what_a_folder_of_other_tools_holds(folder):
 
 
 def test_landmarks_lie_where_pose_and_camera_project_the_head(folder, layout):
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     for frame in (0, 7, 21):
         camera = capture.cameras[0].moved(capture.world_from_head(frame))
         pixels, depths = camera.project(layout.head_points())
@@ -69,7 +70,7 @@ def test_any_pose_survives_the_layout(pose, tmp_path_factory, layout):
     layout.Image.new("RGB", (64, 64)).save(folder / "ori_imgs" / "0.jpg")
     save_transforms(folder, layout.FOCAL, (32.0, 32.0), [0, 1], np.stack([pose, pose]))
     shutil.copy(folder / "ori_imgs" / "0.jpg", folder / "ori_imgs" / "1.jpg")
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     np.testing.assert_allclose(capture.world_from_head(0), pose, atol=1e-12)
     point = np.array([0.01, -0.02, 0.03])
     seen, depth = capture.cameras[0].moved(capture.world_from_head(0)).project(point)
@@ -84,7 +85,7 @@ def test_any_pose_survives_the_layout(pose, tmp_path_factory, layout):
 
 
 def test_eyes_from_action_units(folder):
-    eyes = Capture.open(folder).eyes(4)
+    eyes = open_capture(folder).eyes(4)
     expected = {"browDown": 1.0, "browInnerUp": 0.5, "browOuterUp": 0.2, "eyeBlink": 0.5}
     for name, value in zip(EYE_NAMES, eyes, strict=True):
         assert value == pytest.approx(expected[name.removesuffix("Left").removesuffix("Right")])
@@ -94,26 +95,26 @@ def test_blendshapes_come_before_action_units(folder):
     rows = np.zeros((22, 52), np.float32)
     rows[:, BLENDSHAPES.index("eyeBlinkLeft")] = np.arange(22) / 22  # a line: smoothing keeps it
     np.save(folder / "bs.npy", rows)
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     assert capture.blendshape_names == BLENDSHAPES
     np.testing.assert_allclose(capture.eyes(11), [0, 0, 0, 0, 0, 0.5, 0], atol=1e-6)
 
 
 def test_sound_of_another_rate_is_resampled(folder):
     wavfile.write(folder / "aud.wav", 48_000, np.zeros((48_000, 2), np.int16))
-    assert len(Capture.open(folder).audio().samples) == 16_000
+    assert len(open_capture(folder).audio().samples) == 16_000
 
 
 def test_no_sound_is_none(folder):
     (folder / "aud.wav").unlink()
-    assert Capture.open(folder).audio() is None
+    assert open_capture(folder).audio() is None
 
 
 def test_frames_without_a_face_keep_their_number(folder, layout):
     ids = [i for i in range(22) if i != 9]
     layout.write_transforms(folder, ids, layout.head_poses()[ids])
     (folder / "ori_imgs" / "9.lms").unlink()
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     assert capture.num_frames == 22 and 9 not in capture.split.train
     assert capture.image(0, 9) is None and capture.world_from_head(9) is None
     np.testing.assert_allclose(capture.world_from_head(10), layout.head_poses()[10], atol=1e-9)

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 import torch
 
-from ico3d.capture import photometric, portrait
-from ico3d.capture.capture import Capture
-from ico3d.capture.face import LANDMARKS, MESH_LANDMARKS, CanonicalFace, Face
-from ico3d.capture.parsing import FACE
-from ico3d.capture.portrait import PortraitSettings, track_portrait
-from ico3d.capture.portrait_files import save_picture, save_torso
-from ico3d.capture.tracking import Track
+from ico3d.capture.face.mediapipe_face import LANDMARKS, MESH_LANDMARKS, CanonicalFace, Face
+from ico3d.capture.formats import open_capture
+from ico3d.capture.portrait import photometric_poses, track
+from ico3d.capture.portrait.files import save_picture, save_torso
+from ico3d.capture.portrait.parsing import FACE
+from ico3d.capture.portrait.rigid_head import Track
+from ico3d.capture.portrait.track import PortraitSettings, track_portrait
 from ico3d.errors import SettingsError
 from ico3d.splat.device import cuda_fault
-from pretended_cuda import pretended_cuda
+from support.pretended_cuda import pretended_cuda
 
 av = pytest.importorskip("av")
 
@@ -71,15 +71,15 @@ def _mattes(work, readings, video=None):
 @pytest.fixture
 def video(tmp_path, monkeypatch):
     """A film, and a machine on which everything but the refinement has been done before."""
-    monkeypatch.setattr(portrait, "model_file", lambda *_: tmp_path)
-    monkeypatch.setattr(portrait, "FaceReader", Reader)
+    monkeypatch.setattr(track, "model_file", lambda *_: tmp_path)
+    monkeypatch.setattr(track, "FaceReader", Reader)
     face = CanonicalFace(_POINTS, np.zeros((0, 3), int), np.ones(MESH_LANDMARKS))
-    monkeypatch.setattr(portrait, "canonical_face", lambda _: face)
-    monkeypatch.setattr(portrait, "_track", lambda *_: _TRACK)
-    monkeypatch.setattr(portrait, "_save_mattes", _mattes)
-    monkeypatch.setattr(portrait, "_points", lambda *_: _POINTS)
-    monkeypatch.setattr(photometric, "COUNT", 200)
-    monkeypatch.setattr(photometric, "STEPS", (3, 3))
+    monkeypatch.setattr(track, "canonical_face", lambda _: face)
+    monkeypatch.setattr(track, "_track", lambda *_: _TRACK)
+    monkeypatch.setattr(track, "_save_mattes", _mattes)
+    monkeypatch.setattr(track, "_points", lambda *_: _POINTS)
+    monkeypatch.setattr(photometric_poses, "COUNT", 200)
+    monkeypatch.setattr(photometric_poses, "STEPS", (3, 3))
     path = tmp_path / "me.mp4"
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=25)
@@ -96,7 +96,7 @@ def _notes(folder) -> list[str]:
 
 
 def _is_whole(folder) -> bool:
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     poses = [capture.world_from_head(frame) for frame in range(FRAMES)]
     return all(pose is not None and np.isfinite(pose).all() for pose in poses)
 
@@ -105,7 +105,7 @@ def test_failing_refinement_leaves_the_tracked_capture(video, tmp_path, monkeypa
     def failing(*_, **__):
         raise torch.OutOfMemoryError("CUDA out of memory.\nTried to allocate 20 MiB")
 
-    monkeypatch.setattr(photometric, "render", failing)
+    monkeypatch.setattr(photometric_poses, "render", failing)
     track_portrait(video, tmp_path / "me", PortraitSettings())
     assert _is_whole(tmp_path / "me")
     said = "poses by landmarks only: refining failed (CUDA out of memory.)"

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ico3d.capture import tracking
+from ico3d.capture.portrait import rigid_head
 
 SIZE = (512, 512)
 
@@ -51,12 +51,12 @@ def test_poses_are_exact_where_the_shape_is_known():
     shape, poses = _shape(), _poses(40)
     pixels = _pixels(poses, shape, 1000.0)
     ones = np.ones(len(shape))
-    track = tracking.Track(
+    track = rigid_head.Track(
         1000.0, np.array([256.0, 256]), shape, poses[:, :3, :3], poses[:, :3, 3], ones
     )
     start = poses.copy()
     start[:, :3, 3] += [0.01, -0.02, 0.05]
-    placed = tracking.place(track, pixels, start)
+    placed = rigid_head.place(track, pixels, start)
     np.testing.assert_allclose(placed.poses(), poses, atol=1e-8)
     np.testing.assert_allclose(placed.project(), pixels, atol=1e-5)
 
@@ -69,7 +69,7 @@ def test_fit_finds_pose_and_shape_of_a_person_who_differs_from_the_canonical_fac
     moving = random.random(200) < 0.3  # a third of the landmarks follow the expression
     swing = random.normal(0, 6, (60, 1, 1)) * random.normal(0, 1, (1, 200, 2))
     pixels += np.where(moving[:, None], swing, 0.0)
-    track = tracking.fit(pixels, _rough(poses, 1177.6), canonical, np.ones(200), SIZE)
+    track = rigid_head.fit(pixels, _rough(poses, 1177.6), canonical, np.ones(200), SIZE)
     still = ~moving
     error = np.linalg.norm(track.project() - _pixels(poses, person, 1177.6), axis=-1)
     assert np.sqrt((error[:, still] ** 2).mean()) < 0.35
@@ -84,14 +84,14 @@ def test_focal_length_is_estimated_from_perspective(focal):
     canonical, poses = _shape(), _poses(60, swing=0.5)
     poses[:, 2, 3] = -0.0006 * focal
     pixels = _pixels(poses, canonical, focal)
-    track = tracking.fit(pixels, _rough(poses, focal), canonical, np.ones(200), SIZE)
+    track = rigid_head.fit(pixels, _rough(poses, focal), canonical, np.ones(200), SIZE)
     assert track.focal == pytest.approx(focal, rel=0.15)
 
 
 def test_a_given_focal_length_stays():
     canonical, poses = _shape(), _poses(10)
     pixels = _pixels(poses, canonical, 900.0)
-    track = tracking.fit(pixels, _rough(poses, 900.0), canonical, np.ones(200), SIZE, 900.0)
+    track = rigid_head.fit(pixels, _rough(poses, 900.0), canonical, np.ones(200), SIZE, 900.0)
     assert track.focal == 900.0
     assert _degrees(track.rotations, poses[:, :3, :3]).max() < 0.1
 
@@ -116,14 +116,14 @@ def _textured_frames(poses, focal):
 
 
 def test_alignment_removes_the_jitter_of_landmarks():
-    from ico3d.capture.alignment import align
+    from ico3d.capture.portrait.picture_poses import align
 
     random = np.random.default_rng(4)
     poses, focal = _poses(24, swing=0.12), 1100.0
     images = _textured_frames(poses, focal)
     points = np.append(random.uniform(-0.045, 0.045, (80, 2)), np.full((80, 1), 0.06), 1)
     jittered = Rotation.from_rotvec(random.normal(0, 0.006, (24, 3))).as_matrix() @ poses[:, :3, :3]
-    track = tracking.Track(
+    track = rigid_head.Track(
         focal, np.array([256.0, 256]), points, jittered, poses[:, :3, 3], np.ones(80)
     )
     truth = _pixels(poses, points, focal)

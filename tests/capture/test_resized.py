@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ico3d.capture.capture import Capture
+from ico3d.capture.formats import open_capture
 from ico3d.capture.resized import ResizedCapture
 from ico3d.cli import main
 from ico3d.errors import SettingsError
@@ -39,7 +39,7 @@ def two_sizes(folders, tmp_path):
 
 
 def test_pixels_are_means_of_what_they_cover(two_sizes, folders):
-    whole = Capture.open(two_sizes)
+    whole = open_capture(two_sizes)
     small = ResizedCapture(whole, 32)
     assert [(c.width, c.height) for c in small.cameras] == [(40, 32), (40, 32), (30, 20)]
     expected = folders.picture(0, 0, (80, 64)).reshape(32, 2, 40, 2, 3).mean((1, 3)) / 255
@@ -51,7 +51,7 @@ def test_pixels_are_means_of_what_they_cover(two_sizes, folders):
 
 
 def test_cameras_see_points_where_the_pictures_show_them(two_sizes):
-    whole = Capture.open(two_sizes)
+    whole = open_capture(two_sizes)
     small = ResizedCapture(whole, 32)
     points = np.random.default_rng(0).normal((0, 1, 0), 0.5, (9, 3))
     for before, after in zip(whole.cameras[:2], small.cameras[:2], strict=True):
@@ -60,7 +60,7 @@ def test_cameras_see_points_where_the_pictures_show_them(two_sizes):
 
 def test_everything_else_is_that_of_the_capture(folder):
     """A portrait: poses, expressions, landmarks, sound."""
-    whole = Capture.open(folder)
+    whole = open_capture(folder)
     small = ResizedCapture(whole, 16)
     np.testing.assert_array_equal(small.landmarks(0, 3), whole.landmarks(0, 3) / 4)
     np.testing.assert_array_equal(small.eyes(3), whole.eyes(3))
@@ -73,13 +73,13 @@ def test_everything_else_is_that_of_the_capture(folder):
 
 def test_no_height_is_refused(two_sizes):
     with pytest.raises(SettingsError):
-        ResizedCapture(Capture.open(two_sizes), 0)
+        ResizedCapture(open_capture(two_sizes), 0)
 
 
 def test_the_command_writes_a_smaller_capture(two_sizes, tmp_path, capsys):
     out = tmp_path / "small"
     assert main(["capture", "resize", str(two_sizes), str(out), "--height", "32"]) == 0
-    small, expected = Capture.open(out), ResizedCapture(Capture.open(two_sizes), 32)
+    small, expected = open_capture(out), ResizedCapture(open_capture(two_sizes), 32)
     assert small.split == expected.split and small.provenance == expected.provenance
     for index, camera in enumerate(expected.cameras):
         np.testing.assert_allclose(small.cameras[index].intrinsics, camera.intrinsics)

@@ -9,7 +9,7 @@ import pytest
 import soundfile
 
 from ico3d.capture.sound import RATE, read_sound_file
-from ico3d.capture.synthetic.reader import SyntheticCapture
+from ico3d.capture.synthetic import SyntheticCapture
 from ico3d.capture.video import read_sound
 from ico3d.common.sound import RECORDING, Claim, fault
 from ico3d.errors import CaptureError

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ico3d.capture.capture import Capture
-from ico3d.capture.synthetic import recording
-from ico3d.capture.synthetic.points import surface_points
-from ico3d.capture.synthetic.recording import Recording, choose_views, record
-from ico3d.capture.synthetic.subjects import load_subject
+from ico3d.capture.formats import open_capture
 from ico3d.errors import CaptureError, SettingsError
+from ico3d.studio import recording
+from ico3d.studio.person.choice import load_subject
+from ico3d.studio.points import surface_points
+from ico3d.studio.recording import Recording, choose_views, record
 
 _SPEC = importlib.util.spec_from_file_location(
     "synthetic_people", Path(__file__).parent / "synthetic_people.py"
@@ -69,7 +69,7 @@ def test_a_recording_that_was_cut_off_goes_on(folder, person, tmp_path, monkeypa
     with pytest.raises(OSError, match="full"):
         record(_settings(person), tmp_path / "cut", workers=1)
     with pytest.raises(CaptureError):
-        Capture.open(tmp_path / "cut")
+        open_capture(tmp_path / "cut")
     monkeypatch.setattr(recording, "_write_png", write)
     record(_settings(person), tmp_path / "cut", workers=1)
     assert _files(tmp_path / "cut") == _files(folder)
@@ -77,12 +77,12 @@ def test_a_recording_that_was_cut_off_goes_on(folder, person, tmp_path, monkeypa
 
 def test_another_seed_writes_other_frames(folder, person, tmp_path):
     record(_settings(person, seed=4, frames=2, cameras=1), tmp_path / "other", workers=1)
-    first, other = Capture.open(folder), Capture.open(tmp_path / "other")
+    first, other = open_capture(folder), open_capture(tmp_path / "other")
     assert not np.allclose(first.world_from_head(0), other.world_from_head(0))
 
 
 def test_reader_gives_what_was_recorded(folder):
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     assert (capture.kind, capture.num_frames, capture.fps) == ("synthetic", 11, 25.0)
     assert capture.split.test == (10,)
     assert len(capture.cameras) == 3
@@ -100,7 +100,7 @@ def test_reader_gives_what_was_recorded(folder):
 
 
 def test_outside_the_mask_the_picture_is_the_background(folder):
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     camera = next(c for c in range(3) if capture.image(c, 0) is not None)
     mask = capture.mask(camera, 0)
     outside = mask == 0
@@ -110,7 +110,7 @@ def test_outside_the_mask_the_picture_is_the_background(folder):
 
 
 def test_landmarks_are_the_projected_vertices(folder, person):
-    capture, subject = Capture.open(folder), load_subject(str(person))
+    capture, subject = open_capture(folder), load_subject(str(person))
     for frame in (0, 7):
         vertices = subject.posed(capture.blendshapes(frame))
         pose = capture.world_from_head(frame)
@@ -143,11 +143,11 @@ def test_points_lie_on_the_surface(person):
 def test_a_damaged_file_is_named(copy, name, words):
     (copy / name).write_bytes((copy / name).read_bytes()[:20])
     with pytest.raises(CaptureError, match=words):
-        Capture.open(copy)
+        open_capture(copy)
 
 
 def test_a_missing_picture_is_named_with_its_frame(copy):
-    capture = Capture.open(copy)
+    capture = open_capture(copy)
     camera = next(c for c in range(3) if capture.image(c, 4) is not None)
     (copy / "images" / str(camera) / "000004.png").unlink()
     with pytest.raises(CaptureError, match=rf"frame 4 of camera {camera}"):
@@ -159,13 +159,13 @@ def test_a_wrong_count_of_frames_is_told(copy):
     about["num_frames"] = 12
     (copy / "capture.json").write_text(json.dumps(about))
     with pytest.raises(CaptureError, match="must have shape"):
-        Capture.open(copy)
+        open_capture(copy)
 
 
 def test_sound_missing_is_told(copy):
     (copy / "audio.wav").unlink()
     with pytest.raises(CaptureError, match=r"audio\.wav"):
-        Capture.open(copy).audio()
+        open_capture(copy).audio()
 
 
 @pytest.mark.parametrize("changes", [{"views_per_frame": 4}, {"frames": 0}, {"rig": "dome"}])

@@ -9,18 +9,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ico3d.capture.capture import Capture
-from ico3d.capture.check import examine
-from ico3d.capture.synthetic import paint
-from ico3d.capture.synthetic.acting import pose
-from ico3d.capture.synthetic.gestures import act
-from ico3d.capture.synthetic.limbs import reach, split_twist
-from ico3d.capture.synthetic.recording import Recording, record
-from ico3d.capture.synthetic.rigs import cameras_of
-from ico3d.capture.synthetic.skeleton import about
-from ico3d.capture.synthetic.subject import Material
-from ico3d.capture.synthetic.subjects import load_subject
+from ico3d.capture.checking.check import examine
+from ico3d.capture.formats import open_capture
 from ico3d.errors import CaptureError, SettingsError
+from ico3d.studio.acting.acting import pose
+from ico3d.studio.acting.gestures import act
+from ico3d.studio.acting.limbs import reach, split_twist
+from ico3d.studio.person.choice import load_subject
+from ico3d.studio.person.skeleton import about
+from ico3d.studio.person.subject import Material
+from ico3d.studio.picture import paint
+from ico3d.studio.recording import Recording, record
+from ico3d.studio.rigs import cameras_of
 
 _SPEC = importlib.util.spec_from_file_location(
     "synthetic_bodies", Path(__file__).parent / "synthetic_bodies.py"
@@ -207,7 +207,7 @@ def test_showcase_is_calm_then_gestures_then_is_fast(subject, seed):
 
 
 def test_the_head_is_rigid_and_points_are_on_the_mesh(folder, person):
-    capture, subject = Capture.open(folder), load_subject(str(person), whole=True)
+    capture, subject = open_capture(folder), load_subject(str(person), whole=True)
     assert not np.allclose(capture.world_from_head(0), capture.world_from_head(6), atol=1e-3)
     for frame in range(capture.num_frames):
         marks = subject.landmarks(subject.posed(capture.blendshapes(frame)))
@@ -219,7 +219,7 @@ def test_the_head_is_rigid_and_points_are_on_the_mesh(folder, person):
 
 
 def test_points_lie_in_the_masks(folder):
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     for frame in range(capture.num_frames):
         for index, camera in enumerate(capture.cameras):
             pixels, _ = camera.project(capture.points(frame))
@@ -241,7 +241,7 @@ def test_every_camera_sees_everybody_whole(subject):
 
 
 def test_pictures_and_split_of_a_body(folder):
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     assert (capture.fps, capture.num_frames, len(capture.cameras)) == (3.0, 7, 6)
     assert (capture.cameras[0].width, capture.cameras[0].height) == (40, 64)
     assert capture.split.train == tuple(range(7)) and capture.split.test == ()
@@ -255,7 +255,7 @@ def test_pictures_and_split_of_a_body(folder):
 
 
 def test_cameras_stand_all_around(folder):
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     centers = np.stack([c.camera_to_world[:3, 3] for c in capture.cameras])
     azimuth = np.degrees(np.arctan2(centers[:, 0], centers[:, 2])) % 360
     np.testing.assert_allclose(azimuth, np.arange(6) * 60.0, atol=1e-9)
@@ -263,7 +263,7 @@ def test_cameras_stand_all_around(folder):
 
 
 def test_nothing_is_wrong_with_a_body(folder):
-    levels = {finding.what: finding.level for finding in examine(Capture.open(folder))}
+    levels = {finding.what: finding.level for finding in examine(open_capture(folder))}
     assert {w for w, level in levels.items() if level != "ok"} <= {"landmarks"}
 
 
@@ -277,7 +277,7 @@ def test_the_same_settings_write_the_same_bytes(folder, person, tmp_path):
 
 def test_another_light_changes_pictures_only(folder, person, tmp_path):
     record(_settings(person, light="warm"), tmp_path / "warm", workers=2)
-    one, other = Capture.open(folder), Capture.open(tmp_path / "warm")
+    one, other = open_capture(folder), open_capture(tmp_path / "warm")
     np.testing.assert_array_equal(one.points(3), other.points(3))
     np.testing.assert_array_equal(one.mask(2, 3), other.mask(2, 3))
     for capture, warmer in ((one, False), (other, True)):
@@ -290,11 +290,11 @@ def test_a_head_of_version_1_can_still_be_read(person, tmp_path):
     about = json.loads((tmp_path / "old" / "capture.json").read_text())
     del about["shows"]
     (tmp_path / "old" / "capture.json").write_text(json.dumps(about | {"version": 1}))
-    capture = Capture.open(tmp_path / "old")
+    capture = open_capture(tmp_path / "old")
     assert capture.split.test == (10,) and capture.points(3).shape == (6000, 3)
     (tmp_path / "old" / "capture.json").write_text(json.dumps(about | {"version": 3}))
     with pytest.raises(CaptureError, match="version 3"):
-        Capture.open(tmp_path / "old")
+        open_capture(tmp_path / "old")
 
 
 def test_who_has_no_joints_cannot_be_whole(person, tmp_path):

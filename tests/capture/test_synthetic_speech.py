@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ico3d.capture.synthetic.articulation import LEAST_CLOSED, articulate, closure
-from ico3d.capture.synthetic.performance import PAUSE, SOUND_RATE, _glances, _speak, perform
-from ico3d.capture.synthetic.subjects import load_subject
 from ico3d.common.espeak import Phoneme
 from ico3d.common.expression import EYE_NAMES
+from ico3d.studio.acting.articulation import LEAST_CLOSED, articulate, closure
+from ico3d.studio.acting.performance import PAUSE, SOUND_RATE, _glances, _speak, perform
+from ico3d.studio.person.choice import load_subject
 
 NAMES = ["sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "ih", "oh", "ou"]
 JAW = {"aa": 1.0, "E": 0.6, "ih": 0.4, "oh": 0.8, "ou": 0.3}

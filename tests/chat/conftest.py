@@ -14,9 +14,9 @@ from loguru import logger
 logger.remove()  # before pipecat is imported: it logs its start
 
 from ico3d.bundle.format import Bundle  # noqa: E402
-from ico3d.chat import server  # noqa: E402
-from ico3d.chat.sessions import Sessions  # noqa: E402
-from ico3d.chat.settings import ChatSettings, Choice  # noqa: E402
+from ico3d.chat.serving import server  # noqa: E402
+from ico3d.chat.serving.sessions import Sessions  # noqa: E402
+from ico3d.chat.settings.conversation import ChatSettings, Choice  # noqa: E402
 from ico3d.common.espeak import synthesize  # noqa: E402
 
 OFFLINE = ChatSettings(language=Choice("persona-notes"))

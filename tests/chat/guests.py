@@ -6,13 +6,13 @@ import dataclasses
 
 import numpy as np
 
-from ico3d.chat import server
 from ico3d.chat.page import Outbox
-from ico3d.chat.protocol import MICROPHONE_CHUNK as CHUNK
-from ico3d.chat.protocol import MICROPHONE_RATE, VERSION, Audio, Hello, Speech
-from ico3d.chat.sessions import Sessions
-from ico3d.chat.settings import ChatSettings
-from ico3d.measure.page import CLOCK_EVERY, Player
+from ico3d.chat.serving import server
+from ico3d.chat.serving.sessions import Sessions
+from ico3d.chat.settings.conversation import ChatSettings
+from ico3d.chat.wire.protocol import MICROPHONE_CHUNK as CHUNK
+from ico3d.chat.wire.protocol import MICROPHONE_RATE, VERSION, Audio, Hello, Speech
+from ico3d.measure.talking.page import CLOCK_EVERY, Player
 
 
 class Guest:

@@ -9,7 +9,7 @@ import uvicorn
 from fastapi import FastAPI, Request
 from fastapi.responses import JSONResponse, StreamingResponse
 
-from ico3d.chat import server
+from ico3d.chat.serving import server
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,12 @@ import asyncio
 
 import pytest
 
-from ico3d.chat.protocol import Answer, Deaf, Error, Heard, State, Transcript
 from ico3d.chat.services import choose
 from ico3d.chat.services.recognition import browser
-from ico3d.chat.settings import ChatSettings, Choice
+from ico3d.chat.settings.conversation import ChatSettings, Choice
+from ico3d.chat.wire.protocol import Answer, Deaf, Error, Heard, State, Transcript
 from ico3d.errors import SettingsError
-from ico3d.measure.page import open_page
+from ico3d.measure.talking.page import open_page
 
 from .conftest import serving
 from .test_recognition import silent

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ico3d.chat.protocol import (
+from ico3d.chat.observing.timing import PARTS
+from ico3d.chat.wire.protocol import (
     MAX_AHEAD_SECONDS,
     SPEECH_RATE,
     Answer,
@@ -22,9 +23,8 @@ from ico3d.chat.protocol import (
     Timeline,
     Transcript,
 )
-from ico3d.chat.timing import PARTS
-from ico3d.measure.page import open_page
-from ico3d.measure.questions import read_recording
+from ico3d.measure.talking.page import open_page
+from ico3d.measure.talking.questions import read_recording
 
 STARS = Path(__file__).parents[3] / "shared" / "speech" / "new-home-in-the-stars-16k.wav"
 

@@ -10,11 +10,11 @@ from dataclasses import replace
 import pytest
 from websockets.asyncio.client import connect
 
-from ico3d.chat.codec import decode_server, encode
-from ico3d.chat.protocol import VERSION, Error, Heard, Hello, Speech, Text, Welcome
 from ico3d.chat.services.language import local, openai
-from ico3d.chat.settings import ChatSettings, Choice
-from ico3d.measure.page import open_page
+from ico3d.chat.settings.conversation import ChatSettings, Choice
+from ico3d.chat.wire.codec import decode_server, encode
+from ico3d.chat.wire.protocol import VERSION, Error, Heard, Hello, Speech, Text, Welcome
+from ico3d.measure.talking.page import open_page
 
 from .conftest import OFFLINE, serving
 

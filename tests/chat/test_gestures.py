@@ -5,9 +5,10 @@ import pytest
 
 from ico3d.bundle.animation import Action, Animation, Rest
 from ico3d.chat.frames import Utterances
-from ico3d.chat.gestures import OVERRUN, Gestures
 from ico3d.chat.page import Page
-from ico3d.chat.protocol import (
+from ico3d.chat.performing.gestures import OVERRUN, Gestures
+from ico3d.chat.settings.conversation import ChatSettings, read_settings
+from ico3d.chat.wire.protocol import (
     MAX_AHEAD_SECONDS,
     SPEECH_RATE,
     Clock,
@@ -18,9 +19,8 @@ from ico3d.chat.protocol import (
     Text,
     Timeline,
 )
-from ico3d.chat.settings import ChatSettings, read_settings
 from ico3d.errors import SettingsError
-from ico3d.measure.page import Player, open_page
+from ico3d.measure.talking.page import Player, open_page
 
 from .conftest import serving
 

@@ -16,14 +16,14 @@ from pipecat.frames.frames import LLMContextFrame
 from pipecat.processors.aggregators.llm_context import LLMContext
 
 from ico3d.bundle.persona import Persona
-from ico3d.chat.modules.headless import run
-from ico3d.chat.modules.recognition import heard
+from ico3d.chat.remote.headless import run
+from ico3d.chat.remote.recognition import heard
 from ico3d.chat.services import chosen
 from ico3d.chat.services.language import PROVIDERS as LANGUAGE
 from ico3d.chat.services.provider import Context
 from ico3d.chat.services.recognition import PROVIDERS as RECOGNITION
 from ico3d.chat.services.voice import PROVIDERS as VOICE
-from ico3d.chat.settings import Choice, Expression
+from ico3d.chat.settings.conversation import Choice, Expression
 from ico3d.errors import Ico3dError, SettingsError
 
 from .scripted_server import running
@@ -193,7 +193,7 @@ URLS = st.builds(
 @example("https://api.openai.com.evil.com/v1", False)
 @example("https://api.openai.com:8443/v1", False)
 def test_whoever_reads_the_address_finds_a_host_that_may_have_the_key(url, named):
-    from ico3d.chat.keys import key_for
+    from ico3d.chat.settings.keys import key_for
 
     try:
         key = key_for(url, "BOX_KEY" if named else "", "here")

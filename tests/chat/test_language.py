@@ -12,19 +12,19 @@ from fastapi.responses import RedirectResponse, StreamingResponse
 
 from ico3d.bundle.persona import Persona
 from ico3d.chat.memory import PROMPT
-from ico3d.chat.moods import BROWS, EASE
-from ico3d.chat.protocol import Answer, End, Interrupt, Speech, State, Stop, Text, Timeline
+from ico3d.chat.performing.moods import BROWS, EASE
 from ico3d.chat.services import choose, chosen
 from ico3d.chat.services.language import PROVIDERS, local, openai
 from ico3d.chat.services.language.compatible import MOST_ROUNDS
 from ico3d.chat.services.language.instruction import instruction
 from ico3d.chat.services.language.servers import first_server
 from ico3d.chat.services.provider import Context
-from ico3d.chat.settings import ChatSettings, Choice, Memory
-from ico3d.chat.tool_settings import Tool
+from ico3d.chat.settings.conversation import ChatSettings, Choice, Memory
+from ico3d.chat.settings.tools import Tool
+from ico3d.chat.wire.protocol import Answer, End, Interrupt, Speech, State, Stop, Text, Timeline
 from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
 from ico3d.errors import SettingsError
-from ico3d.measure.page import open_page
+from ico3d.measure.talking.page import open_page
 
 from .conftest import serving
 from .scripted_server import Call, Script, running

@@ -8,11 +8,11 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 
-from ico3d.chat.codec import decode_server, encode
-from ico3d.chat.limits import FORGIVEN, Inlet, Limits
-from ico3d.chat.protocol import MICROPHONE_CHUNK, VERSION, Answer, Audio, Error, Hello
+from ico3d.chat.serving.limits import FORGIVEN, Inlet, Limits
+from ico3d.chat.wire.codec import decode_server, encode
+from ico3d.chat.wire.protocol import MICROPHONE_CHUNK, VERSION, Answer, Audio, Error, Hello
 from ico3d.errors import ProtocolError
-from ico3d.measure.page import open_page
+from ico3d.measure.talking.page import open_page
 
 pytestmark = pytest.mark.slow
 

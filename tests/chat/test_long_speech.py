@@ -20,15 +20,15 @@ from pipecat.services.stt_service import SegmentedSTTService
 from pipecat.tests.utils import SleepFrame, run_test
 from pipecat.utils.time import time_now_iso8601
 
-from ico3d.chat.protocol import Answer, Transcript
 from ico3d.chat.services import Service, choose
 from ico3d.chat.services.provider import Provider
 from ico3d.chat.services.recognition import openai, sphinx, whisper
 from ico3d.chat.services.recognition.segments import BLANK, Segments
-from ico3d.chat.settings import ChatSettings, Choice
+from ico3d.chat.settings.conversation import ChatSettings, Choice
 from ico3d.chat.turns.eager import EagerSmartTurn
+from ico3d.chat.wire.protocol import Answer, Transcript
 from ico3d.errors import SettingsError
-from ico3d.measure.page import open_page
+from ico3d.measure.talking.page import open_page
 
 from .conftest import serving
 from .test_recognition import Script, Scripted, silent

@@ -8,8 +8,8 @@ from pipecat.processors.aggregators.llm_context import LLMContext
 
 from ico3d.chat.memory import forget
 from ico3d.chat.services import choose
-from ico3d.chat.settings import ChatSettings, Choice, Memory
-from ico3d.measure.scripted import Script
+from ico3d.chat.settings.conversation import ChatSettings, Choice, Memory
+from ico3d.measure.talking.scripted import Script
 
 from .guests import Guest, open_sessions
 from .virtual_time import run

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ico3d.chat.moods import BROWS, EASE, Moods, brows
+from ico3d.chat.performing.moods import BROWS, EASE, Moods, brows
 from ico3d.common.expression import EYE_NAMES
 
 

@@ -5,16 +5,16 @@ from dataclasses import replace
 import pytest
 from websockets.asyncio.client import connect
 
-from ico3d.chat import server
-from ico3d.chat.codec import decode_server, encode
 from ico3d.chat.commands import described
-from ico3d.chat.protocol import VERSION, Hello, Offer, Welcome
 from ico3d.chat.services import TABLES, choose
 from ico3d.chat.services.offers import offers, wished
 from ico3d.chat.services.provider import Provider
 from ico3d.chat.services.voice import espeak
-from ico3d.chat.sessions import Sessions
-from ico3d.chat.settings import ChatSettings, Choice
+from ico3d.chat.serving import server
+from ico3d.chat.serving.sessions import Sessions
+from ico3d.chat.settings.conversation import ChatSettings, Choice
+from ico3d.chat.wire.codec import decode_server, encode
+from ico3d.chat.wire.protocol import VERSION, Hello, Offer, Welcome
 
 from .conftest import serving
 

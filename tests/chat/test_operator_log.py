@@ -16,11 +16,11 @@ from loguru import logger
 from openai import AuthenticationError
 from pipecat.frames.frames import ErrorFrame
 
-from ico3d.chat.failures import ReportedError, cause, cause_of
-from ico3d.chat.operator_log import OperatorLog, StandardHandler, constant_part
-from ico3d.chat.protocol import Answer, Speech, State, Text
+from ico3d.chat.observing.failures import ReportedError, cause, cause_of
+from ico3d.chat.observing.operator_log import OperatorLog, StandardHandler, constant_part
+from ico3d.chat.wire.protocol import Answer, Speech, State, Text
 from ico3d.errors import ServiceError
-from ico3d.measure.page import open_page
+from ico3d.measure.talking.page import open_page
 
 from .modules.serving import serving
 from .scripted_server import chunk

@@ -9,7 +9,7 @@ from fastapi import FastAPI
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from ico3d.chat import server
+from ico3d.chat.serving import server
 
 SCRIPT, SHEET, PICTURE = "assets/index-C0ffee00.js", "assets/index-C0ffee00.css", "assets/x-1.png"
 TEXTS = {

@@ -5,15 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ico3d.chat.face import LEAST, MOST, ROW, Face, Sentence
 from ico3d.chat.frames import SpeechFrame, Utterances
 from ico3d.chat.page import MAX_WAITING, Outbox, Page
+from ico3d.chat.performing.face import LEAST, MOST, ROW, Face, Sentence
 from ico3d.chat.playback import Playback
-from ico3d.chat.protocol import Answer, End, Speech, State, Stop, Transcript
 from ico3d.chat.services import choose, chosen
 from ico3d.chat.services.provider import Context, Provider
 from ico3d.chat.services.recognition.sphinx import LOUDNESS, NOISE, Leveller
-from ico3d.chat.settings import ChatSettings, Choice, Turns, read_settings
+from ico3d.chat.settings.conversation import ChatSettings, Choice, Turns, read_settings
+from ico3d.chat.wire.protocol import Answer, End, Speech, State, Stop, Transcript
 from ico3d.errors import SettingsError
 from ico3d.speech.runtime import SpeechModel
 

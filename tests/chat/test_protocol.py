@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ico3d.chat import protocol, protocol_typescript
-from ico3d.chat.codec import (
+from ico3d.chat.wire import protocol, typescript
+from ico3d.chat.wire.codec import (
     OversizedError,
     decode_client,
     decode_server,
@@ -187,6 +187,6 @@ def test_own_mistakes_are_refused_when_encoding():
 
 
 def test_the_viewers_file_is_up_to_date():
-    assert protocol_typescript.TARGET.read_text(encoding="utf-8") == (
-        protocol_typescript.typescript()
-    ), "run python -m ico3d.chat.protocol_typescript"
+    assert typescript.TARGET.read_text(encoding="utf-8") == (typescript.typescript()), (
+        "run python -m ico3d.chat.wire.typescript"
+    )

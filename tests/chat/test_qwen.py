@@ -8,14 +8,14 @@ from pipecat.frames.frames import LLMContextFrame, LLMTextFrame
 from pipecat.processors.aggregators.llm_context import LLMContext
 
 from ico3d.bundle.persona import Persona
-from ico3d.chat.modules.headless import run
-from ico3d.chat.protocol import Answer, Interrupt, Speech, Stop, Text
+from ico3d.chat.remote.headless import run
 from ico3d.chat.services import choose, chosen
 from ico3d.chat.services.language import PROVIDERS, qwen
 from ico3d.chat.services.provider import Context
-from ico3d.chat.settings import ChatSettings, Choice
+from ico3d.chat.settings.conversation import ChatSettings, Choice
+from ico3d.chat.wire.protocol import Answer, Interrupt, Speech, Stop, Text
 from ico3d.errors import MissingModelError
-from ico3d.measure.page import open_page
+from ico3d.measure.talking.page import open_page
 
 from .conftest import serving
 

@@ -12,16 +12,16 @@ from pipecat.frames.frames import LLMContextFrame, LLMTextFrame
 from pipecat.processors.aggregators.llm_context import LLMContext
 
 from ico3d.bundle.persona import Persona
-from ico3d.chat.modules.headless import run
-from ico3d.chat.protocol import Answer, End, State, Text
+from ico3d.chat.remote.headless import run
 from ico3d.chat.services import choose
 from ico3d.chat.services.language import PROVIDERS, local, openai
 from ico3d.chat.services.language.reasoning import Parts, Thoughts
 from ico3d.chat.services.provider import Context
-from ico3d.chat.settings import ChatSettings, Choice, Patience
+from ico3d.chat.settings.conversation import ChatSettings, Choice, Patience
 from ico3d.chat.supervision.apologies import APOLOGIES
+from ico3d.chat.wire.protocol import Answer, End, State, Text
 from ico3d.errors import SettingsError
-from ico3d.measure.page import open_page
+from ico3d.measure.talking.page import open_page
 
 from .conftest import serving
 from .modules.serving import service_app

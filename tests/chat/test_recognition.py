@@ -9,11 +9,11 @@ from pipecat.frames.frames import TranscriptionFrame
 from pipecat.services.stt_service import SegmentedSTTService
 from pipecat.utils.time import time_now_iso8601
 
-from ico3d.chat.protocol import Answer, Speech, State, Transcript
 from ico3d.chat.services import Service
 from ico3d.chat.services.provider import Provider
 from ico3d.chat.services.recognition.segments import Segments
-from ico3d.measure.page import open_page
+from ico3d.chat.wire.protocol import Answer, Speech, State, Transcript
+from ico3d.measure.talking.page import open_page
 
 from .conftest import serving
 from .test_conversation import slowness

@@ -17,15 +17,15 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from ico3d.bundle.persona import Persona
-from ico3d.chat import protocol
-from ico3d.chat.codec import decode_server, encode
-from ico3d.chat.face import open_face
-from ico3d.chat.guard import is_own
-from ico3d.chat.protocol import Ack, Audio, Error, Hello, Speech, Text, Welcome
-from ico3d.chat.server import make_server
+from ico3d.chat.performing.face import open_face
+from ico3d.chat.serving.guard import is_own
+from ico3d.chat.serving.server import make_server
+from ico3d.chat.wire import protocol
+from ico3d.chat.wire.codec import decode_server, encode
+from ico3d.chat.wire.protocol import Ack, Audio, Error, Hello, Speech, Text, Welcome
 from ico3d.cli import main
 from ico3d.errors import BundleError, SettingsError
-from ico3d.measure.page import open_page
+from ico3d.measure.talking.page import open_page
 
 from .conftest import serving
 
@@ -246,7 +246,7 @@ def test_serve_prints_where_it_is_and_ends_on_interrupt(bundle_path, tmp_path):
 
 
 def test_a_taken_port_is_one_sentence():
-    from ico3d.chat.server import bind
+    from ico3d.chat.serving.server import bind
 
     with closing(bind("127.0.0.1", 0)) as listener:
         listener.listen()
@@ -263,7 +263,7 @@ def test_a_bundle_that_is_none_is_one_sentence(tmp_path, capsys):
 def test_a_server_needs_no_torch(bundle_path):
     code = (
         "import sys; from ico3d.chat import server; from ico3d.bundle.format import Bundle;"
-        "from ico3d.chat.settings import ChatSettings;"
+        "from ico3d.chat.settings.conversation import ChatSettings;"
         f"server.open_avatar(Bundle.open({str(bundle_path)!r}), ChatSettings());"
         "assert not {'torch', 'numba', 'scipy', 'transformers'} & set(sys.modules)"
     )

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from websockets.asyncio.client import connect
 
-from ico3d.chat.codec import decode_server, encode
-from ico3d.chat.protocol import VERSION, Answer, Error, Hello, Speech, State, Stop, Text
-from ico3d.measure.page import open_page
+from ico3d.chat.wire.codec import decode_server, encode
+from ico3d.chat.wire.protocol import VERSION, Answer, Error, Hello, Speech, State, Stop, Text
+from ico3d.measure.talking.page import open_page
 
 from .conftest import OFFLINE, serving
 

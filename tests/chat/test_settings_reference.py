@@ -6,11 +6,11 @@ import tomllib
 import pytest
 
 from ico3d.bundle.persona import Persona
-from ico3d.chat import settings_reference
-from ico3d.chat.modules.limits import Limits
+from ico3d.chat.remote.limits import Limits
 from ico3d.chat.services import TABLES
-from ico3d.chat.settings import ChatSettings, filled
-from ico3d.chat.tool_settings import Tool
+from ico3d.chat.settings import reference
+from ico3d.chat.settings.conversation import ChatSettings, filled
+from ico3d.chat.settings.tools import Tool
 
 TABLES_OF_THE_FILE = [type(f.default) for f in dataclasses.fields(ChatSettings)]
 PARTS = [part for part in TABLES_OF_THE_FILE if dataclasses.is_dataclass(part)]
@@ -19,14 +19,14 @@ KINDS = list(dict.fromkeys([ChatSettings, *PARTS, *PROVIDERS, Tool, Persona, Lim
 
 
 def test_the_page_is_up_to_date():
-    assert settings_reference.TARGET.read_text(encoding="utf-8") == settings_reference.markdown(), (
-        "run python -m ico3d.chat.settings_reference"
+    assert reference.TARGET.read_text(encoding="utf-8") == reference.markdown(), (
+        "run python -m ico3d.chat.settings.reference"
     )
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: f"{kind.__module__}.{kind.__name__}")
 def test_every_key_has_a_sentence(kind):
-    notes = settings_reference.notes(kind)
+    notes = reference.notes(kind)
     assert list(notes) == [field.name for field in dataclasses.fields(kind)]
     assert all(note.endswith(".") for note in notes.values())
 
@@ -34,7 +34,7 @@ def test_every_key_has_a_sentence(kind):
 @pytest.mark.parametrize("kind", PROVIDERS, ids=lambda kind: kind.__module__)
 def test_defaults_stand_there_as_a_file_may_say_them(kind):
     lines = [
-        f"{field.name} = {settings_reference.default(field).strip('`')}"
+        f"{field.name} = {reference.default(field).strip('`')}"
         for field in dataclasses.fields(kind)
         if field.default is not None  # which a file says by leaving it out
     ]
@@ -42,7 +42,7 @@ def test_defaults_stand_there_as_a_file_may_say_them(kind):
 
 
 def test_every_table_and_provider_has_a_place():
-    lines = settings_reference.TARGET.read_text(encoding="utf-8").splitlines()
+    lines = reference.TARGET.read_text(encoding="utf-8").splitlines()
     for field in dataclasses.fields(ChatSettings):
         places = (f"## `[{field.name}]`", f"## `[[{field.name}]]`", f"| `{field.name}` |")
         assert any(line.startswith(places) for line in lines), field.name

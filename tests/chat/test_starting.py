@@ -12,13 +12,13 @@ from pipecat.frames.frames import EndWorkerFrame
 from pipecat.processors.frame_processor import FrameDirection
 
 from ico3d.chat.parts import make_parts
-from ico3d.chat.protocol import VERSION as VERSION
-from ico3d.chat.protocol import Error, Speech, Text, Welcome
-from ico3d.chat.server import open_avatar
 from ico3d.chat.services import Service
+from ico3d.chat.serving.server import open_avatar
+from ico3d.chat.wire.protocol import VERSION as VERSION
+from ico3d.chat.wire.protocol import Error, Speech, Text, Welcome
 from ico3d.cli import main
 from ico3d.errors import Ico3dError, MissingModelError
-from ico3d.measure.page import open_page
+from ico3d.measure.talking.page import open_page
 
 from .conftest import OFFLINE, free_port, serving
 from .test_event_loop import first_message

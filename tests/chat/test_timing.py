@@ -23,11 +23,11 @@ from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 from prometheus_client.parser import text_string_to_metric_families
 
 from ico3d.chat.frames import SpeechFrame, TypedFrame
-from ico3d.chat.monitor import Monitor, TurnLog
-from ico3d.chat.protocol import Metrics
-from ico3d.chat.timing import PARTS, TurnObserver
+from ico3d.chat.observing.monitor import Monitor, TurnLog
+from ico3d.chat.observing.timing import PARTS, TurnObserver
+from ico3d.chat.wire.protocol import Metrics
 from ico3d.errors import SettingsError
-from ico3d.measure.scripted import Script, Voice
+from ico3d.measure.talking.scripted import Script, Voice
 
 
 class Watched:

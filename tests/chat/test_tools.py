@@ -7,8 +7,8 @@ import pytest
 from fastapi import FastAPI, Request
 from fastapi.responses import RedirectResponse, Response
 
-from ico3d.chat.settings import Memory, read_settings
-from ico3d.chat.tool_settings import Tool
+from ico3d.chat.settings.conversation import Memory, read_settings
+from ico3d.chat.settings.tools import Tool
 from ico3d.chat.tools.http import MOST_BYTES, Refused, answer, check_address
 from ico3d.errors import SettingsError
 

@@ -11,9 +11,9 @@ import uvicorn
 from fastapi import FastAPI, Request
 from fastapi.responses import JSONResponse
 
-from ico3d.chat import server
 from ico3d.chat.services.recognition.openai import Settings, hindrance, make
 from ico3d.chat.services.recognition.segments import BLANK
+from ico3d.chat.serving import server
 from ico3d.errors import SettingsError
 
 from .listening import NOBODY, listen, noise

@@ -10,10 +10,10 @@ import pytest
 pytest.importorskip("transformers")
 from transformers.utils.import_utils import is_serve_available
 
-from ico3d.chat.protocol import Answer, End, Text
 from ico3d.chat.services.language.servers import language_models
-from ico3d.chat.settings import ChatSettings, Choice
-from ico3d.measure.page import open_page
+from ico3d.chat.settings.conversation import ChatSettings, Choice
+from ico3d.chat.wire.protocol import Answer, End, Text
+from ico3d.measure.talking.page import open_page
 
 from .conftest import free_port, serving
 from .tiny_qwen import write_tiny_qwen

@@ -8,9 +8,9 @@ import numpy as np
 import soxr
 from websockets.asyncio.client import connect
 
-from ico3d.chat import protocol
-from ico3d.chat.protocol import MICROPHONE_CHUNK as CHUNK
-from ico3d.chat.protocol import (
+from ico3d.chat.wire import protocol
+from ico3d.chat.wire.protocol import MICROPHONE_CHUNK as CHUNK
+from ico3d.chat.wire.protocol import (
     MICROPHONE_RATE,
     SPEECH_RATE,
     Answer,
@@ -28,7 +28,7 @@ from ico3d.chat.protocol import (
     Welcome,
 )
 from ico3d.common.espeak import synthesize
-from ico3d.measure.page import SCHEDULING, Page, open_page
+from ico3d.measure.talking.page import SCHEDULING, Page, open_page
 
 FADE = 0.02  # s that the page takes to fall silent
 UNKNOWN = "tell me something nobody has written down"  # its answer takes several seconds

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ico3d.chat.monitor import Monitor
-from ico3d.chat.protocol import VERSION, Error, Hello, Metrics, Speech
-from ico3d.chat.settings import ChatSettings, Turns
+from ico3d.chat.observing.monitor import Monitor
+from ico3d.chat.settings.conversation import ChatSettings, Turns
+from ico3d.chat.wire.protocol import VERSION, Error, Hello, Metrics, Speech
 from ico3d.errors import SettingsError
-from ico3d.measure.scripted import Script
+from ico3d.measure.talking.scripted import Script
 
 from .guests import Guest, open_sessions
 from .virtual_time import run

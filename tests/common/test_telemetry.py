@@ -7,7 +7,7 @@ import sys
 SESSION = """
 from pathlib import Path
 from ico3d.bundle.format import Bundle
-from ico3d.chat.face import open_face
+from ico3d.chat.performing.face import open_face
 assert open_face(Bundle.open(Path("demo")))[1] is not None
 """
 

@@ -10,12 +10,13 @@ from PIL import Image
 
 from ico3d.avatar.film.video import write_video
 from ico3d.capture.capture import Capture
-from ico3d.capture.expressions import BLENDSHAPES
+from ico3d.capture.face.expressions import BLENDSHAPES
+from ico3d.capture.formats import open_capture
 from ico3d.capture.headtrack.track_file import HeadTrack
 from ico3d.capture.multiview.resizing import resize_capture
-from ico3d.capture.synthetic import paint
-from ico3d.capture.synthetic.recording import Recording, record
 from ico3d.common.expression import EYE_NAMES
+from ico3d.studio.picture import paint
+from ico3d.studio.recording import Recording, record
 
 SIZE, CAMERAS, FRAMES, FPS = 144, 5, 9, 15.0
 WARM = np.array([1.0, 0.85, 0.65])
@@ -61,14 +62,14 @@ def data_sets(face: Path, body: Path, work: Path) -> None:
     spec = importlib.util.spec_from_file_location("smc_files", path)
     writer = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(writer)
-    writer.write_renderme(Capture.open(face), work / "renderme", "0026_s1_all")
-    writer.write_dna(Capture.open(body), work / "dna", "0012_11")
+    writer.write_renderme(open_capture(face), work / "renderme", "0026_s1_all")
+    writer.write_dna(open_capture(body), work / "dna", "0012_11")
     shutil.copy(face / "audio.wav", work / "speech.wav")
 
 
 def phone(face: Path, work: Path) -> None:
     """A video by one camera: the frames there and back, so that it is long enough."""
-    capture = Capture.open(face)
+    capture = open_capture(face)
     order = [*range(FRAMES), *range(FRAMES - 2, 0, -1)] * PHONE_ROUNDS
     pictures = ((capture.image(0, frame) * 255).astype(np.uint8) for frame in order)
     write_video(work / "me.mp4", pictures, (SIZE, SIZE), PHONE_FPS, capture.audio())

@@ -20,12 +20,12 @@ import pytest
 import soundfile
 
 from ico3d.bundle.persona import read_persona
-from ico3d.chat import server
-from ico3d.chat.guard import is_own
 from ico3d.chat.services import TABLES, choose
 from ico3d.chat.services.language.notes import Notes
 from ico3d.chat.services.voice.openvoice import permitted
-from ico3d.chat.settings import read_settings
+from ico3d.chat.serving import server
+from ico3d.chat.serving.guard import is_own
+from ico3d.chat.settings.conversation import read_settings
 from ico3d.cli import main
 from ico3d.common.espeak import synthesize
 from ico3d.common.weights import weights_named

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from ico3d.bundle.format import Bundle
-from ico3d.capture.capture import Capture
+from ico3d.capture.formats import open_capture
 
 pytest.importorskip("anny")
 pytestmark = pytest.mark.slow
@@ -52,7 +52,7 @@ def _tracked(tracker, **truth):
 
     def put(words):
         folder = Path(words[3])
-        recordings.write_known_track(Capture.open(truth[folder.name]), folder)
+        recordings.write_known_track(open_capture(truth[folder.name]), folder)
 
     return {} if tracker else {"capture track": put}
 

@@ -8,14 +8,14 @@ import torch
 from safetensors.torch import save_file
 
 from ico3d.head.expressions import BlendshapeTrack
-from ico3d.head.initial import initial_head
+from ico3d.head.initial_gaussians import initial_head
+from ico3d.head.optimise import HeadTrainer
 from ico3d.head.perceptual import CHANNELS, WEIGHTS, vgg_layers
 from ico3d.head.settings import PRESETS
-from ico3d.head.train import HeadJob, train_head
-from ico3d.head.trainer import HeadTrainer
+from ico3d.head.train_head import HeadJob, train_head
 from ico3d.head.watch import WatchedHead
 from ico3d.training.watch import _side_by_side
-from pretended_cuda import is_moved
+from support.pretended_cuda import is_moved
 
 SETTINGS = dataclasses.replace(
     PRESETS["cpu"],

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ico3d.head.model_folder import TrainedHead
 from ico3d.head.settings import PRESETS
-from ico3d.head.train import HeadJob, train_head
-from ico3d.head.trained import TrainedHead
+from ico3d.head.train_head import HeadJob, train_head
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.export import export_speech, make_servable
 from ico3d.speech.runtime import open_speech

@@ -10,7 +10,7 @@ from tiny_capture import TinyCapture
 from ico3d.common.expression import EyeRange
 from ico3d.head.expressions import eye_track
 from ico3d.head.model import HeadModel, HeadShape
-from ico3d.head.trained import TrainedHead
+from ico3d.head.model_folder import TrainedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
 

@@ -10,10 +10,10 @@ from safetensors.torch import save_file
 
 from ico3d.errors import ModelError
 from ico3d.head.loss import HeadLoss
+from ico3d.head.optimise import HeadTrainer
 from ico3d.head.perceptual import WEIGHTS, PerceptualLoss
 from ico3d.head.settings import PRESETS
-from ico3d.head.train import HeadJob, train_head
-from ico3d.head.trainer import HeadTrainer
+from ico3d.head.train_head import HeadJob, train_head
 from ico3d.head.views import Picture
 from ico3d.splat.losses import ssim
 from ico3d.splat.rendering import Drawing, Rendering

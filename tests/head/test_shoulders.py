@@ -9,12 +9,12 @@ from two_balls import HEAD, TRUNK, TwoBalls, seen_by
 
 from ico3d.common.camera import look_at
 from ico3d.errors import CaptureError
-from ico3d.head.initial import initial_head
+from ico3d.head.initial_gaussians import initial_head
 from ico3d.head.model import HeadModel, HeadShape
 from ico3d.head.settings import PRESETS
-from ico3d.head.train import HeadJob, train_head
+from ico3d.head.train_head import HeadJob, train_head
 from ico3d.head.views import PictureCache
-from ico3d.measure.evaluate import evaluate_head
+from ico3d.measure.head import evaluate_head
 from ico3d.splat.render import render
 
 SETTINGS = dataclasses.replace(

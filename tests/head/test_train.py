@@ -9,10 +9,10 @@ import torch
 
 from ico3d.common.expression import EyeRange, eye_range
 from ico3d.errors import CaptureError, ModelError, SettingsError
+from ico3d.head.model_folder import TrainedHead
+from ico3d.head.optimise import HeadTrainer
 from ico3d.head.settings import PRESETS
-from ico3d.head.train import HeadJob, train_head
-from ico3d.head.trained import TrainedHead
-from ico3d.head.trainer import HeadTrainer
+from ico3d.head.train_head import HeadJob, train_head
 from ico3d.splat.render import render
 from ico3d.training.checkpoint import load_tensors
 from ico3d.training.finite import check_finite

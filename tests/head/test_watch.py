@@ -18,7 +18,7 @@ from ico3d.errors import MissingExtraError
 from ico3d.head.expressions import BlendshapeTrack, SpeechTrack
 from ico3d.head.model import HeadModel, HeadShape
 from ico3d.head.settings import PRESETS
-from ico3d.head.train import HeadJob, train_head
+from ico3d.head.train_head import HeadJob, train_head
 from ico3d.head.watch import WatchedHead
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.training.watch import RADIUS, LivePage

@@ -8,7 +8,7 @@ import torch
 from tiny_capture import TinyCapture
 
 from ico3d.head.settings import PRESETS
-from ico3d.head.train import HeadJob, train_head
+from ico3d.head.train_head import HeadJob, train_head
 
 SETTINGS = dataclasses.replace(
     PRESETS["cpu"],

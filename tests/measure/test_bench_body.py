@@ -8,13 +8,13 @@ import pytest
 from made_trial import MadeTrial
 from moving_capture import FRAMES, MovingCapture
 
+from ico3d.body.planning.windows import Window
 from ico3d.body.settings import ONE_WINDOW
-from ico3d.body.windows import Window
-from ico3d.capture.capture import Capture
 from ico3d.errors import SettingsError
-from ico3d.measure import body_bench
-from ico3d.measure.body_bench import Terms, Trial, mean, run_trials, summary
 from ico3d.measure.commands import BenchBody
+from ico3d.measure.methods import bench as methods
+from ico3d.measure.methods.bench import Terms, Trial, mean, run_trials, summary
+from support.captures import open_with
 
 pytestmark = pytest.mark.slow
 
@@ -99,7 +99,7 @@ def bench(tmp_path_factory):
     """A bench of a tiny capture, and what it found."""
     folder = tmp_path_factory.mktemp("bench")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Capture, "open", MovingCapture)
+        open_with(patch, MovingCapture)
         command = BenchBody(
             folder / "capture",
             folder=folder / "runs",
@@ -142,11 +142,11 @@ def test_the_same_command_trains_nothing_twice(bench):
 
 
 def test_a_clip_of_a_capture(monkeypatch):
-    monkeypatch.setattr(Capture, "open", MovingCapture)
-    clip = body_bench.open_clip(Path("c"), 5)
+    open_with(monkeypatch, MovingCapture)
+    clip = methods.open_clip(Path("c"), 5)
     assert clip.num_frames == 5 and clip.split.train == (0, 1, 2, 3, 4)
     assert clip.split.test_cameras == MovingCapture(Path("c")).split.test_cameras
-    assert body_bench.open_clip(Path("c"), 500).num_frames == FRAMES
+    assert methods.open_clip(Path("c"), 500).num_frames == FRAMES
 
 
 def test_several_at_a_time_share_the_cores(tmp_path):
@@ -184,9 +184,9 @@ def test_the_standard_recording_is_made_once(tmp_path, monkeypatch):
         out.mkdir()
         (out / "capture.json").write_text("{}")
 
-    monkeypatch.setattr(body_bench, "record", record)
+    monkeypatch.setattr(methods, "record", record)
     for _ in range(2):
-        assert body_bench.record_standard(Path("m.npz"), tmp_path / "c", 1) == tmp_path / "c"
+        assert methods.record_standard(Path("m.npz"), tmp_path / "c", 1) == tmp_path / "c"
     (recording,) = made
     assert (recording.cameras, recording.frames, recording.fps) == (20, 41, 15.0)
     assert recording.whole and recording.subject == "m.npz"

@@ -8,7 +8,7 @@ import pytest
 from moving_capture import FRAMES, POINTS, MovingCapture
 from true_body import true_body
 
-from ico3d.body.windows import Window
+from ico3d.body.planning.windows import Window
 from ico3d.errors import CaptureError
 from ico3d.measure.body import Truth, evaluate_body, picture_scores
 from ico3d.measure.flicker import border_flicker, masked_difference, novel_cameras

@@ -8,17 +8,17 @@ from moving_capture import FRAMES, MovingCapture
 from PIL import Image
 from true_body import still_body
 
-from ico3d.body.trained import UNTUNED
-from ico3d.capture.capture import Capture
+from ico3d.body.model_folder import UNTUNED
 from ico3d.errors import ModelError
-from ico3d.measure.body_plots import plot_body
 from ico3d.measure.commands import Evaluate
+from ico3d.measure.methods.plots import plot_body
+from support.captures import open_with
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A body folder; `Capture.open` gives the capture of what it shows at frame 0."""
-    monkeypatch.setattr(Capture, "open", MovingCapture)
+    """A body folder; `open_capture` gives the capture of what it shows at frame 0."""
+    open_with(monkeypatch, MovingCapture)
     still_body(MovingCapture(tmp_path), tmp_path / "body")
     return tmp_path
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ico3d.chat.protocol import Pause, Resume, Speech, Stop
+from ico3d.chat.wire.protocol import Pause, Resume, Speech, Stop
 from ico3d.cli import main
 from ico3d.errors import CaptureError
-from ico3d.measure.chat import Assent, Interruption, Question, sound_of
-from ico3d.measure.chat_bench import SCRIPT, TURNS, Results, figures, share
-from ico3d.measure.page import Player
-from ico3d.measure.questions import audible, broken_off, sayings
+from ico3d.measure.talking.bench import SCRIPT, TURNS, Results, figures, share
+from ico3d.measure.talking.page import Player
+from ico3d.measure.talking.questions import audible, broken_off, sayings
+from ico3d.measure.talking.trials import Assent, Interruption, Question, sound_of
 
 SPEECH = Path(__file__).parents[3] / "shared" / "speech"
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ico3d.chat.protocol import Speech
+from ico3d.chat.wire.protocol import Speech
 from ico3d.errors import SettingsError
-from ico3d.measure.crowd import SCRIPT, Visit, ahead, figures, measure, tone_of
-from ico3d.measure.scripted import tone
+from ico3d.measure.talking.crowd import SCRIPT, Visit, ahead, figures, measure, tone_of
+from ico3d.measure.talking.scripted import tone
 
 pytestmark = pytest.mark.slow
 

@@ -12,14 +12,14 @@ from test_scene import Offset as OffsetScene
 from test_scene import _trained
 from test_train import job
 
-from ico3d.body.train import train_body
-from ico3d.capture.capture import Capture
+from ico3d.body.training.train_clip import train_body
 from ico3d.cli import main
 from ico3d.measure import lpips as room
 from ico3d.measure.body import evaluate_body
-from ico3d.measure.evaluate import evaluate_head
+from ico3d.measure.head import evaluate_head
 from ico3d.measure.scene import evaluate_scene
-from pretended_cuda import drawn
+from support.captures import open_with
+from support.pretended_cuda import drawn
 
 
 def _same(found: dict, wanted: dict) -> None:
@@ -79,7 +79,7 @@ def test_the_verb(cuda, no_models, tmp_path, monkeypatch, device):
     head = _head()
     (tmp_path / "head").mkdir()
     head.save(tmp_path / "head")
-    monkeypatch.setattr(Capture, "open", lambda path: Offset(tmp_path, copy.deepcopy(head)))
+    open_with(monkeypatch, lambda path: Offset(tmp_path, copy.deepcopy(head)))
     words = ["evaluate", tmp_path / "head", "capture", "--json", tmp_path / "a.json"]
     with drawn(monkeypatch) as pictures:
         assert main([*map(str, words), "--device", device]) == 0

@@ -13,10 +13,9 @@ from ico3d.capture.capture import Capture, Split
 from ico3d.common.camera import Camera, look_at
 from ico3d.errors import CaptureError
 from ico3d.head.model import HeadModel, HeadShape
-from ico3d.head.trained import TrainedHead
+from ico3d.head.model_folder import TrainedHead
 from ico3d.head.views import view_of
-from ico3d.measure import evaluate
-from ico3d.measure.evaluate import evaluate_head, most_frontal_camera
+from ico3d.measure.head import evaluate_head, most_frontal_camera
 from ico3d.measure.metrics import mouth_box
 from ico3d.splat.render import render
 
@@ -155,7 +154,7 @@ def test_without_a_clean_plate_the_curtain_is_not_compared(tmp_path, no_models):
 
 def test_a_mouth_without_landmarks_is_found_in_the_recorded_picture(tmp_path, monkeypatch):
     head, reader = _head(0.4), Reader()
-    monkeypatch.setattr(evaluate, "landmark_reader", lambda: reader)
+    monkeypatch.setattr(head, "landmark_reader", lambda: reader)
     capture = BeforeCurtain(tmp_path, head)
     scores = evaluate_head(head, capture, (3, 4, 5), None)
     box = mouth_box(Offset.landmarks(None, 0, 0), SIZE, SIZE)
@@ -167,7 +166,7 @@ def test_a_mouth_without_landmarks_is_found_in_the_recorded_picture(tmp_path, mo
 
 def test_cameras_that_see_no_face_are_not_asked_for_one(tmp_path, monkeypatch, caplog):
     head, reader = _head(0.4), Reader()
-    monkeypatch.setattr(evaluate, "landmark_reader", lambda: reader)
+    monkeypatch.setattr(head, "landmark_reader", lambda: reader)
     capture = BeforeCurtain(tmp_path, head)
     behind = look_at(np.array([0.1, 0.0, -0.7]), np.zeros(3))
     capture.cameras = tuple(replace(c, world_to_camera=behind) for c in capture.cameras)

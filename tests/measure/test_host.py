@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from ico3d.measure import host
+from ico3d.measure.talking import host
 
 LINE = "cpu  100 0 50 900 0 0 3 {} 0 0\ncpu0 1 1 1 1 1 1 1 1 1 1\n"
 

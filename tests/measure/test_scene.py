@@ -12,8 +12,9 @@ from ico3d.errors import CaptureError
 from ico3d.measure.commands import Evaluate
 from ico3d.measure.scene import evaluate_scene
 from ico3d.scene.model import scene_on_points
-from ico3d.scene.trained import TrainedScene
+from ico3d.scene.model_folder import TrainedScene
 from ico3d.splat.render import render
+from support.captures import open_with
 
 SIZE = 32
 
@@ -108,7 +109,7 @@ def test_without_test_pictures_it_says_so(tmp_path):
 def test_the_verb_recognises_a_scene_and_writes_pictures(tmp_path, monkeypatch):
     trained = _trained("all")
     trained.save(tmp_path / "model")
-    monkeypatch.setattr(Capture, "open", lambda _: Offset(tmp_path, trained))
+    open_with(monkeypatch, lambda _: Offset(tmp_path, trained))
     out = tmp_path / "out"
     Evaluate(tmp_path / "model", tmp_path, out / "metrics.json", out / "images").run()
     assert json.loads((out / "metrics.json").read_text())["num_gaussians"] == 60

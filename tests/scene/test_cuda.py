@@ -5,10 +5,10 @@ import dataclasses
 import pytest
 import torch
 
+from ico3d.scene.optimise import SceneTrainer
 from ico3d.scene.settings import PRESETS
-from ico3d.scene.train import SceneJob, train_scene
-from ico3d.scene.trainer import SceneTrainer
-from pretended_cuda import is_moved
+from ico3d.scene.train_scene import SceneJob, train_scene
+from support.pretended_cuda import is_moved
 
 SMALL = {
     "steps": 26,

@@ -5,8 +5,8 @@ import pytest
 
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
-from ico3d.scene.initial import initial_scene
 from ico3d.scene.settings import SceneSettings
+from ico3d.scene.surface_points import initial_scene
 from ico3d.scene.views import SceneViews
 
 SETTINGS = SceneSettings(initial_gaussians=100, sh_degree=2, initial_opacity=0.3)

@@ -7,15 +7,15 @@ import pytest
 import torch
 
 from ico3d import cli
-from ico3d.capture.capture import Capture
 from ico3d.errors import ModelError, SettingsError
 from ico3d.measure.scene import evaluate_scene
+from ico3d.scene.model_folder import TrainedScene
+from ico3d.scene.optimise import SceneTrainer
 from ico3d.scene.settings import PRESETS
-from ico3d.scene.train import SceneJob, train_scene
-from ico3d.scene.trained import TrainedScene
-from ico3d.scene.trainer import SceneTrainer
+from ico3d.scene.train_scene import SceneJob, train_scene
 from ico3d.splat.files.formats import read_gaussians
 from ico3d.training.changes import with_changes
+from support.captures import open_with
 
 SMALL = {
     "steps": 200,
@@ -91,7 +91,7 @@ def test_a_saved_scene_is_the_same(still, tmp_path):
 
 
 def test_the_verb_trains_and_exports(still, tmp_path, monkeypatch):
-    monkeypatch.setattr(Capture, "open", lambda _: still(2))
+    open_with(monkeypatch, lambda _: still(2))
     out = tmp_path / "model"
     words = ["train", "static", str(tmp_path), str(out), "--only", "person", "--frames", "0"]
     changes = ["steps=20", "initial_gaussians=80", "sh_degree=2"]

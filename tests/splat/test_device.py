@@ -12,7 +12,7 @@ import torch
 from ico3d.errors import SettingsError
 from ico3d.splat import convention, device
 from ico3d.splat.device import computing_device, cuda_fault
-from pretended_cuda import CUDA, install_gsplat, pretended_cuda, rasterization
+from support.pretended_cuda import CUDA, install_gsplat, pretended_cuda, rasterization
 
 
 @pytest.fixture(autouse=True)

@@ -1,4 +1,4 @@
-// Written by `python -m ico3d.chat.protocol_typescript` from src/ico3d/chat/protocol.py: edit that.
+// Written by `python -m ico3d.chat.wire.typescript`. Edit src/ico3d/chat/wire/protocol.py instead.
 
 export const VERSION = 4;
 export const MICROPHONE_RATE = 16000; // Hz

@@ -8,10 +8,10 @@ import numpy as np
 import torch
 from scipy.spatial.transform import Rotation, Slerp
 
-from ico3d.body.trained import TrainedBody
+from ico3d.body.model_folder import TrainedBody
 from ico3d.common.files import write_atomic
 from ico3d.errors import ModelError
-from ico3d.head.trained import TrainedHead
+from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.training.checkpoint import load_tensors, save_tensors
 

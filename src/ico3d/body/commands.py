@@ -11,7 +11,7 @@ from ico3d.common.device import DeviceName
 from ico3d.errors import SettingsError
 
 if TYPE_CHECKING:
-    from ico3d.body.train import Runner
+    from ico3d.body.training.train_clip import Runner
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,8 @@ class TrainBody:
         from rich.console import Console
 
         from ico3d.body.settings import settings_for
-        from ico3d.body.train import BodyJob, plan_windows, train_body
-        from ico3d.capture.capture import Capture
+        from ico3d.body.training.train_clip import BodyJob, plan_windows, train_body
+        from ico3d.capture.formats import open_capture
         from ico3d.splat.device import decided
         from ico3d.training.changes import with_changes
 
@@ -63,7 +63,7 @@ class TrainBody:
         runner = None if self.plan else runner_of(self.jobs, self.ray, device)
         settings = with_changes(settings_for(self.preset, self.method), self.set)
         job = BodyJob(self.method, self.seed, settings, device=device)
-        capture = Capture.open(self.capture)
+        capture = open_capture(self.capture)
         if self.plan:
             plan_windows(capture, job, self.out)
             return
@@ -86,9 +86,9 @@ def runner_of(jobs: int, ray: str | None, device: str) -> "Runner | None":
     Raises:
         SettingsError: If it cannot be.
     """
-    from ico3d.body.cluster import RayCluster
-    from ico3d.body.jobs import train_windows
-    from ico3d.body.processes import Processes
+    from ico3d.body.workers.cluster import RayCluster
+    from ico3d.body.workers.jobs import train_windows
+    from ico3d.body.workers.processes import Processes
 
     if jobs < 1 or (jobs > 1 and ray):
         raise SettingsError(

@@ -10,8 +10,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ico3d.body.model import WindowModel
-from ico3d.body.windows import Window
+from ico3d.body.motion.window_model import WindowModel
+from ico3d.body.planning.windows import Window
 from ico3d.splat.density import Plan, Population
 from ico3d.splat.gaussians import Gaussians
 

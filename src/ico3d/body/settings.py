@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from ico3d.body.initial import Source
+from ico3d.body.training.surface_points import Source
 from ico3d.training.optimiser import Rate
 
 Method = Literal["swings++", "swings", "4dgs", "spacetime", "freetime", "static"]
@@ -20,7 +20,8 @@ class BodySettings:
     """How a body is trained; defaults are the paper's and, where it is silent, 3DGS's.
 
     Attributes:
-        motion_threshold: Motion that a window may add up to, cm² (`ico3d.body.flow.ClipFlow`).
+        motion_threshold: Motion that a window may add up to, cm²
+            (`ico3d.body.planning.flow.ClipFlow`).
         shortest_window: Frames that a window has at least.
         longest_window: Frames that it has at most.
         initial: Where Gaussians begin: the best that the capture allows, or the visual hull.

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.capture.finding import Finding
+from ico3d.capture.checking.finding import Finding
 from ico3d.common.camera import Camera
 from ico3d.common.expression import EYE_NAMES as EYE_NAMES
-from ico3d.errors import CaptureError
 
 
 @dataclass(frozen=True)
@@ -108,30 +107,6 @@ class Capture(ABC):
     def provenance(self) -> dict:
         """Who was recorded, how, and under which licence: goes into the bundle's manifest."""
         return {"kind": self.kind, "sources": [], "consent": "", "licence": ""}
-
-    @staticmethod
-    def open(path: Path | str) -> "Capture":
-        """Opens a capture, whatever its format, with the head that was tracked in it.
-
-        Raises:
-            CaptureError: If there is none, or the format is not recognised, or it is damaged.
-        """
-        from ico3d.capture.formats import FORMATS
-        from ico3d.capture.headtrack.tracked import with_track
-
-        path = Path(path)
-        if not path.exists():
-            raise CaptureError(f"there is no capture at {path}.")
-        for recognises, reader in FORMATS:
-            if recognises(path):
-                return with_track(reader(path))
-        raise CaptureError(
-            f"{path} is in no format known here: expected a talking-portrait folder "
-            "(transforms_train.json), a synthetic capture (capture.json), a multiview folder "
-            "(cameras.json), a RenderMe-360 recording (_raw.smc and _anno.smc) or a DNA-Rendering "
-            "recording (.smc and _annots.smc); "
-            "other recordings come in with ico3d capture import."
-        )
 
 
 def last_eleventh(num_frames: int) -> Split:

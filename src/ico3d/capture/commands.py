@@ -6,11 +6,6 @@ from typing import Annotated, Literal
 
 import tyro
 
-from ico3d.capture.headtrack.command import Track as Track
-from ico3d.capture.multiview.commands import Import as Import
-from ico3d.capture.multiview.commands import Masks as Masks
-from ico3d.capture.multiview.commands import Resize as Resize
-from ico3d.capture.synthetic.command import Synthetic as Synthetic
 from ico3d.common.device import DeviceName
 
 
@@ -44,7 +39,7 @@ class Portrait:
 
     def run(self) -> None:
         """Runs it."""
-        from ico3d.capture.portrait import PortraitSettings, track_portrait
+        from ico3d.capture.portrait.track import PortraitSettings, track_portrait
 
         focal = None if self.intrinsics == "estimated" else self.intrinsics
         about = (self.consent, self.licence)
@@ -73,11 +68,11 @@ class Check:
         Raises:
             CaptureError: If anything is inconsistent; the sentence is the first such finding.
         """
-        from ico3d.capture.capture import Capture
-        from ico3d.capture.check import report
+        from ico3d.capture.checking.check import report
+        from ico3d.capture.formats import open_capture
 
         inside = self.path / "check.png"
         report(
-            Capture.open(self.path),
+            open_capture(self.path),
             self.out or (inside if self.path.is_dir() else self.path.with_suffix(".png")),
         )

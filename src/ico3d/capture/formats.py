@@ -1,21 +1,23 @@
 """Which reader opens which capture; each is imported only when its format is met."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from ico3d.capture.capture import Capture
+from ico3d.errors import CaptureError
 
 
 def _portrait(path: Path) -> Capture:
     """Opens a talking-portrait folder."""
-    from ico3d.capture.talking_portrait import TalkingPortrait
+    from ico3d.capture.portrait.reader import TalkingPortrait
 
     return TalkingPortrait(path)
 
 
 def _synthetic(path: Path) -> Capture:
     """Opens a synthetic capture."""
-    from ico3d.capture.synthetic.reader import SyntheticCapture
+    from ico3d.capture.synthetic import SyntheticCapture
 
     return SyntheticCapture(path)
 
@@ -60,11 +62,51 @@ def _holds(name: str) -> Callable[[Path], bool]:
     return lambda path: (path / name).is_file()
 
 
-FORMATS: list[tuple[Callable[[Path], bool], Callable[[Path], Capture]]] = [
-    (_holds("transforms_train.json"), _portrait),
-    (_holds("capture.json"), _synthetic),
-    (_holds("cameras.json"), _multiview),
-    (_is_renderme, _renderme),
-    (_is_dna, _dna),
-]
-"""Pairs of (recognises a path, opens it); SMC files of other names are DNA-Rendering's."""
+@dataclass(frozen=True)
+class Format:
+    """One way in which captures are stored.
+
+    Attributes:
+        name: What an error calls it, with the files by which it is known.
+        recognises: Whether a path holds such a capture.
+        read: Opens one.
+    """
+
+    name: str
+    recognises: Callable[[Path], bool]
+    read: Callable[[Path], Capture]
+
+
+FORMATS = (
+    Format(
+        "a talking-portrait folder (transforms_train.json)",
+        _holds("transforms_train.json"),
+        _portrait,
+    ),
+    Format("a synthetic capture (capture.json)", _holds("capture.json"), _synthetic),
+    Format("a multiview folder (cameras.json)", _holds("cameras.json"), _multiview),
+    Format("a RenderMe-360 recording (_raw.smc and _anno.smc)", _is_renderme, _renderme),
+    Format("a DNA-Rendering recording (.smc and _annots.smc)", _is_dna, _dna),
+)
+"""The first that recognises a path reads it; SMC files of unknown names are DNA-Rendering's."""
+
+
+def open_capture(path: Path | str) -> Capture:
+    """Opens a capture, whatever its format, with the head that was tracked in it.
+
+    Raises:
+        CaptureError: If there is none, or the format is not recognised, or it is damaged.
+    """
+    from ico3d.capture.headtrack.tracked import with_track
+
+    path = Path(path)
+    for known in FORMATS:
+        if known.recognises(path):
+            return with_track(known.read(path))
+    if not path.exists():
+        raise CaptureError(f"there is no capture at {path}.")
+    *names, last = (known.name for known in FORMATS)
+    raise CaptureError(
+        f"{path} is in no format known here: expected {', '.join(names)} or {last}; "
+        "other recordings come in with ico3d capture import."
+    )

@@ -10,7 +10,7 @@ from typing import Annotated
 import tyro
 
 from ico3d.bundle import packaged
-from ico3d.chat.operator_log import set_up_log
+from ico3d.chat.observing.operator_log import set_up_log
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,12 @@ class Serve:
         set_up_log(self.verbose)
         from ico3d.bundle.format import Bundle
         from ico3d.bundle.persona import read_persona
-        from ico3d.chat import server
-        from ico3d.chat.monitor import Monitor, TurnLog
+        from ico3d.chat.observing.monitor import Monitor, TurnLog
         from ico3d.chat.parts import make_parts, warm_up
         from ico3d.chat.services.offers import offers
-        from ico3d.chat.sessions import Sessions
-        from ico3d.chat.settings import read_settings
+        from ico3d.chat.serving import server
+        from ico3d.chat.serving.sessions import Sessions
+        from ico3d.chat.settings.conversation import read_settings
 
         settings = read_settings(self.settings)
         persona = read_persona(self.persona) if self.persona else None

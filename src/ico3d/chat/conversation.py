@@ -17,31 +17,31 @@ from pipecat.services.tts_service import TTSService
 from pipecat.turns.user_turn_strategies import UserTurnStrategies
 from pipecat.workers.runner import WorkerRunner
 
-from ico3d.chat import protocol
 from ico3d.chat.activity import Activity
-from ico3d.chat.expression import ExpressionProcessor
-from ico3d.chat.face import Face
 from ico3d.chat.frames import TypedFrame, Utterances
-from ico3d.chat.gestures import Gestures
 from ico3d.chat.listener import Captions, PageInput
 from ico3d.chat.memory import forget, remembering
-from ico3d.chat.modules.mouth import RemoteMouth
-from ico3d.chat.monitor import Visitor
+from ico3d.chat.observing.monitor import Visitor
+from ico3d.chat.observing.timing import Clock, TurnObserver
 from ico3d.chat.page import Page
 from ico3d.chat.parts import Avatar, Parts, make_aside
-from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE, Error, Heard
+from ico3d.chat.performing.expression import ExpressionProcessor
+from ico3d.chat.performing.face import Face
+from ico3d.chat.performing.gestures import Gestures
+from ico3d.chat.remote.mouth import RemoteMouth
 from ico3d.chat.services.voice.clauses import ClauseProcessor
 from ico3d.chat.services.voice.markup import speakable
-from ico3d.chat.settings import ChatSettings
+from ico3d.chat.settings.conversation import ChatSettings
 from ico3d.chat.speaker import Speaker
 from ico3d.chat.supervision.language import AnswerGuard
 from ico3d.chat.supervision.voice import endure
-from ico3d.chat.timing import Clock, TurnObserver
 from ico3d.chat.tools import functions
 from ico3d.chat.turns.detector import VoiceDetector
 from ico3d.chat.turns.echo import EchoGuard
 from ico3d.chat.turns.echo_filter import EchoFilter
 from ico3d.chat.turns.strategies import strategies
+from ico3d.chat.wire import protocol
+from ico3d.chat.wire.protocol import MICROPHONE_RATE, SPEECH_RATE, Error, Heard
 from ico3d.chat.workers import at_once
 
 NOTHING_HEARD = 3.0  # s without a sign of the recogniser after which a turn is given up

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from pipecat.frames.frames import DataFrame, InputAudioRawFrame, SystemFrame
 
-from ico3d.chat.protocol import SPEECH_RATE
+from ico3d.chat.wire.protocol import SPEECH_RATE
 
 
 @dataclass

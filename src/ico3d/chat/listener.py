@@ -16,7 +16,7 @@ from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
 from ico3d.chat.frames import DeafFrame, HeardFrame, MicrophoneFrame, TalkFrame, TypedFrame
 from ico3d.chat.page import Page
-from ico3d.chat.protocol import MICROPHONE_RATE, Audio, Transcript
+from ico3d.chat.wire.protocol import MICROPHONE_RATE, Audio, Transcript
 
 
 class PageInput(FrameProcessor):

@@ -10,7 +10,7 @@ from pipecat.utils.context.llm_context_summarization import (
     LLMContextSummaryConfig,
 )
 
-from ico3d.chat.settings import Memory
+from ico3d.chat.settings.conversation import Memory
 
 KEPT = 4  # latest messages, word by word
 SHARE = 4  # of the budget, one part in so many is the summary's

@@ -9,7 +9,7 @@ from collections import deque
 import numpy as np
 
 from ico3d.chat.frames import SpeechFrame
-from ico3d.chat.protocol import (
+from ico3d.chat.wire.protocol import (
     Answer,
     End,
     Pause,

@@ -17,13 +17,13 @@ from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.bundle.animation import Animation
 from ico3d.bundle.manifest import HeadInfo, Persona
-from ico3d.chat import protocol
-from ico3d.chat.failures import cause
+from ico3d.chat.observing.failures import cause
 from ico3d.chat.services import Chosen, Service
 from ico3d.chat.services.provider import Context, WarmsUp
-from ico3d.chat.settings import ChatSettings
+from ico3d.chat.settings.conversation import ChatSettings
 from ico3d.chat.turns.detector import Ear
 from ico3d.chat.turns.eager import EagerSmartTurn
+from ico3d.chat.wire import protocol
 from ico3d.chat.workers import Workers
 from ico3d.errors import Ico3dError, ServiceError
 from ico3d.speech.runtime import SpeechModel

@@ -1,6 +1,6 @@
 """How far the page has played an utterance, and how long speech must wait."""
 
-from ico3d.chat.protocol import MAX_AHEAD_SECONDS, SPEECH_RATE
+from ico3d.chat.wire.protocol import MAX_AHEAD_SECONDS, SPEECH_RATE
 
 
 class Playback:

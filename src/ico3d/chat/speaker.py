@@ -23,11 +23,11 @@ from pipecat.frames.frames import (
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
 from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame, Utterances
-from ico3d.chat.gestures import Gestures
 from ico3d.chat.page import Page
+from ico3d.chat.performing.gestures import Gestures
 from ico3d.chat.playback import Playback
-from ico3d.chat.protocol import Answer, Clock, End, Pause, Resume, Stop
 from ico3d.chat.turns.echo import SentSound
+from ico3d.chat.wire.protocol import Answer, Clock, End, Pause, Resume, Stop
 
 SOONEST = 0.005  # s between two looks at the clock
 

@@ -44,13 +44,13 @@ class TrainHead:
         """Trains, or goes on training; writes the model folder."""
         from rich.console import Console
 
-        from ico3d.capture.capture import Capture
+        from ico3d.capture.formats import open_capture
         from ico3d.head.settings import PRESETS
-        from ico3d.head.train import HeadJob, train_head
+        from ico3d.head.train_head import HeadJob, train_head
 
         settings = PRESETS[self.preset].with_changes(self.set)
         job = HeadJob(self.inputs, self.variant, self.encoder, self.seed, settings)
         port = self.watch_port if self.watch else None
-        head = train_head(Capture.open(self.capture), self.out, job, port, self.device)
+        head = train_head(open_capture(self.capture), self.out, job, port, self.device)
         seconds = head.summary["train_seconds"]
         Console().print(f"{self.out}: {len(head.model)} Gaussians, trained in {seconds:.0f} s.")

@@ -10,8 +10,8 @@ import numpy as np
 import torch
 from rich.progress import track
 
-from ico3d.body.trained import ROUNDING, TrainedBody
-from ico3d.body.windows import Window
+from ico3d.body.model_folder import ROUNDING, TrainedBody
+from ico3d.body.planning.windows import Window
 from ico3d.capture.capture import Capture
 from ico3d.capture.pictures import View, train_cameras
 from ico3d.errors import CaptureError

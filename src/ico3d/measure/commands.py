@@ -46,10 +46,10 @@ class Evaluate:
 
         from rich.console import Console
 
-        from ico3d.capture.capture import Capture
+        from ico3d.capture.formats import open_capture
         from ico3d.common.files import write_atomic
 
-        metrics = self._metrics(Capture.open(self.capture))
+        metrics = self._metrics(open_capture(self.capture))
         if self.json is not None:
             write_atomic(self.json, json.dumps(metrics, indent=1).encode())
         console = Console()
@@ -62,21 +62,21 @@ class Evaluate:
     def _metrics(self, capture: "Capture") -> dict:
         """Measures what the folder holds: a scene, a whole person, a body, else a head."""
         from ico3d.avatar.avatar import ABOUT as AVATAR
-        from ico3d.body.trained import ABOUT as BODY
-        from ico3d.scene.trained import ABOUT as SCENE
+        from ico3d.body.model_folder import ABOUT as BODY
+        from ico3d.scene.model_folder import ABOUT as SCENE
         from ico3d.splat.device import computing_device
 
         device = computing_device(self.device)
         if (self.model / SCENE).is_file():
             from ico3d.measure.scene import evaluate_scene
-            from ico3d.scene.trained import TrainedScene
+            from ico3d.scene.model_folder import TrainedScene
 
             scene = TrainedScene.load(self.model).to(device)
             return evaluate_scene(scene, capture, self.frames, self.images)
         if (self.model / AVATAR).is_file() or (self.model / BODY).is_file():
             return self._body(capture, (self.model / AVATAR).is_file(), device)
-        from ico3d.head.trained import TrainedHead
-        from ico3d.measure.evaluate import evaluate_head
+        from ico3d.head.model_folder import TrainedHead
+        from ico3d.measure.head import evaluate_head
 
         head = TrainedHead.load(self.model).to(device)
         frames = capture.split.test if self.frames == "test" else range(capture.num_frames)
@@ -86,9 +86,9 @@ class Evaluate:
         from dataclasses import replace
 
         from ico3d.avatar.avatar import BODY, TrainedAvatar
-        from ico3d.body.trained import ABOUT, UNTUNED, TrainedBody
+        from ico3d.body.model_folder import ABOUT, UNTUNED, TrainedBody
         from ico3d.measure.body import evaluate_body
-        from ico3d.measure.body_plots import plot_body
+        from ico3d.measure.methods.plots import plot_body
 
         folder = self.model / BODY if with_head else self.model
         body = TrainedBody.load(folder, UNTUNED if self.untuned else ABOUT).to(device)
@@ -269,11 +269,11 @@ class BenchBody:
         from rich.console import Console
 
         from ico3d.common.files import write_atomic
-        from ico3d.measure import body_bench, body_tables
+        from ico3d.measure.methods import bench, tables
         from ico3d.splat.device import decided
 
         console = Console()
-        terms = body_bench.terms_for(
+        terms = bench.terms_for(
             self._recording(),
             self.frames,
             self.folder,
@@ -282,19 +282,19 @@ class BenchBody:
             decided(self.device),
         )
         trials = [
-            body_bench.Trial(method, seed, terms)
+            bench.Trial(method, seed, terms)
             for seed in range(self.seeds)
             for method in self.methods
         ]
-        results = body_bench.run_trials(
-            trials, self.jobs, lambda *found: console.print(body_tables.line(*found))
+        results = bench.run_trials(
+            trials, self.jobs, lambda *found: console.print(tables.line(*found))
         )
-        figures = body_bench.summary(results)
+        figures = bench.summary(results)
         figures["windows"] = [[window.first, window.last] for window in terms.windows]
         figures["jobs"] = self.jobs
         if self.json is not None:
             write_atomic(self.json, json.dumps(figures, indent=1).encode())
-        for table in body_tables.tables(figures):
+        for table in tables.tables(figures):
             console.print(table)
 
     def _recording(self) -> Path:
@@ -302,7 +302,7 @@ class BenchBody:
         import os
 
         from ico3d.errors import SettingsError
-        from ico3d.measure.body_bench import record_standard
+        from ico3d.measure.methods.bench import record_standard
 
         if self.seeds < 1 or self.jobs < 1 or (self.frames or 2) < 2:
             raise SettingsError("--seeds and --jobs must be at least 1, and --frames at least 2.")

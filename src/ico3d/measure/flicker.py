@@ -6,8 +6,8 @@ import numpy as np
 import torch
 from rich.progress import track
 
-from ico3d.body.novel_views import novel_camera
-from ico3d.body.trained import TrainedBody
+from ico3d.body.model_folder import TrainedBody
+from ico3d.body.training.novel_views import novel_camera
 from ico3d.common.camera import Camera
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render

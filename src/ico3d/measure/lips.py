@@ -72,7 +72,7 @@ class LandmarkReader:
             MissingExtraError: If MediaPipe is not installed.
             MissingModelError: If the model file is not there.
         """
-        from ico3d.capture.face import FaceReader
+        from ico3d.capture.face.mediapipe_face import FaceReader
         from ico3d.common.weights import model_file
 
         model = model_file("face_landmarker.task", "measuring lips")
@@ -95,8 +95,8 @@ class LandmarkReader:
         Returns:
             (68, 2) pixels, or None where no face is seen.
         """
+        from ico3d.capture.face.landmarks import MULTI_PIE
         from ico3d.capture.headtrack.crops import search
-        from ico3d.capture.multipie import MULTI_PIE
 
         face = self._reader.read((np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8))
         if face is not None:

@@ -13,7 +13,7 @@ from ico3d.errors import CaptureError
 from ico3d.measure.metrics import psnr
 from ico3d.measure.scores import Scores, add_picture, write_pictures
 from ico3d.measure.stopwatch import Stopwatch
-from ico3d.scene.trained import TrainedScene
+from ico3d.scene.model_folder import TrainedScene
 from ico3d.scene.views import SceneViews
 from ico3d.splat.render import render
 

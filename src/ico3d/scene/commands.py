@@ -44,9 +44,9 @@ class TrainStatic:
         """Trains, or goes on training; writes the model folder and what is exported."""
         from rich.console import Console
 
-        from ico3d.capture.capture import Capture
+        from ico3d.capture.formats import open_capture
         from ico3d.scene.settings import PRESETS
-        from ico3d.scene.train import SceneJob, train_scene
+        from ico3d.scene.train_scene import SceneJob, train_scene
         from ico3d.splat.files.formats import check_writable, write_gaussians
         from ico3d.training.changes import with_changes
 
@@ -54,7 +54,7 @@ class TrainStatic:
             check_writable(self.export)
         settings = with_changes(PRESETS[self.preset, self.strategy], self.set)
         job = SceneJob(self.only, self.frames, self.strategy, self.seed, settings)
-        trained = train_scene(Capture.open(self.capture), self.out, job, self.device)
+        trained = train_scene(open_capture(self.capture), self.out, job, self.device)
         if self.export is not None:
             write_gaussians(self.export, trained.scene.raw())
         seconds = trained.summary["train_seconds"]

@@ -17,7 +17,7 @@ from ico3d.bundle.format import Bundle
 from ico3d.capture.capture import Capture, all_frames
 from ico3d.common.camera import Camera, look_at
 from ico3d.head.model import HeadModel, HeadShape
-from ico3d.head.trained import TrainedHead
+from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.render import render
 
 MOMENTS = (0.0, 1.5, 3.0)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from ico3d.capture.capture import Capture, all_frames
 from ico3d.common.camera import Camera, look_at
 from ico3d.head.model import HeadModel, HeadShape
-from ico3d.head.trained import TrainedHead
+from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
 

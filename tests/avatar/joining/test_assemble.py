@@ -20,7 +20,7 @@ from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.similarity import moved
 from ico3d.body.companion import Pruning
 from ico3d.body.settings import settings_for
-from ico3d.body.trainer import BodyTrainer
+from ico3d.body.training.optimise_window import BodyTrainer
 from ico3d.capture.capture import Capture
 from ico3d.errors import CaptureError, ModelError, SettingsError
 from ico3d.head.model import HeadModel, HeadShape

@@ -19,7 +19,7 @@ from ico3d.avatar.joining.found_placement import OverRecording, head_poses
 from ico3d.avatar.joining.recolour import color_difference, recolour
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.seam import seam_scores
-from pretended_cuda import drawn, is_moved
+from support.pretended_cuda import drawn, is_moved
 
 
 def test_colours_are_matched(cuda, head, abroad):

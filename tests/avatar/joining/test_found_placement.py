@@ -10,7 +10,7 @@ from planted_person import PlantedPerson, planted_head
 from ico3d.avatar.avatar import HEAD
 from ico3d.avatar.joining.assemble import place_head
 from ico3d.errors import CaptureError, MissingModelError, ModelError
-from ico3d.head.trained import TrainedHead
+from ico3d.head.model_folder import TrainedHead
 
 
 def test_a_head_without_landmarks_is_joined(face_model, packaged_demo, tmp_path, monkeypatch):

@@ -10,10 +10,10 @@ from planted_person import ABROAD, NAMES, planted_head
 from scipy.spatial.transform import Rotation, Slerp
 
 from ico3d.avatar.avatar import PLACEMENT, Placement, TrainedAvatar, load_placement, save_placement
-from ico3d.body.formulas import Still
-from ico3d.body.model import WindowModel
-from ico3d.body.trained import TrainedBody, save_window
-from ico3d.body.windows import Window
+from ico3d.body.model_folder import TrainedBody, save_window
+from ico3d.body.motion.formulas import Still
+from ico3d.body.motion.window_model import WindowModel
+from ico3d.body.planning.windows import Window
 from ico3d.errors import ModelError
 from ico3d.training.checkpoint import load_tensors, save_tensors
 

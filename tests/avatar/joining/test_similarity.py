@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from ico3d.avatar.avatar import Placement
 from ico3d.avatar.joining.similarity import STEADY, canonical_from_head, moved, similarity
-from ico3d.capture.canonical import canonical_landmarks
+from ico3d.capture.face.canonical import canonical_landmarks
 from ico3d.errors import ModelError
 from ico3d.splat import quaternions
 

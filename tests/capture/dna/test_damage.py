@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ico3d.capture.capture import Capture
-from ico3d.capture.check import examine
+from ico3d.capture.checking.check import examine
+from ico3d.capture.formats import open_capture
 from ico3d.cli import main as run
 from ico3d.errors import CaptureError, MissingExtraError
 
@@ -35,7 +35,7 @@ def main(smc, tmp_path):
 
 def test_forty_rows_of_expressions_for_more_frames(smc, tmp_path, caplog):
     rig = smc.Rig(cameras=(0, 1), frames=45, sizes=((8, 8), (8, 8)), expression_rows=40)
-    capture = Capture.open(smc.write_recording(tmp_path, rig))
+    capture = open_capture(smc.write_recording(tmp_path, rig))
     parts = smc.smplx(45)
     with caplog.at_level(logging.WARNING):
         for frame in (39, 40, 44):
@@ -47,7 +47,7 @@ def test_forty_rows_of_expressions_for_more_frames(smc, tmp_path, caplog):
 
 
 def test_one_row_of_betas(smc, tmp_path, caplog):
-    capture = Capture.open(smc.write_recording(tmp_path, smc.Rig(cameras=(0, 1), betas_rows=1)))
+    capture = open_capture(smc.write_recording(tmp_path, smc.Rig(cameras=(0, 1), betas_rows=1)))
     with caplog.at_level(logging.WARNING):
         for frame in range(3):
             betas = capture.smplx(frame).betas
@@ -61,14 +61,14 @@ def test_poses_that_end_early_are_none(main, caplog):
         poses = file["SMPLx/fullpose"][:2]
         del file["SMPLx/fullpose"]
         file["SMPLx/fullpose"] = poses
-    capture = Capture.open(main)
+    capture = open_capture(main)
     assert capture.smplx(1) is not None and capture.smplx(2) is None
     assert "only the first 2 of 3 frames" in caplog.messages[0]
 
 
 def test_parts_without_annotations(smc, tmp_path):
     rig = smc.Rig(cameras=(0, 1, 2), annotated=False)
-    capture = Capture.open(smc.write_recording(tmp_path, rig))
+    capture = open_capture(smc.write_recording(tmp_path, rig))
     assert capture.image(0, 0) is not None
     assert capture.mask(0, 0) is None and capture.smplx(0) is None
     assert capture.keypoints_2d(0, 0) is None and capture.keypoints_3d(0) is None
@@ -86,7 +86,7 @@ def test_missing_frames_are_named(main):
     with h5py.File(main, "a") as file:
         del file["Camera_5mp/1/color/2"]
         del file["Camera_12mp/48/color/0"]
-    capture = Capture.open(main)
+    capture = open_capture(main)
     assert capture.image(1, 2) is None and capture.image(1, 1) is not None
     (finding,) = (f for f in examine(capture) if f.what == "views")
     assert finding.level == "warn"
@@ -100,7 +100,7 @@ def test_damaged_frames_are_named(main, capsys):
         whole = file["Camera_5mp/0/color/2"][()]
         del file["Camera_5mp/0/color/2"]
         file["Camera_5mp/0/color/2"] = whole[: len(whole) // 2]
-    capture = Capture.open(main)
+    capture = open_capture(main)
     (finding,) = (f for f in examine(capture) if f.what == "views")
     assert finding.level == "error" and finding.text == "damaged: camera 02, frame 1"
     fails(lambda: capture.image(2, 1), "camera 02, frame 1", "damaged")
@@ -113,14 +113,14 @@ def test_pictures_of_another_size_are_refused(main, smc):
     with h5py.File(main, "a") as file:
         del file["Camera_5mp/2/color/1"]
         file["Camera_5mp/2/color/1"] = smc.encoded(smc.picture(2, 1, (20, 30)), "JPEG")
-    capture = Capture.open(main)
+    capture = open_capture(main)
     fails(lambda: capture.image(2, 1), "camera 02, frame 1", "30x20", "40x48")
 
 
 def test_cameras_without_calibration_are_left_out(main, caplog):
     with h5py.File(annotations_of(main), "a") as file:
         del file["Camera_Parameter/01"]
-    assert [c.name for c in Capture.open(main).cameras] == ["00", "02", "48"]
+    assert [c.name for c in open_capture(main).cameras] == ["00", "02", "48"]
     assert "01" in caplog.messages[0]
 
 
@@ -140,30 +140,30 @@ def test_damaged_calibrations_are_named(main, part, value, words):
     with h5py.File(annotations_of(main), "a") as file:
         del file[f"Camera_Parameter/02/{part}"]
         file[f"Camera_Parameter/02/{part}"] = value
-    fails(lambda: Capture.open(main), "02", words)
+    fails(lambda: open_capture(main), "02", words)
 
 
 def test_annotations_must_be_there(main):
     annotations_of(main).unlink()
-    fails(lambda: Capture.open(main), "0012_11_annots.smc", "beside it")
+    fails(lambda: open_capture(main), "0012_11_annots.smc", "beside it")
     shutil.copy(main, annotations_of(main))
-    fails(lambda: Capture.open(annotations_of(main)), "main file")
+    fails(lambda: open_capture(annotations_of(main)), "main file")
 
 
 def test_a_folder_of_several_recordings_needs_a_choice(main, smc):
     other = smc.write_recording(main.parent, smc.Rig(cameras=(0, 1)), "0013_01")
-    fails(lambda: Capture.open(main.parent), "2 recordings", "0012_11.smc, 0013_01.smc")
-    assert Capture.open(other).num_frames == 3
+    fails(lambda: open_capture(main.parent), "2 recordings", "0012_11.smc, 0013_01.smc")
+    assert open_capture(other).num_frames == 3
 
 
 def test_other_smc_files_are_told_apart(main):
     with h5py.File(main, "w") as file:
         file.create_group("Camera/00/color")
-    fails(lambda: Capture.open(main), "DNA-Rendering")
+    fails(lambda: open_capture(main), "DNA-Rendering")
 
 
 def test_frames_outside_the_recording(main):
-    capture = Capture.open(main)
+    capture = open_capture(main)
     for frame in (-1, 3):
         fails(lambda frame=frame: capture.image(0, frame), "frames 0 to 2")
 
@@ -174,14 +174,14 @@ def test_links_never_lead_into_other_files(main, tmp_path):
     with h5py.File(main, "a") as file:
         del file["Camera_5mp/0/color/1"]
         file["Camera_5mp/0/color/1"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "x")
-    capture = Capture.open(main)
+    capture = open_capture(main)
     fails(lambda: capture.image(0, 1), "Camera_5mp/0/color/1", "damaged")
 
 
 def test_a_missing_package_names_its_extra(main, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "h5py", None)
     with pytest.raises(MissingExtraError, match=r"ico3d\[body\]"):
-        Capture.open(main)
+        open_capture(main)
 
 
 @pytest.fixture(scope="module")
@@ -192,7 +192,7 @@ def sound(smc, tmp_path_factory):
 
 
 def read_everything(path) -> None:
-    capture = Capture.open(path)
+    capture = open_capture(path)
     for camera in range(len(capture.cameras)):
         capture.image(camera, 0), capture.mask(camera, 0), capture.keypoints_2d(camera, 0)
     capture.smplx(0), capture.keypoints_3d(0), capture.inspect()

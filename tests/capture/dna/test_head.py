@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from ico3d.capture.capture import Capture
-from ico3d.capture.check import examine
+from ico3d.capture.checking.check import examine
+from ico3d.capture.formats import open_capture
 from ico3d.capture.resized import ResizedCapture
 
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -28,7 +28,7 @@ def poses(faces):
 def record(smc, tmp_path):
     def write(points):
         rig = smc.Rig(cameras=(0, 20, 40), frames=30, keypoints=points)
-        return Capture.open(smc.write_recording(tmp_path, rig, same_picture=True))
+        return open_capture(smc.write_recording(tmp_path, rig, same_picture=True))
 
     return write
 

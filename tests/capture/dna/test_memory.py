@@ -9,20 +9,21 @@ import textwrap
 import numpy as np
 import pytest
 
-from ico3d.capture.capture import Capture
+from ico3d.capture.formats import open_capture
 
 LOOK = textwrap.dedent(
     """
     import gc, json, sys, resource
     import numpy as np
     from ico3d.capture.capture import Capture
+    from ico3d.capture.formats import open_capture
 
     def resident():
         gc.collect()
         with open("/proc/self/statm") as file:
             return int(file.read().split()[1]) * resource.getpagesize()
 
-    capture = Capture.open(sys.argv[1])
+    capture = open_capture(sys.argv[1])
     random = np.random.default_rng(0)
     sizes = []
     for turn in range(5):
@@ -61,7 +62,7 @@ def test_memory_and_files_stay_flat_over_hundreds_of_pictures(long):
 def test_several_processes_read_one_open_recording(smc, tmp_path):
     """Also when they are forked after the first picture has been read."""
     main = smc.write_recording(tmp_path, smc.Rig(cameras=(0, 1, 2), frames=4))
-    capture = Capture.open(main)
+    capture = open_capture(main)
     before = [capture.image(camera, frame) for camera in range(3) for frame in range(4)]
     children = []
     for _ in range(4):
@@ -83,7 +84,7 @@ def test_several_processes_read_one_open_recording(smc, tmp_path):
 def test_an_open_recording_can_be_sent_to_other_processes(smc, tmp_path):
     import pickle
 
-    capture = Capture.open(smc.write_recording(tmp_path, smc.Rig(cameras=(0, 1), frames=1)))
+    capture = open_capture(smc.write_recording(tmp_path, smc.Rig(cameras=(0, 1), frames=1)))
     image = capture.image(1, 0)
     copy = pickle.loads(pickle.dumps(capture))
     np.testing.assert_array_equal(copy.image(1, 0), image)

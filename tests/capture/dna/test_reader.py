@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ico3d.capture.capture import Capture
 from ico3d.capture.dna.calibration import colours
+from ico3d.capture.formats import open_capture
 from ico3d.errors import CaptureError
 
 BENT = (-0.12, 0.05, 0.001, -0.002, 0.03)
@@ -23,7 +23,7 @@ def plain(smc, tmp_path_factory):
 
 def test_a_folder_and_its_main_file_are_the_same_recording(plain):
     for path in (plain, plain.parent):
-        capture = Capture.open(path)
+        capture = open_capture(path)
         assert (capture.kind, capture.path) == ("dna-rendering", plain)
         assert (capture.fps, capture.num_frames) == (15.0, 3)
         assert [c.name for c in capture.cameras] == ["00", "01", "02", "03", "47", "48", "59"]
@@ -33,7 +33,7 @@ def test_a_folder_and_its_main_file_are_the_same_recording(plain):
 
 
 def test_pictures_are_those_of_the_jpeg_decoder(plain, smc):
-    capture = Capture.open(plain)
+    capture = open_capture(plain)
     for index, camera in enumerate((0, 1, 2, 3, 47, 48, 59)):
         size = smc.Rig().size(camera)
         stream = smc.encoded(smc.picture(camera, 2, size), "JPEG")
@@ -46,7 +46,7 @@ def test_pictures_are_those_of_the_jpeg_decoder(plain, smc):
 
 def test_cameras_are_inverses_of_rt_turned_upright(plain, smc):
     rig = smc.Rig()
-    capture = Capture.open(plain)
+    capture = open_capture(plain)
     turn = np.diag([1.0, -1.0, -1.0, 1.0])  # the world of this file has -y up
     for camera, number in zip(capture.cameras, rig.cameras, strict=True):
         np.testing.assert_allclose(
@@ -64,7 +64,7 @@ def test_every_world_is_turned_so_that_y_is_up(smc, tmp_path, axis, sign):
     up = np.zeros(3)
     up[axis] = sign
     rig = smc.Rig(cameras=(0, 5, 20, 40), frames=1, up=tuple(up))
-    capture = Capture.open(smc.write_recording(tmp_path, rig))
+    capture = open_capture(smc.write_recording(tmp_path, rig))
     for camera, number in zip(capture.cameras, rig.cameras, strict=True):
         turn = camera.camera_to_world @ np.linalg.inv(rig.camera_to_world(number))
         np.testing.assert_allclose(turn[:3, :3] @ up, [0, 1, 0], atol=1e-12)
@@ -89,7 +89,7 @@ def slowly_corrected(image: np.ndarray, table: np.ndarray) -> np.ndarray:
 def test_colours_follow_the_polynomials_of_blue_green_and_red(smc, tmp_path):
     table = np.array([[0.001, 0.8, 5.0], [-0.0012, 1.2, -6.0], [0.0, 1.4, 0.25]])
     rig = smc.Rig(cameras=(0, 1, 2), frames=1, colours=table)
-    image = Capture.open(smc.write_recording(tmp_path, rig)).image(1, 0)
+    image = open_capture(smc.write_recording(tmp_path, rig)).image(1, 0)
     stream = smc.encoded(smc.picture(1, 0, rig.size(1)), "JPEG")
     expected = slowly_corrected(cv2.imdecode(stream, cv2.IMREAD_COLOR), table)[..., ::-1]
     np.testing.assert_array_equal(np.rint(image * 255), expected)
@@ -108,7 +108,7 @@ def test_a_point_of_the_world_is_found_where_the_straightened_camera_sees_it(smc
     for number, point in enumerate(world):
         main = smc.write_recording(tmp_path / str(number), rig)
         draw_point(main, rig, point)
-        capture = Capture.open(main)
+        capture = open_capture(main)
         for index, camera in enumerate(capture.cameras):
             image, mask = capture.image(index, 0), capture.mask(index, 0)
             turned = point * (1, -1, -1)
@@ -159,14 +159,14 @@ def test_straightened_pictures_show_recorded_pixels_only(smc, tmp_path):
     with h5py.File(main, "a") as file:
         white = np.full((*rig.size(0), 3), 255, np.uint8)
         replace(file, "Camera_5mp/0/color/0", png(white))
-    capture = Capture.open(main)
+    capture = open_capture(main)
     assert capture.image(0, 0).min() > 0.99
     assert not np.allclose(capture.cameras[0].intrinsics, rig.intrinsics(0), atol=1)
 
 
 def test_keypoints_move_with_the_picture(smc, tmp_path):
     rig = smc.Rig(cameras=(0, 1, 50), frames=2, distortion=BENT)
-    capture = Capture.open(smc.write_recording(tmp_path, rig))
+    capture = open_capture(smc.write_recording(tmp_path, rig))
     found = capture.keypoints_2d(2, 1)
     raw = smc.keypoints_2d(rig, 50)[1]
     np.testing.assert_array_equal(found[:, 2], raw[:, 2])
@@ -181,7 +181,7 @@ def test_keypoints_move_with_the_picture(smc, tmp_path):
 
 
 def test_smplx_parameters_by_name(plain, smc):
-    parts, fit = smc.smplx(3), Capture.open(plain).smplx(2)
+    parts, fit = smc.smplx(3), open_capture(plain).smplx(2)
     np.testing.assert_array_equal(fit.betas, parts["betas"][2])
     np.testing.assert_array_equal(fit.expression, parts["expression"][2])
     np.testing.assert_array_equal(fit.transl, parts["transl"][2])
@@ -197,9 +197,9 @@ def test_smplx_parameters_by_name(plain, smc):
 def test_depth_comes_as_it_was_measured(smc, tmp_path):
     rig = smc.Rig(cameras=(0, 1, 2), frames=2)
     main = smc.write_recording(tmp_path, rig)
-    assert Capture.open(main).kinect is None
+    assert open_capture(main).kinect is None
     smc.write_kinect(main, rig)
-    kinect = Capture.open(main).kinect
+    kinect = open_capture(main).kinect
     assert kinect.cameras == (0, 7)
     np.testing.assert_array_equal(kinect.depth(7, 1), smc.depth(7, 1))
     np.testing.assert_array_equal(kinect.mask(0, 0), smc.mask(0, (12, 10))[..., 0] > 127)
@@ -216,4 +216,4 @@ def test_folders_of_the_data_set(smc, tmp_path):
     other = tmp_path / "part_annotations"
     other.mkdir()
     (main.parent / "0012_11_annots.smc").rename(other / "0012_11_annots.smc")
-    assert Capture.open(main).num_frames == 1
+    assert open_capture(main).num_frames == 1

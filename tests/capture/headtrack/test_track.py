@@ -12,11 +12,12 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from ico3d.capture.capture import Capture
+from ico3d.capture.formats import open_capture
 from ico3d.capture.headtrack.track_file import NAME, read_track
 from ico3d.capture.multiview.resizing import resize_capture
-from ico3d.capture.synthetic import paint
-from ico3d.capture.synthetic.recording import Recording, record
 from ico3d.cli import main
+from ico3d.studio.picture import paint
+from ico3d.studio.recording import Recording, record
 
 pytest.importorskip("mediapipe")
 SHARED = Path(__file__).resolve().parents[4] / "shared"
@@ -39,8 +40,8 @@ def _recorded(folder: Path, **settings) -> tuple[Capture, Path]:
     values = dict(text="", lively=True, light="studio", motion="talk", seed=0)
     record(Recording(**values | settings), folder / "truth", 2)
     resize_capture(folder / "truth", folder / "recording", settings["size"], 2)
-    assert Capture.open(folder / "recording").world_from_head(0) is None
-    return Capture.open(folder / "truth"), folder / "recording"
+    assert open_capture(folder / "recording").world_from_head(0) is None
+    return open_capture(folder / "truth"), folder / "recording"
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +71,7 @@ def test_the_head_of_a_bust_moves_as_it_did(head, tmp_path, capsys):
     sheet = tmp_path / "sheet.jpg"
     assert main(["capture", "track", str(folder), "--check", str(sheet)]) == 0
     assert "5 of 5 frames tracked by" in capsys.readouterr().err
-    found = Capture.open(folder)
+    found = open_capture(folder)
     degrees, metres = _agreement(truth, found)
     assert degrees.max() < 2.0 and metres.max() < 0.005
     eyes = [36, 39, 42, 45]  # corners: where the landmarks of all models agree
@@ -96,7 +97,7 @@ def test_a_frame_without_pictures_is_interpolated(head, tmp_path, capsys):
     assert main(["capture", "track", str(copy), "--workers", "1"]) == 0
     assert "frames 2 are interpolated" in capsys.readouterr().err
     assert read_track(copy, 5, 5).gaps == [(2, 2)]
-    degrees, metres = _agreement(truth, Capture.open(copy))
+    degrees, metres = _agreement(truth, open_capture(copy))
     assert np.delete(degrees, 2).max() < 2.5 and metres.max() < 0.02
 
 
@@ -107,7 +108,7 @@ def test_small_faces_in_pictures_of_a_whole_person_are_found(tmp_path):
     shape = dict(subject=str(PERSON), rig="body", cameras=8, views_per_frame=8)
     truth, folder = _recorded(tmp_path, frames=4, fps=15.0, size=576, **shape)
     assert main(["capture", "track", str(folder)]) == 0
-    degrees, metres = _agreement(truth, Capture.open(folder))
+    degrees, metres = _agreement(truth, open_capture(folder))
     assert degrees.max() < 2.0 and metres.max() < 0.005
 
 
@@ -149,7 +150,7 @@ def test_captures_of_other_formats_are_tracked_as_they_are(head, tmp_path):
     truth, _ = head
     copy = shutil.copytree(truth.path, tmp_path / "copy")
     assert main(["capture", "track", str(copy)]) == 0
-    found = Capture.open(copy)
+    found = open_capture(copy)
     assert found.kind == "synthetic" and (copy / NAME).is_file()
     degrees, metres = _agreement(truth, found)
     assert 0 < degrees.max() < 2.0 and 0 < metres.max() < 0.005

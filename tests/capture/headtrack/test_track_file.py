@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from safetensors.numpy import load, save
 
-from ico3d.capture.capture import Capture
-from ico3d.capture.check import examine
-from ico3d.capture.expressions import BLENDSHAPES
+from ico3d.capture.checking.check import examine
+from ico3d.capture.face.expressions import BLENDSHAPES
+from ico3d.capture.formats import open_capture
 from ico3d.capture.headtrack.track_file import NAME, HeadTrack
 from ico3d.capture.multiview.resizing import resize_capture
 from ico3d.capture.resized import ResizedCapture
@@ -49,12 +49,12 @@ def _track(frames=3, cameras=5):
 
 
 def test_a_capture_gives_what_was_tracked(folder):
-    before = Capture.open(folder)
+    before = open_capture(folder)
     assert before.world_from_head(0) is None and before.blendshape_names is None
     assert before.landmarks(0, 0) is None and before.landmarks_3d(0) is None
     track = _track()
     assert track.write(folder) == folder / NAME
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     assert capture.blendshape_names == BLENDSHAPES
     for frame in range(3):
         np.testing.assert_array_equal(capture.world_from_head(frame), track.world_from_head[frame])
@@ -73,9 +73,9 @@ def test_smaller_pictures_keep_the_track(folder, tmp_path):
     track = _track()
     track.write(folder)
     resize_capture(folder, tmp_path / "small", 16, 1)
-    small = Capture.open(tmp_path / "small")
+    small = open_capture(tmp_path / "small")
     np.testing.assert_array_equal(small.world_from_head(2), track.world_from_head[2])
-    np.testing.assert_allclose(small.landmarks(4, 2), Capture.open(folder).landmarks(4, 2) / 2)
+    np.testing.assert_allclose(small.landmarks(4, 2), open_capture(folder).landmarks(4, 2) / 2)
 
 
 def test_interpolated_frames_are_told(folder):
@@ -84,7 +84,7 @@ def test_interpolated_frames_are_told(folder):
     ends = replace(track, views=np.array([[0, 0], [1, 0], [0, 0]], np.uint8))
     assert ends.gaps == [(0, 0), (2, 2)]
     track.write(folder)
-    (head,) = [f for f in examine(Capture.open(folder)) if f.what == "head"]
+    (head,) = [f for f in examine(open_capture(folder)) if f.what == "head"]
     assert head.level == "warn" and head.text.startswith("interpolated in 1 of 3 frames")
 
 
@@ -101,11 +101,11 @@ def test_a_track_of_another_recording_is_refused(folder, change, message):
     arrays = {**load(file.read_bytes()), **change}
     file.write_bytes(save({name: array for name, array in arrays.items() if array is not None}))
     with pytest.raises(CaptureError, match=message):
-        Capture.open(folder)
+        open_capture(folder)
 
 
 def test_a_damaged_track_is_one_sentence(folder):
     file = _track().write(folder)
     file.write_bytes(file.read_bytes()[:-40])
     with pytest.raises(CaptureError, match="is damaged: delete it and run ico3d capture track"):
-        Capture.open(folder)
+        open_capture(folder)

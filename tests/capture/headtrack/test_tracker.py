@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ico3d.capture.capture import Capture
-from ico3d.capture.face import Face
+from ico3d.capture.face.landmarks import MULTI_PIE
+from ico3d.capture.face.mediapipe_face import Face
+from ico3d.capture.formats import open_capture
 from ico3d.capture.headtrack.faces import Head
 from ico3d.capture.headtrack.tracker import assemble, report
-from ico3d.capture.multipie import MULTI_PIE
 from ico3d.errors import CaptureError
 
 FRAMES = 8
@@ -24,7 +24,7 @@ def capture(tmp_path_factory):
     spec = importlib.util.spec_from_file_location("folders", path)
     folders = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(folders)
-    return Capture.open(folders.write_folder(tmp_path_factory.mktemp("many") / "five", 5, FRAMES))
+    return open_capture(folders.write_folder(tmp_path_factory.mktemp("many") / "five", 5, FRAMES))
 
 
 def _canonical():

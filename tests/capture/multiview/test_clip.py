@@ -6,8 +6,8 @@ import pickle
 import numpy as np
 import pytest
 
-from ico3d.capture.capture import Capture
-from ico3d.capture.check import examine
+from ico3d.capture.checking.check import examine
+from ico3d.capture.formats import open_capture
 from ico3d.capture.multiview.clip import MOST_OPEN, Clip
 from ico3d.errors import CaptureError
 
@@ -40,7 +40,7 @@ def recording(folders, folder, cameras=6, frames=20):
 
 
 def test_few_videos_are_open_at_a_time(folders, tmp_path):
-    capture = Capture.open(recording(folders, tmp_path))
+    capture = open_capture(recording(folders, tmp_path))
     before = len(os.listdir("/proc/self/fd"))
     for frame in (0, 7, 3):
         for camera in range(6):
@@ -49,7 +49,7 @@ def test_few_videos_are_open_at_a_time(folders, tmp_path):
 
 
 def test_forked_processes_and_pickled_copies_read_for_themselves(folders, tmp_path):
-    capture = Capture.open(recording(folders, tmp_path, cameras=2))
+    capture = open_capture(recording(folders, tmp_path, cameras=2))
     assert folders.number_of(capture.image(0, 4)) == 4
     children = []
     for wanted in ((5, 6, 2), (19, 0, 11)):
@@ -72,7 +72,7 @@ def test_forked_processes_and_pickled_copies_read_for_themselves(folders, tmp_pa
 def test_short_videos_lack_views(folders, tmp_path):
     folder = recording(folders, tmp_path, cameras=3)
     folders.write_video(folder / "videos/cam01.mp4", 18)
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     assert capture.image(1, 18) is None and capture.image(1, 17) is not None
     (finding,) = (f for f in examine(capture) if f.what == "views")
     assert finding.level == "warn"

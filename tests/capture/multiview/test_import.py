@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from ico3d.capture.capture import Capture
+from ico3d.capture.formats import open_capture
 from ico3d.capture.multiview.importing import ImportSettings, import_recording
 from ico3d.capture.multiview.reader import MultiviewCapture
 from ico3d.cli import main
@@ -21,7 +21,7 @@ Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 
 def imported(source, out, **settings) -> MultiviewCapture:
     import_recording(source, out, ImportSettings(**settings))
-    capture = Capture.open(out)
+    capture = open_capture(out)
     assert isinstance(capture, MultiviewCapture)
     return capture
 

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from ico3d.capture.capture import Capture
-from ico3d.capture.multiview.matte import matte
+from ico3d.capture.formats import open_capture
+from ico3d.capture.multiview.cutout import matte
 from ico3d.cli import main
 from ico3d.errors import CaptureError
 
@@ -98,7 +98,7 @@ def test_the_command_writes_what_is_missing(folders, tmp_path, capsys):
     folders.save(folder / "masks/cam01/000001.png", mended)
     assert main(["capture", "masks", str(folder), "--workers", "2"]) == 0
     assert "5 masks written" in capsys.readouterr().out
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     for index in range(2):
         truth = plate_and_person(index)[2]
         for frame in range(3):

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from ico3d.capture.capture import Capture
-from ico3d.capture.check import examine
+from ico3d.capture.checking.check import examine
+from ico3d.capture.formats import open_capture
 from ico3d.capture.headtrack.track_file import HeadTrack
 from ico3d.cli import main
 from ico3d.common.camera import Camera, look_at
@@ -29,7 +29,7 @@ def fails(call, *words):
 
 
 def test_pictures_come_back_as_they_were_saved(folder, folders):
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     assert (capture.kind, capture.fps, capture.num_frames) == ("multiview", 30.0, 3)
     assert capture.split.train == (0, 1, 2) and len(capture.split.test_cameras) == 1
     for index, camera in enumerate(folders.ring(5)):
@@ -54,7 +54,7 @@ def test_masks_plates_points_and_sound(folder, folders):
     points = np.random.default_rng(0).normal(size=(7, 3)).astype(np.float32)
     np.save(folder / "points/000001.npy", points)
     soundfile.write(folder / "audio.wav", np.zeros((48_000, 2)), 48_000)
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     np.testing.assert_array_equal(np.rint(capture.mask(1, 2) * 255), coverage)
     assert capture.background(1) == pytest.approx(90 / 255, abs=1e-6)
     np.testing.assert_array_equal(capture.points(1), points)
@@ -65,7 +65,7 @@ def test_transparency_is_a_mask_before_black(folder, folders):
     solid = folders.picture(9, 9)
     alpha = np.arange(32 * 40, dtype=np.uint8).reshape(32, 40)
     folders.save(folder / "images/cam00/000000.png", np.dstack([solid, alpha]))
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     expected = solid * (alpha[..., None] / 255.0) / 255
     np.testing.assert_allclose(capture.image(0, 0), expected, atol=1e-6)
     np.testing.assert_array_equal(np.rint(capture.mask(0, 0) * 255), alpha)
@@ -92,7 +92,7 @@ def test_a_point_of_the_world_is_found_where_the_straightened_camera_sees_it(fol
         for kind in (f"images/{camera.name}/000000", f"masks/{camera.name}/000000"):
             folders.save(tmp_path / f"{kind}.png", np.repeat(dot[..., None], 3, 2).astype(np.uint8))
         folders.save(tmp_path / f"backgrounds/{camera.name}.png", dot.astype(np.uint8))
-    capture = Capture.open(folders.write_cameras(tmp_path, entries, 1))
+    capture = open_capture(folders.write_cameras(tmp_path, entries, 1))
     y, x = np.mgrid[: size[1], : size[0]] + 0.5
     for index, camera in enumerate(capture.cameras):
         pixel, _ = camera.project(point)
@@ -113,7 +113,7 @@ def test_a_sound_folder_is_checked_without_errors(folder, capsys):
 def test_missing_and_damaged_views_are_named(folder):
     (folder / "images/cam03/000001.png").unlink()
     (folder / "images/cam02/000002.png").write_bytes(b"\x89PNG nothing")
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     assert capture.image(3, 1) is None
     fails(lambda: capture.image(2, 2), "camera cam02, frame 2", "damaged")
     (finding,) = (f for f in examine(capture) if f.what == "views")
@@ -124,28 +124,28 @@ def test_missing_and_damaged_views_are_named(folder):
 def test_cut_pictures_are_damaged_not_half_grey(folder):
     file = folder / "images/cam00/000000.png"
     file.write_bytes(file.read_bytes()[:-1500])
-    fails(lambda: Capture.open(folder).image(0, 0), "camera cam00, frame 0", "damaged")
+    fails(lambda: open_capture(folder).image(0, 0), "camera cam00, frame 0", "damaged")
 
 
 def test_pictures_of_another_size_are_refused(folder, folders):
     folders.save(folder / "images/cam00/000000.png", folders.picture(0, 0, (20, 20)))
-    fails(lambda: Capture.open(folder).image(0, 0), "20x20", "40x32")
+    fails(lambda: open_capture(folder).image(0, 0), "20x20", "40x32")
 
 
 def test_sixteen_bits_are_refused(folder):
     deep = Image.fromarray(np.full((32, 40), 40_000, np.uint16))
     deep.save(folder / "images/cam00/000000.png")
-    fails(lambda: Capture.open(folder).image(0, 0), "8 bits")
+    fails(lambda: open_capture(folder).image(0, 0), "8 bits")
 
 
 def test_a_camera_without_pictures_is_named(folder, folders):
     rig = folders.ring(6)
     folders.write_cameras(folder, [folders.entry(camera) for camera in rig], 3)
-    fails(lambda: Capture.open(folder), "cam05", "videos/cam05.mp4")
+    fails(lambda: open_capture(folder), "cam05", "videos/cam05.mp4")
 
 
 def test_frames_outside_the_recording(folder):
-    fails(lambda: Capture.open(folder).image(0, 3), "frames 0 to 2")
+    fails(lambda: open_capture(folder).image(0, 3), "frames 0 to 2")
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,7 @@ def test_frames_outside_the_recording(folder):
 def test_what_cannot_be_is_refused(folder, change, words):
     file = folder / "cameras.json"
     file.write_text(json.dumps({**json.loads(file.read_text()), **change}))
-    fails(lambda: Capture.open(folder), "cameras.json", words)
+    fails(lambda: open_capture(folder), "cameras.json", words)
 
 
 @pytest.mark.parametrize(
@@ -186,13 +186,13 @@ def test_cameras_that_cannot_be_are_refused(folder, change, words):
     about = json.loads(file.read_text())
     about["cameras"][0].update(change)
     file.write_text(json.dumps(about))
-    fails(lambda: Capture.open(folder), words)
+    fails(lambda: open_capture(folder), words)
 
 
 def test_pickled_points_are_refused(folder):
     (folder / "points").mkdir()
     np.save(folder / "points/000000.npy", np.array([{"a": 1}], object), allow_pickle=True)
-    fails(lambda: Capture.open(folder).points(), "000000.npy", "damaged")
+    fails(lambda: open_capture(folder).points(), "000000.npy", "damaged")
 
 
 @settings(max_examples=60, deadline=None)
@@ -205,7 +205,7 @@ def test_descriptions_cut_or_changed_anywhere_are_one_sentence(folders, tmp_path
     kept = data.draw(st.sampled_from((text[place + 1 :], "")))
     file.write_text(text[:place] + data.draw(st.sampled_from(("", "9", "]", "e9", "null"))) + kept)
     try:
-        Capture.open(folder).image(0, 0)
+        open_capture(folder).image(0, 0)
     except CaptureError as error:
         assert "\n" not in str(error)
 
@@ -227,7 +227,7 @@ def test_a_folder_that_shows_a_head_is_split_by_time_and_has_its_hull(folders, t
         folders.save(folder / f"masks/{camera.name}/000000.png", ball)
     entries = [folders.entry(camera) for camera in cameras]
     folders.write_cameras(folder, entries, frames, shows="head")
-    capture = Capture.open(folder)
+    capture = open_capture(folder)
     assert capture.split.train == tuple(range(10)) and capture.split.test == (10,)
     assert capture.points() is None  # nobody knows where head space is
     pose = np.eye(4)
@@ -235,9 +235,9 @@ def test_a_folder_that_shows_a_head_is_split_by_time_and_has_its_hull(folders, t
     zeros = [np.zeros((frames, *s), np.float32) for s in ((68, 3), (7,), (52,))]
     seen = np.ones((frames, len(cameras)), np.uint8)
     HeadTrack(np.tile(pose, (frames, 1, 1)), *zeros, seen).write(folder)
-    points = Capture.open(folder).points()
+    points = open_capture(folder).points()
     np.testing.assert_allclose(points.mean(0), (0, 0.05, 0), atol=0.01)  # in head space
     away = np.linalg.norm(points - (0, 0.05, 0), axis=1)
     assert 0.9 * radius < away.min() and np.median(away) < 1.1 * radius
     folders.write_cameras(folder, entries, frames, shows="hands")
-    fails(lambda: Capture.open(folder), "shows must be")
+    fails(lambda: open_capture(folder), "shows must be")

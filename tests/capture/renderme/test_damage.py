@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ico3d.capture.capture import Capture
-from ico3d.capture.check import examine
+from ico3d.capture.checking.check import examine
+from ico3d.capture.formats import open_capture
 from ico3d.cli import main as run
 from ico3d.errors import CaptureError
 
@@ -44,7 +44,7 @@ def test_a_sound_recording_is_checked_without_errors(raw, capsys):
     assert run(["capture", "check", str(raw)]) == 0
     said = capsys.readouterr().out
     assert "all 20 are there" in said and raw.with_suffix(".png").is_file()
-    levels = {f.what: f.level for f in examine(Capture.open(raw))}
+    levels = {f.what: f.level for f in examine(open_capture(raw))}
     for what in ("views", "mask files", "FLAME", "face in space", "poses", "landmarks"):
         assert levels[what] == "ok", what
 
@@ -53,7 +53,7 @@ def test_missing_and_damaged_views_are_named(raw):
     replace(raw, "Camera/22/color/1", None)
     replace(raw, "Camera/28/color/3", np.zeros(50, np.uint8))
     replace(annotations_of(raw), "Camera/45/mask/2", None)
-    capture = Capture.open(raw)
+    capture = open_capture(raw)
     assert capture.image(1, 1) is None and capture.mask(4, 2) is None
     findings = {f.what: f for f in examine(capture)}
     assert findings["views"].level == "error"
@@ -64,7 +64,7 @@ def test_missing_and_damaged_views_are_named(raw):
 
 def test_frames_without_a_fit_have_no_pose(smc, tmp_path):
     rig = smc.Rig(cameras=(22, 25), fitted=(1, 3))
-    capture = Capture.open(smc.write_recording(tmp_path, rig))
+    capture = open_capture(smc.write_recording(tmp_path, rig))
     known = [capture.world_from_head(frame) is not None for frame in range(4)]
     assert known == [False, True, False, True]
     assert capture.flame(0) is None and capture.points(0) is None
@@ -76,7 +76,7 @@ def test_frames_without_a_fit_have_no_pose(smc, tmp_path):
 @pytest.mark.parametrize("nothing", (None, np.zeros((0, 2)), h5py.Empty("f8")))
 def test_faces_that_a_camera_did_not_find(raw, smc, nothing):
     replace(annotations_of(raw), "Keypoints2d/25/2", nothing)
-    capture, rig = Capture.open(raw), smc.Rig()
+    capture, rig = open_capture(raw), smc.Rig()
     assert capture.keypoints_2d(2, 2) is None
     expected = rig.camera(25).project(smc.face_in_files(rig, 2))[0] + 0.5
     np.testing.assert_allclose(capture.landmarks(2, 2), expected, atol=1e-4)
@@ -85,18 +85,18 @@ def test_faces_that_a_camera_did_not_find(raw, smc, nothing):
 def test_faces_that_only_one_camera_found_stay_flat(raw):
     for camera in (22, 28):
         replace(annotations_of(raw), f"Keypoints2d/{camera}", None)
-    capture = Capture.open(raw)
+    capture = open_capture(raw)
     assert capture.landmarks(2, 0) is not None and capture.landmarks(1, 0) is None
     assert capture.landmarks_3d(0) is None and capture.world_from_head(0) is not None
 
 
 def test_one_camera_that_errs_is_outvoted(smc, tmp_path):
     rig = smc.Rig(cameras=(18, 22, 25, 28, 32), frames=1)
-    marks = Capture.open(smc.write_recording(tmp_path / "all", rig)).landmarks_3d(0)
+    marks = open_capture(smc.write_recording(tmp_path / "all", rig)).landmarks_3d(0)
     raw = smc.write_recording(tmp_path / "errs", rig)
     wrong = smc.landmarks(rig, 25, 0) + np.array([3.0, -2.0])
     replace(annotations_of(raw), "Keypoints2d/25/0", wrong)
-    away = np.linalg.norm(Capture.open(raw).landmarks_3d(0) - marks, axis=1)
+    away = np.linalg.norm(open_capture(raw).landmarks_3d(0) - marks, axis=1)
     assert np.median(away) < 0.002  # where one of five with equal say moves them by 1 cm
 
 
@@ -108,7 +108,7 @@ def test_landmarks_in_another_order_are_left_out(smc, tmp_path, caplog):
             for frame in range(2):
                 marks = file[f"Keypoints2d/{camera}/{frame}"]
                 marks[...] = marks[()][shuffled]
-    capture = Capture.open(raw)
+    capture = open_capture(raw)
     with caplog.at_level(logging.WARNING):
         for frame in range(2):
             assert capture.landmarks(1, frame) is None and capture.landmarks_3d(frame) is None
@@ -119,7 +119,7 @@ def test_landmarks_in_another_order_are_left_out(smc, tmp_path, caplog):
 
 def test_cameras_without_calibration_are_left_out(raw, caplog):
     replace(annotations_of(raw), "Calibration/22", None)
-    assert [c.name for c in Capture.open(raw).cameras] == ["00", "25", "28", "45"]
+    assert [c.name for c in open_capture(raw).cameras] == ["00", "25", "28", "45"]
     assert "22" in caplog.messages[0]
 
 
@@ -134,7 +134,7 @@ def test_cameras_without_calibration_are_left_out(raw, caplog):
 )
 def test_damaged_calibrations_are_named(raw, inside, value, words):
     replace(annotations_of(raw), inside, value)
-    fails(lambda: Capture.open(raw), "25", words)
+    fails(lambda: open_capture(raw), "25", words)
 
 
 @pytest.mark.parametrize(
@@ -149,43 +149,43 @@ def test_damaged_calibrations_are_named(raw, inside, value, words):
 )
 def test_damaged_fits_are_named(raw, name, value, words):
     replace(annotations_of(raw), f"FLAME/1/{name}", value)
-    capture = Capture.open(raw)
+    capture = open_capture(raw)
     fails(lambda: capture.flame(1), "0026_e0_anno.smc", words)
 
 
 def test_fits_of_other_shapes_of_array_are_read(raw, smc):
     cam = smc.flame(smc.Rig(), 1)["cam"]
-    expected = Capture.open(raw).world_from_head(1)
+    expected = open_capture(raw).world_from_head(1)
     replace(annotations_of(raw), "FLAME/1/cam", cam[None])
-    np.testing.assert_array_equal(Capture.open(raw).world_from_head(1), expected)
+    np.testing.assert_array_equal(open_capture(raw).world_from_head(1), expected)
 
 
 def test_damaged_landmarks_and_sound_are_named(raw, smc, tmp_path):
     replace(annotations_of(raw), "Keypoints2d/25/0", np.zeros((68, 2)))
-    fails(lambda: Capture.open(raw).landmarks(2, 0), "Keypoints2d/25/0", "106")
+    fails(lambda: open_capture(raw).landmarks(2, 0), "Keypoints2d/25/0", "106")
     rig = smc.Rig(part="s1_all", cameras=(25,), frames=2, sound=np.full(48_000, 3000.0))
     loud = smc.write_recording(tmp_path / "loud", rig)
-    fails(lambda: Capture.open(loud).audio(), "audio", "between -1 and 1")
+    fails(lambda: open_capture(loud).audio(), "audio", "between -1 and 1")
     mute = smc.write_recording(tmp_path / "mute", rig)
     replace(mute, "Camera/00/audio/sample_rate", 0)
-    fails(lambda: Capture.open(mute), "sample rate")
+    fails(lambda: open_capture(mute), "sample rate")
 
 
 def test_annotations_must_be_there(raw):
     annotations = annotations_of(raw)
-    fails(lambda: Capture.open(annotations), "_raw.smc")
+    fails(lambda: open_capture(annotations), "_raw.smc")
     annotations.unlink()
-    fails(lambda: Capture.open(raw), "0026_e0_anno.smc", "beside it")
+    fails(lambda: open_capture(raw), "0026_e0_anno.smc", "beside it")
 
 
 def test_a_folder_of_several_recordings_needs_a_choice(raw, smc):
     other = smc.write_recording(raw.parent, smc.Rig(cameras=(25,), part="h0", frames=1))
-    fails(lambda: Capture.open(raw.parent), "2 recordings", "0026_e0_raw.smc, 0026_h0_raw.smc")
-    assert Capture.open(other).num_frames == 1
+    fails(lambda: open_capture(raw.parent), "2 recordings", "0026_e0_raw.smc, 0026_h0_raw.smc")
+    assert open_capture(other).num_frames == 1
 
 
 def test_frames_outside_the_recording(raw):
-    capture = Capture.open(raw)
+    capture = open_capture(raw)
     for call in (capture.world_from_head, capture.flame, capture.points, capture.landmarks_3d):
         for frame in (-1, 4):
             fails(lambda call=call, frame=frame: call(frame), "frames 0 to 3")
@@ -199,7 +199,7 @@ def sound(smc, tmp_path_factory):
 
 
 def read_everything(path) -> None:
-    capture = Capture.open(path)
+    capture = open_capture(path)
     for camera in range(len(capture.cameras)):
         capture.image(camera, 0), capture.mask(camera, 0), capture.landmarks(camera, 0)
     capture.flame(0), capture.landmarks_3d(0), capture.audio(), capture.inspect()

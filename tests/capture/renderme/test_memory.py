@@ -9,20 +9,21 @@ import textwrap
 import numpy as np
 import pytest
 
-from ico3d.capture.capture import Capture
+from ico3d.capture.formats import open_capture
 
 LOOK = textwrap.dedent(
     """
     import gc, json, sys, resource
     import numpy as np
     from ico3d.capture.capture import Capture
+    from ico3d.capture.formats import open_capture
 
     def resident():
         gc.collect()
         with open("/proc/self/statm") as file:
             return int(file.read().split()[1]) * resource.getpagesize()
 
-    capture = Capture.open(sys.argv[1])
+    capture = open_capture(sys.argv[1])
     random = np.random.default_rng(0)
     capture.world_from_head(0)
     sizes = []
@@ -51,7 +52,7 @@ def test_memory_and_files_stay_flat_over_hundreds_of_pictures(smc, tmp_path):
 
 
 def test_an_open_recording_can_be_sent_to_other_processes(smc, tmp_path):
-    capture = Capture.open(smc.write_recording(tmp_path, smc.Rig(cameras=(22, 25), frames=2)))
+    capture = open_capture(smc.write_recording(tmp_path, smc.Rig(cameras=(22, 25), frames=2)))
     image, pose = capture.image(1, 0), capture.world_from_head(1)
     copy = pickle.loads(pickle.dumps(capture))
     np.testing.assert_array_equal(copy.image(1, 0), image)

@@ -5,7 +5,7 @@ import h5py
 import numpy as np
 import pytest
 
-from ico3d.capture.capture import Capture
+from ico3d.capture.formats import open_capture
 
 UP = np.diag([1.0, -1.0, -1.0, 1.0])
 """From the world of the files, which has +y down, to the capture's."""
@@ -19,7 +19,7 @@ def plain(smc, tmp_path_factory):
 
 def test_a_folder_and_its_raw_file_are_the_same_recording(plain):
     for path in (plain, plain.parent):
-        capture = Capture.open(path)
+        capture = open_capture(path)
         assert (capture.kind, capture.path) == ("renderme-360", plain)
         assert (capture.fps, capture.num_frames) == (30.0, 4)
         assert [c.name for c in capture.cameras] == ["00", "18", "22", "25", "28", "32", "45"]
@@ -33,11 +33,11 @@ def test_annotations_in_the_folders_of_the_data_set(plain, tmp_path):
     for folder, kind in ((raw, "raw"), (anno, "anno")):
         folder.mkdir(parents=True)
         (folder / f"0026_e0_{kind}.smc").symlink_to(plain.with_name(f"0026_e0_{kind}.smc"))
-    assert Capture.open(raw).world_from_head(0) is not None
+    assert open_capture(raw).world_from_head(0) is not None
 
 
 def test_pictures_are_those_of_the_jpeg_decoder_and_mattes_keep_their_edges(plain, smc):
-    capture = Capture.open(plain)
+    capture = open_capture(plain)
     for index, camera in enumerate(smc.Rig().cameras):
         stream = smc.encoded(smc.picture(camera, 2, (40, 48)), "JPEG")
         expected = cv2.imdecode(stream, cv2.IMREAD_COLOR)[..., ::-1]
@@ -50,7 +50,7 @@ def test_pictures_are_those_of_the_jpeg_decoder_and_mattes_keep_their_edges(plai
 
 def test_cameras_are_inverses_of_rt_in_a_world_with_y_up(plain, smc):
     rig = smc.Rig()
-    for camera, number in zip(Capture.open(plain).cameras, rig.cameras, strict=True):
+    for camera, number in zip(open_capture(plain).cameras, rig.cameras, strict=True):
         np.testing.assert_allclose(
             camera.camera_to_world, UP @ rig.camera_to_world(number), atol=1e-12
         )
@@ -75,7 +75,7 @@ def test_pictures_and_landmarks_are_straightened_alike(smc, tmp_path):
             values = marks[()]
             values[smc.MULTI_PIE] = bent[:, 0]
             marks[...] = values
-    capture = Capture.open(raw)
+    capture = open_capture(raw)
     for index, camera in enumerate(capture.cameras):
         expected = camera.project(world @ UP[:3, :3])[0]
         np.testing.assert_allclose(capture.landmarks(index, 0), expected, atol=0.01)
@@ -84,7 +84,7 @@ def test_pictures_and_landmarks_are_straightened_alike(smc, tmp_path):
 def test_the_head_is_the_skull_of_the_fits(smc, faces, tmp_path):
     """Also while the neck bends, the jaw opens and the brows rise."""
     rig = smc.Rig(frames=40, cameras=(22, 25))
-    capture = Capture.open(smc.write_recording(tmp_path, rig, same_picture=True))
+    capture = open_capture(smc.write_recording(tmp_path, rig, same_picture=True))
     found = np.stack([capture.world_from_head(frame) for frame in range(40)])
     assert max(faces.errors(found, rig.world_from_skull())) < 1e-6
     fixed = np.linalg.inv(rig.world_from_skull()[7]) @ found[7]
@@ -104,7 +104,7 @@ def test_the_head_is_the_skull_of_the_fits(smc, faces, tmp_path):
 
 
 def test_the_parts_of_a_fit(plain, smc):
-    fit, parts = Capture.open(plain).flame(2), smc.flame(smc.Rig(), 2)
+    fit, parts = open_capture(plain).flame(2), smc.flame(smc.Rig(), 2)
     pairs = {"global_pose": "global_pose", "neck_pose": "neck_pose", "jaw_pose": "jaw_pose"}
     for name, held in {**pairs, "shape": "shape", "expression": "exp"}.items():
         np.testing.assert_array_equal(getattr(fit, name), parts[held])
@@ -115,7 +115,7 @@ def test_the_parts_of_a_fit(plain, smc):
 
 
 def test_landmarks_are_read_where_there_are_some_and_projected_elsewhere(plain, smc):
-    capture, rig = Capture.open(plain), smc.Rig()
+    capture, rig = open_capture(plain), smc.Rig()
     for index, number in enumerate(rig.cameras):
         expected = rig.camera(number).project(smc.face_in_files(rig, 1))[0] + 0.5
         np.testing.assert_allclose(capture.landmarks(index, 1), expected, atol=1e-4)
@@ -126,7 +126,7 @@ def test_landmarks_are_read_where_there_are_some_and_projected_elsewhere(plain, 
 
 def test_heads_of_parts_without_fits_come_from_landmarks(smc, faces, tmp_path):
     rig = smc.Rig(part="h1_2b", frames=20, size=(200, 240))
-    capture = Capture.open(smc.write_recording(tmp_path, rig, same_picture=True))
+    capture = open_capture(smc.write_recording(tmp_path, rig, same_picture=True))
     assert capture.flame(0) is None
     found = np.stack([capture.world_from_head(frame) for frame in range(20)])
     assert max(faces.errors(found, rig.world_from_skull())) < 1e-5
@@ -140,13 +140,13 @@ def test_heads_of_parts_without_fits_come_from_landmarks(smc, faces, tmp_path):
 def test_the_hull_takes_mattes_of_other_frames_where_a_frame_has_few(smc, tmp_path):
     rig = smc.Rig(part="h0", frames=6, cameras=(0, 10, 22, 25, 28, 45), size=(80, 96))
     raw = smc.write_recording(tmp_path, rig, same_picture=True)
-    all_views = Capture.open(raw).points(0)
+    all_views = open_capture(raw).points(0)
     thin = smc.write_recording(tmp_path / "thin", rig, same_picture=True)
     with h5py.File(thin.with_name("0026_h0_anno.smc"), "a") as file:
         for turn, camera in enumerate(rig.cameras):
             for frame in set(range(6)) - {turn}:
                 del file[f"Camera/{camera:02d}/mask/{frame}"]
-    few = Capture.open(thin).points(0)
+    few = open_capture(thin).points(0)
     near = np.linalg.norm(few[:, None] - all_views[None, ::5], axis=-1).min(1)
     assert len(few) > 0.5 * len(all_views) and np.median(near) < 0.02
 
@@ -157,7 +157,7 @@ def test_sound_lies_in_either_file(smc, tmp_path, place, channels):
     tone = 0.5 * np.sin(2 * np.pi * 440 * np.arange(48_000 * 2) / 48_000)
     sound = tone if channels == 1 else np.stack([tone, tone], 1)
     rig = smc.Rig(part="s1_all", cameras=(25,), frames=60, sound=sound, sound_in=place)
-    capture = Capture.open(smc.write_recording(tmp_path, rig, same_picture=True))
+    capture = open_capture(smc.write_recording(tmp_path, rig, same_picture=True))
     heard = capture.audio()
     assert heard.rate == 16_000 and len(heard.samples) == 32_000
     expected = 0.5 * np.sin(2 * np.pi * 440 * np.arange(32_000) / 16_000)
@@ -167,7 +167,7 @@ def test_sound_lies_in_either_file(smc, tmp_path, place, channels):
 
 def test_the_sound_tells_the_frame_rate(smc, tmp_path):
     rig = smc.Rig(part="s3_all", cameras=(22, 25), frames=30, sound=np.zeros(48_000 * 2))
-    assert Capture.open(smc.write_recording(tmp_path, rig, same_picture=True)).fps == 15
+    assert open_capture(smc.write_recording(tmp_path, rig, same_picture=True)).fps == 15
 
 
 def test_speech_by_38_cameras_has_15_frames_per_second(smc, tmp_path):
@@ -176,11 +176,11 @@ def test_speech_by_38_cameras_has_15_frames_per_second(smc, tmp_path):
     with h5py.File(raw, "a") as file:
         for number in range(38, 60):  # listed, but they took no part
             file.create_group(f"Camera/{number}/color")
-    capture = Capture.open(raw)
+    capture = open_capture(raw)
     assert capture.fps == 15 and len(capture.cameras) == 38
-    assert Capture.open(smc.write_recording(tmp_path / "e", smc.Rig(frames=2))).fps == 30
+    assert open_capture(smc.write_recording(tmp_path / "e", smc.Rig(frames=2))).fps == 30
 
 
 def test_expressions_have_no_sound_and_no_eyes(plain):
-    capture = Capture.open(plain)
+    capture = open_capture(plain)
     assert capture.audio() is None and capture.eyes(0) is None and capture.background(0) is None

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from ico3d.capture.capture import Capture
-from ico3d.capture.expressions import BLENDSHAPES
+from ico3d.capture.face.expressions import BLENDSHAPES
+from ico3d.capture.formats import open_capture
 from ico3d.capture.headtrack import tracker
 from ico3d.capture.headtrack.track_file import HeadTrack, check_writable
 from ico3d.capture.multiview.resizing import resize_capture
@@ -35,7 +36,7 @@ def track_of(capture: Capture) -> HeadTrack:
 
 def test_the_command_takes_the_recording_as_it_is(plain, monkeypatch, capsys):
     """Named by its folder; the track lies beside the file, and is found by either name."""
-    own = Capture.open(plain)
+    own = open_capture(plain)
     track = track_of(own)
     report = tracker.Report(own.num_frames, own.num_frames, 0.5, 3.0, [])
     monkeypatch.setattr(tracker, "track_head", lambda source, workers: (track, report))
@@ -43,7 +44,7 @@ def test_the_command_takes_the_recording_as_it_is(plain, monkeypatch, capsys):
     file = plain.with_name("0026_e0_raw.tracking.safetensors")
     assert file.is_file() and file.name in "".join(capsys.readouterr().err.split())
     for path in (plain, plain.parent):
-        found = Capture.open(path)
+        found = open_capture(path)
         assert (found.kind, found.path) == ("renderme-360", plain)
         assert (found.split, found.blendshape_names) == (own.split, BLENDSHAPES)
         for frame in range(own.num_frames):
@@ -58,9 +59,9 @@ def test_the_command_takes_the_recording_as_it_is(plain, monkeypatch, capsys):
 
 def test_its_surface_moves_to_the_tracks_head_space(plain):
     """Where it is in the world, it stays."""
-    own = Capture.open(plain)
+    own = open_capture(plain)
     track_of(own).write(own.path)
-    found = Capture.open(plain)
+    found = open_capture(plain)
 
     def placed(capture):
         pose = capture.world_from_head(1)
@@ -78,27 +79,27 @@ def test_its_surface_moves_to_the_tracks_head_space(plain):
 
 def test_smaller_copies_keep_it(plain, tmp_path):
     """It is in metres."""
-    own = Capture.open(plain)
+    own = open_capture(plain)
     track = track_of(own)
     track.write(own.path)
     resize_capture(plain, tmp_path / "small", 20, 1)
-    small = Capture.open(tmp_path / "small")
+    small = open_capture(tmp_path / "small")
     np.testing.assert_array_equal(small.world_from_head(2), track.world_from_head[2])
 
 
 def test_a_track_of_another_recording_is_refused(plain):
     """In one sentence."""
-    own = Capture.open(plain)
+    own = open_capture(plain)
     track = track_of(own)
     short = HeadTrack(**{f.name: getattr(track, f.name)[:2] for f in fields(track)})
     short.write(own.path)
     with pytest.raises(CaptureError, match=r"must be .*run ico3d capture track again"):
-        Capture.open(plain)
+        open_capture(plain)
 
 
 def test_where_nothing_can_be_written(plain):
     """A copy is offered."""
-    own = Capture.open(plain)
+    own = open_capture(plain)
     with pytest.raises(CaptureError, match=r"cannot be written .*with ico3d capture resize"):
         track_of(own).write(plain / "deeper" / "0026.smc")
     with pytest.raises(CaptureError, match=r"cannot be written .*with ico3d capture resize"):

@@ -4,9 +4,9 @@ import asyncio
 import contextlib
 
 from ico3d.bundle.format import SPEECH
-from ico3d.chat import server
-from ico3d.chat.modules.app import make_expression_app, make_service_app
-from ico3d.chat.modules.limits import Limits
+from ico3d.chat.remote.app import make_expression_app, make_service_app
+from ico3d.chat.remote.limits import Limits
+from ico3d.chat.serving import server
 from ico3d.speech.runtime import SpeechModel
 
 HOST = "127.0.0.1"

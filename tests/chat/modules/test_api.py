@@ -13,8 +13,8 @@ from pipecat.frames.frames import ErrorFrame, LLMContextFrame, LLMTextFrame
 from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.bundle.manifest import Persona
-from ico3d.chat.modules.limits import Limits
-from ico3d.chat.modules.recognition import read_wav
+from ico3d.chat.remote.limits import Limits
+from ico3d.chat.remote.recognition import read_wav
 from ico3d.chat.services.language import persona
 from ico3d.chat.services.provider import Context
 from ico3d.chat.services.recognition import sphinx

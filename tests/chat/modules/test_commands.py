@@ -9,7 +9,7 @@ from contextlib import closing
 import openai
 import pytest
 
-from ico3d.chat.modules.commands import ServeModule
+from ico3d.chat.remote.commands import ServeModule
 from ico3d.cli import main
 
 OFFLINE = """

@@ -10,11 +10,11 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from ico3d.bundle.format import SPEECH
-from ico3d.chat.modules.limits import Limits
-from ico3d.chat.modules.mouth import AVOIDED, RemoteMouth
-from ico3d.chat.protocol import End, Speech, Text
-from ico3d.chat.settings import ChatSettings, Expression
-from ico3d.measure.page import open_page
+from ico3d.chat.remote.limits import Limits
+from ico3d.chat.remote.mouth import AVOIDED, RemoteMouth
+from ico3d.chat.settings.conversation import ChatSettings, Expression
+from ico3d.chat.wire.protocol import End, Speech, Text
+from ico3d.measure.talking.page import open_page
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions
 
 from ..conftest import serving as serving_avatar

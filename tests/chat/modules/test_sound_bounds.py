@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pipecat.processors.frame_processor import FrameProcessor
 
-from ico3d.chat.modules.limits import Limits
-from ico3d.chat.modules.recognition import read_wav
+from ico3d.chat.remote.limits import Limits
+from ico3d.chat.remote.recognition import read_wav
 from ico3d.errors import ProtocolError
 
 from .serving import service_app, serving

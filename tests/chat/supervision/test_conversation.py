@@ -8,11 +8,11 @@ from urllib.parse import urlsplit
 import numpy as np
 from starlette.responses import JSONResponse, PlainTextResponse
 
-from ico3d.chat.protocol import Answer, End, Error, Speech, State, Text
 from ico3d.chat.services.voice import espeak
-from ico3d.chat.settings import ChatSettings, Choice, Patience
+from ico3d.chat.settings.conversation import ChatSettings, Choice, Patience
 from ico3d.chat.supervision.apologies import APOLOGIES
-from ico3d.measure.page import open_page
+from ico3d.chat.wire.protocol import Answer, End, Error, Speech, State, Text
+from ico3d.measure.talking.page import open_page
 
 from ..conftest import serving as serving_avatar
 from ..modules.serving import service_app, serving

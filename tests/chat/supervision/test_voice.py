@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from pipecat.frames.frames import ErrorFrame, TTSAudioRawFrame
 
-from ico3d.chat.protocol import SPEECH_RATE
 from ico3d.chat.services.voice import espeak
 from ico3d.chat.supervision.apologies import APOLOGIES, apology, espeak_voice
 from ico3d.chat.supervision.voice import EnduringVoice, silence
+from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.errors import MissingExtraError
 
 SORRY = espeak.spoken(apology("voice", "en"), "en-us", espeak.Settings().rate)

@@ -8,12 +8,12 @@ import pytest
 import soxr
 
 from ico3d.chat.frames import VoiceFrame
-from ico3d.chat.protocol import MICROPHONE_CHUNK as PIECE
-from ico3d.chat.protocol import MICROPHONE_RATE as RATE
-from ico3d.chat.settings import Turns
+from ico3d.chat.settings.conversation import Turns
 from ico3d.chat.turns.detector import Ear, Timbre
 from ico3d.chat.turns.floor import Floor, Verdict
 from ico3d.chat.turns.phrases import phrases
+from ico3d.chat.wire.protocol import MICROPHONE_CHUNK as PIECE
+from ico3d.chat.wire.protocol import MICROPHONE_RATE as RATE
 from ico3d.common.espeak import synthesize
 
 SPEECH = Path(__file__).parents[4] / "shared" / "speech"

@@ -7,12 +7,12 @@ from pipecat.audio.turn.smart_turn.base_smart_turn import BaseSmartTurn
 from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
 from pipecat.audio.vad.vad_analyzer import VADState
 
-from ico3d.chat.protocol import MICROPHONE_CHUNK as PIECE
-from ico3d.chat.protocol import MICROPHONE_RATE as RATE
-from ico3d.chat.settings import Turns
+from ico3d.chat.settings.conversation import Turns
 from ico3d.chat.turns.detector import Ear
 from ico3d.chat.turns.eager import EagerSmartTurn
-from ico3d.measure.questions import spoken
+from ico3d.chat.wire.protocol import MICROPHONE_CHUNK as PIECE
+from ico3d.chat.wire.protocol import MICROPHONE_RATE as RATE
+from ico3d.measure.talking.questions import spoken
 
 COMPLETE, INCOMPLETE = EndOfTurnState.COMPLETE, EndOfTurnState.INCOMPLETE
 PAUSE = Turns().pause

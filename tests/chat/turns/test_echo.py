@@ -5,10 +5,10 @@ import pytest
 import soxr
 from pipecat.audio.vad.vad_analyzer import VADState
 
-from ico3d.chat.protocol import MICROPHONE_CHUNK as PIECE
-from ico3d.chat.settings import Turns
+from ico3d.chat.settings.conversation import Turns
 from ico3d.chat.turns.detector import Ear
 from ico3d.chat.turns.echo import EchoGuard, similarity
+from ico3d.chat.wire.protocol import MICROPHONE_CHUNK as PIECE
 from ico3d.common.espeak import synthesize
 
 NEAR, FAR = 16_000, 24_000  # Hz

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ico3d.chat.frames import VoiceFrame
-from ico3d.chat.settings import Turns
+from ico3d.chat.settings.conversation import Turns
 from ico3d.chat.turns.floor import GONE, UNDERSTOOD, Floor, Verdict
 from ico3d.chat.turns.phrases import phrases
 

@@ -34,7 +34,7 @@ from ico3d.bundle.manifest import Persona
 from ico3d.chat.frames import TalkFrame, VoiceFrame
 from ico3d.chat.services.language.notes import Notes
 from ico3d.chat.services.language.persona import PersonaModel
-from ico3d.chat.settings import Turns
+from ico3d.chat.settings.conversation import Turns
 from ico3d.chat.turns.strategies import strategies
 
 PERSONA = Persona("Ada", "", ("who are you => I am Ada.", "who are you and what => Many things."))

@@ -7,8 +7,11 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from ico3d.avatar import baking, body_bundle, staging
+from ico3d.avatar import staging
 from ico3d.avatar.avatar import TrainedAvatar
+from ico3d.avatar.baking import body_bundle, head_bundle
+from ico3d.avatar.baking.person_bundle import animation_of, front_of
+from ico3d.avatar.baking.samples import lips_of
 from ico3d.avatar.film.film import MOMENTS, back_and_forth, extent
 from ico3d.avatar.render_bundle import (
     BakedAvatar,
@@ -17,8 +20,6 @@ from ico3d.avatar.render_bundle import (
     body_gaussians,
     pose_at,
 )
-from ico3d.avatar.samples import lips_of
-from ico3d.avatar.whole_bundle import animation_of, front_of
 from ico3d.bundle.animation import Animation
 from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.bundle.manifest import CameraInfo
@@ -138,7 +139,7 @@ def avatar_actor(folder: Path, capture: Capture | None, device: torch.device = C
         view,
         portrait_of(view, np.concatenate(face)),
         background,
-        baking.idle_expression(head, avatar.expressions),
+        head_bundle.idle_expression(head, avatar.expressions),
         SPEECH_SIZE if driven else None,
         (lambda samples, rate: lips_of(head, samples, rate)) if driven else None,
         animation_of(folder, avatar),

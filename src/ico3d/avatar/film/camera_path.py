@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.avatar.render_bundle import visitor_camera
-from ico3d.body.novel_views import se3_exp, se3_log
+from ico3d.body.training.novel_views import se3_exp, se3_log
 from ico3d.bundle.manifest import CameraInfo
-from ico3d.capture.hull import focus
+from ico3d.capture.surface.hull import focus
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError, SettingsError
 

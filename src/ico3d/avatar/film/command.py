@@ -133,8 +133,8 @@ class Render:
         """Who is filmed, and, but for bodies of their own, how they talk and where they stand."""
         from ico3d.avatar.avatar import ABOUT as AVATAR
         from ico3d.avatar.film import actor, performance
-        from ico3d.body.trained import ABOUT as BODY
-        from ico3d.body.trained import TrainedBody
+        from ico3d.body.model_folder import ABOUT as BODY
+        from ico3d.body.model_folder import TrainedBody
         from ico3d.bundle.format import Bundle
         from ico3d.bundle.manifest import MANIFEST
         from ico3d.bundle.packaged import bundle_path
@@ -154,9 +154,9 @@ class Render:
         return performance.motion(found, self.seconds, self.seed), found
 
     def _opened_capture(self) -> "Capture | None":
-        from ico3d.capture.capture import Capture
+        from ico3d.capture.formats import open_capture
 
-        return None if self.capture is None else Capture.open(self.capture)
+        return None if self.capture is None else open_capture(self.capture)
 
     def _cameras(self, person: "Moving", actor: "Actor | None", count: int) -> list["Camera"]:
         """One for each picture."""

@@ -18,7 +18,7 @@ SEEN = 0.1
 
 
 class Moving(Protocol):
-    """Somebody who moves: `ico3d.body.trained.TrainedBody`, or anything that moves like it."""
+    """Somebody who moves: `ico3d.body.model_folder.TrainedBody`, or anything that moves like it."""
 
     @property
     def seconds(self) -> float:

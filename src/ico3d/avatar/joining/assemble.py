@@ -26,12 +26,12 @@ from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.seam import largest_gap, seam_scores
 from ico3d.avatar.joining.similarity import canonical_from_head, fit_in_words
 from ico3d.body.settings import BodySettings
-from ico3d.body.train import BodyJob, Runner, train_body
-from ico3d.capture.canonical import canonical_landmarks
+from ico3d.body.training.train_clip import BodyJob, Runner, train_body
 from ico3d.capture.capture import Capture
+from ico3d.capture.face.canonical import canonical_landmarks
 from ico3d.common.device import DeviceName
 from ico3d.errors import CaptureError, ModelError, SettingsError
-from ico3d.head.trained import TrainedHead
+from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.device import computing_device
 from ico3d.training.checkpoint import save_tensors
 from ico3d.training.run import RunFolder

@@ -60,10 +60,10 @@ class Assemble:
         from ico3d.avatar.joining import assemble
         from ico3d.avatar.joining.checking import write_checks
         from ico3d.body.commands import runner_of
-        from ico3d.capture.capture import Capture
+        from ico3d.capture.formats import open_capture
         from ico3d.splat.device import decided
 
-        console, capture = Console(), Capture.open(self.capture)
+        console, capture = Console(), open_capture(self.capture)
         device = decided(self.device)
         runner = runner_of(self.jobs, self.ray, self.device if self.ray else device)
         assembly = self._assembly()

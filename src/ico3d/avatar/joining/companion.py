@@ -12,7 +12,7 @@ from ico3d.avatar.avatar import HEAD, PLACEMENT, Placement, load_placement
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.similarity import moved
 from ico3d.errors import ModelError
-from ico3d.head.trained import TrainedHead
+from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.gaussians import Gaussians
 from ico3d.training.checkpoint import load_tensors
 

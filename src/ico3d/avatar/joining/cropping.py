@@ -8,7 +8,7 @@ import torch
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.errors import ModelError
 from ico3d.head.model import GAUSSIAN_AXES, HeadModel
-from ico3d.head.trained import TrainedHead
+from ico3d.head.model_folder import TrainedHead
 
 
 def cropped(head: TrainedHead, region: HeadRegion) -> TrainedHead:

@@ -7,7 +7,7 @@ import torch
 
 from ico3d.capture.capture import Capture
 from ico3d.errors import CaptureError
-from ico3d.head.trained import TrainedHead
+from ico3d.head.model_folder import TrainedHead
 
 log = logging.getLogger(__name__)
 

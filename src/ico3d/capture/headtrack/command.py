@@ -43,7 +43,7 @@ class Track:
         """
         from rich.console import Console
 
-        from ico3d.capture.capture import Capture
+        from ico3d.capture.formats import open_capture
         from ico3d.capture.headtrack.sheet import check_name, write_sheet
         from ico3d.capture.headtrack.track_file import check_writable
         from ico3d.errors import MissingExtraError
@@ -53,7 +53,7 @@ class Track:
         except ModuleNotFoundError as error:
             raise MissingExtraError(error.name or "scipy", "train", "tracking a head") from None
 
-        capture = Capture.open(self.folder)
+        capture = open_capture(self.folder)
         if self.check is not None:
             check_name(self.check)
         check_writable(capture.path)

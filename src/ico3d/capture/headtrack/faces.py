@@ -10,7 +10,7 @@ from queue import SimpleQueue
 import numpy as np
 
 from ico3d.capture.capture import Capture
-from ico3d.capture.face import MESH_LANDMARKS, CanonicalFace, Face, FaceReader
+from ico3d.capture.face.mediapipe_face import MESH_LANDMARKS, CanonicalFace, Face, FaceReader
 from ico3d.capture.headtrack.crops import HEAD, Part, around, search
 from ico3d.capture.headtrack.shape import similarity_fit
 from ico3d.capture.headtrack.triangulation import Sightings, agreeing, robust, sightings

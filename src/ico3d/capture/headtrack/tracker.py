@@ -5,16 +5,17 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.capture.alignment import rigid_landmarks
 from ico3d.capture.capture import Capture
-from ico3d.capture.expressions import BLENDSHAPES, eyes_of_blendshapes
-from ico3d.capture.face import canonical_face
+from ico3d.capture.face.expressions import BLENDSHAPES, eyes_of_blendshapes
+from ico3d.capture.face.landmarks import MULTI_PIE
+from ico3d.capture.face.mediapipe_face import canonical_face
+from ico3d.capture.formats import open_capture
 from ico3d.capture.headtrack.faces import Finder, Head, finder
 from ico3d.capture.headtrack.shape import inverse, moved, rigid_head
 from ico3d.capture.headtrack.smoothing import filled, filled_poses, smoothed_poses
 from ico3d.capture.headtrack.track_file import HeadTrack
-from ico3d.capture.multipie import MULTI_PIE
 from ico3d.capture.multiview.writing import shown
+from ico3d.capture.portrait.picture_poses import rigid_landmarks
 from ico3d.common.weights import model_file
 from ico3d.errors import CaptureError
 
@@ -59,7 +60,7 @@ def track_head(source: Path, workers: int) -> tuple[HeadTrack, Report]:
     """
     model = model_file("face_landmarker.task", PURPOSE)
     canonical = canonical_face(model)
-    with finder(lambda: Capture.open(source), canonical, model, workers) as found:
+    with finder(lambda: open_capture(source), canonical, model, workers) as found:
         capture, heads, last = found.capture, {}, None
         with shown("finding the head", capture.num_frames) as advance:
             for frame in range(capture.num_frames):

@@ -80,7 +80,7 @@ class Masks:
         """
         from rich import print as say
 
-        from ico3d.capture.multiview.masking import make_masks
+        from ico3d.capture.multiview.masks import make_masks
 
         written = make_masks(self.folder, self.workers)
         say(f"{written} masks written; look at them: ico3d capture check {self.folder}")

@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.capture.capture import Capture, Sound, all_frames, last_eleventh
+from ico3d.capture.checking.finding import Finding, missing_and_damaged
 from ico3d.capture.decoding import unit
-from ico3d.capture.expressions import BLENDSHAPES
-from ico3d.capture.finding import Finding, missing_and_damaged
-from ico3d.capture.head_surface import head_hull
+from ico3d.capture.face.expressions import BLENDSHAPES
 from ico3d.capture.headtrack.track_file import read_track
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import read_description
 from ico3d.capture.multiview.files import RecordedFiles
 from ico3d.capture.sound import read_sound_file
+from ico3d.capture.surface.head import head_hull
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
 

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.capture.capture import Capture
+from ico3d.capture.formats import open_capture
 from ico3d.capture.headtrack.track_file import NAME as TRACK
 from ico3d.capture.headtrack.track_file import track_file
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import Description, Place
 from ico3d.capture.multiview.parallel import View, each_camera
 from ico3d.capture.multiview.writing import new_folder
-from ico3d.capture.portrait_files import save_picture
+from ico3d.capture.portrait.files import save_picture
 from ico3d.capture.resized import ResizedCapture
 from ico3d.common.camera import Camera
 
@@ -32,7 +32,7 @@ def resize_capture(source: Path, out: Path, height: int, workers: int) -> Descri
     Raises:
         CaptureError: If `out` exists, or the capture cannot be read.
     """
-    capture = ResizedCapture(Capture.open(source), height)
+    capture = ResizedCapture(open_capture(source), height)
     known = capture.provenance
     about = Description(
         capture.fps,
@@ -47,7 +47,7 @@ def resize_capture(source: Path, out: Path, height: int, workers: int) -> Descri
     with new_folder(out) as work:
 
         def start(camera: int) -> View:
-            opened = ResizedCapture(Capture.open(source), height)
+            opened = ResizedCapture(open_capture(source), height)
             return lambda frame: _write_view(opened, work, camera, frame)
 
         each_camera(start, cameras, capture.num_frames, workers, "pictures")

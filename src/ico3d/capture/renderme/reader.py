@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.capture.capture import Sound, last_eleventh
+from ico3d.capture.checking.finding import Finding
 from ico3d.capture.decoding import largest_channel, unit
-from ico3d.capture.finding import Finding
-from ico3d.capture.head_surface import head_hull
 from ico3d.capture.renderme.calibration import frame_rate, read_cameras
 from ico3d.capture.renderme.examine import examine_files, mask_folder
 from ico3d.capture.renderme.files import find_files
@@ -20,6 +19,7 @@ from ico3d.capture.renderme.landmarks import MULTI_PIE, POINTS, in_known_order, 
 from ico3d.capture.smc.file import SmcFile
 from ico3d.capture.smc.reader import SmcCapture, count_frames
 from ico3d.capture.sound import check_claim, mono
+from ico3d.capture.surface.head import head_hull
 from ico3d.common.sound import Claim
 from ico3d.errors import CaptureError
 

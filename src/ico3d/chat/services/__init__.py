@@ -7,17 +7,13 @@ which need no download, and what is too small to be elsewhere. A new one is a mo
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
-from pipecat.processors.frame_processor import FrameProcessor
-
-from ico3d.chat import protocol
-from ico3d.chat.marks import LONGEST_NAME
 from ico3d.chat.services import language, recognition, voice
-from ico3d.chat.services.provider import Context, Provider, Table
+from ico3d.chat.services.choosing import Service, chosen
+from ico3d.chat.services.provider import Table
 from ico3d.chat.services.recognition import browser
-from ico3d.chat.settings import BEST, ChatSettings, Choice, filled
-from ico3d.errors import SettingsError
+from ico3d.chat.settings.conversation import ChatSettings, Choice
+from ico3d.chat.wire import protocol
 
 TABLES: Mapping[str, Table] = {
     "recognition": recognition.PROVIDERS,
@@ -25,29 +21,6 @@ TABLES: Mapping[str, Table] = {
     "voice": voice.PROVIDERS,
 }
 """Providers by kind and name."""
-
-
-@dataclass(frozen=True)
-class Service:
-    """A provider with its options.
-
-    Attributes:
-        provider: Who does the job.
-        options: An instance of its settings.
-    """
-
-    provider: Provider
-    options: Any
-
-    def make(self, context: Context) -> FrameProcessor:
-        """The processor of one session; may take a while."""
-        return self.provider.make(self.options, context)
-
-    def described(self) -> protocol.Service:
-        """As the page is told."""
-        title, detail = self.provider.title, self.provider.detail(self.options)
-        name = f"{title} ({detail})" if detail else title
-        return protocol.Service(name[:LONGEST_NAME], self.provider.stand_in)
 
 
 @dataclass(frozen=True)
@@ -68,7 +41,7 @@ class Chosen:
         options = self.recognition.options
         if not isinstance(options, browser.Settings):
             return None
-        listener = fallback(options)
+        listener = browser.fallback(recognition.ON_SERVER, options)
         return protocol.Dictation(options.language, listener and listener.provider.title)
 
 
@@ -96,53 +69,3 @@ def with_voice(service: Service, choice: Choice, voices: Mapping[str, str]) -> S
     if own is None or "voice" in choice.options or not hasattr(service.options, "voice"):
         return service
     return replace(service, options=replace(service.options, voice=own))
-
-
-def chosen(table: Table, choice: Choice, kind: str) -> Service:
-    """A service by its name, or the first of the table that works here.
-
-    Args:
-        table: Providers of this kind.
-        choice: Which, and how.
-        kind: What an error calls it.
-
-    Raises:
-        SettingsError: If it is unknown, its options are wrong, or none works.
-    """
-    if choice.use == BEST:
-        if choice.options:
-            raise SettingsError(f"chat settings: {kind} has options but does not say 'use'.")
-        return best(table, kind)
-    provider = table.get(choice.use)
-    if provider is None:
-        names = " or ".join((*table, BEST))
-        raise SettingsError(f"chat settings: {kind} '{choice.use}' is unknown, use {names}.")
-    where = f"chat settings: {kind} '{choice.use}'"
-    return Service(provider, filled(provider.settings, choice.options, where))
-
-
-def fallback(options: browser.Settings) -> Service | None:
-    """The recogniser of the server for browsers that have none.
-
-    Raises:
-        SettingsError: If it is unknown, or none works.
-    """
-    if not options.fallback:
-        return None
-    table = {name: p for name, p in recognition.PROVIDERS.items() if p.make is not browser.make}
-    return chosen(table, Choice(options.fallback), "recognition")
-
-
-def best(table: Table, kind: str) -> Service:
-    """The first of a table that works here.
-
-    Raises:
-        SettingsError: If none does.
-    """
-    hindrance = ""
-    for provider in table.values():
-        options = provider.settings()
-        hindrance = provider.hindrance(options)
-        if not hindrance:
-            return Service(provider, options)
-    raise SettingsError(f"no {kind} works here; the last one needs this: {hindrance}")

@@ -8,7 +8,7 @@ from typing import Any
 
 from openai import DefaultAsyncHttpxClient
 
-from ico3d.chat.keys import NONE, OPENAI, goes_here, is_openai, key_for
+from ico3d.chat.settings.keys import NONE, OPENAI, goes_here, is_openai, key_for
 
 OWN_HEADERS = ("OpenAI-Organization", "OpenAI-Project")
 """What the SDK takes from the environment and sends to every server."""

@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from ico3d.chat import protocol
 from ico3d.chat.services import TABLES, Chosen, Service, chosen, with_voice
-from ico3d.chat.settings import ChatSettings, Choice
+from ico3d.chat.settings.conversation import ChatSettings, Choice
+from ico3d.chat.wire import protocol
 
 LONGEST_HINDRANCE = 400  # characters: all offers go into one message
 

@@ -11,7 +11,7 @@ from pipecat.processors.frame_processor import FrameProcessor
 from ico3d.bundle.animation import Animation
 from ico3d.bundle.manifest import HeadInfo
 from ico3d.bundle.persona import Persona
-from ico3d.chat.keys import OPENAI_KEY, key_for
+from ico3d.chat.settings.keys import OPENAI_KEY, key_for
 from ico3d.common.weights import model_of
 from ico3d.errors import MissingModelError, SettingsError
 

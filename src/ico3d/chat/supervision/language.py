@@ -16,7 +16,7 @@ from pipecat.frames.frames import (
 )
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
-from ico3d.chat.settings import Patience
+from ico3d.chat.settings.conversation import Patience
 from ico3d.chat.supervision.apologies import Failed, apology
 
 

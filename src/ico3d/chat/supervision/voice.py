@@ -13,10 +13,10 @@ from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
 from pipecat.services.tts_service import TTSService
 from pipecat.utils.errors import ErrorCategory
 
-from ico3d.chat.failures import ReportedError
-from ico3d.chat.protocol import SPEECH_RATE
+from ico3d.chat.observing.failures import ReportedError
 from ico3d.chat.services.voice import espeak
 from ico3d.chat.supervision.apologies import apology, espeak_voice
+from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.errors import Ico3dError, ServiceError
 
 TRIES = 2

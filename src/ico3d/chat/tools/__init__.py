@@ -4,9 +4,9 @@ from pipecat.adapters.llm.schemas.tools_schema import ToolsSchema
 from pipecat.processors.aggregators.llm_context import NOT_GIVEN, NotGiven
 from pipecat.processors.frame_processor import FrameProcessor
 
-from ico3d.chat.gestures import Gestures
-from ico3d.chat.moods import Moods
-from ico3d.chat.tool_settings import Tool
+from ico3d.chat.performing.gestures import Gestures
+from ico3d.chat.performing.moods import Moods
+from ico3d.chat.settings.tools import Tool
 from ico3d.chat.tools.body import Said, gesture_function, mood_function
 from ico3d.chat.tools.http import http_function
 

@@ -15,9 +15,9 @@ from pipecat.frames.frames import (
 from pipecat.processors.frame_processor import FrameProcessor
 from pipecat.services.llm_service import FunctionCallParams
 
-from ico3d.chat.gestures import Gestures
-from ico3d.chat.moods import BROWS, Moods
-from ico3d.chat.tool_settings import OWN
+from ico3d.chat.performing.gestures import Gestures
+from ico3d.chat.performing.moods import BROWS, Moods
+from ico3d.chat.settings.tools import OWN
 
 GESTURE, MOOD = OWN
 BESIDE = "Call it in the same message as the words that it goes with; never speak of it."

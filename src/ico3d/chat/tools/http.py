@@ -18,7 +18,7 @@ from aiohttp.resolver import DefaultResolver
 from pipecat.adapters.llm.schemas.function_schema import FunctionSchema
 from pipecat.services.llm_service import FunctionCallParams
 
-from ico3d.chat.tool_settings import PORTS, Tool, host_of
+from ico3d.chat.settings.tools import PORTS, Tool, host_of
 
 MOST_BYTES = 16 * 1024  # of an answer: the model has to read it
 MOST_REDIRECTS = 3

@@ -13,8 +13,8 @@ from pipecat.processors.audio.vad_processor import VADProcessor
 from pipecat.processors.frame_processor import FrameDirection
 
 from ico3d.chat.frames import TalkFrame, VoiceFrame
-from ico3d.chat.protocol import MICROPHONE_RATE
 from ico3d.chat.turns.bands import Bands
+from ico3d.chat.wire.protocol import MICROPHONE_RATE
 
 QUIETEST = 0.4  # smoothed volume of speech; it rises over 0.2 s, so more would notice it later
 HINT = 0.5  # Silero's confidence that makes a first hint

@@ -8,7 +8,7 @@ from pipecat.audio.turn.base_turn_analyzer import EndOfTurnState
 from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
 from pipecat.metrics.metrics import MetricsData, TurnMetricsData
 
-from ico3d.chat.protocol import MICROPHONE_RATE
+from ico3d.chat.wire.protocol import MICROPHONE_RATE
 
 SOON = 0.09  # s of silence after which a voice may well have ended
 SURE = 0.2  # a verdict this near to one half is asked for again

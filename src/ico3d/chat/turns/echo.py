@@ -10,8 +10,8 @@ back is learnt from the sound itself.
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from ico3d.chat.protocol import MICROPHONE_RATE, SPEECH_RATE
 from ico3d.chat.turns.bands import COUNT, FRAME, Bands
+from ico3d.chat.wire.protocol import MICROPHONE_RATE, SPEECH_RATE
 
 HISTORY = 100  # frames that are compared: 2 s
 LATEST = 30  # frames within which an echo comes

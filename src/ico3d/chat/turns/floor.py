@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from ico3d.chat.frames import VoiceFrame
-from ico3d.chat.settings import Turns
+from ico3d.chat.settings.conversation import Turns
 from ico3d.chat.turns.phrases import Phrases
 
 LAST_SOUND = 0.16  # s; a voice that fades is given time to end: "okay" is over, a question goes on

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from pipecat.turns.user_turn_strategies import UserTurnStrategies
 
-from ico3d.chat.settings import Turns
+from ico3d.chat.settings.conversation import Turns
 from ico3d.chat.turns.eager import EagerSmartTurn
 from ico3d.chat.turns.floor import Floor
 from ico3d.chat.turns.phrases import phrases

@@ -6,7 +6,7 @@ from pipecat.frames.frames import ErrorFrame, TTSAudioRawFrame, TTSSpeakFrame
 from pipecat.pipeline.worker import PipelineParams
 from pipecat.tests.utils import run_test
 
-from ico3d.chat.protocol import SPEECH_RATE
+from ico3d.chat.wire.protocol import SPEECH_RATE
 
 
 @pytest.fixture(autouse=True)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from ico3d.bundle.persona import Persona
-from ico3d.chat.protocol import SPEECH_RATE
 from ico3d.chat.services import chosen
 from ico3d.chat.services.provider import Context
 from ico3d.chat.services.voice import PROVIDERS, espeak, kokoro, piper
 from ico3d.chat.services.voice.pieces import STARVED
-from ico3d.chat.settings import Choice
+from ico3d.chat.settings.conversation import Choice
+from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.common.espeak import synthesize
 from ico3d.errors import MissingModelError, SettingsError
 

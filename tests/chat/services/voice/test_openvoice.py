@@ -13,8 +13,8 @@ import pytest
 pytest.importorskip("torch")
 soundfile = pytest.importorskip("soundfile")
 
-from ico3d.chat.protocol import SPEECH_RATE  # noqa: E402
 from ico3d.chat.services.voice import openvoice  # noqa: E402
+from ico3d.chat.wire.protocol import SPEECH_RATE  # noqa: E402
 from ico3d.errors import MissingModelError, SettingsError  # noqa: E402
 
 HERE = __file__.rpartition("/")[0]

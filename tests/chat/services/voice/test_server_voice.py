@@ -13,9 +13,9 @@ from fastapi import FastAPI, Request
 from fastapi.responses import JSONResponse, StreamingResponse
 from pipecat.frames.frames import TTSAudioRawFrame
 
-from ico3d.chat import server
-from ico3d.chat.protocol import SPEECH_RATE
 from ico3d.chat.services.voice import openai
+from ico3d.chat.serving import server
+from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.errors import SettingsError
 
 TONE = 0.1  # radians per sample

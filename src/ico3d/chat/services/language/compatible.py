@@ -14,9 +14,9 @@ from pipecat.frames.frames import LLMThoughtTextFrame
 from pipecat.processors.aggregators.llm_context import LLMContext
 from pipecat.services.openai.llm import OpenAILLMService
 
-from ico3d.chat.failures import cause
-from ico3d.chat.keys import is_openai
+from ico3d.chat.observing.failures import cause
 from ico3d.chat.services.language.reasoning import Parts, Thoughts, field_of, without_thoughts
+from ico3d.chat.settings.keys import is_openai
 
 MOST_ROUNDS = 4
 """How often in a turn a model may call functions before it must speak."""

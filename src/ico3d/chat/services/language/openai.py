@@ -6,11 +6,11 @@ from typing import Any
 
 from pipecat.processors.frame_processor import FrameProcessor
 
-from ico3d.chat.keys import NONE, check_key, is_openai, key_for
 from ico3d.chat.services.language.instruction import instruction
 from ico3d.chat.services.language.sampling import check_sampling
 from ico3d.chat.services.language.servers import language_models
 from ico3d.chat.services.provider import Context, lacks_server
+from ico3d.chat.settings.keys import NONE, check_key, is_openai, key_for
 from ico3d.errors import SettingsError
 
 WHERE = "chat settings: language 'openai'"

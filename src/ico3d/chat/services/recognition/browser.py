@@ -23,9 +23,10 @@ from pipecat.services.stt_service import STTService
 from pipecat.utils.time import time_now_iso8601
 
 from ico3d.chat.frames import DeafFrame, HeardFrame
-from ico3d.chat.services.provider import Context
+from ico3d.chat.services.choosing import Service, chosen
+from ico3d.chat.services.provider import Context, Table
 from ico3d.chat.services.recognition.segments import blank
-from ico3d.chat.settings import BEST
+from ico3d.chat.settings.conversation import BEST, Choice
 
 SETTLED = 0.5  # s without news in silence after which partial words are taken for final ones
 SLOWEST = 1.5  # s that a browser may take for its first words
@@ -158,13 +159,31 @@ def hindrance(settings: Settings) -> str:
     )
 
 
-def make(settings: Settings, context: Context) -> FrameProcessor:
+def fallback(table: Table, settings: Settings) -> Service | None:
+    """The recogniser of the server for browsers that have none.
+
+    Args:
+        table: The recognisers that work on the server.
+        settings: Which of them is wanted.
+
+    Raises:
+        SettingsError: If it is unknown, or none works.
+    """
+    if not settings.fallback:
+        return None
+    return chosen(table, Choice(settings.fallback), "recognition")
+
+
+def make(table: Table, settings: Settings, context: Context) -> FrameProcessor:
     """A recogniser for one session, with the server's own behind it.
+
+    Args:
+        table: The recognisers that work on the server.
+        settings: Which of them stands behind it.
+        context: Whom it works for.
 
     Raises:
         SettingsError: If there is no such fallback.
     """
-    from ico3d.chat.services import fallback
-
-    listener = fallback(settings)
+    listener = fallback(table, settings)
     return BrowserOrServer(listener.make(context)) if listener else BrowserRecognition()

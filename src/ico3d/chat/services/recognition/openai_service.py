@@ -10,7 +10,7 @@ from pipecat.services.openai.stt import OpenAISTTService
 from pipecat.utils.time import time_now_iso8601
 
 from ico3d.chat.services.client import client_options
-from ico3d.chat.services.recognition.openai import WHERE, Settings
+from ico3d.chat.services.recognition.openai_settings import WHERE, Settings
 from ico3d.chat.services.recognition.segments import Segments
 
 

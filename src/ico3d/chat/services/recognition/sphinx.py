@@ -19,7 +19,6 @@ from pipecat.services.settings import STTSettings
 from pipecat.services.stt_service import STTService
 from pipecat.utils.time import time_now_iso8601
 
-from ico3d.chat.protocol import MICROPHONE_RATE
 from ico3d.chat.services.provider import Context, lacks_package
 from ico3d.chat.services.recognition.segments import (
     LONGEST_SPEECH,
@@ -28,6 +27,7 @@ from ico3d.chat.services.recognition.segments import (
     blank,
     check_longest_speech,
 )
+from ico3d.chat.wire.protocol import MICROPHONE_RATE
 from ico3d.common.sphinx import DecoderLostError, SphinxProcess
 from ico3d.errors import MissingExtraError
 

@@ -7,10 +7,10 @@ from pipecat.audio.utils import create_stream_resampler
 from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
 from pipecat.services.openai.tts import OpenAITTSService
 
-from ico3d.chat.keys import check_key
-from ico3d.chat.protocol import SPEECH_RATE
 from ico3d.chat.services.provider import Context, lacks_server
 from ico3d.chat.services.voice.pieces import OPTIONS, STARVED, Prompt
+from ico3d.chat.settings.keys import check_key
+from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.common.sound import REQUEST, Claim, fault, wav_claim
 from ico3d.errors import ServiceError, SettingsError
 

@@ -10,7 +10,7 @@ from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
 from pipecat.services.settings import TTSSettings
 from pipecat.services.tts_service import TTSService
 
-from ico3d.chat.protocol import SPEECH_RATE
+from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.errors import MissingExtraError
 
 STARVED = 60.0  # s that a sentence may take on a machine that is busy with other things

@@ -14,9 +14,9 @@ from pipecat.audio.utils import create_stream_resampler
 from pipecat.frames.frames import Frame, TTSAudioRawFrame
 from pipecat.services.tts_service import TTSService
 
-from ico3d.chat.protocol import SPEECH_RATE
 from ico3d.chat.services.provider import Context, lacks_package
 from ico3d.chat.services.voice.pieces import LOADING, OPTIONS, SYNCHRONOUS, Prompt
+from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.common.weights import model_folders
 from ico3d.errors import MissingExtraError, MissingModelError, SettingsError
 

@@ -1,0 +1,171 @@
+"""Whoever can be animated: trained bodies, avatars, and bundles, seen in one way."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import torch
+
+from ico3d.avatar.animation.keyframes import read_animation
+from ico3d.avatar.avatar import ABOUT as AVATAR
+from ico3d.avatar.avatar import TrainedAvatar
+from ico3d.avatar.baking.person_bundle import front_of
+from ico3d.avatar.baking.shader_body import MovingBody
+from ico3d.avatar.render_bundle import avatar_gaussians, body_gaussians, window_gaussians
+from ico3d.avatar.spans import Span
+from ico3d.body.model_folder import ABOUT as BODY
+from ico3d.body.model_folder import TrainedBody
+from ico3d.bundle.animation import Animation
+from ico3d.bundle.format import Bundle
+from ico3d.errors import BundleError
+from ico3d.splat.device import CPU
+from ico3d.splat.gaussians import Gaussians
+
+
+class Person(MovingBody, Protocol):
+    """A body, perhaps with a head."""
+
+    @property
+    def animation(self) -> Animation | None:
+        """What lies beside it, or in the bundle; None where key frames are to be found."""
+        ...
+
+    @property
+    def facing(self) -> np.ndarray | None:
+        """(3,) where it looks, in the world; None where nobody knows."""
+        ...
+
+    @property
+    def seconds(self) -> float:
+        """How long the clip lasts."""
+        ...
+
+    @property
+    def has_head(self) -> bool:
+        """Whether a head of its own kind is on the body."""
+        ...
+
+    def gaussians(self, seconds: float) -> Gaussians:
+        """All of the person in the world at a time."""
+        ...
+
+    def body_gaussians(self, seconds: float) -> Gaussians:
+        """The same without the head."""
+        ...
+
+
+@dataclass
+class TrainedPerson:
+    """A trained body, or the one of an avatar.
+
+    Attributes:
+        body: What moves.
+        avatar: What is seen; None for a body alone.
+        animation: Of the model's folder.
+    """
+
+    body: TrainedBody
+    avatar: TrainedAvatar | None
+    animation: Animation | None
+
+    def __post_init__(self):
+        """Takes over what the body says of itself."""
+        self.fps, self.windows, self.summary = self.body.fps, self.body.windows, self.body.summary
+        self.seconds, self.window_gaussians = self.body.seconds, self.body.window_gaussians
+
+    @property
+    def facing(self) -> np.ndarray | None:
+        """Where the face looks, if there is one."""
+        return self.avatar and front_of(self.avatar)
+
+    @property
+    def has_head(self) -> bool:
+        """Whether this is an avatar."""
+        return self.avatar is not None
+
+    def gaussians(self, seconds: float) -> Gaussians:
+        """With the head, if there is one."""
+        return (self.avatar or self.body).gaussians(seconds)
+
+    @torch.no_grad()
+    def body_gaussians(self, seconds: float) -> Gaussians:
+        """The body alone."""
+        return self.body.gaussians(seconds)
+
+
+@dataclass
+class BakedPerson:
+    """A bundle with a body.
+
+    Attributes:
+        bundle: The opened bundle.
+        device: Where its Gaussians are drawn.
+        summary: Empty: a bundle does not say how its body was made.
+    """
+
+    bundle: Bundle
+    device: torch.device = CPU
+    summary: dict = field(default_factory=dict)
+
+    def __post_init__(self):
+        """Takes over what the manifest says of the body.
+
+        Raises:
+            BundleError: If there is none.
+        """
+        body = self.bundle.manifest.body
+        if body is None:
+            raise BundleError(f"the bundle of '{self.bundle.manifest.name}' has no body.")
+        self.fps = body.fps
+        self.windows: Sequence[Span] = body.windows
+        self.seconds = body.windows[-1].last / body.fps
+        self.animation = self.bundle.animation
+
+    @property
+    def facing(self) -> np.ndarray:
+        """Towards the visitor."""
+        camera = self.bundle.manifest.camera
+        return np.subtract(camera.eye, camera.target)
+
+    def window_gaussians(self, index: int, tau: float) -> Gaussians:
+        """The Gaussians of a window."""
+        return window_gaussians(self.bundle.window(index), tau).to(self.device)
+
+    @property
+    def has_head(self) -> bool:
+        """Whether the bundle has a head."""
+        return self.bundle.manifest.head is not None
+
+    def body_gaussians(self, seconds: float) -> Gaussians:
+        """The body alone."""
+        return body_gaussians(self.bundle, seconds).to(self.device)
+
+    def gaussians(self, seconds: float) -> Gaussians:
+        """With an idle face, if there is a head."""
+        head = self.bundle.manifest.head
+        if head is None:
+            return body_gaussians(self.bundle, seconds).to(self.device)
+        return avatar_gaussians(self.bundle, seconds, head.idle_expression).to(self.device)
+
+
+def open_person(path: Path, device: torch.device) -> Person:
+    """Opens a model folder or a bundle.
+
+    Args:
+        path: See there.
+        device: Where its Gaussians shall be.
+
+    Raises:
+        ModelError: If a folder holds a damaged model.
+        BundleError: If it is none, and no bundle with a body either; or if there is an animation
+            that makes no sense, or is for another body.
+    """
+    if (path / AVATAR).is_file():
+        avatar = TrainedAvatar.load(path).to(device)
+        return TrainedPerson(avatar.body, avatar, read_animation(path, avatar.body))
+    if (path / BODY).is_file():
+        body = TrainedBody.load(path).to(device)
+        return TrainedPerson(body, None, read_animation(path, body))
+    return BakedPerson(Bundle.open(path), device)

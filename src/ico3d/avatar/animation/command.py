@@ -1,0 +1,159 @@
+"""The verb `ico3d animate`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import tyro
+
+from ico3d.common.device import DeviceName
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ico3d.avatar.animation.animated import Person
+    from ico3d.avatar.animation.keyframes import Motion
+    from ico3d.bundle.animation import Action, Animation
+    from ico3d.capture.capture import Capture
+
+PICTURES = (".jpg", ".jpeg", ".png")
+
+
+@dataclass(frozen=True)
+class Animate:
+    """Finds where a body rests and the key frames of its gestures, or shows those it has.
+
+    A bundle has its own. Folders of models have none until somebody writes one there with --out:
+    it can be edited by hand (add or remove actions, change their scores: those with higher ones
+    are visited more often; the ends of the rest loop; the speeds), looked at with --contact-sheet,
+    and goes into the bundle.
+
+    With --capture, every frame is compared with the recording, part by part of the body. Gestures
+    that cannot be reached without frames that fall far below the clip's own quality are refused,
+    here and by ico3d bake.
+
+    Attributes:
+        model: A folder of ico3d train body or ico3d assemble, or a bundle.
+        out: The file to write, usually MODEL/animation.json.
+        contact_sheet: Draw it here, NAME.jpg or NAME.png: the rest loop's ends and the actions
+            from the front, and how fast the hands are.
+        capture: The body's recording: measure how the motion looks. A body is also drawn from the
+            side of its first camera; without, as someone stands before it in a world with y up.
+            Avatars and bundles know their front.
+        device: Where to compute: by default with CUDA where that works, else on the CPU.
+    """
+
+    model: tyro.conf.Positional[Path]
+    out: Path | None = None
+    contact_sheet: Path | None = None
+    capture: Path | None = None
+    device: DeviceName = "auto"
+
+    def run(self) -> None:
+        """Finds, prints, writes and draws.
+
+        Raises:
+            ModelError: If a folder holds a damaged model.
+            BundleError: If there is no body, its animation makes no sense, or nowhere does its rest
+                look as good as its clip.
+            CaptureError: If the capture is that of another body.
+            SettingsError: If the contact sheet would be no picture.
+        """
+        from rich.console import Console
+        from rich.progress import track
+
+        from ico3d.avatar.animation.animated import open_person
+        from ico3d.avatar.animation.keyframes import (
+            Motion,
+            find_actions,
+            find_animation,
+            window_places,
+        )
+        from ico3d.avatar.animation.motion_quality import in_words, playable, refused
+        from ico3d.capture.formats import open_capture
+        from ico3d.common.files import write_atomic
+        from ico3d.errors import SettingsError
+        from ico3d.splat.device import computing_device
+
+        if self.contact_sheet and self.contact_sheet.suffix.lower() not in PICTURES:
+            raise SettingsError(f"{self.contact_sheet}: a contact sheet is NAME.jpg or NAME.png.")
+        person = open_person(self.model, computing_device(self.device))
+        capture = open_capture(self.capture) if self.capture else None
+        places = track(
+            window_places(person), "measuring motion", len(person.windows), transient=True
+        )
+        motion = Motion.of(person, places)
+        proposed = _with_quality(person.animation or find_animation(motion), person, capture)
+        animation, left_out = playable(proposed), ()
+        console = Console()
+        if proposed.quality:
+            candidates = (*find_actions(motion, proposed.rest), *proposed.actions)
+            left_out = refused(candidates, animation)
+            console.print(in_words(animation, len(left_out)))
+        console.print(table(animation, motion, left_out))
+        if self.out:
+            write_atomic(self.out, animation.to_bytes())
+        if self.contact_sheet:
+            self._draw(person, animation, motion, left_out, capture)
+
+    def _draw(
+        self,
+        person: "Person",
+        animation: "Animation",
+        motion: "Motion",
+        left_out: "Sequence[Action]",
+        capture: "Capture | None",
+    ) -> None:
+        from ico3d.avatar.animation.sheet import draw_sheet
+
+        assert self.contact_sheet is not None
+        cameras = capture.cameras if capture else None
+        draw_sheet(person, animation, motion, left_out, cameras, self.contact_sheet)
+
+
+def _with_quality(
+    animation: "Animation", person: "Person", capture: "Capture | None"
+) -> "Animation":
+    """With what the recording says of it; without a recording, what is known already."""
+    from dataclasses import replace
+
+    from rich.progress import track
+
+    from ico3d.avatar.animation.motion_quality import measure_motion
+    from ico3d.body.planning.windows import Window
+
+    if capture is None:
+        return animation
+    quality = measure_motion(
+        lambda tau: person.gaussians(tau * person.seconds),
+        (lambda tau: person.body_gaussians(tau * person.seconds)) if person.has_head else None,
+        capture,
+        Window(0, person.windows[-1].last),
+        lambda frames: track(list(frames), "comparing pictures", transient=True),
+    )
+    return replace(animation, quality=quality)
+
+
+def table(animation: "Animation", motion: "Motion", left_out: "Sequence[Action]" = ()):
+    """The key frames as a table for the terminal, in the order of time.
+
+    Args:
+        animation: What is played.
+        motion: Of the body.
+        left_out: Actions that are refused for how they look, or the way to them.
+    """
+    from rich.table import Table
+
+    shown = Table("frame", "time s", "what", "score", "hands m/s", "from rest m")
+    if animation.quality:
+        shown.add_column("picture dB")
+    rest = animation.rest
+    rows = [(rest.start, "rest start", ""), (rest.end, "rest end", "")]
+    rows += [(action.frame, "action", f"{action.score:.3f}") for action in animation.actions]
+    rows += [(action.frame, "refused", f"{action.score:.3f}") for action in left_out]
+    for frame, what, score in sorted(rows):
+        speed, away = motion.speeds[frame], motion.away(frame, rest.end)
+        time = f"{frame / animation.fps:.2f}"
+        picture = [f"{animation.quality[frame]:.1f}"] if animation.quality else []
+        shown.add_row(str(frame), time, what, score, f"{speed:.3f}", f"{away:.3f}", *picture)
+    return shown

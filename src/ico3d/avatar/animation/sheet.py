@@ -1,0 +1,160 @@
+"""An animation as a picture: its key frames, and how fast the hands are."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+from rich.progress import track
+
+from ico3d.avatar.animation.animated import Person
+from ico3d.avatar.animation.keyframes import Motion
+from ico3d.avatar.animation.motion_quality import least_quality
+from ico3d.avatar.film.camera_path import Ring, orbit, ring_around, ring_of
+from ico3d.avatar.film.film import extent
+from ico3d.avatar.staging import NEUTRAL
+from ico3d.bundle.animation import Action, Animation
+from ico3d.common.camera import Camera
+from ico3d.common.files import write_atomic
+from ico3d.splat.render import render
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SIZE = 300, 500
+"""Width and height of a picture of the person."""
+MOST = 16
+"""Actions of a kind that are shown; of more, the best."""
+COLUMNS = 6
+REST, ACTION, REFUSED = "tab:blue", "tab:orange", "tab:red"
+
+
+def draw_sheet(
+    person: Person,
+    animation: Animation,
+    motion: Motion,
+    left_out: Sequence[Action],
+    cameras: Sequence[Camera] | None,
+    path: Path,
+) -> None:
+    """Draws an animation into a file.
+
+    Above the speed of the hands, the rest loop and the actions marked, and how the frames look
+    where that was measured; below the person at these frames, in the order of time, from the front.
+
+    Args:
+        person: Who is animated.
+        animation: What is drawn.
+        motion: Of the person.
+        left_out: Actions that are refused.
+        cameras: Those of the recording, whose first one stands in front; None for the person's own
+            front, or in a world with y up.
+        path: NAME.jpg or NAME.png.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    shown = key_frames(animation, left_out)
+    rows = -(-len(shown) // COLUMNS)
+    curves = 2 if animation.quality else 1
+    figure = Figure(figsize=(12, 3 * curves + 3.6 * rows), layout="constrained")
+    FigureCanvasAgg(figure)
+    above, below = figure.subfigures(2, 1, height_ratios=(3 * curves, 3.6 * rows))  # type: ignore
+    charts = above.subplots(curves, 1, squeeze=False).ravel()
+    _speed(charts[0], animation, motion)
+    if animation.quality:
+        _quality(charts[1], animation)
+    places = below.subplots(rows, COLUMNS, squeeze=False).ravel()
+    camera = front(person, cameras)
+    for place in places:
+        place.axis("off")
+    pairs = zip(places, shown.items(), strict=False)
+    for place, (frame, label) in track(pairs, "drawing", len(shown), transient=True):
+        place.imshow(_picture(person, frame / animation.fps, camera))
+        place.set_title(label, fontsize=9, color=_colour(label))
+    kind = "png" if path.suffix.lower() == ".png" else "jpeg"
+    write_atomic(path, lambda file: figure.savefig(file, format=kind, dpi=100))
+
+
+def key_frames(animation: Animation, left_out: Sequence[Action] = ()) -> dict[int, str]:
+    """Frames that are shown with their labels, in the order of time."""
+    labels: dict[int, list[str]] = {}
+    for name, actions in (("action", animation.actions), ("refused", left_out)):
+        for action in sorted(actions, key=lambda action: -action.score)[:MOST]:
+            labels[action.frame] = [f"{name}, score {action.score:.2f}"]
+    rest = animation.rest
+    for frame, name in ((rest.start, "rest start"), (rest.end, "rest end")):
+        labels.setdefault(frame, []).insert(0, name)
+    return {frame: f"{frame}: {', '.join(labels[frame])}" for frame in sorted(labels)}
+
+
+def _colour(label: str) -> str:
+    """Of a picture's title."""
+    return REFUSED if "refused" in label else ACTION if "action" in label else REST
+
+
+def front(person: Person, cameras: Sequence[Camera] | None) -> Camera:
+    """A camera before the person that sees all of it throughout the clip."""
+    points = extent(person)
+    ring = ring_of(cameras, points) if cameras else ring_around(points)
+    if not cameras and person.facing is not None:
+        ring = _turned(ring, person.facing)
+    return orbit(ring, points, 1, *SIZE)[0]
+
+
+def _turned(ring: Ring, facing: np.ndarray) -> Ring:
+    """A ring that begins where somebody looks."""
+    level = facing - (facing @ ring.up) * ring.up
+    length = np.linalg.norm(level)
+    if length < 1e-6:
+        return ring
+    arm = ring.start - ring.middle
+    along = (arm @ ring.up) * ring.up
+    start = ring.middle + along + level / length * np.linalg.norm(arm - along)
+    return Ring(ring.middle, ring.up, start)
+
+
+@torch.no_grad()
+def _picture(person: Person, seconds: float, camera: Camera) -> np.ndarray:
+    rgb = render(person.gaussians(seconds), [camera], torch.tensor(NEUTRAL)).rgb[0]
+    return rgb.clamp(0, 1).cpu().numpy()  # (H, W, 3)
+
+
+def _quality(axes: "Axes", animation: Animation) -> None:
+    """How the worst part of the body looks, and what is too bad to be played."""
+    bound = least_quality(animation)
+    for frame, value in enumerate(animation.quality):
+        if value < bound:
+            axes.axvspan(frame - 0.5, frame + 0.5, color=REFUSED, alpha=0.2, lw=0)
+    axes.axhline(bound, color=REFUSED, lw=1, label="least that is played")
+    axes.plot(animation.quality, color="black", marker=".", lw=1)
+    axes.set(
+        xlim=(0, animation.num_frames - 1), xlabel="frame", ylabel="PSNR of the worst part, dB"
+    )
+    axes.legend(loc="lower right", fontsize=8)
+
+
+def _speed(axes: "Axes", animation: Animation, motion: Motion) -> None:
+    """The speed of the hands, on a scale that shows calm frames too."""
+    rest = animation.rest
+    axes.axvspan(rest.start, rest.end, color=REST, alpha=0.2, lw=0, label="rest loop")
+    for number, action in enumerate(animation.actions):
+        label = None if number else "actions"
+        axes.axvline(action.frame, color=ACTION, lw=1 + 2 * action.score, label=label)
+        axes.annotate(
+            str(action.frame),
+            (action.frame, 1.0),
+            xycoords=("data", "axes fraction"),
+            ha="center",
+            va="bottom",
+            fontsize=8,
+        )
+    axes.plot(motion.speeds, color="black", marker=".", lw=1)
+    axes.set(
+        yscale="log",
+        xlim=(0, len(motion.speeds) - 1),
+        xlabel="frame",
+        ylabel="speed of the hands, m/s",
+    )
+    axes.legend(loc="lower right", fontsize=8)

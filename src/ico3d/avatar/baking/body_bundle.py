@@ -1,0 +1,284 @@
+"""From a trained body to a bundle that browsers play."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ico3d.avatar import staging
+from ico3d.avatar.baking import head_cost
+from ico3d.avatar.baking.body_cost import (
+    HeadAt,
+    comparison_line,
+    measure_window,
+    probe_views,
+    recorded_views,
+    ring_of_cameras,
+    window_pair,
+)
+from ico3d.avatar.baking.shader_body import SAMPLES_PER_FRAME, MovingBody, Shape, WindowBaker
+from ico3d.avatar.render_bundle import window_gaussians
+from ico3d.bundle.body import BakedWindow
+from ico3d.bundle.format import LICENSES, THUMBNAIL, write_bundle
+from ico3d.bundle.manifest import (
+    BodyInfo,
+    CameraInfo,
+    Loss,
+    Manifest,
+    Persona,
+    WindowInfo,
+    window_file,
+)
+from ico3d.capture.capture import Capture
+from ico3d.errors import BundleError
+
+SHAPES = (
+    Shape(16, (3, 2, 1)),
+    Shape(32, (4, 2, 2)),
+    Shape(32, (5, 3, 2)),
+    Shape(32, (7, 2, 2)),
+    Shape(48, (7, 2, 2)),
+)
+"""Tried in this order for each window: about 73, 87, 102, 106, 109 bytes per Gaussian."""
+GOOD_DROP = 0.05
+"""dB on the person, against ground truth, that ends the search."""
+MAX_DROP = 0.1
+"""dB that a baked window may lose."""
+MIN_LIKENESS = 42.5
+"""dB against the exact model, where there is no ground truth: a model that is 26 dB from the truth
+loses 0.1 dB by an independent error of this size."""
+MAX_BYTES = 110.0
+"""Bytes per Gaussian and window, all told."""
+_VISIBLE = 0.1
+
+
+@dataclass(frozen=True)
+class WindowResult:
+    """A baked window, its file, and what it costs.
+
+    Attributes:
+        window: What is drawn.
+        data: The content of its file.
+        seconds: How long it plays.
+        loss: Means over its pictures.
+    """
+
+    window: BakedWindow
+    data: bytes
+    seconds: float
+    loss: Loss
+
+    @property
+    def bytes_per_gaussian(self) -> float:
+        """All of the file, over N."""
+        return len(self.data) / self.window.num_gaussians
+
+    @property
+    def drop(self) -> float | None:
+        """What is lost against ground truth, in dB; None where there is none."""
+        return head_cost.drop(self.loss)
+
+    @property
+    def acceptable(self) -> bool:
+        """Whether it is within the bounds of loss and size."""
+        return self._loses_at_most(MAX_DROP)
+
+    @property
+    def good(self) -> bool:
+        """Whether nothing larger need be tried."""
+        return self._loses_at_most(GOOD_DROP)
+
+    def _loses_at_most(self, drop: float) -> bool:
+        if self.bytes_per_gaussian > MAX_BYTES:
+            return False
+        if self.drop is None:
+            return (self.loss.psnr_baked_vs_exact or 0.0) >= MIN_LIKENESS
+        return self.drop <= drop
+
+    def __str__(self) -> str:
+        """One line for people."""
+        window = self.window
+        shape = f"{window.num_clusters} × {'/'.join(map(str, window.ranks))}"
+        return (
+            f"{window.num_gaussians} Gaussians, {self.seconds:.2f} s, {shape} components: "
+            f"{head_cost.in_words(self.loss)}, {self.bytes_per_gaussian:.1f} bytes per Gaussian"
+        )
+
+
+def bake(
+    body: MovingBody, capture: Capture | None, head: HeadAt | None = None
+) -> Iterator[WindowResult]:
+    """Bakes window after window, each in the smallest shape that loses little, or the best.
+
+    Args:
+        body: The exact body.
+        capture: Its recording, to measure with; None to measure against the exact body only.
+        head: The exact head on it, which is in the recorded pictures.
+    """
+    for index in range(len(body.windows)):
+        yield _best(_attempts(body, index, capture, head))
+
+
+def check(results: list[WindowResult]) -> None:
+    """Refuses results that break a bound.
+
+    Raises:
+        BundleError: With what was measured.
+    """
+    for index, result in enumerate(results):
+        if not result.acceptable:
+            raise BundleError(
+                f"baking window {index} costs too much ({result}; allowed are {MAX_DROP} dB lost, "
+                f"{MIN_LIKENESS} dB against exact where there is no capture, {MAX_BYTES:g} bytes): "
+                "train with shorter windows, or use --force."
+            )
+
+
+def megabits_per_second(results: list[WindowResult]) -> float:
+    """What a page loads while the body plays."""
+    size = sum(len(result.data) for result in results)
+    return 8e-6 * size / sum(result.seconds for result in results)
+
+
+def write(
+    out: Path,
+    persona: Persona,
+    results: list[WindowResult],
+    body: MovingBody,
+    capture: Capture | None,
+    notices: str,
+) -> Manifest:
+    """Gathers everything else that a bundle holds, and writes it.
+
+    Args:
+        out: The file to write.
+        persona: Who it is; its name is the bundle's.
+        results: The baked windows.
+        body: The exact body, for its times.
+        capture: For camera, background and provenance; None where it is not at hand.
+        notices: Text of LICENSES.txt; no such file where it is empty.
+    """
+    windows = [result.window for result in results]
+    info = body_info(windows, body)
+    camera = standing_camera(np.array(info.low), np.array(info.high), capture)
+    background = staging.background_colour(capture, 0) if capture else staging.NEUTRAL
+    files = {window_file(i): result.data for i, result in enumerate(results)}
+    files[THUMBNAIL] = staging.thumbnail(window_gaussians(windows[0], 0.0), camera, background)
+    if notices:
+        files[LICENSES] = notices.encode()
+    about = capture.provenance if capture else body.summary.get("capture", {})
+    manifest = Manifest(
+        name=persona.name,
+        head=None,
+        body=info,
+        speech=None,
+        camera=camera,
+        background=background,
+        persona=persona,
+        loss=_mean_loss([result.loss for result in results]),
+        provenance=staging.provenance(about, "the body's recording"),
+    )
+    return write_bundle(out, manifest, files)
+
+
+def strip(body: MovingBody, results: list[WindowResult], capture: Capture | None) -> np.ndarray:
+    """[recorded |] exact | baked of each window's begin, one below the other: uint8."""
+    lines = []
+    for index, (span, result) in enumerate(zip(body.windows, results, strict=True)):
+        probes = probe_views(ring_of_cameras(*seen_box(result.window)), span, 1)
+        views = list(recorded_views(capture, span, 1)) if capture else probes
+        pair = window_pair(body, index, result.window, None)
+        lines.append(comparison_line(*pair, views[0]))
+    return (np.vstack(lines).clip(0, 1) * 255 + 0.5).astype(np.uint8)
+
+
+def _attempts(
+    body: MovingBody, index: int, capture: Capture | None, head: HeadAt | None
+) -> Iterator[WindowResult]:
+    """A window in one shape after the other."""
+    span, baker = body.windows[index], WindowBaker(body, index)
+    seconds = (span.last - span.first) / body.fps
+    for shape in SHAPES:
+        baked = baker.baked(shape)
+        recorded = recorded_views(capture, span) if capture else []
+        probes = probe_views(ring_of_cameras(*seen_box(baked)), span)
+        loss = measure_window(body, index, baked, recorded, probes, head)
+        yield WindowResult(baked, baked.to_bytes(window_file(index)), seconds, loss)
+
+
+def _best(attempts: Iterator[WindowResult]) -> WindowResult:
+    """The first that loses little, else that within the size that is most like the exact."""
+    tried = []
+    for result in attempts:
+        if result.good:
+            return result
+        tried.append(result)
+    within = [result for result in tried if result.bytes_per_gaussian <= MAX_BYTES]
+    return max(within or tried, key=lambda result: result.loss.psnr_baked_vs_exact or 0.0)
+
+
+def body_info(windows: list[BakedWindow], body: MovingBody) -> BodyInfo:
+    """What the manifest says about a body."""
+    boxes = [seen_box(window, (0.0, 0.5, 1.0)) for window in windows]
+    infos = [
+        WindowInfo(
+            first=span.first,
+            last=span.last,
+            num_gaussians=window.num_gaussians,
+            num_clusters=window.num_clusters,
+            ranks=window.ranks,
+            file=window_file(i),
+        )
+        for i, (span, window) in enumerate(zip(body.windows, windows, strict=True))
+    ]
+    low = np.min([low for low, _ in boxes], axis=0)
+    high = np.max([high for _, high in boxes], axis=0)
+    return BodyInfo(
+        body.fps, SAMPLES_PER_FRAME, staging.triple(low), staging.triple(high), tuple(infos)
+    )
+
+
+def seen_box(
+    window: BakedWindow, taus: tuple[float, ...] = (0.5,)
+) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest coordinates of what is seen, but for a few strays."""
+    seen = window.rgba[:, 3] > 255 * _VISIBLE
+    points = np.concatenate(
+        [window.at(tau)[0][seen if seen.any() else slice(None)] for tau in taus]
+    )
+    low, high = np.percentile(points, (0.5, 99.5), axis=0)
+    return low, high
+
+
+def standing_camera(
+    low: np.ndarray, high: np.ndarray, capture: Capture | None, front: np.ndarray | None = None
+) -> CameraInfo:
+    """Level with the body's middle, so far away that all of it is seen.
+
+    Args:
+        low: (3,) least coordinates.
+        high: (3,) greatest coordinates.
+        capture: Its cameras stand upright, more or less; without one, y is up.
+        front: (3,) where the person looks; by default toward the capture's first camera, without
+            one along +z.
+    """
+    up, toward = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    if capture is not None:
+        rotations = np.stack([camera.world_to_camera[:3, :3] for camera in capture.cameras])
+        up = -rotations[:, 1].mean(axis=0)
+        up /= np.linalg.norm(up)
+        toward = capture.cameras[0].camera_to_world[:3, 3] - (low + high) / 2
+    if front is not None:
+        toward = front
+    toward = toward - up * (toward @ up)
+    return staging.standing_view(low, high, up, toward / np.linalg.norm(toward))
+
+
+def _mean_loss(losses: list[Loss]) -> Loss:
+    """Means over the windows; None where one lacks the value."""
+    columns = {}
+    for name in ("psnr_exact", "psnr_baked", "psnr_baked_vs_exact"):
+        values = [getattr(loss, name) for loss in losses]
+        columns[name] = None if None in values else round(float(np.mean(values)), 4)
+    return Loss(**columns)

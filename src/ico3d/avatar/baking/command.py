@@ -1,0 +1,234 @@
+"""The verb `ico3d bake`."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NoReturn
+
+import tyro
+
+from ico3d.common.device import DeviceName
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import torch
+
+    from ico3d.avatar.baking.body_bundle import WindowResult
+    from ico3d.bundle.animation import Animation
+    from ico3d.bundle.manifest import Persona
+    from ico3d.capture.capture import Capture
+
+FILES = "[CAPTURE ...] OUT"
+
+
+@dataclass(frozen=True)
+class Bake:
+    """Makes the bundle that browsers play, and measures what baking costs on test pictures.
+
+    Attributes:
+        model: A model folder of ico3d train head, ico3d train body or ico3d assemble.
+        files: The recordings it was made from, and the bundle to write, NAME.ico3d. A head: CAPTURE
+            OUT. A body: [CAPTURE] OUT. A whole person: [HEAD_CAPTURE [BODY_CAPTURE]] OUT. Without
+            its capture, a body is measured against the exact model only; without that of its head,
+            a whole person is baked from what synthetic voices say.
+        rank: Number of basis vectors of a head, 1 to 64; by default the smallest from 16 on that
+            keeps the bounds: at most 0.3 dB lost against ground truth, at least 45 dB against the
+            exact model, at most 1.7 MB per 10,000 Gaussians. Bodies: at most 0.1 dB lost, at most
+            110 bytes per Gaussian and window. Whole persons: besides, at most 0.3 dB lost.
+        name: The avatar's name; by default the persona's, of bodies the bundle's.
+        persona: TOML or JSON file that says who it is; for heads, by default that of the package.
+        licences: Text files with notices that the sources ask for; they go into LICENSES.txt.
+        background: Splats that stand behind the person, in the same world: .spz or .ply.
+        strip: Also write a picture here: recorded | exact | baked.
+        force: Write the bundle although it breaks a bound, and play motion that looks bad.
+        device: Where to compute: by default with CUDA where that works, else on the CPU.
+    """
+
+    model: tyro.conf.Positional[Path]
+    files: Annotated[
+        tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="[CAPTURE ...] OUT")
+    ]
+    rank: int | None = None
+    name: str | None = None
+    persona: Path | None = None
+    licences: tuple[Path, ...] = ()
+    background: Path | None = None
+    strip: Path | None = None
+    force: bool = False
+    device: DeviceName = "auto"
+
+    def run(self) -> None:
+        """Bakes, measures, writes and checks the bundle.
+
+        Raises:
+            BundleError: If the loss breaks a bound and `force` is not set.
+            SettingsError: If what was given does not fit the model.
+        """
+        from rich.console import Console
+
+        from ico3d.avatar.avatar import ABOUT as AVATAR
+        from ico3d.body.model_folder import ABOUT as BODY
+        from ico3d.bundle.format import Bundle, add_files, read_background
+
+        console = Console()
+        is_whole, is_body = ((self.model / about).is_file() for about in (AVATAR, BODY))
+        least, most = (1, 3) if is_whole else (1, 2) if is_body else (2, 2)
+        if not least <= len(self.files) <= most:
+            self._refuse(
+                "ico3d bake needs HEAD CAPTURE OUT, BODY [CAPTURE] OUT, or "
+                "AVATAR [HEAD_CAPTURE [BODY_CAPTURE]] OUT."
+            )
+        bake = self._bake_whole if is_whole else self._bake_body if is_body else self._bake_head
+        behind = read_background(self.background) if self.background else {}
+        bake(console.print)
+        if behind:
+            add_files(self._out, behind)
+        Bundle.open(self._out)
+        console.print(f"{self._out}: {self._out.stat().st_size / 1e6:.2f} MB.")
+
+    @property
+    def _out(self) -> Path:
+        return self.files[-1]
+
+    @property
+    def _place(self) -> "torch.device":
+        from ico3d.splat.device import computing_device
+
+        return computing_device(self.device)
+
+    def _bake_head(self, report) -> None:
+        from ico3d.avatar import staging
+        from ico3d.avatar.baking import head_bundle, head_cost
+        from ico3d.avatar.baking.persona import load_persona
+        from ico3d.avatar.baking.samples import recorded_samples
+        from ico3d.capture.formats import open_capture
+        from ico3d.head.model_folder import TrainedHead
+
+        self._check_rank()
+        persona, notices = load_persona(self.persona), self._notices()
+        head, capture = TrainedHead.load(self.model), open_capture(self.files[0])
+        head.to(self._place)
+        neutral = staging.background_colour(capture, 0)
+        views = head_cost.references(head, capture, neutral, head_bundle.MEASURED_VIEWS)
+        samples = recorded_samples(head, capture)
+        result = head_bundle.bake(head, views, samples, self.rank, report)
+        if self.strip:
+            _save_picture(head_cost.strip(result.head, views), self.strip)
+        if not self.force:
+            head_bundle.check(result)
+        name = self.name or persona.name
+        head_bundle.write(self._out, name, result, samples, head, capture, persona, notices)
+
+    def _bake_body(self, report) -> None:
+        from ico3d.avatar.baking import body_bundle
+        from ico3d.body.model_folder import TrainedBody
+
+        if self.rank is not None:
+            self._refuse("--rank is for heads: what a body keeps is chosen window by window.")
+        persona, notices = self._body_persona(), self._notices()
+        body, capture = TrainedBody.load(self.model).to(self._place), self._capture(0)
+        results = _watched(body_bundle.bake(body, capture), len(body.windows), report)
+        if self.strip:
+            _save_picture(body_bundle.strip(body, results, capture), self.strip)
+        if not self.force:
+            body_bundle.check(results)
+        body_bundle.write(self._out, persona, results, body, capture, notices)
+
+    def _bake_whole(self, report) -> None:
+        from ico3d.avatar.avatar import TrainedAvatar
+        from ico3d.avatar.baking import body_bundle, head_bundle, head_cost, person_bundle
+        from ico3d.avatar.baking.persona import load_persona
+
+        self._check_rank()
+        persona, notices = load_persona(self.persona), self._notices()
+        avatar = TrainedAvatar.load(self.model).to(self._place)
+        animation = person_bundle.animation_of(self.model, avatar)
+        head_capture, body_capture = self._capture(0), self._capture(1)
+        samples, views = person_bundle.head_samples(avatar, head_capture, persona)
+        head = head_bundle.bake(avatar.head, views, samples, self.rank, report)
+        windows = person_bundle.bake_windows(avatar, body_capture)
+        windows = _watched(windows, len(avatar.body.windows), report)
+        parts = (head.head, windows, samples.expressions)
+        result = person_bundle.put_together(avatar, *parts, body_capture)
+        report(f"the whole person: {head_cost.in_words(result.loss)}.")
+        if self.strip:
+            _save_picture(person_bundle.strip(avatar, result.person, body_capture), self.strip)
+        animation = person_bundle.with_quality(animation, avatar, result.person, body_capture)
+        if not self.force:
+            head_bundle.check(head)
+            body_bundle.check(windows)
+            person_bundle.check(result)
+            animation = _played(animation, report)
+        about = (persona, self.name or persona.name, notices)
+        person_bundle.write(self._out, avatar, result, animation, body_capture, about)
+
+    def _capture(self, index: int) -> "Capture | None":
+        """The one that was named in this place before the bundle, if any."""
+        from ico3d.capture.formats import open_capture
+
+        return open_capture(self.files[index]) if index < len(self.files) - 1 else None
+
+    def _check_rank(self) -> None:
+        from ico3d.bundle.limits import MAX_RANK
+
+        if self.rank is not None and not 1 <= self.rank <= MAX_RANK:
+            self._refuse(f"--rank must lie between 1 and {MAX_RANK}, not {self.rank}.")
+
+    def _body_persona(self) -> "Persona":
+        """The one that was given; bodies alone do not talk and need but a name."""
+        from dataclasses import replace
+
+        from ico3d.avatar.baking.persona import load_persona
+        from ico3d.bundle.manifest import Persona
+
+        persona = load_persona(self.persona) if self.persona else Persona(self._out.stem, "", ())
+        return replace(persona, name=self.name or persona.name)
+
+    def _notices(self) -> str:
+        try:
+            return "\n\n".join(path.read_text("utf-8").strip() for path in self.licences)
+        except (OSError, UnicodeDecodeError) as error:
+            self._refuse(f"a notice of --licences cannot be read: {error}.")
+
+    @staticmethod
+    def _refuse(sentence: str) -> NoReturn:
+        from ico3d.errors import SettingsError
+
+        raise SettingsError(sentence)
+
+
+def _played(animation: "Animation", report: Callable[[str], None]) -> "Animation":
+    """Leaves out motion that looks far worse than the rest of the clip."""
+    from ico3d.avatar.animation import motion_quality
+
+    played = motion_quality.playable(animation)
+    if animation.quality:
+        left_out = motion_quality.refused(animation.actions, played)
+        report(motion_quality.in_words(animation, len(left_out)))
+    else:
+        report("how the motion looks was not measured: that takes the body's recording.")
+    return played
+
+
+def _watched(
+    windows: "Iterator[WindowResult]", count: int, report: Callable[[str], None]
+) -> "list[WindowResult]":
+    """Bakes all windows while the progress is shown."""
+    from rich.progress import track
+
+    from ico3d.avatar.baking.body_bundle import megabits_per_second
+
+    results = []
+    for result in track(windows, "baking", count):
+        report(f"window {len(results)}: {result}")
+        results.append(result)
+    report(f"{megabits_per_second(results):.2f} Mbit/s while it plays.")
+    return results
+
+
+def _save_picture(picture, path: Path) -> None:
+    from PIL import Image
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(picture).save(path)

@@ -1,0 +1,217 @@
+"""From a trained head and its capture to a bundle."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ico3d.avatar import staging
+from ico3d.avatar.baking import head_cost
+from ico3d.avatar.baking.samples import Samples
+from ico3d.avatar.baking.shader_head import MAX_RANK, BakeSettings, HeadBaker, megabytes_per_10k
+from ico3d.avatar.render_bundle import baked_gaussians
+from ico3d.bundle.format import HEAD, LICENSES, POSES, SPEECH, THUMBNAIL, write_bundle
+from ico3d.bundle.head import BakedHead, poses_to_bytes
+from ico3d.bundle.manifest import (
+    HeadInfo,
+    Loss,
+    Manifest,
+    Persona,
+    SpeechInfo,
+)
+from ico3d.capture.capture import Capture
+from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
+from ico3d.errors import BundleError
+from ico3d.head.expressions import FEATURE_RATE
+from ico3d.head.model_folder import TrainedHead
+from ico3d.speech.encoder import load_encoder
+from ico3d.speech.export import export_speech, make_servable
+from ico3d.speech.network import SpeechAdaptor
+
+RANKS = (16, 20, 24, 28, MAX_RANK)
+"""Tried in this order. Not fewer: means over views would not notice that rare blinks are lost."""
+MAX_MEGABYTES = 1.7
+"""MB of head.safetensors per 10,000 Gaussians, at most."""
+MEASURED_VIEWS = 40
+
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class BakedResult:
+    """A baked head and what it costs."""
+
+    head: BakedHead
+    loss: Loss
+    megabytes: float
+
+    @property
+    def acceptable(self) -> bool:
+        """Whether it is within the bounds of loss and size."""
+        return head_cost.acceptable(self.loss) and self.megabytes <= MAX_MEGABYTES
+
+    def __str__(self) -> str:
+        """One line for people."""
+        return (
+            f"rank {self.head.rank}: {head_cost.in_words(self.loss)}, "
+            f"{self.megabytes:.2f} MB per 10,000 of {self.head.num_gaussians} Gaussians"
+        )
+
+
+def bake(
+    head: TrainedHead,
+    views: list[head_cost.Reference],
+    samples: Samples,
+    rank: int | None,
+    report: Report,
+    settings: BakeSettings | None = None,
+) -> BakedResult:
+    """Bakes with the given rank, or with the smallest that keeps the bounds (else the best).
+
+    Args:
+        head: The exact head.
+        views: What to measure with.
+        samples: What it is baked from.
+        rank: K, or None to choose.
+        report: Is told each result.
+        settings: Of the fit; the usual ones where None.
+    """
+    report("sampling the exact head …")
+    chosen = settings or BakeSettings()
+    baker = HeadBaker(head.model, samples.expressions, samples.importance, rank or MAX_RANK, chosen)
+    results = []
+    for candidate in (rank,) if rank else RANKS:
+        baked = baker.baked(candidate)
+        result = BakedResult(baked, head_cost.measure(baked, views), megabytes_per_10k(baked))
+        report(str(result))
+        if result.acceptable:
+            return result
+        results.append(result)
+    within = [result for result in results if result.megabytes <= MAX_MEGABYTES]
+    return max(within or results, key=lambda result: result.loss.psnr_baked_vs_exact or 0)
+
+
+def check(result: BakedResult) -> None:
+    """Refuses a result that breaks a bound.
+
+    Raises:
+        BundleError: With what was measured.
+    """
+    if not result.acceptable:
+        raise BundleError(
+            f"baking costs too much ({result}; allowed are {head_cost.MAX_DROP} dB lost, at least "
+            f"{head_cost.MIN_LIKENESS:g} dB against exact, {MAX_MEGABYTES} MB): train longer, or "
+            "use --force."
+        )
+
+
+def write(
+    out: Path,
+    name: str,
+    result: BakedResult,
+    samples: Samples,
+    head: TrainedHead,
+    capture: Capture,
+    persona: Persona,
+    notices: str,
+) -> Manifest:
+    """Gathers everything else that a bundle holds, and writes it.
+
+    Args:
+        out: The file to write.
+        name: The avatar's name.
+        result: The baked head and its loss.
+        samples: What it was baked from.
+        head: The exact head, for its speech adaptor.
+        capture: For motion, camera, background and provenance.
+        persona: Who the avatar is.
+        notices: Text of LICENSES.txt; no such file where it is empty.
+    """
+    poses = staging.idle_motion(capture)
+    frontal = staging.frontal_camera(capture)
+    idle = idle_expression(head, samples.expressions)
+    baked = driven(result.head, head)
+    seen = baked_gaussians(baked, idle)
+    middle = poses[len(poses) // 2]
+    points = seen.means[seen.opacities > 0.1].numpy() @ middle[:3, :3].T + middle[:3, 3]
+    camera = staging.visitor_view(capture.cameras[frontal], points)
+    background = staging.background_colour(capture, frontal)
+    files = {
+        HEAD: baked.to_bytes(),
+        POSES: poses_to_bytes(poses),
+        THUMBNAIL: staging.thumbnail(seen.transform(middle), camera, background),
+    }
+    speech = None
+    if head.adaptor is not None:
+        files[SPEECH], speech = speech_file(head.adaptor, head.encoder)
+    if notices:
+        files[LICENSES] = notices.encode()
+    manifest = Manifest(
+        name=name,
+        head=head_info(baked, head, idle, capture.fps, len(poses)),
+        body=None,
+        speech=speech,
+        camera=camera,
+        background=background,
+        persona=persona,
+        loss=result.loss,
+        provenance=staging.provenance(capture.provenance, str(capture.path)),
+    )
+    return write_bundle(out, manifest, files)
+
+
+def idle_expression(head: TrainedHead, recorded: np.ndarray) -> np.ndarray:
+    """(B,) silence with open eyes; for blendshapes, the most neutral face that was recorded.
+
+    It is what drives an avatar: eyes and brows at rest are 0 (`TrainedHead.recorded`).
+
+    Args:
+        head: Whose face.
+        recorded: (T, B) what it usually does.
+    """
+    if head.adaptor is None:
+        return recorded[np.abs(recorded).sum(axis=1).argmin()]
+    return np.concatenate([head.neutral()[:SPEECH_SIZE], np.zeros(len(EYE_NAMES), np.float32)])
+
+
+def driven(baked: BakedHead, head: TrainedHead) -> BakedHead:
+    """A head that takes what drives avatars, from one that takes what was recorded.
+
+    `TrainedHead.recorded` is linear, so it goes into the coefficient network's first layer.
+    """
+    size = baked.expression_size
+    offset = head.recorded(np.zeros(size, np.float32))  # (B,)
+    slope = head.recorded(np.ones(size, np.float32)) - offset  # (B,)
+    bias = baked.b1 + offset.astype(np.float64) @ baked.w1
+    return replace(baked, w1=slope[:, None] * baked.w1, b1=bias.astype(np.float32))
+
+
+def speech_file(adaptor: SpeechAdaptor, encoder_name: str) -> tuple[bytes, SpeechInfo]:
+    """`speech.onnx` and what the manifest says about it."""
+    encoder = load_encoder(encoder_name)
+    kind = "mel"
+    if encoder.name != "builtin":  # the user's own: it stays on this machine
+        kind = "features"
+        make_servable(encoder)
+    info = SpeechInfo(encoder.name, encoder.sha256, FEATURE_RATE, kind)
+    return export_speech(adaptor, encoder), info
+
+
+def head_info(
+    baked: BakedHead, head: TrainedHead, idle: np.ndarray, fps: float, num_poses: int
+) -> HeadInfo:
+    """What the manifest says about a head."""
+    speech = head.adaptor is not None
+    return HeadInfo(
+        num_gaussians=baked.num_gaussians,
+        rank=baked.rank,
+        hidden=baked.hidden,
+        inputs=head.inputs,
+        expression_size=baked.expression_size,
+        eye_offset=SPEECH_SIZE if speech else None,
+        expression_names=() if speech else head.blendshape_names,
+        fps=fps,
+        num_poses=num_poses,
+        idle_expression=tuple(round(float(value), 6) for value in idle),
+    )

@@ -1,0 +1,305 @@
+"""From a whole person, a trained head on a trained body, to a bundle that browsers play."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from ico3d.avatar import staging
+from ico3d.avatar.animation import motion_quality
+from ico3d.avatar.animation.keyframes import Motion, find_animation, read_animation
+from ico3d.avatar.avatar import TrainedAvatar
+from ico3d.avatar.baking import body_bundle, body_cost, head_bundle, head_cost
+from ico3d.avatar.baking.body_bundle import WindowResult
+from ico3d.avatar.baking.samples import (
+    Samples,
+    expressions_of,
+    references_around,
+    samples_around,
+    spoken_expressions,
+    training_expressions,
+)
+from ico3d.avatar.render_bundle import BakedAvatar
+from ico3d.body.planning.windows import Window
+from ico3d.bundle.animation import ANIMATION, Animation
+from ico3d.bundle.format import LICENSES, SPEECH, THUMBNAIL, write_bundle
+from ico3d.bundle.head import HEAD, POSES, BakedHead, poses_to_bytes
+from ico3d.bundle.manifest import CameraInfo, Loss, Manifest, Persona, window_file
+from ico3d.capture.capture import Capture
+from ico3d.errors import BundleError
+from ico3d.splat.gaussians import Gaussians
+
+VIEWS = 40
+"""Pictures that a whole person is measured with."""
+MAX_DROP = head_cost.MAX_DROP
+"""dB that it may lose on the person, against ground truth."""
+_STRIP_ROWS = 4
+_FACING = np.array([0.0, 0.0, 1.0])
+"""Where the face looks in the space of the head's model."""
+
+
+@dataclass(frozen=True)
+class WholeResult:
+    """A baked person and what it costs.
+
+    Attributes:
+        person: What is drawn.
+        windows: Of its body, with their files.
+        idle: (B,) its face at rest.
+        loss: Means over pictures of the whole person.
+    """
+
+    person: BakedAvatar
+    windows: Sequence[WindowResult]
+    idle: np.ndarray
+    loss: Loss
+
+
+def head_samples(
+    avatar: TrainedAvatar, capture: Capture | None, persona: Persona
+) -> tuple[Samples, list[head_cost.Reference]]:
+    """What the head is baked from, and what it is measured with.
+
+    Args:
+        avatar: The exact person.
+        capture: The head's recording, whose training frames say how the face moves; without one,
+            synthetic voices read what the persona says, besides what the body's recording holds.
+        persona: See there.
+
+    Raises:
+        MissingExtraError: If there is no recording and espeak-ng is not installed.
+    """
+    head, tests = avatar.head, avatar.expressions
+    expressions = avatar.expressions
+    if capture is not None:
+        expressions = training_expressions(head, capture)
+        tests = expressions_of(head, capture, capture.split.test or capture.split.train)
+    elif head.adaptor is not None:
+        answers = [note.partition("=>")[2].strip() for note in persona.notes]
+        expressions = np.concatenate([expressions, spoken_expressions(head, answers)])
+    return samples_around(head, expressions), references_around(
+        head, tests, head_bundle.MEASURED_VIEWS
+    )
+
+
+def bake_windows(avatar: TrainedAvatar, capture: Capture | None) -> Iterator[WindowResult]:
+    """Bakes the body, window after window, each measured with the exact head on it."""
+    return body_bundle.bake(
+        avatar.body, capture, lambda frame: avatar.head_gaussians(frame / avatar.fps)
+    )
+
+
+def put_together(
+    avatar: TrainedAvatar,
+    head: BakedHead,
+    windows: Sequence[WindowResult],
+    expressions: np.ndarray,
+    capture: Capture | None,
+) -> WholeResult:
+    """The baked parts as one person, measured with the expressions of the body's recording.
+
+    Args:
+        avatar: The exact person.
+        head: Baked in the space of the exact head's model.
+        windows: Of the body.
+        expressions: (T, B) what the face usually does.
+        capture: The body's recording; None to measure against the exact person only.
+    """
+    place = avatar.placement
+    person = BakedAvatar(
+        moved_head(head, place.canonical_from_head),
+        lambda index: windows[index].window,
+        avatar.body.windows,
+        avatar.fps,
+        place.world_from_canonical,
+    )
+    idle = head_bundle.idle_expression(avatar.head, expressions)
+    return WholeResult(person, windows, idle, measure(avatar, person, capture))
+
+
+def moved_head(head: BakedHead, a_from_b: np.ndarray) -> BakedHead:
+    """A baked head given in space b, in space a; (4, 4) similarity."""
+    moved = Gaussians(
+        means=torch.from_numpy(head.means.astype(np.float64)),
+        quats=torch.from_numpy(head.quats.astype(np.float64)),
+        scales=torch.from_numpy(head.scales.astype(np.float64)).exp(),
+        opacities=torch.ones(head.num_gaussians),
+    ).transform(a_from_b)
+    return replace(
+        head,
+        means=moved.means.numpy().astype(np.float32),
+        quats=torch.nn.functional.normalize(moved.quats).numpy().astype(np.float16),
+        scales=moved.scales.log().numpy().astype(np.float16),
+    )
+
+
+def measure(avatar: TrainedAvatar, person: BakedAvatar, capture: Capture | None) -> Loss:
+    """Mean PSNR on the whole person, through all of the clip."""
+    span = _span(avatar)
+    recorded = body_cost.recorded_views(capture, span, VIEWS) if capture else []
+    return body_cost.measure(*_pair(avatar, person), recorded, _probes(avatar, person, VIEWS))
+
+
+def check(result: WholeResult) -> None:
+    """Refuses a whole person that breaks the bound.
+
+    Raises:
+        BundleError: With what was measured.
+    """
+    if (head_cost.drop(result.loss) or 0.0) > MAX_DROP:
+        raise BundleError(
+            f"baking costs the whole person too much ({head_cost.in_words(result.loss)}; allowed "
+            f"are {MAX_DROP} dB lost): train longer, or use --force."
+        )
+
+
+def strip(avatar: TrainedAvatar, person: BakedAvatar, capture: Capture | None) -> np.ndarray:
+    """[recorded |] exact | baked through the clip, one below the other: uint8."""
+    views = _probes(avatar, person, _STRIP_ROWS)
+    if capture is not None:
+        views = body_cost.recorded_views(capture, _span(avatar), _STRIP_ROWS)
+    lines = [body_cost.comparison_line(*_pair(avatar, person), view) for view in views]
+    return (np.vstack(lines).clip(0, 1) * 255 + 0.5).astype(np.uint8)
+
+
+def animation_of(folder: Path, avatar: TrainedAvatar) -> Animation:
+    """`animation.json` of the avatar's folder, where somebody put one, else what is found.
+
+    Raises:
+        BundleError: If the file makes no sense, or is for another body.
+    """
+    return read_animation(folder, avatar.body) or find_animation(Motion.of(avatar.body))
+
+
+def with_quality(
+    animation: Animation, avatar: TrainedAvatar, person: BakedAvatar, capture: Capture | None
+) -> Animation:
+    """An animation that knows how the baked body looks in each frame of its recording.
+
+    Args:
+        animation: As found or edited.
+        avatar: The exact person, for the recorded expressions.
+        person: The baked one, which will be played.
+        capture: The body's recording; without one nothing is known.
+    """
+    if capture is None:
+        return replace(animation, quality=())
+    length, device = avatar.seconds, avatar.body.device
+    quality = motion_quality.measure_motion(
+        _pair(avatar, person)[1],
+        lambda tau: person.body_gaussians(tau * length).to(device),
+        capture,
+        _span(avatar),
+    )
+    return replace(animation, quality=quality)
+
+
+def write(
+    out: Path,
+    avatar: TrainedAvatar,
+    result: WholeResult,
+    animation: Animation,
+    capture: Capture | None,
+    about: tuple[Persona, str, str],
+) -> Manifest:
+    """Gathers everything else that a bundle holds, and writes it.
+
+    Args:
+        out: The file to write.
+        avatar: The exact person.
+        result: The baked one.
+        animation: How it moves.
+        capture: The body's recording, for camera and background; None where it is not at hand.
+        about: Who it is, the avatar's name, and the text of LICENSES.txt (no such file where it
+            is empty).
+
+    Raises:
+        BundleError: If the animation is not that of this body.
+    """
+    persona, name, notices = about
+    head = avatar.head
+    person = replace(result.person, head=head_bundle.driven(result.person.head, head))
+    start = person.gaussians(animation.rest.start / avatar.fps, result.idle)
+    body = body_bundle.body_info([window.window for window in result.windows], avatar.body)
+    animation.check_body(body)
+    camera = standing_camera(avatar, person, capture)
+    background = staging.background_colour(capture, 0) if capture else staging.NEUTRAL
+    files = {window_file(i): window.data for i, window in enumerate(result.windows)}
+    files |= {
+        HEAD: person.head.to_bytes(),
+        POSES: poses_to_bytes(person.world_from_head),
+        ANIMATION: animation.to_bytes(),
+        THUMBNAIL: staging.thumbnail(start, camera, background),
+    }
+    speech = None
+    if head.adaptor is not None:
+        files[SPEECH], speech = head_bundle.speech_file(head.adaptor, head.encoder)
+    if notices:
+        files[LICENSES] = notices.encode()
+    poses = len(person.world_from_head)
+    parts = {"the head's recording": head.summary, "the body's recording": avatar.body.summary}
+    manifest = Manifest(
+        name=name,
+        head=head_bundle.head_info(person.head, head, result.idle, avatar.fps, poses),
+        body=body,
+        speech=speech,
+        camera=camera,
+        background=background,
+        persona=persona,
+        loss=result.loss,
+        provenance=staging.joint_provenance(
+            [staging.provenance(part.get("capture", {}), where) for where, part in parts.items()]
+        ),
+    )
+    return write_bundle(out, manifest, files)
+
+
+def standing_camera(
+    avatar: TrainedAvatar, person: BakedAvatar, capture: Capture | None
+) -> CameraInfo:
+    """In front of the person, so far away that all of it is seen."""
+    return body_bundle.standing_camera(*_box(person), capture, front_of(avatar))
+
+
+def front_of(avatar: TrainedAvatar) -> np.ndarray:
+    """(3,) where the face looks, on average."""
+    turns = avatar.placement.world_from_canonical[:, :3, :3]  # (F, 3, 3)
+    return turns.mean(axis=0) @ avatar.placement.canonical_from_head[:3, :3] @ _FACING
+
+
+def _span(avatar: TrainedAvatar) -> Window:
+    return Window(0, avatar.body.windows[-1].last)
+
+
+def _pair(avatar: TrainedAvatar, person: BakedAvatar) -> tuple[body_cost.At, body_cost.At]:
+    """The exact and the baked person at τ of the whole clip, with the recorded expression."""
+    length, device = avatar.seconds, avatar.body.device
+    return (
+        lambda tau: avatar.gaussians(tau * length),
+        lambda tau: person.gaussians(tau * length, avatar.expression(tau * length)).to(device),
+    )
+
+
+def _probes(avatar: TrainedAvatar, person: BakedAvatar, count: int) -> list[body_cost.View]:
+    ring = body_cost.ring_of_cameras(*_box(person))
+    return body_cost.probe_views(ring, _span(avatar), count)
+
+
+def _box(person: BakedAvatar) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest coordinates of what is seen, in all frames where windows begin or end."""
+    boxes = []
+    for index, span in enumerate(person.spans):
+        boxes.append(body_bundle.seen_box(person.window(index), (0.0, 0.5, 1.0)))
+        for frame in (span.first, span.last):
+            boxes.append(_head_box(person, frame))
+    low, high = zip(*boxes, strict=True)
+    return np.min(low, axis=0), np.max(high, axis=0)
+
+
+def _head_box(person: BakedAvatar, frame: int) -> tuple[np.ndarray, np.ndarray]:
+    pose = person.world_from_head[frame]
+    points = person.head.means @ pose[:3, :3].T + pose[:3, 3]  # (N, 3)
+    low, high = np.percentile(points, (0.5, 99.5), axis=0)
+    return low, high

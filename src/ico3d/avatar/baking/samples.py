@@ -1,0 +1,127 @@
+"""What a head is baked from: expressions, and how much each of its logits is seen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from ico3d.avatar import staging
+from ico3d.avatar.baking.head_cost import Reference, reference
+from ico3d.avatar.baking.importance import logit_importance
+from ico3d.capture.capture import Capture
+from ico3d.common.camera import Camera, look_at
+from ico3d.common.espeak import synthesize
+from ico3d.common.spread import spread
+from ico3d.head.expressions import FEATURE_RATE
+from ico3d.head.model import HeadModel
+from ico3d.head.model_folder import TrainedHead
+from ico3d.head.views import view_of
+from ico3d.speech.encoder import load_encoder
+from ico3d.speech.eyes import EyeBehaviour
+
+_PROBES = 32
+_SIZE, _FOV = 192, 20.0
+"""Of the pictures that a head without recorded ones is looked at with; pixels, degrees."""
+_SIDES = np.deg2rad([0, -35, 20, 60, -15, 40, -60, -5])
+"""Where their cameras stand; 0 is in front."""
+_VOICES = ("en-us", "en-us+f3", "en-us+m3", "en-us+f5")
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What a head is baked from.
+
+    Attributes:
+        expressions: (T, B) what it shall look right in.
+        importance: (N, 4) weights of logit errors.
+    """
+
+    expressions: np.ndarray
+    importance: np.ndarray
+
+
+def recorded_samples(head: TrainedHead, capture: Capture) -> Samples:
+    """Those of a capture's training frames, as its cameras see them."""
+    return Samples(training_expressions(head, capture), importance_of(head, capture))
+
+
+def samples_around(head: TrainedHead, expressions: np.ndarray) -> Samples:
+    """Given expressions (T, B), as cameras in front of the head and beside it see them."""
+    rows = np.linspace(0, len(expressions) - 1, _PROBES).round().astype(int)
+    probes = torch.from_numpy(np.asarray(expressions[rows], np.float32))  # (P, B)
+    cameras = cameras_around(head.model, _PROBES)
+    colour = torch.tensor(staging.NEUTRAL)
+    importance = logit_importance(head.model, probes, cameras, colour, seed=0)
+    return Samples(expressions, importance)
+
+
+def references_around(head: TrainedHead, expressions: np.ndarray, count: int) -> list[Reference]:
+    """What the exact head shows to the same cameras in some of these expressions (T, B)."""
+    rows = spread(len(expressions), count)
+    cameras, colour = cameras_around(head.model, len(rows)), torch.tensor(staging.NEUTRAL)
+    shown = torch.from_numpy(np.asarray(expressions[rows], np.float32))  # (V, B)
+    pairs = zip(cameras, shown, strict=True)
+    return [reference(head, camera, expression, colour) for camera, expression in pairs]
+
+
+def training_expressions(head: TrainedHead, capture: Capture) -> np.ndarray:
+    """(T, B) of the training frames."""
+    return expressions_of(head, capture, capture.split.train)
+
+
+def expressions_of(head: TrainedHead, capture: Capture, frames) -> np.ndarray:
+    """(T, B) of some frames."""
+    track = head.track(capture)
+    with torch.no_grad():
+        return np.stack([track.at(frame).numpy() for frame in frames])
+
+
+def spoken_expressions(head: TrainedHead, texts: Sequence[str], seed: int = 0) -> np.ndarray:
+    """(T, B) of synthetic voices that read texts to a head driven by speech, with blinks.
+
+    Raises:
+        MissingExtraError: If espeak-ng is not installed.
+    """
+    rows = []
+    for number, text in enumerate(texts):
+        speech = synthesize(text, _VOICES[number % len(_VOICES)], rate=150)
+        rows.append(lips_of(head, speech.samples, speech.rate))
+    lips = np.concatenate(rows)
+    eyes = EyeBehaviour(seed).values(np.arange(len(lips)) / FEATURE_RATE)
+    return head.recorded(np.concatenate([lips, eyes], 1))
+
+
+def lips_of(head: TrainedHead, samples: np.ndarray, rate: int) -> np.ndarray:
+    """(T, 32) what a sound (S,) does to a head driven by speech, 25 rows per second."""
+    assert head.adaptor is not None
+    encoder = load_encoder(head.encoder)
+    features = torch.from_numpy(encoder.features(samples, rate, head.model.device))  # (T, D)
+    with torch.no_grad():
+        return head.adaptor.track(features).numpy()
+
+
+def importance_of(head: TrainedHead, capture: Capture) -> np.ndarray:
+    """(N, 4) as training frames see it, from all cameras in turn."""
+    frames = capture.split.train
+    frames = [frames[i] for i in np.linspace(0, len(frames) - 1, _PROBES).astype(int)]
+    frames = [frame for frame in frames if capture.world_from_head(frame) is not None]
+    cameras = [view_of(capture, i % len(capture.cameras), f).camera for i, f in enumerate(frames)]
+    track = head.track(capture)
+    with torch.no_grad():
+        expressions = torch.stack([track.at(frame) for frame in frames])  # (P, B)
+    colour = torch.tensor(staging.background_colour(capture, 0))
+    return logit_importance(head.model, expressions, cameras, colour, seed=0)
+
+
+def cameras_around(model: HeadModel, count: int) -> list[Camera]:
+    """Cameras in canonical head space, which looks along z, with all of the head in sight."""
+    means = model.means.detach().cpu().numpy()
+    low, high = np.percentile(means, (0.5, 99.5), axis=0)  # (3,), (3,)
+    middle, half = (low + high) / 2, np.linalg.norm(high - low) / 2
+    away = half / np.sin(np.deg2rad(_FOV) / 2)
+    focal = 0.5 * _SIZE / np.tan(np.deg2rad(_FOV) / 2)
+    intrinsics = np.array([[focal, 0, _SIZE / 2], [0, focal, _SIZE / 2], [0, 0, 1]])
+    sides = [_SIDES[i % len(_SIDES)] for i in range(count)]
+    eyes = [middle + away * np.array([np.sin(a), 0.1, np.cos(a)]) for a in sides]
+    return [Camera(_SIZE, _SIZE, intrinsics, look_at(eye, middle)) for eye in eyes]

@@ -1,0 +1,142 @@
+"""Baking: the exact head model → a head that a shader blends (design section 3)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from ico3d.avatar.baking.distil import CoefficientNetwork, augmented, distil
+from ico3d.avatar.baking.lowrank import LowRank, factorise
+from ico3d.avatar.baking.quantise import quantise
+from ico3d.bundle.head import BakedHead
+from ico3d.errors import BundleError
+from ico3d.head.model import HeadModel
+
+CLIP = 8.0
+"""Logits beyond ±8 differ by less than 1/2,980 in the picture."""
+LEAST_ALPHA = 1 / 255
+"""A splat under this alpha is never drawn (splat.render)."""
+MAX_RANK = 32
+"""The largest rank within 1.7 MB per 10,000 Gaussians (38 + 4·K bytes each)."""
+
+
+@dataclass(frozen=True)
+class BakeSettings:
+    """How a head is baked.
+
+    Attributes:
+        hidden: H, width of the coefficient network.
+        max_frames: Training expressions used at most, spread evenly.
+        augmented: Further expressions made from them for the coefficient network.
+        steps: Steps of its fit.
+        seed: Seed of all randomness.
+    """
+
+    hidden: int = 128
+    max_frames: int = 1000
+    augmented: int = 1500
+    steps: int = 2500
+    seed: int = 0
+
+
+class HeadBaker:
+    """Does what all ranks share once: samples, principal components, coefficient network."""
+
+    def __init__(
+        self,
+        model: HeadModel,
+        expressions: np.ndarray,
+        importance: np.ndarray,
+        rank: int = MAX_RANK,
+        settings: BakeSettings = BakeSettings(),
+    ):
+        """Samples the model.
+
+        Args:
+            model: The exact head.
+            expressions: (T, B) those of the training frames.
+            importance: (N, 4) weights of logit errors.
+            rank: The largest that `baked` will be asked for.
+            settings: See there.
+
+        Raises:
+            BundleError: If no Gaussian is ever opaque enough to be drawn.
+        """
+        chosen = _spread(expressions, settings.max_frames)
+        samples = sample_logits(model, chosen)  # (T, N, 4)
+        self._kept = (samples[:, :, 3] > np.log(LEAST_ALPHA / (1 - LEAST_ALPHA))).any(axis=0)
+        if not self._kept.any():
+            raise BundleError("the head has no Gaussian that is ever seen: train it again.")
+        self._model, self._weights = model, importance[self._kept]
+        flat = _flat(samples[:, self._kept])
+        self._factors: LowRank = factorise(flat, self._weights.reshape(-1), rank)
+        self._network = self._fit(chosen, settings)
+
+    def baked(self, rank: int) -> BakedHead:
+        """The head with the first `rank` components."""
+        count = int(self._kept.sum())
+        basis = self._factors.basis[:rank].reshape(rank, count, 4)
+        sizes = np.sqrt(np.square(self._factors.scores[:, :rank]).mean(axis=0))
+        rounded = quantise(basis, sizes, self._weights)
+        network = self._network
+        return BakedHead(
+            **_geometry(self._model, self._kept),
+            mean_logits=self._factors.mean.reshape(count, 4).astype(np.float16),
+            basis=rounded.values,
+            basis_scale=rounded.scale,
+            w1=network.w1,
+            b1=network.b1,
+            w2=network.w2[:, :rank] * rounded.gains,
+            b2=network.b2[:rank] * rounded.gains,
+        )
+
+    def _fit(self, recorded: np.ndarray, settings: BakeSettings) -> CoefficientNetwork:
+        """Distils scores of recorded and of made-up expressions into the small network."""
+        rng = np.random.default_rng(settings.seed)
+        made = augmented(recorded, settings.augmented, rng)
+        scores = [self._factors.scores]
+        for part in np.array_split(made, max(1, len(made) // 100)):
+            logits = sample_logits(self._model, part)[:, self._kept]
+            scores.append(self._factors.project(_flat(logits)))
+        inputs = np.concatenate([recorded, made])  # (T + A, B)
+        targets = np.concatenate(scores)  # (T + A, K)
+        return distil(inputs, targets, settings.hidden, settings.steps, settings.seed)
+
+
+def sample_logits(model: HeadModel, expressions: np.ndarray) -> np.ndarray:
+    """The exact logits, clipped to ±8: (T, B) → (T, N, 4) float16."""
+    samples = np.empty((len(expressions), len(model), 4), np.float16)
+    with torch.no_grad():
+        for row, expression in zip(samples, expressions, strict=True):
+            logits = model.logits(torch.from_numpy(np.asarray(expression, np.float32)))
+            row[:] = logits.clamp(-CLIP, CLIP).cpu().numpy()
+    return samples
+
+
+def megabytes_per_10k(head: BakedHead) -> float:
+    """Size of `head.safetensors` in MB for 10,000 Gaussians."""
+    return len(head.to_bytes()) / head.num_gaussians * 1e4 / 1e6
+
+
+def _geometry(model: HeadModel, kept: np.ndarray) -> dict[str, np.ndarray]:
+    means, quats, log_scales = (
+        parameter.detach().cpu().numpy()[kept]
+        for parameter in (model.means, model.quats, model.log_scales)
+    )
+    quats = quats / np.maximum(np.linalg.norm(quats, axis=1, keepdims=True), 1e-12)
+    return {
+        "means": np.ascontiguousarray(means, np.float32),
+        "quats": quats.astype(np.float16),
+        "scales": log_scales.astype(np.float16),
+    }
+
+
+def _spread(expressions: np.ndarray, count: int) -> np.ndarray:
+    """At most `count` rows, evenly spread."""
+    if len(expressions) <= count:
+        return expressions
+    return expressions[np.linspace(0, len(expressions) - 1, count).round().astype(int)]
+
+
+def _flat(samples: np.ndarray) -> np.ndarray:
+    return samples.reshape(len(samples), -1)  # (T, N·4)

@@ -1,0 +1,140 @@
+"""A trained body: what a model folder holds."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import torch
+
+from ico3d.body.motion.opening import motion_from
+from ico3d.body.motion.window_model import WindowModel
+from ico3d.body.planning.windows import Window
+from ico3d.body.settings import Method
+from ico3d.common.files import write_atomic
+from ico3d.errors import ModelError
+from ico3d.splat.gaussians import Gaussians
+from ico3d.training.checkpoint import load_tensors, save_tensors
+
+ABOUT = "body.json"
+"""The file by which a folder is known to hold a body."""
+UNTUNED = "untuned.json"
+"""The same for the windows as they were before temporal fine-tuning, where there was one."""
+ROUNDING = 1e-6
+"""Frames by which a time may miss its frame: 31 / 15 s is, in floats, after frame 31."""
+
+
+def save_window(file: Path, model: WindowModel) -> None:
+    """Writes one window's model."""
+    named = {f"gaussians.{name}": tensor for name, tensor in model.gaussians.items()}
+    named |= {f"shared.{name}": tensor for name, tensor in model.shared.items()}
+    save_tensors(file, named, model.motion.about())
+
+
+def load_window(file: Path) -> WindowModel:
+    """Reads what `save_window` wrote, onto the CPU.
+
+    Raises:
+        ModelError: If the file is missing or damaged.
+    """
+    tensors, about = load_tensors(file)
+    parts: dict[str, dict] = {"gaussians": {}, "shared": {}}
+    try:
+        for name, tensor in tensors.items():
+            part, _, rest = name.partition(".")
+            parts[part][rest] = tensor
+        return WindowModel(motion_from(about), parts["gaussians"], parts["shared"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise ModelError(f"{file} does not hold a window of a body: {error}.") from error
+
+
+@dataclass
+class TrainedBody:
+    """A body through all of its clip.
+
+    Attributes:
+        models: One per window.
+        windows: Which frames they show; neighbours share one.
+        fps: Frames per second.
+        method: What moves the Gaussians.
+        summary: How it was made: provenance of the capture, seconds of training, settings.
+    """
+
+    models: Sequence[WindowModel]
+    windows: tuple[Window, ...]
+    fps: float
+    method: Method
+    summary: dict
+
+    @property
+    def seconds(self) -> float:
+        """How long the clip lasts."""
+        return self.windows[-1].last / self.fps
+
+    def window_at(self, seconds: float) -> int:
+        """The window that shows a time; at a shared frame the earlier one."""
+        frame = seconds * self.fps - ROUNDING
+        inside = (i for i, window in enumerate(self.windows) if frame <= window.last)
+        return next(inside, len(self.windows) - 1)
+
+    def window_gaussians(self, index: int, tau: float) -> Gaussians:
+        """Activated Gaussians of a window in the world, τ in [0, 1]."""
+        return self.models[index].at(tau)
+
+    def gaussians(self, seconds: float) -> Gaussians:
+        """Activated Gaussians in the world at a time, which is clamped to the clip."""
+        index = self.window_at(seconds)
+        tau = self.windows[index].tau(seconds * self.fps)
+        return self.window_gaussians(index, min(max(tau, 0.0), 1.0))
+
+    @property
+    def device(self) -> torch.device:
+        """Where its windows are."""
+        return self.models[0].device
+
+    def to(self, device: torch.device) -> "TrainedBody":
+        """Moves all windows, and gives itself back."""
+        for model in self.models:
+            model.to(device)
+        return self
+
+    def save(self, folder: Path, files: Sequence[str], about: str = ABOUT) -> None:
+        """Writes `body.json` or its like, which names the windows' files in the folder."""
+        content = {
+            "fps": self.fps,
+            "method": self.method,
+            "windows": [
+                {**asdict(window), "file": file}
+                for window, file in zip(self.windows, files, strict=True)
+            ],
+            "summary": self.summary,
+        }
+        write_atomic(folder / about, json.dumps(content, indent=1).encode())
+
+    @classmethod
+    def load(cls, folder: Path | str, about: str = ABOUT) -> "TrainedBody":
+        """Reads a body onto the CPU.
+
+        Args:
+            folder: The model folder.
+            about: `ABOUT` or `UNTUNED`.
+
+        Raises:
+            ModelError: If the folder holds none, or a damaged one.
+        """
+        folder = Path(folder)
+        try:
+            content = json.loads((folder / about).read_text())
+            entries = content["windows"]
+            windows = tuple(Window(int(e["first"]), int(e["last"])) for e in entries)
+            files = [folder / str(entry["file"]) for entry in entries]
+            fps, method = float(content["fps"]), content["method"]
+            summary = content["summary"]
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise ModelError(
+                f"{folder} holds no body ({error}): train one with ico3d train body."
+            ) from error
+        for file in files:
+            if not file.resolve().is_relative_to(folder.resolve()):
+                raise ModelError(f"{folder / about} names a file outside of its folder: {file}.")
+        return cls([load_window(file) for file in files], windows, fps, method, summary)

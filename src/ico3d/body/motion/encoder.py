@@ -1,0 +1,239 @@
+"""The space-time encoder: features of a place and a time from six planes (paper, eq. of φ(f_v)).
+
+Of the HexPlane family, as the paper: a plane per pair of axes, sampled bilinearly and multiplied,
+at one or more resolutions of space.
+"""
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn.functional import grid_sample, pad
+
+from ico3d.body.motion import encoder_kernels as kernels
+from ico3d.errors import SettingsError
+
+SPACE_PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+"""The planes of space, and the axes of their columns and rows."""
+TIME_PLANES = ("xt", "yt", "zt")
+"""The planes of time in the order of the axes of their columns; rows are times."""
+SPACE_RANGE = (0.1, 0.5)
+"""Where the planes of space begin; those of time begin at 1, so that nothing moves."""
+SUMS = 4
+"""Parts of the points whose gradients are summed apart, by as many threads at most."""
+
+
+@dataclass(frozen=True)
+class EncoderShape:
+    """What decides the sizes of the planes.
+
+    Attributes:
+        space: Places along x, y and z at each scale.
+        time: Times, at every scale; as many as frames lets each frame have its own.
+        channels: Features per scale.
+    """
+
+    space: tuple[int, ...] = (32,)
+    time: int = 16
+    channels: int = 16
+
+    def __post_init__(self):
+        """Raises SettingsError where planes would be empty."""
+        if not self.space or min(self.space) < 2 or self.time < 1 or self.channels < 1:
+            raise SettingsError(
+                f"An encoder of {self.space} places, {self.time} times and {self.channels} "
+                "channels does not exist: give at least 2 places per scale, 1 time and 1 channel."
+            )
+
+    @property
+    def outputs(self) -> int:
+        """The number of features of a place."""
+        return len(self.space) * self.channels
+
+    def planes(self, scale: int) -> dict[str, tuple[int, int, int]]:
+        """Names and sizes (rows, columns, channels) of the planes of one scale."""
+        places = self.space[scale]
+        space = {f"{name}{scale}": (places, places, self.channels) for name in SPACE_PLANES}
+        times = {f"{name}{scale}": (self.time, places, self.channels) for name in TIME_PLANES}
+        return space | times
+
+
+def initial_planes(shape: EncoderShape, generator: torch.Generator) -> dict[str, Tensor]:
+    """Planes to begin with, by name: the axes of columns and rows, then the scale ("xt0").
+
+    Args:
+        shape: Sizes.
+        generator: Of the planes of space, which are random.
+
+    Returns:
+        Per scale of S places: xy, xz, yz (S, S, channels) and xt, yt, zt (time, S, channels).
+    """
+    planes = {}
+    for scale in range(len(shape.space)):
+        for name, size in shape.planes(scale).items():
+            planes[name] = torch.ones(size)
+            if name[:2] in SPACE_PLANES:
+                planes[name].uniform_(*SPACE_RANGE, generator=generator)
+    return planes
+
+
+def encode(
+    planes: dict[str, Tensor], shape: EncoderShape, positions: Tensor, time: float
+) -> Tensor:
+    """Features of places at one time.
+
+    Samples are bilinear between the nodes of a plane, the first and last of which lie at −1 and 1
+    in space and at 0 and 1 in time. What lies outside has the features of the border.
+
+    Args:
+        planes: As `initial_planes` makes them.
+        shape: Their sizes.
+        positions: (N, 3), −1 … 1 inside the box.
+        time: 0 … 1 within the window.
+
+    Returns:
+        (N, outputs), differentiable in planes and positions.
+
+    Raises:
+        ValueError: If the planes or positions are of other sizes.
+    """
+    if positions.shape[1:] != (3,):
+        raise ValueError(f"positions must be (N, 3), not {tuple(positions.shape)}")
+    scales = []
+    for scale in range(len(shape.space)):
+        chosen = [planes[name] for name in shape.planes(scale)]
+        if [plane.shape for plane in chosen] != list(shape.planes(scale).values()):
+            raise ValueError(f"the planes of scale {scale} must be {shape.planes(scale)}")
+        if all(_has_kernel(tensor) for tensor in (positions, *chosen)):
+            scales.append(_Product.apply(time, positions, *chosen))
+        else:
+            lines = [_line(plane, *_row(shape.time, time)) for plane in chosen[3:]]
+            scales.append(_product(positions, chosen[:3], lines))
+    return torch.cat(scales, 1)
+
+
+def _has_kernel(tensor: Tensor) -> bool:
+    return tensor.device.type == "cpu" and tensor.dtype == torch.float32
+
+
+def _product(positions: Tensor, planes: list[Tensor], lines: list[Tensor]) -> Tensor:
+    """(N, C) product of the samples of planes (S, S, C) and lines (S, C)."""
+    product = torch.ones_like(positions[:, :1])
+    for plane, axes in zip(planes, SPACE_PLANES.values(), strict=True):
+        product = product * _sample(plane, positions[:, axes])
+    for axis, line in enumerate(lines):
+        place = positions[:, axis]
+        product = product * _sample(line[None], torch.stack([place, torch.zeros_like(place)], 1))
+    return product
+
+
+def _sample(plane: Tensor, places: Tensor) -> Tensor:
+    """(N, C) samples of a plane (H, W, C) at columns and rows (N, 2) within −1 … 1."""
+    sampled = grid_sample(
+        plane.permute(2, 0, 1)[None],  # (1, C, H, W)
+        places[None, None],  # (1, 1, N, 2)
+        padding_mode="border",
+        align_corners=True,
+    )  # (1, C, 1, N)
+    return sampled[0, :, 0].T
+
+
+def _line(plane: Tensor, row: int, part: float) -> Tensor:
+    """(S, C): a plane of time (T, S, C) between a row and the next."""
+    return plane[row] if part == 0 else torch.lerp(plane[row], plane[row + 1], part)
+
+
+def _row(times: int, time: float) -> tuple[int, float]:
+    """The node at or before a time, and how far the time is from it to the next."""
+    place = min(max(time, 0.0), 1.0) * (times - 1)
+    return int(place), place - int(place)
+
+
+class _Product(torch.autograd.Function):
+    """`_product` of planes and the lines of one time, by kernels.
+
+    Threads share the points in parts that do not depend on how many threads there are, so that the
+    sums do not, either.
+    """
+
+    @staticmethod
+    def forward(ctx, time: float, positions: Tensor, *planes: Tensor) -> Tensor:
+        row, part = _row(len(planes[-1]), time)
+        lines = [_line(plane, row, part) for plane in planes[3:]]
+        sampled = [_grouped(tensor) for tensor in (*planes[:3], *lines)]
+        positions = positions.contiguous()
+        features = positions.new_empty(len(positions), *sampled[0].shape[2:])
+        kernels.forward(numba.get_num_threads(), *_arrays(*sampled, positions, features))
+        ctx.save_for_backward(positions, *sampled)
+        ctx.row, ctx.part, ctx.sizes = row, part, [plane.shape for plane in planes]
+        return _channels(features, planes[0].shape[-1])
+
+    @staticmethod
+    def backward(ctx, *gradients: Tensor):
+        positions, *sampled = ctx.saved_tensors
+        g_positions = torch.zeros_like(positions)
+        g_planes = positions.new_zeros(SUMS, 3, *sampled[0].shape)
+        g_lines = positions.new_zeros(SUMS, 3, *sampled[-1].shape)
+        taken = (*sampled, positions, _grouped(gradients[0]))
+        kernels.backward(*_arrays(*taken, g_planes, g_lines, g_positions))
+        channels = gradients[0].shape[1]
+        by_planes = _channels(g_planes.sum(0), channels)  # (3, S, S, C)
+        by_lines = _channels(g_lines.sum(0), channels)  # (3, S, C)
+        by_times = [
+            _on_rows(line, size, ctx.row, ctx.part)
+            for line, size in zip(by_lines, ctx.sizes[3:], strict=True)
+        ]
+        return None, g_positions, *by_planes, *by_times
+
+
+def _on_rows(line: Tensor, size: torch.Size, row: int, part: float) -> Tensor:
+    """Gradient of a plane of time (T, S, C) from that of its `_line`."""
+    gradient = line.new_zeros(size)
+    gradient[row] = line * (1 - part)
+    if part > 0:
+        gradient[row + 1] = line * part
+    return gradient
+
+
+def _grouped(tensor: Tensor) -> Tensor:
+    """(…, C) to (…, groups, LANES), as the kernels take channels; zeros fill the last group."""
+    missing = -tensor.shape[-1] % kernels.LANES
+    padded = pad(tensor, (0, missing)) if missing else tensor
+    return padded.unflatten(-1, (-1, kernels.LANES)).contiguous()
+
+
+def _channels(grouped: Tensor, channels: int) -> Tensor:
+    """(…, C) of what `_grouped` gives."""
+    return grouped.flatten(-2)[..., :channels]
+
+
+def _arrays(*tensors: Tensor) -> list[np.ndarray]:
+    return [tensor.detach().numpy() for tensor in tensors]
+
+
+def space_smoothness(planes: dict[str, Tensor]) -> Tensor:
+    """Mean square of the second differences along both axes, over the planes of space."""
+    chosen = [plane for name, plane in planes.items() if name[:2] in SPACE_PLANES]
+    return _mean_square([plane.diff(2, axis) for plane in chosen for axis in (0, 1)])
+
+
+def time_smoothness(planes: dict[str, Tensor]) -> Tensor:
+    """Mean square of the second differences along time, over the planes of time."""
+    return _mean_square([plane.diff(2, 0) for plane in _of_time(planes)])
+
+
+def time_change(planes: dict[str, Tensor]) -> Tensor:
+    """Mean of |1 − P| over the planes of time: 0 where the features do not depend on time."""
+    return torch.cat([(1 - plane).abs().flatten() for plane in _of_time(planes)]).mean()
+
+
+def _of_time(planes: dict[str, Tensor]) -> list[Tensor]:
+    return [plane for name, plane in planes.items() if name[:2] in TIME_PLANES]
+
+
+def _mean_square(differences: list[Tensor]) -> Tensor:
+    """The mean over all; 0 where there are none, as with two times."""
+    values = torch.cat([difference.flatten() for difference in differences])
+    return values.square().sum() / max(len(values), 1)

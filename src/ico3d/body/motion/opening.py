@@ -1,0 +1,30 @@
+"""Motions from what files say about them."""
+
+from ico3d.body.motion.deformation import Deformation
+from ico3d.body.motion.encoder import EncoderShape
+from ico3d.body.motion.formulas import Polynomial, Still
+from ico3d.body.motion.tunable import MlpShape
+from ico3d.body.motion.window_model import Motion
+
+
+def motion_from(about: dict) -> Motion:
+    """Makes again what `Motion.about` described.
+
+    Raises:
+        ValueError: If there is no such kind.
+        KeyError: If something is missing.
+        TypeError: If something is superfluous or of a wrong type.
+    """
+    fields = dict(about)
+    kind = fields.pop("kind")
+    if kind == "still":
+        return Still(**fields)
+    if kind == "polynomial":
+        return Polynomial(**fields)
+    if kind == "deformation":
+        grid = fields.pop("encoder")
+        if grid is not None:
+            grid = EncoderShape(**{**grid, "space": tuple(grid["space"])})
+        middle, half = (tuple(float(x) for x in fields.pop(name)) for name in ("middle", "half"))
+        return Deformation(middle, half, MlpShape(**fields.pop("mlp")), grid, **fields)  # type: ignore[arg-type]
+    raise ValueError(f"there is no motion of the kind '{kind}'")

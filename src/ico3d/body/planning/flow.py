@@ -1,0 +1,280 @@
+"""How much moves from frame to frame, and where: optical flow in the pictures of a clip."""
+
+import hashlib
+import json
+import logging
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ico3d.body.planning.flow_methods import FlowMethod, best_method, opencv
+from ico3d.body.planning.windows import Window
+from ico3d.body.training.surface_points import HIDING
+from ico3d.capture.capture import Capture
+from ico3d.capture.pictures import train_cameras
+from ico3d.capture.surface.coverage import visible
+from ico3d.capture.surface.hull import focus
+from ico3d.common.camera import Camera
+from ico3d.common.files import write_atomic
+from ico3d.errors import CaptureError
+from ico3d.splat.initial import in_pictures, spacing
+from ico3d.training.log import progress_bar
+
+if TYPE_CHECKING:
+    import torch
+
+HEIGHT = 320
+"""Rows of the pictures that flow is estimated in; larger ones are made smaller."""
+MOST_CAMERAS = 16
+"""Cameras that are looked at, evenly spread by azimuth: more tell nothing new."""
+MOVING = 1.0
+"""Centimetres per step from which on a pixel moves."""
+DYNAMIC_SHARES = 0.3, 0.7
+"""Shares of the views seeing a point move at which it counts as still and as dynamic."""
+PERSON = 200.0
+"""Centimetres that a picture is taken to be high, where its cameras do not tell."""
+VERSION = 1
+"""Of what is cached; counted up when the numbers change."""
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class CameraFlow:
+    """What moved in the pictures of one camera.
+
+    Attributes:
+        index: Number of the camera in the capture.
+        camera: The camera, of the size of the pictures that were looked at.
+        energy: (S,) Σ_mask |f|² / Σ mask of each step, cm²; NaN where a picture is missing or
+            shows nobody.
+        moving: (S, H, ⌈W/8⌉) uint8, packed bits: foreground pixels that move in a step.
+    """
+
+    index: int
+    camera: Camera
+    energy: np.ndarray
+    moving: np.ndarray
+
+
+@dataclass(frozen=True)
+class ClipFlow:
+    """What moved in a span of a clip.
+
+    Attributes:
+        span: Frames that were looked at; step i goes from frame span.first + i to the next.
+        method: Name of the flow method.
+        cameras: One for each camera.
+    """
+
+    span: Window
+    method: str
+    cameras: tuple[CameraFlow, ...]
+
+    @property
+    def motion(self) -> np.ndarray:
+        """(S,) cm²: m_i = mean over cameras of Σ_mask |f_i|² / Σ mask.
+
+        f_i is the flow of a foreground pixel of frame i towards frame i + 1, measured in
+        centimetres at the distance of what the cameras look at, so that a threshold means the
+        same at any resolution and framing. Steps that no camera saw lie between their neighbours.
+        """
+        energy = np.stack([flow.energy for flow in self.cameras])  # (C, S)
+        known = np.isfinite(energy)
+        seen = np.flatnonzero(known.any(0))
+        if len(seen) == 0:
+            return np.zeros(energy.shape[1])
+        mean = np.nansum(energy[:, seen], 0) / known[:, seen].sum(0)
+        return np.interp(np.arange(energy.shape[1]), seen, mean)
+
+    def moving(self, flow: CameraFlow, window: Window) -> np.ndarray:
+        """(H, W) bool: a camera's pixels in which the person moves in any step of a window."""
+        steps = slice(window.first - self.span.first, max(window.last - self.span.first, 0))
+        packed = np.bitwise_or.reduce(flow.moving[steps], axis=0)  # (H, ⌈W/8⌉)
+        return np.unpackbits(packed, axis=1, count=flow.camera.width).astype(bool)
+
+
+def clip_flow(
+    capture: Capture,
+    folder: Path | None = None,
+    span: Window | None = None,
+    method: FlowMethod | None = None,
+    device: "torch.device | str" = "cpu",
+) -> ClipFlow:
+    """Measures what moves, in the pictures of up to 16 cameras that train.
+
+    Args:
+        capture: The recording; where it has no masks, all pixels count.
+        folder: Where results are kept, one file per camera, and found again.
+        span: Which frames; else the whole clip.
+        method: Estimates flow; else the best that is installed.
+        device: Where that computes, if it can.
+
+    Raises:
+        CaptureError: If no camera has two pictures on end.
+        MissingExtraError: If no flow method is installed.
+    """
+    span = span or Window(0, capture.num_frames - 1)
+    method = method or best_method(device)
+    indices = _spread(capture)
+    middle = focus([capture.cameras[index] for index in train_cameras(capture)])
+    flows = []
+    with progress_bar() as bar:
+        steps = len(indices) * (len(span) - 1)
+        task = bar.add_task("motion", total=steps, numbers=f"{method.name}, {len(indices)} cameras")
+        for index in indices:
+            size = _centimetres(capture.cameras[index], middle)
+            work = _Work(capture, index, span, method, size, lambda: bar.advance(task))
+            flows.append(_cached(work, folder))
+            bar.update(task, completed=len(flows) * (len(span) - 1))
+    if len(span) > 1 and all(np.isnan(flow.energy).all() for flow in flows):
+        raise CaptureError(
+            f"{capture.path}: no camera shows the person in two frames on end: motion cannot be "
+            "measured."
+        )
+    return ClipFlow(span, method.name, tuple(flows))
+
+
+def dynamic_weights(
+    points: np.ndarray, capture: Capture, window: Window, flow: ClipFlow | None = None
+) -> np.ndarray:
+    """Which surface points move within a window: what α of the tunable MLP begins with.
+
+    A point moves if, in enough of the views in which nothing hides it, it lies on a pixel of the
+    person that moves at any step of the window.
+
+    Args:
+        points: (P, 3) metres, in the world, on the surface at the window's centre frame.
+        capture: The recording.
+        window: Which frames.
+        flow: What is known of the clip; else the window's frames are looked at.
+
+    Returns:
+        (P,) float64: 0 still, 1 dynamic, between where views disagree; 0 where none sees a point.
+    """
+    flow = flow or clip_flow(capture, span=window)
+    gap = HIDING * float(np.quantile(spacing(points), 0.9))
+    seen, moved = np.zeros(len(points)), np.zeros(len(points))
+    for one in flow.cameras:
+        inside = in_pictures(points, [one.camera])[0] & visible(points, one.camera, gap)  # (P,)
+        column, row = one.camera.project(points[inside])[0].astype(int).T
+        seen[inside] += 1
+        moved[inside] += flow.moving(one, window)[row, column]
+    still, dynamic = DYNAMIC_SHARES
+    return np.clip((moved / np.maximum(seen, 1) - still) / (dynamic - still), 0, 1)
+
+
+def _spread(capture: Capture) -> list[int]:
+    """Training cameras, evenly spread by azimuth about their middle."""
+    indices = np.array(train_cameras(capture))
+    centers = np.stack([capture.cameras[index].camera_to_world[:3, 3] for index in indices])
+    across = centers - centers.mean(0)  # (C, 3)
+    ring = indices[np.argsort(np.arctan2(across[:, 0], across[:, 2]), kind="stable")]
+    places = np.linspace(0, len(ring), min(MOST_CAMERAS, len(ring)), endpoint=False)
+    return sorted(ring[places.astype(int)].tolist())
+
+
+def _centimetres(camera: Camera, middle: np.ndarray | None) -> float:
+    """Centimetres that a pixel of full size is wide at what the cameras look at (3,)."""
+    depth = 0.0 if middle is None else float(camera.project(middle)[1])
+    return 100 * depth / float(camera.intrinsics[1, 1]) if depth > 0 else PERSON / camera.height
+
+
+@dataclass(frozen=True)
+class _Work:
+    """What is to be done for one camera.
+
+    Attributes:
+        capture: Where pictures come from.
+        index: The camera's number.
+        span: Which frames.
+        method: Estimates flow.
+        pixel: Centimetres that a pixel of full size is wide.
+        advance: Called after each step.
+    """
+
+    capture: Capture
+    index: int
+    span: Window
+    method: FlowMethod
+    pixel: float
+    advance: Callable[[], None]
+
+    @property
+    def camera(self) -> Camera:
+        """The camera, of the size of the pictures that are looked at."""
+        camera = self.capture.cameras[self.index]
+        scale = min(1.0, HEIGHT / camera.height)
+        return camera.resized(max(1, round(scale * camera.width)), round(scale * camera.height))
+
+    def picture(self, frame: int) -> tuple[np.ndarray, np.ndarray] | None:
+        """The person before black (h, w, 3) uint8, and where it is (h, w) bool."""
+        image = self.capture.image(self.index, frame)
+        if image is None:
+            return None
+        mask = self.capture.mask(self.index, frame)
+        mask = np.ones(image.shape[:2], np.float32) if mask is None else mask
+        cut = np.concatenate([image * mask[..., None], mask[..., None]], -1)  # (H, W, 4)
+        size, area = (self.camera.width, self.camera.height), opencv().INTER_AREA
+        small = opencv().resize(np.ascontiguousarray(cut, np.float32), size, interpolation=area)
+        return (small[..., :3] * 255 + 0.5).astype(np.uint8), small[..., 3] > 0.5
+
+    def key(self) -> str:
+        """A name for all that the result depends on; a few pictures stand for all."""
+        camera, frames = self.camera, {self.span.first, self.span.center, self.span.last}
+        digest = hashlib.sha256()
+        about = [VERSION, self.method.name, HEIGHT, MOVING, self.pixel, camera.width, camera.height]
+        span = [self.index, self.span.first, self.span.last]
+        digest.update(json.dumps([*about, *span, str(self.capture.path.resolve())]).encode())
+        digest.update(camera.intrinsics.tobytes() + camera.world_to_camera.tobytes())
+        for frame in sorted(frames):
+            for part in self.picture(frame) or ():
+                digest.update(part.tobytes())
+        return digest.hexdigest()[:24]
+
+    def measure(self) -> tuple[np.ndarray, np.ndarray]:
+        """Energy (S,) and packed moving pixels (S, h, ⌈w/8⌉) of all steps."""
+        camera, steps = self.camera, len(self.span) - 1
+        pixel = self.pixel * self.capture.cameras[self.index].height / camera.height
+        energy = np.full(steps, np.nan)
+        moving = np.zeros((steps, camera.height, -(-camera.width // 8)), np.uint8)
+        before = self.picture(self.span.first)
+        for step in range(steps):
+            after = self.picture(self.span.first + step + 1)
+            if before is not None and after is not None and before[1].any():
+                flow = pixel * self.method(before[0], after[0])  # (h, w, 2) centimetres
+                squared = np.where(before[1], (flow.astype(np.float64) ** 2).sum(-1), 0)  # (h, w)
+                energy[step] = squared.sum() / before[1].sum()
+                moving[step] = np.packbits(squared > MOVING**2, axis=1)
+            before = after
+            self.advance()
+        return energy, moving
+
+
+def _cached(work: _Work, folder: Path | None) -> CameraFlow:
+    """A camera's flow, from its file where there is one."""
+    if folder is None:
+        return CameraFlow(work.index, work.camera, *work.measure())
+    file = folder / f"{work.key()}.npz"
+    known = _load(file)
+    if known is None:
+        known = work.measure()
+        energy, moving = known
+        write_atomic(file, lambda path: np.savez_compressed(path, energy=energy, moving=moving))
+    return CameraFlow(work.index, work.camera, *known)
+
+
+def _load(file: Path) -> tuple[np.ndarray, np.ndarray] | None:
+    """What a file holds; None where there is none, or it is damaged."""
+    try:
+        with np.load(file, allow_pickle=False) as arrays:
+            return arrays["energy"], arrays["moving"]
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        logger.warning("%s is damaged; motion is measured again.", file)
+        return None

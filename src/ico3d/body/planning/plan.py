@@ -1,0 +1,144 @@
+"""Which windows a clip is trained in, decided and shown before any training."""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from ico3d.body.planning.flow import clip_flow
+from ico3d.body.planning.windows import Window, cut
+from ico3d.capture.capture import Capture
+from ico3d.common.files import write_atomic
+from ico3d.errors import ModelError
+
+BLOCKS = "▁▂▃▄▅▆▇█"
+
+if TYPE_CHECKING:
+    import torch
+
+
+@dataclass(frozen=True)
+class PlanSettings:
+    """Where a clip is cut.
+
+    Attributes:
+        threshold: Motion that a window may add up to, cm² (`ClipFlow.motion`).
+        shortest: Frames that a window has at least.
+        longest: Frames that it has at most.
+    """
+
+    threshold: float
+    shortest: int
+    longest: int
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The windows of a clip and why they are so.
+
+    Attributes:
+        windows: From the first to the last frame; neighbours share one.
+        motion: Of each step from one frame to the next, cm² (`ClipFlow.motion`).
+        method: Name of the flow method that measured it.
+        fps: Frames per second.
+        busiest: Number of the camera that saw most motion.
+        settings: What the clip was cut by.
+    """
+
+    windows: tuple[Window, ...]
+    motion: tuple[float, ...]
+    method: str
+    fps: float
+    busiest: int
+    settings: PlanSettings
+
+    def moved(self, window: Window) -> float:
+        """What moves in a window altogether, cm²."""
+        return float(sum(self.motion[window.first : window.last]))
+
+
+def make_plan(
+    capture: Capture,
+    settings: PlanSettings,
+    folder: Path,
+    device: "torch.device | str" = "cpu",
+) -> Plan:
+    """Measures how much moves and cuts the clip.
+
+    Args:
+        capture: The recording.
+        settings: Where to cut.
+        folder: Model folder; flow is kept in `flow/` below it, and found again.
+        device: Where motion is estimated, if the method can.
+
+    Raises:
+        CaptureError: If motion cannot be measured.
+        MissingExtraError: If no flow method is installed.
+        SettingsError: If the settings contradict one another.
+    """
+    flow = clip_flow(capture, folder / "flow", device=device)
+    windows = cut(flow.motion, settings.threshold, settings.shortest, settings.longest)
+    sums = [np.nansum(one.energy) for one in flow.cameras]
+    busiest = flow.cameras[int(np.argmax(sums))].index
+    motion = tuple(flow.motion.tolist())
+    return Plan(windows, motion, flow.method, capture.fps, busiest, settings)
+
+
+def save_plan(plan: Plan, path: Path) -> None:
+    """Writes a plan as JSON."""
+    write_atomic(path, json.dumps(asdict(plan), indent=1).encode())
+
+
+def load_plan(path: Path) -> Plan:
+    """Reads a plan.
+
+    Raises:
+        ModelError: If there is none, or it is damaged.
+    """
+    try:
+        values = json.loads(path.read_text())
+        values["windows"] = tuple(Window(**window) for window in values["windows"])
+        values["motion"] = tuple(map(float, values["motion"]))
+        values["settings"] = PlanSettings(**values["settings"])
+        return Plan(**values)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ModelError(
+            f"{path} is no plan of windows ({error}): make it with ico3d train body --plan."
+        ) from error
+
+
+def print_plan(plan: Plan, console: Console) -> None:
+    """Shows windows in a table, with the motion curve in letters."""
+    settings = plan.settings
+    table = Table(
+        "",
+        "frames",
+        "seconds",
+        "count",
+        "moves, cm²",
+        "motion",
+        title=f"{len(plan.windows)} windows of {settings.shortest} to {settings.longest} frames, "
+        f"up to {settings.threshold:g} cm² ({plan.method})",
+        title_justify="left",
+    )
+    peak = max(plan.motion, default=0.0)
+    for number, window in enumerate(plan.windows):
+        table.add_row(
+            str(number),
+            f"{window.first} – {window.last}",
+            f"{window.first / plan.fps:.2f} – {window.last / plan.fps:.2f}",
+            str(len(window)),
+            f"{plan.moved(window):.1f}",
+            "".join(_block(m, peak) for m in plan.motion[window.first : window.last]),
+        )
+    console.print(table)
+
+
+def _block(motion: float, peak: float) -> str:
+    """A letter as high as the motion; the root is shown, that slow motion is seen beside fast."""
+    share = np.sqrt(motion / peak) if peak > 0 else 0.0
+    return BLOCKS[min(int(share * len(BLOCKS)), len(BLOCKS) - 1)]

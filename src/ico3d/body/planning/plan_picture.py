@@ -1,0 +1,122 @@
+"""A plan of windows as a picture: the motion curve, its cuts, and what is seen there."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ico3d.body.planning.plan import Plan
+from ico3d.body.planning.windows import Window
+from ico3d.capture.capture import Capture
+from ico3d.common.files import write_atomic
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+COLORS = "tab10"
+MOST_PICTURES = 14
+"""Frames that are shown."""
+MARGIN = 0.05
+"""Around the person, as a part of the picture."""
+
+
+def draw_plan(plan: Plan, capture: Capture, path: Path) -> None:
+    """Draws a plan into a PNG file.
+
+    Above the motion of every step, coloured by window, and within each window its sum, which the
+    threshold bounds; below the frames at which the clip is cut and those in the middle of
+    windows, seen by the busiest camera.
+
+    Args:
+        plan: What to draw.
+        capture: Where its pictures come from.
+        path: The file.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(14, 7.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    parts = figure.subfigures(2, 1, height_ratios=(3, 2))
+    above, below = parts  # type: ignore (its stub knows one part alone)
+    axes = above.subplots()
+    _curve(axes, plan)
+    frames = _shown(plan.windows)
+    box = _person(capture, plan.busiest, frames)
+    for place, frame in zip(below.subplots(1, len(frames), squeeze=False)[0], frames, strict=True):
+        _picture(place, capture, plan.busiest, frame, box)
+    write_atomic(path, lambda file: figure.savefig(file, format="png", dpi=100))
+
+
+def _curve(axes: "Axes", plan: Plan) -> None:
+    """Motion as bars, its sum within each window as a line."""
+    from matplotlib import colormaps
+
+    colors = colormaps[COLORS].colors  # type: ignore (its stub knows the base class alone)
+    sums = axes.twinx()
+    for number, window in enumerate(plan.windows):
+        color = colors[number % len(colors)]
+        steps = np.arange(window.first, window.last)
+        motion = np.array(plan.motion[window.first : window.last])
+        axes.bar(steps + 0.5, motion, 0.9, color=color)
+        frames = np.arange(window.first, window.last + 1)
+        sums.plot(frames, np.concatenate([[0], motion.cumsum()]), color=color, alpha=0.6)
+        axes.axvspan(window.first, window.last, color=color, alpha=0.08, lw=0)
+        label = f"{number}\n{window.first}–{window.last}\n{plan.moved(window):.1f} cm²"
+        middle = (window.first + window.last) / 2
+        axes.annotate(
+            label, (middle, 0.98), xycoords=("data", "axes fraction"), ha="center", va="top"
+        )
+    for window, _ in pairwise(plan.windows):
+        axes.axvline(window.last, color="black", lw=0.8)
+    bound = plan.settings.threshold
+    sums.axhline(bound, color="grey", ls="--", lw=0.8)
+    axes.set(
+        xlim=(plan.windows[0].first, max(plan.windows[-1].last, 1)),
+        ylim=(0, 1.3 * max(*plan.motion, 1e-9) if plan.motion else 1),
+        xlabel="frame",
+        ylabel="motion of a step, cm² per foreground pixel (bars)",
+        title=f"{len(plan.windows)} windows; motion by {plan.method}",
+    )
+    sums.set_ylim(0, 1.3 * max([bound, *map(plan.moved, plan.windows)]))
+    sums.set_ylabel("sum within the window, cm² (lines); threshold (dashed)")
+
+
+def _shown(windows: Sequence[Window]) -> list[int]:
+    """Frames at which windows end, and those in their middle; of many, some evenly spread."""
+    ends = [windows[0].first, *(window.last for window in windows)]
+    frames = sorted({*ends, *(window.center for window in windows)})
+    frames = frames if len(frames) <= MOST_PICTURES else ends
+    places = np.linspace(0, len(frames) - 1, min(len(frames), MOST_PICTURES)).round().astype(int)
+    return [frames[place] for place in places]
+
+
+def _person(capture: Capture, camera: int, frames: list[int]) -> tuple[slice, slice]:
+    """Rows and columns that hold the person in all these frames; all of them without masks."""
+    lens = capture.cameras[camera]
+    found = np.zeros((lens.height, lens.width), bool)
+    for frame in frames:
+        mask = capture.mask(camera, frame)
+        if mask is not None:
+            found |= mask > 0.5
+    if not found.any():
+        return slice(None), slice(None)
+    spans = []
+    for axis, size in ((1, lens.height), (0, lens.width)):
+        places = np.flatnonzero(found.any(axis))
+        margin = round(MARGIN * lens.height)
+        spans.append(slice(max(places[0] - margin, 0), min(places[-1] + margin, size)))
+    return spans[0], spans[1]
+
+
+def _picture(
+    axes: "Axes", capture: Capture, camera: int, frame: int, box: tuple[slice, slice]
+) -> None:
+    """One frame, cut out."""
+    image = capture.image(camera, frame)
+    if image is not None:
+        axes.imshow(np.clip(image[box], 0, 1))
+    axes.set_title(f"frame {frame}", fontsize=9)
+    axes.axis("off")

@@ -1,0 +1,143 @@
+"""Temporal fine-tuning: a window learns to agree with the one before (paper, same section)."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ico3d.body.companion import Companion
+from ico3d.body.motion.window_model import CANONICAL, WindowModel
+from ico3d.body.planning.windows import Window
+from ico3d.body.settings import BodySettings
+from ico3d.body.training.novel_views import novel_camera
+from ico3d.body.training.optimise_window import masked_psnr
+from ico3d.body.training.picture_step import Learner
+from ico3d.body.training.views import MARGIN, BodyViews
+from ico3d.common.camera import Camera
+from ico3d.splat.gaussians import Gaussians
+from ico3d.splat.losses import l1
+from ico3d.splat.render import render
+
+STILL_SEEN = 0.05
+"""Opacity from which a Gaussian counts for where the person is in a picture."""
+
+
+class FineTuner:
+    """A `Trainee`: the canonical Gaussians of a window; all that moves them is frozen.
+
+    Most steps compare the window's first moment with the previous window's last, which is the same
+    frame, as cameras between the recording ones would see it; the others are ordinary ones.
+    """
+
+    def __init__(
+        self,
+        model: WindowModel,
+        previous: WindowModel,
+        window: Window,
+        pictures: BodyViews,
+        cameras: Sequence[Camera],
+        settings: BodySettings,
+        extent: float,
+        seed: int,
+        companion: Companion | None = None,
+    ):
+        """Gets ready for the first step.
+
+        Args:
+            model: Changed in place.
+            previous: The window before; not changed.
+            window: The frames of `model`.
+            pictures: Those of the window.
+            cameras: The training cameras, between which novel ones lie.
+            settings: Rates and weights.
+            extent: Size of the person in metres.
+            seed: All randomness follows from it.
+            companion: Who is in the pictures, too.
+        """
+        for name, tensor in {**model.gaussians, **model.shared}.items():
+            tensor.requires_grad_(name in CANONICAL)
+        self._learner = Learner(model, window, pictures, settings, extent, seed, companion)
+        self._settings, self._cameras = settings, cameras
+        self._shared = window.first
+        with torch.no_grad():
+            self._goal = self._learner.accompanied(previous.at(1.0), self._shared)
+
+    @property
+    def model(self) -> WindowModel:
+        """What is trained."""
+        return self._learner.model
+
+    def step(self, index: int) -> Mapping[str, float]:
+        """Learns from the window before, or from a picture."""
+        if self._learner.random(index, 2).random() < self._settings.consistency:
+            values = self._agree(index)
+        else:
+            values = self._remember(index)
+        start, done = self._settings.finetune_from, index / self._settings.finetune_steps
+        self._learner.update(start + (1 - start) * done)
+        self._average(index)
+        self._learner.prune(index, self._settings.finetune_steps)
+        return values
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Parameters and moments."""
+        return self._learner.tensors()
+
+    def place(self, name: str) -> torch.device:
+        """All are where the model is."""
+        del name
+        return self.model.device
+
+    def state(self) -> dict:
+        """Nothing beside the tensors: randomness follows from the step's number."""
+        return {}
+
+    def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
+        """Takes back what `tensors` gave."""
+        del state
+        self._learner.restore(tensors)
+
+    def _average(self, index: int) -> None:
+        """Ends with a mean over many steps: single ones look at one moment, from one side."""
+        steps = self._settings.finetune_steps
+        first = round((1 - self._settings.finetune_mean) * steps)
+        if index >= first:
+            self._learner.keep_mean(index - first)
+            if index == steps - 1:
+                self._learner.take_mean()
+
+    def _agree(self, index: int) -> Mapping[str, float]:
+        """A step on L_consistency."""
+        rng = self._learner.random(index, 3)
+        camera = around(novel_camera(self._cameras, rng), self._goal)
+        color = torch.from_numpy(rng.random(3)).to(self._goal.means)
+        with torch.no_grad():
+            goal = render(self._goal, [camera], color).rgb
+        person = self._learner.accompanied(self.model.at(0.0), self._shared)
+        loss = l1(render(person, [camera], color).rgb, goal)
+        loss.backward()
+        return {"loss": loss.item(), "difference": loss.item()}
+
+    def _remember(self, index: int) -> Mapping[str, float]:
+        """An ordinary step, so that the rest of the window does not suffer."""
+        learner = self._learner
+        view = learner.view(learner.views, index)
+        example = learner.example(view, index)
+        rendering = learner.draw(self.model.at(learner.tau(view)), view, example)
+        loss = learner.loss(rendering, example)
+        loss.backward()
+        return {"loss": loss.item(), "psnr": masked_psnr(rendering, example)}
+
+
+def around(camera: Camera, person: Gaussians) -> Camera:
+    """The camera cropped to what it sees of a person, with the margin of training pictures."""
+    seen = person.means[person.opacities > STILL_SEEN].detach().cpu().numpy()
+    pixels, depths = camera.project(seen)  # (N, 2), (N,)
+    pixels = pixels[depths > 0]
+    if len(pixels) == 0:
+        return camera
+    size = np.array([camera.width, camera.height])
+    low = np.floor(pixels.min(0) - MARGIN).clip(0, size - 1).astype(int)
+    high = np.ceil(pixels.max(0) + MARGIN).clip(low + 1, size).astype(int)
+    return camera.cropped(*low.tolist(), *(high - low).tolist())

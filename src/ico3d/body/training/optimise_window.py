@@ -1,0 +1,113 @@
+"""Optimising one window: one picture per step (paper, dynamic 3D body Gaussians)."""
+
+import math
+from collections.abc import Mapping
+
+import torch
+from torch import Tensor
+
+from ico3d.body.companion import Companion
+from ico3d.body.motion.deformation import GRID, Deformation
+from ico3d.body.motion.encoder import space_smoothness, time_change, time_smoothness
+from ico3d.body.motion.window_model import WindowModel
+from ico3d.body.planning.windows import Window
+from ico3d.body.settings import BodySettings, Method
+from ico3d.body.training.density import density_control
+from ico3d.body.training.picture_step import Learner
+from ico3d.body.training.views import BodyViews, Example
+from ico3d.splat.rendering import Rendering
+
+
+class BodyTrainer:
+    """A `Trainee`: a window's model, density control, and the pictures."""
+
+    def __init__(
+        self,
+        model: WindowModel,
+        window: Window,
+        pictures: BodyViews,
+        method: Method,
+        settings: BodySettings,
+        extent: float,
+        seed: int,
+        companion: Companion | None = None,
+    ):
+        """Gets ready for the first step; arguments as for `Learner`."""
+        for tensor in (*model.gaussians.values(), *model.shared.values()):
+            tensor.requires_grad_()
+        self._learner = Learner(model, window, pictures, settings, extent, seed, companion)
+        self._settings = settings
+        self._steps = settings.steps_of(len(window))
+        self._strategy = density_control(method, settings, self._steps, seed, extent)
+        deforms = isinstance(model.motion, Deformation)
+        self._warmup = settings.warmup_steps if deforms else 0
+        self._center = [v for v in self._learner.views if v.frame == window.center]
+
+    @property
+    def model(self) -> WindowModel:
+        """What is trained."""
+        return self._learner.model
+
+    def step(self, index: int) -> Mapping[str, float]:
+        """Renders one picture and learns from the difference."""
+        learner = self._learner
+        still = index < self._warmup and bool(self._center)
+        view = learner.view(self._center if still else learner.views, index)
+        example = learner.example(view, index)
+        gaussians = self.model.canonical() if still else self.model.at(learner.tau(view))
+        rendering = learner.draw(gaussians, view, example)
+        loss = learner.loss(rendering, example) + self._penalties()
+        loss.backward()
+        self._strategy.observe(rendering.info.first(len(gaussians)), index)
+        progress = index / self._steps
+        learner.update(progress)
+        rate = self._settings.rates()["means"].at(progress)
+        self._strategy.adapt(learner.population, index, rate)
+        learner.prune(index, self._steps)
+        return {
+            "loss": loss.item(),
+            "psnr": masked_psnr(rendering, example),
+            "gaussians": len(self.model),
+        }
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Parameters, moments, and what density control has gathered."""
+        gathered = {f"density.{name}": t for name, t in self._strategy.tensors().items()}
+        return self._learner.tensors() | gathered
+
+    def place(self, name: str) -> torch.device:
+        """All are where the model is."""
+        del name
+        return self.model.device
+
+    def state(self) -> dict:
+        """Nothing beside the tensors: randomness follows from the step's number."""
+        return {}
+
+    def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
+        """Takes back what `tensors` gave."""
+        del state
+        self._learner.restore(tensors)
+        prefix = "density."
+        gathered = {n.removeprefix(prefix): t for n, t in tensors.items() if n.startswith(prefix)}
+        self._strategy.restore(gathered)
+
+    def _penalties(self) -> Tensor:
+        """What density control and the planes' regularisers add to the loss."""
+        settings, model = self._settings, self.model
+        total = self._strategy.penalty(self._learner.population)
+        planes = {n.removeprefix(GRID): p for n, p in model.shared.items() if n.startswith(GRID)}
+        if settings.smoothness_weight and planes:
+            total = total + settings.smoothness_weight * (
+                space_smoothness(planes) + time_smoothness(planes)
+            )
+        if settings.stillness_weight and planes:
+            total = total + settings.stillness_weight * time_change(planes)
+        return total
+
+
+def masked_psnr(rendering: Rendering, example: Example) -> float:
+    """PSNR on the person, for the progress bar."""
+    squares = (rendering.rgb.detach()[0] - example.target).square().mean(-1)  # (H, W)
+    error = float((squares * example.mask).sum() / example.mask.sum().clamp_min(1))
+    return -10 * math.log10(max(error, 1e-12))

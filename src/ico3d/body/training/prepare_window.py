@@ -1,0 +1,217 @@
+"""What the training of a window begins with."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from scipy.spatial import KDTree
+from torch import Tensor
+
+from ico3d.body.companion import Companion, Pruning
+from ico3d.body.motion.deformation import Deformation
+from ico3d.body.motion.encoder import EncoderShape
+from ico3d.body.motion.formulas import FREETIME, SPACETIME, Polynomial, Still
+from ico3d.body.motion.tunable import MlpShape
+from ico3d.body.motion.window_model import Motion, WindowModel
+from ico3d.body.planning.windows import Window
+from ico3d.body.settings import BodySettings, Method
+from ico3d.body.training.surface_points import initial_points, point_colors
+from ico3d.capture.capture import Capture
+from ico3d.splat.density import Population
+from ico3d.splat.initial import resampled, spacing
+
+PADDING = 0.15
+"""Of the box, as a part of its edge: what moves out of it would not be told apart any more."""
+POSITIONS = 4
+"""Values that the positional encoding encodes: place and time."""
+
+
+@dataclass(frozen=True)
+class Begin:
+    """What training begins with.
+
+    Attributes:
+        model: The Gaussians.
+        extent: Half the longest edge of the person's box, metres.
+        source: Where the points come from, for people.
+    """
+
+    model: WindowModel
+    extent: float
+    source: str
+
+
+Dynamic = Callable[[np.ndarray], np.ndarray]
+"""(P, 3) points → (P,) how much each moves, 0 to 1."""
+
+
+def begin_window(
+    capture: Capture,
+    window: Window,
+    method: Method,
+    settings: BodySettings,
+    dynamic: Dynamic,
+    seed: int,
+    companion: Companion | None = None,
+) -> Begin:
+    """Round Gaussians on the person, at the window's centre frame or throughout it.
+
+    Args:
+        capture: Where surface points or masks come from.
+        window: Which frames.
+        method: What moves the Gaussians.
+        settings: How many, and the sizes of the deformation.
+        dynamic: Tells which points move in this window.
+        seed: Decides which points.
+        companion: Where nothing begins; about its border more does.
+
+    Raises:
+        CaptureError: If the masks of the cameras agree on no place.
+    """
+    rng = np.random.default_rng([seed, window.first])
+    count = min(settings.initial_gaussians, settings.max_gaussians)
+    if method in ("spacetime", "freetime"):
+        frames = range(window.first, window.last + 1)
+    else:
+        frames = (window.center,)
+    clouds, source = _clouds(capture, frames, -(-count // len(frames)), settings, rng)
+    if companion is not None:
+        pairs = zip(clouds, frames, strict=True)
+        clouds = [_beside(companion, cloud, frame, rng) for cloud, frame in pairs]
+    points = np.concatenate(clouds)  # (P, 3)
+    motion, extra = _motion(method, settings, capture, window, clouds, dynamic, rng)
+    gaussians = _round(capture, frames, clouds, settings) | extra
+    generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
+    shared = motion.initial(generator) if isinstance(motion, Deformation) else {}
+    extent = float(np.ptp(points, axis=0).max() / 2)
+    return Begin(WindowModel(motion, gaussians, shared), extent, source)
+
+
+def continued_window(model: WindowModel, window: Window, companion: Companion | None) -> Begin:
+    """A trained window as the begin of another training.
+
+    Args:
+        model: Changed in place: what trespasses is removed.
+        window: Its frames.
+        companion: Where nothing begins.
+    """
+    if companion is not None:
+        Pruning(companion, window).carry_out(model, Population(model.gaussians, {}))
+    low, high = np.percentile(model.gaussians["means"].numpy(), (0.5, 99.5), axis=0)  # (3,) each
+    return Begin(model, float((high - low).max() / 2), "a trained body")
+
+
+def _clouds(
+    capture: Capture,
+    frames: Sequence[int],
+    each: int,
+    settings: BodySettings,
+    rng: np.random.Generator,
+) -> tuple[list[np.ndarray], str]:
+    """Points (each, 3) of every frame, and where they come from."""
+    starts = [initial_points(capture, frame, each, rng, settings.initial) for frame in frames]
+    return [resampled(start.points, each, rng) for start in starts], starts[0].source
+
+
+def _beside(
+    companion: Companion, points: np.ndarray, frame: int, rng: np.random.Generator
+) -> np.ndarray:
+    """(Q, 3) points of a frame that do not trespass, and those of the companion's border."""
+    places = np.concatenate([points, companion.border(frame, rng)])
+    trespass = companion.trespassing(torch.from_numpy(places).float(), frame)
+    return places[~trespass.cpu().numpy()]
+
+
+def _round(
+    capture: Capture, frames: Sequence[int], clouds: list[np.ndarray], settings: BodySettings
+) -> dict[str, Tensor]:
+    """The canonical tensors of round Gaussians on points."""
+    colors = [point_colors(p, capture, f) for p, f in zip(clouds, frames, strict=True)]
+    sizes = np.concatenate([spacing(cloud) for cloud in clouds]) * settings.initial_scale  # (P,)
+    count, opacity = len(sizes), settings.initial_opacity
+    color = torch.from_numpy(np.concatenate(colors).clip(0.02, 0.98)).float()  # (P, 3)
+    return {
+        "means": torch.from_numpy(np.concatenate(clouds)).float(),
+        "quats": torch.tensor([1.0, 0, 0, 0]).repeat(count, 1),
+        "log_scales": torch.from_numpy(np.log(sizes)).float()[:, None].repeat(1, 3),
+        "opacity_logits": torch.full((count,), math.log(opacity / (1 - opacity))),
+        "color_logits": color.logit(),
+    }
+
+
+def _motion(
+    method: Method,
+    settings: BodySettings,
+    capture: Capture,
+    window: Window,
+    clouds: list[np.ndarray],
+    dynamic: Dynamic,
+    rng: np.random.Generator,
+) -> tuple[Motion, dict[str, Tensor]]:
+    """The motion of a method, and what it hangs on the Gaussians."""
+    if method == "static":
+        return Still(), {}
+    if method in ("spacetime", "freetime"):
+        formula = SPACETIME if method == "spacetime" else FREETIME
+        return formula, _formula_tensors(formula, settings, clouds)
+    sampled = [initial_points(capture, f, 500, rng, settings.initial) for f in _some(window)]
+    motion = deformation(method, settings, window, np.concatenate([s.points for s in sampled]))
+    if motion.mlp.sets == 1:
+        return motion, {}
+    moving = torch.from_numpy(dynamic(clouds[0])).float()  # (P,)
+    alpha = moving.new_zeros(len(moving), motion.mlp.sets)  # (P, M)
+    alpha[:, 0], alpha[:, 1:] = 1 - moving, moving[:, None] / (motion.mlp.sets - 1)
+    return motion, {"alpha": alpha}
+
+
+def _some(window: Window) -> list[int]:
+    """A few frames of a window, its ends among them."""
+    return sorted({*range(window.first, window.last, 3), window.last})
+
+
+def deformation(
+    method: Method, settings: BodySettings, window: Window, points: np.ndarray
+) -> Deformation:
+    """The deformation of a window whose motion stays about points (P, 3)."""
+    low, high = points.min(0), points.max(0)
+    middle, half = (low + high) / 2, (high - low) / 2 * (1 + 2 * PADDING)
+    encoder = None
+    inputs = POSITIONS * (1 + 2 * settings.bands)
+    if method != "swings":
+        space = tuple(settings.grid_space * 2**scale for scale in range(settings.grid_scales))
+        encoder = EncoderShape(space, len(window), settings.grid_channels)
+        inputs = encoder.outputs
+    mlp = MlpShape(inputs, settings.width, settings.depth, sets=settings.sets)
+    box = tuple(middle.tolist()), tuple(half.tolist())
+    return Deformation(*box, mlp, encoder, settings.bands)
+
+
+def _formula_tensors(
+    formula: Polynomial, settings: BodySettings, clouds: list[np.ndarray]
+) -> dict[str, Tensor]:
+    """Gaussians that live about their cloud's frame and move on to the next frame's cloud."""
+    steps = max(len(clouds) - 1, 1)
+    sizes = [len(cloud) for cloud in clouds]
+    center = torch.repeat_interleave(torch.arange(len(clouds)) / steps, torch.tensor(sizes))
+    speed = np.concatenate([_speed(clouds, index) for index in range(len(clouds))])  # (P, 3)
+    path = torch.zeros(len(speed), formula.degree, 3)
+    path[:, 0] = torch.from_numpy(speed).float()
+    tensors = {
+        "center": center.float(),
+        "log_duration": torch.full((len(speed),), math.log(settings.duration)),
+        "path": path,
+    }
+    return tensors | ({"turn": torch.zeros(len(speed), 4)} if formula.turning else {})
+
+
+def _speed(clouds: list[np.ndarray], index: int) -> np.ndarray:
+    """(P, 3) metres per window from a cloud to the nearest points of its neighbour in time."""
+    steps = max(len(clouds) - 1, 1)
+    after = index < len(clouds) - 1
+    if steps == 1 and not after and index == 0:
+        return np.zeros_like(clouds[0])
+    other = clouds[index + 1 if after else index - 1]
+    nearest = other[KDTree(other).query(clouds[index])[1]]
+    return (nearest - clouds[index]) * (steps if after else -steps)

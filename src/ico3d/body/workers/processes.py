@@ -1,0 +1,143 @@
+"""Windows trained by processes of this machine."""
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+
+import torch
+
+from ico3d.body.training.train_clip import WindowTask
+from ico3d.body.workers.jobs import Lost, work
+from ico3d.errors import Ico3dError, ModelError, SettingsError
+
+GPUS = "CUDA_VISIBLE_DEVICES"
+
+
+@dataclass(frozen=True)
+class Worker:
+    """A process that trains one window.
+
+    Attributes:
+        task: The window.
+        place: Its number among those that work at once.
+        process: The process.
+        results: Where it says how it ended.
+    """
+
+    task: WindowTask
+    place: int
+    process: BaseProcess
+    results: Connection
+
+    def outcome(self) -> float | Lost:
+        """How it ended, which it has.
+
+        Raises:
+            Ico3dError: That it met.
+            ModelError: If the program has an error.
+        """
+        try:
+            result = self.results.recv()
+        except (EOFError, ConnectionError):
+            result = None
+        self.process.join()
+        code = self.process.exitcode or 0
+        if isinstance(result, Ico3dError):
+            raise result
+        if result is not None:
+            return result
+        if code < 0:
+            return Lost(f"was killed by {signal.Signals(-code).name}")
+        raise ModelError(
+            f"{self.task.label}: its worker ended with the error that is printed above; the same "
+            "command goes on from the latest checkpoints."
+        )
+
+
+class Processes:
+    """A `Crew` of processes: each has its share of the cores, and on CUDA a GPU of its own."""
+
+    def __init__(self, jobs: int, with_gpus: bool = True):
+        """Starts nothing yet.
+
+        Args:
+            jobs: How many work at once.
+            with_gpus: Whether each gets a GPU.
+
+        Raises:
+            SettingsError: If there are fewer GPUs than that, but some.
+        """
+        self._gpus = _gpus() if with_gpus else []
+        if self._gpus and jobs > len(self._gpus):
+            raise SettingsError(
+                f"{jobs} windows at once need a GPU each, and this machine has {len(self._gpus)}: "
+                f"give --jobs {len(self._gpus)} or fewer."
+            )
+        self.capacity = jobs
+        self._threads = 1
+        self._context = multiprocessing.get_context("spawn")  # threads and CUDA survive no fork
+        self._workers: list[Worker] = []
+
+    def expect(self, windows: int) -> None:
+        """Shares out the cores among those that work at once."""
+        self._threads = max(torch.get_num_threads() // min(self.capacity, windows), 1)
+
+    def start(self, task: WindowTask) -> None:
+        """Starts a process for a window."""
+        taken = {worker.place for worker in self._workers}
+        place = min(set(range(self.capacity)) - taken)
+        gpu = self._gpus[place] if self._gpus else None
+        results, sender = self._context.Pipe(duplex=False)
+        process = self._context.Process(
+            target=_main, args=(sender, task, self._threads, gpu), name=task.label, daemon=True
+        )
+        process.start()
+        sender.close()  # the worker's end closes when it ends, whatever ends it
+        self._workers.append(Worker(task, place, process, results))
+
+    def ended(self, timeout: float) -> Sequence[tuple[WindowTask, float | Lost]]:
+        """Waits until a process has a result, or has none to give any more."""
+        ready = wait([worker.results for worker in self._workers], timeout)
+        ended = [worker for worker in self._workers if worker.results in ready]
+        outcomes = [(worker.task, worker.outcome()) for worker in ended]
+        self._workers = [worker for worker in self._workers if worker not in ended]
+        return outcomes
+
+    def stop(self) -> None:
+        """Kills all processes; files are written as a whole or not at all."""
+        for worker in self._workers:
+            worker.process.kill()
+        for worker in self._workers:
+            worker.process.join()
+        self._workers.clear()
+
+
+def _gpus() -> list[str]:
+    """The GPUs that this process may use, by the names that CUDA takes; none without CUDA."""
+    named = os.environ.get(GPUS, "")
+    names = [name for name in named.split(",") if name] or list(map(str, range(64)))
+    return names[: torch.cuda.device_count()]
+
+
+def _main(sender: Connection, task: WindowTask, threads: int, gpu: str | None) -> None:
+    """What a process does."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all: the parent decides
+    sys.stdout = open(os.devnull, "w")  # noqa: SIM115 (to the end); the parent draws for all
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    if gpu is not None:
+        os.environ[GPUS] = gpu  # read at the first use of CUDA, which is later
+    sender.send(work(task, threads))
+
+
+def _end_with_parent() -> None:
+    """Ends this process when the one that started it is gone: nobody waits for the result."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)

@@ -1,0 +1,68 @@
+"""Masks of a multiview folder from its clean plates."""
+
+import io
+import logging
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from ico3d.capture.multiview.cutout import matte
+from ico3d.capture.multiview.parallel import View, each_camera
+from ico3d.capture.multiview.reader import MultiviewCapture
+from ico3d.common.files import write_atomic
+from ico3d.errors import CaptureError
+
+log = logging.getLogger(__name__)
+
+
+def make_masks(folder: Path, workers: int) -> int:
+    """Writes the masks that are missing; those that are there stay.
+
+    Args:
+        folder: A multiview folder with `backgrounds/`.
+        workers: Threads.
+
+    Returns:
+        How many were written.
+
+    Raises:
+        CaptureError: If the folder has no clean plate, or a picture is damaged.
+    """
+    capture = MultiviewCapture(folder)
+    plates = [capture.files.plate(camera) is not None for camera in range(len(capture.cameras))]
+    if not any(plates):
+        raise CaptureError(
+            f"{folder} has no clean plates: put a picture without the person into "
+            "backgrounds/CAMERA.png for each camera."
+        )
+    for lens, there in zip(capture.lenses, plates, strict=True):
+        if not there:
+            log.warning("%s: camera %s has no clean plate and gets no masks.", folder, lens.name)
+    cameras = [camera for camera, there in enumerate(plates) if there]
+    return each_camera(lambda c: _masker(folder, c), cameras, capture.num_frames, workers, "masks")
+
+
+def _masker(folder: Path, camera: int) -> View:
+    """What writes the masks of one camera."""
+    capture = MultiviewCapture(folder)
+    plate = capture.files.plate(camera)
+    masks = folder / "masks" / capture.lenses[camera].name
+
+    def write(frame: int) -> int:
+        if capture.files.file("masks", camera, frame) is not None:
+            return 0
+        picture = capture.files.picture(camera, frame)
+        if picture is None or plate is None:
+            return 0
+        write_atomic(masks / f"{frame:06d}.png", png(matte(picture[..., :3], plate)))
+        return 1
+
+    return write
+
+
+def png(picture: np.ndarray) -> bytes:
+    """A uint8 picture as a PNG file."""
+    stream = io.BytesIO()
+    Image.fromarray(picture).save(stream, "PNG", compress_level=3)
+    return stream.getvalue()

@@ -1,0 +1,338 @@
+"""Reading the talking-portrait layout, ours and that of other tools."""
+
+import json
+from collections.abc import Callable
+from functools import cached_property
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from PIL import Image
+
+from ico3d.capture.capture import EYE_NAMES, Capture, Sound, Split
+from ico3d.capture.face.expressions import AU_COLUMNS, eyes_of_action_units, eyes_of_blendshapes
+from ico3d.capture.portrait.files import DETAILS, OPENGL_FROM_OPENCV, load_landmarks
+from ico3d.capture.portrait.parsing import BACKGROUND, FACE, HAIR, MOUTH, is_class
+from ico3d.capture.sound import read_sound_file
+from ico3d.capture.surface.first_points import unknown_person
+from ico3d.common.camera import Camera
+from ico3d.errors import CaptureError
+
+FPS = 25.0
+Result = TypeVar("Result")
+
+
+class TalkingPortrait(Capture):
+    """A talking-portrait folder: one steady camera, one head.
+
+    The world is the camera's own frame with OpenGL axes (y up, the camera looks along -z), so a
+    person facing the camera faces +Z. Frame numbers are the file numbers; a frame without a face
+    has no image and no pose, and is in neither part of the split.
+    """
+
+    kind = "portrait"
+
+    def __init__(self, path: Path):
+        """Opens the folder and checks that its parts agree; pictures are read when asked for.
+
+        Raises:
+            CaptureError: Naming the file and the frame that is missing, damaged or off.
+        """
+        self.path = path
+        self._details = _read_json(path / DETAILS) if (path / DETAILS).is_file() else {}
+        parts = {name: _read_json(path / f"transforms_{name}.json") for name in ("train", "val")}
+        ids = {name: _ids(path, name, part) for name, part in parts.items()}
+        self.split = Split(ids["train"], ids["val"])
+        self._poses = {
+            int(frame["img_id"]): _pose(path, name, frame)
+            for name, part in parts.items()
+            for frame in part["frames"]
+        }
+        self.fps = float(self._details.get("fps", FPS))
+        listed = max(self._poses) + 1
+        self.num_frames = int(self._details.get("num_frames", max(listed, self._count_pictures())))
+        self.cameras = (self._camera(parts["train"]),)
+        self.blendshape_names = self._names()
+        _check_ids(path, sorted(self._poses))
+        self._check_rows()
+
+    def image(self, camera: int, frame: int) -> np.ndarray | None:
+        """The person before the clean plate where the folder has that, else the frame itself."""
+        if frame not in self._poses:
+            return None
+        return _picture(self._first(f"gt_imgs/{frame}.jpg", f"ori_imgs/{frame}.jpg"))
+
+    def mask(self, camera: int, frame: int) -> np.ndarray | None:
+        """The person: our soft mask, else everything that parsing does not call background."""
+        soft = self.path / "alpha" / f"{frame}.png"
+        if frame in self._poses and soft.is_file():
+            return _picture(soft)
+        parsing = self._parsing(frame)
+        return None if parsing is None else 1.0 - is_class(parsing, BACKGROUND)
+
+    def head_mask(self, camera: int, frame: int) -> np.ndarray | None:
+        """Face, hair and mouth."""
+        parsing = self._parsing(frame)
+        return None if parsing is None else is_class(parsing, FACE, HAIR, MOUTH)
+
+    def background(self, camera: int) -> np.ndarray | None:
+        """The clean plate `bc.jpg`."""
+        plate = self.path / "bc.jpg"
+        return _picture(plate) if plate.is_file() else None
+
+    def audio(self) -> Sound | None:
+        """`aud.wav`, at 16 kHz."""
+        return read_sound_file(self.path / "aud.wav")
+
+    def world_from_head(self, frame: int) -> np.ndarray | None:
+        """The pose of a frame with a face."""
+        return self._poses.get(frame)
+
+    def eyes(self, frame: int) -> np.ndarray | None:
+        """From blendshapes, else from action units, smoothed over time."""
+        return None if self._eyes is None or frame >= len(self._eyes) else self._eyes[frame]
+
+    def blendshapes(self, frame: int) -> np.ndarray | None:
+        """A row of `bs.npy`."""
+        return None if self._blendshapes is None else self._blendshapes[frame]
+
+    def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
+        """The `.lms` file beside the frame."""
+        path = self.path / "ori_imgs" / f"{frame}.lms"
+        if frame not in self._poses or not path.is_file():
+            return None
+        points = _reading(path, lambda: load_landmarks(path))
+        if points.shape != (68, 2) or not np.isfinite(points).all():
+            raise CaptureError(f"{path}: expected 68 finite landmarks; delete or redo the file.")
+        return points
+
+    def points(self, frame: int = 0) -> np.ndarray | None:
+        """The tracked face with a guess of the body around it, or a guess of both."""
+        path = self.path / "points.npy"
+        if not path.is_file():
+            return unknown_person()
+        return _reading(path, lambda: np.load(path, allow_pickle=False))
+
+    @property
+    def provenance(self) -> dict:
+        """What the folder says about itself."""
+        unknown = {"sources": [self.path.name], "consent": "not stated", "licence": "not stated"}
+        return {"kind": self.kind, **unknown, **self._details.get("provenance", {})}
+
+    @property
+    def details(self) -> dict:
+        """`ico3d.json`: what our own tracker adds; empty for folders of other tools."""
+        return self._details
+
+    @cached_property
+    def _blendshapes(self) -> np.ndarray | None:
+        """(N, 52) float32 of `bs.npy`."""
+        path = self.path / "bs.npy"
+        if not path.is_file():
+            return None
+        return np.asarray(_reading(path, lambda: np.load(path, allow_pickle=False)), np.float32)
+
+    @cached_property
+    def _action_units(self) -> dict[str, np.ndarray] | None:
+        """The columns of `au.csv` that are used; OpenFace puts a space before their names."""
+        path = self.path / "au.csv"
+        if not path.is_file():
+            return None
+        header = path.read_text().split("\n", 1)[0].split(",")
+        names = [name.strip() for name in header]
+        missing = [name for name in AU_COLUMNS if name not in names]
+        if missing:
+            raise CaptureError(f"{path}: there is no column {missing[0]}; OpenFace writes it.")
+        wanted = [names.index(name) for name in AU_COLUMNS]
+        table = _reading(
+            path,
+            lambda: np.loadtxt(path, delimiter=",", skiprows=1, usecols=wanted, ndmin=2),
+        )
+        return dict(zip(AU_COLUMNS, table.T, strict=True))
+
+    @cached_property
+    def _eyes(self) -> np.ndarray | None:
+        """(N, 7) smoothed."""
+        names = self.blendshape_names
+        if self._blendshapes is not None and names and set(EYE_NAMES) <= set(names):
+            return eyes_of_blendshapes(self._blendshapes, names)
+        return None if self._action_units is None else eyes_of_action_units(self._action_units)
+
+    def _names(self) -> tuple[str, ...] | None:
+        """Names of the columns of `bs.npy`: as stated, else MediaPipe's, which these tools use."""
+        if self._blendshapes is None:
+            return None
+        from ico3d.capture.face.expressions import BLENDSHAPES
+
+        stated = tuple(self._details.get("blendshape_names", ()))
+        names = stated or BLENDSHAPES
+        columns = self._blendshapes.shape[-1]
+        if self._blendshapes.ndim != 2 or columns != len(names):
+            raise CaptureError(
+                f"{self.path / 'bs.npy'}: expected {len(names)} columns, "
+                f"found shape {self._blendshapes.shape}."
+            )
+        return names
+
+    def _count_pictures(self) -> int:
+        """One more than the highest number among the pictures."""
+        return max(_numbers(self.path / "ori_imgs", ".jpg"), default=-1) + 1
+
+    def _camera(self, transforms: dict) -> Camera:
+        """The steady camera; it is the world."""
+        first = self._first(f"gt_imgs/{min(self._poses)}.jpg", f"ori_imgs/{min(self._poses)}.jpg")
+        with _reading(first, lambda: Image.open(first)) as picture:
+            width, height = picture.size
+        file = self.path / "transforms_train.json"
+        values = [transforms.get(k, d) for k, d in _lens_defaults(width, height)]
+        if not all(isinstance(v, int | float) and np.isfinite(v) for v in values):
+            raise CaptureError(f"{file}: focal_len, cx and cy must be numbers in pixels.")
+        focal, x, y = values
+        if abs(x - width / 2) > width / 4 or abs(y - height / 2) > height / 4:
+            raise CaptureError(
+                f"{file}: principal point ({x}, {y}) does not fit the {width}x{height} pictures; "
+                "were they scaled after tracking?"
+            )
+        lens = np.array([[focal, 0, x], [0, focal, y], [0, 0, 1.0]])
+        return Camera(width, height, lens, OPENGL_FROM_OPENCV)
+
+    def _parsing(self, frame: int) -> np.ndarray | None:
+        """The parsing picture of a frame with a face, uint8 RGB."""
+        path = self.path / "parsing" / f"{frame}.png"
+        if frame not in self._poses or not path.is_file():
+            return None
+        with _reading(path, lambda: Image.open(path)) as picture:
+            return np.asarray(picture.convert("RGB"))
+
+    def _first(self, *names: str) -> Path:
+        """The first of these files that exists.
+
+        Raises:
+            CaptureError: If none does.
+        """
+        for name in names:
+            if (self.path / name).is_file():
+                return self.path / name
+        raise CaptureError(
+            f"{self.path}: frame {Path(names[-1]).stem} is listed in the transforms, "
+            f"but {names[-1]} is missing."
+        )
+
+    def _check_rows(self) -> None:
+        """Rows of tables must belong to frame numbers, not to a count of frames with a face."""
+        tables = {"bs.npy": self._blendshapes}
+        units = self._action_units
+        if units is not None:
+            tables["au.csv"] = np.stack(list(units.values()), 1)
+        for name, table in tables.items():
+            if table is None:
+                continue
+            if len(table) != self.num_frames:
+                raise CaptureError(
+                    f"{self.path / name} has {len(table)} rows for {self.num_frames} frames: "
+                    "row i must belong to frame i; extract it again from all frames."
+                )
+            bad = np.flatnonzero(~np.isfinite(table).all(1))
+            if len(bad):
+                raise CaptureError(f"{self.path / name}: row {bad[0]} holds NaN or infinity.")
+
+
+def _lens_defaults(width: int, height: int) -> list[tuple[str, float | None]]:
+    """Keys of the lens in the transforms, and what holds where one is absent."""
+    return [("focal_len", None), ("cx", width / 2), ("cy", height / 2)]
+
+
+def _check_ids(path: Path, ids: list[int]) -> None:
+    """Frame ids, pictures and landmark files must speak of the same frames."""
+    pictures = _numbers(path / "ori_imgs", ".jpg") | _numbers(path / "gt_imgs", ".jpg")
+    absent = [i for i in ids if i not in pictures]
+    if absent:
+        raise CaptureError(
+            f"{path}: frame {absent[0]} is listed in the transforms, "
+            f"but ori_imgs/{absent[0]}.jpg is missing."
+        )
+    marked = _numbers(path / "ori_imgs", ".lms")
+    bare = [i for i in ids if marked and i not in marked]
+    if not bare:
+        return
+    if len(marked) == len(ids):
+        raise CaptureError(
+            f"{path}: img_id in the transforms counts only frames with landmarks, so it is off "
+            f"from frame {bare[0]} on (ori_imgs/{bare[0]}.lms is missing); img_id must be the "
+            "number of the picture."
+        )
+    raise CaptureError(
+        f"{path}: frame {bare[0]} has a pose, but ori_imgs/{bare[0]}.lms is missing."
+    )
+
+
+def _ids(path: Path, name: str, transforms: dict) -> tuple[int, ...]:
+    """Frame numbers of one transforms file, ascending."""
+    file = path / f"transforms_{name}.json"
+    frames = transforms.get("frames")
+    if not isinstance(frames, list) or (name == "train" and not frames):
+        raise CaptureError(f"{file} lists no frames.")
+    ids = [frame.get("img_id") for frame in frames]
+    if not all(isinstance(i, int) and i >= 0 for i in ids):
+        raise CaptureError(f"{file}: every frame needs a whole img_id of 0 or more.")
+    doubled = sorted({i for i in ids if ids.count(i) > 1}) if len(set(ids)) < len(ids) else []
+    if doubled:
+        raise CaptureError(f"{file}: frame {doubled[0]} is listed twice.")
+    off = next((f for f in frames if f.get("aud_id", f["img_id"]) != f["img_id"]), None)
+    if off is not None:
+        raise CaptureError(
+            f"{file}: frame {off['img_id']} has aud_id {off['aud_id']}; picture and sound must be "
+            "of one moment."
+        )
+    return tuple(sorted(ids))
+
+
+def _pose(path: Path, name: str, frame: dict) -> np.ndarray:
+    """W (4, 4) of one frame: OpenGL camera axes from head, the inverse of `transform_matrix`."""
+    where = f"{path / f'transforms_{name}.json'}: frame {frame['img_id']}"
+    try:
+        matrix = np.asarray(frame["transform_matrix"], np.float64)
+    except (KeyError, TypeError, ValueError) as error:
+        raise CaptureError(f"{where} has no 4x4 transform_matrix.") from error
+    if matrix.shape != (4, 4):
+        raise CaptureError(f"{where} has no 4x4 transform_matrix.")
+    if not np.isfinite(matrix).all():
+        raise CaptureError(f"{where}: the pose holds NaN or infinity; track the frame again.")
+    rotation = matrix[:3, :3]
+    if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
+        raise CaptureError(f"{where}: the pose is no rotation and translation.")
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation.T, -rotation.T @ matrix[:3, 3]
+    return pose
+
+
+def _read_json(path: Path) -> dict:
+    """One JSON object."""
+    if not path.is_file():
+        raise CaptureError(f"{path} is missing.")
+    content = _reading(path, lambda: json.loads(path.read_text()))
+    if not isinstance(content, dict):
+        raise CaptureError(f"{path} must hold a JSON object.")
+    return content
+
+
+def _picture(path: Path) -> np.ndarray:
+    """A picture as float32 in [0, 1]; (H, W, 3), or (H, W) where it is grey."""
+    with _reading(path, lambda: Image.open(path)) as picture:
+        plain = picture if picture.mode == "L" else picture.convert("RGB")
+        return _reading(path, lambda: np.asarray(plain, np.float32) / 255)
+
+
+def _reading(path: Path, read: Callable[[], Result]) -> Result:
+    """Reads a file; what goes wrong becomes one sentence."""
+    try:
+        return read()
+    except (OSError, ValueError, RuntimeError) as error:
+        raise CaptureError(f"{path} cannot be read: {error}.") from error
+
+
+def _numbers(folder: Path, suffix: str) -> set[int]:
+    """The numbers that are file names in a folder."""
+    if not folder.is_dir():
+        return set()
+    return {int(p.stem) for p in folder.iterdir() if p.suffix == suffix and p.stem.isdigit()}

@@ -1,0 +1,53 @@
+"""The surface of a head from masks alone."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ico3d.capture.capture import Capture
+from ico3d.capture.surface.hull import Silhouette, visual_hull
+
+EDGE = 0.005
+"""Metres of a voxel's edge."""
+
+
+def head_hull(capture: Capture, frame: int) -> np.ndarray | None:
+    """The visual hull of each camera's mask nearest in time: not all take all frames.
+
+    Args:
+        capture: With masks and head poses.
+        frame: Which.
+
+    Returns:
+        (P, 3) in canonical head space, metres; None where poses, masks or a hull are lacking.
+    """
+    seen = head_silhouettes(capture, frame, range(capture.num_frames))
+    hull = visual_hull(list(seen.values()), EDGE)
+    return None if hull is None else hull.surface
+
+
+def head_silhouettes(capture: Capture, frame: int, among: Sequence[int]) -> dict[int, Silhouette]:
+    """Each camera's mask nearest in time to a frame, as seen from canonical head space.
+
+    Args:
+        capture: With masks and head poses.
+        frame: Which.
+        among: Frames whose masks may be taken.
+
+    Returns:
+        By the camera's number, for cameras that have a mask of a frame with a head pose.
+    """
+    order = sorted(among, key=lambda other: (abs(other - frame), other))
+    posed = [other for other in order if capture.world_from_head(other) is not None]
+    cameras = range(len(capture.cameras))
+    found = {camera: _silhouette(capture, camera, posed) for camera in cameras}
+    return {camera: seen for camera, seen in found.items() if seen is not None}
+
+
+def _silhouette(capture: Capture, camera: int, frames: list[int]) -> Silhouette | None:
+    """The mask of the first of the frames that has one, as seen from head space."""
+    for frame in frames:
+        pose, mask = capture.world_from_head(frame), capture.mask(camera, frame)
+        if pose is not None and mask is not None:
+            return Silhouette.of(capture.cameras[camera].moved(pose), mask)
+    return None

@@ -1,0 +1,164 @@
+"""What whoever runs a server may know of it: figures for Prometheus, and a log of turns.
+
+No word of a visitor goes in, and no name of a session: with that one its conversation could be
+taken over.
+"""
+
+import itertools
+import json
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TextIO
+
+from loguru import logger
+from prometheus_client import (
+    CONTENT_TYPE_LATEST,
+    CollectorRegistry,
+    Counter,
+    Gauge,
+    Histogram,
+    ProcessCollector,
+    generate_latest,
+)
+
+from ico3d.chat.observing.timing import Turn
+from ico3d.errors import SettingsError
+
+BUCKETS = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0, 1.3, 2.0, 3.0, 5.0, 10.0)
+CONTENT_TYPE = CONTENT_TYPE_LATEST
+
+
+class TurnLog:
+    """A file with one JSON object per line for each turn: times and counts only."""
+
+    def __init__(self, file: TextIO):
+        """Use `TurnLog.open`."""
+        self._file = file
+
+    @classmethod
+    def open(cls, path: Path) -> "TurnLog":
+        """Goes on with a file or begins it.
+
+        Raises:
+            SettingsError: If it cannot be written.
+        """
+        try:
+            return cls(path.open("a", encoding="utf-8", buffering=1))
+        except OSError as error:
+            raise SettingsError(f"--log {path}: cannot be written ({error.strerror}).") from error
+
+    def write(self, entry: dict) -> None:
+        """Adds a line."""
+        self._file.write(json.dumps(entry) + "\n")
+
+
+class Monitor:
+    """Counts what happens on one server."""
+
+    def __init__(self, log: TurnLog | None = None, today: Callable[[], datetime] | None = None):
+        """Nothing has happened yet.
+
+        Args:
+            log: Takes every turn.
+            today: The calendar's time, for the log.
+        """
+        self._log, self._today = log, today or (lambda: datetime.now(UTC))
+        self._numbers = itertools.count(1)
+        self._registry = registry = CollectorRegistry()
+        ProcessCollector(registry=registry)
+        self._parts = Histogram(
+            "ico3d_turn_part_seconds",
+            "From the end of a question to the first sound sent, by part.",
+            ["part"],
+            buckets=BUCKETS,
+            registry=registry,
+        )
+        self._heard = Histogram(
+            "ico3d_voice_to_voice_seconds",
+            "From the end of a question to the first sound heard.",
+            buckets=BUCKETS,
+            registry=registry,
+        )
+        self._turns = Counter("ico3d_turns", "Questions answered.", ["kind"], registry=registry)
+        self._interruptions = Counter(
+            "ico3d_interruptions", "Answers that were stopped.", registry=registry
+        )
+        self._errors = Counter("ico3d_errors", "Errors by place.", ["where"], registry=registry)
+        self._ended = Counter(
+            "ico3d_sessions_ended", "Sessions by end.", ["why"], registry=registry
+        )
+        self._sessions = Gauge("ico3d_sessions", "Open sessions.", registry=registry)
+        self.connections = Gauge("ico3d_connections", "Open connections.", registry=registry)
+
+    def visitor(self) -> "Visitor":
+        """A session has opened."""
+        self._sessions.inc()
+        return Visitor(self, next(self._numbers))
+
+    def left(self, why: str) -> None:
+        """A session has ended."""
+        self._sessions.dec()
+        self._ended.labels(why).inc()
+
+    def failed(self, where: str, cause: str = "") -> None:
+        """Counts an error, and tells whoever runs the server why it happened, where that is known.
+
+        Args:
+            where: Part of the conversation or of the server.
+            cause: Without a word that anybody said.
+        """
+        self._errors.labels(where).inc()
+        if cause:
+            logger.error(f"{where} failed: {cause}")
+
+    def turn(self, session: int, number: int, turn: Turn) -> None:
+        """Counts a turn whose answer is over.
+
+        Args:
+            session: Number of the session.
+            number: Number of the turn in it.
+            turn: Its times.
+        """
+        parts = turn.parts()
+        for part, milliseconds in parts.items():
+            self._parts.labels(part).observe(milliseconds / 1000)
+        heard = turn.voice_to_voice()
+        if heard is not None:
+            self._heard.observe(heard / 1000)
+        self._turns.labels("typed" if turn.typed else "spoken").inc()
+        self._interruptions.inc(turn.interrupted)
+        if self._log is not None:
+            self._log.write(
+                {
+                    "time": self._today().isoformat(timespec="milliseconds"),
+                    "session": session,
+                    "turn": number,
+                    "typed": turn.typed,
+                    "parts_ms": {part: round(value, 1) for part, value in parts.items()},
+                    "voice_to_voice_ms": None if heard is None else round(heard, 1),
+                    "answer_seconds": round(turn.seconds, 2),
+                    "interrupted": turn.interrupted,
+                }
+            )
+
+    def exposition(self) -> bytes:
+        """All figures in Prometheus' text format."""
+        return generate_latest(self._registry)
+
+
+class Visitor:
+    """One session as the monitor knows it: a number."""
+
+    def __init__(self, monitor: Monitor, number: int):
+        """Use `Monitor.visitor`."""
+        self._monitor, self._number = monitor, number
+        self._turns = itertools.count(1)
+
+    def turn(self, turn: Turn) -> None:
+        """A turn is over."""
+        self._monitor.turn(self._number, next(self._turns), turn)
+
+    def failed(self, where: str, cause: str) -> None:
+        """Something went wrong; `cause` holds no word that anybody said."""
+        self._monitor.failed(where, f"{cause} [session {self._number}]")

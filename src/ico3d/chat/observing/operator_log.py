@@ -1,0 +1,139 @@
+"""What whoever runs a server reads on the standard error: never a word that visitors said.
+
+Our own code says what it means in its messages, and keeps to that (`failures.py`). Of what others
+log, which may hold a question, an answer or the whole request to a server, only the constant part
+of the message is shown: what stands in the source where it was logged.
+"""
+
+import ast
+import functools
+import linecache
+import logging
+import sys
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TextIO
+
+from ico3d.chat.observing.failures import cause
+from ico3d.errors import MissingExtraError
+
+if TYPE_CHECKING:
+    from loguru import Message
+
+OWN = "ico3d."
+TOLD = (  # places where pipecat logs the errors of processors, of which `monitor.py` tells
+    ("pipecat.processors.frame_processor", "push_error_frame"),
+    ("pipecat.pipeline.worker", "_source_push_frame"),
+    ("pipecat.pipeline.worker", "_handle_unusable_processor"),
+)
+QUIET = 60.0  # s for which a line that has just been written is not written again
+MOST = 200  # lines that are remembered for it
+LOGGING_CALL_LINES = 12  # source lines that one call of a logger takes at most
+
+
+class OperatorLog:
+    """Writes lines, and counts those that repeat themselves instead of writing them again."""
+
+    def __init__(self, file: TextIO | None = None, now: Callable[[], float] = time.monotonic):
+        """Writes to `file`; by default to what is the standard error at that moment."""
+        self._file, self._now = file, now
+        self._seen: dict[str, tuple[float, int]] = {}  # when a line was written, how often since
+
+    def write(self, level: str, line: str) -> None:
+        """Writes a line, unless it has just been written."""
+        now = self._now()
+        since, more = self._seen.pop(line, (-QUIET, 0))
+        if now - since < QUIET:
+            self._seen[line] = since, more + 1
+            return
+        self._seen[line] = now, 0
+        while len(self._seen) > MOST:
+            del self._seen[next(iter(self._seen))]
+        again = f" ({more} more of these since)" if more else ""
+        when = time.strftime("%H:%M:%S")
+        print(f"{when} {level}: {line}{again}", file=self._file or sys.stderr, flush=True)
+
+    def take(self, message: "Message") -> None:
+        """A record of loguru: ours or pipecat's."""
+        record = message.record
+        name, place = record["name"] or "", (record["name"], record["function"])
+        if name.startswith(OWN):
+            self.write(record["level"].name, record["message"])
+        elif place not in TOLD and record["function"] != "<module>":  # a package that is missing
+            said = constant_part(record["file"].path, record["line"])
+            exception = record["exception"]
+            self.write(
+                record["level"].name,
+                _line(f"{name}.{record['function']}", said, exception and exception.value),
+            )
+
+
+class StandardHandler(logging.Handler):
+    """Passes on what is logged with Python's own `logging`: by uvicorn, asyncio, clients."""
+
+    def __init__(self, log: OperatorLog):
+        """Takes warnings and what is worse."""
+        super().__init__(logging.WARNING)
+        self._log = log
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Writes the constant part of a record; all of ours."""
+        own = record.name.startswith(OWN)
+        said = record.getMessage() if own else constant_part(record.pathname, record.lineno)
+        error = record.exc_info[1] if record.exc_info else None
+        self._log.write(record.levelname, _line(record.name, said, error))
+
+
+def set_up_log(verbose: bool) -> None:
+    """Shows warnings and errors on the standard error; everything, with all words, if verbose.
+
+    Raises:
+        MissingExtraError: If the extra `chat` is not installed.
+    """
+    try:
+        from loguru import logger
+    except ImportError:
+        raise MissingExtraError("pipecat-ai", "chat", "talking with an avatar") from None
+    logger.remove()
+    if verbose:
+        logger.add(sys.stderr, level="DEBUG")
+        logging.basicConfig(level=logging.INFO)
+        return
+    log = OperatorLog()
+    logger.add(log.take, level="WARNING", format="{message}")
+    logging.getLogger().addHandler(StandardHandler(log))
+
+
+def constant_part(path: str, line: int) -> str:
+    """What a logging call always says: its message with … for what is filled in; else nothing."""
+    for node in ast.walk(_call(path, line) or ast.Pass()):
+        if isinstance(node, ast.Call) and node.args:
+            return _constant(node.args[0])
+    return ""
+
+
+@functools.cache
+def _call(path: str, line: int) -> ast.AST | None:
+    """The statement that begins in a line of a source file."""
+    source = ""
+    for number in range(line, line + LOGGING_CALL_LINES):
+        source += linecache.getline(path, number).lstrip() if number == line else ""
+        source += linecache.getline(path, number) if number > line else ""
+        try:
+            return ast.parse(source)
+        except SyntaxError:
+            continue
+    return None
+
+
+def _constant(message: ast.expr) -> str:
+    if isinstance(message, ast.Constant) and isinstance(message.value, str):
+        return message.value
+    if isinstance(message, ast.JoinedStr):
+        return "".join(_constant(part) for part in message.values)
+    return "…" if isinstance(message, ast.FormattedValue) else ""
+
+
+def _line(place: str, said: str, error: BaseException | None) -> str:
+    parts = [place, " ".join(said.split()), cause(error) if error else ""]
+    return ": ".join(part for part in parts if part.strip("… :"))

@@ -1,0 +1,125 @@
+"""The processor between voice and page: gives every piece of sound its face."""
+
+import asyncio
+import time
+
+import numpy as np
+from pipecat.frames.frames import (
+    AggregatedTextFrame,
+    Frame,
+    InterruptionFrame,
+    LLMFullResponseEndFrame,
+    LLMFullResponseStartFrame,
+    TTSAudioRawFrame,
+    TTSStoppedFrame,
+    TTSTextFrame,
+)
+from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
+from pipecat.utils.text.base_text_aggregator import TextType
+
+from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame, Utterances
+from ico3d.chat.performing.face import MOST, ROW, Face, Piece, Sentence
+from ico3d.chat.wire.protocol import EXPRESSION_FPS
+from ico3d.chat.workers import Run
+
+STEP = 3 * MOST * ROW  # samples that go through the model at once: the first face comes early
+
+
+class ExpressionProcessor(FrameProcessor):
+    """Turns the voice's audio frames into `SpeechFrame`s of numbered utterances.
+
+    An utterance is one answer of the language model, or one text spoken outside of an answer.
+    """
+
+    def __init__(self, face: Face, utterances: Utterances, run: Run):
+        """A processor for one session.
+
+        Args:
+            face: What moves.
+            utterances: Which answers there are.
+            run: Does what takes a while, in time for the row that it is for.
+        """
+        super().__init__()
+        self._face, self._utterances, self._run = face, utterances, run
+        self._in_answer = False
+        self._utterance: int | None = None
+        self._reset()
+
+    def _reset(self) -> None:
+        self._utterance = None
+        self._sentence: Sentence | None = None
+        self._text: str | None = None  # of the sentence that comes next
+        self._next_row = 0
+        self._start = 0.0
+
+    async def cleanup(self):
+        """Lets the face go."""
+        await super().cleanup()
+        await asyncio.to_thread(self._face.close)
+
+    async def process_frame(self, frame: Frame, direction: FrameDirection):
+        """Replaces audio, watches where sentences and answers begin and end, passes the rest."""
+        await super().process_frame(frame, direction)
+        if isinstance(frame, TTSAudioRawFrame):
+            await self._speak(frame)
+            return
+        if isinstance(frame, InterruptionFrame):
+            self._in_answer = False
+            self._reset()
+        elif isinstance(frame, LLMFullResponseStartFrame):
+            self._in_answer = True
+        elif isinstance(frame, LLMFullResponseEndFrame):
+            self._in_answer = False
+            await self._end_utterance()
+        elif isinstance(frame, TTSStoppedFrame):
+            await self._end_sentence()
+            if not self._in_answer:
+                await self._end_utterance()
+        elif isinstance(frame, TTSTextFrame):
+            if frame.text_type == TextType.SENTENCE:  # single words come in the middle of sound
+                await self._end_sentence()
+        elif isinstance(frame, AggregatedTextFrame) and frame.will_be_spoken:
+            await self._end_sentence()
+            self._text = frame.text
+        await self.push_frame(frame, direction)
+
+    async def _speak(self, frame: TTSAudioRawFrame) -> None:
+        if self._utterance is None:
+            self._utterance = self._utterances.begin()
+            self._start = time.monotonic()
+        if self._sentence is None:
+            self._sentence = Sentence(self._face, self._next_row, self._start % 1e5)
+        pcm = np.frombuffer(frame.audio, np.int16)
+        for at in range(0, len(pcm), STEP):
+            due = self._due(self._sentence)
+            await self._push(await self._run(due, self._sentence.push, pcm[at : at + STEP]))
+
+    async def _end_sentence(self) -> None:
+        if self._sentence is None:
+            return
+        sentence, self._sentence = self._sentence, None
+        await self._push(await self._run(self._due(sentence), sentence.finish))
+        self._next_row = sentence.next_row
+
+    def _due(self, sentence: Sentence) -> float:
+        """When the next piece is heard, at the soonest."""
+        return self._start + sentence.next_row / EXPRESSION_FPS
+
+    async def _end_utterance(self) -> None:
+        await self._end_sentence()
+        if self._utterance is not None:
+            samples = self._next_row * ROW
+            self._utterances.made(self._utterance, samples, complete=True)
+            self._face.moods.forget()
+            await self.push_frame(UtteranceEndFrame(self._utterance, samples))
+        self._reset()
+
+    async def _push(self, pieces: list[Piece]) -> None:
+        for piece in pieces:
+            text, self._text = self._text, None
+            row = piece.first_row
+            assert self._utterance is not None
+            self._utterances.made(self._utterance, row * ROW + len(piece.pcm))
+            await self.push_frame(
+                SpeechFrame(self._utterance, row * ROW, row, piece.pcm, piece.expressions, text)
+            )

@@ -1,0 +1,99 @@
+"""What lets a request into a module: its key, its size, and how many there are."""
+
+import hmac
+
+from starlette.datastructures import Headers
+from starlette.responses import JSONResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from ico3d.chat.remote.limits import Limits
+
+OPEN_PATHS = ("/health",)
+BROKEN, BUSY = 1008, 1013  # WebSocket close codes
+
+
+class Door:
+    """ASGI middleware in front of a module."""
+
+    def __init__(self, app: ASGIApp, limits: Limits, key: str = ""):
+        """Guards `app`; an empty key lets everybody in."""
+        self._app, self._limits, self._key = app, limits, key
+        self._inside = 0
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Handles one request or WebSocket handshake."""
+        if scope["type"] not in ("http", "websocket") or scope["path"] in OPEN_PATHS:
+            await self._app(scope, receive, send)
+            return
+        refusal = self._refusal(Headers(scope=scope))
+        if refusal is not None:
+            await _refuse(*refusal, scope, receive, send)
+            return
+        self._inside += 1
+        try:
+            body = Body(self._limits.megabytes, scope, receive, send)
+            await self._app(scope, body.receive, body.send)
+        finally:
+            self._inside -= 1
+
+    def _refusal(self, headers: Headers) -> tuple[int, str] | None:
+        given = headers.get("authorization", "").removeprefix("Bearer ").strip()
+        if self._key and not hmac.compare_digest(given.encode(), self._key.encode()):
+            return 401, "the key is missing or wrong."
+        if self._inside >= self._limits.requests:
+            return 429, f"{self._limits.requests} requests are being served: try again soon."
+        length = headers.get("content-length", "0")
+        if length.isdecimal() and int(length) > self._limits.megabytes * 1e6:
+            return 413, too_large(self._limits.megabytes)
+        return None
+
+
+class Body:
+    """One request whose length is counted, for it may tell none; past the limit it is refused."""
+
+    def __init__(self, megabytes: float, scope: Scope, receive: Receive, send: Send):
+        """Counts what `receive` brings, and answers by `send`."""
+        self._megabytes, self._scope = megabytes, scope
+        self._receive, self._send = receive, send
+        self._taken, self._refused = 0, False
+
+    async def receive(self) -> Message:
+        """The next message; the end of the connection past the limit."""
+        message = await self._receive()
+        self._taken += len(message.get("body", b""))
+        return {"type": "http.disconnect"} if self._is_over else message
+
+    async def send(self, message: Message) -> None:
+        """Passes the answer on; whatever was made of a body that was cut off is a refusal."""
+        if not self._is_over or self._scope["type"] != "http":
+            await self._send(message)
+        elif not self._refused and message["type"] == "http.response.start":
+            self._refused = True
+            refusal = error_response(413, too_large(self._megabytes))
+            await refusal(self._scope, self._receive, self._send)
+
+    @property
+    def _is_over(self) -> bool:
+        return self._taken > self._megabytes * 1e6
+
+
+def too_large(megabytes: float) -> str:
+    """Why a request is refused."""
+    return f"the request is larger than {megabytes:g} MB."
+
+
+def error_response(status: int, sentence: str) -> JSONResponse:
+    """An error in the form that clients of the OpenAI API expect."""
+    kind = "invalid_request_error" if status < 500 else "server_error"
+    error = {"message": sentence, "type": kind, "param": None, "code": None}
+    headers = {"Retry-After": "1"} if status in (429, 503) else {}
+    return JSONResponse({"error": error}, status, headers)
+
+
+async def _refuse(status: int, sentence: str, scope: Scope, receive: Receive, send: Send) -> None:
+    if scope["type"] == "websocket":
+        await receive()
+        code = BUSY if status == 429 else BROKEN
+        await send({"type": "websocket.close", "code": code, "reason": sentence})
+        return
+    await error_response(status, sentence)(scope, receive, send)

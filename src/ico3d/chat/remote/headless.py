@@ -1,0 +1,112 @@
+"""A service of the conversation without one: frames in, its frames out."""
+
+import asyncio
+import time
+from collections.abc import AsyncGenerator, Callable, Sequence
+
+from pipecat.frames.frames import CancelFrame, EndFrame, ErrorFrame, Frame
+from pipecat.pipeline.pipeline import Pipeline
+from pipecat.pipeline.worker import PipelineParams, PipelineWorker
+from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
+from pipecat.workers.runner import WorkerRunner
+
+from ico3d.chat.wire.protocol import MICROPHONE_RATE, SPEECH_RATE
+from ico3d.errors import ServiceError
+
+
+class Collector(FrameProcessor):
+    """The end of the pipeline: keeps what comes out."""
+
+    def __init__(self, found: asyncio.Queue[Frame | None]):
+        """Puts frames into `found`."""
+        super().__init__()
+        self._found = found
+
+    async def process_frame(self, frame: Frame, direction: FrameDirection):
+        """Keeps what comes down."""
+        await super().process_frame(frame, direction)
+        if direction == FrameDirection.DOWNSTREAM:
+            self._found.put_nowait(frame)
+        await self.push_frame(frame, direction)
+
+
+async def run(
+    processor: FrameProcessor, frames: Sequence[Frame], seconds: float
+) -> AsyncGenerator[Frame, None]:
+    """What a service makes of some frames, as it makes it; it is used up then.
+
+    pipecat promises that a service is done with everything when it lets an `EndFrame` through.
+
+    Args:
+        processor: A fresh one.
+        frames: What goes in.
+        seconds: That all of it may take.
+
+    Raises:
+        ServiceError: If it reports an error.
+        TimeoutError: If it takes too long.
+    """
+    deadline = time.monotonic() + seconds
+    found: asyncio.Queue[Frame | None] = asyncio.Queue()
+    pipeline = Pipeline([processor, Collector(found)])
+    worker = PipelineWorker(
+        pipeline,
+        params=PipelineParams(
+            audio_in_sample_rate=MICROPHONE_RATE, audio_out_sample_rate=SPEECH_RATE
+        ),
+        enable_rtvi=False,
+        enable_turn_tracking=False,
+        idle_timeout_secs=None,
+    )
+
+    async def failed(_: FrameProcessor, error: ErrorFrame) -> None:
+        found.put_nowait(error)
+
+    processor.add_event_handler("on_error", failed)
+    runner = WorkerRunner(handle_sigint=False, handle_sigterm=False)
+    await runner.add_workers(worker)
+    task = asyncio.create_task(runner.run())
+    task.add_done_callback(lambda _: found.put_nowait(None))
+    try:
+        await worker.queue_frames([*frames, EndFrame()])
+        while True:
+            # one wait at a time: whoever streams this may go on in another task
+            frame = await asyncio.wait_for(found.get(), deadline - time.monotonic())
+            if isinstance(frame, EndFrame):
+                return
+            if frame is None:
+                raise ServiceError("the service ended by itself.")
+            if isinstance(frame, ErrorFrame):
+                raise ServiceError(frame.error)
+            yield frame
+    finally:
+        # past the worker, which waits for its EndFrame before it takes anything else
+        await pipeline.queue_frame(CancelFrame())
+        await worker.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+class Spares:
+    """Fresh processors: each request has its own, one is always made ahead."""
+
+    def __init__(self, make: Callable[[], FrameProcessor]):
+        """Makes with `make`, which may take a while and runs in a thread."""
+        self._make = make
+        self._next: asyncio.Task[FrameProcessor] | None = None
+
+    async def take(self) -> FrameProcessor:
+        """A processor that nobody has used.
+
+        Raises:
+            Ico3dError: If it cannot be made.
+        """
+        taken, self._next = self._next or self._start(), None
+        try:
+            return await taken
+        finally:
+            self._next = self._start()
+
+    def _start(self) -> asyncio.Task[FrameProcessor]:
+        task = asyncio.create_task(asyncio.to_thread(self._make))
+        task.add_done_callback(lambda done: done.cancelled() or done.exception())  # seen
+        return task

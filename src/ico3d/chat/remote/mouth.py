@@ -1,0 +1,159 @@
+"""A remote expression module as the conversation uses it, with the own model behind it."""
+
+import json
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+from loguru import logger
+from websockets.exceptions import WebSocketException
+from websockets.sync.client import ClientConnection, connect
+
+from ico3d.chat.remote.expression import FINISH, PATH, ROW, START
+from ico3d.chat.settings.conversation import Expression
+from ico3d.chat.settings.keys import key_for
+from ico3d.chat.wire.protocol import EXPRESSION_FPS, SPEECH_RATE
+from ico3d.common.expression import SPEECH_SIZE
+from ico3d.errors import Ico3dError, ServiceError
+from ico3d.speech.runtime import SpeechModel, StreamingExpressions
+
+AVOIDED = 20.0  # s for which a server that failed is not asked again
+FAILURES = (OSError, WebSocketException, Ico3dError, ValueError)  # TimeoutError is an OSError
+
+
+class RemoteMouth:
+    """The mouths of one session's sentences, by one connection."""
+
+    def __init__(
+        self,
+        settings: Expression,
+        model: SpeechModel,
+        sha256: str,
+        now: Callable[[], float] = time.monotonic,
+    ):
+        """A mouth that has not connected.
+
+        Args:
+            settings: Where the server is.
+            model: The avatar's own model, for when it fails.
+            sha256: Of the model's file; the server must have the same.
+            now: Clock, seconds.
+        """
+        self.model = model
+        self._settings, self._sha256, self._now = settings, sha256, now
+        self._lock = threading.Lock()  # a sentence that was interrupted may still be under way
+        self._socket: ClientConnection | None = None
+        self._sentence = 0
+        self._avoided_until = float("-inf")
+
+    def lips(self) -> "RemoteLips":
+        """The mouth for a new sentence."""
+        with self._lock:
+            self._sentence += 1
+            return RemoteLips(self, self._sentence)
+
+    def ask(self, sentence: int, message: bytes | str, is_first: bool) -> np.ndarray:
+        """The rows (n, C) that a message of a sentence brings.
+
+        Raises:
+            OSError: If the server does not answer, or not in time.
+            WebSocketException: If it ends the connection.
+            ServiceError: If it is not to be asked, or its answer is wrong.
+        """
+        with self._lock:
+            if sentence != self._sentence:
+                return np.zeros((0, SPEECH_SIZE), np.float32)  # nobody waits for it
+            if self._now() < self._avoided_until:
+                raise ServiceError("it failed a moment ago.")
+            try:
+                return self._exchange(message, is_first)
+            except FAILURES as error:
+                self._avoided_until = self._now() + AVOIDED
+                self._hang_up()
+                logger.error(f"remote expression failed, the own model goes on: {error}")
+                raise
+
+    def close(self) -> None:
+        """Ends the connection."""
+        with self._lock:
+            self._hang_up()
+
+    def _exchange(self, message: bytes | str, is_first: bool) -> np.ndarray:
+        socket = self._socket = self._socket or self._connected()
+        if is_first:
+            socket.send(START)
+        socket.send(message)
+        answer = socket.recv(self._settings.timeout)
+        if isinstance(answer, str) or len(answer) % (ROW.itemsize * SPEECH_SIZE):
+            raise ServiceError("its answer is no rows.")
+        rows = np.frombuffer(answer, ROW).reshape(-1, SPEECH_SIZE).astype(np.float32)
+        if not np.isfinite(rows).all():
+            raise ServiceError("its rows are not finite.")
+        return rows
+
+    def _connected(self) -> ClientConnection:
+        settings = self._settings
+        key = key_for(settings.url, settings.key_variable, "chat settings: [expression]")
+        socket = connect(
+            settings.url.replace("http", "ws", 1).rstrip("/") + PATH,
+            additional_headers={"Authorization": f"Bearer {key}"} if key else {},
+            open_timeout=settings.timeout,
+            close_timeout=settings.timeout,
+            proxy=None,
+        )
+        hello = json.loads(socket.recv(settings.timeout))
+        own = {
+            "model": self._sha256,
+            "rate": SPEECH_RATE,
+            "fps": EXPRESSION_FPS,
+            "size": SPEECH_SIZE,
+        }
+        if hello != own:
+            socket.close()
+            raise ServiceError("it serves another avatar's model: start it with this --bundle.")
+        return socket
+
+    def _hang_up(self) -> None:
+        socket, self._socket = self._socket, None
+        if socket is not None:
+            threading.Thread(target=socket.close, daemon=True).start()  # it may wait for an answer
+
+
+class RemoteLips:
+    """The mouth's part of one sentence; goes on with the own model where the server fails."""
+
+    def __init__(self, mouth: RemoteMouth, sentence: int):
+        """A sentence that has not begun."""
+        self._mouth, self._sentence = mouth, sentence
+        self._samples = np.zeros(0, np.float32)  # all that came
+        self._given = 0  # rows
+        self._own: StreamingExpressions | None = None
+
+    def push(self, samples: np.ndarray) -> np.ndarray:
+        """Takes (S,) samples in [-1, 1]; returns the rows (n, C) known now."""
+        if self._own is not None:
+            return self._own.push(samples)
+        is_first = len(self._samples) == 0
+        self._samples = np.concatenate([self._samples, samples])
+        pcm = np.round(samples * 32768).astype("<i2").tobytes()
+        return self._asked(pcm, is_first)
+
+    def finish(self) -> np.ndarray:
+        """Ends the sentence; returns the remaining rows (n, C)."""
+        if self._own is None:
+            rows = self._asked(FINISH, len(self._samples) == 0)
+            if self._own is None:
+                return rows
+            return np.concatenate([rows, self._own.finish()])
+        return self._own.finish()
+
+    def _asked(self, message: bytes | str, is_first: bool) -> np.ndarray:
+        try:
+            rows = self._mouth.ask(self._sentence, message, is_first)
+        except FAILURES:
+            # from the sentence's start, for a row depends on what was before it
+            self._own = StreamingExpressions(self._mouth.model, SPEECH_RATE)
+            rows = self._own.push(self._samples)[self._given :]
+        self._given += len(rows)
+        return rows

@@ -1,0 +1,117 @@
+"""`POST /v1/audio/transcriptions`: a WAV file in, its words out."""
+
+import asyncio
+import io
+import wave
+from collections.abc import Iterator
+from typing import Annotated, BinaryIO, Literal
+
+import numpy as np
+from fastapi import FastAPI, File, Form, Response, UploadFile
+from fastapi.responses import JSONResponse, PlainTextResponse
+from pipecat.frames.frames import (
+    Frame,
+    InputAudioRawFrame,
+    TranscriptionFrame,
+    VADUserStartedSpeakingFrame,
+    VADUserStoppedSpeakingFrame,
+)
+
+from ico3d.chat.remote.headless import Spares, run
+from ico3d.chat.wire.protocol import MICROPHONE_CHUNK, MICROPHONE_RATE
+from ico3d.common.sound import REQUEST, WAV_ERRORS, fault, open_claim
+from ico3d.errors import ProtocolError
+from ico3d.speech.mel import resampling_stream
+
+LEAD_IN = 15  # chunks before speech is announced: a VAD is that late too
+QUIET = np.zeros(MICROPHONE_RATE * 3 // 10, np.int16)  # around speech, as recognisers expect it
+BLOCK = 1 << 14  # frames that are converted at once
+DTYPES = {1: np.uint8, 2: np.dtype("<i2"), 4: np.dtype("<i4")}  # by bytes of a WAV's samples
+
+
+def add_routes(app: FastAPI, name: str, spares: Spares, seconds: float) -> None:
+    """Adds the route.
+
+    Args:
+        app: Where to.
+        name: Of the model; what clients call it is not looked at.
+        spares: Makes recognisers.
+        seconds: That a request may take.
+    """
+
+    @app.post("/v1/audio/transcriptions")
+    async def transcriptions(
+        file: Annotated[UploadFile, File()],
+        response_format: Annotated[Literal["json", "text", "verbose_json"], Form()] = "json",
+    ) -> Response:
+        pcm = await asyncio.to_thread(read_wav, file.file)
+        made = run(await spares.take(), heard(pcm), seconds)
+        said = [frame async for frame in made if isinstance(frame, TranscriptionFrame)]
+        return _answer(said, len(pcm) / MICROPHONE_RATE, response_format)
+
+
+def _answer(said: list[TranscriptionFrame], duration: float, form: str) -> Response:
+    text = " ".join(frame.text.strip() for frame in said)
+    if form == "text":
+        return PlainTextResponse(text + "\n")
+    if form == "json":
+        return JSONResponse({"text": text})
+    language = next((str(frame.language) for frame in said if frame.language), "")
+    facts = {"task": "transcribe", "language": language, "duration": duration, "text": text}
+    return JSONResponse(facts)
+
+
+def heard(pcm: np.ndarray) -> list[Frame]:
+    """(S,) int16 at 16 kHz as a conversation would bring it: one stretch of speech."""
+    pcm = np.concatenate([QUIET, pcm, QUIET])
+    starts = range(0, len(pcm), MICROPHONE_CHUNK)
+    pieces = [pcm[at : at + MICROPHONE_CHUNK].tobytes() for at in starts]
+    frames: list[Frame] = [InputAudioRawFrame(piece, MICROPHONE_RATE, 1) for piece in pieces]
+    frames.insert(min(LEAD_IN, len(frames)), VADUserStartedSpeakingFrame())
+    return [*frames, VADUserStoppedSpeakingFrame()]
+
+
+def read_wav(file: BinaryIO) -> np.ndarray:
+    """A WAV file as (S,) int16 mono at 16 kHz, judged by its header before its samples are read.
+
+    Raises:
+        ProtocolError: If it is none, has no sound, or claims what is not taken.
+        MissingExtraError: If soxr is needed and not installed.
+    """
+    size = file.seek(0, io.SEEK_END)
+    file.seek(0)
+    try:
+        with wave.open(file, "rb") as sound:
+            pieces = list(_pieces(sound, size))
+    except WAV_ERRORS as error:
+        raise ProtocolError(f"the file is no WAV file of PCM samples ({error}).") from None
+    pcm = np.concatenate(pieces)
+    if len(pcm) == 0:
+        raise ProtocolError("the WAV file has no sound in it.")
+    return pcm
+
+
+def _pieces(sound: wave.Wave_read, size: int) -> Iterator[np.ndarray]:
+    """The (n,) int16 pieces of a sound of at most `size` bytes, mono at 16 kHz."""
+    claim = open_claim(sound, size)
+    if claim.width not in DTYPES:
+        raise ProtocolError(f"the WAV file has samples of {8 * claim.width} bits: use 16.")
+    wrong = fault(claim, REQUEST)
+    if wrong:
+        raise ProtocolError(f"the WAV file {wrong}.")
+    convert = resampling_stream(claim.rate)
+    one = claim.width * claim.channels  # bytes
+    while raw := sound.readframes(BLOCK):
+        whole = raw[: len(raw) // one * one]
+        yield _int16(convert(_mono(whole, claim.width, claim.channels), False))
+    yield _int16(convert(np.zeros(0, np.float32), True))
+
+
+def _mono(raw: bytes, width: int, channels: int) -> np.ndarray:
+    """Whole frames as (n,) samples in [-32768, 32768)."""
+    samples = np.frombuffer(raw, DTYPES[width]).reshape(-1, channels).mean(axis=1)  # (n,)
+    return (samples - 128 if width == 1 else samples) / 256.0 ** (width - 2)
+
+
+def _int16(samples: np.ndarray) -> np.ndarray:
+    return np.clip(np.round(samples), -32768, 32767).astype(np.int16)

@@ -1,0 +1,219 @@
+"""One WebSocket: from `hello` to its end."""
+
+import asyncio
+import contextlib
+
+from fastapi import WebSocket, WebSocketDisconnect
+from loguru import logger
+
+from ico3d.chat.observing.failures import cause
+from ico3d.chat.page import Outbox
+from ico3d.chat.serving.limits import Inlet, Limits
+from ico3d.chat.serving.sessions import BROKEN_OFF, FullError, Session, Sessions
+from ico3d.chat.wire import protocol
+from ico3d.chat.wire.codec import OversizedError, decode_client, encode
+from ico3d.chat.wire.protocol import (
+    Ack,
+    Audio,
+    ClientMessage,
+    Clock,
+    Deaf,
+    Error,
+    Heard,
+    Hello,
+    Interrupt,
+    Talk,
+    Text,
+    Welcome,
+)
+from ico3d.errors import Ico3dError, ProtocolError
+
+HELLO_SECONDS = 10  # that a page may take to say hello
+GOING, BROKEN, TOO_BIG, FAILED, BUSY = 1000, 1008, 1009, 1011, 1013  # WebSocket close codes
+GONE = (1000, 1001)  # what pages send that will not come back: the visitor left, or loads it anew
+UNREADY = "the avatar cannot talk now: something on the server does not start. Try again later."
+
+
+class Hangup(Exception):
+    """The connection is to be closed with an error."""
+
+    def __init__(self, code: int, message: str, again: bool = False):
+        """A close code, one sentence for the page, and whether a new session may succeed."""
+        super().__init__(message)
+        self.code, self.again = code, again
+
+
+class Connection:
+    """Reads a page's messages and writes what its session has for it."""
+
+    def __init__(self, socket: WebSocket, sessions: Sessions, notices: list[str]):
+        """A connection.
+
+        Args:
+            socket: An accepted WebSocket.
+            sessions: Where its session comes from.
+            notices: What every page is told of the avatar.
+        """
+        self._socket, self._sessions, self._notices = socket, sessions, notices
+        self._limits, self._inlet = Limits(), Inlet()
+        self._outbox = Outbox()
+
+    async def run(self) -> None:
+        """Talks until one of both sides ends it."""
+        with self._sessions.monitor.connections.track_inprogress():
+            await self._run()
+
+    async def _run(self) -> None:
+        writer: asyncio.Task | None = None
+        session: Session | None = None
+        for_good = True
+        try:
+            hello = await self._hello()
+            session, resumed = await self._enter(hello)
+            await self._greet(session, resumed)
+            writer = asyncio.create_task(self._write())
+            await self._read(session)
+        except Hangup as hangup:
+            await self._hang_up(hangup)
+        except WebSocketDisconnect as disconnect:
+            for_good = disconnect.code in GONE and not self._outbox.is_closed
+        except Exception as error:
+            await self._break_off(error)
+        finally:
+            self._outbox.close()
+            if writer is not None:
+                writer.cancel()
+                await asyncio.gather(writer, return_exceptions=True)
+            if session is not None:
+                self._sessions.leave(session, self._outbox, for_good)
+
+    async def _enter(self, hello: Hello) -> tuple[Session, bool]:
+        """The page's session, or a sentence on why there is none."""
+        try:
+            return await self._sessions.enter(hello, self._outbox)
+        except FullError as error:
+            self._sessions.monitor.failed("full")
+            raise Hangup(BUSY, str(error), again=True) from error
+        except Exception as error:
+            own = isinstance(error, Ico3dError)
+            self._sessions.monitor.failed("start", str(error) if own else cause(error))
+            told = str(error) if own and self._sessions.at_home else UNREADY
+            raise Hangup(FAILED, told, again=True) from error
+
+    async def _hello(self) -> Hello:
+        try:
+            frame = await asyncio.wait_for(self._receive(), HELLO_SECONDS)
+            message = decode_client(frame)
+        except TimeoutError:
+            raise Hangup(BROKEN, "the page did not say hello.") from None
+        except ProtocolError as error:
+            raise Hangup(TOO_BIG if _is_big(error) else BROKEN, str(error)) from error
+        if not isinstance(message, Hello):
+            raise Hangup(BROKEN, "the first message must be hello.")
+        if message.version != protocol.VERSION:
+            raise Hangup(
+                BROKEN,
+                f"this page speaks version {message.version} of the protocol, "
+                f"the server version {protocol.VERSION}: reload the page.",
+            )
+        return message
+
+    async def _greet(self, session: Session, resumed: bool) -> None:
+        assert session.parts is not None
+        welcome = Welcome(
+            protocol.VERSION,
+            session.id,
+            resumed,
+            session.parts.services,
+            self._notices,
+            session.parts.dictation,
+            self._sessions.offers,
+        )
+        await self._socket.send_text(str(encode(welcome)))
+        if not resumed:
+            await session.conversation.greet()
+
+    async def _read(self, session: Session) -> None:
+        binary = 0
+        while True:
+            frame = await self._receive()
+            if isinstance(frame, bytes):
+                binary += 1
+                self._outbox.put(Ack(binary))
+            try:
+                self._limits.check_frame(frame)
+                message = decode_client(frame)
+                self._limits.check_message(message)
+                await self._handle(session, message)
+            except OversizedError as error:
+                raise Hangup(TOO_BIG, str(error)) from error
+            except ProtocolError as error:
+                self._sessions.monitor.failed("protocol")
+                if not self._limits.forgive():
+                    raise Hangup(BROKEN, str(error), again=True) from error
+                self._outbox.put(Error(str(error), fatal=False))
+
+    async def _receive(self) -> str | bytes:
+        event = await self._socket.receive()
+        if event["type"] == "websocket.disconnect":
+            raise WebSocketDisconnect(event.get("code", GOING))
+        text = event.get("text")
+        return text if text is not None else event.get("bytes") or b""
+
+    async def _handle(self, session: Session, message: ClientMessage) -> None:
+        conversation = session.conversation
+        if isinstance(message, Audio):
+            for sound in self._inlet.take(message):
+                await conversation.hear(sound)
+        elif isinstance(message, Clock):
+            conversation.clock(message)
+        elif isinstance(message, Text):
+            if not message.text.strip():
+                raise ProtocolError("text: is empty.")
+            await conversation.ask(message.text.strip())
+        elif isinstance(message, Heard | Deaf) and not (session.parts and session.parts.dictation):
+            raise ProtocolError("this server listens itself.")
+        elif isinstance(message, Heard):
+            await conversation.heard(message)
+        elif isinstance(message, Deaf):
+            await conversation.deaf(message.reason)
+        elif isinstance(message, Talk):
+            for sound in self._inlet.rest():  # it belongs to the button's last state
+                await conversation.hear(sound)
+            await conversation.talk(message.pressed)
+        elif isinstance(message, Interrupt):
+            await conversation.interrupt(message.utterance)
+        else:
+            raise ProtocolError("hello comes only once.")
+
+    async def _write(self) -> None:
+        """Sends until the outbox is closed, which ends the connection too."""
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # the page is gone
+            while (message := await self._outbox.get()) is not None:
+                try:
+                    frame = encode(message)
+                except ProtocolError as error:  # one message less, and the conversation goes on
+                    self._sessions.monitor.failed("encoding", str(error))
+                    continue
+                if isinstance(frame, str):
+                    await self._socket.send_text(frame)
+                else:
+                    await self._socket.send_bytes(frame)
+            await self._socket.close(GOING)
+
+    async def _break_off(self, error: Exception) -> None:
+        """A fault of ours: the page is told, and does not come back to the same again."""
+        self._sessions.monitor.failed("connection", cause(error))
+        logger.opt(exception=error).debug("the connection's fault in full")
+        await self._hang_up(Hangup(FAILED, BROKEN_OFF, again=True))
+
+    async def _hang_up(self, hangup: Hangup) -> None:
+        logger.debug(f"closing a connection with {hangup.code}: {hangup}")
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            error = Error(str(hangup), fatal=True, again=hangup.again)
+            await self._socket.send_text(str(encode(error)))
+            await self._socket.close(hangup.code)
+
+
+def _is_big(error: ProtocolError) -> bool:
+    return isinstance(error, OversizedError)

@@ -1,0 +1,126 @@
+"""How much a page may send, and what of late sound is still of use."""
+
+import time
+from collections import deque
+from collections.abc import Callable
+
+from ico3d.chat.wire.protocol import (
+    MAX_BURST,
+    MAX_RATE,
+    MICROPHONE_CHUNK,
+    MICROPHONE_RATE,
+    Audio,
+    ClientMessage,
+)
+from ico3d.errors import ProtocolError
+
+STALL = 60  # s for which a network may hold back what a microphone makes, and deliver it at once
+AUDIO_RATE = 1.25 * MICROPHONE_RATE  # samples per second for long: clocks differ a little
+FORGIVEN = 5  # broken rules after which a connection is closed
+FORGOTTEN = 10.0  # s after which one of them is forgotten
+
+PAUSE = 1.0  # s without sound after which a backlog may follow
+CATCH_UP = 2.0  # times real time at which sound may arrive and still be used
+JITTER, BACKLOG = 1.0, 0.1  # s of sound that may come at once, and that may after a pause
+SETTLED = 0.2  # s of sound: how far the balance falls at most, so how soon a backlog is over
+KEPT = 5.0  # s of a backlog's latest sound that are still used: a question and how it began
+
+
+class Bucket:
+    """A token bucket: `rate` per second for long, `burst` at once."""
+
+    def __init__(self, rate: float, burst: float, now: Callable[[], float]):
+        """A full bucket."""
+        self._rate, self._burst, self._now = rate, burst, now
+        self._level, self._at = burst, now()
+
+    def take(self, amount: float) -> bool:
+        """Takes an amount if it is there."""
+        now = self._now()
+        self._level = min(self._burst, self._level + self._rate * (now - self._at))
+        self._at = now
+        if amount > self._level:
+            return False
+        self._level -= amount
+        return True
+
+
+class Limits:
+    """The limits of one connection.
+
+    Sound has wide ones: when a network that stalled comes back, all that the microphone made
+    meanwhile arrives at once, and that is nobody's fault.
+    """
+
+    def __init__(self, now: Callable[[], float] = time.monotonic):
+        """A connection that has sent nothing yet."""
+        self._texts = Bucket(MAX_RATE, MAX_BURST, now)
+        self._sounds = Bucket(MAX_RATE, STALL * MICROPHONE_RATE / MICROPHONE_CHUNK, now)
+        self._samples = Bucket(AUDIO_RATE, STALL * MICROPHONE_RATE, now)
+        self._forgiveness = Bucket(1 / FORGOTTEN, FORGIVEN - 1, now)
+
+    def check_frame(self, frame: str | bytes) -> None:
+        """Counts a frame; only sound comes in binary ones.
+
+        Raises:
+            ProtocolError: If there are too many.
+        """
+        if not (self._sounds if isinstance(frame, bytes) else self._texts).take(1):
+            raise ProtocolError(f"more than {MAX_RATE} messages per second.")
+
+    def check_message(self, message: ClientMessage) -> None:
+        """Counts a message's sound.
+
+        Raises:
+            ProtocolError: If more sound comes than a microphone makes.
+        """
+        if isinstance(message, Audio) and not self._samples.take(len(message.pcm)):
+            raise ProtocolError("more sound than a microphone makes.")
+
+    def forgive(self) -> bool:
+        """Counts a broken rule; False when it was one too many in a short time."""
+        return self._forgiveness.take(1)
+
+
+class Inlet:
+    """Lets sound in as it arrives; of a backlog, only the latest seconds.
+
+    What a network held back for many seconds comes much faster than it was said. To answer it
+    would be to answer the past, so it waits until sound comes in time again, and the oldest of
+    it is dropped. Whether sound is in time is told by its rate alone: the numbers of its samples
+    are no clock, for they stand still while the visitor's button is up.
+    """
+
+    def __init__(self, now: Callable[[], float] = time.monotonic):
+        """No sound yet."""
+        self._now, self._at = now, now()
+        self._balance = BACKLOG  # s of sound that may still come at once; below 0 in a backlog
+        self._waiting: deque[Audio] = deque()
+
+    def take(self, sound: Audio) -> list[Audio]:
+        """Takes sound as it arrives; returns what is to be heard now, in order."""
+        now = self._now()
+        since, self._at = now - self._at, now
+        if since - seconds(sound) >= PAUSE:
+            self._balance = BACKLOG
+            self._waiting.clear()  # the end of an older backlog
+        else:
+            self._balance = min(JITTER, self._balance + CATCH_UP * since)
+        self._balance = max(-SETTLED, self._balance - seconds(sound))
+        self._waiting.append(sound)
+        if self._balance >= 0:
+            return self.rest()
+        while sum(map(seconds, self._waiting)) > KEPT:
+            self._waiting.popleft()
+        return []
+
+    def rest(self) -> list[Audio]:
+        """What still waits, for something that comes after it."""
+        rest = list(self._waiting)
+        self._waiting.clear()
+        return rest
+
+
+def seconds(sound: Audio) -> float:
+    """How long a message's sound is."""
+    return len(sound.pcm) / MICROPHONE_RATE

@@ -1,0 +1,195 @@
+"""The HTTP server: the page, the bundle's files, and the WebSocket of the conversation."""
+
+import asyncio
+import contextlib
+import gc
+import socket
+from collections.abc import AsyncIterator
+from dataclasses import replace
+from pathlib import Path
+
+import uvicorn
+from fastapi import FastAPI, Request, Response, WebSocket
+from fastapi.responses import JSONResponse, PlainTextResponse
+from threadpoolctl import threadpool_limits
+
+from ico3d.bundle.format import SPEECH, Bundle
+from ico3d.bundle.manifest import MANIFEST
+from ico3d.bundle.persona import Persona
+from ico3d.chat.observing.monitor import CONTENT_TYPE
+from ico3d.chat.parts import Avatar
+from ico3d.chat.performing.face import open_face
+from ico3d.chat.services import choose
+from ico3d.chat.services.offers import offers
+from ico3d.chat.serving.connection import Connection
+from ico3d.chat.serving.guard import LOOPBACK, Guard
+from ico3d.chat.serving.page_files import PageFiles
+from ico3d.chat.serving.sessions import Sessions
+from ico3d.chat.settings.conversation import ChatSettings
+from ico3d.chat.wire import protocol
+from ico3d.errors import BundleError, SettingsError
+
+STATIC = Path(__file__).parents[1] / "static"
+JSON = "application/json"
+TYPES = {".json": JSON, ".png": "image/png", ".txt": "text/plain; charset=utf-8"}
+FRESH = {"Cache-Control": "no-cache"}
+STILL = "This avatar is driven by blendshapes, not by sound: its lips do not move while it speaks."
+
+
+def open_avatar(bundle: Bundle, settings: ChatSettings, persona: Persona | None = None) -> Avatar:
+    """What the sessions share.
+
+    Args:
+        bundle: The avatar.
+        settings: Services and timing.
+        persona: Who it is; the bundle's by default.
+
+    Raises:
+        BundleError: If the bundle has no head.
+        SettingsError: If a service is unknown.
+        ModelError: If the bundle's speech model cannot be used.
+    """
+    head, speech = open_face(bundle)
+    persona = persona or bundle.manifest.persona
+    services = choose(settings, persona.voice)
+    sha256 = bundle.manifest.files[SPEECH].sha256 if speech else ""
+    return Avatar(head, speech, persona, services, settings, bundle.animation, sha256)
+
+
+def make_app(
+    bundle: Bundle, avatar: Avatar | None, host: str, sessions: Sessions | None = None
+) -> Guard:
+    """The application.
+
+    Args:
+        bundle: What the page loads.
+        avatar: What the sessions share; None for a body alone, which does not talk.
+        host: The address that the server is bound to.
+        sessions: Where sessions live; a new place by default.
+    """
+    if avatar is not None:
+        sessions = Sessions(avatar) if sessions is None else sessions
+        sessions.at_home = host in LOOPBACK  # it may cost money, and tells of the machine
+        if sessions.at_home:
+            sessions.offers = offers(avatar.settings, avatar.persona.voice)
+
+    @contextlib.asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        gc.freeze()  # what stays need not be looked at when a session's memory is freed
+        yield
+        if sessions is not None:
+            await sessions.close_all()
+
+    app = FastAPI(lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
+
+    @app.get("/health")
+    async def health() -> JSONResponse:
+        return JSONResponse({"ok": True})
+
+    @app.get("/bundle/{name:path}")
+    async def bundle_file(name: str, request: Request) -> Response:
+        if name == MANIFEST and avatar is not None:
+            manifest = await asyncio.to_thread(shown_manifest, bundle, avatar.persona)
+            return Response(manifest, headers=FRESH, media_type=JSON)
+        return await asyncio.to_thread(serve_file, bundle, name, request)
+
+    if avatar is not None and sessions is not None:
+        add_conversation(app, avatar, sessions)
+    add_page(app)
+    return Guard(app, host)
+
+
+def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
+    """The WebSocket, and figures of what happens on it."""
+    notices = [] if avatar.speech else [STILL]
+
+    @app.websocket("/ws")
+    async def conversation(socket: WebSocket) -> None:
+        await socket.accept()
+        await Connection(socket, sessions, notices).run()
+
+    @app.get("/metrics")
+    async def metrics() -> Response:
+        return Response(sessions.monitor.exposition(), headers={"Content-Type": CONTENT_TYPE})
+
+
+def shown_manifest(bundle: Bundle, persona: Persona) -> bytes:
+    """The manifest with the name of who is there; what a persona's file knows stays here."""
+    if persona is bundle.manifest.persona:
+        return bundle.read(MANIFEST)
+    return replace(bundle.manifest, persona=Persona(persona.name, persona.greeting)).to_json()
+
+
+def serve_file(bundle: Bundle, name: str, request: Request) -> Response:
+    """One file of the bundle; browsers keep it as long as its hash stays the same."""
+    if name not in bundle.names:
+        return PlainTextResponse(f"The bundle has no file {name[:80]!r}.\n", 404)
+    entry = bundle.manifest.files.get(name)
+    headers = dict(FRESH)
+    if entry is not None:
+        headers["ETag"] = f'"{entry.sha256}"'
+        if request.headers.get("if-none-match") == headers["ETag"]:
+            return Response(status_code=304, headers=headers)
+    try:
+        data = bundle.read(name)
+    except BundleError as error:
+        return PlainTextResponse(f"{error}\n", 500)
+    media_type = TYPES.get(Path(name).suffix, "application/octet-stream")
+    return Response(data, media_type=media_type, headers=headers)
+
+
+def add_page(app: FastAPI) -> None:
+    """The viewer's files, or a sentence on how to build them."""
+    if (STATIC / "index.html").is_file():
+        app.mount("/", PageFiles(STATIC))
+        return
+
+    @app.get("/")
+    async def missing() -> PlainTextResponse:
+        return PlainTextResponse("The page is not built: run `make viewer` and reload.\n", 503)
+
+
+def bind(host: str, port: int) -> socket.socket:
+    """Takes the port before anything is loaded for it.
+
+    Raises:
+        SettingsError: If it cannot be had.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((host, port))
+    except OSError as error:
+        listener.close()
+        raise SettingsError(
+            f"port {port} on {host} cannot be used ({error.strerror}): "
+            "choose another one with --port, 0 takes any."
+        ) from error
+    return listener
+
+
+def address(listener: socket.socket) -> str:
+    """The URL to open."""
+    host, port = listener.getsockname()[:2]
+    shown = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)
+    return f"http://{shown}:{port}/"
+
+
+def make_server(app: Guard) -> uvicorn.Server:
+    """A server for `app`; run it with `server.run(sockets=[listener])`.
+
+    From now on numpy multiplies matrices in one thread. A server's are small, and others would
+    wait for the next one by spinning, on the cores that the conversation needs.
+    """
+    threadpool_limits(1, user_api="blas")
+    config = uvicorn.Config(
+        app,
+        log_config=None,  # `operator_log` takes what it says
+        log_level="warning",
+        ws_max_size=protocol.MAX_BINARY_FRAME,
+        ws_per_message_deflate=False,  # sound hardly shrinks, and a core has better things to do
+        timeout_graceful_shutdown=2,
+        server_header=False,
+    )
+    return uvicorn.Server(config)

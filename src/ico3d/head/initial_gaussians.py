@@ -1,0 +1,113 @@
+"""The Gaussians a head starts with."""
+
+import logging
+
+import numpy as np
+import torch
+
+from ico3d.capture.capture import Capture
+from ico3d.capture.surface.coverage import Moment, find_gap
+from ico3d.capture.surface.head import head_silhouettes
+from ico3d.common.spread import spread
+from ico3d.errors import CaptureError
+from ico3d.head.model import HeadModel, HeadShape, Variant
+from ico3d.head.settings import HeadSettings
+from ico3d.head.views import view_of
+from ico3d.splat.initial import in_pictures, resampled, spacing
+
+MOMENTS = 4
+"""Spread over the training frames: where the masks are compared with the surface points."""
+NEAREST = 16
+"""Frames about such a moment among which each camera's mask is looked for."""
+REACH = 3.0
+"""Spacings around a surface point that it accounts for."""
+LEAST_REACH = 0.01
+"""Metres: how far a surface may lie off the masks' edges, however dense it is."""
+
+log = logging.getLogger(__name__)
+
+
+def initial_head(
+    capture: Capture,
+    settings: HeadSettings,
+    variant: Variant,
+    expression_size: int,
+    rng: np.random.Generator,
+) -> HeadModel:
+    """A head on the capture's surface points, round Gaussians as wide as their spacing.
+
+    What the masks show of the person beyond these points (a face model ends at the neck) begins on
+    the visual hull, with as large a part of the Gaussians as it has of the person's pixels.
+
+    Raises:
+        CaptureError: If the capture has no surface points or one is not finite.
+    """
+    surface = capture.points()
+    if surface is None or len(surface) < 4 or not np.isfinite(surface).all():
+        raise CaptureError(f"{capture.path} has no finite surface points to start from.")
+    seen = _seen(capture, np.asarray(surface, np.float64))  # (P', 3)
+    points = _whole_person(capture, seen, settings.initial_gaussians, rng)  # (N, 3)
+    low, high = points.min(0), points.max(0)
+    shape = HeadShape(
+        expression_size=expression_size,
+        variant=variant,
+        features=settings.features,
+        hidden=settings.hidden,
+        frequencies=settings.frequencies,
+        box_center=tuple(((low + high) / 2).tolist()),
+        box_size=float((high - low).max() / 2),
+    )
+    model = HeadModel(shape, len(points))
+    model.means.data = torch.from_numpy(points).float()
+    model.log_scales.data = torch.from_numpy(np.log(spacing(points))).float()[:, None].repeat(1, 3)
+    return model
+
+
+def _whole_person(
+    capture: Capture, surface: np.ndarray, count: int, rng: np.random.Generator
+) -> np.ndarray:
+    """(count, 3) points on a surface (P, 3), and on what it leaves out of the person."""
+    reach = max(REACH * float(np.quantile(spacing(surface), 0.9)), LEAST_REACH)
+    gap = find_gap(surface, _moments(capture), reach)
+    if len(gap.points) < 4:
+        if gap.share:
+            log.warning(
+                "%s: the surface points leave out %.0f %% of the person, and the masks do not "
+                "agree on where that is: what lies beyond the points will be blurred.",
+                capture.path,
+                100 * gap.share,
+            )
+        return resampled(surface, count, rng)
+    log.info(
+        "%s: the surface points leave out %.0f %% of the person, who begins there on the masks.",
+        capture.path,
+        100 * gap.share,
+    )
+    extra = round(gap.share * count)
+    parts = [resampled(surface, count - extra, rng), resampled(gap.points, extra, rng)]
+    return np.concatenate(parts)
+
+
+def _moments(capture: Capture) -> list[Moment]:
+    """What the cameras saw of the person in some training frames, in canonical head space."""
+    train, found = capture.split.train, []
+    for place in spread(len(train), MOMENTS):
+        first = min(max(place - NEAREST // 2, 0), max(len(train) - NEAREST, 0))
+        seen = head_silhouettes(capture, train[place], train[first : first + NEAREST])
+        if seen:
+            found.append(seen)
+    return found
+
+
+def _seen(capture: Capture, points: np.ndarray) -> np.ndarray:
+    """The points (P', 3) of (P, 3) that lie within some picture: others would never be trained."""
+    frames = capture.split.train[:: max(1, len(capture.split.train) // 8)]
+    cameras = [
+        view_of(capture, index, frame).camera
+        for frame in frames
+        for index in range(len(capture.cameras))
+    ]
+    inside = in_pictures(points, cameras).any(0)  # (P,)
+    if inside.sum() < 4:
+        raise CaptureError(f"{capture.path}: no camera sees the surface points; check the poses.")
+    return points[inside]

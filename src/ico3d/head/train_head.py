@@ -1,0 +1,136 @@
+"""From a capture to a model folder: sets up, trains, saves."""
+
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from ico3d.capture.capture import Capture
+from ico3d.capture.face.canonical import canonical_landmarks
+from ico3d.common.device import DeviceName
+from ico3d.common.expression import EyeRange, eye_range
+from ico3d.errors import CaptureError
+from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack, SpeechTrack, speech_features
+from ico3d.head.initial_gaussians import initial_head
+from ico3d.head.model import HeadModel, Variant
+from ico3d.head.model_folder import Inputs, TrainedHead
+from ico3d.head.optimise import HeadTrainer
+from ico3d.head.settings import HeadSettings
+from ico3d.head.views import poses_digest
+from ico3d.head.watch import WatchedHead
+from ico3d.speech.encoder import load_encoder
+from ico3d.speech.network import SpeechAdaptor
+from ico3d.splat.device import computing_device
+from ico3d.training.loop import LoopSettings, run_loop
+from ico3d.training.run import RunFolder
+from ico3d.training.watch import LivePage
+
+
+@dataclass(frozen=True)
+class HeadJob:
+    """What to train.
+
+    Attributes:
+        inputs: What drives the head.
+        variant: The model.
+        encoder: Name of the speech encoder, for speech.
+        seed: All randomness follows from it.
+        settings: How to train.
+    """
+
+    inputs: Inputs
+    variant: Variant
+    encoder: str
+    seed: int
+    settings: HeadSettings
+
+
+def train_head(
+    capture: Capture,
+    folder: Path,
+    job: HeadJob,
+    watch_port: int | None = None,
+    device: DeviceName = "auto",
+) -> TrainedHead:
+    """Trains a head, or goes on with an interrupted run of the same settings.
+
+    Args:
+        capture: Where pictures, poses and expressions come from.
+        folder: Model folder; also holds metrics and checkpoints.
+        job: What to train.
+        watch_port: Where a page shows the training while it lasts; None for nowhere.
+        device: Where to compute; a run may go on elsewhere.
+
+    Returns:
+        The trained head, as the folder now holds it.
+
+    Raises:
+        CaptureError: If the capture lacks something that is needed.
+        SettingsError: If the folder holds a run with other settings, or CUDA does not work.
+        ModelError: If training diverges.
+        MissingExtraError: If it is to be watched and viser is not installed.
+    """
+    about = asdict(job)
+    about |= {"capture": str(capture.path.resolve()), **about.pop("settings")}
+    run = RunFolder(folder, about)
+    if run.finished() is not None:
+        return TrainedHead.load(folder)
+    place = computing_device(device)
+    torch.manual_seed(job.seed)  # layers draw their weights
+    track, adaptor, encoder = _inputs(capture, job, place)
+    rng = np.random.default_rng(job.seed)
+    model = initial_head(capture, job.settings, job.variant, track.size, rng)
+    model.to(place)
+    trainer = HeadTrainer(capture, model, track, adaptor, job.settings, job.seed)
+    every = job.settings.checkpoint_every
+    loop = LoopSettings(job.settings.steps, checkpoint_every=every, label="head")
+    with _page(capture, model, track, watch_port) as page:
+        seconds = run_loop(trainer, run, loop, page)
+    names = track.names if isinstance(track, BlendshapeTrack) else ()
+    summary = {
+        "train_seconds": seconds,
+        "capture": capture.provenance,
+        "recording": {"path": str(capture.path.resolve()), "poses": poses_digest(capture)},
+        "settings": asdict(trainer.settings),
+    }
+    landmarks = canonical_landmarks(capture)
+    eyes = _eyes(capture, track)
+    head = TrainedHead(
+        trainer.model, job.inputs, names, *encoder, adaptor, summary, landmarks, eyes
+    )
+    head.save(folder)
+    run.finish({"train_seconds": seconds, "num_gaussians": len(trainer.model)})
+    return head
+
+
+def _eyes(capture: Capture, track: ExpressionTrack) -> EyeRange:
+    """How far eyes and brows move in the frames that train the head."""
+    if not isinstance(track, SpeechTrack):
+        return EyeRange()
+    return eye_range(track.eyes[list(capture.split.train)].numpy())
+
+
+def _page(
+    capture: Capture, model: HeadModel, track: ExpressionTrack, port: int | None
+) -> AbstractContextManager[LivePage | None]:
+    """The page that shows the training, if there is to be one."""
+    return nullcontext() if port is None else LivePage(WatchedHead(capture, model, track), port)
+
+
+def _inputs(
+    capture: Capture, job: HeadJob, device: torch.device
+) -> tuple[ExpressionTrack, SpeechAdaptor | None, tuple[str, str]]:
+    """What drives the head; for speech the adaptor to train and the encoder's name and sha256."""
+    if job.inputs == "blendshapes":
+        if capture.blendshape_names is None:
+            raise CaptureError(f"{capture.path} has no blendshapes: train with --inputs speech.")
+        track = BlendshapeTrack(capture, capture.blendshape_names)
+        for frame in capture.split.train:
+            track.at(frame)  # a frame without is better found now than after an hour
+        return track, None, ("", "")
+    encoder = load_encoder(job.encoder)
+    features = speech_features(capture, encoder, device)  # (T, D)
+    adaptor = SpeechAdaptor(encoder.size, encoder.vectors)
+    return SpeechTrack(capture, features, adaptor), adaptor, (encoder.name, encoder.sha256)

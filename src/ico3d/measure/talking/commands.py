@@ -1,0 +1,121 @@
+"""Commands that measure conversations; heavy imports happen when they run."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from ico3d.measure.talking.kinds import Kind
+
+
+@dataclass(frozen=True)
+class BenchChat:
+    """Talks with a served bundle by the clock: how soon it answers, and how soon it falls silent.
+
+    Questions are timed from their end to the first sample of the answer that a page would play,
+    with the services that the settings name. Interruptions are timed from the visitor's first
+    audible sample; "uh-huh" must not stop an answer. The server's own share is measured on a
+    second server, whose services have set delays, from questions that break off amid a sound.
+
+    Attributes:
+        bundle: The avatar to serve; servers run as processes of their own.
+        speech: Folder of recorded questions (WAV, PCM16 mono 16 kHz); synthetic voices ask by
+            default.
+        turns: How many trials of each kind.
+        kinds: Which trials.
+        settings: TOML or JSON file that chooses services and timing.
+        json: File for the figures.
+    """
+
+    bundle: tyro.conf.Positional[Path] = Path("demo")
+    speech: Path | None = None
+    turns: int = 50
+    kinds: tuple[Kind, ...] = ("questions", "interruptions", "assent", "share")
+    settings: Path | None = None
+    json: Path | None = None
+
+    def run(self) -> None:
+        """Prints median and 95th percentile, writes the figures.
+
+        Raises:
+            SettingsError: If there are to be no trials.
+        """
+        import json
+
+        from rich.console import Console
+        from rich.progress import Progress
+
+        from ico3d.chat.observing.operator_log import set_up_log
+        from ico3d.common.files import write_atomic
+        from ico3d.errors import SettingsError
+
+        set_up_log(verbose=False)
+        from ico3d.measure.talking import bench, host
+        from ico3d.measure.talking.questions import sayings
+
+        if self.turns < 1:
+            raise SettingsError("--turns must be at least 1.")
+        said = sayings(self.speech)
+        with host.watched() as stolen, Progress() as progress:
+            bars = {kind: progress.add_task(kind, total=self.turns) for kind in self.kinds}
+            results = bench.measure(
+                self.bundle,
+                self.settings,
+                said,
+                self.kinds,
+                self.turns,
+                lambda kind: progress.advance(bars[kind]),
+            )
+        figures = bench.figures(results)
+        if self.json is not None:
+            told = figures | {"stolen_cores": stolen.cores}
+            write_atomic(self.json, json.dumps(told, indent=1).encode())
+        for table in bench.tables(figures):
+            Console().print(table)
+        Console().print(stolen.sentence())
+
+
+@dataclass(frozen=True)
+class BenchSessions:
+    """Lets many visitors talk with one server at once, and checks what each of them hears.
+
+    All ask within two seconds, twice. The voices are made in advance, one tone for each visitor;
+    faces are made as always. Nobody may hear another one's tone, and each piece of speech has to
+    be there before it is played.
+
+    Attributes:
+        bundle: The avatar to serve, by a process of its own.
+        visitors: How many.
+        microphones: How many of them have theirs open, in a silent room: the server listens.
+        json: File for the figures.
+    """
+
+    bundle: tyro.conf.Positional[Path] = Path("demo")
+    visitors: int = 20
+    microphones: int = 0
+    json: Path | None = None
+
+    def run(self) -> None:
+        """Prints what was heard and how early, writes the figures.
+
+        Raises:
+            SettingsError: If there are to be no visitors, or more than there are tones.
+        """
+        import json
+
+        from rich.console import Console
+
+        from ico3d.chat.observing.operator_log import set_up_log
+        from ico3d.common.files import write_atomic
+
+        set_up_log(verbose=False)
+        from ico3d.measure.talking import crowd, host
+
+        with host.watched() as stolen:
+            visits = crowd.measure(self.bundle, self.visitors, self.microphones)
+        figures = crowd.figures(visits)
+        if self.json is not None:
+            told = figures | {"stolen_cores": stolen.cores}
+            write_atomic(self.json, json.dumps(told, indent=1).encode())
+        Console().print(crowd.table(figures))
+        Console().print(stolen.sentence())

@@ -1,0 +1,150 @@
+"""Services with set delays: whatever time a conversation takes besides is the server's own.
+
+They understand, think and speak nothing. For timing and load tests of the server, also on machines
+where the real services are slow or absent.
+"""
+
+import asyncio
+import itertools
+from collections.abc import AsyncGenerator, Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from pipecat.frames.frames import (
+    Frame,
+    LLMContextFrame,
+    LLMFullResponseEndFrame,
+    LLMFullResponseStartFrame,
+    LLMTextFrame,
+    TranscriptionFrame,
+    TTSAudioRawFrame,
+    VADUserStoppedSpeakingFrame,
+)
+from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
+from pipecat.services.llm_service import LLMService
+from pipecat.services.settings import LLMSettings, STTSettings, TTSSettings
+from pipecat.services.stt_service import STTService
+from pipecat.services.tts_service import TTSService
+from pipecat.utils.time import time_now_iso8601
+
+from ico3d.chat.services import Chosen, Service
+from ico3d.chat.services.provider import Context, Provider
+from ico3d.chat.wire.protocol import SPEECH_RATE
+
+SLOWEST = 10.0  # s that pipecat waits for words or for sound
+
+
+@dataclass(frozen=True)
+class Script:
+    """What the three do.
+
+    Attributes:
+        recognition: Seconds from the noticed end of speech to the transcript.
+        language: Seconds from a question to the first word of its answer.
+        voice: Seconds from a clause to its first sound.
+        heard: What every question is taken for.
+        answer: What is said to it.
+        seconds: How long the sound of a clause is.
+        pitch: Its tone, Hz.
+        apart: Hz by which the tone of each further session is higher.
+    """
+
+    recognition: float = 0.1
+    language: float = 0.15
+    voice: float = 0.1
+    heard: str = "what shall I ask"
+    answer: str = "This answer is as good as any other."
+    seconds: float = 2.0
+    pitch: float = 220.0
+    apart: float = 0.0
+
+    def delay(self) -> float:
+        """Seconds that all of them take, one after the other."""
+        return self.recognition + self.language + self.voice
+
+    def services(self) -> Chosen:
+        """The three, as a conversation takes them."""
+        pitches = itertools.count(self.pitch, self.apart)
+
+        def voice(script: Script, _: Context) -> FrameProcessor:
+            return Voice(replace(script, pitch=next(pitches)))
+
+        makes = (partial(made, Recognition), partial(made, Language), voice)
+        return Chosen(*(Service(Provider("scripted", Script, make), self) for make in makes))
+
+
+class Recognition(STTService):
+    """Hears the same words in everything."""
+
+    def __init__(self, script: Script):
+        """A recogniser for one session."""
+        settings = STTSettings(model="scripted", language=None)
+        super().__init__(ttfs_p99_latency=SLOWEST, settings=settings)
+        self._script = script
+
+    async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame | None, None]:
+        """Nothing: words come after the end of speech."""
+        yield None
+
+    async def _handle_vad_user_stopped_speaking(self, frame: VADUserStoppedSpeakingFrame):
+        await super()._handle_vad_user_stopped_speaking(frame)
+        self.create_task(self._tell())
+
+    async def _tell(self) -> None:
+        await asyncio.sleep(self._script.recognition)
+        words = TranscriptionFrame(self._script.heard, "", time_now_iso8601(), finalized=True)
+        await self.push_frame(words)
+
+
+class Language(LLMService):
+    """Gives every question the same answer, word by word."""
+
+    def __init__(self, script: Script):
+        """A model for one session."""
+        super().__init__(settings=LLMSettings(model="scripted"))
+        self._script = script
+
+    async def process_frame(self, frame: Frame, direction: FrameDirection):
+        """Answers contexts, passes everything else."""
+        await super().process_frame(frame, direction)
+        if not isinstance(frame, LLMContextFrame):
+            await self.push_frame(frame, direction)
+            return
+        await self.push_frame(LLMFullResponseStartFrame())
+        await asyncio.sleep(self._script.language)
+        for word in self._script.answer.split():
+            await self.push_frame(LLMTextFrame(word + " "))
+        await self.push_frame(LLMFullResponseEndFrame())
+
+
+class Voice(TTSService):
+    """Hums one tone."""
+
+    def __init__(self, script: Script):
+        """A voice for one session."""
+        super().__init__(
+            push_start_frame=True,
+            push_stop_frames=True,
+            stop_frame_timeout_s=SLOWEST,
+            sample_rate=SPEECH_RATE,
+            settings=TTSSettings(model=None, voice="scripted", language=None),
+        )
+        self._script = script
+
+    async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame | None, None]:
+        """Yields a clause's sound in one frame."""
+        await asyncio.sleep(self._script.voice)
+        sound = tone(self._script.pitch, self._script.seconds)
+        yield TTSAudioRawFrame(sound.tobytes(), SPEECH_RATE, 1, context_id=context_id)
+
+
+def tone(pitch: float, seconds: float) -> np.ndarray:
+    """(S,) int16 at 24 kHz."""
+    times = np.arange(int(seconds * SPEECH_RATE)) / SPEECH_RATE
+    return (8000 * np.sin(2 * np.pi * pitch * times)).astype(np.int16)
+
+
+def made(kind: Callable[[Script], FrameProcessor], script: Script, _: Context) -> FrameProcessor:
+    """One of the three for one session."""
+    return kind(script)

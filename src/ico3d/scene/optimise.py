@@ -1,0 +1,174 @@
+"""Optimising a static scene: one picture per step."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ico3d.capture.pictures import View
+from ico3d.scene.model import NAMES, StaticScene
+from ico3d.scene.settings import SceneSettings
+from ico3d.scene.surface_points import Start
+from ico3d.scene.views import Example, SceneViews
+from ico3d.splat.density import (
+    DefaultStrategy,
+    DensitySettings,
+    McmcSettings,
+    McmcStrategy,
+    Population,
+    Schedule,
+    Strategy,
+    StrategyName,
+)
+from ico3d.splat.losses import photometric
+from ico3d.splat.render import render
+from ico3d.splat.rendering import Rendering
+from ico3d.training.optimiser import Optimiser
+
+CLONE_BELOW = 0.01
+PRUNE_ABOVE = 0.1
+"""Sizes relative to the scene's extent, as in 3DGS."""
+
+
+class SceneTrainer:
+    """A `Trainee`: the scene, its optimiser, density control and the pictures.
+
+    Every random choice of a step follows from the seed and the step's number.
+    """
+
+    def __init__(
+        self,
+        start: Start,
+        views: SceneViews,
+        strategy: StrategyName,
+        settings: SceneSettings,
+        seed: int,
+    ):
+        """Gets ready for the first step."""
+        self.scene = start.scene
+        self._views, self._settings, self._seed = views, settings, seed
+        self._extent = start.extent
+        self._optimiser = Optimiser()
+        self._strategy = density_control(strategy, settings, seed, start.extent)
+        self._rates = settings.rates()
+        for parameter in self.scene.parameters.values():
+            parameter.requires_grad_()
+
+    @property
+    def _population(self) -> Population:
+        """The scene as density control sees it."""
+        return Population(self.scene.parameters, self._optimiser.moments)
+
+    def step(self, index: int) -> Mapping[str, float]:
+        """Renders one picture and learns from the difference."""
+        view = self._view(index)
+        example = self._example(view, index)
+        degree = index // self._settings.sh_every
+        rendering = render(
+            self.scene.gaussians(degree),
+            [view.camera],
+            example.behind,
+            absgrad=self._settings.absgrad,
+        )
+        loss = self._loss(rendering, example)
+        (loss + self._strategy.penalty(self._population)).backward()
+        self._strategy.observe(rendering.info, index)
+        self._update(index)
+        rate = self._rates["means"].at(index / self._settings.steps)
+        self._strategy.adapt(self._population, index, rate)
+        return {
+            "loss": loss.item(),
+            "psnr": _psnr(rendering, example),
+            "gaussians": len(self.scene),
+        }
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Parameters, moments, and what density control has gathered."""
+        named = {f"scene.{name}": value for name, value in self.scene.parameters.items()}
+        named |= {f"moments.{name}": value for name, value in self._optimiser.moments.items()}
+        return named | {f"density.{name}": t for name, t in self._strategy.tensors().items()}
+
+    def place(self, name: str) -> torch.device:
+        """All are where the scene is."""
+        del name
+        return self.scene.device
+
+    def state(self) -> dict:
+        """Nothing beside the tensors: randomness follows from the step's number."""
+        return {}
+
+    def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
+        """Takes back what `tensors` gave."""
+        del state
+        parts: dict[str, dict[str, Tensor]] = {"scene": {}, "moments": {}, "density": {}}
+        for name, tensor in tensors.items():
+            part, _, rest = name.partition(".")
+            parts[part][rest] = tensor
+        self.scene = StaticScene({n: t.requires_grad_() for n, t in parts["scene"].items()})
+        self._optimiser.moments = parts["moments"]
+        self._strategy.restore(parts["density"])
+
+    def _view(self, index: int) -> View:
+        """Every view once per epoch, in an order of its own."""
+        epoch, place = divmod(index, len(self._views.train))
+        if place == 0 or not hasattr(self, "_order"):
+            rng = np.random.default_rng([self._seed, epoch])
+            self._order = rng.permutation(len(self._views.train))
+        return self._views.train[self._order[place]]
+
+    def _example(self, view: View, index: int) -> Example:
+        """What a view asks for, on the scene's device; a person stands before a random colour."""
+        color = np.random.default_rng([self._seed, index, 1]).random(3)
+        return self._views.example(view, color).to(self.scene.device)
+
+    def _loss(self, rendering: Rendering, example: Example) -> Tensor:
+        """(1 − λ)·L1 + λ·(1 − SSIM) over the pixels that count."""
+        image, target = rendering.rgb, example.target[None]  # (1, H, W, 3)
+        if example.weight is not None:
+            image = target + example.weight[..., None] * (image - target)
+        return photometric(image, target, self._settings.ssim_weight)
+
+    def _update(self, index: int) -> None:
+        """One optimiser step on every parameter that has a gradient."""
+        progress = index / self._settings.steps
+        for name in NAMES:
+            parameter = self.scene.parameters[name]
+            if parameter.grad is None:
+                continue
+            rate = self._rates[name].at(progress) * (self._extent if name == "means" else 1)
+            self._optimiser.update(name, parameter, parameter.grad, rate)
+            parameter.grad = None
+
+
+def density_control(
+    name: StrategyName, settings: SceneSettings, seed: int, extent: float
+) -> Strategy:
+    """The strategy of that name, with thresholds for a scene of this extent in metres."""
+    schedule = Schedule(settings.densify_from, settings.densify_until, settings.densify_every)
+    if name == "mcmc":
+        chain = McmcSettings(
+            max_gaussians=settings.max_gaussians,
+            min_opacity=settings.min_opacity,
+            noise_rate=settings.noise_rate,
+            opacity_weight=settings.opacity_weight,
+            scale_weight=settings.scale_weight,
+        )
+        return McmcStrategy(schedule, chain, seed, extent)
+    thresholds = DensitySettings(
+        max_gaussians=settings.max_gaussians,
+        gradient_threshold=settings.densify_gradient,
+        clone_below=CLONE_BELOW * extent,
+        prune_opacity=settings.min_opacity,
+        prune_scale=PRUNE_ABOVE * extent,
+    )
+    return DefaultStrategy(schedule, thresholds, seed, settings.reset_every)
+
+
+def _psnr(rendering: Rendering, example: Example) -> float:
+    """PSNR over the pixels that count, for the progress bar."""
+    squares = (rendering.rgb.detach()[0] - example.target).square().mean(-1)  # (H, W)
+    weight = torch.ones_like(squares) if example.weight is None else example.weight
+    error = float((squares * weight).sum() / weight.sum().clamp_min(1))
+    return -10 * math.log10(max(error, 1e-12))

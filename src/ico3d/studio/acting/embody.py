@@ -1,0 +1,35 @@
+"""Gives a performance a body."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ico3d.errors import SettingsError
+from ico3d.studio.acting.acting import pose
+from ico3d.studio.acting.gestures import act
+from ico3d.studio.acting.performance import Performance
+from ico3d.studio.person.subject import Subject
+
+
+def embodied(
+    subject: Subject, acted: Performance, motion: str, fps: float, seed: int
+) -> Performance:
+    """The performance with a body that moves; the head goes where the neck takes it.
+
+    Args:
+        subject: A whole person.
+        acted: What the face does.
+        motion: One of `MOTIONS`.
+        fps: Frames per second.
+        seed: Decides what the body does.
+
+    Raises:
+        SettingsError: If the person has no skeleton.
+    """
+    skeleton = subject.skeleton
+    if skeleton is None:
+        raise SettingsError(f"the subject {subject.name} has no joints: name an .npz file.")
+    times = np.arange(len(acted.weights)) / fps
+    joints = pose(skeleton, act(skeleton, motion, times, seed))
+    joints[..., :3, 3] += subject.head_in_world
+    return replace(acted, joints=joints, world_from_head=joints[:, skeleton.index("head")])

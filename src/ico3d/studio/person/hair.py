@@ -1,0 +1,41 @@
+"""Hair: where its sheets end and where its strands run."""
+
+import numpy as np
+
+from ico3d.studio.person.subject import Material, Subject
+
+
+def hair_edge(subject: Subject) -> np.ndarray:
+    """Vertices (N,) on open edges of the hair: where sheets of hair end."""
+    hair = subject.faces[subject.materials == Material.HAIR]
+    corners = np.sort(hair[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges, count = np.unique(corners, axis=0, return_counts=True)
+    return np.unique(edges[count == 1])
+
+
+def strand_frames(subject: Subject) -> np.ndarray:
+    """Where strands run at each vertex, from texture coordinates.
+
+    Returns:
+        (V, 4) float32: unit vector along v, and units of u per metre across it.
+    """
+    corners, uv = subject.vertices[subject.faces], subject.corner_uv
+    e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]  # (F, 3)
+    d1, d2 = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]  # (F, 2)
+    determinant = d1[:, 0] * d2[:, 1] - d2[:, 0] * d1[:, 1]  # (F,)
+    fine = np.abs(determinant) > 1e-14
+    safe = np.where(fine, determinant, 1.0)[:, None]
+    along = (e2 * d1[:, :1] - e1 * d2[:, :1]) / safe
+    across = np.linalg.norm((e1 * d2[:, 1:] - e2 * d1[:, 1:]) / safe, axis=1)  # metres per u
+    rows = np.zeros((len(corners), 5))
+    rows[:, :3] = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    rows[:, 3] = 1 / np.maximum(across, 1e-3)
+    rows[:, 4] = 1
+    rows[~fine] = 0
+    frames = np.zeros((len(subject.vertices), 5))
+    for corner in range(3):
+        np.add.at(frames, subject.faces[:, corner], rows)
+    frames[:, 3] /= np.maximum(frames[:, 4], 1)
+    length = np.linalg.norm(frames[:, :3], axis=1, keepdims=True)
+    frames[:, :3] /= np.maximum(length, 1e-9)
+    return frames[:, :4].astype(np.float32)

@@ -1,0 +1,272 @@
+"""Reads a person from an `.npz` file: ICT-FaceKit head on a MakeHuman body.
+
+The layout is the one of `docs/captures-synthetic.md`, "Subject files".
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from ico3d.errors import CaptureError
+from ico3d.studio.person.skeleton import Skeleton
+from ico3d.studio.person.smooth import smoothed
+from ico3d.studio.person.subject import GARMENTS, Eye, Look, Material, Subject
+
+MATERIAL_OF_PART = {
+    "skin": Material.SKIN,
+    "lips": Material.SKIN,
+    "nails": Material.SKIN,
+    "mouth_inside": Material.MOUTH,
+    "eye_white": Material.EYE,
+    "iris": Material.EYE,
+    "pupil": Material.EYE,
+    "eye_inner": Material.EYE,
+    "teeth": Material.TEETH,
+    "gums": Material.GUMS,
+    "tongue": Material.TONGUE,
+    "lashes": Material.LASH,
+    "brows": Material.BROW,
+    "hair": Material.HAIR,
+    "shirt": Material.CLOTH,
+}
+MATERIAL_BELOW = {
+    "trousers": Material.TROUSERS,
+    "shoes": Material.SHOE,
+    "socks": Material.SOCK,
+}
+"""What only a whole person wears."""
+BUST_DEPTH = 0.55
+"""How far below the eyes the person is kept, metres; no camera of the head rig sees lower."""
+
+LASH_CARDS = (0.0235, 0.1665, 0.122)
+"""Where the first lash card begins in the atlas, how far apart cards lie, how high each is."""
+IRIS_SHOWN = 0.8
+"""Visible part of the iris mesh's radius; the rest lies behind the white."""
+
+RELAXED_ARMS = {
+    "shoulder01.L": (0.0, 0.0, -6.0),
+    "upperarm01.L": (8.0, 0.0, -30.0),
+    "lowerarm01.L": (0.0, 0.0, 5.0),
+    "shoulder01.R": (0.0, 0.0, 6.0),
+    "upperarm01.R": (8.0, 0.0, 30.0),
+    "lowerarm01.R": (0.0, 0.0, -5.0),
+}
+"""Degrees about the world axes X, Y, Z (applied X first) that lower the arms of the rest pose."""
+
+FAIR = Look(
+    skin=(0.60, 0.37, 0.27),
+    lips=(0.50, 0.17, 0.15),
+    hair=(0.080, 0.028, 0.013),
+    iris=(0.13, 0.21, 0.19),
+    cloth=((0.50, 0.47, 0.42), (0.045, 0.10, 0.20)),
+    stripes=False,
+    freckles=0.55,
+    stubble=0.0,
+)
+TANNED = Look(
+    skin=(0.42, 0.235, 0.155),
+    lips=(0.36, 0.135, 0.11),
+    hair=(0.020, 0.012, 0.008),
+    iris=(0.13, 0.065, 0.03),
+    cloth=((0.035, 0.10, 0.16), (0.40, 0.36, 0.28)),
+    stripes=True,
+    freckles=0.1,
+    stubble=0.6,
+)
+
+
+def load_npz(path: Path, whole: bool = False) -> Subject:
+    """Reads a person from a file.
+
+    Args:
+        path: The file.
+        whole: The whole person with a skeleton, in the rest pose; otherwise a bust.
+
+    Raises:
+        CaptureError: If the file is missing, is no npz, or lacks an array.
+    """
+    if not path.is_file():
+        raise CaptureError(f"there is no subject file {path}: name an .npz file, or 'anny'.")
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        subject = _subject(path.stem, arrays, whole)
+        coarse = (Material.HAIR, *GARMENTS) if whole else (Material.HAIR,)
+        return smoothed(subject, np.isin(subject.materials, coarse))
+    except KeyError as error:
+        raise CaptureError(f"the subject file {path} lacks the array {error}.") from error
+    except (ValueError, OSError, IndexError) as error:
+        raise CaptureError(f"the subject file {path} cannot be read: {error}.") from error
+
+
+def _subject(name: str, arrays: dict[str, np.ndarray], whole: bool) -> Subject:
+    joints = {str(n): i for i, n in enumerate(arrays["joint_names"])}
+    joint_at, tail_at = arrays["joint_pos"].astype(float), arrays["joint_tail"].astype(float)
+    eye_left = joint_at[joints["eye.L"]]
+    origin = np.array([0.0, eye_left[1], joint_at[joints["head"], 2]])
+    known = MATERIAL_OF_PART | MATERIAL_BELOW if whole else MATERIAL_OF_PART
+    kept = _kept_faces(arrays, known, 0.0 if whole else origin[1] - BUST_DEPTH)
+    used, faces = np.unique(arrays["faces"][kept], return_inverse=True)
+    shape = arrays["verts"].astype(float) if whole else _relaxed(arrays, joints)
+    vertices = shape[used] - origin
+    parts = [str(p) for p in arrays["part_names"]]
+    materials = np.array([known.get(p, 255) for p in parts], np.uint8)
+    names, moved, deltas = _blendshapes(arrays, used)
+    male = name.endswith("_m")
+    return Subject(
+        name=name,
+        vertices=vertices.astype(np.float32),
+        faces=faces.reshape(-1, 3).astype(np.int32),
+        materials=materials[arrays["face_part"][kept]],
+        corner_uv=_texture_coordinates(arrays, kept),
+        lip_mask=arrays["lip_mask"][used].astype(np.float32),
+        blendshape_names=names,
+        delta_vertices=moved,
+        deltas=deltas,
+        visemes=_visemes(arrays, names),
+        landmark_vertices=_positions_in(used, arrays["landmarks68"]),
+        eyes=(
+            _eye(arrays, joint_at[joints["eye.L"]], tail_at[joints["eye.L"]], origin),
+            _eye(arrays, joint_at[joints["eye.R"]], tail_at[joints["eye.R"]], origin),
+        ),
+        neck_base=joint_at[joints["neck01"]] - origin,
+        head_in_world=origin,
+        male=male,
+        look=TANNED if male else FAIR,
+        sources=(
+            "ICT-VGL/ICT-FaceKit, (c) 2020 USC Institute for Creative Technologies, MIT",
+            "MakeHuman community assets, CC0 1.0",
+        ),
+        licence="MIT (keep ICT-FaceKit-LICENSE.txt) and CC0 1.0",
+        skeleton=_skeleton(arrays, used, origin) if whole else None,
+    )
+
+
+def _kept_faces(
+    arrays: dict[str, np.ndarray], known: dict[str, Material], lowest: float
+) -> np.ndarray:
+    """Indices of the faces that are drawn: shown by default, of a known part, high enough."""
+    known_part = np.array([str(p) in known for p in arrays["part_names"]])
+    height = arrays["verts"][:, 1][arrays["faces"]].max(axis=1)  # (F,)
+    shown = ~arrays["face_hidden"] & known_part[arrays["face_part"]]
+    return np.flatnonzero(shown & (height > lowest))
+
+
+def _texture_coordinates(arrays: dict[str, np.ndarray], kept: np.ndarray) -> np.ndarray:
+    """(F, 3, 2) float32 texture coordinates, rewritten where `Subject.corner_uv` says more."""
+    uv = arrays["uv"][arrays["faces_uv"][kept]].astype(np.float32)
+    parts = np.array([str(p) for p in arrays["part_names"]])[arrays["face_part"][kept]]
+    lashes = parts == "lashes"
+    for garment in ("shirt", *MATERIAL_BELOW):
+        cloth = parts == garment
+        if not cloth.any():
+            continue
+        corners = arrays["verts"][arrays["faces"][kept]][cloth]  # (F, 3, 3)
+        length = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
+        in_atlas = np.linalg.norm(uv[cloth, 1] - uv[cloth, 0], axis=1)
+        uv[cloth] *= np.median(length / np.maximum(in_atlas, 1e-9))
+    # Six cards lie above one another in the atlas, tips down, those of the lower lid below.
+    card = (uv[lashes, :, 1] - LASH_CARDS[0]) / LASH_CARDS[1]  # (F, 3)
+    index = np.floor(card.mean(axis=1, keepdims=True) + 0.1)
+    uv[lashes, :, 0] += np.where(index < 3, 2.0, 0.0) - np.floor(uv[lashes, :, 0])
+    uv[lashes, :, 1] = 1 - np.clip((card - index) * LASH_CARDS[1] / LASH_CARDS[2], 0, 1)
+    return uv
+
+
+def _skeleton(arrays: dict[str, np.ndarray], used: np.ndarray, origin: np.ndarray) -> Skeleton:
+    """The joints, and how the `used` vertices hang on them; shoes are as stiff as their soles."""
+    names = tuple(str(n) for n in arrays["joint_names"])
+    weights = np.zeros((len(arrays["verts"]), len(names)), np.float32)
+    rows = np.arange(len(weights))[:, None]
+    np.add.at(weights, (rows, arrays["w_idx"]), arrays["w_val"].astype(np.float32))
+    parts = [str(p) for p in arrays["part_names"]]
+    shoes = np.unique(arrays["faces"][arrays["face_part"] == parts.index("shoes")])
+    left = arrays["verts"][shoes, 0] > 0
+    weights[shoes] = 0
+    weights[shoes[left], names.index("foot.L")] = 1
+    weights[shoes[~left], names.index("foot.R")] = 1
+    return Skeleton(
+        names,
+        arrays["joint_parents"].astype(int),
+        arrays["joint_pos"].astype(float) - origin,
+        weights[used] / weights[used].sum(axis=1, keepdims=True),
+    )
+
+
+def _positions_in(used: np.ndarray, indices: np.ndarray) -> np.ndarray:
+    """Where vertex indices went when only the sorted `used` ones were kept."""
+    at = np.searchsorted(used, indices)
+    if (used[np.minimum(at, len(used) - 1)] != indices).any():
+        raise ValueError("a landmark lies on a vertex that is not drawn")
+    return at.astype(np.int32)
+
+
+def _rotation(degrees: tuple[float, float, float]) -> np.ndarray:
+    """(3, 3) rotation about X, then Y, then Z."""
+    (cx, cy, cz), (sx, sy, sz) = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    return about_z @ about_y @ about_x
+
+
+def _relaxed(arrays: dict[str, np.ndarray], joints: dict[str, int]) -> np.ndarray:
+    """(V, 3) float64 rest vertices with lowered arms, by linear blend skinning."""
+    at = arrays["joint_pos"].astype(float)
+    world = np.empty((len(joints), 4, 4))
+    for name, j in joints.items():
+        local = np.eye(4)
+        local[:3, :3] = _rotation(RELAXED_ARMS.get(name, (0.0, 0.0, 0.0)))
+        local[:3, 3] = at[j] - local[:3, :3] @ at[j]
+        parent = int(arrays["joint_parents"][j])
+        world[j] = local if parent < 0 else world[parent] @ local
+    weights = arrays["w_val"].astype(float)
+    weights /= weights.sum(axis=1, keepdims=True)
+    matrices = np.einsum("vi,vijk->vjk", weights, world[arrays["w_idx"]])  # (V, 4, 4)
+    vertices = arrays["verts"].astype(float)
+    return np.einsum("vjk,vk->vj", matrices[:, :3, :3], vertices) + matrices[:, :3, 3]
+
+
+def _arkit_name(name: str) -> str:
+    """ARKit's name of an ICT shape; the two halves of `browInnerUp` are one ARKit shape."""
+    if name.startswith("browInnerUp"):
+        return "browInnerUp"
+    return name.replace("_L", "Left").replace("_R", "Right")
+
+
+def _blendshapes(
+    arrays: dict[str, np.ndarray], used: np.ndarray
+) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
+    """ARKit names (K), moved vertices (M,) among `used`, deltas (K, M, 3) float32."""
+    names = tuple(dict.fromkeys(_arkit_name(str(n)) for n in arrays["bs_names"]))
+    position = np.full(int(arrays["verts"].shape[0]), -1, np.int64)
+    position[used] = np.arange(len(used))
+    dense = np.zeros((len(names), len(used), 3), np.float32)
+    for k, name in enumerate(arrays["bs_names"]):
+        first, last = arrays["bs_ptr"][k : k + 2]
+        at = position[arrays["bs_idx"][first:last]]
+        dense[names.index(_arkit_name(str(name))), at[at >= 0]] += arrays["bs_delta"][first:last][
+            at >= 0
+        ]
+    moved = np.flatnonzero(np.abs(dense).max(axis=(0, 2)) > 0).astype(np.int32)
+    return names, moved, np.ascontiguousarray(dense[:, moved])
+
+
+def _visemes(arrays: dict[str, np.ndarray], names: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """Viseme name to (K,) weights in the order of `names`."""
+    columns = [names.index(_arkit_name(str(n))) for n in arrays["bs_names"]]
+    visemes = {}
+    for viseme, row in zip(arrays["vis_names"], arrays["vis_weights"], strict=True):
+        weights = np.zeros(len(names), np.float32)
+        np.maximum.at(weights, columns, row.astype(np.float32))
+        visemes[str(viseme)] = weights
+    return visemes
+
+
+def _eye(arrays: dict[str, np.ndarray], centre: np.ndarray, tail: np.ndarray, origin) -> Eye:
+    axis = (tail - centre) / np.linalg.norm(tail - centre)
+    iris = arrays["face_part"] == [str(p) for p in arrays["part_names"]].index("iris")
+    points = arrays["verts"][np.unique(arrays["faces"][iris])].astype(float) - centre
+    points = points[points[:, 0] * np.sign(centre[0]) > -abs(centre[0])]  # this side only
+    radius = float(np.linalg.norm(np.cross(points, axis), axis=1).max())
+    return Eye(centre - origin, axis, IRIS_SHOWN * radius)

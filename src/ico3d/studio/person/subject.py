@@ -1,0 +1,144 @@
+"""A synthetic person: one deforming mesh with everything a studio needs to record it."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from ico3d.studio.person.skeleton import Skeleton
+
+
+class Material(IntEnum):
+    """What a face of the mesh is made of; the number is the one the shader switches on."""
+
+    SKIN = 0
+    MOUTH = 1
+    EYE = 2
+    TEETH = 3
+    GUMS = 4
+    TONGUE = 5
+    HAIR = 6
+    CLOTH = 7
+    BROW = 8
+    LASH = 9
+    TROUSERS = 10
+    SHOE = 11
+    SOCK = 12
+
+
+CARDS = (Material.BROW, Material.LASH)
+"""Materials that are drawn with an alpha over what lies behind them."""
+GARMENTS = (Material.CLOTH, Material.TROUSERS, Material.SHOE, Material.SOCK)
+
+
+@dataclass(frozen=True)
+class Eye:
+    """An eyeball that does not turn.
+
+    Attributes:
+        centre: (3,) metres, canonical head space.
+        axis: (3,) unit vector through the middle of the pupil.
+        iris_radius: Metres, measured at right angles to the axis.
+    """
+
+    centre: np.ndarray
+    axis: np.ndarray
+    iris_radius: float
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colours of a person, linear RGB.
+
+    Attributes:
+        skin: (3,) albedo of the cheek.
+        lips: (3,) albedo of the lips.
+        hair: (3,) albedo of a strand.
+        iris: (3,) albedo of the iris.
+        cloth: (2, 3) albedo of the cloth and of its pattern.
+        stripes: Whether the pattern is stripes; flowers otherwise.
+        freckles: How many, 0 to 1.
+        stubble: How much shaved beard shows, 0 to 1.
+        accent: (3,) albedo of the third colour of a whole person's shirt.
+        trousers: (2, 3) albedo of the trousers and of their checks.
+        shoe: (3,) albedo of the leather.
+    """
+
+    skin: tuple[float, float, float]
+    lips: tuple[float, float, float]
+    hair: tuple[float, float, float]
+    iris: tuple[float, float, float]
+    cloth: tuple[tuple[float, float, float], tuple[float, float, float]]
+    stripes: bool
+    freckles: float
+    stubble: float
+    accent: tuple[float, float, float] = (0.45, 0.09, 0.04)
+    trousers: tuple[tuple[float, float, float], tuple[float, float, float]] = (
+        (0.10, 0.12, 0.17),
+        (0.30, 0.29, 0.27),
+    )
+    shoe: tuple[float, float, float] = (0.13, 0.06, 0.03)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A person in canonical head space: metres, +Y up, +Z as the face looks, +X their left.
+
+    Attributes:
+        name: Name used in reports.
+        vertices: (V, 3) float32, neutral.
+        faces: (F, 3) int32, counter-clockwise seen from outside.
+        materials: (F,) uint8 of `Material`.
+        corner_uv: (F, 3, 2) float32 texture coordinates. Hair: strands run along v. Cloth: metres.
+            Brows: u from the nose outwards, v upwards. Lashes: u along the lid (plus 2 on the
+            lower one), v from root to tip.
+        lip_mask: (V,) float32, 1 on the red of the lips.
+        blendshape_names: K ARKit names.
+        delta_vertices: (M,) int32, the vertices that blendshapes move.
+        deltas: (K, M, 3) float32 metres at weight 1.
+        visemes: Oculus viseme name to (K,) weights.
+        landmark_vertices: (68,) int32, Multi-PIE order.
+        eyes: Left and right (the person's).
+        neck_base: (3,) the point that the body sways about.
+        head_in_world: (3,) where the canonical origin is at rest; the floor is y = 0.
+        male: Whether a man's voice suits.
+        look: Colours.
+        sources: What the geometry was made from, with licences.
+        licence: Licence of pictures of this person.
+        skeleton: Of a whole person, who stands in the mesh's rest pose; None for a bust.
+    """
+
+    name: str
+    vertices: np.ndarray
+    faces: np.ndarray
+    materials: np.ndarray
+    corner_uv: np.ndarray
+    lip_mask: np.ndarray
+    blendshape_names: tuple[str, ...]
+    delta_vertices: np.ndarray
+    deltas: np.ndarray
+    visemes: dict[str, np.ndarray]
+    landmark_vertices: np.ndarray
+    eyes: tuple[Eye, Eye]
+    neck_base: np.ndarray
+    head_in_world: np.ndarray
+    male: bool
+    look: Look
+    sources: tuple[str, ...]
+    licence: str
+    skeleton: Skeleton | None = None
+
+    def posed(self, weights: np.ndarray) -> np.ndarray:
+        """Vertices (V, 3) float32 for blendshape weights (K,)."""
+        vertices = self.vertices.copy()
+        moved = np.einsum("k,kmc->mc", weights.astype(np.float32), self.deltas)  # (M, 3)
+        vertices[self.delta_vertices] += moved
+        return vertices
+
+    def landmarks(self, vertices: np.ndarray) -> np.ndarray:
+        """(68, 3) float32 landmarks on posed vertices (V, 3)."""
+        return vertices[self.landmark_vertices]
+
+    def weights(self, values: dict[str, float]) -> np.ndarray:
+        """(K,) float32 weights from names; names this person lacks are left out."""
+        return np.array([values.get(name, 0.0) for name in self.blendshape_names], np.float32)

@@ -1,0 +1,276 @@
+"""Records a synthetic person: writes the folder that `reader` reads.
+
+Layout: `docs/captures-synthetic.md`, "Synthetic captures".
+"""
+
+import io
+import json
+import wave
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+from rich.progress import Progress, TextColumn
+from safetensors.numpy import save
+
+from ico3d.capture.synthetic import FORMAT, VERSION
+from ico3d.common.camera import Camera
+from ico3d.common.files import write_atomic
+from ico3d.errors import SettingsError
+from ico3d.studio.acting.embody import embodied
+from ico3d.studio.acting.gestures import MOTIONS
+from ico3d.studio.acting.performance import SOUND_RATE, Performance, perform
+from ico3d.studio.person.choice import load_subject
+from ico3d.studio.person.subject import Subject
+from ico3d.studio.picture.lighting import STUDIOS
+from ico3d.studio.points import surface_points
+from ico3d.studio.rigs import RIGS, cameras_of
+from ico3d.studio.studio import Studio, backdrop
+
+POINTS = 6000
+BODY_POINTS = 4000
+"""In each frame."""
+UNFINISHED = "unfinished.json"
+"""Settings of a recording that has not come to its end."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What to record.
+
+    Attributes:
+        subject: `anny` or an `.npz` file.
+        rig: Name of the camera rig: `head`, `bust` or `body`.
+        cameras: How many cameras.
+        frames: How many frames.
+        fps: Frames per second.
+        views_per_frame: How many cameras take a picture of each frame.
+        size: Height of the pictures; those of heads are as wide.
+        text: What is said; empty for sentences of our own.
+        seed: Decides everything that is random.
+        lively: Whether the face shows moods and glances too, which the sound does not tell.
+        light: One of `STUDIOS`.
+        motion: What a whole person does, one of `MOTIONS`.
+    """
+
+    subject: str
+    rig: str
+    cameras: int
+    frames: int
+    fps: float
+    views_per_frame: int
+    size: int
+    text: str
+    seed: int
+    lively: bool
+    light: str
+    motion: str
+
+    @property
+    def whole(self) -> bool:
+        """Whether the whole person is recorded."""
+        return self.rig == "body"
+
+
+def record(recording: Recording, out: Path, workers: int) -> None:
+    """Records a person; the same call goes on where an earlier one was cut off.
+
+    Args:
+        recording: What to record.
+        out: Folder to write; holds nothing yet, or what a cut-off call left.
+        workers: Threads that draw pictures.
+
+    Raises:
+        SettingsError: If the settings make no sense or the folder is not empty.
+        CaptureError: If the subject cannot be read.
+        MissingExtraError: If an optional package is missing.
+    """
+    _check(recording)
+    subject = load_subject(recording.subject, recording.whole)
+    acted = perform(
+        subject, recording.text, recording.frames, recording.fps, recording.seed, recording.lively
+    )
+    if recording.whole:
+        acted = embodied(subject, acted, recording.motion, recording.fps, recording.seed)
+    cameras = cameras_of(subject, recording.rig, recording.cameras, recording.size)
+    views = choose_views(
+        recording.frames, recording.cameras, recording.views_per_frame, recording.seed
+    )
+    _begin(recording, out)
+    lamps = STUDIOS[recording.light]
+    backdrops = [backdrop(camera, lamps) for camera in cameras]
+    for camera, image in zip(cameras, backdrops, strict=True):
+        _write_png(out / "backgrounds" / f"{camera.name}.png", image)
+    _write_sound(out / "audio.wav", acted.samples)
+    _write_frames(out / "frames.safetensors", subject, acted, views, recording.seed)
+    _draw(Studio(subject, lamps), acted, cameras, backdrops, views, out, workers)
+    # Last: a folder with capture.json is complete.
+    _write_json(out / "capture.json", recording, subject, acted, cameras)
+    (out / UNFINISHED).unlink()
+
+
+def _check(recording: Recording) -> None:
+    for name, known in (("rig", RIGS), ("light", tuple(STUDIOS)), ("motion", MOTIONS)):
+        value = getattr(recording, name)
+        if value not in known:
+            raise SettingsError(f"there is no {name} '{value}': use {' or '.join(known)}.")
+    for name in ("cameras", "frames", "fps", "views_per_frame", "size"):
+        if getattr(recording, name) < 1:
+            raise SettingsError(f"{name} must be at least 1, not {getattr(recording, name)}.")
+    if recording.views_per_frame > recording.cameras:
+        raise SettingsError(
+            f"views_per_frame ({recording.views_per_frame}) cannot exceed "
+            f"the number of cameras ({recording.cameras})."
+        )
+
+
+def _begin(recording: Recording, out: Path) -> None:
+    """Marks a folder as being recorded, unless it is marked with the same settings already."""
+    settings = json.dumps(asdict(recording)).encode()
+    mark = out / UNFINISHED
+    if mark.is_file() and mark.read_bytes() == settings:
+        return
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise SettingsError(f"{out} holds something already: name a new folder.")
+    write_atomic(mark, settings)
+
+
+def choose_views(frames: int, cameras: int, per_frame: int, seed: int) -> np.ndarray:
+    """Which cameras take each frame, each as often as the others, in random order.
+
+    Returns:
+        (frames, cameras) uint8, `per_frame` ones in each row.
+    """
+    random = np.random.default_rng([seed, 1])
+    views = np.zeros((frames, cameras), np.uint8)
+    used = np.zeros(cameras)
+    for row in views:
+        chosen = np.argsort(used + random.random(cameras))[:per_frame]
+        row[chosen] = 1
+        used[chosen] += 1
+    return views
+
+
+def _draw(
+    studio: Studio,
+    acted: Performance,
+    cameras: tuple[Camera, ...],
+    backdrops: list[np.ndarray],
+    views: np.ndarray,
+    out: Path,
+    workers: int,
+) -> None:
+    missing = {
+        frame: [
+            int(c)
+            for c in np.flatnonzero(row)
+            if not (out / "masks" / cameras[c].name / _png_name(frame)).exists()
+        ]
+        for frame, row in enumerate(views)
+    }
+
+    def draw(frame: int) -> None:
+        vertices = acted.vertices(studio.subject, frame)
+        figure = studio.figure(vertices, acted.world_from_head[frame])
+        for index in missing[frame]:
+            camera = cameras[index]
+            rgb, alpha = studio.picture(camera, figure)
+            image = rgb + (1 - alpha[..., None]) * backdrops[index]
+            _write_png(out / "images" / camera.name / _png_name(frame), image)
+            # The mask comes last: where it is, the picture is whole.
+            _write_png(out / "masks" / camera.name / _png_name(frame), alpha)
+
+    jobs = [frame for frame, left in missing.items() if left]
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            for _ in _progress(pool.map(draw, jobs), len(jobs)):
+                pass
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def _png_name(frame: int) -> str:
+    return f"{frame:06d}.png"
+
+
+def _progress(steps: Iterator, total: int) -> Iterator:
+    columns = (*Progress.get_default_columns(), TextColumn("{task.completed}/{task.total} frames"))
+    with Progress(*columns) as progress:
+        yield from progress.track(steps, total=total, description="recording")
+
+
+def _write_png(path: Path, values: np.ndarray) -> None:
+    """Writes display values in [0, 1], (H, W) or (H, W, 3), with 8 bits."""
+    data = io.BytesIO()
+    Image.fromarray((np.clip(values, 0, 1) * 255 + 0.5).astype(np.uint8)).save(
+        data, format="PNG", compress_level=4
+    )
+    write_atomic(path, data.getvalue())
+
+
+def _write_sound(path: Path, samples: np.ndarray) -> None:
+    data = io.BytesIO()
+    with wave.open(data, "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(SOUND_RATE)
+        file.writeframes((np.clip(samples, -1, 1) * 32767).astype("<i2").tobytes())
+    write_atomic(path, data.getvalue())
+
+
+def _write_frames(
+    path: Path, subject: Subject, acted: Performance, views: np.ndarray, seed: int
+) -> None:
+    meshes = (acted.vertices(subject, frame) for frame in range(len(views)))
+    landmarks, points = [], []
+    places = surface_points(subject, POINTS if acted.joints is None else BODY_POINTS, seed)
+    for mesh, pose in zip(meshes, acted.world_from_head, strict=True):
+        landmarks.append(subject.landmarks(mesh))
+        if acted.joints is not None:
+            points.append(places.on(mesh @ pose[:3, :3].T + pose[:3, 3]))
+    arrays = {
+        "world_from_head": acted.world_from_head,
+        "eyes": acted.eyes,
+        "blendshapes": acted.weights,
+        "landmarks": np.stack(landmarks).astype(np.float32),
+        "views": views,
+        "points": np.stack(points) if points else places.on(subject.vertices),
+    }
+    write_atomic(path, save({k: np.ascontiguousarray(v) for k, v in arrays.items()}))
+
+
+def _write_json(
+    path: Path,
+    recording: Recording,
+    subject: Subject,
+    acted: Performance,
+    cameras: tuple[Camera, ...],
+) -> None:
+    settings = asdict(recording) | {"subject": subject.name, "text": acted.text}
+    content = {
+        "format": FORMAT,
+        "version": VERSION,
+        "shows": "body" if recording.whole else "head",
+        "fps": recording.fps,
+        "num_frames": recording.frames,
+        "settings": settings,
+        "blendshape_names": subject.blendshape_names,
+        "cameras": [
+            {
+                "name": camera.name,
+                "width": camera.width,
+                "height": camera.height,
+                "intrinsics": camera.intrinsics.tolist(),
+                "world_to_camera": camera.world_to_camera.tolist(),
+            }
+            for camera in cameras
+        ],
+        "phonemes": [[round(p.time, 6), p.symbol] for p in acted.phonemes],
+        "sources": [*subject.sources, "voice: espeak-ng"],
+        "licence": subject.licence,
+    }
+    write_atomic(path, json.dumps(content, indent=1, ensure_ascii=False).encode())

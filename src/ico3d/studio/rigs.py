@@ -1,0 +1,109 @@
+"""Where cameras stand: an arc in front of a head, or rings all around a body."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ico3d.common.camera import Camera, look_at
+from ico3d.studio.person.subject import Subject
+
+DISTANCE = 1.35
+"""Metres from the cameras to the head."""
+WIDEST_AZIMUTH = 60.0
+
+
+@dataclass(frozen=True)
+class Framing:
+    """What the pictures of a rig show.
+
+    Attributes:
+        height: Metres from their top to their bottom, at the head.
+        aim: What they look at: metres from the canonical origin at rest, upwards.
+    """
+
+    height: float
+    aim: float
+
+
+ARCS = {"head": Framing(0.31, -0.02), "bust": Framing(0.46, -0.045)}
+"""Head: three quarters of the picture are head. Bust: half, with the shoulders."""
+
+BODY = Framing(2.36, 1.05)
+"""A person from the floor to above raised hands; the aim is a height above the floor."""
+BODY_DISTANCE = 2.8
+ASPECT = 0.62
+"""Width of a picture of a body by its height."""
+RINGS = (-7.0, 5.0, 17.0)
+"""Elevations of the rings of cameras, degrees."""
+RIGS = (*ARCS, "body")
+
+
+def cameras_of(subject: Subject, rig: str, count: int, size: int) -> tuple[Camera, ...]:
+    """The cameras of a rig.
+
+    Args:
+        subject: Its rest pose places the arcs.
+        rig: One of `RIGS`.
+        count: How many.
+        size: Height of the pictures in pixels; those of a head are as wide.
+    """
+    if rig == "body":
+        return camera_rings(count, size)
+    return camera_arc(subject, rig, count, size)
+
+
+def camera_rings(count: int, height: int) -> tuple[Camera, ...]:
+    """Cameras all around a body, azimuths evenly spaced; neighbours stand on different rings."""
+    width = 2 * round(ASPECT * height / 2)
+    focal = height * BODY_DISTANCE / BODY.height
+    intrinsics = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
+    target = np.array([0.0, BODY.aim, 0.0])
+    cameras = []
+    for index in range(count):
+        elevation = RINGS[(index + 1) % len(RINGS)]
+        towards = _towards(360.0 * index / count, elevation)
+        pose = look_at(target + BODY_DISTANCE * towards, target)
+        cameras.append(Camera(width, height, intrinsics, pose, str(index)))
+    return tuple(cameras)
+
+
+def camera_arc(subject: Subject, rig: str, count: int, size: int) -> tuple[Camera, ...]:
+    """Cameras on a frontal arc around the head; the first looks straight at the face.
+
+    Args:
+        subject: Its rest pose places the rig.
+        rig: One of `ARCS`.
+        count: How many.
+        size: Width and height of the pictures.
+    """
+    framing = ARCS[rig]
+    target = subject.head_in_world + np.array([0.0, framing.aim, 0.0])
+    focal = size * DISTANCE / framing.height
+    intrinsics = np.array([[focal, 0, size / 2], [0, focal, size / 2], [0, 0, 1]])
+    cameras = []
+    for index in range(count):
+        towards = _towards(*_direction(index, count))
+        pose = look_at(target + DISTANCE * towards, target)
+        cameras.append(Camera(size, size, intrinsics, pose, str(index)))
+    return tuple(cameras)
+
+
+def _towards(azimuth: float, elevation: float) -> np.ndarray:
+    """(3,) unit vector from degrees; 0, 0 is where the face looks."""
+    azimuth, elevation = np.radians((azimuth, elevation))
+    return np.array(
+        [
+            np.sin(azimuth) * np.cos(elevation),
+            np.sin(elevation),
+            np.cos(azimuth) * np.cos(elevation),
+        ]
+    )
+
+
+def _direction(index: int, count: int) -> tuple[float, float]:
+    """Azimuth and elevation in degrees: the front, then wider and wider, side by side."""
+    if index == 0:
+        return 0.0, 0.0
+    ring, rings = (index + 1) // 2, count // 2
+    side = 1.0 if index % 2 else -1.0
+    return side * WIDEST_AZIMUTH * ring / rings, (9.0, -7.0, 16.0)[index % 3]
