@@ -262,7 +262,7 @@ def test_a_bundle_that_is_none_is_one_sentence(tmp_path, capsys):
 
 def test_a_server_needs_no_torch(bundle_path):
     code = (
-        "import sys; from ico3d.chat import server; from ico3d.bundle.format import Bundle;"
+        "import sys; from ico3d.chat.serving import server; from ico3d.bundle.format import Bundle;"
         "from ico3d.chat.settings.conversation import ChatSettings;"
         f"server.open_avatar(Bundle.open({str(bundle_path)!r}), ChatSettings());"
         "assert not {'torch', 'numba', 'scipy', 'transformers'} & set(sys.modules)"

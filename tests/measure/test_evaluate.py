@@ -154,7 +154,7 @@ def test_without_a_clean_plate_the_curtain_is_not_compared(tmp_path, no_models):
 
 def test_a_mouth_without_landmarks_is_found_in_the_recorded_picture(tmp_path, monkeypatch):
     head, reader = _head(0.4), Reader()
-    monkeypatch.setattr(head, "landmark_reader", lambda: reader)
+    monkeypatch.setattr("ico3d.measure.head.landmark_reader", lambda: reader)
     capture = BeforeCurtain(tmp_path, head)
     scores = evaluate_head(head, capture, (3, 4, 5), None)
     box = mouth_box(Offset.landmarks(None, 0, 0), SIZE, SIZE)
@@ -166,7 +166,7 @@ def test_a_mouth_without_landmarks_is_found_in_the_recorded_picture(tmp_path, mo
 
 def test_cameras_that_see_no_face_are_not_asked_for_one(tmp_path, monkeypatch, caplog):
     head, reader = _head(0.4), Reader()
-    monkeypatch.setattr(head, "landmark_reader", lambda: reader)
+    monkeypatch.setattr("ico3d.measure.head.landmark_reader", lambda: reader)
     capture = BeforeCurtain(tmp_path, head)
     behind = look_at(np.array([0.1, 0.0, -0.7]), np.zeros(3))
     capture.cameras = tuple(replace(c, world_to_camera=behind) for c in capture.cameras)
