@@ -1,6 +1,13 @@
 """What holds for all tests."""
 
+import os
+
 import pytest
+
+# Threads of tiny kernels wait for one another far longer than they work. Whatever computes reads
+# this once, when it is imported; what tests start inherits it.
+for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ.setdefault(_threads, "1")
 
 
 @pytest.fixture

@@ -1,16 +1,10 @@
 """Baking, films and animations of exact models that are on CUDA."""
 
 import copy
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-from support.pretended_cuda import drawn
-
-sys.path.insert(0, str(Path(__file__).parent))
-from whole_person import WholeFilmed, head_recording, write_whole_person
 
 from ico3d.avatar.animation.keyframes import Motion
 from ico3d.avatar.baking import body_bundle, head_bundle, head_cost, person_bundle
@@ -21,7 +15,9 @@ from ico3d.avatar.film.film import extent, pictures
 from ico3d.body.model_folder import TrainedBody
 from ico3d.bundle.format import Bundle
 from ico3d.cli import main
+from support.avatars.whole_person import WholeFilmed, head_recording, write_whole_person
 from support.captures import open_with
+from support.pretended_cuda import drawn
 
 QUICK = BakeSettings(hidden=32, augmented=20, steps=40)
 

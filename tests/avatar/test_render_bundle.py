@@ -1,8 +1,5 @@
 """What a viewer of a whole person must show."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 import torch
@@ -16,11 +13,9 @@ from ico3d.avatar.render_bundle import (
 )
 from ico3d.bundle.format import Bundle
 from ico3d.errors import BundleError
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "bundle"))
-from random_body import write_random_body
-from random_bundle import write_random_bundle
-from random_whole import FRAMES, nodding_poses, write_random_whole
+from support.bundles.random_body import write_random_body
+from support.bundles.random_bundle import write_random_bundle
+from support.bundles.random_whole import FRAMES, nodding_poses, write_random_whole
 
 FPS = 15.0
 FACE = np.linspace(-1, 1, 39)

@@ -1,15 +1,10 @@
 """What the tests of bodies share."""
 
-import sys
-from pathlib import Path
-
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from moving_ball import MovingBall
-from recorded_capture import record
-from window_tasks import files_of_a_sequence
+from support.bodies.moving_ball import MovingBall
+from support.bodies.recorded_capture import record
+from support.bodies.window_tasks import files_of_a_sequence
 
 
 @pytest.fixture

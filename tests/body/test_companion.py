@@ -5,9 +5,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 import torch
-from moving_capture import FRAMES, MovingCapture
-from test_trainer import SMALL, WINDOW
-from window_parts import canonical
 
 from ico3d.body.companion import MOMENTS, PRUNE_EVERY, Pruning
 from ico3d.body.motion.formulas import FREETIME, Still
@@ -23,6 +20,9 @@ from ico3d.errors import ModelError, SettingsError
 from ico3d.splat.density import Population
 from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
+from support.bodies.moving_capture import FRAMES, MovingCapture
+from support.bodies.tiny_training import SMALL, WINDOW
+from support.bodies.window_parts import canonical
 
 RADIUS = 0.13
 BALL = np.array([0.0, 0.35, 0.0])

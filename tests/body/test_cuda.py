@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import pytest
 import torch
-from moving_capture import MovingCapture
-from test_train import TINY
 
 from ico3d.body.settings import settings_for
 from ico3d.body.training.finetune_window import FineTuner
 from ico3d.body.training.optimise_window import BodyTrainer
 from ico3d.body.training.train_clip import BodyJob, train_body
+from support.bodies.moving_capture import MovingCapture
+from support.bodies.tiny_training import TINY
 
 DEATHS = {BodyTrainer: 8, FineTuner: 4}
 """Steps before which a run is interrupted."""

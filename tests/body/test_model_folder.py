@@ -4,13 +4,13 @@ import json
 
 import pytest
 import torch
-from window_parts import ENCODED, canonical
 
 from ico3d.body.model_folder import ABOUT, TrainedBody, load_window, save_window
 from ico3d.body.motion.formulas import Still
 from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.errors import ModelError
+from support.bodies.window_parts import ENCODED, canonical
 
 
 @pytest.fixture

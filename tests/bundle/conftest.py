@@ -1,15 +1,12 @@
-import sys
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 
 @pytest.fixture(scope="session")
 def bundle_bytes(tmp_path_factory) -> bytes:
     """A valid bundle, small enough for thousands of mutations."""
-    from random_bundle import write_random_bundle
+    from support.bundles.random_bundle import write_random_bundle
 
     path = tmp_path_factory.mktemp("bundle") / "valid.ico3d"
     write_random_bundle(path, 60)

@@ -3,10 +3,10 @@
 import json
 
 import pytest
-from random_body import body_manifest, random_windows
 
 from ico3d.bundle.animation import Action, Animation, Rest
 from ico3d.errors import BundleError
+from support.bundles.random_body import body_manifest, random_windows
 
 VALID = {
     "version": 1,

@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from random_body import (
+
+from ico3d.bundle.body import BakedWindow
+from ico3d.bundle.format import Bundle
+from ico3d.bundle.manifest import Manifest
+from ico3d.errors import BundleError
+from support.bundles.random_body import (
     RANKS,
     body_manifest,
     random_window,
     random_windows,
     write_random_body,
 )
-from random_bundle import random_head, random_manifest
-
-from ico3d.bundle.body import BakedWindow
-from ico3d.bundle.format import Bundle
-from ico3d.bundle.manifest import Manifest
-from ico3d.errors import BundleError
+from support.bundles.random_bundle import random_head, random_manifest
 
 RELAXED = settings(
     max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]

@@ -4,13 +4,13 @@ import json
 import zipfile
 
 import pytest
-from random_body import write_random_body
-from random_whole import write_random_whole
 
 from ico3d.bundle import packaged
 from ico3d.bundle.format import Bundle
 from ico3d.cli import main
 from ico3d.errors import BundleError
+from support.bundles.random_body import write_random_body
+from support.bundles.random_whole import write_random_whole
 
 
 def info(path, tmp_path) -> dict:

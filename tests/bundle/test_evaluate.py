@@ -1,9 +1,9 @@
 """The reference evaluator against closed forms."""
 
 import numpy as np
-from random_bundle import random_head
 
 from ico3d.bundle.evaluate import attributes, coefficients, logits
+from support.bundles.random_bundle import random_head
 
 
 def test_zero_coefficients_give_the_mean_look():

@@ -6,10 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from random_bundle import random_files, random_head, random_manifest, write_random_bundle
 
 from ico3d.bundle.format import Bundle, write_bundle
 from ico3d.errors import BundleError
+from support.bundles.random_bundle import (
+    random_files,
+    random_head,
+    random_manifest,
+    write_random_bundle,
+)
 
 
 def test_a_bundle_reads_back_as_it_was_written(tmp_path):

@@ -5,10 +5,10 @@ import json
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from random_bundle import random_head, random_manifest
 
 from ico3d.bundle.manifest import Manifest
 from ico3d.errors import BundleError
+from support.bundles.random_bundle import random_head, random_manifest
 
 VALID = json.loads(random_manifest(random_head(10)).to_json())
 

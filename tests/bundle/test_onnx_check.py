@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from onnx import TensorProto, helper, numpy_helper
-from random_bundle import speech_graph
 
 from ico3d.bundle.onnx_check import check_onnx
 from ico3d.errors import BundleError
+from support.bundles.random_bundle import speech_graph
 
 GRAPH = speech_graph()
 

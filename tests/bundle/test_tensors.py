@@ -5,10 +5,10 @@ import struct
 
 import numpy as np
 import pytest
-from random_bundle import random_head, random_manifest, swaying_poses
 
 from ico3d.bundle.head import BakedHead, poses_from_bytes, poses_to_bytes
 from ico3d.errors import BundleError
+from support.bundles.random_bundle import random_head, random_manifest, swaying_poses
 
 HEAD = random_head(30)
 INFO = random_manifest(HEAD).head

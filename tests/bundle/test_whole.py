@@ -9,12 +9,18 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from random_bundle import random_files, random_head, random_manifest
-from random_whole import ANIMATION, FRAMES, whole_files, whole_manifest, write_random_whole
 
 from ico3d.bundle.backdrop import check_background
 from ico3d.bundle.format import Bundle, write_bundle
 from ico3d.errors import BundleError
+from support.bundles.random_bundle import random_files, random_head, random_manifest
+from support.bundles.random_whole import (
+    ANIMATION,
+    FRAMES,
+    whole_files,
+    whole_manifest,
+    write_random_whole,
+)
 
 
 def ply(count: int = 2, rows: bytes | None = None, more: str = "", kind: str = "float") -> bytes:

@@ -1,8 +1,5 @@
 """Captures with smaller pictures."""
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,39 +7,39 @@ from ico3d.capture.formats import open_capture
 from ico3d.capture.resized import ResizedCapture
 from ico3d.cli import main
 from ico3d.errors import SettingsError
-
-
-@pytest.fixture(scope="module")
-def folders():
-    """The writer of multiview folders."""
-    path = Path(__file__).parent / "multiview" / "folders.py"
-    spec = importlib.util.spec_from_file_location("folders", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+from support.recordings import multiview_folders
 
 
 @pytest.fixture
-def two_sizes(folders, tmp_path):
+def two_sizes(tmp_path):
     """Three cameras: two of 80 x 64 pixels, one of 30 x 20."""
-    folder, rig = tmp_path / "whole", [*folders.ring(2, (80, 64)), folders.ring(3, (30, 20))[2]]
+    folder, rig = (
+        tmp_path / "whole",
+        [*multiview_folders.ring(2, (80, 64)), multiview_folders.ring(3, (30, 20))[2]],
+    )
     for index, camera in enumerate(rig):
         size = (camera.width, camera.height)
-        folders.save(folder / f"images/{camera.name}/000000.png", folders.picture(index, 0, size))
+        multiview_folders.save(
+            folder / f"images/{camera.name}/000000.png", multiview_folders.picture(index, 0, size)
+        )
         mask = np.zeros((size[1], size[0]), np.uint8)
         mask[size[1] // 4 :, size[0] // 4 : -size[0] // 4] = 255
-        folders.save(folder / f"masks/{camera.name}/000000.png", mask)
-        folders.save(folder / f"backgrounds/{camera.name}.png", folders.picture(index, 1, size))
+        multiview_folders.save(folder / f"masks/{camera.name}/000000.png", mask)
+        multiview_folders.save(
+            folder / f"backgrounds/{camera.name}.png", multiview_folders.picture(index, 1, size)
+        )
     (folder / "points").mkdir()
     np.save(folder / "points/000000.npy", np.ones((4, 3), np.float32))
-    return folders.write_cameras(folder, [folders.entry(camera) for camera in rig], 1)
+    return multiview_folders.write_cameras(
+        folder, [multiview_folders.entry(camera) for camera in rig], 1
+    )
 
 
-def test_pixels_are_means_of_what_they_cover(two_sizes, folders):
+def test_pixels_are_means_of_what_they_cover(two_sizes):
     whole = open_capture(two_sizes)
     small = ResizedCapture(whole, 32)
     assert [(c.width, c.height) for c in small.cameras] == [(40, 32), (40, 32), (30, 20)]
-    expected = folders.picture(0, 0, (80, 64)).reshape(32, 2, 40, 2, 3).mean((1, 3)) / 255
+    expected = multiview_folders.picture(0, 0, (80, 64)).reshape(32, 2, 40, 2, 3).mean((1, 3)) / 255
     np.testing.assert_allclose(small.image(0, 0), expected, atol=1e-6)
     assert small.mask(0, 0).sum() * 4 == pytest.approx(whole.mask(0, 0).sum())
     assert small.background(1).shape == (32, 40, 3)

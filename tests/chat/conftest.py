@@ -20,7 +20,7 @@ from ico3d.chat.settings.conversation import ChatSettings, Choice  # noqa: E402
 from ico3d.common.espeak import synthesize  # noqa: E402
 
 OFFLINE = ChatSettings(language=Choice("persona-notes"))
-RANDOM_BUNDLE = Path(__file__).parents[1] / "bundle" / "random_bundle.py"
+RANDOM_BUNDLE = Path(__file__).parents[1] / "support" / "bundles" / "random_bundle.py"
 
 
 def random_bundle_module(name="random_bundle"):

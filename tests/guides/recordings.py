@@ -1,11 +1,11 @@
 """Tiny recordings of one synthetic person, laid out as each guide expects them."""
 
-import importlib.util
 import json
 import shutil
 from pathlib import Path
 
 import numpy as np
+from bench import smc_files
 from PIL import Image
 
 from ico3d.avatar.film.video import write_video
@@ -58,12 +58,8 @@ def many_cameras(face: Path, body: Path, work: Path) -> None:
 
 def data_sets(face: Path, body: Path, work: Path) -> None:
     """What the makers of the data sets hand out."""
-    path = Path(__file__).parents[2] / "bench" / "smc_files.py"
-    spec = importlib.util.spec_from_file_location("smc_files", path)
-    writer = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(writer)
-    writer.write_renderme(open_capture(face), work / "renderme", "0026_s1_all")
-    writer.write_dna(open_capture(body), work / "dna", "0012_11")
+    smc_files.write_renderme(open_capture(face), work / "renderme", "0026_s1_all")
+    smc_files.write_dna(open_capture(body), work / "dna", "0012_11")
     shutil.copy(face / "audio.wav", work / "speech.wav")
 
 

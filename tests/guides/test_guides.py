@@ -1,32 +1,20 @@
 """The commands of docs/guides, as they stand there, on recordings of a few tiny pictures."""
 
-import importlib.util
-import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from guides import guide, recordings
+from guides.small import SMALL
 from ico3d.bundle.format import Bundle
 from ico3d.capture.formats import open_capture
+from support.shared import MODELS
 
 pytest.importorskip("anny")
 pytestmark = pytest.mark.slow
 MODEL = "face_landmarker.task"
-SHARED = Path(__file__).resolve().parents[3] / "shared" / "models"
-
-
-def _module(name):
-    """A file beside this one."""
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-recordings, guide = _module("recordings"), _module("guide")
-SMALL = _module("small").SMALL
 
 
 @pytest.fixture(scope="module")
@@ -42,9 +30,8 @@ def body(face):
 @pytest.fixture
 def tracker(monkeypatch):
     """Whether faces can be tracked here: MediaPipe's model is not part of ico3d."""
-    folder = Path(os.environ.get("ICO3D_MODELS", SHARED))
-    monkeypatch.setenv("ICO3D_MODELS", str(folder))
-    return (folder / MODEL).is_file()
+    monkeypatch.setenv("ICO3D_MODELS", str(MODELS))
+    return (MODELS / MODEL).is_file()
 
 
 def _tracked(tracker, **truth):

@@ -1,9 +1,7 @@
 """Heads that listen with the encoders that users bring, from training to the server's face."""
 
 import dataclasses
-import sys
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,10 +12,7 @@ from ico3d.head.train_head import HeadJob, train_head
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.export import export_speech, make_servable
 from ico3d.speech.runtime import open_speech
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "speech"))
-
-from users_weights import write_ave, write_hubert
+from support.users_weights import write_ave, write_hubert
 
 
 @pytest.fixture(params=["ave", "hubert"])

@@ -5,7 +5,6 @@ import logging
 import numpy as np
 import pytest
 import torch
-from tiny_capture import TinyCapture
 
 from ico3d.common.expression import EyeRange
 from ico3d.head.expressions import eye_track
@@ -13,6 +12,7 @@ from ico3d.head.model import HeadModel, HeadShape
 from ico3d.head.model_folder import TrainedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
+from support.heads.tiny_capture import TinyCapture
 
 
 @pytest.fixture

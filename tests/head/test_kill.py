@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 from safetensors.torch import load_file
-from train_tiny import SETTINGS, train_tiny
+
+from support.heads.train_tiny import SETTINGS, train_tiny
 
 pytestmark = pytest.mark.slow
 
@@ -21,7 +22,7 @@ KILLS = 5
 def processes():
     """Starts real processes in which everything heavy is imported already."""
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["train_tiny", "torch.utils.tensorboard"])
+    context.set_forkserver_preload(["support.heads.train_tiny", "torch.utils.tensorboard"])
     return context
 
 

@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 import torch
-from two_balls import HEAD, TRUNK, TwoBalls, seen_by
 
 from ico3d.common.camera import look_at
 from ico3d.errors import CaptureError
@@ -16,6 +15,7 @@ from ico3d.head.train_head import HeadJob, train_head
 from ico3d.head.views import PictureCache
 from ico3d.measure.head import evaluate_head
 from ico3d.splat.render import render
+from support.recordings.two_balls import HEAD, TRUNK, TwoBalls, seen_by
 
 SETTINGS = dataclasses.replace(
     PRESETS["cpu"],

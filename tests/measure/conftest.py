@@ -1,7 +1,19 @@
-"""What tests of measuring share with the tests of bodies."""
+import pytest
 
-import sys
-from pathlib import Path
+from ico3d.measure import lpips
+from support.lpips_weights import write_weights
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "body"))
-sys.path.insert(0, str(Path(__file__).parent))
+
+@pytest.fixture(scope="session")
+def lpips_weights(tmp_path_factory):
+    """The folder of made-up weights of LPIPS, and both tables in it."""
+    path = tmp_path_factory.mktemp("models")
+    return path, *write_weights(path)
+
+
+@pytest.fixture
+def look_again():
+    """Which weights are here is asked anew by each test."""
+    lpips._installed.cache_clear()
+    yield
+    lpips._installed.cache_clear()

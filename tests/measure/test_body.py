@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from moving_capture import FRAMES, POINTS, MovingCapture
-from true_body import true_body
 
 from ico3d.body.planning.windows import Window
 from ico3d.errors import CaptureError
 from ico3d.measure.body import Truth, evaluate_body, picture_scores
 from ico3d.measure.flicker import border_flicker, masked_difference, novel_cameras
 from ico3d.measure.metrics import moving_pixels, psnr_moving
+from support.bodies.moving_capture import FRAMES, POINTS, MovingCapture
+from support.bodies.true_body import true_body
 
 
 @pytest.fixture(scope="module")

@@ -4,14 +4,14 @@ import json
 
 import numpy as np
 import pytest
-from moving_capture import FRAMES, MovingCapture
 from PIL import Image
-from true_body import still_body
 
 from ico3d.body.model_folder import UNTUNED
 from ico3d.errors import ModelError
 from ico3d.measure.commands import Evaluate
 from ico3d.measure.methods.plots import plot_body
+from support.bodies.moving_capture import FRAMES, MovingCapture
+from support.bodies.true_body import still_body
 from support.captures import open_with
 
 

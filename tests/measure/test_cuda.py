@@ -5,12 +5,6 @@ import json
 
 import numpy as np
 import pytest
-from moving_capture import MovingCapture
-from test_evaluate import Offset, _head
-from test_lpips import folder, look_again  # noqa: F401 (fixtures)
-from test_scene import Offset as OffsetScene
-from test_scene import _trained
-from test_train import job
 
 from ico3d.body.training.train_clip import train_body
 from ico3d.cli import main
@@ -18,8 +12,12 @@ from ico3d.measure import lpips as room
 from ico3d.measure.body import evaluate_body
 from ico3d.measure.head import evaluate_head
 from ico3d.measure.scene import evaluate_scene
+from support.bodies.moving_capture import MovingCapture
+from support.bodies.tiny_training import job
 from support.captures import open_with
+from support.heads.offset_head import OffsetHead, offset_head
 from support.pretended_cuda import drawn
+from support.scenes.offset_scene import OffsetScene, offset_scene
 
 
 def _same(found: dict, wanted: dict) -> None:
@@ -37,8 +35,8 @@ def no_models(tmp_path, monkeypatch):
 
 
 def test_a_head(cuda, no_models, tmp_path):
-    head = _head()
-    capture = Offset(tmp_path, copy.deepcopy(head))
+    head = offset_head()
+    capture = OffsetHead(tmp_path, copy.deepcopy(head))
     here = evaluate_head(head, capture, (3, 4, 5), None)
     head.model.to(cuda)
     there = evaluate_head(head, capture, (3, 4, 5), tmp_path / "pictures")
@@ -59,7 +57,7 @@ def test_a_body(cuda, no_models, tmp_path):
 
 @pytest.mark.parametrize("only", ["all", "person"])
 def test_a_scene(cuda, tmp_path, only):
-    scene = _trained(only)
+    scene = offset_scene(only)
     capture = OffsetScene(tmp_path, copy.deepcopy(scene), plate=0.5)
     here = evaluate_scene(scene, capture, "test", None)
     scene.scene.to(cuda)
@@ -68,18 +66,18 @@ def test_a_scene(cuda, tmp_path, only):
     assert (here["device"], there["device"]) == ("cpu", "cuda (Pretended)")
 
 
-def test_lpips_looks_there(cuda, folder, monkeypatch):  # noqa: F811
-    monkeypatch.setenv("ICO3D_MODELS", str(folder[0]))
+def test_lpips_looks_there(cuda, lpips_weights, look_again, monkeypatch):
+    monkeypatch.setenv("ICO3D_MODELS", str(lpips_weights[0]))
     a, b = np.random.default_rng(1).random((2, 32, 40, 3)).astype(np.float32)
     assert room.lpips(a, b, cuda) == pytest.approx(room.lpips(a, b), rel=1e-5)
 
 
 @pytest.mark.parametrize("device", ["auto", "cuda", "cpu"])
 def test_the_verb(cuda, no_models, tmp_path, monkeypatch, device):
-    head = _head()
+    head = offset_head()
     (tmp_path / "head").mkdir()
     head.save(tmp_path / "head")
-    open_with(monkeypatch, lambda path: Offset(tmp_path, copy.deepcopy(head)))
+    open_with(monkeypatch, lambda path: OffsetHead(tmp_path, copy.deepcopy(head)))
     words = ["evaluate", tmp_path / "head", "capture", "--json", tmp_path / "a.json"]
     with drawn(monkeypatch) as pictures:
         assert main([*map(str, words), "--device", device]) == 0

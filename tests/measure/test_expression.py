@@ -1,7 +1,6 @@
 """The bench of the mouth: alignment, reading of lips, figures."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +11,7 @@ from ico3d.measure import expression as room
 from ico3d.measure.alignment import aligned, transcripts
 from ico3d.speech.corpus import utterance
 from ico3d.speech.targets import ARTICULATION, articulation_track
-
-SPEECH = Path(__file__).parents[3] / "shared" / "speech"
+from support.shared import SPEECH
 
 
 @pytest.fixture(autouse=True)

@@ -9,73 +9,16 @@ import pytest
 import torch
 from PIL import Image
 
-from ico3d.capture.capture import Capture, Split
-from ico3d.common.camera import Camera, look_at
+from ico3d.common.camera import look_at
 from ico3d.errors import CaptureError
-from ico3d.head.model import HeadModel, HeadShape
-from ico3d.head.model_folder import TrainedHead
 from ico3d.head.views import view_of
 from ico3d.measure.head import evaluate_head, most_frontal_camera
 from ico3d.measure.metrics import mouth_box
 from ico3d.splat.render import render
-
-SIZE, ERROR = 32, 0.1
-
-
-def _head(size=1.0) -> TrainedHead:
-    torch.manual_seed(0)
-    model = HeadModel(HeadShape(2, "no-mlp"), 40)
-    model.means.data = size * 0.1 * torch.randn(40, 3)
-    model.log_scales.data.fill_(-3 + np.log(size))
-    model.basis.data[:, :, :3] = torch.randn(3, 40, 3) - 1
-    return TrainedHead(model, "blendshapes", ("a", "b"), "", "", None, {"train_seconds": 7.0})
+from support.heads.offset_head import ERROR, SIZE, OffsetHead, offset_head
 
 
-class Offset(Capture):
-    """What the head renders, everywhere lighter by `ERROR`."""
-
-    kind = "offset"
-    fps = 25.0
-    num_frames = 6
-    split = Split((0, 1, 2), (3, 4, 5))
-    blendshape_names = ("b", "extra", "a")
-
-    def __init__(self, path, head: TrainedHead):
-        self.path, self._head = path, head
-        intrinsics = np.array([[50.0, 0, SIZE / 2], [0, 50.0, SIZE / 2], [0, 0, 1]])
-        eyes = ([0.6, 0.0, 0.3], [0.05, 0.0, 0.7])
-        self.cameras = tuple(
-            Camera(SIZE, SIZE, intrinsics, look_at(np.array(eye), np.zeros(3)), name)
-            for eye, name in zip(eyes, ("side", "front"), strict=True)
-        )
-
-    def blendshapes(self, frame):
-        return np.array([0.1 * frame, 9.0, 1 - 0.1 * frame], np.float32)
-
-    def world_from_head(self, frame):
-        return np.eye(4)
-
-    def image(self, camera, frame):
-        if frame == 4 and camera == 0:
-            return None
-        weights = self.blendshapes(frame)
-        expression = torch.tensor([weights[2], weights[0]])
-        with torch.no_grad():
-            gaussians = self._head.model(expression)
-            picture = render(gaussians, [view_of(self, camera, frame).camera]).rgb[0]
-        return (picture + ERROR).numpy()
-
-    def background(self, camera):
-        return np.zeros((SIZE, SIZE, 3), np.float32)
-
-    def mask(self, camera, frame):
-        return np.eye(SIZE, dtype=np.float32)
-
-    def landmarks(self, camera, frame):
-        return np.stack(np.meshgrid(np.arange(10, 22), np.arange(10, 16)), -1).reshape(-1, 2)[:68]
-
-
-class BeforeCurtain(Offset):
+class BeforeCurtain(OffsetHead):
     """The person, lighter by `ERROR`, before a curtain that no clean plate shows."""
 
     def background(self, camera):
@@ -115,7 +58,7 @@ class Reader:
 
     def read(self, picture, mask=None):
         self.seen.append(picture)
-        return Offset.landmarks(None, 0, 0)
+        return OffsetHead.landmarks(None, 0, 0)
 
 
 @pytest.fixture
@@ -125,9 +68,9 @@ def no_models(tmp_path, monkeypatch):
 
 
 def test_metrics_of_a_known_error(tmp_path, no_models, caplog):
-    head = _head()
+    head = offset_head()
     with caplog.at_level(logging.WARNING):
-        scores = evaluate_head(head, Offset(tmp_path, head), (3, 4, 5), None)
+        scores = evaluate_head(head, OffsetHead(tmp_path, head), (3, 4, 5), None)
     for key in ("psnr", "psnr_mask", "psnr_mouth"):
         assert scores[key] == pytest.approx(20.0, abs=1e-3)
     assert 0 < scores["ssim"] < 1
@@ -140,7 +83,7 @@ def test_metrics_of_a_known_error(tmp_path, no_models, caplog):
 
 
 def test_without_a_clean_plate_the_curtain_is_not_compared(tmp_path, no_models):
-    head = _head(0.4)
+    head = offset_head(0.4)
     capture = BeforeCurtain(tmp_path, head)
     scores = evaluate_head(head, capture, (3, 4, 5), tmp_path / "images")
     share = np.mean([capture.mask(c, f).mean() for f in (3, 4, 5) for c in (0, 1)])
@@ -153,11 +96,11 @@ def test_without_a_clean_plate_the_curtain_is_not_compared(tmp_path, no_models):
 
 
 def test_a_mouth_without_landmarks_is_found_in_the_recorded_picture(tmp_path, monkeypatch):
-    head, reader = _head(0.4), Reader()
+    head, reader = offset_head(0.4), Reader()
     monkeypatch.setattr("ico3d.measure.head.landmark_reader", lambda: reader)
     capture = BeforeCurtain(tmp_path, head)
     scores = evaluate_head(head, capture, (3, 4, 5), None)
-    box = mouth_box(Offset.landmarks(None, 0, 0), SIZE, SIZE)
+    box = mouth_box(OffsetHead.landmarks(None, 0, 0), SIZE, SIZE)
     shares = [capture.mask(c, f)[box].mean() for f in (3, 4, 5) for c in (0, 1)]
     expected = np.mean([20 - 10 * np.log10(share) for share in shares])
     assert scores["psnr_mouth"] == pytest.approx(expected, abs=1e-3)
@@ -165,7 +108,7 @@ def test_a_mouth_without_landmarks_is_found_in_the_recorded_picture(tmp_path, mo
 
 
 def test_cameras_that_see_no_face_are_not_asked_for_one(tmp_path, monkeypatch, caplog):
-    head, reader = _head(0.4), Reader()
+    head, reader = offset_head(0.4), Reader()
     monkeypatch.setattr("ico3d.measure.head.landmark_reader", lambda: reader)
     capture = BeforeCurtain(tmp_path, head)
     behind = look_at(np.array([0.1, 0.0, -0.7]), np.zeros(3))
@@ -178,8 +121,8 @@ def test_cameras_that_see_no_face_are_not_asked_for_one(tmp_path, monkeypatch, c
 
 
 def test_pictures_lie_where_anybody_can_score_them(tmp_path, no_models):
-    head = _head()
-    evaluate_head(head, Offset(tmp_path, head), (3, 4, 5), tmp_path / "images")
+    head = offset_head()
+    evaluate_head(head, OffsetHead(tmp_path, head), (3, 4, 5), tmp_path / "images")
     for part in ("pred", "gt", "mask"):
         names = sorted(str(p.relative_to(tmp_path / "images" / part)) for p in
                        (tmp_path / "images" / part).rglob("*.png"))  # fmt: skip
@@ -190,12 +133,12 @@ def test_pictures_lie_where_anybody_can_score_them(tmp_path, no_models):
 
 
 def test_the_frontal_camera_faces_the_head(tmp_path):
-    assert most_frontal_camera(Offset(tmp_path, _head()), (0, 1)) == 1
+    assert most_frontal_camera(OffsetHead(tmp_path, offset_head()), (0, 1)) == 1
 
 
 def test_a_capture_of_another_face_is_one_sentence(tmp_path, no_models):
-    head = _head()
-    capture = Offset(tmp_path, head)
+    head = offset_head()
+    capture = OffsetHead(tmp_path, head)
     capture.blendshape_names = ("b", "extra", "c")
     with pytest.raises(CaptureError, match="has no blendshape 'a'"):
         evaluate_head(head, capture, (3,), None)

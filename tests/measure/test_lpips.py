@@ -9,35 +9,9 @@ from safetensors.torch import save_file
 
 from ico3d.errors import ModelError
 from ico3d.measure import lpips as room
+from support.lpips_weights import STAGES
 
-STAGES = ((64, 64), (128, 128), (256, 256, 256), (512, 512, 512), (512, 512, 512))
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """Random weights, under torchvision's and the authors' names."""
-    generator = torch.Generator().manual_seed(0)
-    vgg, linear, number, width = {}, {}, 0, 3
-    for stage, widths in enumerate(STAGES):
-        for channels in widths:
-            size = (channels, width, 3, 3)
-            vgg[f"features.{number}.weight"] = torch.randn(size, generator=generator) / width**0.5
-            vgg[f"features.{number}.bias"] = 0.1 * torch.randn(channels, generator=generator)
-            number, width = number + 2, channels
-        number += 1  # the pooling
-        name = f"lin{stage}.model.1.weight"
-        linear[name] = torch.rand(1, width, 1, 1, generator=generator)
-    path = tmp_path_factory.mktemp("models")
-    save_file(vgg, path / "vgg16.safetensors")
-    save_file(linear, path / "lpips_vgg.safetensors")
-    return path, vgg, linear
-
-
-@pytest.fixture(autouse=True)
-def look_again():
-    room._installed.cache_clear()
-    yield
-    room._installed.cache_clear()
+pytestmark = pytest.mark.usefixtures("look_again")
 
 
 def _by_definition(a, b, vgg, linear) -> float:
@@ -58,8 +32,8 @@ def _by_definition(a, b, vgg, linear) -> float:
     return total
 
 
-def test_it_is_what_it_is_defined_as(folder, monkeypatch):
-    path, vgg, linear = folder
+def test_it_is_what_it_is_defined_as(lpips_weights, monkeypatch):
+    path, vgg, linear = lpips_weights
     monkeypatch.setenv("ICO3D_MODELS", str(path))
     rng = np.random.default_rng(1)
     a, b = rng.random((2, 32, 40, 3)).astype(np.float32)
@@ -67,8 +41,8 @@ def test_it_is_what_it_is_defined_as(folder, monkeypatch):
     assert room.lpips(a, a) == 0
 
 
-def test_a_file_of_something_else_is_refused(folder, tmp_path, monkeypatch):
-    _, vgg, linear = folder
+def test_a_file_of_something_else_is_refused(lpips_weights, tmp_path, monkeypatch):
+    _, vgg, linear = lpips_weights
     save_file({k: v for k, v in vgg.items() if "28" not in k}, tmp_path / "vgg16.safetensors")
     save_file(linear, tmp_path / "lpips_vgg.safetensors")
     monkeypatch.setenv("ICO3D_MODELS", str(tmp_path))

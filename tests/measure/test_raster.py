@@ -1,14 +1,14 @@
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from ico3d.errors import SettingsError
 from ico3d.measure.raster import compare
+from support.shared import SHARED
 
-OPPONENT = Path(__file__).parents[3] / "shared" / "reference" / "raster_c" / "opponent.py"
+OPPONENT = SHARED / "reference" / "raster_c" / "opponent.py"
 
 
 @pytest.mark.skipif(not OPPONENT.is_file(), reason="the C++ opponent is not beside the repository")

@@ -7,7 +7,6 @@ import warnings
 import numpy as np
 import pytest
 import torch
-from users_weights import write_ave
 
 from ico3d.cli import main
 from ico3d.errors import MissingModelError
@@ -15,6 +14,7 @@ from ico3d.speech.encoder import load_encoder
 from ico3d.speech.export import export_speech, make_servable
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.speech.runtime import StreamingExpressions, open_speech
+from support.users_weights import write_ave
 
 # channels in and out, kernel, stride, padding, residual
 LAYERS = [

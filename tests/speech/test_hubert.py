@@ -7,7 +7,6 @@ import sys
 import numpy as np
 import pytest
 import torch
-from users_weights import write_hubert
 
 from ico3d.errors import MissingModelError, ModelError
 from ico3d.speech.blocks import SIZE, sound_blocks
@@ -15,6 +14,7 @@ from ico3d.speech.encoder import load_encoder
 from ico3d.speech.export import export_speech, make_servable
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions
+from support.users_weights import write_hubert
 
 transformers = pytest.importorskip("transformers")
 

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 import torch
-from users_weights import write_ave
 
 from ico3d.errors import MissingModelError, ModelError, SettingsError
 from ico3d.speech.encoder import load_ave, load_builtin, load_encoder
@@ -13,6 +12,7 @@ from ico3d.speech.network import (
     SpeechAdaptor,
     feature_windows,
 )
+from support.users_weights import write_ave
 
 
 def sound(seconds=1.5, seed=0):

@@ -1,7 +1,5 @@
 """The built-in encoder never heard a human: here it does, against forced alignment."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import torch
@@ -10,8 +8,7 @@ from ico3d.measure.alignment import aligned, transcripts
 from ico3d.speech.encoder import BUILTIN_FILE, load_encoder
 from ico3d.speech.targets import ARTICULATION, articulation_track
 from ico3d.speech.training import load_readout
-
-SPEECH = Path(__file__).parents[3] / "shared" / "speech"
+from support.shared import SPEECH
 
 
 @pytest.fixture(scope="module")

@@ -15,14 +15,6 @@ pytest.importorskip("espeakng_loader")
 SETTINGS = EncoderSettings(steps=4, batch=2, seconds=1.0, seed=5)
 
 
-@pytest.fixture(autouse=True)
-def one_thread():
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
-
-
 def test_an_interrupted_training_goes_on_exactly(tmp_path, monkeypatch):
     monkeypatch.setattr(training, "_CHECKPOINT_EVERY", 2)
     whole = EncoderTraining(SETTINGS, tmp_path / "whole.pt")

@@ -1,11 +1,6 @@
-import sys
-from pathlib import Path
-
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from reference import camera_at
+from support.splats.reference import camera_at
 
 
 @pytest.fixture

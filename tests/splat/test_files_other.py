@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from gaussian_files import as_gsply, gsply, random_gaussians, same, splat_bytes
 
 from ico3d.cli import main
 from ico3d.errors import GaussianFileError, SettingsError
 from ico3d.splat.files.formats import read_file, read_gaussians, write_gaussians
+from support.splats.gaussian_files import as_gsply, gsply, random_gaussians, same, splat_bytes
 
 
 def sigmoid(values):

@@ -4,7 +4,6 @@ import tracemalloc
 import numpy as np
 import pytest
 import torch
-from gaussian_files import as_gsply, gsply, ply_bytes, random_gaussians, same
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
@@ -14,6 +13,7 @@ from ico3d.splat.files.formats import read_file, read_gaussians, write_gaussians
 from ico3d.splat.files.raw import RawGaussians
 from ico3d.splat.files.standard_ply import header, property_order
 from ico3d.splat.gaussians import Gaussians
+from support.splats.gaussian_files import as_gsply, gsply, ply_bytes, random_gaussians, same
 
 FINITE = st.floats(width=32, allow_nan=False, allow_infinity=False)
 SCALES = st.floats(width=32, max_value=80, allow_nan=False, allow_infinity=False)

@@ -6,12 +6,12 @@ import tracemalloc
 import numpy as np
 import pytest
 import torch
-from gaussian_files import as_gsply, gsply, random_gaussians, same
 
 from ico3d.errors import GaussianFileError
 from ico3d.splat import harmonics, quaternions
 from ico3d.splat.files.formats import read_file, read_gaussians, write_gaussians
 from ico3d.splat.files.spz_container import FREE_BYTES, MAX_RATIO
+from support.splats.gaussian_files import as_gsply, gsply, random_gaussians, same
 
 FLIP = np.array([1, -1, -1], np.float32)
 VALUES = ("means", "dc", "rest", "opacities", "log_scales", "quats")

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
-import reference
 import torch
 from scipy.spatial.transform import Rotation
 
 from ico3d.splat import harmonics, quaternions
 from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
+from support.splats import reference
 
 
 def similarity(scale=1.7, seed=0):

@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
-import reference
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from reference import camera_at
 
 from ico3d.common.camera import Camera
 from ico3d.splat import quaternions
 from ico3d.splat.gaussians import cat
 from ico3d.splat.render import render
+from support.splats import reference
+from support.splats.reference import camera_at
 
 SEEDS = st.integers(0, 10_000)
 FEW = settings(max_examples=15, deadline=None)

@@ -4,9 +4,9 @@ import math
 
 import pytest
 import torch
-from reference import camera_at, harmonic, render, scene
 
 from ico3d.splat.gaussians import Gaussians
+from support.splats.reference import camera_at, harmonic, render, scene
 
 
 @pytest.mark.parametrize("antialiased", [True, False])

@@ -4,9 +4,7 @@ import sys
 
 import numpy as np
 import pytest
-import reference
 import torch
-from reference import camera_at
 
 from ico3d.errors import MissingExtraError
 from ico3d.splat import cuda
@@ -15,6 +13,8 @@ from ico3d.splat.cpu.rasterise import Project, bin_views, camera_numbers
 from ico3d.splat.cpu.tiles import VECTOR
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
+from support.splats import reference
+from support.splats.reference import camera_at
 
 PARAMETERS = ("means", "quats", "scales", "opacities", "colors")
 DEVICES = [

@@ -1,7 +1,5 @@
 """The performance: lips follow the sound without delay and close at p, b and m."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,6 +8,7 @@ from ico3d.common.expression import EYE_NAMES
 from ico3d.studio.acting.articulation import LEAST_CLOSED, articulate, closure
 from ico3d.studio.acting.performance import PAUSE, SOUND_RATE, _glances, _speak, perform
 from ico3d.studio.person.choice import load_subject
+from support.shared import SUBJECTS
 
 NAMES = ["sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "ih", "oh", "ou"]
 JAW = {"aa": 1.0, "E": 0.6, "ih": 0.4, "oh": 0.8, "ou": 0.3}
@@ -79,7 +78,7 @@ def test_a_gaze_rests_and_jumps():
     assert 0.8 < still.mean() < 0.98  # it moves in a frame or two, then rests
 
 
-NPZ = Path(__file__).parents[3] / "shared" / "subjects" / "human_face_f.npz"
+NPZ = SUBJECTS / "human_face_f.npz"
 
 
 @pytest.mark.skipif(not NPZ.is_file(), reason="../shared/subjects is not here")

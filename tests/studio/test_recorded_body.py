@@ -1,8 +1,6 @@
 """Whole synthetic people: bones, gestures, cameras all around, and what is written."""
 
-import importlib.util
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,14 +19,10 @@ from ico3d.studio.person.subject import Material
 from ico3d.studio.picture import paint
 from ico3d.studio.recording import Recording, record
 from ico3d.studio.rigs import cameras_of
+from support.recordings import synthetic_bodies
+from support.shared import SUBJECTS
 
-_SPEC = importlib.util.spec_from_file_location(
-    "synthetic_bodies", Path(__file__).parent / "synthetic_bodies.py"
-)
-bodies = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(bodies)
-
-SHARED = Path(__file__).parents[3] / "shared" / "subjects" / "human_face_m.npz"
+HUMAN = SUBJECTS / "human_face_m.npz"
 FPS = 15.0
 
 
@@ -40,16 +34,16 @@ def _settings(subject, **changes) -> Recording:
 
 @pytest.fixture(scope="module")
 def person(tmp_path_factory):
-    return bodies.write_body(tmp_path_factory.mktemp("people") / "tubes.npz")
+    return synthetic_bodies.write_body(tmp_path_factory.mktemp("people") / "tubes.npz")
 
 
 @pytest.fixture(scope="module", params=["tubes", "human_face_m"])
 def subject(request, person):
     if request.param == "tubes":
         return load_subject(str(person), whole=True)
-    if not SHARED.is_file():
+    if not HUMAN.is_file():
         pytest.skip("the shared subjects are not here")
-    return load_subject(str(SHARED), whole=True)
+    return load_subject(str(HUMAN), whole=True)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -300,7 +294,7 @@ def test_a_head_of_version_1_can_still_be_read(person, tmp_path):
 def test_who_has_no_joints_cannot_be_whole(person, tmp_path):
     with pytest.raises(SettingsError, match="anny"):
         load_subject("anny", whole=True)
-    bust = bodies.people.write_person(tmp_path / "bust.npz")
+    bust = synthetic_bodies.people.write_person(tmp_path / "bust.npz")
     with pytest.raises((CaptureError, SettingsError)):
         record(_settings(bust), tmp_path / "x", workers=1)
     with pytest.raises(SettingsError, match="motion"):

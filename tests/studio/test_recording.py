@@ -1,8 +1,8 @@
 """Synthetic captures: what is written is exact, and the same every time."""
 
-import importlib.util
 import json
 import shutil
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +14,8 @@ from ico3d.studio import recording
 from ico3d.studio.person.choice import load_subject
 from ico3d.studio.points import surface_points
 from ico3d.studio.recording import Recording, choose_views, record
-
-_SPEC = importlib.util.spec_from_file_location(
-    "synthetic_people", Path(__file__).parent / "synthetic_people.py"
-)
-people = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(people)
-
-SUBJECTS = Path(__file__).parents[3] / "shared" / "subjects"
+from support.recordings import synthetic_people
+from support.shared import SUBJECTS
 
 
 def _settings(subject: Path, **changes) -> Recording:
@@ -32,7 +26,7 @@ def _settings(subject: Path, **changes) -> Recording:
 
 @pytest.fixture(scope="module")
 def person(tmp_path_factory):
-    return people.write_person(tmp_path_factory.mktemp("people") / "block.npz")
+    return synthetic_people.write_person(tmp_path_factory.mktemp("people") / "block.npz")
 
 
 @pytest.fixture(scope="module")
@@ -183,7 +177,7 @@ def test_a_full_folder_is_not_overwritten(folder, person):
 
 
 def test_subject_files_that_lack_an_array_are_told(tmp_path):
-    path = people.write_person(tmp_path / "bad.npz", lip_mask=None)
+    path = synthetic_people.write_person(tmp_path / "bad.npz", lip_mask=None)
     with pytest.raises(CaptureError, match="lip_mask"):
         load_subject(str(path))
     with pytest.raises(CaptureError, match="no subject file"):
@@ -201,7 +195,7 @@ def test_shared_subjects_close_and_open_their_lips(name):
     assert gaps["PP"] < 0.002 and gaps["aa"] > 0.012
 
 
-@pytest.mark.skipif(importlib.util.find_spec("anny") is None, reason="anny is not installed")
+@pytest.mark.skipif(find_spec("anny") is None, reason="anny is not installed")
 def test_anny_closes_and_opens_the_lips():
     subject = load_subject("anny")
     gaps = {}

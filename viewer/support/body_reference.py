@@ -21,8 +21,8 @@ from ico3d.avatar.render_bundle import body_gaussians, render_body, visitor_came
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import Loss, Persona, window_file
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "avatar"))
-from moving_body import FPS, MovingPerson
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+from support.avatars.moving_body import FPS, MovingPerson
 
 BORDERS, SHAPE = (0, 15, 30, 45), Shape(8, (7, 5, 2))
 PROVENANCE = {"kind": "computed", "sources": ["a seed"], "consent": "none", "licence": "CC0-1.0"}

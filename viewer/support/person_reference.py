@@ -33,8 +33,8 @@ from ico3d.splat.files.raw import RawGaussians
 from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "bundle"))
-from random_bundle import random_files, random_head, random_manifest
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+from support.bundles.random_bundle import random_files, random_head, random_manifest
 
 FPS = 15.0
 ANIMATED = Animation(FPS, BORDERS[-1] + 1, Rest(0, 12), (Action(24, 0.9), Action(40, 0.7)))

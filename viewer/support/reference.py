@@ -16,8 +16,8 @@ import numpy as np
 from ico3d.bundle import evaluate
 from ico3d.bundle.format import Bundle
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "bundle"))
-from random_bundle import write_random_bundle
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+from support.bundles.random_bundle import write_random_bundle
 
 NUM_EXPRESSIONS = 5
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from ico3d.avatar.persona import load_persona
 from ico3d.bundle.format import Bundle, write_bundle
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "bundle"))
-from random_bundle import random_files, random_head, random_manifest
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+from support.bundles.random_bundle import random_files, random_head, random_manifest
 
 GAUSSIANS = 300
 PERSONA = Path(__file__).with_name("persona.json")

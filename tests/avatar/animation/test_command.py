@@ -1,8 +1,6 @@
 """`ico3d animate` on a body, an avatar and a bundle."""
 
 import json
-import sys
-from pathlib import Path
 
 import pytest
 from PIL import Image
@@ -11,14 +9,11 @@ from ico3d.avatar.animation.animated import open_person
 from ico3d.bundle.animation import Action, Animation, Rest
 from ico3d.cli import main
 from ico3d.splat.device import CPU
+from support.avatars.whole_person import FRAMES, WholeFilmed, write_whole_person
+from support.bundles.random_body import write_random_body
+from support.bundles.random_bundle import write_random_bundle
+from support.bundles.random_whole import ANIMATION, write_random_whole
 from support.captures import open_with
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "bundle"))
-sys.path.insert(0, str(Path(__file__).parent))
-from random_body import write_random_body
-from random_bundle import write_random_bundle
-from random_whole import ANIMATION, write_random_whole
-from whole_person import FRAMES, WholeFilmed, write_whole_person
 
 
 @pytest.fixture(scope="module")

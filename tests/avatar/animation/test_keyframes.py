@@ -1,17 +1,12 @@
 """Key frames of a body whose rest and whose gestures are known."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from ico3d.avatar.animation.keyframes import Motion, find_actions, find_animation, find_rest
 from ico3d.bundle.animation import Rest
 from ico3d.splat.gaussians import Gaussians
-
-sys.path.insert(0, str(Path(__file__).parent))
-from moving_body import MovingPerson
+from support.avatars.moving_body import MovingPerson
 
 FPS = 15.0
 KEYS = {0: 0.0, 20: 0.0, 28: 0.6, 38: -0.5, 46: 0.9, 56: 0.9, 64: 0.35, 70: 0.0, 80: 0.0}

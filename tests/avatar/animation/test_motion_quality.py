@@ -1,16 +1,10 @@
 """Motion that does not look as it was recorded is found, and not played."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-
-sys.path.insert(0, str(Path(__file__).parent))
-from moving_body import MovingPerson, Span
-from test_bake_body import FilmedPerson
 
 from ico3d.avatar.animation.command import table
 from ico3d.avatar.animation.keyframes import Motion
@@ -25,6 +19,8 @@ from ico3d.avatar.animation.motion_quality import (
 from ico3d.bundle.animation import Action, Animation, Rest
 from ico3d.errors import BundleError, CaptureError
 from ico3d.splat.gaussians import Gaussians
+from support.avatars.filmed_person import FilmedPerson
+from support.avatars.moving_body import MovingPerson, Span
 
 CLIP = Span(0, 22)
 HEAD, ARM = 1, 2

@@ -1,9 +1,7 @@
 """Planted heads of both kinds, and their bundles."""
 
-import sys
 from pathlib import Path
 
-import numba
 import pytest
 import torch
 
@@ -15,20 +13,7 @@ from ico3d.bundle.format import Bundle
 from ico3d.head.model_folder import TrainedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
-
-sys.path.insert(0, str(Path(__file__).parent))
-from planted import PlantedCapture, planted_eyes, planted_model
-
-
-@pytest.fixture(autouse=True, scope="session")
-def one_thread():
-    """Tiny tensors: more threads only wait for one another."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    numba.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
-    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+from support.avatars.planted import PlantedCapture, planted_eyes, planted_model
 
 
 def _blendshape_head(folder: Path) -> tuple[TrainedHead, PlantedCapture]:

@@ -1,8 +1,5 @@
 """Baking a planted head, from its pictures to the bundle that is opened again."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 import torch
@@ -14,10 +11,8 @@ from ico3d.avatar.render_bundle import render_bundle
 from ico3d.bundle.evaluate import logits
 from ico3d.bundle.manifest import Loss
 from ico3d.errors import BundleError
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "bundle"))
-from planted import driving
-from random_bundle import random_head
+from support.avatars.planted import driving
+from support.bundles.random_bundle import random_head
 
 QUICK = BakeSettings(hidden=64, augmented=100, steps=300)
 

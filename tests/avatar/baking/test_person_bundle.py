@@ -2,19 +2,11 @@
 
 import json
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-
-sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).parents[1] / "bundle"))
-from planted import driving
-from random_bundle import random_head
-from test_bake_body import NOISE, SIZE
-from whole_person import FPS, FRAMES, NECK, WholeFilmed, head_recording, write_whole_person
 
 from ico3d.avatar.baking import head_bundle, person_bundle
 from ico3d.avatar.baking.head_cost import psnr
@@ -27,6 +19,17 @@ from ico3d.bundle.manifest import Loss
 from ico3d.cli import main
 from ico3d.errors import BundleError
 from ico3d.splat.render import render
+from support.avatars.filmed_person import NOISE, SIZE
+from support.avatars.planted import driving
+from support.avatars.whole_person import (
+    FPS,
+    FRAMES,
+    NECK,
+    WholeFilmed,
+    head_recording,
+    write_whole_person,
+)
+from support.bundles.random_bundle import random_head
 from support.captures import open_with
 
 QUICK = BakeSettings(hidden=64, augmented=100, steps=300)

@@ -1,7 +1,6 @@
 """Films of a body: paths of cameras, time, and the file."""
 
 import json
-import sys
 from pathlib import Path
 
 import av
@@ -10,16 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "body"))
-from moving_capture import MovingCapture
-from true_body import still_body, true_body
-
 from ico3d.avatar.film.camera_path import orbit, read_key_cameras, ring_around, ring_of, through
 from ico3d.avatar.film.command import Render
 from ico3d.avatar.film.film import back_and_forth, extent, pictures
 from ico3d.avatar.film.video import write_video
 from ico3d.common.camera import look_at
 from ico3d.errors import CaptureError, ModelError, SettingsError
+from support.bodies.moving_capture import MovingCapture
+from support.bodies.true_body import still_body, true_body
 from support.captures import open_with
 
 WIDTH, HEIGHT = 64, 96

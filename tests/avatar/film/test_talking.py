@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import sys
 from pathlib import Path
 
 import av
@@ -10,13 +9,6 @@ import numpy as np
 import pytest
 import soundfile
 import torch
-
-sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).parents[1] / "bundle"))
-from random_body import write_random_body
-from random_bundle import write_random_bundle
-from random_whole import FRAMES, write_random_whole
-from whole_person import write_whole_person
 
 from ico3d.avatar.film.actor import avatar_actor, bundle_actor
 from ico3d.avatar.film.command import Render
@@ -31,9 +23,13 @@ from ico3d.speech.runtime import SpeechModel
 from ico3d.splat.files.formats import write_gaussians
 from ico3d.splat.files.raw import RawGaussians
 from ico3d.splat.gaussians import Gaussians
+from support.avatars.whole_person import write_whole_person
+from support.bundles.random_body import write_random_body
+from support.bundles.random_bundle import write_random_bundle
+from support.bundles.random_whole import FRAMES, write_random_whole
+from support.shared import SPEECH
 
 FPS, RATE = 15.0, 16_000
-SHARED = Path(__file__).parents[3] / "shared" / "speech"
 
 
 def hum(seconds: float) -> Sound:
@@ -257,11 +253,11 @@ def test_the_demos_lips_open_when_the_sounds_do(tmp_path):
 
 @needs_face
 @needs_demo
-@pytest.mark.skipif(not SHARED.is_dir(), reason="no recordings of human speech (../shared/speech)")
+@pytest.mark.skipif(not SPEECH.is_dir(), reason="no recordings of human speech (../shared/speech)")
 def test_the_demos_lips_follow_a_human_voice(tmp_path):
     from ico3d.measure.lips import lip_lag_ms
 
-    sound, rate = soundfile.read(SHARED / "jfk_16k.wav")
+    sound, rate = soundfile.read(SPEECH / "jfk_16k.wav")
     soundfile.write(tmp_path / "voice.wav", sound[: 6 * rate], rate)
     gaps, loudness = lips_in_film(tmp_path / "voice.wav", tmp_path, 20)
     assert np.isfinite(gaps).mean() >= 0.95

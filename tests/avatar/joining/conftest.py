@@ -1,19 +1,10 @@
 """What the tests of joining share."""
 
-import os
-import sys
-from pathlib import Path
-
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from planted_person import PlantedPerson, planted_head
-
 from ico3d.bundle import packaged
-
-SHARED = Path(__file__).resolve().parents[4] / "shared" / "models"
-MODELS = Path(os.environ.get("ICO3D_MODELS", SHARED))
+from support.avatars.planted_person import PlantedPerson, planted_head
+from support.shared import MODELS
 
 
 @pytest.fixture

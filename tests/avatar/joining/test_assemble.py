@@ -2,52 +2,32 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 from PIL import Image
-from planted_person import ABROAD, FRAMES, NAMES, PlantedPerson, face, planted_head
 
 from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.joining import assemble as module
-from ico3d.avatar.joining.assemble import Assembly, JoiningSettings, align, assemble, measured
+from ico3d.avatar.joining.assemble import JoiningSettings, align, assemble, measured
 from ico3d.avatar.joining.checking import write_checks
 from ico3d.avatar.joining.command import Assemble
 from ico3d.avatar.joining.companion import HeadSource
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.similarity import moved
 from ico3d.body.companion import Pruning
-from ico3d.body.settings import settings_for
 from ico3d.body.training.optimise_window import BodyTrainer
 from ico3d.capture.capture import Capture
 from ico3d.errors import CaptureError, ModelError, SettingsError
 from ico3d.head.model import HeadModel, HeadShape
 from ico3d.measure.body import evaluate_body
-
-TINY = {
-    "initial_gaussians": 400,
-    "max_gaussians": 600,
-    "steps_per_frame": 35,
-    "warmup_steps": 20,
-    "densify_from": 30,
-    "grid_space": 8,
-    "width": 16,
-    "finetune_steps": 0,
-    "checkpoint_every": 60,
-}
-JOINING = JoiningSettings(color_steps=120, border_points=60)
+from support.avatars.planted_person import ABROAD, FRAMES, NAMES, PlantedPerson, face, planted_head
+from support.avatars.tiny_joining import assembly_of
 
 
 class Stopped(Exception):
     """Somebody has ended the process."""
-
-
-def assembly_of(head: Path, **joining) -> Assembly:
-    """What to assemble in seconds."""
-    body = replace(settings_for("cpu", "swings++"), **TINY)
-    return Assembly(head, replace(JOINING, **joining), body, 0)
 
 
 @pytest.fixture(scope="module")

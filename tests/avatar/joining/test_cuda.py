@@ -6,9 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from planted_person import FRAMES, PlantedPerson, face, planted_head
-from test_assemble import assembly_of
-from test_recolour import SETTINGS, parts_of
 
 from ico3d.avatar.avatar import Placement, TrainedAvatar
 from ico3d.avatar.joining.assemble import assemble
@@ -19,6 +16,8 @@ from ico3d.avatar.joining.found_placement import OverRecording, head_poses
 from ico3d.avatar.joining.recolour import color_difference, recolour
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.seam import seam_scores
+from support.avatars.planted_person import FRAMES, PlantedPerson, face, planted_head
+from support.avatars.tiny_joining import RECOLOUR, assembly_of, parts_of
 from support.pretended_cuda import drawn, is_moved
 
 
@@ -27,7 +26,7 @@ def test_colours_are_matched(cuda, head, abroad):
     placement, expressions, views, tested = parts_of(abroad, head)
     other = copy.deepcopy(head.model).requires_grad_(False).to(cuda)
     head.model.requires_grad_(False)
-    quick = replace(SETTINGS, steps=20)
+    quick = replace(RECOLOUR, steps=20)
     recolour(head.model, placement, expressions, views, quick)
     recolour(other, placement, expressions, views, quick)
     assert is_moved(other.color_branch.weight)

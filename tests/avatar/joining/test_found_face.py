@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from filmed_demo import FilmedDemo, away, demo, head_abroad, saved
 from scipy.spatial.transform import Rotation
 
 from ico3d.avatar.joining import found_face
@@ -13,6 +12,7 @@ from ico3d.avatar.joining.similarity import canonical_from_head, moved, scale_of
 from ico3d.avatar.render_bundle import baked_gaussians
 from ico3d.errors import ModelError
 from ico3d.splat.gaussians import Gaussians
+from support.avatars.filmed_demo import FilmedDemo, away, demo, head_abroad, saved
 
 
 def resting() -> Gaussians:

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from filmed_demo import FilmedDemo, away, head_abroad, saved
-from planted_person import PlantedPerson, planted_head
 
 from ico3d.avatar.avatar import HEAD
 from ico3d.avatar.joining.assemble import place_head
 from ico3d.errors import CaptureError, MissingModelError, ModelError
 from ico3d.head.model_folder import TrainedHead
+from support.avatars.filmed_demo import FilmedDemo, away, head_abroad, saved
+from support.avatars.planted_person import PlantedPerson, planted_head
 
 
 def test_a_head_without_landmarks_is_joined(face_model, packaged_demo, tmp_path, monkeypatch):

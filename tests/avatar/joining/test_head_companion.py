@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from planted_person import ABROAD, FRAMES, face
 
 from ico3d.avatar.avatar import PLACEMENT, Placement, save_placement
 from ico3d.avatar.joining.companion import JITTER, SEAM, HeadSource
@@ -14,6 +13,7 @@ from ico3d.avatar.joining.driving import head_poses
 from ico3d.avatar.joining.similarity import moved
 from ico3d.errors import ModelError
 from ico3d.training.checkpoint import save_tensors
+from support.avatars.planted_person import ABROAD, FRAMES, face
 
 CPU = torch.device("cpu")
 

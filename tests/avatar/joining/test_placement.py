@@ -6,7 +6,6 @@ import shutil
 import numpy as np
 import pytest
 import torch
-from planted_person import ABROAD, NAMES, planted_head
 from scipy.spatial.transform import Rotation, Slerp
 
 from ico3d.avatar.avatar import PLACEMENT, Placement, TrainedAvatar, load_placement, save_placement
@@ -16,6 +15,7 @@ from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.errors import ModelError
 from ico3d.training.checkpoint import load_tensors, save_tensors
+from support.avatars.planted_person import ABROAD, NAMES, planted_head
 
 FRAMES = 5
 

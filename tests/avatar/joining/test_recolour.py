@@ -3,17 +3,11 @@
 import numpy as np
 import pytest
 import torch
-from planted_person import face
 from scipy.spatial import KDTree
 
-from ico3d.avatar.avatar import Placement
 from ico3d.avatar.joining import recolour as module
-from ico3d.avatar.joining.driving import head_poses, recorded_expressions
-from ico3d.avatar.joining.face_views import face_views
 from ico3d.avatar.joining.recolour import RecolourSettings, color_difference, recolour
-from ico3d.avatar.joining.region import HeadRegion
-
-SETTINGS = RecolourSettings(steps=150)
+from support.avatars.tiny_joining import RECOLOUR, parts_of
 
 
 @pytest.fixture
@@ -23,23 +17,13 @@ def head(head):
     return head
 
 
-def parts_of(capture, head):
-    """Placement, expressions and views, for training and held out."""
-    placement = Placement(capture.canonical_from_head, head_poses(capture))
-    expressions = recorded_expressions(head, capture, head.neutral())
-    region = HeadRegion.around(face())
-    views = face_views(capture, placement, region, face())
-    tested = face_views(capture, placement, region, face(), list(capture.split.test_cameras))
-    return placement, expressions, views, tested
-
-
 def test_a_tint_is_recovered(head, abroad):
     """A quarter of the difference is left at most, by cameras that were not learnt from, too."""
     placement, expressions, views, tested = parts_of(abroad, head)
     before = [color_difference(head.model, placement, expressions, v) for v in (views, tested)]
     assert min(before) > 0.03
     kept = {name: value.clone() for name, value in head.model.state_dict().items()}
-    recolour(head.model, placement, expressions, views, SETTINGS)
+    recolour(head.model, placement, expressions, views, RECOLOUR)
     after = [color_difference(head.model, placement, expressions, v) for v in (views, tested)]
     assert after[0] < 0.25 * before[0] and after[1] < 0.25 * before[1]
     changed = {n for n, v in head.model.state_dict().items() if not torch.equal(v, kept[n])}
@@ -76,7 +60,7 @@ def test_light_changes_little_between_neighbours(head, abroad):
         before = head.model.logits(values)[:, :3].detach()
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(module, "ROUGHNESS", weight)
-            recolour(head.model, placement, expressions, views, SETTINGS)
+            recolour(head.model, placement, expressions, views, RECOLOUR)
         change = head.model.logits(values)[:, :3] - before
         rough.append(float((change - change[nearest]).detach().square().mean()))
     assert rough[0] < 0.75 * rough[1]

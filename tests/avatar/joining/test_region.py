@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import torch
-from planted_person import AXES, FRAMES, face
 from scipy.spatial.transform import Rotation
 
 from ico3d.avatar.avatar import Placement
@@ -12,6 +11,7 @@ from ico3d.avatar.joining.driving import head_poses, recorded_expressions
 from ico3d.avatar.joining.face_views import WIDEST, face_views, faces
 from ico3d.avatar.joining.region import CHIN, HeadRegion
 from ico3d.errors import CaptureError, ModelError
+from support.avatars.planted_person import AXES, FRAMES, face
 
 
 @pytest.fixture

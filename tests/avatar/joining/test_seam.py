@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from planted_person import FRAMES, face
 from scipy.spatial.transform import Rotation
 
 from ico3d.avatar.avatar import Placement, TrainedAvatar
@@ -15,6 +14,7 @@ from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.seam import gap, largest_gap, seam_scores
 from ico3d.errors import CaptureError
 from ico3d.splat.gaussians import Gaussians
+from support.avatars.planted_person import FRAMES, face
 
 FLAT = HeadRegion(
     np.array([0, 0, 1.0]), np.array([0, 1.0, 0]), 0.0, -1.0, 1.0, np.array([[0, 0.1, 0, 0.05]])

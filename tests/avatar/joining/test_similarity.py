@@ -5,7 +5,6 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planted_person import ABROAD, face
 from scipy.spatial.transform import Rotation
 
 from ico3d.avatar.avatar import Placement
@@ -13,6 +12,7 @@ from ico3d.avatar.joining.similarity import STEADY, canonical_from_head, moved, 
 from ico3d.capture.face.canonical import canonical_landmarks
 from ico3d.errors import ModelError
 from ico3d.splat import quaternions
+from support.avatars.planted_person import ABROAD, face
 
 seeds = st.integers(0, 2**32 - 1)
 OUTLIERS = round(0.2 * len(STEADY))

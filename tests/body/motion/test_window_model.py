@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 import torch
-from window_parts import ENCODED, POSITIONAL, canonical
 
 from ico3d.body.motion.deformation import GRID, MLP
 from ico3d.body.motion.encoder import EncoderShape
@@ -17,6 +16,7 @@ from ico3d.body.motion.window_model import WindowModel, activated
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import settings_for
 from ico3d.body.training.prepare_window import PADDING, deformation
+from support.bodies.window_parts import ENCODED, POSITIONAL, canonical
 
 MOTIONS = [Still(), SPACETIME, FREETIME, ENCODED, POSITIONAL]
 

@@ -7,12 +7,12 @@ import cv2
 import numpy as np
 import pytest
 import torch
-from moving_ball import BALL, HEIGHT
 
 from ico3d.body.planning.flow import clip_flow, dynamic_weights
 from ico3d.body.planning.flow_methods import DisFlow, best_method
 from ico3d.body.planning.windows import Window
 from ico3d.errors import CaptureError, MissingExtraError
+from support.bodies.moving_ball import BALL, HEIGHT
 
 STEPS = [0.0, 0.0, 0.01, 0.05, 0.0, 0.1]
 """Metres that the ball rises in each step."""

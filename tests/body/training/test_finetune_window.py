@@ -5,8 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from moving_capture import MovingCapture
-from test_trainer import SMALL, trainer_of
 
 from ico3d.body.motion.window_model import CANONICAL
 from ico3d.body.planning.windows import Window
@@ -15,6 +13,8 @@ from ico3d.body.training.finetune_window import FineTuner, around
 from ico3d.body.training.views import MARGIN, BodyViews
 from ico3d.splat.initial import in_pictures
 from ico3d.splat.render import render
+from support.bodies.moving_capture import MovingCapture
+from support.bodies.tiny_training import SMALL, trainer_of
 
 BEFORE, AFTER = Window(0, 4), Window(4, 8)
 

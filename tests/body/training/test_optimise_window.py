@@ -1,48 +1,22 @@
 """Training a window."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import torch
-from moving_capture import MovingCapture
 
-from ico3d.body.planning.windows import Window
 from ico3d.body.settings import settings_for
-from ico3d.body.training.optimise_window import BodyTrainer
 from ico3d.body.training.picture_step import Learner
-from ico3d.body.training.prepare_window import begin_window
 from ico3d.body.training.views import BodyViews
 from ico3d.splat.losses import ssim
 from ico3d.splat.render import render
-
-WINDOW = Window(4, 8)
-SMALL = {
-    "initial_gaussians": 250,
-    "max_gaussians": 400,
-    "steps_per_frame": 50,
-    "warmup_steps": 20,
-    "densify_from": 30,
-    "densify_every": 30,
-    "grid_space": 8,
-    "width": 32,
-}
+from support.bodies.moving_capture import MovingCapture
+from support.bodies.tiny_training import WINDOW, trainer_of
 
 
 @pytest.fixture
 def capture(tmp_path):
     """The swinging arm."""
     return MovingCapture(tmp_path)
-
-
-def trainer_of(capture, method="swings++", seed=0, window=WINDOW, **changes):
-    """A trainer of the window in which the arm rises."""
-    settings = replace(settings_for("cpu", method), **(SMALL | changes))
-    begin = begin_window(
-        capture, window, method, settings, lambda p: (p[:, 0] > 0.2).astype(float), seed
-    )
-    pictures = BodyViews(capture, window.frames, 0.1)
-    return BodyTrainer(begin.model, window, pictures, method, settings, begin.extent, seed)
 
 
 def masked_error(capture, model, frame):

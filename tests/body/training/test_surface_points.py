@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from moving_ball import AXES, BALL
 
 from ico3d.body.training.surface_points import initial_points, point_colors
 from ico3d.capture.surface.coverage import visible
 from ico3d.errors import CaptureError
+from support.bodies.moving_ball import AXES, BALL
 
 
 def _start(capture, frame=0, count=3000):

@@ -1,36 +1,16 @@
 """From a capture to a model folder."""
 
 import json
-from dataclasses import replace
 
 import pytest
 import torch
-from moving_capture import FRAMES, MovingCapture
 
 from ico3d.body.model_folder import TrainedBody
 from ico3d.body.planning.windows import Window
-from ico3d.body.settings import settings_for
-from ico3d.body.training.train_clip import BodyJob, train_body
+from ico3d.body.training.train_clip import train_body
 from ico3d.errors import SettingsError
-
-TINY = {
-    "longest_window": 6,
-    "shortest_window": 3,
-    "initial_gaussians": 60,
-    "max_gaussians": 90,
-    "steps_per_frame": 4,
-    "warmup_steps": 4,
-    "densify_from": 5,
-    "densify_every": 5,
-    "grid_space": 4,
-    "width": 8,
-    "finetune_steps": 6,
-}
-
-
-def job(method="swings++", seed=0, **changes):
-    """A training of a few seconds."""
-    return BodyJob(method, seed, replace(settings_for("cpu", method), **(TINY | changes)))
+from support.bodies.moving_capture import FRAMES, MovingCapture
+from support.bodies.tiny_training import job
 
 
 @pytest.fixture(scope="module")

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import torch
-from moving_capture import MovingCapture
 
 from ico3d.body.training.views import MARGIN, BodyViews
 from ico3d.errors import CaptureError
+from support.bodies.moving_capture import MovingCapture
 
 CPU = torch.device("cpu")
 

@@ -7,14 +7,13 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from test_jobs import wait_for
-from window_tasks import CHECKPOINT_EVERY, step_gone_on_from, tasks
 
 from ico3d.body.workers.cluster import RayCluster, share
 from ico3d.body.workers.jobs import train_windows
 from ico3d.errors import MissingExtraError, SettingsError
 from ico3d.training.log import METRICS
 from ico3d.training.run import CHECKPOINT
+from support.bodies.window_tasks import CHECKPOINT_EVERY, step_gone_on_from, tasks, wait_for
 
 pytestmark = pytest.mark.slow
 

@@ -11,7 +11,6 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from window_tasks import CHECKPOINT_EVERY, step_gone_on_from, tasks
 
 from ico3d.body.commands import TrainBody
 from ico3d.body.workers.jobs import RETRIES, Lost, train_windows
@@ -20,6 +19,7 @@ from ico3d.errors import CaptureError, MissingExtraError, ModelError, SettingsEr
 from ico3d.training.finite import NotFiniteError
 from ico3d.training.loop import saved_steps
 from ico3d.training.run import CHECKPOINT
+from support.bodies.window_tasks import CHECKPOINT_EVERY, step_gone_on_from, tasks, wait_for
 
 pytestmark = pytest.mark.slow
 
@@ -42,15 +42,6 @@ class Disturbed(Processes):
             self._victim = None
             self._disturb(self._pid)
         return super().ended(timeout)
-
-
-def wait_for(file: Path) -> bool:
-    """Waits until a file is there."""
-    for _ in range(60_000):
-        if file.exists():
-            return True
-        time.sleep(0.002)
-    raise TimeoutError(file)
 
 
 def killed(pid):
@@ -132,13 +123,13 @@ def test_an_error_of_the_program_is_shown_and_not_tried_again(recorded, tmp_path
 def test_workers_end_with_the_one_who_started_them(recorded, tmp_path):
     """Even if that is killed: nobody would stop them, and who comes next writes the same files."""
     command = (
-        "import sys; from pathlib import Path; from window_tasks import tasks;"
+        "import sys; from pathlib import Path; from support.bodies.window_tasks import tasks;"
         "from ico3d.body.workers.jobs import train_windows;"
         "from ico3d.body.workers.processes import Processes;"
         "made = tasks(*map(Path, sys.argv[1:]), 'static', steps_per_frame=10_000);"
         "train_windows(made[:1], Processes(1, False))"
     )
-    paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    paths = os.pathsep.join(sys.path)
     environment = {**os.environ, "PYTHONPATH": paths}
     words = [sys.executable, "-c", command, str(recorded), str(tmp_path)]
     with subprocess.Popen(words, env=environment, stdout=subprocess.DEVNULL) as parent:

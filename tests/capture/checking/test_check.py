@@ -4,6 +4,7 @@ from PIL import Image
 from ico3d.capture.checking.check import examine
 from ico3d.capture.formats import open_capture
 from ico3d.cli import main
+from support.recordings import portrait_folder
 
 
 def _levels(folder):
@@ -21,10 +22,10 @@ def test_steady_landmarks_of_a_rigid_head_fit_exactly(folder):
     assert "within 0.0" in _levels(folder)["landmarks"].text
 
 
-def test_landmarks_of_the_next_frame_are_noticed(folder, layout, capsys):
-    poses = layout.head_poses()
-    for frame in range(layout.FRAMES - 1):
-        pixels = layout.project(poses[frame + 1], layout.head_points())
+def test_landmarks_of_the_next_frame_are_noticed(folder, capsys):
+    poses = portrait_folder.head_poses()
+    for frame in range(portrait_folder.FRAMES - 1):
+        pixels = portrait_folder.project(poses[frame + 1], portrait_folder.head_points())
         np.savetxt(folder / "ori_imgs" / f"{frame}.lms", pixels)
     finding = _levels(folder)["landmarks"]
     assert finding.level == "error" and "-1 frame" in finding.text

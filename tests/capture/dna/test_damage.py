@@ -13,6 +13,7 @@ from ico3d.capture.checking.check import examine
 from ico3d.capture.formats import open_capture
 from ico3d.cli import main as run
 from ico3d.errors import CaptureError, MissingExtraError
+from support.recordings import dna_files
 
 
 def fails(call, *words):
@@ -28,15 +29,15 @@ def annotations_of(main):
 
 
 @pytest.fixture
-def main(smc, tmp_path):
+def main(tmp_path):
     """A recording of four cameras and three frames."""
-    return smc.write_recording(tmp_path, smc.Rig(cameras=(0, 1, 2, 48)))
+    return dna_files.write_recording(tmp_path, dna_files.Rig(cameras=(0, 1, 2, 48)))
 
 
-def test_forty_rows_of_expressions_for_more_frames(smc, tmp_path, caplog):
-    rig = smc.Rig(cameras=(0, 1), frames=45, sizes=((8, 8), (8, 8)), expression_rows=40)
-    capture = open_capture(smc.write_recording(tmp_path, rig))
-    parts = smc.smplx(45)
+def test_forty_rows_of_expressions_for_more_frames(tmp_path, caplog):
+    rig = dna_files.Rig(cameras=(0, 1), frames=45, sizes=((8, 8), (8, 8)), expression_rows=40)
+    capture = open_capture(dna_files.write_recording(tmp_path, rig))
+    parts = dna_files.smplx(45)
     with caplog.at_level(logging.WARNING):
         for frame in (39, 40, 44):
             fit = capture.smplx(frame)
@@ -46,12 +47,14 @@ def test_forty_rows_of_expressions_for_more_frames(smc, tmp_path, caplog):
     assert "expression have 40 rows for 45 frames" in said
 
 
-def test_one_row_of_betas(smc, tmp_path, caplog):
-    capture = open_capture(smc.write_recording(tmp_path, smc.Rig(cameras=(0, 1), betas_rows=1)))
+def test_one_row_of_betas(tmp_path, caplog):
+    capture = open_capture(
+        dna_files.write_recording(tmp_path, dna_files.Rig(cameras=(0, 1), betas_rows=1))
+    )
     with caplog.at_level(logging.WARNING):
         for frame in range(3):
             betas = capture.smplx(frame).betas
-            np.testing.assert_array_equal(betas, smc.smplx(3)["betas"][0])
+            np.testing.assert_array_equal(betas, dna_files.smplx(3)["betas"][0])
     (said,) = caplog.messages
     assert "betas have 1 rows for 3 frames" in said
 
@@ -66,9 +69,9 @@ def test_poses_that_end_early_are_none(main, caplog):
     assert "only the first 2 of 3 frames" in caplog.messages[0]
 
 
-def test_parts_without_annotations(smc, tmp_path):
-    rig = smc.Rig(cameras=(0, 1, 2), annotated=False)
-    capture = open_capture(smc.write_recording(tmp_path, rig))
+def test_parts_without_annotations(tmp_path):
+    rig = dna_files.Rig(cameras=(0, 1, 2), annotated=False)
+    capture = open_capture(dna_files.write_recording(tmp_path, rig))
     assert capture.image(0, 0) is not None
     assert capture.mask(0, 0) is None and capture.smplx(0) is None
     assert capture.keypoints_2d(0, 0) is None and capture.keypoints_3d(0) is None
@@ -109,10 +112,10 @@ def test_damaged_frames_are_named(main, capsys):
     assert "camera" in capsys.readouterr().err
 
 
-def test_pictures_of_another_size_are_refused(main, smc):
+def test_pictures_of_another_size_are_refused(main):
     with h5py.File(main, "a") as file:
         del file["Camera_5mp/2/color/1"]
-        file["Camera_5mp/2/color/1"] = smc.encoded(smc.picture(2, 1, (20, 30)), "JPEG")
+        file["Camera_5mp/2/color/1"] = dna_files.encoded(dna_files.picture(2, 1, (20, 30)), "JPEG")
     capture = open_capture(main)
     fails(lambda: capture.image(2, 1), "camera 02, frame 1", "30x20", "40x48")
 
@@ -150,8 +153,8 @@ def test_annotations_must_be_there(main):
     fails(lambda: open_capture(annotations_of(main)), "main file")
 
 
-def test_a_folder_of_several_recordings_needs_a_choice(main, smc):
-    other = smc.write_recording(main.parent, smc.Rig(cameras=(0, 1)), "0013_01")
+def test_a_folder_of_several_recordings_needs_a_choice(main):
+    other = dna_files.write_recording(main.parent, dna_files.Rig(cameras=(0, 1)), "0013_01")
     fails(lambda: open_capture(main.parent), "2 recordings", "0012_11.smc, 0013_01.smc")
     assert open_capture(other).num_frames == 3
 
@@ -185,10 +188,10 @@ def test_a_missing_package_names_its_extra(main, monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def sound(smc, tmp_path_factory):
+def sound(tmp_path_factory):
     """A small recording to be damaged."""
-    rig = smc.Rig(cameras=(0, 1), frames=1, sizes=((8, 8), (8, 8)))
-    return smc.write_recording(tmp_path_factory.mktemp("sound"), rig)
+    rig = dna_files.Rig(cameras=(0, 1), frames=1, sizes=((8, 8), (8, 8)))
+    return dna_files.write_recording(tmp_path_factory.mktemp("sound"), rig)
 
 
 def read_everything(path) -> None:

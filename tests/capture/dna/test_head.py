@@ -6,12 +6,13 @@ import pytest
 from ico3d.capture.checking.check import examine
 from ico3d.capture.formats import open_capture
 from ico3d.capture.resized import ResizedCapture
+from support.recordings import dna_files, faces
 
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 """The world of these files has -y up."""
 
 
-def whole_body(faces, poses, noise=0.0):
+def whole_body(poses, noise=0.0):
     """(T, 133, 3) keypoints of a person whose head moves, in the world of the files."""
     random = np.random.default_rng(6)
     points = random.uniform(-0.8, 0.8, (len(poses), 133, 3))
@@ -20,21 +21,21 @@ def whole_body(faces, poses, noise=0.0):
 
 
 @pytest.fixture(scope="module")
-def poses(faces):
+def poses():
     return faces.motion(30, 15, at=(0.1, 0.6, 0.0))
 
 
 @pytest.fixture
-def record(smc, tmp_path):
+def record(tmp_path):
     def write(points):
-        rig = smc.Rig(cameras=(0, 20, 40), frames=30, keypoints=points)
-        return open_capture(smc.write_recording(tmp_path, rig, same_picture=True))
+        rig = dna_files.Rig(cameras=(0, 20, 40), frames=30, keypoints=points)
+        return open_capture(dna_files.write_recording(tmp_path, rig, same_picture=True))
 
     return write
 
 
-def test_the_head_moves_as_its_keypoints(record, faces, poses):
-    capture = record(whole_body(faces, poses))
+def test_the_head_moves_as_its_keypoints(record, poses):
+    capture = record(whole_body(poses))
     found = np.stack([capture.world_from_head(frame) for frame in range(30)])
     assert max(faces.errors(found, poses)) < 1e-6
     for frame in (0, 17, 29):
@@ -47,15 +48,15 @@ def test_the_head_moves_as_its_keypoints(record, faces, poses):
             np.testing.assert_allclose(capture.landmarks(camera, frame), pixels, atol=1e-6)
 
 
-def test_noise_is_smoothed(record, faces, poses):
-    capture = record(whole_body(faces, poses, noise=0.002))
+def test_noise_is_smoothed(record, poses):
+    capture = record(whole_body(poses, noise=0.002))
     found = np.stack([capture.world_from_head(frame) for frame in range(30)])
     degrees, millimetres = faces.errors(found, poses)
     assert degrees < 0.7 and millimetres < 1.5
 
 
-def test_keypoints_that_were_not_found(record, faces, poses):
-    points = whole_body(faces, poses)
+def test_keypoints_that_were_not_found(record, poses):
+    points = whole_body(poses)
     points[3, 23:60] = np.nan
     points[5, 40] = 0.0
     points[12:20, 23:91] = np.nan
@@ -71,19 +72,19 @@ def test_keypoints_that_were_not_found(record, faces, poses):
     assert (finding.level, finding.text) == ("ok", "22 of 30 frames")
 
 
-def test_tables_that_end_early(record, faces, poses):
-    capture = record(whole_body(faces, poses)[:25])
+def test_tables_that_end_early(record, poses):
+    capture = record(whole_body(poses)[:25])
     assert capture.world_from_head(24) is not None and capture.world_from_head(25) is None
 
 
-def test_other_sets_of_keypoints_have_no_face(record, faces, poses):
-    capture = record(whole_body(faces, poses)[:, :25])
+def test_other_sets_of_keypoints_have_no_face(record, poses):
+    capture = record(whole_body(poses)[:, :25])
     assert capture.world_from_head(0) is None and capture.landmarks(0, 0) is None
     assert capture.landmarks_3d(0) is None
 
 
-def test_smaller_pictures_have_the_same_head(record, faces, poses):
-    capture = record(whole_body(faces, poses))
+def test_smaller_pictures_have_the_same_head(record, poses):
+    capture = record(whole_body(poses))
     small = ResizedCapture(capture, 24)
     np.testing.assert_array_equal(small.landmarks_3d(4), capture.landmarks_3d(4))
     np.testing.assert_array_equal(small.world_from_head(4), capture.world_from_head(4))

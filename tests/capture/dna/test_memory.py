@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ico3d.capture.formats import open_capture
+from support.recordings import dna_files
 
 LOOK = textwrap.dedent(
     """
@@ -43,10 +44,10 @@ LOOK = textwrap.dedent(
 
 
 @pytest.fixture(scope="module")
-def long(smc, tmp_path_factory):
+def long(tmp_path_factory):
     """60 cameras, 225 frames: 13,500 pictures and as many masks."""
-    rig = smc.Rig(cameras=tuple(range(60)), frames=225, sizes=((30, 25), (40, 30)))
-    return smc.write_recording(tmp_path_factory.mktemp("long"), rig, same_picture=True)
+    rig = dna_files.Rig(cameras=tuple(range(60)), frames=225, sizes=((30, 25), (40, 30)))
+    return dna_files.write_recording(tmp_path_factory.mktemp("long"), rig, same_picture=True)
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
@@ -59,9 +60,9 @@ def test_memory_and_files_stay_flat_over_hundreds_of_pictures(long):
     assert found["open"] < 20
 
 
-def test_several_processes_read_one_open_recording(smc, tmp_path):
+def test_several_processes_read_one_open_recording(tmp_path):
     """Also when they are forked after the first picture has been read."""
-    main = smc.write_recording(tmp_path, smc.Rig(cameras=(0, 1, 2), frames=4))
+    main = dna_files.write_recording(tmp_path, dna_files.Rig(cameras=(0, 1, 2), frames=4))
     capture = open_capture(main)
     before = [capture.image(camera, frame) for camera in range(3) for frame in range(4)]
     children = []
@@ -81,10 +82,12 @@ def test_several_processes_read_one_open_recording(smc, tmp_path):
     np.testing.assert_array_equal(still, before[-1])
 
 
-def test_an_open_recording_can_be_sent_to_other_processes(smc, tmp_path):
+def test_an_open_recording_can_be_sent_to_other_processes(tmp_path):
     import pickle
 
-    capture = open_capture(smc.write_recording(tmp_path, smc.Rig(cameras=(0, 1), frames=1)))
+    capture = open_capture(
+        dna_files.write_recording(tmp_path, dna_files.Rig(cameras=(0, 1), frames=1))
+    )
     image = capture.image(1, 0)
     copy = pickle.loads(pickle.dumps(capture))
     np.testing.assert_array_equal(copy.image(1, 0), image)

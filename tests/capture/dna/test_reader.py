@@ -11,14 +11,15 @@ from PIL import Image
 from ico3d.capture.dna.calibration import colours
 from ico3d.capture.formats import open_capture
 from ico3d.errors import CaptureError
+from support.recordings import dna_files
 
 BENT = (-0.12, 0.05, 0.001, -0.002, 0.03)
 
 
 @pytest.fixture(scope="module")
-def plain(smc, tmp_path_factory):
+def plain(tmp_path_factory):
     """A recording without distortion or colour correction."""
-    return smc.write_recording(tmp_path_factory.mktemp("plain"))
+    return dna_files.write_recording(tmp_path_factory.mktemp("plain"))
 
 
 def test_a_folder_and_its_main_file_are_the_same_recording(plain):
@@ -32,20 +33,22 @@ def test_a_folder_and_its_main_file_are_the_same_recording(plain):
         assert capture.split.train == (0, 1, 2) and len(capture.split.test_cameras) == 1
 
 
-def test_pictures_are_those_of_the_jpeg_decoder(plain, smc):
+def test_pictures_are_those_of_the_jpeg_decoder(plain):
     capture = open_capture(plain)
     for index, camera in enumerate((0, 1, 2, 3, 47, 48, 59)):
-        size = smc.Rig().size(camera)
-        stream = smc.encoded(smc.picture(camera, 2, size), "JPEG")
+        size = dna_files.Rig().size(camera)
+        stream = dna_files.encoded(dna_files.picture(camera, 2, size), "JPEG")
         expected = cv2.imdecode(stream, cv2.IMREAD_COLOR)[..., ::-1]
         image = capture.image(index, 2)
         assert image.dtype == np.float32
         np.testing.assert_array_equal(np.rint(image * 255), expected)
-        np.testing.assert_array_equal(capture.mask(index, 2), smc.mask(camera, size)[..., 0] > 127)
+        np.testing.assert_array_equal(
+            capture.mask(index, 2), dna_files.mask(camera, size)[..., 0] > 127
+        )
 
 
-def test_cameras_are_inverses_of_rt_turned_upright(plain, smc):
-    rig = smc.Rig()
+def test_cameras_are_inverses_of_rt_turned_upright(plain):
+    rig = dna_files.Rig()
     capture = open_capture(plain)
     turn = np.diag([1.0, -1.0, -1.0, 1.0])  # the world of this file has -y up
     for camera, number in zip(capture.cameras, rig.cameras, strict=True):
@@ -60,11 +63,11 @@ def test_cameras_are_inverses_of_rt_turned_upright(plain, smc):
 
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("sign", (-1.0, 1.0))
-def test_every_world_is_turned_so_that_y_is_up(smc, tmp_path, axis, sign):
+def test_every_world_is_turned_so_that_y_is_up(tmp_path, axis, sign):
     up = np.zeros(3)
     up[axis] = sign
-    rig = smc.Rig(cameras=(0, 5, 20, 40), frames=1, up=tuple(up))
-    capture = open_capture(smc.write_recording(tmp_path, rig))
+    rig = dna_files.Rig(cameras=(0, 5, 20, 40), frames=1, up=tuple(up))
+    capture = open_capture(dna_files.write_recording(tmp_path, rig))
     for camera, number in zip(capture.cameras, rig.cameras, strict=True):
         turn = camera.camera_to_world @ np.linalg.inv(rig.camera_to_world(number))
         np.testing.assert_allclose(turn[:3, :3] @ up, [0, 1, 0], atol=1e-12)
@@ -72,7 +75,7 @@ def test_every_world_is_turned_so_that_y_is_up(smc, tmp_path, axis, sign):
         assert set(np.abs(turn[:3, :3]).round(12).ravel()) == {0.0, 1.0}
     fit = capture.smplx(0)
     np.testing.assert_allclose(fit.world_from_fit, turn, atol=1e-12)
-    expected = smc.keypoints_3d(1)[0] @ turn[:3, :3].T
+    expected = dna_files.keypoints_3d(1)[0] @ turn[:3, :3].T
     np.testing.assert_allclose(capture.keypoints_3d(0), expected, atol=1e-12)
 
 
@@ -86,11 +89,11 @@ def slowly_corrected(image: np.ndarray, table: np.ndarray) -> np.ndarray:
     return out
 
 
-def test_colours_follow_the_polynomials_of_blue_green_and_red(smc, tmp_path):
+def test_colours_follow_the_polynomials_of_blue_green_and_red(tmp_path):
     table = np.array([[0.001, 0.8, 5.0], [-0.0012, 1.2, -6.0], [0.0, 1.4, 0.25]])
-    rig = smc.Rig(cameras=(0, 1, 2), frames=1, colours=table)
-    image = open_capture(smc.write_recording(tmp_path, rig)).image(1, 0)
-    stream = smc.encoded(smc.picture(1, 0, rig.size(1)), "JPEG")
+    rig = dna_files.Rig(cameras=(0, 1, 2), frames=1, colours=table)
+    image = open_capture(dna_files.write_recording(tmp_path, rig)).image(1, 0)
+    stream = dna_files.encoded(dna_files.picture(1, 0, rig.size(1)), "JPEG")
     expected = slowly_corrected(cv2.imdecode(stream, cv2.IMREAD_COLOR), table)[..., ::-1]
     np.testing.assert_array_equal(np.rint(image * 255), expected)
 
@@ -101,12 +104,14 @@ def test_colours_saturate():
     assert ramp[:, 1].max() == 0 and ramp[:, 0].tolist() == [min(x * x, 255) for x in range(256)]
 
 
-def test_a_point_of_the_world_is_found_where_the_straightened_camera_sees_it(smc, tmp_path):
+def test_a_point_of_the_world_is_found_where_the_straightened_camera_sees_it(tmp_path):
     """A dot drawn where the bending lens sees a point lies where the pinhole camera says."""
-    rig = smc.Rig(cameras=(0, 20, 50), frames=1, sizes=((300, 260), (340, 300)), distortion=BENT)
+    rig = dna_files.Rig(
+        cameras=(0, 20, 50), frames=1, sizes=((300, 260), (340, 300)), distortion=BENT
+    )
     world = np.array([[0.0, 0, 0], [0.3, -0.25, 0.1], [-0.35, 0.3, -0.2], [0.2, 0.35, 0.25]])
     for number, point in enumerate(world):
-        main = smc.write_recording(tmp_path / str(number), rig)
+        main = dna_files.write_recording(tmp_path / str(number), rig)
         draw_point(main, rig, point)
         capture = open_capture(main)
         for index, camera in enumerate(capture.cameras):
@@ -152,10 +157,10 @@ def replace(file, inside, data) -> None:
     file.create_dataset(inside, data=data)
 
 
-def test_straightened_pictures_show_recorded_pixels_only(smc, tmp_path):
+def test_straightened_pictures_show_recorded_pixels_only(tmp_path):
     """No black rims, also with a large k3."""
-    rig = smc.Rig(cameras=(0, 1, 2), frames=1, distortion=(-0.3, 0.1, 0, 0, 0.9))
-    main = smc.write_recording(tmp_path, rig)
+    rig = dna_files.Rig(cameras=(0, 1, 2), frames=1, distortion=(-0.3, 0.1, 0, 0, 0.9))
+    main = dna_files.write_recording(tmp_path, rig)
     with h5py.File(main, "a") as file:
         white = np.full((*rig.size(0), 3), 255, np.uint8)
         replace(file, "Camera_5mp/0/color/0", png(white))
@@ -164,11 +169,11 @@ def test_straightened_pictures_show_recorded_pixels_only(smc, tmp_path):
     assert not np.allclose(capture.cameras[0].intrinsics, rig.intrinsics(0), atol=1)
 
 
-def test_keypoints_move_with_the_picture(smc, tmp_path):
-    rig = smc.Rig(cameras=(0, 1, 50), frames=2, distortion=BENT)
-    capture = open_capture(smc.write_recording(tmp_path, rig))
+def test_keypoints_move_with_the_picture(tmp_path):
+    rig = dna_files.Rig(cameras=(0, 1, 50), frames=2, distortion=BENT)
+    capture = open_capture(dna_files.write_recording(tmp_path, rig))
     found = capture.keypoints_2d(2, 1)
-    raw = smc.keypoints_2d(rig, 50)[1]
+    raw = dna_files.keypoints_2d(rig, 50)[1]
     np.testing.assert_array_equal(found[:, 2], raw[:, 2])
     matrix = capture.cameras[2].intrinsics.copy()
     matrix[:2, 2] -= 0.5
@@ -180,8 +185,8 @@ def test_keypoints_move_with_the_picture(smc, tmp_path):
     np.testing.assert_allclose(bent[:, 0], raw[:, :2], atol=1e-3)
 
 
-def test_smplx_parameters_by_name(plain, smc):
-    parts, fit = smc.smplx(3), open_capture(plain).smplx(2)
+def test_smplx_parameters_by_name(plain):
+    parts, fit = dna_files.smplx(3), open_capture(plain).smplx(2)
     np.testing.assert_array_equal(fit.betas, parts["betas"][2])
     np.testing.assert_array_equal(fit.expression, parts["expression"][2])
     np.testing.assert_array_equal(fit.transl, parts["transl"][2])
@@ -194,15 +199,15 @@ def test_smplx_parameters_by_name(plain, smc):
     assert (fit.scale, fit.gender) == (1.02, "female")
 
 
-def test_depth_comes_as_it_was_measured(smc, tmp_path):
-    rig = smc.Rig(cameras=(0, 1, 2), frames=2)
-    main = smc.write_recording(tmp_path, rig)
+def test_depth_comes_as_it_was_measured(tmp_path):
+    rig = dna_files.Rig(cameras=(0, 1, 2), frames=2)
+    main = dna_files.write_recording(tmp_path, rig)
     assert open_capture(main).kinect is None
-    smc.write_kinect(main, rig)
+    dna_files.write_kinect(main, rig)
     kinect = open_capture(main).kinect
     assert kinect.cameras == (0, 7)
-    np.testing.assert_array_equal(kinect.depth(7, 1), smc.depth(7, 1))
-    np.testing.assert_array_equal(kinect.mask(0, 0), smc.mask(0, (12, 10))[..., 0] > 127)
+    np.testing.assert_array_equal(kinect.depth(7, 1), dna_files.depth(7, 1))
+    np.testing.assert_array_equal(kinect.mask(0, 0), dna_files.mask(0, (12, 10))[..., 0] > 127)
     assert kinect.depth(7, 2) is None and kinect.mask(3, 0) is None
     place = kinect.calibration(7).camera_to_world
     expected = np.diag([1.0, -1, -1, 1]) @ rig.camera_to_world(56)
@@ -211,8 +216,10 @@ def test_depth_comes_as_it_was_measured(smc, tmp_path):
         kinect.calibration(3)
 
 
-def test_folders_of_the_data_set(smc, tmp_path):
-    main = smc.write_recording(tmp_path / "part_main", smc.Rig(cameras=(0, 1), frames=1))
+def test_folders_of_the_data_set(tmp_path):
+    main = dna_files.write_recording(
+        tmp_path / "part_main", dna_files.Rig(cameras=(0, 1), frames=1)
+    )
     other = tmp_path / "part_annotations"
     other.mkdir()
     (main.parent / "0012_11_annots.smc").rename(other / "0012_11_annots.smc")

@@ -9,9 +9,10 @@ from scipy.spatial.transform import Rotation
 from ico3d.capture.headtrack.from_landmarks import BEHIND, head_from_landmarks
 from ico3d.capture.headtrack.procrustes import procrustes
 from ico3d.capture.headtrack.whittaker import LONGEST_GAP
+from support.recordings import faces
 
 
-def test_without_noise_the_motion_is_exact(faces):
+def test_without_noise_the_motion_is_exact():
     face, poses = faces.face(), faces.motion(40, 15)
     points = faces.moved(poses, face)
     track = head_from_landmarks(points)
@@ -25,7 +26,7 @@ def test_without_noise_the_motion_is_exact(faces):
         np.testing.assert_allclose(local, track.face, atol=1e-9)
 
 
-def test_canonical_head_space(faces):
+def test_canonical_head_space():
     track = head_from_landmarks(faces.moved(faces.motion(10, 15), faces.face()))
     right, left, bridge, under = track.face[[36, 45, 27, 33]]
     np.testing.assert_allclose((left + right) / 2, [0, 0, BEHIND], atol=1e-9)
@@ -37,7 +38,7 @@ def test_canonical_head_space(faces):
 
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 10_000), st.floats(0, 2.5))
-def test_any_turn_is_exact_without_noise(faces, seed, turn):
+def test_any_turn_is_exact_without_noise(seed, turn):
     poses = faces.motion(12, 15, turn=turn)
     outside = np.eye(4)
     outside[:3, :3] = Rotation.random(random_state=seed).as_matrix()
@@ -48,7 +49,7 @@ def test_any_turn_is_exact_without_noise(faces, seed, turn):
 
 @pytest.mark.parametrize("millimetres", (1.0, 3.0))
 @pytest.mark.parametrize("turn", (0.0, 0.3))
-def test_noise_is_bounded_and_smoothing_helps(faces, millimetres, turn):
+def test_noise_is_bounded_and_smoothing_helps(millimetres, turn):
     random = np.random.default_rng(3)
     poses = faces.motion(150, 15, turn=turn)
     exact = faces.moved(poses, faces.face())
@@ -60,7 +61,7 @@ def test_noise_is_bounded_and_smoothing_helps(faces, millimetres, turn):
     assert smooth[0] < 0.75 * rough[0]
 
 
-def test_expressions_do_not_move_the_head(faces):
+def test_expressions_do_not_move_the_head():
     """A mouth that opens by 3 cm, and eyes that blink, leave the pose where it was."""
     poses, face = faces.motion(60, 25), faces.face()
     opened = np.repeat(face[None], 60, 0)
@@ -73,7 +74,7 @@ def test_expressions_do_not_move_the_head(faces):
     assert degrees < 0.05 and millimetres < 0.1
 
 
-def test_missing_landmarks_and_stray_ones(faces):
+def test_missing_landmarks_and_stray_ones():
     random = np.random.default_rng(4)
     poses, face = faces.motion(60, 15), faces.face()
     points = faces.moved(poses, face)
@@ -86,7 +87,7 @@ def test_missing_landmarks_and_stray_ones(faces):
     assert degrees < 0.05 and millimetres < 0.1
 
 
-def test_short_gaps_are_bridged_and_long_ones_are_not(faces):
+def test_short_gaps_are_bridged_and_long_ones_are_not():
     poses = faces.motion(60, 15)
     points = faces.moved(poses, faces.face())
     points[10 : 10 + LONGEST_GAP] = np.nan
@@ -104,7 +105,7 @@ def test_short_gaps_are_bridged_and_long_ones_are_not(faces):
     )
 
 
-def test_a_landmark_never_seen_stays_unknown(faces):
+def test_a_landmark_never_seen_stays_unknown():
     points = faces.moved(faces.motion(9, 15), faces.face())
     points[:, 5] = np.nan
     track = head_from_landmarks(points)
@@ -112,14 +113,14 @@ def test_a_landmark_never_seen_stays_unknown(faces):
     assert track.pose(3) is not None
 
 
-def test_nothing_to_track(faces):
+def test_nothing_to_track():
     assert head_from_landmarks(np.full((5, 68, 3), np.nan)) is None
     points = faces.moved(faces.motion(5, 15), faces.face())
     points[:, 20:] = np.nan
     assert head_from_landmarks(points) is None
 
 
-def test_one_frame(faces):
+def test_one_frame():
     poses = faces.motion(1, 15)
     track = head_from_landmarks(faces.moved(poses, faces.face()))
     np.testing.assert_allclose(track.points[0], faces.moved(poses, faces.face())[0], atol=1e-9)

@@ -1,8 +1,6 @@
 """`ico3d capture track` on recordings of synthetic people, whose heads are known exactly."""
 
-import importlib.util
 import json
-import os
 import shutil
 from pathlib import Path
 
@@ -18,11 +16,11 @@ from ico3d.capture.multiview.resizing import resize_capture
 from ico3d.cli import main
 from ico3d.studio.picture import paint
 from ico3d.studio.recording import Recording, record
+from support.recordings import multiview_folders
+from support.shared import MODELS, SUBJECTS
 
 pytest.importorskip("mediapipe")
-SHARED = Path(__file__).resolve().parents[4] / "shared"
-MODELS = Path(os.environ.get("ICO3D_MODELS", SHARED / "models"))
-PERSON = SHARED / "subjects" / "human_face_f.npz"
+PERSON = SUBJECTS / "human_face_f.npz"
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -112,21 +110,12 @@ def test_small_faces_in_pictures_of_a_whole_person_are_found(tmp_path):
     assert degrees.max() < 2.0 and metres.max() < 0.005
 
 
-def _folders():
-    """The writer of multiview folders."""
-    path = Path(__file__).parents[1] / "multiview" / "folders.py"
-    spec = importlib.util.spec_from_file_location("folders", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.mark.parametrize(
     ("cameras", "message"),
     [(3, "no frame shows a face to two cameras at least"), (1, "has one camera")],
 )
 def test_what_cannot_be_tracked_is_one_sentence(tmp_path, capsys, cameras, message):
-    folder = _folders().write_folder(tmp_path / "noise", cameras)
+    folder = multiview_folders.write_folder(tmp_path / "noise", cameras)
     assert main(["capture", "track", str(folder)]) == 1
     error = capsys.readouterr().err
     assert message in error and error.strip().count("\n") <= 1

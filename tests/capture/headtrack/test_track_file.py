@@ -1,8 +1,6 @@
 """The file beside a recording, and what a multiview capture gives from it."""
 
-import importlib.util
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,22 +13,13 @@ from ico3d.capture.headtrack.track_file import NAME, HeadTrack
 from ico3d.capture.multiview.resizing import resize_capture
 from ico3d.capture.resized import ResizedCapture
 from ico3d.errors import CaptureError
-
-
-@pytest.fixture(scope="module")
-def folders():
-    """The writer of multiview folders."""
-    path = Path(__file__).parents[1] / "multiview" / "folders.py"
-    spec = importlib.util.spec_from_file_location("folders", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+from support.recordings import multiview_folders
 
 
 @pytest.fixture
-def folder(folders, tmp_path):
+def folder(tmp_path):
     """Five cameras, three frames."""
-    return folders.write_folder(tmp_path / "recording")
+    return multiview_folders.write_folder(tmp_path / "recording")
 
 
 def _track(frames=3, cameras=5):

@@ -1,8 +1,5 @@
 """From heads of single frames to one motion, exactly."""
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -13,6 +10,7 @@ from ico3d.capture.formats import open_capture
 from ico3d.capture.headtrack.faces import Head
 from ico3d.capture.headtrack.tracker import assemble, report
 from ico3d.errors import CaptureError
+from support.recordings import multiview_folders
 
 FRAMES = 8
 
@@ -20,11 +18,9 @@ FRAMES = 8
 @pytest.fixture(scope="module")
 def capture(tmp_path_factory):
     """Five cameras all around, eight frames."""
-    path = Path(__file__).parents[1] / "multiview" / "folders.py"
-    spec = importlib.util.spec_from_file_location("folders", path)
-    folders = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(folders)
-    return open_capture(folders.write_folder(tmp_path_factory.mktemp("many") / "five", 5, FRAMES))
+    return open_capture(
+        multiview_folders.write_folder(tmp_path_factory.mktemp("many") / "five", 5, FRAMES)
+    )
 
 
 def _canonical():

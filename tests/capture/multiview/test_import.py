@@ -14,6 +14,7 @@ from ico3d.capture.multiview.importing import ImportSettings, import_recording
 from ico3d.capture.multiview.reader import MultiviewCapture
 from ico3d.cli import main
 from ico3d.errors import CaptureError, SettingsError
+from support.recordings import foreign_models
 
 Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 """From a world with z up to one with y up, the shortest way."""
@@ -38,12 +39,12 @@ def fails(call, *words):
 @pytest.mark.parametrize(
     "model", ("SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV")
 )
-def test_colmap_models_of_every_kind(models, tmp_path, model, binary):
-    root = models.write_colmap(tmp_path / "scene", models.poses(), model, binary)
+def test_colmap_models_of_every_kind(tmp_path, model, binary):
+    root = foreign_models.write_colmap(tmp_path / "scene", foreign_models.poses(), model, binary)
     capture = imported(root, tmp_path / "out")
     assert capture.num_frames == 1 and len(capture.cameras) == 6
     assert capture.lenses[0].name == "first" and capture.lenses[1].name == "view_1"
-    values = models.PARAMETERS[model]
+    values = foreign_models.PARAMETERS[model]
     focal = (55.0, 57.0) if model in ("PINHOLE", "OPENCV") else (55.0, 55.0)
     bent = {
         "SIMPLE_RADIAL": (-0.1, 0, 0, 0),
@@ -55,33 +56,33 @@ def test_colmap_models_of_every_kind(models, tmp_path, model, binary):
         np.testing.assert_array_equal(lens.intrinsics, expected)
         assert lens.distortion == bent
         recorded = capture.files.picture(index, 0)
-        np.testing.assert_array_equal(recorded, models.picture(index))
+        np.testing.assert_array_equal(recorded, foreign_models.picture(index))
     pose = capture.cameras[2].camera_to_world
-    np.testing.assert_allclose(pose[:3, 3], Y_UP @ models.poses()[2, :3, 3], atol=1e-9)
-    np.testing.assert_allclose(pose[:3, :3], Y_UP @ models.poses()[2, :3, :3], atol=1e-9)
-    np.testing.assert_allclose(capture.points(0), models.POINTS @ Y_UP.T, atol=1e-6)
+    np.testing.assert_allclose(pose[:3, 3], Y_UP @ foreign_models.poses()[2, :3, 3], atol=1e-9)
+    np.testing.assert_allclose(pose[:3, :3], Y_UP @ foreign_models.poses()[2, :3, :3], atol=1e-9)
+    np.testing.assert_allclose(capture.points(0), foreign_models.POINTS @ Y_UP.T, atol=1e-6)
 
 
-def test_colmap_worlds_are_turned_upright_and_scaled(models, tmp_path):
+def test_colmap_worlds_are_turned_upright_and_scaled(tmp_path):
     """Pictures and points keep their relation."""
-    poses = models.tilted(models.poses())
-    root = models.write_colmap(tmp_path / "scene", poses, "PINHOLE")
+    poses = foreign_models.tilted(foreign_models.poses())
+    root = foreign_models.write_colmap(tmp_path / "scene", poses, "PINHOLE")
     capture = imported(root, tmp_path / "out", scale=2.5)
     centers = np.stack([camera.camera_to_world[:3, 3] for camera in capture.cameras])
     np.testing.assert_allclose(centers[:, 1], 2.5 * 0.5, atol=1e-9)
     np.testing.assert_allclose(np.hypot(centers[:, 0], centers[:, 2]), 2.5 * 2.0, atol=1e-9)
     for camera, pose in zip(capture.cameras, poses, strict=True):
-        local = (models.POINTS - pose[:3, 3]) @ pose[:3, :3]
+        local = (foreign_models.POINTS - pose[:3, 3]) @ pose[:3, :3]
         pixels, depth = camera.project(capture.points(0))
         np.testing.assert_allclose(depth, 2.5 * local[:, 2], rtol=1e-5)
         expected = local[:, :2] / local[:, 2:] * (55, 57) + (20.5, 16.5)
         np.testing.assert_allclose(pixels, expected, atol=1e-3)
 
 
-def test_smaller_pictures_than_those_calibrated(models, tmp_path):
-    root = models.write_colmap(tmp_path / "scene", models.poses(), "PINHOLE")
+def test_smaller_pictures_than_those_calibrated(tmp_path):
+    root = foreign_models.write_colmap(tmp_path / "scene", foreign_models.poses(), "PINHOLE")
     half = tmp_path / "half"
-    models.write_pictures(half, ["sub/first.png", *(f"view {i}.png" for i in range(1, 6))])
+    foreign_models.write_pictures(half, ["sub/first.png", *(f"view {i}.png" for i in range(1, 6))])
     for file in half.rglob("*.png"):
         with Image.open(file) as image:
             image.resize((20, 16)).save(file)
@@ -91,56 +92,58 @@ def test_smaller_pictures_than_those_calibrated(models, tmp_path):
     assert (capture.cameras[0].width, capture.cameras[0].height) == (20, 16)
 
 
-def test_lenses_that_are_not_read_are_named(models, tmp_path):
-    root = models.write_colmap(tmp_path / "scene", models.poses(), binary=False)
+def test_lenses_that_are_not_read_are_named(tmp_path):
+    root = foreign_models.write_colmap(tmp_path / "scene", foreign_models.poses(), binary=False)
     file = root / "sparse/0/cameras.txt"
     file.write_text(file.read_text().replace("OPENCV", "OPENCV_FISHEYE"))
     fails(lambda: imported(root, tmp_path / "out"), "OPENCV_FISHEYE", "image_undistorter")
     assert not (tmp_path / "out").exists()
 
 
-def test_pictures_of_colmap_that_are_not_there(models, tmp_path):
-    root = models.write_colmap(tmp_path / "scene", models.poses())
+def test_pictures_of_colmap_that_are_not_there(tmp_path):
+    root = foreign_models.write_colmap(tmp_path / "scene", foreign_models.poses())
     (root / "images/view 3.png").unlink()
     fails(lambda: imported(root, tmp_path / "out"), "view 3.png", "missing")
     shutil.rmtree(root / "images")
     fails(lambda: imported(root, tmp_path / "out"), "--images")
 
 
-def test_a_still_scene_of_nerfstudio(models, tmp_path):
+def test_a_still_scene_of_nerfstudio(tmp_path):
     names = [f"images/frame_{i:05d}.png" for i in range(6)]
-    models.write_pictures(tmp_path, names)
-    entries = models.frames(models.poses(), names)
+    foreign_models.write_pictures(tmp_path, names)
+    entries = foreign_models.frames(foreign_models.poses(), names)
     entries[1]["fl_x"] = 60.0  # intrinsics of one frame
-    models.write_transforms(tmp_path, entries, camera_model="OPENCV", k1=-0.05, k2=0.01, p1=1e-3)
+    foreign_models.write_transforms(
+        tmp_path, entries, camera_model="OPENCV", k1=-0.05, k2=0.01, p1=1e-3
+    )
     capture = imported(tmp_path, tmp_path / "out", consent="given", licence="CC0")
     assert [lens.name for lens in capture.lenses][:2] == ["frame_00000", "frame_00001"]
     assert [lens.intrinsics[0, 0] for lens in capture.lenses][:3] == [55, 60, 55]
     assert capture.lenses[4].distortion == (-0.05, 0.01, 1e-3, 0, 0)
-    for index, pose in enumerate(models.poses()):
+    for index, pose in enumerate(foreign_models.poses()):
         found = capture.cameras[index].camera_to_world
         np.testing.assert_allclose(found[:3, :3], Y_UP @ pose[:3, :3], atol=1e-9)
         np.testing.assert_allclose(found[:3, 3], Y_UP @ pose[:3, 3], atol=1e-9)
         recorded = capture.files.picture(index, 0)
-        np.testing.assert_array_equal(recorded, models.picture(index))
+        np.testing.assert_array_equal(recorded, foreign_models.picture(index))
     assert capture.provenance["consent"] == "given" and capture.provenance["licence"] == "CC0"
 
 
-def test_the_axis_nearly_up_is_meant_to_be_up(models, tmp_path):
+def test_the_axis_nearly_up_is_meant_to_be_up(tmp_path):
     """Cameras that all look down from one side do not tilt a world whose z is up."""
     names = ["a.png", "b.png"]
-    models.write_pictures(tmp_path, names)
-    poses = models.poses(8)[:2]
-    models.write_transforms(tmp_path, models.frames(poses, names))
+    foreign_models.write_pictures(tmp_path, names)
+    poses = foreign_models.poses(8)[:2]
+    foreign_models.write_transforms(tmp_path, foreign_models.frames(poses, names))
     capture = imported(tmp_path, tmp_path / "out")
     np.testing.assert_allclose(
         capture.cameras[0].camera_to_world[:3, 3], Y_UP @ poses[0, :3, 3], atol=1e-12
     )
 
 
-def test_angles_of_instant_ngp_and_names_without_suffix(models, tmp_path):
-    models.write_pictures(tmp_path, ["train/r_0.png"])
-    frames = models.frames(models.poses(1), ["./train/r_0"])
+def test_angles_of_instant_ngp_and_names_without_suffix(tmp_path):
+    foreign_models.write_pictures(tmp_path, ["train/r_0.png"])
+    frames = foreign_models.frames(foreign_models.poses(1), ["./train/r_0"])
     text = json.dumps({"camera_angle_x": 0.7, "frames": frames})
     (tmp_path / "transforms.json").write_text(text)
     (camera,) = imported(tmp_path / "transforms.json", tmp_path / "out").cameras
@@ -149,45 +152,47 @@ def test_angles_of_instant_ngp_and_names_without_suffix(models, tmp_path):
     np.testing.assert_allclose(camera.intrinsics, expected)
 
 
-def test_times_make_frames(models, tmp_path):
+def test_times_make_frames(tmp_path):
     """Three cameras at four times, one view missing; times from 0 to 1 as nerfstudio has them."""
-    poses, entries, names = models.poses(3), [], []
+    poses, entries, names = foreign_models.poses(3), [], []
     for camera in range(3):
         for frame in range(4):
             if (camera, frame) != (1, 2):
                 names.append(f"cam{camera}/{frame}.png")
-                entries += models.frames(poses[camera : camera + 1], names[-1:], time=frame / 3)
-    models.write_pictures(tmp_path, names)
-    models.write_transforms(tmp_path, entries)
+                entries += foreign_models.frames(
+                    poses[camera : camera + 1], names[-1:], time=frame / 3
+                )
+    foreign_models.write_pictures(tmp_path, names)
+    foreign_models.write_transforms(tmp_path, entries)
     capture = imported(tmp_path, tmp_path / "out", fps=15.0)
     assert (capture.num_frames, capture.fps) == (4, 15.0)
     assert [lens.name for lens in capture.lenses] == ["cam0", "cam1", "cam2"]
     assert capture.image(1, 2) is None
     number = names.index("cam1/3.png")
-    np.testing.assert_array_equal(capture.files.picture(1, 3), models.picture(number))
+    np.testing.assert_array_equal(capture.files.picture(1, 3), foreign_models.picture(number))
 
 
-def test_a_moving_camera_gives_one_view_for_each_frame(models, tmp_path):
+def test_a_moving_camera_gives_one_view_for_each_frame(tmp_path):
     names = [f"r_{i}.png" for i in range(5)]
-    models.write_pictures(tmp_path, names)
-    entries = models.frames(models.poses(5), names)
+    foreign_models.write_pictures(tmp_path, names)
+    entries = foreign_models.frames(foreign_models.poses(5), names)
     for index, entry in enumerate(entries):
         entry["time"] = 0.25 * index
-    models.write_transforms(tmp_path, entries)
+    foreign_models.write_transforms(tmp_path, entries)
     capture = imported(tmp_path, tmp_path / "out")
     assert capture.num_frames == 5 and [lens.name for lens in capture.lenses][3] == "r_3"
     views = [[capture.image(c, f) is not None for f in range(5)] for c in range(5)]
     np.testing.assert_array_equal(views, np.eye(5, dtype=bool))
 
 
-def test_masks_of_nerfstudio(models, tmp_path):
-    models.write_pictures(tmp_path, ["a.png", "b.png"])
+def test_masks_of_nerfstudio(tmp_path):
+    foreign_models.write_pictures(tmp_path, ["a.png", "b.png"])
     mask = np.zeros((32, 40), np.uint8)
     mask[4:20] = 255
     Image.fromarray(mask).save(tmp_path / "mask.png")
-    entries = models.frames(models.poses(2), ["a.png", "b.png"])
+    entries = foreign_models.frames(foreign_models.poses(2), ["a.png", "b.png"])
     entries[1]["mask_path"] = "mask.png"
-    models.write_transforms(tmp_path, entries)
+    foreign_models.write_transforms(tmp_path, entries)
     capture = imported(tmp_path, tmp_path / "out")
     np.testing.assert_array_equal(capture.mask(1, 0), mask / 255)
     assert capture.mask(0, 0) is None
@@ -213,14 +218,14 @@ def test_masks_of_nerfstudio(models, tmp_path):
         ({"time": 0.1}, "some frames have a time"),
     ),
 )
-def test_frames_that_cannot_be_are_refused(models, tmp_path, change, words):
+def test_frames_that_cannot_be_are_refused(tmp_path, change, words):
     root = tmp_path / "scene"
-    models.write_pictures(tmp_path, ["outside.png"])
-    models.write_pictures(root, ["a.png", "b.png"])
+    foreign_models.write_pictures(tmp_path, ["outside.png"])
+    foreign_models.write_pictures(root, ["a.png", "b.png"])
     (root / "notes.txt").write_text("no picture")
-    entries = models.frames(models.poses(2), ["a.png", "b.png"])
+    entries = foreign_models.frames(foreign_models.poses(2), ["a.png", "b.png"])
     entries[1].update(change)
-    models.write_transforms(root, entries)
+    foreign_models.write_transforms(root, entries)
     fails(lambda: imported(root, tmp_path / "out"), words)
     assert not (tmp_path / "out").exists() and len(list(tmp_path.iterdir())) == 2
 
@@ -229,26 +234,26 @@ def test_frames_that_cannot_be_are_refused(models, tmp_path, change, words):
     ("times", "words"),
     (((0, 0.1, 0.35), "evenly"), ((0, 0, 1), "one camera"), ((0, 1e-6, 1), "evenly")),
 )
-def test_times_that_make_no_frames(models, tmp_path, times, words):
+def test_times_that_make_no_frames(tmp_path, times, words):
     names = ["a.png", "b.png", "c.png"]
-    models.write_pictures(tmp_path, names)
-    entries = models.frames(np.repeat(models.poses(1), 3, 0), names)
+    foreign_models.write_pictures(tmp_path, names)
+    entries = foreign_models.frames(np.repeat(foreign_models.poses(1), 3, 0), names)
     for entry, time in zip(entries, times, strict=True):
         entry["time"] = time
-    models.write_transforms(tmp_path, entries)
+    foreign_models.write_transforms(tmp_path, entries)
     fails(lambda: imported(tmp_path, tmp_path / "out"), words)
 
 
-def test_names_that_would_collide_or_escape(models, tmp_path):
+def test_names_that_would_collide_or_escape(tmp_path):
     names = ["x/001.png", "y/001.png", "-.png", "Ä ö.png"]
-    models.write_pictures(tmp_path, names)
-    models.write_transforms(tmp_path, models.frames(models.poses(4), names))
+    foreign_models.write_pictures(tmp_path, names)
+    foreign_models.write_transforms(tmp_path, foreign_models.frames(foreign_models.poses(4), names))
     capture = imported(tmp_path, tmp_path / "out")
     assert [c.name for c in capture.cameras] == ["001", "001_2", "camera-", "___"]
 
 
-def test_the_command(models, tmp_path, capsys):
-    root = models.write_colmap(tmp_path / "scene", models.poses())
+def test_the_command(tmp_path, capsys):
+    root = foreign_models.write_colmap(tmp_path / "scene", foreign_models.poses())
     out = tmp_path / "out"
     assert main(["capture", "import", str(root), str(out), "--scale", "2"]) == 0
     assert "6 cameras, 1 frames" in capsys.readouterr().out
@@ -262,11 +267,11 @@ def test_the_command(models, tmp_path, capsys):
 
 
 @pytest.fixture(scope="module")
-def scene(models, tmp_path_factory):
+def scene(tmp_path_factory):
     """Both kinds of COLMAP model over the same pictures."""
     root = tmp_path_factory.mktemp("fuzz")
-    models.write_colmap(root / "bin", models.poses(2), "OPENCV", True)
-    models.write_colmap(root / "txt", models.poses(2), "OPENCV", False)
+    foreign_models.write_colmap(root / "bin", foreign_models.poses(2), "OPENCV", True)
+    foreign_models.write_colmap(root / "txt", foreign_models.poses(2), "OPENCV", False)
     return root
 
 
@@ -289,10 +294,12 @@ def test_models_cut_or_changed_anywhere_are_one_sentence(scene, tmp_path_factory
 
 @settings(max_examples=60, deadline=None)
 @given(data=st.data())
-def test_transforms_cut_or_changed_anywhere_are_one_sentence(models, tmp_path_factory, data):
+def test_transforms_cut_or_changed_anywhere_are_one_sentence(tmp_path_factory, data):
     root = tmp_path_factory.mktemp("cut")
-    models.write_pictures(root, ["a.png"])
-    models.write_transforms(root, models.frames(models.poses(1), ["a.png"], time=0.5), k1=0.01)
+    foreign_models.write_pictures(root, ["a.png"])
+    foreign_models.write_transforms(
+        root, foreign_models.frames(foreign_models.poses(1), ["a.png"], time=0.5), k1=0.01
+    )
     file = root / "transforms.json"
     text = file.read_text()
     place = data.draw(st.integers(0, len(text) - 1))

@@ -10,6 +10,7 @@ from ico3d.capture.formats import open_capture
 from ico3d.capture.multiview.cutout import matte
 from ico3d.cli import main
 from ico3d.errors import CaptureError
+from support.recordings import multiview_folders
 
 SIZE = (240, 360)
 """Width, height."""
@@ -77,25 +78,27 @@ def test_nobody_gives_an_empty_mask():
     assert not matte(nobody, photographed(wall, person, 0 * truth, seed=1)).any()
 
 
-def recording(folders, folder, cameras=2, frames=3):
-    rig = folders.ring(cameras, SIZE)
+def recording(folder, cameras=2, frames=3):
+    rig = multiview_folders.ring(cameras, SIZE)
     for index, camera in enumerate(rig):
         wall, person, truth = plate_and_person(index)
-        folders.save(
+        multiview_folders.save(
             folder / f"backgrounds/{camera.name}.png",
             photographed(wall, person, 0 * truth, seed=index),
         )
         for frame in range(frames):
             moved = np.roll(truth, 9 * frame, 1)
             picture = photographed(wall, np.roll(person, 9 * frame, 1), moved, seed=frame)
-            folders.save(folder / f"images/{camera.name}/{frame:06d}.png", picture)
-    return folders.write_cameras(folder, [folders.entry(camera) for camera in rig], frames)
+            multiview_folders.save(folder / f"images/{camera.name}/{frame:06d}.png", picture)
+    return multiview_folders.write_cameras(
+        folder, [multiview_folders.entry(camera) for camera in rig], frames
+    )
 
 
-def test_the_command_writes_what_is_missing(folders, tmp_path, capsys):
-    folder = recording(folders, tmp_path)
+def test_the_command_writes_what_is_missing(tmp_path, capsys):
+    folder = recording(tmp_path)
     mended = np.full((SIZE[1], SIZE[0]), 77, np.uint8)
-    folders.save(folder / "masks/cam01/000001.png", mended)
+    multiview_folders.save(folder / "masks/cam01/000001.png", mended)
     assert main(["capture", "masks", str(folder), "--workers", "2"]) == 0
     assert "5 masks written" in capsys.readouterr().out
     capture = open_capture(folder)
@@ -111,8 +114,8 @@ def test_the_command_writes_what_is_missing(folders, tmp_path, capsys):
     assert main(["capture", "check", str(folder)]) == 0
 
 
-def test_cameras_without_a_plate_are_said(folders, tmp_path, caplog, capsys):
-    folder = recording(folders, tmp_path, frames=1)
+def test_cameras_without_a_plate_are_said(tmp_path, caplog, capsys):
+    folder = recording(tmp_path, frames=1)
     (folder / "backgrounds/cam00.png").unlink()
     with caplog.at_level(logging.WARNING):
         assert main(["capture", "masks", str(folder)]) == 0
@@ -122,8 +125,8 @@ def test_cameras_without_a_plate_are_said(folders, tmp_path, caplog, capsys):
     assert "no clean plates" in capsys.readouterr().err
 
 
-def test_a_damaged_picture_ends_it_with_its_name(folders, tmp_path, capsys):
-    folder = recording(folders, tmp_path)
+def test_a_damaged_picture_ends_it_with_its_name(tmp_path, capsys):
+    folder = recording(tmp_path)
     (folder / "images/cam01/000002.png").write_bytes(b"\x89PNG")
     assert main(["capture", "masks", str(folder), "--workers", "1"]) == 1
     assert "camera cam01, frame 2" in capsys.readouterr().err

@@ -16,6 +16,7 @@ from ico3d.capture.headtrack.track_file import HeadTrack
 from ico3d.cli import main
 from ico3d.common.camera import Camera, look_at
 from ico3d.errors import CaptureError
+from support.recordings import multiview_folders
 
 BENT = [-0.2, 0.06, 0.002, -0.001, 0.01]
 
@@ -28,11 +29,11 @@ def fails(call, *words):
     assert "\n" not in message and message.endswith(".")
 
 
-def test_pictures_come_back_as_they_were_saved(folder, folders):
+def test_pictures_come_back_as_they_were_saved(folder):
     capture = open_capture(folder)
     assert (capture.kind, capture.fps, capture.num_frames) == ("multiview", 30.0, 3)
     assert capture.split.train == (0, 1, 2) and len(capture.split.test_cameras) == 1
-    for index, camera in enumerate(folders.ring(5)):
+    for index, camera in enumerate(multiview_folders.ring(5)):
         np.testing.assert_array_equal(capture.cameras[index].intrinsics, camera.intrinsics)
         np.testing.assert_allclose(
             capture.cameras[index].world_to_camera, camera.world_to_camera, atol=1e-12
@@ -40,16 +41,18 @@ def test_pictures_come_back_as_they_were_saved(folder, folders):
         for frame in range(3):
             image = capture.image(index, frame)
             assert image.dtype == np.float32
-            np.testing.assert_array_equal(np.rint(image * 255), folders.picture(index, frame))
+            np.testing.assert_array_equal(
+                np.rint(image * 255), multiview_folders.picture(index, frame)
+            )
     assert capture.mask(0, 0) is None and capture.background(0) is None
     assert capture.audio() is None and capture.points() is None
     assert capture.provenance["consent"] == "not stated"
 
 
-def test_masks_plates_points_and_sound(folder, folders):
+def test_masks_plates_points_and_sound(folder):
     coverage = np.arange(32 * 40, dtype=np.uint8).reshape(32, 40)
-    folders.save(folder / "masks/cam01/000002.png", coverage)
-    folders.save(folder / "backgrounds/cam01.jpg", np.full((32, 40, 3), 90, np.uint8))
+    multiview_folders.save(folder / "masks/cam01/000002.png", coverage)
+    multiview_folders.save(folder / "backgrounds/cam01.jpg", np.full((32, 40, 3), 90, np.uint8))
     (folder / "points").mkdir()
     points = np.random.default_rng(0).normal(size=(7, 3)).astype(np.float32)
     np.save(folder / "points/000001.npy", points)
@@ -61,20 +64,20 @@ def test_masks_plates_points_and_sound(folder, folders):
     assert capture.points(0) is None and len(capture.audio().samples) == 16_000
 
 
-def test_transparency_is_a_mask_before_black(folder, folders):
-    solid = folders.picture(9, 9)
+def test_transparency_is_a_mask_before_black(folder):
+    solid = multiview_folders.picture(9, 9)
     alpha = np.arange(32 * 40, dtype=np.uint8).reshape(32, 40)
-    folders.save(folder / "images/cam00/000000.png", np.dstack([solid, alpha]))
+    multiview_folders.save(folder / "images/cam00/000000.png", np.dstack([solid, alpha]))
     capture = open_capture(folder)
     expected = solid * (alpha[..., None] / 255.0) / 255
     np.testing.assert_allclose(capture.image(0, 0), expected, atol=1e-6)
     np.testing.assert_array_equal(np.rint(capture.mask(0, 0) * 255), alpha)
 
 
-def test_a_point_of_the_world_is_found_where_the_straightened_camera_sees_it(folders, tmp_path):
+def test_a_point_of_the_world_is_found_where_the_straightened_camera_sees_it(tmp_path):
     """Pictures, masks and plates of a lens that bends lines are straightened alike."""
     size, point = (320, 240), np.array([0.5, 1.35, 0.2])
-    rig = folders.ring(3, size)
+    rig = multiview_folders.ring(3, size)
     entries = []
     for camera in rig:
         matrix = camera.intrinsics * [[6], [6], [1]] - [
@@ -82,7 +85,7 @@ def test_a_point_of_the_world_is_found_where_the_straightened_camera_sees_it(fol
             [0, 0, 600],
             [0] * 3,
         ]
-        entries.append(folders.entry(camera, intrinsics=matrix.tolist(), distortion=BENT))
+        entries.append(multiview_folders.entry(camera, intrinsics=matrix.tolist(), distortion=BENT))
         opencv = matrix - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
         turn, _ = cv2.Rodrigues(camera.world_to_camera[:3, :3])
         move = camera.world_to_camera[:3, 3]
@@ -90,9 +93,11 @@ def test_a_point_of_the_world_is_found_where_the_straightened_camera_sees_it(fol
         y, x = np.mgrid[: size[1], : size[0]]
         dot = 255 * np.exp(-((x - where[0, 0, 0]) ** 2 + (y - where[0, 0, 1]) ** 2) / 16)
         for kind in (f"images/{camera.name}/000000", f"masks/{camera.name}/000000"):
-            folders.save(tmp_path / f"{kind}.png", np.repeat(dot[..., None], 3, 2).astype(np.uint8))
-        folders.save(tmp_path / f"backgrounds/{camera.name}.png", dot.astype(np.uint8))
-    capture = open_capture(folders.write_cameras(tmp_path, entries, 1))
+            multiview_folders.save(
+                tmp_path / f"{kind}.png", np.repeat(dot[..., None], 3, 2).astype(np.uint8)
+            )
+        multiview_folders.save(tmp_path / f"backgrounds/{camera.name}.png", dot.astype(np.uint8))
+    capture = open_capture(multiview_folders.write_cameras(tmp_path, entries, 1))
     y, x = np.mgrid[: size[1], : size[0]] + 0.5
     for index, camera in enumerate(capture.cameras):
         pixel, _ = camera.project(point)
@@ -127,8 +132,10 @@ def test_cut_pictures_are_damaged_not_half_grey(folder):
     fails(lambda: open_capture(folder).image(0, 0), "camera cam00, frame 0", "damaged")
 
 
-def test_pictures_of_another_size_are_refused(folder, folders):
-    folders.save(folder / "images/cam00/000000.png", folders.picture(0, 0, (20, 20)))
+def test_pictures_of_another_size_are_refused(folder):
+    multiview_folders.save(
+        folder / "images/cam00/000000.png", multiview_folders.picture(0, 0, (20, 20))
+    )
     fails(lambda: open_capture(folder).image(0, 0), "20x20", "40x32")
 
 
@@ -138,9 +145,9 @@ def test_sixteen_bits_are_refused(folder):
     fails(lambda: open_capture(folder).image(0, 0), "8 bits")
 
 
-def test_a_camera_without_pictures_is_named(folder, folders):
-    rig = folders.ring(6)
-    folders.write_cameras(folder, [folders.entry(camera) for camera in rig], 3)
+def test_a_camera_without_pictures_is_named(folder):
+    rig = multiview_folders.ring(6)
+    multiview_folders.write_cameras(folder, [multiview_folders.entry(camera) for camera in rig], 3)
     fails(lambda: open_capture(folder), "cam05", "videos/cam05.mp4")
 
 
@@ -197,8 +204,8 @@ def test_pickled_points_are_refused(folder):
 
 @settings(max_examples=60, deadline=None)
 @given(data=st.data())
-def test_descriptions_cut_or_changed_anywhere_are_one_sentence(folders, tmp_path_factory, data):
-    folder = folders.write_folder(tmp_path_factory.mktemp("cut"), 1, 1)
+def test_descriptions_cut_or_changed_anywhere_are_one_sentence(tmp_path_factory, data):
+    folder = multiview_folders.write_folder(tmp_path_factory.mktemp("cut"), 1, 1)
     file = folder / "cameras.json"
     text = file.read_text()
     place = data.draw(st.integers(0, len(text) - 1))
@@ -210,7 +217,7 @@ def test_descriptions_cut_or_changed_anywhere_are_one_sentence(folders, tmp_path
         assert "\n" not in str(error)
 
 
-def test_a_folder_that_shows_a_head_is_split_by_time_and_has_its_hull(folders, tmp_path):
+def test_a_folder_that_shows_a_head_is_split_by_time_and_has_its_hull(tmp_path):
     folder, middle, radius, frames = tmp_path / "head", np.array([0.1, 1.6, -0.2]), 0.1, 11
     lens = np.array([[50.0, 0, 20], [0, 50, 16], [0, 0, 1]])
     turns = np.arange(8) * np.pi / 4
@@ -223,10 +230,12 @@ def test_a_folder_that_shows_a_head_is_split_by_time_and_has_its_hull(folders, t
         away = np.linalg.norm(eye - middle)
         seen = 50 * radius / np.sqrt(away**2 - radius**2)  # pixels from the ball's middle
         ball = (255 * (np.hypot(x - 20, y - 16) < seen)).astype(np.uint8)
-        folders.save(folder / f"images/{camera.name}/000000.png", folders.picture(0, 0))
-        folders.save(folder / f"masks/{camera.name}/000000.png", ball)
-    entries = [folders.entry(camera) for camera in cameras]
-    folders.write_cameras(folder, entries, frames, shows="head")
+        multiview_folders.save(
+            folder / f"images/{camera.name}/000000.png", multiview_folders.picture(0, 0)
+        )
+        multiview_folders.save(folder / f"masks/{camera.name}/000000.png", ball)
+    entries = [multiview_folders.entry(camera) for camera in cameras]
+    multiview_folders.write_cameras(folder, entries, frames, shows="head")
     capture = open_capture(folder)
     assert capture.split.train == tuple(range(10)) and capture.split.test == (10,)
     assert capture.points() is None  # nobody knows where head space is
@@ -239,5 +248,5 @@ def test_a_folder_that_shows_a_head_is_split_by_time_and_has_its_hull(folders, t
     np.testing.assert_allclose(points.mean(0), (0, 0.05, 0), atol=0.01)  # in head space
     away = np.linalg.norm(points - (0, 0.05, 0), axis=1)
     assert 0.9 * radius < away.min() and np.median(away) < 1.1 * radius
-    folders.write_cameras(folder, entries, frames, shows="hands")
+    multiview_folders.write_cameras(folder, entries, frames, shows="hands")
     fails(lambda: open_capture(folder), "shows must be")

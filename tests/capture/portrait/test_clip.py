@@ -1,7 +1,6 @@
 """The whole way from a video to a capture, where MediaPipe and its model are there."""
 
 import json
-import os
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +10,8 @@ from ico3d.capture.checking.check import examine
 from ico3d.capture.formats import open_capture
 from ico3d.capture.portrait import photometric_poses
 from ico3d.cli import main
+from support.shared import MODELS, SHARED
 
-SHARED = Path(__file__).resolve().parents[3] / "shared"
 CLIP = SHARED / "clips" / "portrait_a.mp4"
 
 av = pytest.importorskip("av")
@@ -22,10 +21,9 @@ needs_clip = pytest.mark.skipif(not CLIP.is_file(), reason="../shared/clips is n
 
 @pytest.fixture(autouse=True)
 def model(monkeypatch):
-    folder = Path(os.environ.get("ICO3D_MODELS", SHARED / "models"))
-    if not (folder / "face_landmarker.task").is_file():
+    if not (MODELS / "face_landmarker.task").is_file():
         pytest.skip("face_landmarker.task is not here")
-    monkeypatch.setenv("ICO3D_MODELS", str(folder))
+    monkeypatch.setenv("ICO3D_MODELS", str(MODELS))
     monkeypatch.setattr(photometric_poses, "STEPS", (30, 30))  # its own test tells whether it helps
 
 

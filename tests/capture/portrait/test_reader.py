@@ -14,6 +14,7 @@ from ico3d.capture.face.expressions import BLENDSHAPES
 from ico3d.capture.formats import open_capture
 from ico3d.capture.portrait.files import camera_to_world, save_transforms
 from ico3d.errors import CaptureError
+from support.recordings import portrait_folder
 
 
 def _fails(folder: Path, *words: str) -> None:
@@ -38,11 +39,11 @@ def test_what_a_folder_of_other_tools_holds(folder):
     assert capture.blendshapes(0) is None and capture.provenance["consent"] == "not stated"
 
 
-def test_landmarks_lie_where_pose_and_camera_project_the_head(folder, layout):
+def test_landmarks_lie_where_pose_and_camera_project_the_head(folder):
     capture = open_capture(folder)
     for frame in (0, 7, 21):
         camera = capture.cameras[0].moved(capture.world_from_head(frame))
-        pixels, depths = camera.project(layout.head_points())
+        pixels, depths = camera.project(portrait_folder.head_points())
         assert (depths > 0).all()
         np.testing.assert_allclose(pixels, capture.landmarks(0, frame), atol=1e-6)
 
@@ -63,12 +64,12 @@ def _rigid(turn, move):
 
 @settings(max_examples=40, deadline=None)
 @given(pose=poses)
-def test_any_pose_survives_the_layout(pose, tmp_path_factory, layout):
+def test_any_pose_survives_the_layout(pose, tmp_path_factory):
     np.testing.assert_allclose(camera_to_world(pose) @ pose, np.eye(4), atol=1e-12)
     folder = tmp_path_factory.mktemp("round") / "person"
     (folder / "ori_imgs").mkdir(parents=True)
-    layout.Image.new("RGB", (64, 64)).save(folder / "ori_imgs" / "0.jpg")
-    save_transforms(folder, layout.FOCAL, (32.0, 32.0), [0, 1], np.stack([pose, pose]))
+    portrait_folder.Image.new("RGB", (64, 64)).save(folder / "ori_imgs" / "0.jpg")
+    save_transforms(folder, portrait_folder.FOCAL, (32.0, 32.0), [0, 1], np.stack([pose, pose]))
     shutil.copy(folder / "ori_imgs" / "0.jpg", folder / "ori_imgs" / "1.jpg")
     capture = open_capture(folder)
     np.testing.assert_allclose(capture.world_from_head(0), pose, atol=1e-12)
@@ -77,7 +78,9 @@ def test_any_pose_survives_the_layout(pose, tmp_path_factory, layout):
     local = pose[:3, :3] @ point + pose[:3, 3]
     assert depth == pytest.approx(-local[2])
     if local[2] < -1e-3:
-        np.testing.assert_allclose(seen, layout.project(pose, point[None])[0], rtol=1e-9, atol=1e-6)
+        np.testing.assert_allclose(
+            seen, portrait_folder.project(pose, point[None])[0], rtol=1e-9, atol=1e-6
+        )
     # Columns 1 and 2 of the camera negated, then inverted: OpenCV's world to camera.
     opencv = np.linalg.inv(camera_to_world(pose) @ np.diag([1, -1, -1, 1]))
     whole = capture.cameras[0].world_to_camera @ capture.world_from_head(0)
@@ -110,14 +113,16 @@ def test_no_sound_is_none(folder):
     assert open_capture(folder).audio() is None
 
 
-def test_frames_without_a_face_keep_their_number(folder, layout):
+def test_frames_without_a_face_keep_their_number(folder):
     ids = [i for i in range(22) if i != 9]
-    layout.write_transforms(folder, ids, layout.head_poses()[ids])
+    portrait_folder.write_transforms(folder, ids, portrait_folder.head_poses()[ids])
     (folder / "ori_imgs" / "9.lms").unlink()
     capture = open_capture(folder)
     assert capture.num_frames == 22 and 9 not in capture.split.train
     assert capture.image(0, 9) is None and capture.world_from_head(9) is None
-    np.testing.assert_allclose(capture.world_from_head(10), layout.head_poses()[10], atol=1e-9)
+    np.testing.assert_allclose(
+        capture.world_from_head(10), portrait_folder.head_poses()[10], atol=1e-9
+    )
 
 
 def test_missing_frame(folder):
@@ -126,15 +131,15 @@ def test_missing_frame(folder):
     _fails(folder, "frame 5", "ori_imgs/5.jpg", "missing")
 
 
-def test_ids_off_by_one(folder, layout):
-    layout.write_transforms(folder, list(range(1, 23)), layout.head_poses())
+def test_ids_off_by_one(folder):
+    portrait_folder.write_transforms(folder, list(range(1, 23)), portrait_folder.head_poses())
     _fails(folder, "frame 22", "missing")
 
 
-def test_ids_that_count_only_frames_with_landmarks(folder, layout):
+def test_ids_that_count_only_frames_with_landmarks(folder):
     (folder / "ori_imgs" / "9.lms").unlink()
     kept = [i for i in range(22) if i != 9]
-    layout.write_transforms(folder, list(range(21)), layout.head_poses()[kept])
+    portrait_folder.write_transforms(folder, list(range(21)), portrait_folder.head_poses()[kept])
     _fails(folder, "img_id", "off from frame 9", "9.lms")
 
 
@@ -143,14 +148,14 @@ def test_rows_that_count_only_frames_with_a_face(folder):
     _fails(folder, "bs.npy", "21 rows", "22 frames")
 
 
-def test_action_unit_rows_are_counted(folder, layout):
-    layout.write_action_units(folder, 20)
+def test_action_unit_rows_are_counted(folder):
+    portrait_folder.write_action_units(folder, 20)
     _fails(folder, "au.csv", "20 rows", "22 frames")
 
 
-def test_nan_pose(folder, layout):
-    poses = layout.head_poses()
-    layout.write_transforms(folder, list(range(22)), poses)
+def test_nan_pose(folder):
+    poses = portrait_folder.head_poses()
+    portrait_folder.write_transforms(folder, list(range(22)), poses)
     file = folder / "transforms_val.json"
     content = json.loads(file.read_text())
     content["frames"][1]["transform_matrix"][0][3] = float("nan")
@@ -158,10 +163,10 @@ def test_nan_pose(folder, layout):
     _fails(folder, "transforms_val.json", "frame 21", "NaN")
 
 
-def test_pose_that_is_no_rotation(folder, layout):
-    poses = layout.head_poses()
+def test_pose_that_is_no_rotation(folder):
+    poses = portrait_folder.head_poses()
     poses[3, :3, :3] *= 1.1
-    layout.write_transforms(folder, list(range(22)), poses)
+    portrait_folder.write_transforms(folder, list(range(22)), poses)
     _fails(folder, "frame 3", "rotation")
 
 
@@ -182,9 +187,9 @@ def test_damaged_json(folder):
     _fails(folder, "transforms_train.json", "cannot be read")
 
 
-def test_scaled_pictures_do_not_fit_the_lens(folder, layout):
+def test_scaled_pictures_do_not_fit_the_lens(folder):
     for frame in range(22):
-        layout.Image.new("RGB", (16, 16)).save(folder / "gt_imgs" / f"{frame}.jpg")
+        portrait_folder.Image.new("RGB", (16, 16)).save(folder / "gt_imgs" / f"{frame}.jpg")
     _fails(folder, "principal point", "16x16")
 
 

@@ -13,6 +13,7 @@ from ico3d.capture.checking.check import examine
 from ico3d.capture.formats import open_capture
 from ico3d.cli import main as run
 from ico3d.errors import CaptureError
+from support.recordings import renderme_files
 
 
 def fails(call, *words):
@@ -35,9 +36,9 @@ def replace(path, inside, value):
 
 
 @pytest.fixture
-def raw(smc, tmp_path):
+def raw(tmp_path):
     """A recording of five cameras and four frames."""
-    return smc.write_recording(tmp_path, smc.Rig(cameras=(0, 22, 25, 28, 45)))
+    return renderme_files.write_recording(tmp_path, renderme_files.Rig(cameras=(0, 22, 25, 28, 45)))
 
 
 def test_a_sound_recording_is_checked_without_errors(raw, capsys):
@@ -62,9 +63,9 @@ def test_missing_and_damaged_views_are_named(raw):
     fails(lambda: capture.image(3, 3), "camera 28, frame 3", "damaged")
 
 
-def test_frames_without_a_fit_have_no_pose(smc, tmp_path):
-    rig = smc.Rig(cameras=(22, 25), fitted=(1, 3))
-    capture = open_capture(smc.write_recording(tmp_path, rig))
+def test_frames_without_a_fit_have_no_pose(tmp_path):
+    rig = renderme_files.Rig(cameras=(22, 25), fitted=(1, 3))
+    capture = open_capture(renderme_files.write_recording(tmp_path, rig))
     known = [capture.world_from_head(frame) is not None for frame in range(4)]
     assert known == [False, True, False, True]
     assert capture.flame(0) is None and capture.points(0) is None
@@ -74,11 +75,11 @@ def test_frames_without_a_fit_have_no_pose(smc, tmp_path):
 
 
 @pytest.mark.parametrize("nothing", (None, np.zeros((0, 2)), h5py.Empty("f8")))
-def test_faces_that_a_camera_did_not_find(raw, smc, nothing):
+def test_faces_that_a_camera_did_not_find(raw, nothing):
     replace(annotations_of(raw), "Keypoints2d/25/2", nothing)
-    capture, rig = open_capture(raw), smc.Rig()
+    capture, rig = open_capture(raw), renderme_files.Rig()
     assert capture.keypoints_2d(2, 2) is None
-    expected = rig.camera(25).project(smc.face_in_files(rig, 2))[0] + 0.5
+    expected = rig.camera(25).project(renderme_files.face_in_files(rig, 2))[0] + 0.5
     np.testing.assert_allclose(capture.landmarks(2, 2), expected, atol=1e-4)
 
 
@@ -90,18 +91,20 @@ def test_faces_that_only_one_camera_found_stay_flat(raw):
     assert capture.landmarks_3d(0) is None and capture.world_from_head(0) is not None
 
 
-def test_one_camera_that_errs_is_outvoted(smc, tmp_path):
-    rig = smc.Rig(cameras=(18, 22, 25, 28, 32), frames=1)
-    marks = open_capture(smc.write_recording(tmp_path / "all", rig)).landmarks_3d(0)
-    raw = smc.write_recording(tmp_path / "errs", rig)
-    wrong = smc.landmarks(rig, 25, 0) + np.array([3.0, -2.0])
+def test_one_camera_that_errs_is_outvoted(tmp_path):
+    rig = renderme_files.Rig(cameras=(18, 22, 25, 28, 32), frames=1)
+    marks = open_capture(renderme_files.write_recording(tmp_path / "all", rig)).landmarks_3d(0)
+    raw = renderme_files.write_recording(tmp_path / "errs", rig)
+    wrong = renderme_files.landmarks(rig, 25, 0) + np.array([3.0, -2.0])
     replace(annotations_of(raw), "Keypoints2d/25/0", wrong)
     away = np.linalg.norm(open_capture(raw).landmarks_3d(0) - marks, axis=1)
     assert np.median(away) < 0.002  # where one of five with equal say moves them by 1 cm
 
 
-def test_landmarks_in_another_order_are_left_out(smc, tmp_path, caplog):
-    raw = smc.write_recording(tmp_path, smc.Rig(cameras=(22, 25, 28), frames=2))
+def test_landmarks_in_another_order_are_left_out(tmp_path, caplog):
+    raw = renderme_files.write_recording(
+        tmp_path, renderme_files.Rig(cameras=(22, 25, 28), frames=2)
+    )
     shuffled = np.random.default_rng(0).permutation(106)
     with h5py.File(annotations_of(raw), "a") as file:
         for camera in (22, 25, 28):
@@ -153,20 +156,20 @@ def test_damaged_fits_are_named(raw, name, value, words):
     fails(lambda: capture.flame(1), "0026_e0_anno.smc", words)
 
 
-def test_fits_of_other_shapes_of_array_are_read(raw, smc):
-    cam = smc.flame(smc.Rig(), 1)["cam"]
+def test_fits_of_other_shapes_of_array_are_read(raw):
+    cam = renderme_files.flame(renderme_files.Rig(), 1)["cam"]
     expected = open_capture(raw).world_from_head(1)
     replace(annotations_of(raw), "FLAME/1/cam", cam[None])
     np.testing.assert_array_equal(open_capture(raw).world_from_head(1), expected)
 
 
-def test_damaged_landmarks_and_sound_are_named(raw, smc, tmp_path):
+def test_damaged_landmarks_and_sound_are_named(raw, tmp_path):
     replace(annotations_of(raw), "Keypoints2d/25/0", np.zeros((68, 2)))
     fails(lambda: open_capture(raw).landmarks(2, 0), "Keypoints2d/25/0", "106")
-    rig = smc.Rig(part="s1_all", cameras=(25,), frames=2, sound=np.full(48_000, 3000.0))
-    loud = smc.write_recording(tmp_path / "loud", rig)
+    rig = renderme_files.Rig(part="s1_all", cameras=(25,), frames=2, sound=np.full(48_000, 3000.0))
+    loud = renderme_files.write_recording(tmp_path / "loud", rig)
     fails(lambda: open_capture(loud).audio(), "audio", "between -1 and 1")
-    mute = smc.write_recording(tmp_path / "mute", rig)
+    mute = renderme_files.write_recording(tmp_path / "mute", rig)
     replace(mute, "Camera/00/audio/sample_rate", 0)
     fails(lambda: open_capture(mute), "sample rate")
 
@@ -178,8 +181,10 @@ def test_annotations_must_be_there(raw):
     fails(lambda: open_capture(raw), "0026_e0_anno.smc", "beside it")
 
 
-def test_a_folder_of_several_recordings_needs_a_choice(raw, smc):
-    other = smc.write_recording(raw.parent, smc.Rig(cameras=(25,), part="h0", frames=1))
+def test_a_folder_of_several_recordings_needs_a_choice(raw):
+    other = renderme_files.write_recording(
+        raw.parent, renderme_files.Rig(cameras=(25,), part="h0", frames=1)
+    )
     fails(lambda: open_capture(raw.parent), "2 recordings", "0026_e0_raw.smc, 0026_h0_raw.smc")
     assert open_capture(other).num_frames == 1
 
@@ -192,10 +197,10 @@ def test_frames_outside_the_recording(raw):
 
 
 @pytest.fixture(scope="module")
-def sound(smc, tmp_path_factory):
+def sound(tmp_path_factory):
     """A small recording to be damaged."""
-    rig = smc.Rig(cameras=(22, 25), frames=1, size=(8, 8))
-    return smc.write_recording(tmp_path_factory.mktemp("sound"), rig)
+    rig = renderme_files.Rig(cameras=(22, 25), frames=1, size=(8, 8))
+    return renderme_files.write_recording(tmp_path_factory.mktemp("sound"), rig)
 
 
 def read_everything(path) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ico3d.capture.formats import open_capture
+from support.recordings import renderme_files
 
 LOOK = textwrap.dedent(
     """
@@ -40,10 +41,10 @@ LOOK = textwrap.dedent(
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
-def test_memory_and_files_stay_flat_over_hundreds_of_pictures(smc, tmp_path):
+def test_memory_and_files_stay_flat_over_hundreds_of_pictures(tmp_path):
     """60 cameras, 24 frames: 1440 pictures and mattes, 120 kB of vertices for each frame."""
-    rig = smc.Rig(cameras=tuple(range(60)), frames=24, size=(30, 36))
-    raw = smc.write_recording(tmp_path, rig, same_picture=True)
+    rig = renderme_files.Rig(cameras=tuple(range(60)), frames=24, size=(30, 36))
+    raw = renderme_files.write_recording(tmp_path, rig, same_picture=True)
     run = [sys.executable, "-c", LOOK, str(raw)]
     found = json.loads(subprocess.run(run, check=True, capture_output=True, text=True).stdout)
     # 120 pictures after the first 60 add nothing; HDF5 keeps a megabyte or two of its index.
@@ -51,8 +52,10 @@ def test_memory_and_files_stay_flat_over_hundreds_of_pictures(smc, tmp_path):
     assert found["open"] < 20
 
 
-def test_an_open_recording_can_be_sent_to_other_processes(smc, tmp_path):
-    capture = open_capture(smc.write_recording(tmp_path, smc.Rig(cameras=(22, 25), frames=2)))
+def test_an_open_recording_can_be_sent_to_other_processes(tmp_path):
+    capture = open_capture(
+        renderme_files.write_recording(tmp_path, renderme_files.Rig(cameras=(22, 25), frames=2))
+    )
     image, pose = capture.image(1, 0), capture.world_from_head(1)
     copy = pickle.loads(pickle.dumps(capture))
     np.testing.assert_array_equal(copy.image(1, 0), image)

@@ -13,11 +13,12 @@ from ico3d.capture.headtrack.track_file import HeadTrack, check_writable
 from ico3d.capture.multiview.resizing import resize_capture
 from ico3d.cli import main
 from ico3d.errors import CaptureError
+from support.recordings import renderme_files
 
 
 @pytest.fixture
-def plain(smc, tmp_path):
-    return smc.write_recording(tmp_path / "recording")
+def plain(tmp_path):
+    return renderme_files.write_recording(tmp_path / "recording")
 
 
 def track_of(capture: Capture) -> HeadTrack:

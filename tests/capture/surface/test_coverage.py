@@ -5,6 +5,7 @@ import pytest
 
 from ico3d.capture.surface.coverage import find_gap
 from ico3d.capture.surface.hull import Silhouette
+from support.recordings import two_balls
 
 SIZE, REACH = 96, 0.02
 PIXEL = 0.44 / SIZE
@@ -12,11 +13,11 @@ PIXEL = 0.44 / SIZE
 
 
 @pytest.fixture
-def cameras(two_balls):
+def cameras():
     return two_balls.arc(SIZE)
 
 
-def _moment(two_balls, cameras, pose=None):
+def _moment(cameras, pose=None):
     """What the cameras see of the person, in head space."""
     where = np.eye(4) if pose is None else pose
     return {
@@ -30,8 +31,8 @@ def _filled(points, gap, moments):
     return find_gap(np.concatenate([points, gap.points]), moments, REACH).share
 
 
-def test_points_on_the_head_alone_leave_the_trunk_to_the_masks(two_balls, cameras):
-    moments, head = [_moment(two_balls, cameras)], two_balls.ball_points(0, 1500)
+def test_points_on_the_head_alone_leave_the_trunk_to_the_masks(cameras):
+    moments, head = [_moment(cameras)], two_balls.ball_points(0, 1500)
     gap = find_gap(head, moments, REACH)
     shown = np.stack([two_balls.seen_by(camera)[0] for camera in cameras])
     assert gap.share == pytest.approx((shown == 1).sum() / (shown >= 0).sum(), abs=0.08)
@@ -41,17 +42,15 @@ def test_points_on_the_head_alone_leave_the_trunk_to_the_masks(two_balls, camera
     assert np.median(np.abs(two_balls.outside(gap.points))) < 0.03
 
 
-def test_points_all_over_the_person_are_left_alone(two_balls, cameras):
+def test_points_all_over_the_person_are_left_alone(cameras):
     points = np.concatenate([two_balls.ball_points(ball, 1500) for ball in (0, 1)])
-    gap = find_gap(points, [_moment(two_balls, cameras)], REACH)
+    gap = find_gap(points, [_moment(cameras)], REACH)
     assert gap.share == 0 and gap.points.shape == (0, 3)
 
 
-def test_a_trunk_that_stays_when_the_head_turns_is_found(two_balls, cameras):
+def test_a_trunk_that_stays_when_the_head_turns_is_found(cameras):
     capture = two_balls.TwoBalls(None)
-    moments = [
-        _moment(two_balls, cameras, capture.world_from_head(frame)) for frame in (0, 3, 10, 17)
-    ]
+    moments = [_moment(cameras, capture.world_from_head(frame)) for frame in (0, 3, 10, 17)]
     head = two_balls.ball_points(0, 1500)
     gap = find_gap(head, moments, REACH)
     assert 0.4 < gap.share < 0.75
@@ -60,8 +59,8 @@ def test_a_trunk_that_stays_when_the_head_turns_is_found(two_balls, cameras):
 
 
 @pytest.mark.parametrize("wrong", ["everything", "nothing", "head alone"])
-def test_one_wrong_mask_changes_little(two_balls, cameras, wrong):
-    moments = [_moment(two_balls, cameras) for _ in range(3)]
+def test_one_wrong_mask_changes_little(cameras, wrong):
+    moments = [_moment(cameras) for _ in range(3)]
     good = find_gap(two_balls.ball_points(0, 1500), moments, REACH)
     bad = moments[1][2].mask
     bad[:] = wrong == "everything"
@@ -74,10 +73,10 @@ def test_one_wrong_mask_changes_little(two_balls, cameras, wrong):
         np.testing.assert_allclose(one, other, atol=0.03)
 
 
-def test_what_the_picture_cuts_goes_on_to_its_edge(two_balls, cameras):
+def test_what_the_picture_cuts_goes_on_to_its_edge(cameras):
     for camera in cameras:
         assert (two_balls.seen_by(camera)[0][-1] == 1).any()
-    gap = find_gap(two_balls.ball_points(0, 1500), [_moment(two_balls, cameras)], REACH)
+    gap = find_gap(two_balls.ball_points(0, 1500), [_moment(cameras)], REACH)
     lowest = max(camera.project(gap.points)[0][:, 1].max() for camera in cameras)
     assert lowest > SIZE - 3
     held = sum(
@@ -87,15 +86,15 @@ def test_what_the_picture_cuts_goes_on_to_its_edge(two_balls, cameras):
     assert held.min() > 3  # nothing is guessed where half of the pictures do not reach
 
 
-def test_masks_that_no_two_sides_saw_fill_nothing(two_balls, cameras):
+def test_masks_that_no_two_sides_saw_fill_nothing(cameras):
     head = two_balls.ball_points(0, 1500)
-    one = _moment(two_balls, cameras[:1])
+    one = _moment(cameras[:1])
     assert len(find_gap(head, [one], REACH).points) == 0
     assert find_gap(head, [], REACH).share == 0
     empty = {0: Silhouette(one[0].camera, np.zeros_like(one[0].mask))}
     assert find_gap(head, [empty], REACH).share == 0
 
 
-def test_points_behind_the_camera_account_for_nothing(two_balls, cameras):
+def test_points_behind_the_camera_account_for_nothing(cameras):
     behind = two_balls.ball_points(0, 100) + np.array([0, 0, 50.0])
-    assert find_gap(behind, [_moment(two_balls, cameras)], REACH).share == 1
+    assert find_gap(behind, [_moment(cameras)], REACH).share == 1

@@ -5,8 +5,6 @@ import os
 from pathlib import Path
 
 import pytest
-from made_trial import MadeTrial
-from moving_capture import FRAMES, MovingCapture
 
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import ONE_WINDOW
@@ -14,7 +12,9 @@ from ico3d.errors import SettingsError
 from ico3d.measure.commands import BenchBody
 from ico3d.measure.methods import bench as methods
 from ico3d.measure.methods.bench import Terms, Trial, mean, run_trials, summary
+from support.bodies.moving_capture import FRAMES, MovingCapture
 from support.captures import open_with
+from support.made_trial import MadeTrial
 
 pytestmark = pytest.mark.slow
 

@@ -5,8 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import torch
-from planted import PlantedCapture, planted_eyes, planted_model
-from test_bake_body import FilmedPerson
 
 from ico3d.avatar.avatar import BODY, Placement, TrainedAvatar
 from ico3d.avatar.baking.samples import training_expressions
@@ -18,6 +16,8 @@ from ico3d.common.expression import EyeRange
 from ico3d.head.model_folder import TrainedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
+from support.avatars.filmed_person import FilmedPerson
+from support.avatars.planted import PlantedCapture, planted_eyes, planted_model
 
 FPS, WINDOWS = 15.0, (Window(0, 8), Window(8, 14))
 FRAMES = WINDOWS[-1].last + 1

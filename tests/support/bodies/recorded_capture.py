@@ -4,9 +4,10 @@ import json
 from pathlib import Path
 
 import numpy as np
-from moving_capture import CAMERAS, FRAMES, MovingCapture
 from PIL import Image
 from safetensors.numpy import save_file
+
+from support.bodies.moving_capture import CAMERAS, FRAMES, MovingCapture
 
 
 def record(folder: Path) -> None:

@@ -3,12 +3,12 @@
 from pathlib import Path
 
 import torch
-from moving_capture import POINTS, MovingCapture
 
 from ico3d.body.model_folder import ABOUT, TrainedBody, save_window
 from ico3d.body.motion.formulas import Still
 from ico3d.body.motion.window_model import WindowModel, activated
 from ico3d.body.planning.windows import Window
+from support.bodies.moving_capture import POINTS, MovingCapture
 
 WINDOWS = (Window(0, 4), Window(4, 8))
 

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -43,6 +44,15 @@ def step_gone_on_from(said: str, task: WindowTask, reason: str) -> int:
     )
     assert found, said
     return int(rest.partition(".")[0])
+
+
+def wait_for(file: Path) -> bool:
+    """Waits until a file is there."""
+    for _ in range(60_000):
+        if file.exists():
+            return True
+        time.sleep(0.002)
+    raise TimeoutError(file)
 
 
 def files_of_a_sequence(capture: Path, folder: Path) -> list[bytes]:

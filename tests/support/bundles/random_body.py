@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-from random_bundle import thumbnail
 
 from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.format import write_bundle
@@ -17,6 +16,7 @@ from ico3d.bundle.manifest import (
     WindowInfo,
     window_file,
 )
+from support.bundles.random_bundle import thumbnail
 
 SPANS, SIZES, RANKS, CLUSTERS = ((0, 4), (4, 6)), (20, 23), (5, 3, 2), 3
 

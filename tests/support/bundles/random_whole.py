@@ -9,12 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from random_body import SPANS, body_files, body_manifest, random_windows
-from random_bundle import random_files, random_head, random_manifest, swaying_poses
 
 from ico3d.bundle.format import write_bundle
 from ico3d.bundle.head import poses_to_bytes
 from ico3d.bundle.manifest import Manifest
+from support.bundles.random_body import SPANS, body_files, body_manifest, random_windows
+from support.bundles.random_bundle import random_files, random_head, random_manifest, swaying_poses
 
 FRAMES = SPANS[-1][1] + 1
 ANIMATION = {

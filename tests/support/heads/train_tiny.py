@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numba
 import torch
-from tiny_capture import TinyCapture
 
 from ico3d.head.settings import PRESETS
 from ico3d.head.train_head import HeadJob, train_head
+from support.heads.tiny_capture import TinyCapture
 
 SETTINGS = dataclasses.replace(
     PRESETS["cpu"],

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from ico3d.capture.renderme.landmarks import MULTI_PIE
 from ico3d.common.camera import Camera, look_at
+from support.recordings import faces
 
-faces = None  # the module of that name, set by the fixture
 FRONTAL = tuple(range(18, 33))
 DOWN = np.diag([1.0, -1.0, -1.0])
 """Takes a world with +y up to that of the files, which has +y down, and back."""

@@ -1,15 +1,10 @@
 """A tiny whole person in the layout of the subject files: tubes on MakeHuman's joints."""
 
-import importlib.util
 from pathlib import Path
 
 import numpy as np
 
-_SPEC = importlib.util.spec_from_file_location(
-    "synthetic_people", Path(__file__).parent / "synthetic_people.py"
-)
-people = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(people)
+from support.recordings import synthetic_people
 
 MIDDLE = [
     ("root", None, (0, 0.94, -0.05)),
@@ -117,23 +112,23 @@ def _pieces(names, at):
 
 def write_body(path: Path) -> Path:
     """Writes a whole person with the block head of `synthetic_people`."""
-    people.write_person(path)
+    synthetic_people.write_person(path)
     with np.load(path) as archive:
         head = {name: archive[name] for name in archive.files}
     names, parents, at = joints()
     # The block person's own shirt hangs 0.3 m below its eyes: the tubes replace it.
-    kept = head["face_part"] != people.PARTS.index("shirt")
+    kept = head["face_part"] != synthetic_people.PARTS.index("shirt")
     vertices, faces, parts = [head["verts"]], [head["faces"][kept]], [head["face_part"][kept]]
     bound = [np.full(len(head["verts"]), names.index("head"))]
     for part, joint, points, triangles in _pieces(names, at):
         faces.append(triangles + sum(map(len, vertices)))
         vertices.append(points)
-        parts.append(np.full(len(triangles), people.PARTS.index(part), np.uint8))
+        parts.append(np.full(len(triangles), synthetic_people.PARTS.index(part), np.uint8))
         bound.append(np.full(len(points), names.index(joint)))
     verts, tris = np.concatenate(vertices), np.concatenate(faces)
     index = np.zeros((len(verts), 4), np.uint8)
     index[:, 0] = np.concatenate(bound)
-    return people.write_person(
+    return synthetic_people.write_person(
         path,
         verts=verts.astype(np.float32),
         faces=tris.astype(np.int32),

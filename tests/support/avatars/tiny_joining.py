@@ -1,0 +1,43 @@
+"""Joining a head to a body in seconds, all of it or its colours alone."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from ico3d.avatar.avatar import Placement
+from ico3d.avatar.joining.assemble import Assembly, JoiningSettings
+from ico3d.avatar.joining.driving import head_poses, recorded_expressions
+from ico3d.avatar.joining.face_views import face_views
+from ico3d.avatar.joining.recolour import RecolourSettings
+from ico3d.avatar.joining.region import HeadRegion
+from ico3d.body.settings import settings_for
+from support.avatars.planted_person import face
+
+TINY = {
+    "initial_gaussians": 400,
+    "max_gaussians": 600,
+    "steps_per_frame": 35,
+    "warmup_steps": 20,
+    "densify_from": 30,
+    "grid_space": 8,
+    "width": 16,
+    "finetune_steps": 0,
+    "checkpoint_every": 60,
+}
+JOINING = JoiningSettings(color_steps=120, border_points=60)
+RECOLOUR = RecolourSettings(steps=150)
+
+
+def assembly_of(head: Path, **joining) -> Assembly:
+    """What to assemble in seconds."""
+    body = replace(settings_for("cpu", "swings++"), **TINY)
+    return Assembly(head, replace(JOINING, **joining), body, 0)
+
+
+def parts_of(capture, head):
+    """Placement, expressions and views, for training and held out."""
+    placement = Placement(capture.canonical_from_head, head_poses(capture))
+    expressions = recorded_expressions(head, capture, head.neutral())
+    region = HeadRegion.around(face())
+    views = face_views(capture, placement, region, face())
+    tested = face_views(capture, placement, region, face(), list(capture.split.test_cameras))
+    return placement, expressions, views, tested

@@ -1,0 +1,26 @@
+"""Made-up weights of LPIPS."""
+
+from pathlib import Path
+
+import torch
+from safetensors.torch import save_file
+
+STAGES = ((64, 64), (128, 128), (256, 256, 256), (512, 512, 512), (512, 512, 512))
+
+
+def write_weights(path: Path) -> tuple[dict, dict]:
+    """Random weights, under torchvision's and the authors' names."""
+    generator = torch.Generator().manual_seed(0)
+    vgg, linear, number, width = {}, {}, 0, 3
+    for stage, widths in enumerate(STAGES):
+        for channels in widths:
+            size = (channels, width, 3, 3)
+            vgg[f"features.{number}.weight"] = torch.randn(size, generator=generator) / width**0.5
+            vgg[f"features.{number}.bias"] = 0.1 * torch.randn(channels, generator=generator)
+            number, width = number + 2, channels
+        number += 1  # the pooling
+        name = f"lin{stage}.model.1.weight"
+        linear[name] = torch.rand(1, width, 1, 1, generator=generator)
+    save_file(vgg, path / "vgg16.safetensors")
+    save_file(linear, path / "lpips_vgg.safetensors")
+    return vgg, linear
