@@ -10,9 +10,8 @@ from ico3d.chat.memory import forget
 from ico3d.chat.services import choose
 from ico3d.chat.settings.conversation import ChatSettings, Choice, Memory
 from ico3d.measure.talking.scripted import Script
-
-from .guests import Guest, open_sessions
-from .virtual_time import run
+from support.chat.guests import Guest, open_sessions
+from support.chat.virtual_time import run
 
 SMALL = Memory(tokens=200)
 

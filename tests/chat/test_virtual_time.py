@@ -15,9 +15,8 @@ from ico3d.chat.settings.conversation import ChatSettings, Turns
 from ico3d.chat.wire.protocol import VERSION, Error, Hello, Metrics, Speech
 from ico3d.errors import SettingsError
 from ico3d.measure.talking.scripted import Script
-
-from .guests import Guest, open_sessions
-from .virtual_time import run
+from support.chat.guests import Guest, open_sessions
+from support.chat.virtual_time import run
 
 SHARE = 0.060  # s that a server may add to what its services take
 TURNS = Turns(pause=0.2, end_silence=0.6, speculate=False)

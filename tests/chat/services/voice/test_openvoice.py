@@ -1,7 +1,6 @@
 """OpenVoice V2: its adapter, consent and cache, against a fake of its documented API."""
 
 import importlib
-import importlib.util
 import inspect
 import json
 import sys
@@ -17,17 +16,15 @@ from ico3d.chat.services.voice import openvoice  # noqa: E402
 from ico3d.chat.wire.protocol import SPEECH_RATE  # noqa: E402
 from ico3d.errors import MissingModelError, SettingsError  # noqa: E402
 
-HERE = __file__.rpartition("/")[0]
 LANGUAGES = openvoice.LANGUAGES
 CONSENT = {"consent": "I agree that my voice speaks here.", "consent_by": "Änne Müller"}
 
 
 @pytest.fixture(scope="module")
 def fake():
-    spec = importlib.util.spec_from_file_location("fake_openvoice", f"{HERE}/fake_openvoice.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    from support.chat import fake_openvoice
+
+    return fake_openvoice
 
 
 @pytest.fixture

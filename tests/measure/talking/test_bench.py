@@ -16,7 +16,7 @@ from ico3d.measure.talking.page import Player
 from ico3d.measure.talking.questions import audible, broken_off, sayings
 from ico3d.measure.talking.trials import Assent, Interruption, Question, sound_of
 
-SPEECH = Path(__file__).parents[3] / "shared" / "speech"
+SPEECH = Path(__file__).parents[4] / "shared" / "speech"
 
 
 def question(arrival, turn=100.0):

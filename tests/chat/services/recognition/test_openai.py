@@ -15,8 +15,7 @@ from ico3d.chat.services.recognition.openai import Settings, hindrance, make
 from ico3d.chat.services.recognition.segments import BLANK
 from ico3d.chat.serving import server
 from ico3d.errors import SettingsError
-
-from .listening import NOBODY, listen, noise
+from support.chat.listening import NOBODY, listen, noise
 
 
 def described(file, form, request):

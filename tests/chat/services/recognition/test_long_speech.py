@@ -30,8 +30,8 @@ from ico3d.chat.wire.protocol import Answer, Transcript
 from ico3d.errors import SettingsError
 from ico3d.measure.talking.page import open_page
 
-from .conftest import serving
-from .test_recognition import Script, Scripted, silent
+from ...conftest import serving
+from .test_segments import Script, Scripted, silent
 
 RATE = 16_000
 MINUTES = 10

@@ -10,7 +10,7 @@ from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import VERSION, Answer, Error, Hello, Speech, State, Stop, Text
 from ico3d.measure.talking.page import open_page
 
-from .conftest import OFFLINE, serving
+from ..conftest import OFFLINE, serving
 
 
 async def dropped(page):

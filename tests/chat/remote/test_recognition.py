@@ -13,8 +13,7 @@ from pipecat.processors.frame_processor import FrameProcessor
 from ico3d.chat.remote.limits import Limits
 from ico3d.chat.remote.recognition import read_wav
 from ico3d.errors import ProtocolError
-
-from .serving import service_app, serving
+from support.chat.remote import service_app, serving
 
 RATE = 16_000
 LONGEST = 600  # s

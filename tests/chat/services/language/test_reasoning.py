@@ -22,11 +22,11 @@ from ico3d.chat.supervision.apologies import APOLOGIES
 from ico3d.chat.wire.protocol import Answer, End, State, Text
 from ico3d.errors import SettingsError
 from ico3d.measure.talking.page import open_page
+from support.chat.remote import service_app
+from support.chat.remote import serving as serving_app
+from support.chat.scripted_server import Script, Thought, running
 
-from .conftest import serving
-from .modules.serving import service_app
-from .modules.serving import serving as serving_app
-from .scripted_server import Script, Thought, running
+from ...conftest import serving
 
 pytestmark = pytest.mark.slow
 

@@ -17,10 +17,10 @@ from ico3d.chat.wire.protocol import Answer, Interrupt, Speech, Stop, Text
 from ico3d.errors import MissingModelError
 from ico3d.measure.talking.page import open_page
 
-from .conftest import serving
+from ...conftest import serving
 
 pytest.importorskip("transformers")
-from .tiny_qwen import write_tiny_qwen
+from support.chat.tiny_qwen import write_tiny_qwen
 
 ANSWER = "My name is Ada. Nice to meet you, dear visitor!"
 CONTEXT = Context(Persona("Ada"), None, None)

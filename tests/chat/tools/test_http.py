@@ -11,8 +11,7 @@ from ico3d.chat.settings.conversation import Memory, read_settings
 from ico3d.chat.settings.tools import Tool
 from ico3d.chat.tools.http import MOST_BYTES, Refused, answer, check_address
 from ico3d.errors import SettingsError
-
-from .scripted_server import running
+from support.chat.scripted_server import running
 
 FILE = """
 allow = ["api.example.org", "127.0.0.1:9000"]

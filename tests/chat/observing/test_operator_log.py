@@ -21,9 +21,8 @@ from ico3d.chat.observing.operator_log import OperatorLog, StandardHandler, cons
 from ico3d.chat.wire.protocol import Answer, Speech, State, Text
 from ico3d.errors import ServiceError
 from ico3d.measure.talking.page import open_page
-
-from .modules.serving import serving
-from .scripted_server import chunk
+from support.chat.remote import serving
+from support.chat.scripted_server import chunk
 
 MARKER = "zanzibar"
 SETTINGS = """

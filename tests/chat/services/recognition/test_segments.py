@@ -15,8 +15,8 @@ from ico3d.chat.services.recognition.segments import Segments
 from ico3d.chat.wire.protocol import Answer, Speech, State, Transcript
 from ico3d.measure.talking.page import open_page
 
-from .conftest import serving
-from .test_conversation import slowness
+from ...conftest import serving
+from ...test_conversation import slowness
 
 
 @dataclass(frozen=True)

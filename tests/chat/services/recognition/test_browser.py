@@ -11,8 +11,8 @@ from ico3d.chat.wire.protocol import Answer, Deaf, Error, Heard, State, Transcri
 from ico3d.errors import SettingsError
 from ico3d.measure.talking.page import open_page
 
-from .conftest import serving
-from .test_recognition import silent
+from ...conftest import serving
+from .test_segments import silent
 
 BROWSER = ChatSettings(recognition=Choice("browser", {"language": "en-US"}))
 

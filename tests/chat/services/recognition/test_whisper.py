@@ -7,8 +7,7 @@ from ico3d.chat.services.recognition import PROVIDERS, whisper
 from ico3d.chat.services.recognition.segments import BLANK
 from ico3d.chat.services.recognition.whisper import Settings, find, hindrance, make
 from ico3d.errors import MissingModelError, SettingsError
-
-from .listening import NOBODY, listen, noise
+from support.chat.listening import NOBODY, listen, noise
 
 pytest.importorskip("faster_whisper")
 pytest.importorskip("transformers")
@@ -19,14 +18,14 @@ SENTENCE = "Wie heißt du? 你好 1,5 %"
 
 @pytest.fixture(scope="module")
 def german(tmp_path_factory):
-    from .tiny_whisper import write_whisper
+    from support.chat.tiny_whisper import write_whisper
 
     return write_whisper(tmp_path_factory.mktemp("german"), SENTENCE, "de")
 
 
 @pytest.fixture(scope="module")
 def random(tmp_path_factory):
-    from .tiny_whisper import write_whisper
+    from support.chat.tiny_whisper import write_whisper
 
     return write_whisper(tmp_path_factory.mktemp("random"))
 

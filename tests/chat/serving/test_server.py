@@ -27,7 +27,7 @@ from ico3d.cli import main
 from ico3d.errors import BundleError, SettingsError
 from ico3d.measure.talking.page import open_page
 
-from .conftest import serving
+from ..conftest import serving
 
 pytestmark = pytest.mark.slow
 

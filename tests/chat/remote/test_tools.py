@@ -9,8 +9,7 @@ from starlette.responses import StreamingResponse
 from ico3d.bundle.manifest import Persona
 from ico3d.chat.services.language import openai as language
 from ico3d.chat.services.provider import Context
-
-from .serving import service_app, serving
+from support.chat.remote import service_app, serving
 
 WAVE = {
     "type": "function",

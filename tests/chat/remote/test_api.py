@@ -20,8 +20,7 @@ from ico3d.chat.services.provider import Context
 from ico3d.chat.services.recognition import sphinx
 from ico3d.chat.services.voice import espeak
 from ico3d.errors import ProtocolError
-
-from .serving import service_app, serving
+from support.chat.remote import service_app, serving
 
 ADA = Persona("Ada", "Hello.", ("who are you => I am Ada. I live in a box. Grüße, 你好!",))
 CONTEXT = Context(ADA, None, None)

@@ -25,8 +25,7 @@ from ico3d.chat.services.recognition import PROVIDERS as RECOGNITION
 from ico3d.chat.services.voice import PROVIDERS as VOICE
 from ico3d.chat.settings.conversation import Choice, Expression
 from ico3d.errors import Ico3dError, SettingsError
-
-from .scripted_server import running
+from support.chat.scripted_server import running
 
 TABLES = {"recognition": RECOGNITION, "language": LANGUAGE, "voice": VOICE}
 KINDS = list(TABLES)
