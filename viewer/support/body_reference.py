@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.avatar import body_bundle
-from ico3d.avatar.bake_body import Shape, WindowBaker
-from ico3d.avatar.body_bundle import WindowResult
+from ico3d.avatar.baking import body_bundle
+from ico3d.avatar.baking.body_bundle import WindowResult
+from ico3d.avatar.baking.shader_body import Shape, WindowBaker
 from ico3d.avatar.render_bundle import body_gaussians, render_body, visitor_camera
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import Loss, Persona, window_file

@@ -17,7 +17,7 @@ import numpy as np
 import torch
 from body_reference import BORDERS, write_body
 
-from ico3d.avatar.persona import load_persona
+from ico3d.avatar.baking.persona import load_persona
 from ico3d.avatar.render_bundle import (
     avatar_gaussians,
     body_gaussians,

@@ -7,7 +7,7 @@ import dataclasses
 import sys
 from pathlib import Path
 
-from ico3d.avatar.persona import load_persona
+from ico3d.avatar.baking.persona import load_persona
 from ico3d.bundle.format import Bundle, write_bundle
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "bundle"))

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.chat.codec import decode_client, encode
-from ico3d.chat.protocol import (
+from ico3d.chat.wire.codec import decode_client, encode
+from ico3d.chat.wire.protocol import (
     Dictation,
     End,
     Offer,
