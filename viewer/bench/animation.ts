@@ -4,12 +4,12 @@
  */
 import { createServer } from 'vite';
 import { expect, test } from 'vitest';
-import { Browser } from '../support/browser.ts';
-import { makePerson } from '../support/person.ts';
-import { psnr, takePixels } from '../support/pictures.ts';
+import { Browser } from '../support/browser/browser.ts';
+import { makePerson } from '../support/references/person.ts';
+import { psnr, takePixels } from '../support/browser/pictures.ts';
 import { processorTime } from '../support/processor.ts';
 import { REPOSITORY } from '../support/python.ts';
-import { servePage } from '../support/static.ts';
+import { servePage } from '../support/servers/static.ts';
 import { quantile } from '../support/statistics.ts';
 import type { Frame } from './page/scenes.ts';
 

@@ -4,13 +4,13 @@
  */
 import { join } from 'node:path';
 import { expect, test } from 'vitest';
-import { Browser } from '../support/browser.ts';
+import { Browser } from '../support/browser/browser.ts';
 import { runPython } from '../support/python.ts';
-import { pauseDrawing, readRecord, recordLoudness, recordWire, type Record } from '../support/recorder.ts';
+import { pauseDrawing, readRecord, recordLoudness, recordWire, type Record } from '../support/browser/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
-import { ChatServer } from '../support/server.ts';
+import { ChatServer } from '../support/servers/server.ts';
 import { quantile } from '../support/statistics.ts';
-import { VOICE } from '../support/talk.ts';
+import { VOICE } from '../support/browser/talk.ts';
 
 const TURNS = 20;
 const PAUSE = 9; // s for the answer
@@ -22,7 +22,7 @@ test(`voice to voice over ${TURNS} turns`, async () => {
   const [bundle, voice] = [join(folder, 'random.ico3d'), join(folder, 'voice.wav')];
   runPython('../../tests/bundle/random_bundle.py', bundle, '--gaussians', '300');
   const parts = Array.from({ length: TURNS }, (_, i) => [QUESTIONS[i % QUESTIONS.length]!, String(PAUSE)]);
-  runPython('voice.py', voice, '6', ...parts.flat());
+  runPython('sound/voice.py', voice, '6', ...parts.flat());
 
   const server = await ChatServer.start(bundle);
   const browser = await Browser.launch({ width: 320, height: 240, microphone: voice });

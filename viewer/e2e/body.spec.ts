@@ -1,10 +1,10 @@
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { Browser } from '../support/browser.ts';
-import { makeBody } from '../support/body.ts';
+import { Browser } from '../support/browser/browser.ts';
+import { makeBody } from '../support/references/body.ts';
 import type { Playback } from '../src/motion/playback.ts';
-import { psnr, takePixels, worst } from '../support/pictures.ts';
-import { ChatServer } from '../support/server.ts';
+import { psnr, takePixels, worst } from '../support/browser/pictures.ts';
+import { ChatServer } from '../support/servers/server.ts';
 
 const WIDTH = 120;
 const HEIGHT = 160;

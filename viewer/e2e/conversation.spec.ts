@@ -1,17 +1,17 @@
 import { join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import type { Browser } from '../support/browser.ts';
+import type { Browser } from '../support/browser/browser.ts';
 import { runPython } from '../support/python.ts';
-import { readRecord, type Record } from '../support/recorder.ts';
+import { readRecord, type Record } from '../support/browser/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
-import { ChatServer } from '../support/server.ts';
-import { finished, openPage, SENTENCE, SILENCE, until } from '../support/talk.ts';
+import { ChatServer } from '../support/servers/server.ts';
+import { finished, openPage, SENTENCE, SILENCE, until } from '../support/browser/talk.ts';
 
 let server: ChatServer;
 
 beforeAll(async () => {
   const bundle = join(scratchFolder(), 'talking.ico3d');
-  runPython('talking_bundle.py', bundle);
+  runPython('references/talking_bundle.py', bundle);
   server = await ChatServer.start(bundle);
 });
 

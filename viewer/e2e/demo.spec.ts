@@ -1,10 +1,10 @@
 import { existsSync } from 'node:fs';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import type { Browser } from '../support/browser.ts';
-import { DEMO } from '../support/line.ts';
-import { readMouth, watchMouth } from '../support/mouth.ts';
-import { ChatServer } from '../support/server.ts';
-import { finished, openPage, until } from '../support/talk.ts';
+import type { Browser } from '../support/browser/browser.ts';
+import { DEMO } from '../support/references/portrait.ts';
+import { readMouth, watchMouth } from '../support/browser/mouth.ts';
+import { ChatServer } from '../support/servers/server.ts';
+import { finished, openPage, until } from '../support/browser/talk.ts';
 
 describe.skipIf(!existsSync(DEMO))('the packaged demo (needs src/ico3d/chat/data/demo.ico3d)', () => {
   let server: ChatServer;

@@ -1,10 +1,10 @@
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { afterAll, beforeAll, expect, test } from 'vitest';
-import { Browser } from '../support/browser.ts';
+import { Browser } from '../support/browser/browser.ts';
 import { runPython } from '../support/python.ts';
 import { scratchFolder } from '../support/scratch.ts';
-import { ChatServer } from '../support/server.ts';
+import { ChatServer } from '../support/servers/server.ts';
 
 const folder = scratchFolder();
 const voice = join(folder, 'voice.wav');
@@ -12,8 +12,8 @@ let server: ChatServer;
 
 beforeAll(async () => {
   const bundle = join(folder, 'talking.ico3d');
-  runPython('talking_bundle.py', bundle);
-  runPython('voice.py', voice, '3', ...Array.from({ length: 8 }, () => ['What is your name?', '4']).flat());
+  runPython('references/talking_bundle.py', bundle);
+  runPython('sound/voice.py', voice, '3', ...Array.from({ length: 8 }, () => ['What is your name?', '4']).flat());
   writeFileSync(join(folder, 'chat.toml'), 'recognition = "browser"\n');
   server = await ChatServer.start(bundle, 0, '--settings', join(folder, 'chat.toml'));
 }, 120_000);

@@ -1,12 +1,12 @@
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { afterEach, beforeAll, expect, test } from 'vitest';
-import type { Browser } from '../support/browser.ts';
+import type { Browser } from '../support/browser/browser.ts';
 import { runPython } from '../support/python.ts';
-import { microphones, pauseDrawing } from '../support/recorder.ts';
+import { microphones, pauseDrawing } from '../support/browser/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
-import { ChatServer } from '../support/server.ts';
-import { openPage, until } from '../support/talk.ts';
+import { ChatServer } from '../support/servers/server.ts';
+import { openPage, until } from '../support/browser/talk.ts';
 
 const folder = scratchFolder();
 const [bundle, silence] = [join(folder, 'talking.ico3d'), join(folder, 'silence.wav')];
@@ -16,8 +16,8 @@ const FULL = /^all places are taken/;
 const opened: { close(): Promise<void> }[] = [];
 
 beforeAll(() => {
-  runPython('talking_bundle.py', bundle);
-  runPython('voice.py', silence, '90');
+  runPython('references/talking_bundle.py', bundle);
+  runPython('sound/voice.py', silence, '90');
 });
 
 afterEach(async () => {

@@ -1,8 +1,8 @@
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import type { Browser } from '../support/browser.ts';
-import { atRest, excess, headAt, makePerson, settle, watchSteps } from '../support/person.ts';
-import { ChatServer } from '../support/server.ts';
-import { finished, openPage, SENTENCE, until } from '../support/talk.ts';
+import type { Browser } from '../support/browser/browser.ts';
+import { atRest, excess, headAt, makePerson, settle, watchSteps } from '../support/references/person.ts';
+import { ChatServer } from '../support/servers/server.ts';
+import { finished, openPage, SENTENCE, until } from '../support/browser/talk.ts';
 
 const person = makePerson({ gaussians: '300,500' });
 

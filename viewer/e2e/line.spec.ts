@@ -1,14 +1,14 @@
 import { join } from 'node:path';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import type { Browser } from '../support/browser.ts';
-import { hasClip, makePortrait, makeStandIn } from '../support/line.ts';
+import type { Browser } from '../support/browser/browser.ts';
+import { hasClip, makePortrait, makeStandIn } from '../support/references/portrait.ts';
 import { MICROPHONE_RATE } from '../src/protocol.ts';
-import { readMouth, watchMouth } from '../support/mouth.ts';
-import type { Loudness, Record } from '../support/recorder.ts';
+import { readMouth, watchMouth } from '../support/browser/mouth.ts';
+import type { Loudness, Record } from '../support/browser/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
-import { ChatServer } from '../support/server.ts';
+import { ChatServer } from '../support/servers/server.ts';
 import { correlation, quantile } from '../support/statistics.ts';
-import { finished, lastOnset, makeVoice, openPage, SENTENCE, SILENCE, until } from '../support/talk.ts';
+import { finished, lastOnset, makeVoice, openPage, SENTENCE, SILENCE, until } from '../support/browser/talk.ts';
 
 const folder = scratchFolder();
 const LONG_ENOUGH = 2000; // ms of speech before the interruption

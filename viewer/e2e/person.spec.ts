@@ -1,10 +1,10 @@
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, beforeEach, describe, expect, test } from 'vitest';
-import { Browser } from '../support/browser.ts';
-import { feed, noise } from '../support/feeder.ts';
-import { atRest, excess, headAt, makePerson, readSteps, settle, watchSteps } from '../support/person.ts';
-import { crop, lookAsBundled, psnr, takePixels } from '../support/pictures.ts';
-import { servePage } from '../support/static.ts';
+import { Browser } from '../support/browser/browser.ts';
+import { feed, noise } from '../support/sound/feeder.ts';
+import { atRest, excess, headAt, makePerson, readSteps, settle, watchSteps } from '../support/references/person.ts';
+import { crop, lookAsBundled, psnr, takePixels } from '../support/browser/pictures.ts';
+import { servePage } from '../support/servers/static.ts';
 
 const WIDTH = 240;
 const HEIGHT = 320;

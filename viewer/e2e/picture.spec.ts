@@ -1,8 +1,8 @@
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { Browser } from '../support/browser.ts';
-import { lookAsBundled, psnr, takeStill, worst } from '../support/pictures.ts';
-import { makeReference } from '../support/reference.ts';
-import { servePage } from '../support/static.ts';
+import { Browser } from '../support/browser/browser.ts';
+import { lookAsBundled, psnr, takeStill, worst } from '../support/browser/pictures.ts';
+import { makeReference } from '../support/references/head.ts';
+import { servePage } from '../support/servers/static.ts';
 
 const WIDTH = 320;
 const HEIGHT = 240;

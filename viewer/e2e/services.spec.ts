@@ -1,10 +1,10 @@
 import { join } from 'node:path';
 import { afterAll, beforeAll, expect, test } from 'vitest';
-import type { Browser } from '../support/browser.ts';
+import type { Browser } from '../support/browser/browser.ts';
 import { runPython } from '../support/python.ts';
 import { scratchFolder } from '../support/scratch.ts';
-import { ChatServer } from '../support/server.ts';
-import { finished, openPage, until } from '../support/talk.ts';
+import { ChatServer } from '../support/servers/server.ts';
+import { finished, openPage, until } from '../support/browser/talk.ts';
 
 const folder = scratchFolder();
 let server: ChatServer;
@@ -12,7 +12,7 @@ let browser: Browser;
 
 beforeAll(async () => {
   const bundle = join(folder, 'talking.ico3d');
-  runPython('talking_bundle.py', bundle);
+  runPython('references/talking_bundle.py', bundle);
   server = await ChatServer.start(bundle);
   browser = await openPage(server.url);
 }, 120_000);

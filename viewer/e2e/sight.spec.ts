@@ -1,10 +1,10 @@
 import { existsSync } from 'node:fs';
 import type { CDPSession, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { Browser } from '../support/browser.ts';
-import { seeChin, seeEyes } from '../support/eyes.ts';
-import { DEMO } from '../support/line.ts';
-import { ChatServer } from '../support/server.ts';
+import { Browser } from '../support/browser/browser.ts';
+import { seeChin, seeEyes } from '../support/browser/eyes.ts';
+import { DEMO } from '../support/references/portrait.ts';
+import { ChatServer } from '../support/servers/server.ts';
 
 const MOST_SCRIPT = 1.2e6; // bytes on the wire until she is seen
 

@@ -1,12 +1,12 @@
 import { afterAll, beforeAll, expect, test } from 'vitest';
-import { Browser } from '../support/browser.ts';
-import { feed, noise } from '../support/feeder.ts';
-import { lookAsBundled } from '../support/pictures.ts';
+import { Browser } from '../support/browser/browser.ts';
+import { feed, noise } from '../support/sound/feeder.ts';
+import { lookAsBundled } from '../support/browser/pictures.ts';
 import { runPython } from '../support/python.ts';
 import { scratchFolder } from '../support/scratch.ts';
-import { servePage } from '../support/static.ts';
+import { servePage } from '../support/servers/static.ts';
 import { slope } from '../support/statistics.ts';
-import { comparePlacement, tap } from '../support/tap.ts';
+import { comparePlacement, tap } from '../support/sound/tap.ts';
 
 const RATE = 24_000;
 const TICK = 1 / 30;
@@ -18,7 +18,7 @@ let browser: Browser;
 
 beforeAll(async () => {
   const folder = scratchFolder();
-  runPython('phase_bundle.py', folder);
+  runPython('references/phase_bundle.py', folder);
   server = await servePage(folder);
   browser = await Browser.launch({ width: SIZE, height: SIZE });
   await lookAsBundled(await browser.open(server.url), folder);

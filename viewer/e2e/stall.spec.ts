@@ -1,14 +1,14 @@
 import { join } from 'node:path';
 import { afterAll, beforeAll, expect, test } from 'vitest';
 import { MICROPHONE_CHUNK, MICROPHONE_RATE } from '../src/protocol.ts';
-import type { Browser } from '../support/browser.ts';
+import type { Browser } from '../support/browser/browser.ts';
 import { runPython } from '../support/python.ts';
-import { pauseDrawing, readRecord, type Heard } from '../support/recorder.ts';
+import { pauseDrawing, readRecord, type Heard } from '../support/browser/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
-import { ChatServer } from '../support/server.ts';
-import { StallingLine } from '../support/stalling.ts';
+import { ChatServer } from '../support/servers/server.ts';
+import { StallingLine } from '../support/servers/stalling.ts';
 import { quantile } from '../support/statistics.ts';
-import { finished, makeVoice, openPage, until } from '../support/talk.ts';
+import { finished, makeVoice, openPage, until } from '../support/browser/talk.ts';
 
 const STALL = 8000; // ms: more than a server takes at once of sound that comes late
 
@@ -19,7 +19,7 @@ let browser: Browser;
 beforeAll(async () => {
   const folder = scratchFolder();
   const [bundle, voice] = [join(folder, 'talking.ico3d'), join(folder, 'voice.wav')];
-  runPython('talking_bundle.py', bundle);
+  runPython('references/talking_bundle.py', bundle);
   makeVoice(voice);
   server = await ChatServer.start(bundle);
   line = await StallingLine.to(server.url);

@@ -3,12 +3,12 @@ import { join } from 'node:path';
 import { expect, test } from 'vitest';
 import { decode, encode, floatFromHalf, type SpeechMessage } from '../src/protocol.ts';
 import { runPython } from '../support/python.ts';
-import { arrayBuffer } from '../support/reference.ts';
+import { arrayBuffer } from '../support/references/head.ts';
 import { scratchFolder } from '../support/scratch.ts';
 
 test('frames of the server mean here what they meant there', () => {
   const folder = scratchFolder();
-  runPython('wire_fixtures.py', 'encode', folder);
+  runPython('references/wire_fixtures.py', 'encode', folder);
   const text = (name: string) => decode(readFileSync(join(folder, name), 'utf8'));
 
   const service = { name: 'offline', stand_in: true };
@@ -45,7 +45,7 @@ test('frames of the page mean there what they mean here', () => {
     writeFileSync(file, typeof frame === 'string' ? frame : new Uint8Array(frame));
     return file;
   });
-  const understood = JSON.parse(runPython('wire_fixtures.py', 'decode', ...files)) as object[];
+  const understood = JSON.parse(runPython('references/wire_fixtures.py', 'decode', ...files)) as object[];
   const expected = messages.map(({ type: _, ...fields }) =>
     'pcm' in fields ? { ...fields, pcm: [...fields.pcm] } : fields,
   );

@@ -1,0 +1,48 @@
+import { existsSync } from 'node:fs';
+import { join } from 'node:path';
+import { Browser, type BrowserOptions } from './browser.ts';
+import { REPOSITORY, runPython } from '../python.ts';
+import { readRecord, recordLoudness, recordWire, type Record } from './recorder.ts';
+
+export const SENTENCE = 'we must find a new home in the stars'; // the persona of persona.json has a long answer to it
+const RECORDING = join(REPOSITORY, '../shared/speech/new-home-in-the-stars-16k.wav');
+
+export const VOICE = 0.005; // level of the microphone above which somebody speaks
+export const SILENCE = 1e-4; // level of the avatar under which nothing is heard
+
+/** Opens the page of a server in a small window and records its conversation. */
+export async function openPage(url: string, options: BrowserOptions = {}): Promise<Browser> {
+  const browser = await Browser.launch({ width: 320, height: 240, ...options });
+  await recordWire(browser.context);
+  await browser.open(url);
+  await recordLoudness(browser.page);
+  return browser;
+}
+
+/** Waits until the recorded conversation fulfils a condition; then gives the record. */
+export async function until(browser: Browser, condition: (record: Record) => boolean, timeout: number): Promise<Record> {
+  for (const end = Date.now() + timeout; Date.now() < end; ) {
+    const record = await readRecord(browser.page);
+    if (condition(record)) return record;
+    await browser.page.waitForTimeout(100);
+  }
+  throw new Error(`not within ${timeout} ms: ${condition}`);
+}
+
+/** Whether all of an utterance has been said and heard. */
+export const finished = (utterance: number) => ({ received }: Record) => {
+  const end = received.findIndex((m) => m.type === 'end' && m.utterance === utterance);
+  return end >= 0 && received.slice(end).findLast(({ type }) => type === 'state')?.state === 'idle';
+};
+
+/** When the visitor began to speak for the last time before `end`, after at least a second's pause. */
+export function lastOnset({ microphone }: Record, end: number): number {
+  const voiced = microphone.filter(({ at, level }) => at < end && level > VOICE);
+  return voiced.findLast(({ at }, i) => i === 0 || at - voiced[i - 1]!.at > 1000)!.at;
+}
+
+/** A WAV in which the sentence is said again and again: on a busy machine nobody knows when the answer will come. */
+export function makeVoice(path: string): void {
+  const sentence = existsSync(RECORDING) ? RECORDING : SENTENCE;
+  runPython('sound/voice.py', path, '2', ...Array.from({ length: 8 }, () => [sentence, '4.5']).flat());
+}

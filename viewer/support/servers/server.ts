@@ -1,0 +1,43 @@
+import { spawn, type ChildProcess } from 'node:child_process';
+import { once } from 'node:events';
+import { PYTHON, REPOSITORY } from '../python.ts';
+
+const START_TIMEOUT = 60_000; // ms
+
+/** `ico3d serve` with a bundle, on a free port of this machine. */
+export class ChatServer {
+  private readonly child: ChildProcess;
+  readonly url: string;
+
+  private constructor(child: ChildProcess, url: string) {
+    this.child = child;
+    this.url = url;
+  }
+
+  /** @param more arguments of `ico3d serve` */
+  static async start(bundle: string, port = 0, ...more: string[]): Promise<ChatServer> {
+    const args = ['-m', 'ico3d.cli', 'serve', bundle, '--port', String(port), ...more];
+    const child = spawn(PYTHON, args, { cwd: REPOSITORY, stdio: ['ignore', 'pipe', 'inherit'] });
+    return new ChatServer(child, await readUrl(child));
+  }
+
+  async stop(): Promise<void> {
+    this.child.kill('SIGINT');
+    if (this.child.exitCode === null) await once(this.child, 'exit');
+  }
+}
+
+function readUrl(child: ChildProcess): Promise<string> {
+  return new Promise((resolve, reject) => {
+    let printed = '';
+    const timer = setTimeout(() => reject(new Error(`ico3d serve does not start: ${printed}`)), START_TIMEOUT);
+    child.stdout!.on('data', (chunk: Buffer) => {
+      printed += chunk.toString();
+      const url = /https?:\/\/\S+\//.exec(printed)?.[0];
+      if (!url) return;
+      clearTimeout(timer);
+      resolve(url);
+    });
+    child.on('exit', (code) => reject(new Error(`ico3d serve ended with status ${code}: ${printed}`)));
+  });
+}

@@ -1,0 +1,77 @@
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { describe, expect, test } from 'vitest';
+import { blinkIndices, checkManifest } from '../../src/bundle/manifest.ts';
+import { parseSafetensors } from '../../src/bundle/safetensors.ts';
+import { readBakedHead } from '../../src/head/baked.ts';
+import { coefficients } from '../../src/head/coefficients.ts';
+import { arrayBuffer, makeReference } from '../../support/references/head.ts';
+
+const reference = makeReference({ gaussians: 37 });
+const read = (name: string) => readFileSync(join(reference.folder, name));
+const manifest = checkManifest(JSON.parse(read('manifest.json').toString()));
+const info = manifest.head!;
+const headFile = arrayBuffer(read('head.safetensors'));
+const parse = () => readBakedHead(parseSafetensors(headFile, 'head'), info, 'head');
+
+describe('a bundle that Python wrote', () => {
+  test('its coefficients are those of the Python evaluator', () => {
+    const { network, rank } = parse();
+    const out = new Float32Array(rank);
+    reference.expressions.forEach((row, i) => {
+      coefficients(network, Float32Array.from(row), out);
+      reference.coefficients[i]!.forEach((value, k) => expect(out[k]).toBeCloseTo(value, 4));
+    });
+  });
+
+  test('its attributes follow from means, basis and scale', () => {
+    const head = parse();
+    const c = reference.coefficients[2]!;
+    for (let i = 0; i < 4 * head.count; i++) {
+      const blend = c.reduce((sum, value, k) => sum + value * head.basis[k * 4 * head.count + i]!, 0);
+      const logit = head.meanLogits[i]! + head.basisScale[Math.floor(i / 4)]! * blend;
+      expect(1 / (1 + Math.exp(-logit))).toBeCloseTo(reference.attributes[2 * 4 * head.count + i]!, 4);
+    }
+  });
+
+  test('eyelids lie behind the five brow values', () => {
+    expect(blinkIndices(info)).toEqual([37, 38]);
+    const named = { ...info, eye_offset: null, expression_names: ['jawOpen', 'eyeBlinkRight', 'eyeBlinkLeft'] };
+    expect(blinkIndices(named)).toEqual([2, 1]);
+  });
+});
+
+describe('a damaged bundle is refused in one sentence', () => {
+  const cases: [string, () => unknown, RegExp][] = [
+    ['cut short', () => parseSafetensors(headFile.slice(0, -1), 'head'), /does not fit its shape/],
+    ['empty', () => parseSafetensors(new ArrayBuffer(3), 'head'), /too short/],
+    ['header cut', () => parseSafetensors(headFile.slice(0, 40), 'head'), /ends before its header/],
+    ['no header', () => parseSafetensors(withHeader('{'), 'head'), /not JSON/],
+    ['unknown type', () => parseSafetensors(withHeader(entry('F64', [1], 8), 8), 'head'), /F64/],
+    ['other counts', () => readBakedHead(parseSafetensors(headFile, 'head'), { ...info, rank: 3 }, 'head'), /basis/],
+    ['not finite', () => readBakedHead(spoiled(), info, 'head'), /means holds numbers that are not finite/],
+    ['other format', () => checkManifest({ format: 'zip' }), /not that of an avatar bundle/],
+    ['other version', () => checkManifest({ ...manifest, version: 3 }), /format version 3/],
+    ['not a manifest', () => checkManifest(null), /not that of an avatar bundle/],
+    ['short idle face', () => checkManifest({ ...manifest, head: { ...manifest.head, idle_expression: [0] } }), /idle_expression/],
+    ['no camera', () => checkManifest({ ...manifest, camera: null }), /camera/],
+  ];
+  test.each(cases)('%s', (_, act, sentence) => expect(act).toThrow(sentence));
+});
+
+function entry(dtype: string, shape: number[], size: number): string {
+  return JSON.stringify({ x: { dtype, shape, data_offsets: [0, size] } });
+}
+
+function withHeader(header: string, dataSize = 0): ArrayBuffer {
+  const bytes = new Uint8Array(8 + header.length + dataSize);
+  new DataView(bytes.buffer).setBigUint64(0, BigInt(header.length), true);
+  bytes.set(new TextEncoder().encode(header), 8);
+  return bytes.buffer;
+}
+
+function spoiled() {
+  const tensors = parseSafetensors(headFile, 'head');
+  tensors.get('means')!.data[4] = Infinity;
+  return tensors;
+}

@@ -1,0 +1,146 @@
+import { afterEach, beforeEach, expect, test, vi } from 'vitest';
+import { Connection, type ConnectionEvents, type Ending } from '../../src/talk/connection.ts';
+import { ScriptedSocket } from '../../support/doubles/scripted-socket.ts';
+
+const FULL = 'all places are taken: try again in a minute.';
+
+beforeEach(() => {
+  vi.useFakeTimers({ now: 0, toFake: ['setTimeout', 'clearTimeout', 'performance'] });
+  vi.stubGlobal('WebSocket', ScriptedSocket);
+  ScriptedSocket.all = [];
+});
+afterEach(() => {
+  vi.useRealTimers();
+  vi.unstubAllGlobals();
+});
+
+function connect() {
+  const endings: Ending[] = [];
+  const told: string[] = [];
+  const events: ConnectionEvents = {
+    message: () => {},
+    welcome: ({ resumed }, replaced) => told.push(`welcome, resumed ${resumed}, replaced ${replaced}`),
+    lost: () => told.push('lost'),
+    stalled: () => {},
+    ended: (ending) => endings.push(ending),
+  };
+  const connection = new Connection('ws://server/ws', events);
+  connection.open();
+  return { connection, endings, told };
+}
+
+/** How long it takes until the next try, ms; null if there is none within ten minutes. */
+function nextTry(): number | null {
+  const [began, tries] = [performance.now(), ScriptedSocket.all.length];
+  while (ScriptedSocket.all.length === tries) {
+    if (performance.now() - began > 600_000) return null;
+    vi.advanceTimersByTime(100);
+  }
+  return performance.now() - began;
+}
+
+test('a full server is asked again, less and less often, until there is a place', () => {
+  const { connection, endings, told } = connect();
+  for (const wait of [5000, 10_000, 20_000, 40_000, 60_000, 60_000]) {
+    ScriptedSocket.last.hangUp(FULL, 1013, true);
+    expect(endings.at(-1)).toEqual({ sentence: FULL, again: true, wait });
+    expect(nextTry()).toBe(wait);
+  }
+  ScriptedSocket.last.welcome();
+  expect(told).toEqual(['welcome, resumed false, replaced false']);
+  expect(connection.send({ type: 'text', text: 'At last!' })).toBe(true);
+  ScriptedSocket.last.hangUp(FULL, 1013, true); // the waits begin anew
+  expect(endings.at(-1)!.wait).toBe(5000);
+});
+
+test('the visitor need not wait, and does not try twice', () => {
+  const { connection } = connect();
+  ScriptedSocket.last.hangUp(FULL, 1013, true);
+  vi.advanceTimersByTime(1000);
+  connection.open();
+  connection.open();
+  expect(ScriptedSocket.all).toHaveLength(2);
+  vi.advanceTimersByTime(60_000); // the handshake takes its time
+  expect(ScriptedSocket.all).toHaveLength(2);
+});
+
+test('a session that ended is not resumed, and nobody is called back who went away', () => {
+  const { connection, endings } = connect();
+  ScriptedSocket.last.welcome();
+  const sentence = 'Nothing was said for 10 min, so this conversation has ended.';
+  ScriptedSocket.last.hangUp(sentence, 1000, true);
+  expect(endings).toEqual([{ sentence, again: true, wait: null }]);
+  expect(connection.send({ type: 'text', text: 'Hello?' })).toBe(false);
+  expect(nextTry()).toBe(null);
+  connection.open();
+  ScriptedSocket.last.welcome();
+  expect(ScriptedSocket.last.of('hello')).toMatchObject([{ session: null, last_index: -1 }]);
+  expect(connection.send({ type: 'text', text: 'Hello?' })).toBe(true);
+});
+
+test('what a new session would not mend is not tried again', () => {
+  const { endings } = connect();
+  const sentence = 'this page speaks version 2 of the protocol, the server version 4: reload the page.';
+  ScriptedSocket.last.hangUp(sentence, 1008, false);
+  expect(endings).toEqual([{ sentence, again: false, wait: null }]);
+  expect(nextTry()).toBe(null);
+});
+
+test('a server of another version ends it too', () => {
+  const { endings, told } = connect();
+  ScriptedSocket.last.welcome({ version: 1 });
+  expect(ScriptedSocket.last.closed).toBe(true);
+  ScriptedSocket.last.drop(1000);
+  expect(endings).toMatchObject([{ again: false, wait: null }]);
+  expect(told).toEqual([]);
+});
+
+test('a dropped connection resumes its session, and says so when there is none any more', () => {
+  const { told } = connect();
+  ScriptedSocket.last.welcome();
+  ScriptedSocket.last.drop();
+  expect(nextTry()).toBe(300);
+  ScriptedSocket.last.welcome({ resumed: true });
+  expect(ScriptedSocket.last.of('hello')).toMatchObject([{ session: 'first' }]);
+  ScriptedSocket.last.drop();
+  expect(nextTry()).toBe(300);
+  ScriptedSocket.last.welcome({ resumed: false, session: 'second' });
+  expect(told).toEqual([
+    'welcome, resumed false, replaced false',
+    'lost',
+    'welcome, resumed true, replaced false',
+    'lost',
+    'welcome, resumed false, replaced true',
+  ]);
+});
+
+test('a server that stays away ends the session once it cannot be resumed; trying goes on', () => {
+  const { endings, told } = connect();
+  ScriptedSocket.last.welcome();
+  vi.advanceTimersByTime(120_000); // a long conversation
+  const waits = [];
+  for (let i = 0; i < 20 && endings.length === 0; i++) {
+    ScriptedSocket.last.drop();
+    if (endings.length === 0) waits.push(nextTry());
+  }
+  expect(waits).toEqual([300, 600, 1200, 2400, 4800, 5000, 5000, 5000, 5000, 5000]);
+  expect(endings).toEqual([{ sentence: 'The connection to the server was lost.', again: true, wait: 10_000 }]);
+  expect(nextTry()).toBe(10_000);
+  ScriptedSocket.last.drop();
+  expect(endings.at(-1)!.wait).toBe(20_000);
+  expect(nextTry()).toBe(20_000);
+  ScriptedSocket.last.welcome();
+  expect(ScriptedSocket.last.of('hello')).toMatchObject([{ session: null }]);
+  expect(told.at(-1)).toBe('welcome, resumed false, replaced false');
+});
+
+test('other services mean another session, which replaces none', () => {
+  const { connection, told } = connect();
+  ScriptedSocket.last.welcome();
+  connection.restart({ voice: 'kokoro' });
+  ScriptedSocket.last.drop(1005);
+  nextTry();
+  ScriptedSocket.last.welcome({ session: 'second' });
+  expect(ScriptedSocket.last.of('hello')).toMatchObject([{ session: null, wishes: { voice: 'kokoro' } }]);
+  expect(told.at(-1)).toBe('welcome, resumed false, replaced false');
+});
