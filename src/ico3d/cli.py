@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import tyro
 
+from ico3d import __version__
 from ico3d.errors import Ico3dError
 
 
@@ -69,7 +70,8 @@ def usage() -> str:
     """The list of verbs that `ico3d --help` prints."""
     width = max(map(len, VERBS))
     lines = [f"  {verb:<{width}}  {entry.help}" for verb, entry in VERBS.items()]
-    return "usage: ico3d VERB ... (ico3d VERB --help tells the rest)\n\n" + "\n".join(lines)
+    head = "usage: ico3d VERB ... (ico3d VERB --help tells the rest; ico3d --version)\n\n"
+    return head + "\n".join(lines)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -82,6 +84,9 @@ def main(arguments: list[str] | None = None) -> int:
         The exit status: 0, 1 for an error the user can mend, 2 for an unknown verb.
     """
     words = sys.argv[1:] if arguments is None else arguments
+    if words == ["--version"]:
+        print(f"ico3d {__version__}")
+        return 0
     verb = next((v for v in VERBS if words[: len(v.split())] == v.split()), None)
     if verb is None:
         known = not words or words[0] in ("-h", "--help")

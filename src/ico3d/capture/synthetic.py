@@ -1,4 +1,4 @@
-"""Reads a synthetic capture: `docs/captures-synthetic.md`, "Synthetic captures"."""
+"""Reads a synthetic capture: `docs/captures/synthetic.md`, "Synthetic captures"."""
 
 import json
 import wave

@@ -35,7 +35,7 @@ class HeadSettings:
         basis_weight_decay: Factor of the basis' rows, the bias excepted, added to their gradient:
             what the expression need not change, it shall not. For 100 training frames; it falls
             with the fourth power of their number: many frames are not learned by heart (measured:
-            docs/benchmarks.md).
+            docs/choices.md).
         mlp_rate: Learning rate of the MLP.
         mlp_decay: What it decays to, as a factor.
         adaptor_rate: Learning rate of the speech adaptor.

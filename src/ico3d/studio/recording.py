@@ -1,6 +1,6 @@
 """Records a synthetic person: writes the folder that `reader` reads.
 
-Layout: `docs/captures-synthetic.md`, "Synthetic captures".
+Layout: `docs/captures/synthetic.md`, "Synthetic captures".
 """
 
 import io

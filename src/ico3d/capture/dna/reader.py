@@ -1,4 +1,4 @@
-"""Reads a recording of the DNA-Rendering data set: `docs/captures-dna.md`."""
+"""Reads a recording of the DNA-Rendering data set: `docs/captures/dna.md`."""
 
 import logging
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""The file of a tracked head, `tracking.safetensors`: `docs/captures-multiview.md`."""
+"""The file of a tracked head, `tracking.safetensors`: `docs/captures/multiview.md`."""
 
 import os
 from dataclasses import dataclass, fields

@@ -1,4 +1,4 @@
-"""The file `cameras.json` of a multiview folder: `docs/captures-multiview.md`."""
+"""The file `cameras.json` of a multiview folder: `docs/captures/multiview.md`."""
 
 import json
 import re

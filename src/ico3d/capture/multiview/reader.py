@@ -1,4 +1,4 @@
-"""Reads a multiview folder: `docs/captures-multiview.md`."""
+"""Reads a multiview folder: `docs/captures/multiview.md`."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Reads a recording of the RenderMe-360 data set: `docs/captures-renderme.md`."""
+"""Reads a recording of the RenderMe-360 data set: `docs/captures/renderme.md`."""
 
 import logging
 import math

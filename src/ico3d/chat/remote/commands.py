@@ -18,7 +18,7 @@ LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 @dataclass(frozen=True)
 class ServeModule:
-    """Serves one part of the conversation to other machines (docs/modules.md).
+    """Serves one part of the conversation to other machines (docs/conversation/modules.md).
 
     Recognition, language and voice speak the OpenAI-compatible API; expression has its own.
 

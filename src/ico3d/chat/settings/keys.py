@@ -43,7 +43,7 @@ def check_key(url: str, key_variable: str, where: str) -> None:
     if key_variable and not safe:
         raise SettingsError(
             f"{where}: the key in {key_variable} would be sent unencrypted to {found['host']}: "
-            "use https, or a tunnel to this machine (docs/modules.md)."
+            "use https, or a tunnel to this machine (docs/conversation/modules.md)."
         )
 
 

@@ -41,7 +41,7 @@ PERSONA = """\
 LIMITS = """\
 ## Limits of a module
 
-In no file: words behind `ico3d serve-module`, [more](modules.md).
+In no file: words behind `ico3d serve-module`, [more](conversation/modules.md).
 """
 
 

@@ -1,6 +1,6 @@
 """Reads a person from an `.npz` file: ICT-FaceKit head on a MakeHuman body.
 
-The layout is the one of `docs/captures-synthetic.md`, "Subject files".
+The layout is the one of `docs/captures/synthetic.md`, "Subject files".
 """
 
 from pathlib import Path

@@ -152,7 +152,8 @@ def test_what_is_missing_is_said(fake, monkeypatch, reference, models):
     with pytest.raises(MissingModelError, match="ico3d weights fetch openvoice"):
         openvoice.make(settings, None)
     monkeypatch.setitem(sys.modules, "melo.api", None)
-    with pytest.raises(SettingsError, match=r"needs the package 'melo.api'.*docs/conversation\.md"):
+    missing = r"needs the package 'melo.api'.*docs/conversation/voices\.md"
+    with pytest.raises(SettingsError, match=missing):
         openvoice.make(openvoice.Settings(), None)
 
 

@@ -1,7 +1,7 @@
 """OpenVoice V2: MeloTTS speaks, and a tone-colour converter gives it a person's voice.
 
-Neither is on the package index; `docs/conversation.md` says how to install them. Both belong to
-MyShell and are MIT-licensed, as are their weights.
+Neither is on the package index; `docs/conversation/voices.md` says how to install them. Both
+belong to MyShell and are MIT-licensed, as are their weights.
 """
 
 import contextlib
@@ -32,7 +32,7 @@ LANGUAGES = {
 }
 """What it speaks: weights, and a first word, which loads the rest of its models."""
 
-INSTALL = "the commands are in docs/conversation.md under 'Voice'."
+INSTALL = "the commands are in docs/conversation/voices.md."
 
 
 @dataclass(frozen=True)
