@@ -22,6 +22,7 @@ from ico3d.bundle.format import Bundle
 from ico3d.splat.files.formats import read_gaussians, write_gaussians
 from ico3d.splat.files.raw import RawGaussians
 from ico3d.splat.gaussians import Gaussians
+from ico3d.splat.losses import tensor_psnr
 from ico3d.splat.render import render
 
 
@@ -122,7 +123,7 @@ def psnr(before: Gaussians, after: Gaussians, camera) -> float:
     """Of the picture of what came back against what was written, dB."""
     with torch.no_grad():
         a, b = (render(g, [camera], torch.ones(3)).rgb[0] for g in (before, after))
-    return float(-10 * torch.log10((a - b).square().mean().clamp(min=1e-12)))
+    return tensor_psnr(a, b)
 
 
 if __name__ == "__main__":

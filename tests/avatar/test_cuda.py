@@ -10,8 +10,9 @@ from ico3d.avatar.animation.keyframes import Motion
 from ico3d.avatar.baking import body_bundle, head_bundle, head_cost, person_bundle
 from ico3d.avatar.baking.samples import recorded_samples
 from ico3d.avatar.baking.shader_head import BakeSettings
-from ico3d.avatar.film.camera_path import orbit, ring_around
-from ico3d.avatar.film.film import extent, pictures
+from ico3d.avatar.camera_path import orbit, ring_around
+from ico3d.avatar.film.film import pictures
+from ico3d.avatar.moving import extent
 from ico3d.body.model_folder import TrainedBody
 from ico3d.bundle.format import Bundle
 from ico3d.cli import main

@@ -17,6 +17,8 @@ from ico3d.training.checkpoint import load_tensors, save_tensors
 
 ABOUT = "avatar.json"
 """The file by which a folder is known to hold an avatar."""
+FACING = np.array([0.0, 0.0, 1.0])
+"""Where the face looks in the space of the head's model."""
 HEAD, BODY, PLACEMENT = "head", "body", "placement.safetensors"
 
 
@@ -32,6 +34,12 @@ class Placement:
 
     canonical_from_head: np.ndarray
     world_from_canonical: np.ndarray
+
+    @property
+    def facing(self) -> np.ndarray:
+        """(3,) where the face looks in the world, on average over the frames; of any length."""
+        turns = self.world_from_canonical[:, :3, :3]  # (F, 3, 3)
+        return turns.mean(axis=0) @ self.canonical_from_head[:3, :3] @ FACING  # (3,)
 
     def world_from_head(self, frame: float) -> np.ndarray:
         """(4, 4) similarity W·G at a frame, between frames as viewers interpolate it."""

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from ico3d.avatar.avatar import Placement
-from ico3d.avatar.spans import Span
+from ico3d.avatar.moving import Span
 from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.evaluate import attributes
 from ico3d.bundle.format import Bundle

@@ -19,6 +19,8 @@ from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.training.checkpoint import load_tensors, save_tensors
 
+ABOUT = "head.json"
+"""The file by which a folder is known to hold a head."""
 SILENCE = 2
 """Seconds, in the middle of which a voice has been silent for long."""
 Inputs = Literal["speech", "blendshapes"]
@@ -119,7 +121,7 @@ class TrainedHead:
             "landmarks": None if self.landmarks is None else self.landmarks.round(6).tolist(),
             "eyes": asdict(self.eyes),
         }
-        write_atomic(folder / "head.json", json.dumps(about, indent=1).encode())
+        write_atomic(folder / ABOUT, json.dumps(about, indent=1).encode())
 
     @classmethod
     def load(cls, folder: Path | str) -> "TrainedHead":
@@ -130,7 +132,7 @@ class TrainedHead:
         """
         folder = Path(folder)
         try:
-            about = json.loads((folder / "head.json").read_text())
+            about = json.loads((folder / ABOUT).read_text())
             inputs, names = about["inputs"], tuple(about["blendshape_names"])
             encoder = about["encoder"], about["encoder_sha256"]
             summary, landmarks = about["summary"], _landmarks(about.get("landmarks"))

@@ -17,6 +17,7 @@ from ico3d.head.settings import HeadSettings
 from ico3d.head.views import Picture, PictureCache, View, poses_digest, staged
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.density import contributions
+from ico3d.splat.losses import tensor_psnr
 from ico3d.splat.render import render
 from ico3d.training.acceleration import accelerated
 from ico3d.training.optimiser import Optimiser
@@ -96,8 +97,7 @@ class HeadTrainer:
         self._density.observe(rendering.info, index)
         self._update(expression, features, index)
         self._density.adapt(self.model, self._optimiser, self._sampled, index)
-        error = float((rendering.rgb.detach()[0] - target).square().mean())
-        psnr = -10 * np.log10(max(error, 1e-12))
+        psnr = tensor_psnr(rendering.rgb[0], target)
         return {"loss": float(loss.detach()), "psnr": psnr, "gaussians": len(self.model)}
 
     def tensors(self) -> dict[str, Tensor]:

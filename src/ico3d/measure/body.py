@@ -14,10 +14,11 @@ from ico3d.body.model_folder import ROUNDING, TrainedBody
 from ico3d.body.planning.windows import Window
 from ico3d.capture.capture import Capture
 from ico3d.capture.pictures import View, train_cameras
+from ico3d.common.psnr import psnr
 from ico3d.errors import CaptureError
 from ico3d.measure.flicker import border_flicker, novel_cameras
 from ico3d.measure.lpips import lpips
-from ico3d.measure.metrics import moving_pixels, psnr, psnr_moving
+from ico3d.measure.metrics import moving_pixels, psnr_moving
 from ico3d.measure.scores import Scores, add_picture, write_pictures
 from ico3d.measure.stopwatch import Stopwatch
 from ico3d.splat.device import CPU

@@ -9,8 +9,8 @@ import tyro
 from ico3d.common.device import DeviceName
 
 if TYPE_CHECKING:
-    import torch
-
+    from ico3d.avatar.avatar import TrainedAvatar
+    from ico3d.body.model_folder import TrainedBody
     from ico3d.capture.capture import Capture
 
 
@@ -60,41 +60,40 @@ class Evaluate:
             console.print(f"{name:16} {'not measured' if value is None else shown}")
 
     def _metrics(self, capture: "Capture") -> dict:
-        """Measures what the folder holds: a scene, a whole person, a body, else a head."""
-        from ico3d.avatar.avatar import ABOUT as AVATAR
-        from ico3d.body.model_folder import ABOUT as BODY
-        from ico3d.scene.model_folder import ABOUT as SCENE
-        from ico3d.splat.device import computing_device
-
-        device = computing_device(self.device)
-        if (self.model / SCENE).is_file():
-            from ico3d.measure.scene import evaluate_scene
-            from ico3d.scene.model_folder import TrainedScene
-
-            scene = TrainedScene.load(self.model).to(device)
-            return evaluate_scene(scene, capture, self.frames, self.images)
-        if (self.model / AVATAR).is_file() or (self.model / BODY).is_file():
-            return self._body(capture, (self.model / AVATAR).is_file(), device)
+        """Measures what the folder holds, whatever it is."""
+        from ico3d.avatar.avatar import TrainedAvatar
+        from ico3d.avatar.models import open_model
+        from ico3d.body.model_folder import TrainedBody
         from ico3d.head.model_folder import TrainedHead
         from ico3d.measure.head import evaluate_head
+        from ico3d.measure.scene import evaluate_scene
+        from ico3d.scene.model_folder import TrainedScene
+        from ico3d.splat.device import computing_device
 
-        head = TrainedHead.load(self.model).to(device)
-        frames = capture.split.test if self.frames == "test" else range(capture.num_frames)
-        return evaluate_head(head, capture, frames, self.images)
+        model = open_model(self.model, TrainedHead, TrainedBody, TrainedAvatar, TrainedScene)
+        model.to(computing_device(self.device))
+        if isinstance(model, TrainedScene):
+            return evaluate_scene(model, capture, self.frames, self.images)
+        if isinstance(model, TrainedHead):
+            frames = capture.split.test if self.frames == "test" else range(capture.num_frames)
+            return evaluate_head(model, capture, frames, self.images)
+        return self._body(model, capture)
 
-    def _body(self, capture: "Capture", with_head: bool, device: "torch.device") -> dict:
+    def _body(self, drawn: "TrainedBody | TrainedAvatar", capture: "Capture") -> dict:
+        """Measures a body, alone or with the head on it."""
         from dataclasses import replace
 
         from ico3d.avatar.avatar import BODY, TrainedAvatar
-        from ico3d.body.model_folder import ABOUT, UNTUNED, TrainedBody
+        from ico3d.body.model_folder import UNTUNED, TrainedBody
         from ico3d.measure.body import evaluate_body
         from ico3d.measure.methods.plots import plot_body
 
-        folder = self.model / BODY if with_head else self.model
-        body = TrainedBody.load(folder, UNTUNED if self.untuned else ABOUT).to(device)
-        drawn = body
-        if with_head:
-            drawn = replace(TrainedAvatar.load(self.model), body=body).to(device)
+        with_head = isinstance(drawn, TrainedAvatar)
+        body = drawn.body if with_head else drawn
+        if self.untuned:
+            folder = self.model / BODY if with_head else self.model
+            body = TrainedBody.load(folder, UNTUNED).to(body.device)
+            drawn = replace(drawn, body=body) if with_head else body
         cameras = range(len(capture.cameras)) if self.frames == "all" else None
         metrics = evaluate_body(body, capture, cameras, images=self.images, drawn=drawn)
         if self.plots is not None:

@@ -12,12 +12,13 @@ from torch import Tensor
 
 from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera
+from ico3d.common.psnr import psnr
 from ico3d.errors import CaptureError
 from ico3d.head.expressions import ExpressionTrack
 from ico3d.head.model_folder import TrainedHead
 from ico3d.head.views import GREY, Picture, PictureCache, View, staged, view_of
 from ico3d.measure.lips import LandmarkReader, landmark_reader, lip_correlation, lip_gap, lip_lag_ms
-from ico3d.measure.metrics import lmd, psnr, psnr_mouth
+from ico3d.measure.metrics import lmd, psnr_mouth
 from ico3d.measure.scores import Scores, add_picture, write_pictures
 from ico3d.measure.stopwatch import Stopwatch
 from ico3d.splat.render import render

@@ -1,8 +1,10 @@
-"""Picture metrics, with the one meaning they have everywhere (design, section 2)."""
+"""Picture metrics, each with one meaning everywhere (docs/architecture.md, "Metrics")."""
 
 from collections.abc import Sequence
 
 import numpy as np
+
+from ico3d.common.psnr import psnr
 
 MOUTH = slice(48, 68)
 """The mouth among the 68 landmarks."""
@@ -14,28 +16,6 @@ SPREAD = 3
 FEWEST_MOVING = 50
 """Moving pixels of the person below which a picture tells nothing about motion: a lone pixel
 spreads over 49."""
-
-
-def psnr(predicted: np.ndarray, truth: np.ndarray, mask: np.ndarray | None = None) -> float | None:
-    """Peak signal-to-noise ratio in dB, on the mask where one is given.
-
-    Args:
-        predicted: (H, W, 3) in [0, 1].
-        truth: (H, W, 3) in [0, 1].
-        mask: (H, W) weights in [0, 1].
-
-    Returns:
-        −10·log₁₀(Σ_mask err² / (3·Σ mask)), or None where the mask is empty.
-    """
-    squares = (predicted.astype(np.float64) - truth) ** 2  # (H, W, 3)
-    if mask is None:
-        error = squares.mean()
-    else:
-        weight = float(mask.sum(dtype=np.float64))
-        if weight == 0:
-            return None
-        error = (squares * mask[..., None]).sum() / (3 * weight)
-    return float(-10 * np.log10(max(error, 1e-12)))
 
 
 def moving_pixels(picture: np.ndarray, neighbours: Sequence[np.ndarray]) -> np.ndarray:

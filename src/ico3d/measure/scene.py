@@ -9,8 +9,8 @@ from rich.progress import track
 
 from ico3d.capture.capture import Capture
 from ico3d.capture.pictures import View
+from ico3d.common.psnr import psnr
 from ico3d.errors import CaptureError
-from ico3d.measure.metrics import psnr
 from ico3d.measure.scores import Scores, add_picture, write_pictures
 from ico3d.measure.stopwatch import Stopwatch
 from ico3d.scene.model_folder import TrainedScene

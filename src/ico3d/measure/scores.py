@@ -8,7 +8,7 @@ import torch
 from PIL import Image
 
 from ico3d.capture.pictures import View
-from ico3d.measure.metrics import psnr
+from ico3d.common.psnr import psnr
 from ico3d.splat.losses import ssim
 
 

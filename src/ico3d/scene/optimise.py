@@ -1,6 +1,5 @@
 """Optimising a static scene: one picture per step."""
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -22,7 +21,7 @@ from ico3d.splat.density import (
     Strategy,
     StrategyName,
 )
-from ico3d.splat.losses import photometric
+from ico3d.splat.losses import photometric, tensor_psnr
 from ico3d.splat.render import render
 from ico3d.splat.rendering import Rendering
 from ico3d.training.optimiser import Optimiser
@@ -80,7 +79,7 @@ class SceneTrainer:
         self._strategy.adapt(self._population, index, rate)
         return {
             "loss": loss.item(),
-            "psnr": _psnr(rendering, example),
+            "psnr": tensor_psnr(rendering.rgb[0], example.target, example.weight),
             "gaussians": len(self.scene),
         }
 
@@ -164,11 +163,3 @@ def density_control(
         prune_scale=PRUNE_ABOVE * extent,
     )
     return DefaultStrategy(schedule, thresholds, seed, settings.reset_every)
-
-
-def _psnr(rendering: Rendering, example: Example) -> float:
-    """PSNR over the pixels that count, for the progress bar."""
-    squares = (rendering.rgb.detach()[0] - example.target).square().mean(-1)  # (H, W)
-    weight = torch.ones_like(squares) if example.weight is None else example.weight
-    error = float((squares * weight).sum() / weight.sum().clamp_min(1))
-    return -10 * math.log10(max(error, 1e-12))

@@ -4,6 +4,7 @@ import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
 
+from ico3d.common.psnr import decibels
 from ico3d.splat.convention import SSIM_C1, SSIM_C2, SSIM_RADIUS, ssim_window
 
 
@@ -40,6 +41,20 @@ def ssim(rgb: Tensor, target: Tensor) -> Tensor:
 def photometric(rgb: Tensor, target: Tensor, ssim_weight: float = 0.2) -> Tensor:
     """(1 − λ)·L1 + λ·(1 − SSIM), λ = `ssim_weight`; arguments as for `ssim`."""
     return (1 - ssim_weight) * l1(rgb, target) + ssim_weight * (1 - ssim(rgb, target))
+
+
+def tensor_psnr(rgb: Tensor, target: Tensor, weight: Tensor | None = None) -> float:
+    """PSNR in dB of tensors where they are, for progress bars; files are measured by `psnr`.
+
+    Args:
+        rgb: (H, W, 3) in [0, 1].
+        target: (H, W, 3) in [0, 1].
+        weight: (H, W) in [0, 1]: which pixels count, and how much; all by default.
+    """
+    squares = (rgb.detach() - target).square().mean(-1)  # (H, W)
+    if weight is None:
+        return decibels(float(squares.mean()))
+    return decibels(float((squares * weight).sum() / weight.sum().clamp_min(1)))
 
 
 class _CpuSsim(torch.autograd.Function):

@@ -9,7 +9,6 @@ import pytest
 import torch
 
 from ico3d.avatar.baking import head_bundle, person_bundle
-from ico3d.avatar.baking.head_cost import psnr
 from ico3d.avatar.baking.persona import load_persona
 from ico3d.avatar.baking.shader_head import BakeSettings
 from ico3d.avatar.render_bundle import avatar_gaussians, baked_gaussians, visitor_camera
@@ -17,6 +16,7 @@ from ico3d.bundle.animation import Animation, Rest
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import Loss
 from ico3d.cli import main
+from ico3d.common.psnr import psnr
 from ico3d.errors import BundleError
 from ico3d.splat.render import render
 from support.avatars.filmed_person import NOISE, SIZE

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ico3d.avatar.film.camera_path import orbit, read_key_cameras, ring_around, ring_of, through
+from ico3d.avatar.camera_path import orbit, read_key_cameras, ring_around, ring_of, through
 from ico3d.avatar.film.command import Render
-from ico3d.avatar.film.film import back_and_forth, extent, pictures
+from ico3d.avatar.film.film import pictures
 from ico3d.avatar.film.video import write_video
+from ico3d.avatar.moving import back_and_forth, extent
 from ico3d.common.camera import look_at
 from ico3d.errors import CaptureError, ModelError, SettingsError
 from support.bodies.moving_capture import MovingCapture
@@ -212,5 +213,5 @@ def test_settings_that_make_no_sense_are_refused(tmp_path, capture, arguments):
 
 
 def test_what_is_no_body_is_named(tmp_path):
-    with pytest.raises(ModelError, match="holds no body"):
+    with pytest.raises(ModelError, match=r"no model .* a whole person .* a body .* or a bundle"):
         Render(tmp_path, tmp_path / "out.mp4").run()

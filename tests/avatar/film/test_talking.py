@@ -10,6 +10,7 @@ import pytest
 import soundfile
 import torch
 
+from ico3d.avatar.baking.person_bundle import animation_of
 from ico3d.avatar.film.actor import avatar_actor, bundle_actor
 from ico3d.avatar.film.command import Render
 from ico3d.avatar.film.film import pictures
@@ -135,7 +136,7 @@ def test_a_film_of_a_bundle_is_as_long_as_its_sound(bundles, tmp_path, name):
 
 def test_a_film_of_the_exact_person(tmp_path):
     avatar = write_whole_person(tmp_path / "avatar")
-    actor = avatar_actor(tmp_path / "avatar", None)
+    actor = avatar_actor(avatar, animation_of(tmp_path / "avatar", avatar), None)
     assert actor.seconds == avatar.seconds and len(actor.idle) == 39
     low = avatar.gaussians(0.0).means.min(0).values.numpy()
     assert actor.view.eye[2] > 1 and low[1] < actor.view.target[1] < 1.7

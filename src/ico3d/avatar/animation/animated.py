@@ -9,13 +9,10 @@ import numpy as np
 import torch
 
 from ico3d.avatar.animation.keyframes import read_animation
-from ico3d.avatar.avatar import ABOUT as AVATAR
 from ico3d.avatar.avatar import TrainedAvatar
-from ico3d.avatar.baking.person_bundle import front_of
-from ico3d.avatar.baking.shader_body import MovingBody
+from ico3d.avatar.models import open_model
+from ico3d.avatar.moving import MovingBody, Span
 from ico3d.avatar.render_bundle import avatar_gaussians, body_gaussians, window_gaussians
-from ico3d.avatar.spans import Span
-from ico3d.body.model_folder import ABOUT as BODY
 from ico3d.body.model_folder import TrainedBody
 from ico3d.bundle.animation import Animation
 from ico3d.bundle.format import Bundle
@@ -78,7 +75,7 @@ class TrainedPerson:
     @property
     def facing(self) -> np.ndarray | None:
         """Where the face looks, if there is one."""
-        return self.avatar and front_of(self.avatar)
+        return self.avatar and self.avatar.placement.facing
 
     @property
     def has_head(self) -> bool:
@@ -154,18 +151,18 @@ def open_person(path: Path, device: torch.device) -> Person:
     """Opens a model folder or a bundle.
 
     Args:
-        path: See there.
+        path: A folder of ico3d train body or ico3d assemble, or a bundle.
         device: Where its Gaussians shall be.
 
     Raises:
-        ModelError: If a folder holds a damaged model.
-        BundleError: If it is none, and no bundle with a body either; or if there is an animation
-            that makes no sense, or is for another body.
+        ModelError: If it is none of them, or holds a damaged model.
+        BundleError: If the bundle is damaged or has no body, or if there is an animation that makes
+            no sense, or is for another body.
     """
-    if (path / AVATAR).is_file():
-        avatar = TrainedAvatar.load(path).to(device)
-        return TrainedPerson(avatar.body, avatar, read_animation(path, avatar.body))
-    if (path / BODY).is_file():
-        body = TrainedBody.load(path).to(device)
-        return TrainedPerson(body, None, read_animation(path, body))
-    return BakedPerson(Bundle.open(path), device)
+    model = open_model(path, TrainedAvatar, TrainedBody, Bundle)
+    if isinstance(model, Bundle):
+        return BakedPerson(model, device)
+    model.to(device)
+    if isinstance(model, TrainedAvatar):
+        return TrainedPerson(model.body, model, read_animation(path, model.body))
+    return TrainedPerson(model, None, read_animation(path, model))

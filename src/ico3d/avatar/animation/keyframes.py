@@ -15,7 +15,7 @@ import torch
 from scipy.signal import find_peaks
 from scipy.spatial import KDTree
 
-from ico3d.avatar.baking.shader_body import MovingBody
+from ico3d.avatar.moving import MovingBody
 from ico3d.bundle.animation import ANIMATION, Action, Animation, Rest
 from ico3d.errors import BundleError
 

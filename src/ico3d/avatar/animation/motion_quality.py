@@ -12,10 +12,11 @@ import numpy as np
 from scipy.ndimage import uniform_filter
 
 from ico3d.avatar.animation.keyframes import longest_run
-from ico3d.avatar.baking.body_cost import At, View, drawn, measuring_cameras, recorded_view
-from ico3d.avatar.spans import Span
+from ico3d.avatar.clip_views import At, View, drawn, measuring_cameras, recorded_view
+from ico3d.avatar.moving import Span
 from ico3d.bundle.animation import Action, Animation, Rest
 from ico3d.capture.capture import Capture
+from ico3d.common.psnr import decibels
 from ico3d.common.spread import spread
 from ico3d.errors import BundleError, CaptureError
 
@@ -170,4 +171,4 @@ def _worst_part(whole: At, body: At | None, view: View) -> float:
     parts = weights > COVERED
     if not parts.any():
         return np.nan
-    return float(-10 * np.log10(max((errors[parts] / weights[parts]).max(), 1e-10)))
+    return decibels(float((errors[parts] / weights[parts]).max()))

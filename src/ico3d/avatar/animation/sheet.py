@@ -11,8 +11,8 @@ from rich.progress import track
 from ico3d.avatar.animation.animated import Person
 from ico3d.avatar.animation.keyframes import Motion
 from ico3d.avatar.animation.motion_quality import least_quality
-from ico3d.avatar.film.camera_path import Ring, orbit, ring_around, ring_of
-from ico3d.avatar.film.film import extent
+from ico3d.avatar.camera_path import Ring, orbit, ring_around, ring_of
+from ico3d.avatar.moving import extent
 from ico3d.avatar.staging import NEUTRAL
 from ico3d.bundle.animation import Action, Animation
 from ico3d.common.camera import Camera

@@ -13,11 +13,12 @@ from ico3d.avatar.baking.body_cost import (
     comparison_line,
     measure_window,
     probe_views,
-    recorded_views,
     ring_of_cameras,
     window_pair,
 )
-from ico3d.avatar.baking.shader_body import SAMPLES_PER_FRAME, MovingBody, Shape, WindowBaker
+from ico3d.avatar.baking.shader_body import SAMPLES_PER_FRAME, Shape, WindowBaker
+from ico3d.avatar.clip_views import recorded_views
+from ico3d.avatar.moving import MovingBody
 from ico3d.avatar.render_bundle import window_gaussians
 from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.format import LICENSES, THUMBNAIL, write_bundle

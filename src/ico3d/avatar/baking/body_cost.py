@@ -1,91 +1,34 @@
 """What baking costs a body: exact and baked windows beside each other and the recording."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 import torch
 
-from ico3d.avatar.baking.head_cost import psnr
-from ico3d.avatar.baking.shader_body import SAMPLES_PER_FRAME, MovingBody
+from ico3d.avatar.baking.head_cost import mean_of
+from ico3d.avatar.baking.shader_body import SAMPLES_PER_FRAME
+from ico3d.avatar.clip_views import VIEWS, At, View, drawn
+from ico3d.avatar.moving import MovingBody, Span
 from ico3d.avatar.render_bundle import window_gaussians
-from ico3d.avatar.spans import Span
 from ico3d.avatar.staging import NEUTRAL
 from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.manifest import Loss
-from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera, look_at
+from ico3d.common.psnr import psnr
+from ico3d.common.spread import spread
 from ico3d.splat.gaussians import Gaussians, cat
-from ico3d.splat.render import render
 
-At = Callable[[float], Gaussians]
-"""Somebody in the world at τ in [0, 1] of a span of time."""
 HeadAt = Callable[[float], Gaussians]
 """The head on a body, in the world, at a frame."""
-VIEWS = 24
-"""Pictures per window that baking is measured with."""
 _PROBE_SIZE, _PROBE_FOV = 256, 40.0
-
-
-@dataclass(frozen=True)
-class View:
-    """A camera at a time of a window; picture and mask where they were recorded.
-
-    Attributes:
-        camera: In the world.
-        tau: In [0, 1].
-        background: (3,) or (H, W, 3).
-        truth: (H, W, 3), or None.
-        mask: (H, W) the person, or None.
-    """
-
-    camera: Camera
-    tau: float
-    background: torch.Tensor
-    truth: np.ndarray | None = None
-    mask: np.ndarray | None = None
-
-
-def recorded_views(capture: Capture, span: Span, count: int = VIEWS) -> Iterator[View]:
-    """Pictures of the test cameras, or of all where none tests, spread over a window.
-
-    One at a time: large recordings do not fit into memory. Where the capture lacks a clean
-    background, the person is cut out over a neutral colour.
-    """
-    frames, cameras = range(span.first, span.last + 1), measuring_cameras(capture)
-    pairs = [(camera, frame) for frame in frames for camera in cameras]
-    for number in np.unique(np.linspace(0, len(pairs) - 1, count).astype(int)):
-        view = recorded_view(capture, *pairs[number], span=span)
-        if view is not None:
-            yield view
-
-
-def measuring_cameras(capture: Capture) -> tuple[int, ...]:
-    """The test cameras, or all where none tests."""
-    return capture.split.test_cameras or tuple(range(len(capture.cameras)))
-
-
-def recorded_view(capture: Capture, camera: int, frame: int, span: Span) -> View | None:
-    """One recorded picture; None where there is none, or nobody in it."""
-    truth, mask = capture.image(camera, frame), capture.mask(camera, frame)
-    if truth is None or (mask is not None and not mask.any()):
-        return None
-    behind = capture.background(camera)
-    if behind is None:
-        behind = np.array(NEUTRAL, np.float32)
-        if mask is not None:
-            truth = truth * mask[..., None] + behind * (1 - mask[..., None])
-    tau = (frame - span.first) / (span.last - span.first)
-    return View(capture.cameras[camera], tau, torch.from_numpy(behind), truth, mask)
 
 
 def probe_views(cameras: Sequence[Camera], span: Span, count: int = VIEWS) -> list[View]:
     """Times between the sampled ones, seen from these cameras in turn."""
     intervals = SAMPLES_PER_FRAME * (span.last - span.first)
-    chosen = np.unique(np.linspace(0, intervals - 1, count).astype(int))
     return [
         View(cameras[i % len(cameras)], (interval + 0.5) / intervals, torch.tensor(NEUTRAL))
-        for i, interval in enumerate(chosen)
+        for i, interval in enumerate(spread(intervals, count))
     ]
 
 
@@ -145,21 +88,10 @@ def measure(exact: At, baked: At, recorded: Iterable[View], probes: Iterable[Vie
         model, alpha = drawn(exact, view)
         if alpha.any():
             likeness.append(psnr(drawn(baked, view)[0], model, alpha))
-    return Loss(_mean(exact_psnr), _mean(baked_psnr), _mean(likeness))
+    return Loss(mean_of(exact_psnr), mean_of(baked_psnr), mean_of(likeness))
 
 
 def comparison_line(exact: At, baked: At, view: View) -> np.ndarray:
     """[recorded |] exact | baked of one view, side by side: (H, W·3 or W·2, 3) float32."""
     pictures = [drawn(model, view)[0] for model in (exact, baked)]
     return np.hstack(pictures if view.truth is None else [view.truth, *pictures])
-
-
-def drawn(person: At, view: View) -> tuple[np.ndarray, np.ndarray]:
-    """What a view shows of somebody: (H, W, 3) and alpha (H, W)."""
-    with torch.no_grad():
-        rendered = render(person(view.tau), [view.camera], view.background)
-    return rendered.rgb[0].cpu().numpy(), rendered.alpha[0].cpu().numpy()
-
-
-def _mean(values: list[float]) -> float | None:
-    return round(float(np.mean(values)), 4) if values else None

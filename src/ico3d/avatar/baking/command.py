@@ -14,12 +14,16 @@ if TYPE_CHECKING:
 
     import torch
 
+    from ico3d.avatar.avatar import TrainedAvatar
     from ico3d.avatar.baking.body_bundle import WindowResult
+    from ico3d.body.model_folder import TrainedBody
     from ico3d.bundle.animation import Animation
     from ico3d.bundle.manifest import Persona
     from ico3d.capture.capture import Capture
+    from ico3d.head.model_folder import TrainedHead
 
-FILES = "[CAPTURE ...] OUT"
+Report = Callable[[str], None]
+"""Tells people how it goes."""
 
 
 @dataclass(frozen=True)
@@ -63,25 +67,34 @@ class Bake:
 
         Raises:
             BundleError: If the loss breaks a bound and `force` is not set.
+            ModelError: If the folder holds nothing that can be baked.
             SettingsError: If what was given does not fit the model.
         """
         from rich.console import Console
 
-        from ico3d.avatar.avatar import ABOUT as AVATAR
-        from ico3d.body.model_folder import ABOUT as BODY
+        from ico3d.avatar.avatar import TrainedAvatar
+        from ico3d.avatar.models import open_model
+        from ico3d.body.model_folder import TrainedBody
         from ico3d.bundle.format import Bundle, add_files, read_background
+        from ico3d.head.model_folder import TrainedHead
 
         console = Console()
-        is_whole, is_body = ((self.model / about).is_file() for about in (AVATAR, BODY))
-        least, most = (1, 3) if is_whole else (1, 2) if is_body else (2, 2)
+        model = open_model(self.model, TrainedHead, TrainedBody, TrainedAvatar)
+        by_kind = {TrainedHead: (2, 2), TrainedBody: (1, 2), TrainedAvatar: (1, 3)}
+        least, most = by_kind[type(model)]
         if not least <= len(self.files) <= most:
             self._refuse(
                 "ico3d bake needs HEAD CAPTURE OUT, BODY [CAPTURE] OUT, or "
                 "AVATAR [HEAD_CAPTURE [BODY_CAPTURE]] OUT."
             )
-        bake = self._bake_whole if is_whole else self._bake_body if is_body else self._bake_head
         behind = read_background(self.background) if self.background else {}
-        bake(console.print)
+        model.to(self._place)
+        if isinstance(model, TrainedAvatar):
+            self._bake_whole(model, console.print)
+        elif isinstance(model, TrainedBody):
+            self._bake_body(model, console.print)
+        else:
+            self._bake_head(model, console.print)
         if behind:
             add_files(self._out, behind)
         Bundle.open(self._out)
@@ -97,18 +110,16 @@ class Bake:
 
         return computing_device(self.device)
 
-    def _bake_head(self, report) -> None:
+    def _bake_head(self, head: "TrainedHead", report: Report) -> None:
         from ico3d.avatar import staging
         from ico3d.avatar.baking import head_bundle, head_cost
         from ico3d.avatar.baking.persona import load_persona
         from ico3d.avatar.baking.samples import recorded_samples
         from ico3d.capture.formats import open_capture
-        from ico3d.head.model_folder import TrainedHead
 
         self._check_rank()
         persona, notices = load_persona(self.persona), self._notices()
-        head, capture = TrainedHead.load(self.model), open_capture(self.files[0])
-        head.to(self._place)
+        capture = open_capture(self.files[0])
         neutral = staging.background_colour(capture, 0)
         views = head_cost.references(head, capture, neutral, head_bundle.MEASURED_VIEWS)
         samples = recorded_samples(head, capture)
@@ -120,14 +131,13 @@ class Bake:
         name = self.name or persona.name
         head_bundle.write(self._out, name, result, samples, head, capture, persona, notices)
 
-    def _bake_body(self, report) -> None:
+    def _bake_body(self, body: "TrainedBody", report: Report) -> None:
         from ico3d.avatar.baking import body_bundle
-        from ico3d.body.model_folder import TrainedBody
 
         if self.rank is not None:
             self._refuse("--rank is for heads: what a body keeps is chosen window by window.")
         persona, notices = self._body_persona(), self._notices()
-        body, capture = TrainedBody.load(self.model).to(self._place), self._capture(0)
+        capture = self._capture(0)
         results = _watched(body_bundle.bake(body, capture), len(body.windows), report)
         if self.strip:
             _save_picture(body_bundle.strip(body, results, capture), self.strip)
@@ -135,14 +145,12 @@ class Bake:
             body_bundle.check(results)
         body_bundle.write(self._out, persona, results, body, capture, notices)
 
-    def _bake_whole(self, report) -> None:
-        from ico3d.avatar.avatar import TrainedAvatar
+    def _bake_whole(self, avatar: "TrainedAvatar", report: Report) -> None:
         from ico3d.avatar.baking import body_bundle, head_bundle, head_cost, person_bundle
         from ico3d.avatar.baking.persona import load_persona
 
         self._check_rank()
         persona, notices = load_persona(self.persona), self._notices()
-        avatar = TrainedAvatar.load(self.model).to(self._place)
         animation = person_bundle.animation_of(self.model, avatar)
         head_capture, body_capture = self._capture(0), self._capture(1)
         samples, views = person_bundle.head_samples(avatar, head_capture, persona)
@@ -198,7 +206,7 @@ class Bake:
         raise SettingsError(sentence)
 
 
-def _played(animation: "Animation", report: Callable[[str], None]) -> "Animation":
+def _played(animation: "Animation", report: Report) -> "Animation":
     """Leaves out motion that looks far worse than the rest of the clip."""
     from ico3d.avatar.animation import motion_quality
 
@@ -211,9 +219,7 @@ def _played(animation: "Animation", report: Callable[[str], None]) -> "Animation
     return played
 
 
-def _watched(
-    windows: "Iterator[WindowResult]", count: int, report: Callable[[str], None]
-) -> "list[WindowResult]":
+def _watched(windows: "Iterator[WindowResult]", count: int, report: Report) -> "list[WindowResult]":
     """Bakes all windows while the progress is shown."""
     from rich.progress import track
 

@@ -11,6 +11,8 @@ from ico3d.bundle.head import BakedHead
 from ico3d.bundle.manifest import Loss
 from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera
+from ico3d.common.psnr import psnr
+from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.head.views import PictureCache, View, staged
@@ -59,16 +61,14 @@ def references(
     """
     pictures, track = PictureCache(capture, 0.0), head.track(capture)
     frames = capture.split.test
-    chosen = (
-        {frames[i] for i in np.linspace(0, len(frames) - 1, count).astype(int)} if frames else {}
-    )
-    views = pictures.views(sorted(chosen))[: 4 * count]
+    chosen = [frames[i] for i in spread(len(frames), count)]
+    views = pictures.views(chosen)[: 4 * count]
     if not views:
         raise CaptureError(f"{capture.path}: no test frame has a picture to measure baking with.")
-    spread = np.unique(np.linspace(0, len(views) - 1, count).astype(int))
     with torch.no_grad():
         return [
-            _reference(head, pictures, views[i], track.at(views[i].frame), neutral) for i in spread
+            _reference(head, pictures, view, track.at(view.frame), neutral)
+            for view in (views[i] for i in spread(len(views), count))
         ]
 
 
@@ -77,9 +77,9 @@ def measure(head: BakedHead, views: list[Reference]) -> Loss:
     baked = [baked_picture(head, view) for view in views]
     pairs = list(zip(baked, views, strict=True))
     return Loss(
-        psnr_exact=_mean(psnr(v.exact, v.truth) for v in views if v.truth is not None),
-        psnr_baked=_mean(psnr(b, v.truth) for b, v in pairs if v.truth is not None),
-        psnr_baked_vs_exact=_mean(psnr(b, v.exact) for b, v in pairs),
+        psnr_exact=mean_of(psnr(v.exact, v.truth) for v in views if v.truth is not None),
+        psnr_baked=mean_of(psnr(b, v.truth) for b, v in pairs if v.truth is not None),
+        psnr_baked_vs_exact=mean_of(psnr(b, v.exact) for b, v in pairs),
     )
 
 
@@ -90,7 +90,7 @@ def drop(loss: Loss) -> float | None:
 
 
 def acceptable(loss: Loss) -> bool:
-    """Whether a measured loss is within the design's bounds."""
+    """Whether a measured loss is within `MAX_DROP` and `MIN_LIKENESS`."""
     return (drop(loss) or 0.0) <= MAX_DROP and (loss.psnr_baked_vs_exact or 0.0) >= MIN_LIKENESS
 
 
@@ -107,7 +107,7 @@ def in_words(loss: Loss) -> str:
 
 def strip(head: BakedHead, views: list[Reference], rows: int = 4) -> np.ndarray:
     """[Truth |] exact | baked of some views, one below the other: (rows·H, 3·W or 2·W, 3) uint8."""
-    chosen = [views[i] for i in np.unique(np.linspace(0, len(views) - 1, rows).astype(int))]
+    chosen = [views[i] for i in spread(len(views), rows)]
     lines = []
     for view in chosen:
         pictures = [view.exact, baked_picture(head, view)]
@@ -118,19 +118,6 @@ def strip(head: BakedHead, views: list[Reference], rows: int = 4) -> np.ndarray:
 def baked_picture(head: BakedHead, view: Reference) -> np.ndarray:
     """The baked head where the reference is: (H, W, 3) float32."""
     return _picture(baked_gaussians(head, view.expression), view.camera, view.background)
-
-
-def psnr(a: np.ndarray, b: np.ndarray, mask: np.ndarray | None = None) -> float:
-    """Peak signal-to-noise ratio in dB of two pictures in [0, 1], at most 100.
-
-    Args:
-        a: (H, W, 3).
-        b: (H, W, 3).
-        mask: (H, W) weights of the pixels, not all 0.
-    """
-    squares = np.square(a.astype(np.float64) - b.astype(np.float64)).mean(axis=2)  # (H, W)
-    error = np.average(squares, weights=mask)
-    return float(-10 * np.log10(max(error, 1e-10)))
 
 
 def _reference(
@@ -167,7 +154,7 @@ def _picture(gaussians: Gaussians, camera: Camera, background: torch.Tensor) -> 
     return drawn.rgb[0].cpu().numpy()  # (H, W, 3)
 
 
-def _mean(values: Iterable[float]) -> float | None:
-    """None without any."""
-    found = list(values)
+def mean_of(values: Iterable[float | None]) -> float | None:
+    """The mean of the values that are there; None where there is none."""
+    found = [value for value in values if value is not None]
     return round(float(np.mean(found)), 4) if found else None

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from ico3d.avatar import staging
+from ico3d.avatar import clip_views, staging
 from ico3d.avatar.animation import motion_quality
 from ico3d.avatar.animation.keyframes import Motion, find_animation, read_animation
 from ico3d.avatar.avatar import TrainedAvatar
@@ -36,8 +36,6 @@ VIEWS = 40
 MAX_DROP = head_cost.MAX_DROP
 """dB that it may lose on the person, against ground truth."""
 _STRIP_ROWS = 4
-_FACING = np.array([0.0, 0.0, 1.0])
-"""Where the face looks in the space of the head's model."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +136,7 @@ def moved_head(head: BakedHead, a_from_b: np.ndarray) -> BakedHead:
 def measure(avatar: TrainedAvatar, person: BakedAvatar, capture: Capture | None) -> Loss:
     """Mean PSNR on the whole person, through all of the clip."""
     span = _span(avatar)
-    recorded = body_cost.recorded_views(capture, span, VIEWS) if capture else []
+    recorded = clip_views.recorded_views(capture, span, VIEWS) if capture else []
     return body_cost.measure(*_pair(avatar, person), recorded, _probes(avatar, person, VIEWS))
 
 
@@ -159,7 +157,7 @@ def strip(avatar: TrainedAvatar, person: BakedAvatar, capture: Capture | None) -
     """[recorded |] exact | baked through the clip, one below the other: uint8."""
     views = _probes(avatar, person, _STRIP_ROWS)
     if capture is not None:
-        views = body_cost.recorded_views(capture, _span(avatar), _STRIP_ROWS)
+        views = clip_views.recorded_views(capture, _span(avatar), _STRIP_ROWS)
     lines = [body_cost.comparison_line(*_pair(avatar, person), view) for view in views]
     return (np.vstack(lines).clip(0, 1) * 255 + 0.5).astype(np.uint8)
 
@@ -260,20 +258,14 @@ def standing_camera(
     avatar: TrainedAvatar, person: BakedAvatar, capture: Capture | None
 ) -> CameraInfo:
     """In front of the person, so far away that all of it is seen."""
-    return body_bundle.standing_camera(*_box(person), capture, front_of(avatar))
-
-
-def front_of(avatar: TrainedAvatar) -> np.ndarray:
-    """(3,) where the face looks, on average."""
-    turns = avatar.placement.world_from_canonical[:, :3, :3]  # (F, 3, 3)
-    return turns.mean(axis=0) @ avatar.placement.canonical_from_head[:3, :3] @ _FACING
+    return body_bundle.standing_camera(*_box(person), capture, avatar.placement.facing)
 
 
 def _span(avatar: TrainedAvatar) -> Window:
     return Window(0, avatar.body.windows[-1].last)
 
 
-def _pair(avatar: TrainedAvatar, person: BakedAvatar) -> tuple[body_cost.At, body_cost.At]:
+def _pair(avatar: TrainedAvatar, person: BakedAvatar) -> tuple[clip_views.At, clip_views.At]:
     """The exact and the baked person at τ of the whole clip, with the recorded expression."""
     length, device = avatar.seconds, avatar.body.device
     return (
@@ -282,7 +274,7 @@ def _pair(avatar: TrainedAvatar, person: BakedAvatar) -> tuple[body_cost.At, bod
     )
 
 
-def _probes(avatar: TrainedAvatar, person: BakedAvatar, count: int) -> list[body_cost.View]:
+def _probes(avatar: TrainedAvatar, person: BakedAvatar, count: int) -> list[clip_views.View]:
     ring = body_cost.ring_of_cameras(*_box(person))
     return body_cost.probe_views(ring, _span(avatar), count)
 

@@ -1,15 +1,13 @@
-"""Baking: the exact moving body → windows that a shader blends (design section 3)."""
+"""Baking: the exact moving body → windows that a shader blends (docs/bundle.md)."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import torch
 
 from ico3d.avatar.baking.motion_clusters import Channel, components, group
 from ico3d.avatar.baking.shader_head import LEAST_ALPHA
-from ico3d.avatar.spans import Span
+from ico3d.avatar.moving import MovingBody
 from ico3d.bundle.body import QUAT_UNIT, BakedWindow
 from ico3d.errors import BundleError
 from ico3d.splat.gaussians import Gaussians
@@ -21,27 +19,6 @@ _MOST_FADING = 0.02
 """How much an opacity may change within a window, which has but one; more would be seen."""
 GAUSSIANS_PER_CLUSTER = 140
 """At least, on average: each cluster's curves take their room, too."""
-
-
-class MovingBody(Protocol):
-    """What is baked: `ico3d.body.model_folder.TrainedBody`, or anything that moves like it.
-
-    Attributes:
-        fps: Frames per second.
-        summary: How it was made; `capture` is the provenance of its recording.
-    """
-
-    fps: float
-    summary: dict
-
-    @property
-    def windows(self) -> Sequence[Span]:
-        """Spans of time with Gaussians of their own; neighbours share one frame."""
-        ...
-
-    def window_gaussians(self, index: int, tau: float) -> Gaussians:
-        """The Gaussians of a window at τ in [0, 1], with `colors`; always equally many."""
-        ...
 
 
 @dataclass(frozen=True)

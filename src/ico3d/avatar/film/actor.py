@@ -2,17 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-import torch
 
 from ico3d.avatar import staging
 from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.baking import body_bundle, head_bundle
-from ico3d.avatar.baking.person_bundle import animation_of, front_of
 from ico3d.avatar.baking.samples import lips_of
-from ico3d.avatar.film.film import MOMENTS, back_and_forth, extent
+from ico3d.avatar.moving import MOMENTS, back_and_forth, extent
 from ico3d.avatar.render_bundle import (
     BakedAvatar,
     backdrop_gaussians,
@@ -26,7 +23,6 @@ from ico3d.bundle.manifest import CameraInfo
 from ico3d.capture.capture import Capture
 from ico3d.common.expression import SPEECH_SIZE
 from ico3d.speech.runtime import open_speech
-from ico3d.splat.device import CPU
 from ico3d.splat.gaussians import Gaussians
 
 Draw = Callable[[float, np.ndarray], Gaussians]
@@ -116,18 +112,17 @@ def _swaying_head(bundle: Bundle) -> tuple[Draw, float]:
     return draw, seconds
 
 
-def avatar_actor(folder: Path, capture: Capture | None, device: torch.device = CPU) -> Actor:
-    """The exact person of a folder that `ico3d assemble` wrote.
+def avatar_actor(avatar: TrainedAvatar, animation: Animation, capture: Capture | None) -> Actor:
+    """The exact person that `ico3d assemble` made.
 
     Args:
-        folder: See there.
-        capture: The body's recording says which way is up; y is where there is none.
-        device: Where the person shall be.
+        avatar: Who is filmed, on the device where it is drawn.
+        animation: How the body moves while it talks.
+        capture: The body's recording, which says which way is up; without one, y is.
     """
-    avatar = TrainedAvatar.load(folder).to(device)
     points = extent(avatar)
     low, high = points.min(0), points.max(0)
-    view = body_bundle.standing_camera(low, high, capture, front_of(avatar))
+    view = body_bundle.standing_camera(low, high, capture, avatar.placement.facing)
     moments = np.linspace(0, avatar.seconds, MOMENTS)
     face = [avatar.head_gaussians(float(moment)).means.cpu().numpy() for moment in moments]
     background = staging.background_colour(capture, 0) if capture else staging.NEUTRAL
@@ -142,7 +137,7 @@ def avatar_actor(folder: Path, capture: Capture | None, device: torch.device = C
         head_bundle.idle_expression(head, avatar.expressions),
         SPEECH_SIZE if driven else None,
         (lambda samples, rate: lips_of(head, samples, rate)) if driven else None,
-        animation_of(folder, avatar),
+        animation,
     )
 
 

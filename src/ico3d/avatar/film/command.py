@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import torch
 
     from ico3d.avatar.film.actor import Actor
-    from ico3d.avatar.film.film import Moving
+    from ico3d.avatar.moving import Moving
     from ico3d.capture.capture import Capture, Sound
     from ico3d.common.camera import Camera
 
@@ -67,7 +67,7 @@ class Render:
 
         Raises:
             SettingsError: If the settings make no sense.
-            ModelError: If the folder holds nobody who can be filmed.
+            ModelError: If there is nobody who can be filmed.
             BundleError: If the bundle fails a check.
             CaptureError: If the sound cannot be read.
         """
@@ -131,24 +131,27 @@ class Render:
         self, sound: "Sound | None", device: "torch.device"
     ) -> tuple["Moving", "Actor | None"]:
         """Who is filmed, and, but for bodies of their own, how they talk and where they stand."""
-        from ico3d.avatar.avatar import ABOUT as AVATAR
+        from ico3d.avatar.avatar import TrainedAvatar
+        from ico3d.avatar.baking.person_bundle import animation_of
         from ico3d.avatar.film import actor, performance
-        from ico3d.body.model_folder import ABOUT as BODY
+        from ico3d.avatar.models import open_model
         from ico3d.body.model_folder import TrainedBody
         from ico3d.bundle.format import Bundle
-        from ico3d.bundle.manifest import MANIFEST
-        from ico3d.bundle.packaged import bundle_path
         from ico3d.errors import SettingsError
 
-        path = bundle_path(self.model)
-        if path.is_dir() and (path / AVATAR).is_file():
-            found = actor.avatar_actor(path, self._opened_capture(), device)
-        elif path.is_dir() and not (path / MANIFEST).is_file():
-            if sound is not None and (path / BODY).is_file():
-                raise SettingsError(f"{path} is a body alone, which does not talk: no --audio.")
-            return TrainedBody.load(path).to(device), None
+        model = open_model(self.model, TrainedAvatar, TrainedBody, Bundle)
+        if isinstance(model, TrainedBody):
+            if sound is not None:
+                raise SettingsError(
+                    f"{self.model} is a body alone, which does not talk: no --audio."
+                )
+            return model.to(device), None
+        if isinstance(model, TrainedAvatar):
+            model.to(device)
+            animation = animation_of(self.model, model)
+            found = actor.avatar_actor(model, animation, self._opened_capture())
         else:
-            found = actor.bundle_actor(Bundle.open(path))
+            found = actor.bundle_actor(model)
         if sound is not None:
             return performance.speech(found, sound, self.seed), found
         return performance.motion(found, self.seconds, self.seed), found
@@ -160,8 +163,8 @@ class Render:
 
     def _cameras(self, person: "Moving", actor: "Actor | None", count: int) -> list["Camera"]:
         """One for each picture."""
-        from ico3d.avatar.film import camera_path
-        from ico3d.avatar.film.film import extent
+        from ico3d.avatar import camera_path
+        from ico3d.avatar.moving import extent
         from ico3d.avatar.render_bundle import visitor_camera
         from ico3d.errors import SettingsError
 

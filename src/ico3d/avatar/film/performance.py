@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ico3d.avatar.film.actor import Actor
-from ico3d.avatar.film.film import back_and_forth
+from ico3d.avatar.moving import back_and_forth
 from ico3d.bundle.planner import Start, plan
 from ico3d.capture.capture import Sound
 from ico3d.common.expression import expression_rows

@@ -13,6 +13,7 @@ from ico3d.avatar.joining.face_views import FaceView
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.similarity import moved
 from ico3d.common.camera import Camera, look_at
+from ico3d.common.psnr import decibels
 from ico3d.errors import CaptureError
 from ico3d.splat.density import contributions
 from ico3d.splat.gaussians import Gaussians, cat
@@ -116,8 +117,8 @@ def seam_scores(avatar: TrainedAvatar, views: Sequence[FaceView]) -> SeamScores:
     if not found:
         raise CaptureError("no picture shows the border between head and body.")
     errors = np.mean([scores[:2] for scores in found], axis=0)  # (2,)
-    face, border = -10 * np.log10(np.maximum(errors, 1e-10))
-    return SeamScores(float(face), float(border), float(np.mean([s[2] for s in found])))
+    face, border = (decibels(float(error)) for error in errors)
+    return SeamScores(face, border, float(np.mean([s[2] for s in found])))
 
 
 @torch.no_grad()

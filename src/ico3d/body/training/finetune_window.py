@@ -11,12 +11,11 @@ from ico3d.body.motion.window_model import CANONICAL, WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings
 from ico3d.body.training.novel_views import novel_camera
-from ico3d.body.training.optimise_window import masked_psnr
 from ico3d.body.training.picture_step import Learner
 from ico3d.body.training.views import MARGIN, BodyViews
 from ico3d.common.camera import Camera
 from ico3d.splat.gaussians import Gaussians
-from ico3d.splat.losses import l1
+from ico3d.splat.losses import l1, tensor_psnr
 from ico3d.splat.render import render
 
 STILL_SEEN = 0.05
@@ -127,7 +126,10 @@ class FineTuner:
         rendering = learner.draw(self.model.at(learner.tau(view)), view, example)
         loss = learner.loss(rendering, example)
         loss.backward()
-        return {"loss": loss.item(), "psnr": masked_psnr(rendering, example)}
+        return {
+            "loss": loss.item(),
+            "psnr": tensor_psnr(rendering.rgb[0], example.target, example.mask),
+        }
 
 
 def around(camera: Camera, person: Gaussians) -> Camera:

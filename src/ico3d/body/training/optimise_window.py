@@ -1,6 +1,5 @@
 """Optimising one window: one picture per step (paper, dynamic 3D body Gaussians)."""
 
-import math
 from collections.abc import Mapping
 
 import torch
@@ -14,8 +13,8 @@ from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings, Method
 from ico3d.body.training.density import density_control
 from ico3d.body.training.picture_step import Learner
-from ico3d.body.training.views import BodyViews, Example
-from ico3d.splat.rendering import Rendering
+from ico3d.body.training.views import BodyViews
+from ico3d.splat.losses import tensor_psnr
 
 
 class BodyTrainer:
@@ -66,7 +65,7 @@ class BodyTrainer:
         learner.prune(index, self._steps)
         return {
             "loss": loss.item(),
-            "psnr": masked_psnr(rendering, example),
+            "psnr": tensor_psnr(rendering.rgb[0], example.target, example.mask),
             "gaussians": len(self.model),
         }
 
@@ -104,10 +103,3 @@ class BodyTrainer:
         if settings.stillness_weight and planes:
             total = total + settings.stillness_weight * time_change(planes)
         return total
-
-
-def masked_psnr(rendering: Rendering, example: Example) -> float:
-    """PSNR on the person, for the progress bar."""
-    squares = (rendering.rgb.detach()[0] - example.target).square().mean(-1)  # (H, W)
-    error = float((squares * example.mask).sum() / example.mask.sum().clamp_min(1))
-    return -10 * math.log10(max(error, 1e-12))

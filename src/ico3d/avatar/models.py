@@ -1,0 +1,96 @@
+"""Which folder holds which kind of model; one table that every verb asks."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from ico3d.avatar.avatar import ABOUT as AVATAR
+from ico3d.avatar.avatar import TrainedAvatar
+from ico3d.body.model_folder import ABOUT as BODY
+from ico3d.body.model_folder import TrainedBody
+from ico3d.bundle.format import Bundle
+from ico3d.bundle.manifest import MANIFEST
+from ico3d.bundle.packaged import bundle_path
+from ico3d.errors import ModelError
+from ico3d.head.model_folder import ABOUT as HEAD
+from ico3d.head.model_folder import TrainedHead
+from ico3d.scene.model_folder import ABOUT as SCENE
+from ico3d.scene.model_folder import TrainedScene
+
+Model = TrainedAvatar | TrainedBody | TrainedHead | TrainedScene | Bundle
+"""What can be opened."""
+M = TypeVar("M", bound=Model)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of model.
+
+    Attributes:
+        name: What an error calls it.
+        file: The file by which a folder is known to hold one.
+        model: Its class.
+        read: Opens one, onto the CPU.
+        verb: Which verb of `ico3d` makes one.
+    """
+
+    name: str
+    file: str
+    model: type[Model]
+    read: Callable[[Path], Model]
+    verb: str
+
+    def __str__(self):
+        """The name, with the file and the verb."""
+        return f"{self.name} ({self.file}, made by ico3d {self.verb})"
+
+
+KINDS = (
+    Kind("a whole person", AVATAR, TrainedAvatar, TrainedAvatar.load, "assemble"),
+    Kind("a body", BODY, TrainedBody, TrainedBody.load, "train body"),
+    Kind("a head", HEAD, TrainedHead, TrainedHead.load, "train head"),
+    Kind("a static scene", SCENE, TrainedScene, TrainedScene.load, "train static"),
+    Kind("a bundle", MANIFEST, Bundle, Bundle.open, "bake"),
+)
+"""The first whose file lies in a folder opens it; a bundle may be a single file, too."""
+
+
+def open_model(path: Path | str, *models: type[M]) -> M:
+    """Opens a model folder or a bundle, onto the CPU.
+
+    Args:
+        path: The folder, or the bundle; `demo` is the packaged one, where bundles are wanted.
+        models: The kinds that the caller can use.
+
+    Raises:
+        ModelError: If it holds none of them, or a damaged one.
+        BundleError: If it is a damaged bundle.
+    """
+    path = bundle_path(path) if Bundle in models else Path(path)
+    found = _kind_of(path)
+    if found is None or found.model not in models:
+        raise ModelError(_refusal(path, found, [kind for kind in KINDS if kind.model in models]))
+    model = found.read(path)
+    assert isinstance(model, models)
+    return model
+
+
+def _kind_of(path: Path) -> Kind | None:
+    """What a path holds; any file is taken for a bundle."""
+    return next((kind for kind in KINDS if _is(path, kind)), None)
+
+
+def _is(path: Path, kind: Kind) -> bool:
+    return (path / kind.file).is_file() or (kind.model is Bundle and path.is_file())
+
+
+def _refusal(path: Path, found: Kind | None, wanted: list[Kind]) -> str:
+    """What there is instead, and what was expected."""
+    *names, last = map(str, wanted)
+    expected = f"{', '.join(names)} or {last}" if names else last
+    if not path.exists():
+        return f"there is nothing at {path}: expected {expected}."
+    if found is None:
+        return f"{path} holds no model that is known here: expected {expected}."
+    return f"{path} holds {found.name}: expected {expected}."

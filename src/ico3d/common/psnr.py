@@ -1,0 +1,33 @@
+"""Peak signal-to-noise ratio, with the one meaning that it has everywhere."""
+
+import math
+
+import numpy as np
+
+LEAST_ERROR = 1e-12
+"""Mean squared error below which pictures count as equal: 120 dB."""
+
+
+def decibels(error: float) -> float:
+    """−10·log₁₀ of a mean squared error of colours in [0, 1]; at most 120 dB."""
+    return -10 * math.log10(max(error, LEAST_ERROR))
+
+
+def psnr(predicted: np.ndarray, truth: np.ndarray, mask: np.ndarray | None = None) -> float | None:
+    """Peak signal-to-noise ratio in dB, on the mask where one is given.
+
+    Args:
+        predicted: (H, W, 3) in [0, 1].
+        truth: (H, W, 3) in [0, 1].
+        mask: (H, W) weights in [0, 1].
+
+    Returns:
+        −10·log₁₀(Σ_mask err² / (3·Σ mask)), at most 120, or None where the mask is empty.
+    """
+    squares = (predicted.astype(np.float64) - truth) ** 2  # (H, W, 3)
+    if mask is None:
+        return decibels(float(squares.mean()))
+    weight = float(mask.sum(dtype=np.float64))
+    if weight == 0:
+        return None
+    return decibels(float((squares * mask[..., None]).sum()) / (3 * weight))
