@@ -9,6 +9,7 @@ from pipecat.processors.aggregators.llm_context import LLMContext
 from ico3d.chat.memory import forget
 from ico3d.chat.services import choose
 from ico3d.chat.settings.conversation import ChatSettings, Choice, Memory
+from ico3d.chat.wire.protocol import Text
 from ico3d.measure.talking.scripted import Script
 from support.chat.guests import Guest, open_sessions
 from support.chat.virtual_time import run
@@ -66,7 +67,7 @@ def test_a_long_talk_is_kept_in_bounds(bundle, monkeypatch, notes):
             guest = await Guest.enter(sessions)
             await asyncio.sleep(5)
             for number in range(30):
-                await guest.session.conversation.ask(f"question {number} " + "x" * 300)
+                await guest.session.conversation.handle(Text(f"question {number} " + "x" * 300))
                 await asyncio.sleep(10)
                 sizes.append(len(guest.session.conversation._context.messages))
             await guest.leave()

@@ -12,7 +12,7 @@ import pytest
 
 from ico3d.chat.observing.monitor import Monitor
 from ico3d.chat.settings.conversation import ChatSettings, Turns
-from ico3d.chat.wire.protocol import VERSION, Error, Hello, Metrics, Speech
+from ico3d.chat.wire.protocol import VERSION, Error, Hello, Metrics, Speech, Text
 from ico3d.errors import SettingsError
 from ico3d.measure.talking.scripted import Script
 from support.chat.guests import Guest, open_sessions
@@ -84,7 +84,7 @@ def test_a_session_in_which_nothing_happens_ends_with_a_sentence(bundle, questio
             guests = [await Guest.enter(sessions) for _ in range(3)]
             began = now()
             await asyncio.sleep(10 + 50)  # the greeting, then silence
-            await guests[0].session.conversation.ask("still there?")  # answers for 10 s
+            await guests[0].session.conversation.handle(Text("still there?"))  # answers for 10 s
             await guests[1].say(question, silence=0.8)  # interrupts nothing, is answered
             ends = {}
             while len(ends) < 3 and now() < began + 300:
@@ -177,7 +177,7 @@ def test_nobody_hears_another_ones_answer(bundle, monkeypatch):
             guests = [await Guest.enter(sessions) for _ in range(3)]
             await asyncio.sleep(1)
             for guest in guests[1:]:
-                await guest.session.conversation.ask("and now?")
+                await guest.session.conversation.handle(Text("and now?"))
                 await asyncio.sleep(0.3)
             await asyncio.sleep(4)
             heard = [guest.speech() for guest in guests]
@@ -205,7 +205,7 @@ def test_nine_sessions_leave_no_more_behind_than_three(bundle, monkeypatch):
     async def visit(sessions):
         guest = await Guest.enter(sessions)
         await asyncio.sleep(0.5)
-        await guest.session.conversation.ask("and now?")
+        await guest.session.conversation.handle(Text("and now?"))
         await asyncio.sleep(0.5)
         await guest.leave()
         await asyncio.sleep(31)

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from functools import singledispatchmethod
 
 from loguru import logger
 from pipecat.adapters.llm.schemas.tools_schema import ToolsSchema
@@ -22,7 +23,7 @@ from ico3d.chat.frames import TypedFrame, Utterances
 from ico3d.chat.listener import Captions, PageInput
 from ico3d.chat.memory import forget, remembering
 from ico3d.chat.observing.monitor import Visitor
-from ico3d.chat.observing.timing import Clock, TurnObserver
+from ico3d.chat.observing.timing import PipelineClock, TurnObserver
 from ico3d.chat.page import Page
 from ico3d.chat.parts import Avatar, Parts, make_aside
 from ico3d.chat.performing.expression import ExpressionProcessor
@@ -40,15 +41,28 @@ from ico3d.chat.turns.detector import VoiceDetector
 from ico3d.chat.turns.echo import EchoGuard
 from ico3d.chat.turns.echo_filter import EchoFilter
 from ico3d.chat.turns.strategies import strategies
-from ico3d.chat.wire import protocol
-from ico3d.chat.wire.protocol import MICROPHONE_RATE, SPEECH_RATE, Error, Heard
+from ico3d.chat.wire.protocol import (
+    MICROPHONE_RATE,
+    SPEECH_RATE,
+    Audio,
+    ClientMessage,
+    Clock,
+    Deaf,
+    Error,
+    Heard,
+    Hello,
+    Interrupt,
+    Talk,
+    Text,
+)
 from ico3d.chat.workers import at_once
+from ico3d.errors import ProtocolError
 
 NOTHING_HEARD = 3.0  # s without a sign of the recogniser after which a turn is given up
 
 
 class Conversation:
-    """A running pipeline. What the page says goes in here; what it shall hear goes to `Page`."""
+    """A running pipeline: takes the page's messages, and sends its own to `Page`."""
 
     def __init__(self, avatar: Avatar, page: Page, visitor: Visitor, ended: Callable[[], None]):
         """A conversation that has not started.
@@ -62,7 +76,6 @@ class Conversation:
         self._avatar, self._page, self._ended = avatar, page, ended
         self._now = now = asyncio.get_running_loop().time  # for all that waits and measures
         self.activity = Activity(now)
-        self._clock = Clock(now)
         self._timing = TurnObserver(now, page.send, visitor.turn, visitor.failed)
         self._context = LLMContext()
         self._utterances = Utterances()
@@ -75,6 +88,7 @@ class Conversation:
         self._speaker = Speaker(page, self._utterances, self._echo.sent, gestures, now)
         self._worker: PipelineWorker | None = None
         self._task: asyncio.Task | None = None
+        self._dictates = False  # whether the browser recognises speech
 
     async def start(self) -> Parts:
         """Builds and starts the pipeline (about 0.5 s, most of it in a thread).
@@ -83,13 +97,14 @@ class Conversation:
             Ico3dError: If a service cannot be made, whatever the reason.
         """
         parts = await make_aside(self._avatar)
+        self._dictates = parts.dictation is not None
         self._prepare_voice(parts.voice)
         self._worker = PipelineWorker(
             self._pipeline(parts),
             params=PipelineParams(
                 audio_in_sample_rate=MICROPHONE_RATE, audio_out_sample_rate=SPEECH_RATE
             ),
-            clock=self._clock,
+            clock=PipelineClock(self._now),
             observers=[self._timing, self.activity],
             enable_rtvi=False,
             enable_turn_tracking=False,
@@ -116,40 +131,55 @@ class Conversation:
         if self._avatar.persona.greeting.strip():
             await self._input.say(self._avatar.persona.greeting)
 
-    async def hear(self, sound: protocol.Audio) -> None:
-        """Sound from the microphone."""
-        await self._input.hear(sound)
+    @singledispatchmethod
+    async def handle(self, message: ClientMessage) -> None:
+        """Does what a message of the page asks for; its type chooses the handler below.
 
-    async def ask(self, text: str) -> None:
-        """A typed question."""
+        Raises:
+            ProtocolError: If the page may not send such a message now.
+        """
+        raise TypeError(f"no handler for {type(message).__name__}")
+
+    @handle.register
+    async def _hello(self, _: Hello) -> None:
+        raise ProtocolError("hello comes only once.")
+
+    @handle.register
+    async def _audio(self, message: Audio) -> None:
+        await self._input.hear(message)
+
+    @handle.register
+    async def _text(self, message: Text) -> None:
+        question = message.text.strip()
+        if not question:
+            raise ProtocolError("text: is empty.")
         self.activity.touch()
-        await self._input.ask(text)
+        await self._input.ask(question)
 
-    async def talk(self, pressed: bool) -> None:
-        """The button of push to talk."""
+    @handle.register
+    async def _interrupt(self, message: Interrupt) -> None:
         self.activity.touch()
-        await self._input.talk(pressed)
-
-    async def heard(self, message: Heard) -> None:
-        """What the browser's recogniser understood."""
-        await self._input.heard(message.result, message.text, message.final)
-
-    async def deaf(self, reason: str) -> None:
-        """The browser cannot recognise speech."""
-        logger.info(f"the browser does not recognise speech: {reason!r}")
-        await self._input.deaf()
-
-    async def interrupt(self, utterance: int | None) -> None:
-        """Silence, if that utterance (any, for null) is being said or prepared."""
-        self.activity.touch()
-        if utterance is None or self._speaker.is_speaking(utterance):
+        if message.utterance is None or self._speaker.is_speaking(message.utterance):
             await self._input.interrupt()
 
-    def clock(self, message: protocol.Clock) -> None:
-        """Where the page is."""
+    @handle.register
+    async def _clock(self, message: Clock) -> None:
         self.activity.touch()  # it comes only while something plays
         self._speaker.clock(message)
         self._timing.heard(message.utterance, message.position)
+
+    @handle.register
+    async def _talk(self, message: Talk) -> None:
+        self.activity.touch()
+        await self._input.pass_on(message)  # to the VoiceDetector and the strategies of turns
+
+    @handle.register
+    async def _dictated(self, message: Heard | Deaf) -> None:
+        if not self._dictates:
+            raise ProtocolError("this server listens itself.")
+        if isinstance(message, Deaf):
+            logger.info(f"the browser does not recognise speech: {message.reason!r}")
+        await self._input.pass_on(message)  # to the BrowserRecognition
 
     def hold(self) -> None:
         """The connection dropped."""
@@ -165,7 +195,10 @@ class Conversation:
         self._ended()
 
     async def _all_stopped(self, _: PipelineWorker, question: TypedFrame) -> None:
-        """Any sooner, the question would stand before the words that it interrupts."""
+        """Adds a typed question to the context once all that it interrupts has stopped.
+
+        Added any sooner, the question would stand before the words of the interrupted answer.
+        """
         self._context.add_message({"role": "user", "content": question.text})
         forget(self._context, self._avatar.settings.memory)
         await self._input.answer(question)

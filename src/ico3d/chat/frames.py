@@ -1,11 +1,14 @@
-"""Frames that only this pipeline has: sound with its face, and the end of an utterance."""
+"""Frames that only this pipeline has: what comes from the page, and sound with its face."""
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
-from pipecat.frames.frames import DataFrame, InputAudioRawFrame, SystemFrame
+from pipecat.frames.frames import DataFrame, Frame, InputAudioRawFrame, SystemFrame
 
-from ico3d.chat.wire.protocol import SPEECH_RATE
+from ico3d.chat.wire.protocol import SPEECH_RATE, ClientMessage
+
+Message = TypeVar("Message")
 
 
 @dataclass
@@ -77,14 +80,20 @@ class VoiceFrame(SystemFrame):
 
 
 @dataclass
-class TalkFrame(SystemFrame):
-    """Push to talk: the visitor holds the button or has let it go.
+class PageFrame(SystemFrame):
+    """A message from the page on its way to the processor that acts on it.
 
     Parameters:
-        pressed: True when it goes down.
+        message: What the page sent; `message_in` takes it out.
     """
 
-    pressed: bool = False
+    message: ClientMessage
+
+
+def message_in(frame: Frame, kind: type[Message]) -> Message | None:
+    """The message of a `PageFrame` if it is of a certain kind; None for every other frame."""
+    carried = frame.message if isinstance(frame, PageFrame) else None
+    return carried if isinstance(carried, kind) else None
 
 
 @dataclass
@@ -96,26 +105,6 @@ class TypedFrame(SystemFrame):
     """
 
     text: str = ""
-
-
-@dataclass
-class HeardFrame(SystemFrame):
-    """What the browser's recogniser understood.
-
-    Parameters:
-        result: Number of the result.
-        text: Its words so far.
-        final: Whether they stay as they are.
-    """
-
-    result: int = 0
-    text: str = ""
-    final: bool = False
-
-
-@dataclass
-class DeafFrame(SystemFrame):
-    """The browser's recogniser does not work."""
 
 
 class Utterances:

@@ -14,9 +14,9 @@ from pipecat.frames.frames import (
 )
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
-from ico3d.chat.frames import DeafFrame, HeardFrame, MicrophoneFrame, TalkFrame, TypedFrame
+from ico3d.chat.frames import MicrophoneFrame, PageFrame, TypedFrame
 from ico3d.chat.page import Page
-from ico3d.chat.wire.protocol import MICROPHONE_RATE, Audio, Transcript
+from ico3d.chat.wire.protocol import MICROPHONE_RATE, Audio, ClientMessage, Transcript
 
 
 class PageInput(FrameProcessor):
@@ -38,17 +38,9 @@ class PageInput(FrameProcessor):
         frame = MicrophoneFrame(pcm, MICROPHONE_RATE, 1, sound.playing, sound.position)
         await self.push_frame(frame)
 
-    async def talk(self, pressed: bool) -> None:
-        """The button of push to talk."""
-        await self.push_frame(TalkFrame(pressed))
-
-    async def heard(self, result: int, text: str, final: bool) -> None:
-        """What the browser's recogniser understood."""
-        await self.push_frame(HeardFrame(result, text, final))
-
-    async def deaf(self) -> None:
-        """The browser cannot recognise speech."""
-        await self.push_frame(DeafFrame())
+    async def pass_on(self, message: ClientMessage) -> None:
+        """A message that a processor behind this one acts on, as `PageFrame`."""
+        await self.push_frame(PageFrame(message))
 
     async def ask(self, text: str) -> None:
         """A typed question: whatever is being said stops; `answer` comes when all have stopped."""

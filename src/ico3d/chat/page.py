@@ -9,18 +9,7 @@ from collections import deque
 import numpy as np
 
 from ico3d.chat.frames import SpeechFrame
-from ico3d.chat.wire.protocol import (
-    Answer,
-    End,
-    Pause,
-    Resume,
-    ServerMessage,
-    Speech,
-    State,
-    Stop,
-    Timeline,
-    Transcript,
-)
+from ico3d.chat.wire.protocol import ServerMessage, Speech, State, Stop, Transcript
 
 KEPT = 320  # messages that can be sent again: more than 30 s of speech and motion
 HALF = 65000.0  # float16 ends at 65504
@@ -55,7 +44,7 @@ class Outbox:
 
     def drop(self, utterance: int) -> None:
         """Forgets what belongs to an utterance."""
-        kept = [message for message in self._waiting if not _belongs(message, utterance)]
+        kept = [message for message in self._waiting if _utterance_of(message) != utterance]
         self._waiting = deque(kept)
 
     @property
@@ -120,7 +109,7 @@ class Page:
         if isinstance(message, Stop):
             self._forget(message.utterance)
         final = isinstance(message, Transcript) and message.final
-        if final or isinstance(message, Answer | Speech | Timeline | End | Stop | Pause | Resume):
+        if final or _utterance_of(message) is not None:
             self._log.append(message)
         self._put(message)
 
@@ -142,10 +131,11 @@ class Page:
             self._outbox.put(message)
 
     def _forget(self, utterance: int) -> None:
-        self._log = deque((m for m in self._log if not _belongs(m, utterance)), maxlen=KEPT)
+        self._log = deque((m for m in self._log if _utterance_of(m) != utterance), maxlen=KEPT)
         if self._outbox is not None:
             self._outbox.drop(utterance)
 
 
-def _belongs(message: ServerMessage, utterance: int) -> bool:
-    return getattr(message, "utterance", None) == utterance
+def _utterance_of(message: ServerMessage) -> int | None:
+    """The utterance that a message is about, if it is about one."""
+    return getattr(message, "utterance", None)

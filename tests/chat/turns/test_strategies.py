@@ -31,11 +31,12 @@ from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 from pipecat.workers.runner import WorkerRunner
 
 from ico3d.bundle.manifest import Persona
-from ico3d.chat.frames import TalkFrame, VoiceFrame
+from ico3d.chat.frames import PageFrame, VoiceFrame
 from ico3d.chat.services.language.notes import Notes
 from ico3d.chat.services.language.persona import PersonaModel
 from ico3d.chat.settings.conversation import Turns
 from ico3d.chat.turns.strategies import strategies
+from ico3d.chat.wire.protocol import Talk
 
 PERSONA = Persona("Ada", "", ("who are you => I am Ada.", "who are you and what => Many things."))
 
@@ -255,7 +256,7 @@ async def test_the_button_alone_says_when_a_turn_ends(stage):
     stage.analyzer.complete = True
     await stage.play(
         BotStartedSpeakingFrame(),
-        TalkFrame(pressed=True),
+        PageFrame(Talk(True)),
         VADUserStartedSpeakingFrame(start_secs=0.0),
         BotStoppedSpeakingFrame(),
         TranscriptionFrame("Who are", "", "now", finalized=True),
@@ -264,7 +265,7 @@ async def test_the_button_alone_says_when_a_turn_ends(stage):
     assert stage.asked.of(InterruptionFrame) == ["InterruptionFrame"]
     assert stage.questions == []
     await stage.play(
-        TalkFrame(pressed=False),
+        PageFrame(Talk(False)),
         VADUserStoppedSpeakingFrame(stop_secs=0.0),
         TranscriptionFrame("you?", "", "now", finalized=True),
     )
@@ -274,10 +275,10 @@ async def test_the_button_alone_says_when_a_turn_ends(stage):
 
 async def test_letting_go_ends_a_turn_whose_words_came_already(stage):
     await stage.play(
-        TalkFrame(pressed=True),
+        PageFrame(Talk(True)),
         VADUserStartedSpeakingFrame(start_secs=0.0),
         TranscriptionFrame("Who are you?", "", "now"),
-        TalkFrame(pressed=False),
+        PageFrame(Talk(False)),
         VADUserStoppedSpeakingFrame(stop_secs=0.0),
         wait=0.4,
     )
@@ -286,9 +287,9 @@ async def test_letting_go_ends_a_turn_whose_words_came_already(stage):
 
 async def test_an_empty_turn_ends_by_itself_and_the_next_one_works(stage):
     await stage.play(
-        TalkFrame(pressed=True),
+        PageFrame(Talk(True)),
         VADUserStartedSpeakingFrame(start_secs=0.0),
-        TalkFrame(pressed=False),
+        PageFrame(Talk(False)),
         VADUserStoppedSpeakingFrame(stop_secs=0.0),
         wait=0.7,
     )

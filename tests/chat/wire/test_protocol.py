@@ -1,5 +1,6 @@
 """The wire: what is encoded comes back the same; what is malformed is refused in one sentence."""
 
+import inspect
 import json
 import struct
 import typing
@@ -10,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ico3d.chat.conversation import Conversation
 from ico3d.chat.wire import protocol, typescript
 from ico3d.chat.wire.codec import (
     OversizedError,
@@ -184,6 +186,11 @@ def test_own_mistakes_are_refused_when_encoding():
         encode(protocol.Clock(0, float("nan"), 0.0))
     with pytest.raises(ProtocolError):
         encode(protocol.Audio(0, np.zeros(16001, np.int16)))
+
+
+def test_every_message_of_a_page_has_a_handler():
+    handlers = inspect.getattr_static(Conversation, "handle").dispatcher.registry
+    assert set(handlers) - {object} == set(protocol.CLIENT_MESSAGES)
 
 
 def test_the_viewers_file_is_up_to_date():

@@ -38,7 +38,7 @@ class Guest:
         sound = np.concatenate([pcm, np.zeros(int(silence * MICROPHONE_RATE), np.int16)])
         for at in range(0, len(sound) - CHUNK, CHUNK):
             await asyncio.sleep(CHUNK / MICROPHONE_RATE)
-            await self.session.conversation.hear(Audio(at, sound[at : at + CHUNK]))
+            await self.session.conversation.handle(Audio(at, sound[at : at + CHUNK]))
         return end
 
     def speech(self):
@@ -67,7 +67,7 @@ class Guest:
         while True:
             clock = self.player.clock(asyncio.get_running_loop().time())
             if clock is not None:
-                self.session.conversation.clock(clock)
+                await self.session.conversation.handle(clock)
             await asyncio.sleep(CLOCK_EVERY)
 
 

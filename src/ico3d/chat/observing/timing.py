@@ -71,7 +71,7 @@ class Turn:
         return None if self.heard is None else 1000 * (self.heard - self.asked)
 
 
-class Clock(BaseClock):
+class PipelineClock(BaseClock):
     """Lets a pipeline stamp its frames by any clock."""
 
     def __init__(self, now: Callable[[], float]):

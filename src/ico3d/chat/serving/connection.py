@@ -12,20 +12,7 @@ from ico3d.chat.serving.limits import Inlet, Limits
 from ico3d.chat.serving.sessions import BROKEN_OFF, FullError, Session, Sessions
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import OversizedError, decode_client, encode
-from ico3d.chat.wire.protocol import (
-    Ack,
-    Audio,
-    ClientMessage,
-    Clock,
-    Deaf,
-    Error,
-    Heard,
-    Hello,
-    Interrupt,
-    Talk,
-    Text,
-    Welcome,
-)
+from ico3d.chat.wire.protocol import Ack, Error, Hello, Welcome
 from ico3d.errors import Ico3dError, ProtocolError
 
 HELLO_SECONDS = 10  # that a page may take to say hello
@@ -144,7 +131,8 @@ class Connection:
                 self._limits.check_frame(frame)
                 message = decode_client(frame)
                 self._limits.check_message(message)
-                await self._handle(session, message)
+                for due in self._inlet.admit(message):
+                    await session.conversation.handle(due)
             except OversizedError as error:
                 raise Hangup(TOO_BIG, str(error)) from error
             except ProtocolError as error:
@@ -159,32 +147,6 @@ class Connection:
             raise WebSocketDisconnect(event.get("code", GOING))
         text = event.get("text")
         return text if text is not None else event.get("bytes") or b""
-
-    async def _handle(self, session: Session, message: ClientMessage) -> None:
-        conversation = session.conversation
-        if isinstance(message, Audio):
-            for sound in self._inlet.take(message):
-                await conversation.hear(sound)
-        elif isinstance(message, Clock):
-            conversation.clock(message)
-        elif isinstance(message, Text):
-            if not message.text.strip():
-                raise ProtocolError("text: is empty.")
-            await conversation.ask(message.text.strip())
-        elif isinstance(message, Heard | Deaf) and not (session.parts and session.parts.dictation):
-            raise ProtocolError("this server listens itself.")
-        elif isinstance(message, Heard):
-            await conversation.heard(message)
-        elif isinstance(message, Deaf):
-            await conversation.deaf(message.reason)
-        elif isinstance(message, Talk):
-            for sound in self._inlet.rest():  # it belongs to the button's last state
-                await conversation.hear(sound)
-            await conversation.talk(message.pressed)
-        elif isinstance(message, Interrupt):
-            await conversation.interrupt(message.utterance)
-        else:
-            raise ProtocolError("hello comes only once.")
 
     async def _write(self) -> None:
         """Sends until the outbox is closed, which ends the connection too."""

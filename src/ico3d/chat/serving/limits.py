@@ -11,6 +11,7 @@ from ico3d.chat.wire.protocol import (
     MICROPHONE_RATE,
     Audio,
     ClientMessage,
+    Talk,
 )
 from ico3d.errors import ProtocolError
 
@@ -96,6 +97,14 @@ class Inlet:
         self._now, self._at = now, now()
         self._balance = BACKLOG  # s of sound that may still come at once; below 0 in a backlog
         self._waiting: deque[Audio] = deque()
+
+    def admit(self, message: ClientMessage) -> list[ClientMessage]:
+        """Takes any message as it arrives; returns what is to be handled now, in order."""
+        if isinstance(message, Audio):
+            return [*self.take(message)]
+        if isinstance(message, Talk):
+            return [*self.rest(), message]  # sound that waits belongs to the button's last state
+        return [message]
 
     def take(self, sound: Audio) -> list[Audio]:
         """Takes sound as it arrives; returns what is to be heard now, in order."""

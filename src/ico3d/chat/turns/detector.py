@@ -12,9 +12,9 @@ from pipecat.frames.frames import (
 from pipecat.processors.audio.vad_processor import VADProcessor
 from pipecat.processors.frame_processor import FrameDirection
 
-from ico3d.chat.frames import TalkFrame, VoiceFrame
+from ico3d.chat.frames import VoiceFrame, message_in
 from ico3d.chat.turns.bands import Bands
-from ico3d.chat.wire.protocol import MICROPHONE_RATE
+from ico3d.chat.wire.protocol import MICROPHONE_RATE, Talk
 
 QUIETEST = 0.4  # smoothed volume of speech; it rises over 0.2 s, so more would notice it later
 HINT = 0.5  # Silero's confidence that makes a first hint
@@ -122,8 +122,8 @@ class VoiceDetector(VADProcessor):
         await super().process_frame(frame, direction)
         if isinstance(frame, InputAudioRawFrame):
             await self._tell(np.frombuffer(frame.audio, np.int16) / 32768)
-        elif isinstance(frame, TalkFrame) and frame.pressed != self._held:
-            self._held = frame.pressed
+        elif (talk := message_in(frame, Talk)) and talk.pressed != self._held:
+            self._held = talk.pressed
             await self._hold()
 
     async def _tell(self, samples: np.ndarray) -> None:

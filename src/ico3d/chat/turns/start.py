@@ -16,8 +16,9 @@ from pipecat.frames.frames import (
 from pipecat.turns.types import ProcessFrameResult
 from pipecat.turns.user_start import BaseUserTurnStartStrategy
 
-from ico3d.chat.frames import TalkFrame, VoiceFrame
+from ico3d.chat.frames import VoiceFrame, message_in
 from ico3d.chat.turns.floor import Floor, Verdict
+from ico3d.chat.wire.protocol import Talk
 
 LOOK = 0.05  # s between two looks at the clock while the avatar waits
 
@@ -57,8 +58,8 @@ class FloorTurnStart(BaseUserTurnStartStrategy):
             await self._fall_silent()
         elif isinstance(frame, VoiceFrame):
             await self._follow(self._floor.hear(frame))
-        elif isinstance(frame, TalkFrame):
-            if frame.pressed:
+        elif talk := message_in(frame, Talk):
+            if talk.pressed:
                 await self.trigger_user_turn_started()
         elif isinstance(frame, VADUserStartedSpeakingFrame):
             self._voice = True

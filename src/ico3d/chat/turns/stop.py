@@ -16,8 +16,9 @@ from pipecat.turns.user_stop import (
     TurnAnalyzerUserTurnStopStrategy,
 )
 
-from ico3d.chat.frames import TalkFrame, VoiceFrame
+from ico3d.chat.frames import VoiceFrame, message_in
 from ico3d.chat.turns.eager import EagerSmartTurn
+from ico3d.chat.wire.protocol import Talk
 
 
 class SpeculativeTurnStop(TurnAnalyzerUserTurnStopStrategy):
@@ -123,8 +124,8 @@ class ReleaseTurnStop(BaseUserTurnStopStrategy):
         await super().process_frame(frame)
         if isinstance(frame, STTMetadataFrame):
             self._patience = frame.ttfs_p99_latency
-        elif isinstance(frame, TalkFrame):
-            await self._talk(frame.pressed)
+        elif talk := message_in(frame, Talk):
+            await self._talk(talk.pressed)
         elif isinstance(frame, TranscriptionFrame) and (self._held or self._released):
             self._words = True
             if self._released:

@@ -22,11 +22,12 @@ from pipecat.services.settings import STTSettings
 from pipecat.services.stt_service import STTService
 from pipecat.utils.time import time_now_iso8601
 
-from ico3d.chat.frames import DeafFrame, HeardFrame
+from ico3d.chat.frames import message_in
 from ico3d.chat.services.choosing import Service, chosen
 from ico3d.chat.services.provider import Context, Table
 from ico3d.chat.services.recognition.segments import blank
 from ico3d.chat.settings.conversation import BEST, Choice
+from ico3d.chat.wire.protocol import Deaf, Heard
 
 SETTLED = 0.5  # s without news in silence after which partial words are taken for final ones
 SLOWEST = 1.5  # s that a browser may take for its first words
@@ -57,7 +58,7 @@ class BrowserRecognition(STTService):
         """A recogniser for one session."""
         settings = STTSettings(model="browser", language=None)
         super().__init__(ttfs_p99_latency=SLOWEST, settings=settings)
-        self._partial: HeardFrame | None = None
+        self._partial: Heard | None = None
         self._taken = -1  # the last result whose words are final here
         self._understood = False  # whether there were final words since the voice began
         self._voice_until = -LATE  # the event loop's clock
@@ -74,8 +75,8 @@ class BrowserRecognition(STTService):
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
         """Takes what comes from the page, passes everything else."""
-        if isinstance(frame, HeardFrame):
-            await self._hear(frame)
+        if heard := message_in(frame, Heard):
+            await self._hear(heard)
             return
         await super().process_frame(frame, direction)
         if isinstance(frame, VADUserStoppedSpeakingFrame):
@@ -87,7 +88,7 @@ class BrowserRecognition(STTService):
         self._understood = False
         await self._stop_timer()
 
-    async def _hear(self, heard: HeardFrame) -> None:
+    async def _hear(self, heard: Heard) -> None:
         belongs = self._user_speaking or self._now() - self._voice_until < LATE
         if heard.result <= self._taken or not belongs or not heard.text.strip():
             return
@@ -99,7 +100,7 @@ class BrowserRecognition(STTService):
         if not self._user_speaking:
             await self._restart_timer()
 
-    async def _take(self, heard: HeardFrame) -> None:
+    async def _take(self, heard: Heard) -> None:
         self._taken, self._partial, self._understood = heard.result, None, True
         words = TranscriptionFrame(heard.text.strip(), "", time_now_iso8601())
         words.finalized = not self._user_speaking
@@ -146,7 +147,7 @@ class BrowserOrServer(ServiceSwitcher):
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
         """Switches when it must."""
-        if isinstance(frame, DeafFrame):
+        if message_in(frame, Deaf):
             frame = ManuallySwitchServiceFrame(service=self._server)
         await super().process_frame(frame, direction)
 
