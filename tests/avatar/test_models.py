@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import pytest
-from whole_person import write_whole_person
 
 from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.models import KINDS, open_model
@@ -12,6 +11,7 @@ from ico3d.bundle.format import Bundle
 from ico3d.errors import BundleError, ModelError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.scene.model_folder import TrainedScene
+from support.avatars.whole_person import write_whole_person
 
 EVERY = tuple(kind.model for kind in KINDS)
 
