@@ -14,7 +14,7 @@ import numpy as np
 import tyro
 
 from ico3d.capture.formats import open_capture
-from ico3d.capture.resized import ResizedCapture
+from ico3d.capture.importing.resized import ResizedCapture
 
 
 @dataclass(frozen=True)

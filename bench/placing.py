@@ -27,7 +27,7 @@ from ico3d.avatar.joining.similarity import moved
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.canonical import canonical_landmarks
 from ico3d.capture.formats import open_capture
-from ico3d.capture.resized import ResizedCapture
+from ico3d.capture.importing.resized import ResizedCapture
 from ico3d.head.model_folder import TrainedHead
 from ico3d.head.settings import PRESETS
 from ico3d.head.train_head import HeadJob, train_head

@@ -24,16 +24,16 @@ VERBS: dict[str, Verb] = {
     "capture portrait": Verb("ico3d.capture.commands", "Portrait", "track a talking-head video"),
     "capture synthetic": Verb("ico3d.studio.command", "Synthetic", "record a synthetic person"),
     "capture import": Verb(
-        "ico3d.capture.multiview.commands", "Import", "take over COLMAP or nerfstudio"
+        "ico3d.capture.importing.commands", "Import", "take over COLMAP or nerfstudio"
     ),
     "capture masks": Verb(
-        "ico3d.capture.multiview.commands", "Masks", "cut people out by clean plates"
+        "ico3d.capture.importing.commands", "Masks", "cut people out by clean plates"
     ),
     "capture track": Verb(
         "ico3d.capture.headtrack.command", "Track", "find the head in many cameras"
     ),
     "capture resize": Verb(
-        "ico3d.capture.multiview.commands", "Resize", "write it with smaller pictures"
+        "ico3d.capture.importing.commands", "Resize", "write it with smaller pictures"
     ),
     "capture check": Verb("ico3d.capture.commands", "Check", "check it, draw a contact sheet"),
     "train head": Verb("ico3d.head.commands", "TrainHead", "train HeadGaS++ on a capture"),

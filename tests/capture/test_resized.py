@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ico3d.capture.formats import open_capture
-from ico3d.capture.resized import ResizedCapture
+from ico3d.capture.importing.resized import ResizedCapture
 from ico3d.cli import main
 from ico3d.errors import SettingsError
 from support.recordings import multiview_folders

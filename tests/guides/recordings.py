@@ -12,8 +12,8 @@ from ico3d.avatar.film.video import write_video
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.expressions import BLENDSHAPES
 from ico3d.capture.formats import open_capture
-from ico3d.capture.headtrack.track_file import HeadTrack
-from ico3d.capture.multiview.resizing import resize_capture
+from ico3d.capture.headpose.track_file import HeadTrack
+from ico3d.capture.importing.resizing import resize_capture
 from ico3d.common.expression import EYE_NAMES
 from ico3d.studio.picture import paint
 from ico3d.studio.recording import Recording, record

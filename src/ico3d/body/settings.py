@@ -3,13 +3,16 @@
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from ico3d.body.training.surface_points import Source
 from ico3d.training.optimiser import Rate
 
 Method = Literal["swings++", "swings", "4dgs", "spacetime", "freetime", "static"]
 """SWinGS++; SWinGS: a positional encoding in the place of the encoder; 4DGS: one window for the
 whole clip, the encoder, no tuning; Spacetime Gaussians and FreeTime: one window whose Gaussians
 come, move and go by formulas; static: Gaussians that do not move within a window."""
+
+Source = Literal["best", "hull"]
+"""Where the Gaussians of a window begin: on the best surface that the capture can give (its own
+points, else the visual hull), or on the visual hull in any case."""
 
 ONE_WINDOW: tuple[Method, ...] = ("4dgs", "spacetime", "freetime")
 """Methods that take the whole clip as one window."""

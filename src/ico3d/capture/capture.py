@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.capture.checking.finding import Finding
+from ico3d.capture.finding import Finding
 from ico3d.common.camera import Camera
 from ico3d.common.expression import EYE_NAMES as EYE_NAMES
 

@@ -97,7 +97,7 @@ def open_capture(path: Path | str) -> Capture:
     Raises:
         CaptureError: If there is none, or the format is not recognised, or it is damaged.
     """
-    from ico3d.capture.headtrack.tracked import with_track
+    from ico3d.capture.headpose.tracked import with_track
 
     path = Path(path)
     for known in FORMATS:

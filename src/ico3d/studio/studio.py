@@ -10,9 +10,9 @@ from ico3d.studio.person.subject import CARDS, Subject
 from ico3d.studio.picture.lighting import BUST, WHOLE, Lamps, Lights, lights_on
 from ico3d.studio.picture.materials import Colors
 from ico3d.studio.picture.paint import lip_gap, paint
-from ico3d.studio.picture.raster import empty_buffers, rasterise, to_screen, vertex_normals
 from ico3d.studio.picture.shader import Scene, display, shade, shade_cards
 from ico3d.studio.picture.textures import noise
+from ico3d.studio.raster import empty_buffers, rasterise, to_screen, vertex_normals
 
 SUPERSAMPLING = 3
 

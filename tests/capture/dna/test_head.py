@@ -5,7 +5,7 @@ import pytest
 
 from ico3d.capture.checking.check import examine
 from ico3d.capture.formats import open_capture
-from ico3d.capture.resized import ResizedCapture
+from ico3d.capture.importing.resized import ResizedCapture
 from support.recordings import dna_files, faces
 
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])

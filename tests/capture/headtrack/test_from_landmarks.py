@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from ico3d.capture.headtrack.from_landmarks import BEHIND, head_from_landmarks
-from ico3d.capture.headtrack.procrustes import procrustes
-from ico3d.capture.headtrack.whittaker import LONGEST_GAP
+from ico3d.capture.headpose.from_landmarks import BEHIND, head_from_landmarks
+from ico3d.capture.headpose.procrustes import procrustes
+from ico3d.capture.headpose.whittaker import LONGEST_GAP
 from support.recordings import faces
 
 

@@ -3,7 +3,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from ico3d.capture.headtrack.shape import (
+from ico3d.capture.headpose.shape import (
     inverse,
     moved,
     rigid_fit,

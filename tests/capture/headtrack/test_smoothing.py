@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from ico3d.capture.headtrack.smoothing import filled, filled_poses, smoothed_poses, window_of
+from ico3d.capture.headpose.smoothing import filled, filled_poses, smoothed_poses, window_of
 
 
 def _poses(turns, places):

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from ico3d.capture.capture import Capture
 from ico3d.capture.formats import open_capture
-from ico3d.capture.headtrack.track_file import NAME, read_track
-from ico3d.capture.multiview.resizing import resize_capture
+from ico3d.capture.headpose.track_file import NAME, read_track
+from ico3d.capture.importing.resizing import resize_capture
 from ico3d.cli import main
 from ico3d.studio.picture import paint
 from ico3d.studio.recording import Recording, record

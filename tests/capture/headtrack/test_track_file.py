@@ -9,9 +9,9 @@ from safetensors.numpy import load, save
 from ico3d.capture.checking.check import examine
 from ico3d.capture.face.expressions import BLENDSHAPES
 from ico3d.capture.formats import open_capture
-from ico3d.capture.headtrack.track_file import NAME, HeadTrack
-from ico3d.capture.multiview.resizing import resize_capture
-from ico3d.capture.resized import ResizedCapture
+from ico3d.capture.headpose.track_file import NAME, HeadTrack
+from ico3d.capture.importing.resized import ResizedCapture
+from ico3d.capture.importing.resizing import resize_capture
 from ico3d.errors import CaptureError
 from support.recordings import multiview_folders
 

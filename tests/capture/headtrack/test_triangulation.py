@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ico3d.capture.headtrack.triangulation import (
+from ico3d.capture.headpose.triangulation import (
     agreeing,
     misses,
     robust,

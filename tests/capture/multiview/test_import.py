@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from ico3d.capture.formats import open_capture
-from ico3d.capture.multiview.importing import ImportSettings, import_recording
+from ico3d.capture.importing.recording import ImportSettings, import_recording
 from ico3d.capture.multiview.reader import MultiviewCapture
 from ico3d.cli import main
 from ico3d.errors import CaptureError, SettingsError

@@ -12,7 +12,7 @@ from PIL import Image
 
 from ico3d.capture.checking.check import examine
 from ico3d.capture.formats import open_capture
-from ico3d.capture.headtrack.track_file import HeadTrack
+from ico3d.capture.headpose.track_file import HeadTrack
 from ico3d.cli import main
 from ico3d.common.camera import Camera, look_at
 from ico3d.errors import CaptureError

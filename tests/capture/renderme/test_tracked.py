@@ -8,9 +8,9 @@ import pytest
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.expressions import BLENDSHAPES
 from ico3d.capture.formats import open_capture
+from ico3d.capture.headpose.track_file import HeadTrack, check_writable
 from ico3d.capture.headtrack import tracker
-from ico3d.capture.headtrack.track_file import HeadTrack, check_writable
-from ico3d.capture.multiview.resizing import resize_capture
+from ico3d.capture.importing.resizing import resize_capture
 from ico3d.cli import main
 from ico3d.errors import CaptureError
 from support.recordings import renderme_files

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 from ico3d.avatar.joining.drawn_head import DrawnHead
 from ico3d.avatar.joining.similarity import moved, scale_of
 from ico3d.capture.face.mediapipe_face import MESH_LANDMARKS, CanonicalFace, FaceReader
+from ico3d.capture.headpose.shape import similarity_fit
 from ico3d.capture.headtrack.crops import Part, search
-from ico3d.capture.headtrack.shape import similarity_fit
 from ico3d.common.camera import Camera, look_at
 from ico3d.splat.gaussians import Gaussians
 

@@ -20,9 +20,9 @@ from ico3d.avatar.joining.similarity import STEADY, moved, scale_of
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.landmarks import MULTI_PIE
 from ico3d.capture.face.mediapipe_face import CanonicalFace, FaceReader, canonical_face
+from ico3d.capture.headpose.shape import similarity_fit
+from ico3d.capture.headpose.triangulation import misses, sightings
 from ico3d.capture.headtrack.faces import Finder, Head
-from ico3d.capture.headtrack.shape import similarity_fit
-from ico3d.capture.headtrack.triangulation import misses, sightings
 from ico3d.common.camera import Camera, look_at
 from ico3d.common.spread import spread
 from ico3d.common.weights import model_file

@@ -13,10 +13,9 @@ import numpy as np
 
 from ico3d.body.planning.flow_methods import FlowMethod, best_method, opencv
 from ico3d.body.planning.windows import Window
-from ico3d.body.training.surface_points import HIDING
 from ico3d.capture.capture import Capture
 from ico3d.capture.pictures import train_cameras
-from ico3d.capture.surface.coverage import visible
+from ico3d.capture.surface.coverage import HIDING, visible
 from ico3d.capture.surface.hull import focus
 from ico3d.common.camera import Camera
 from ico3d.common.files import write_atomic

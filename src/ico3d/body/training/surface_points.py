@@ -2,14 +2,14 @@
 
 import logging
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from scipy.spatial import KDTree
 
+from ico3d.body.settings import Source
 from ico3d.capture.capture import Capture
 from ico3d.capture.pictures import train_cameras
-from ico3d.capture.surface.coverage import visible
+from ico3d.capture.surface.coverage import HIDING, visible
 from ico3d.capture.surface.hull import Silhouette, looked_at, visual_hull
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
@@ -19,11 +19,6 @@ HULL_EDGE = 0.02
 """Metres of a voxel's edge."""
 FEWEST = 4
 """Points that make a surface."""
-HIDING = 3.0
-"""How many times their spacing points must lie behind others to be hidden by them: no hole
-between points is as wide, however they fell."""
-
-Source = Literal["best", "hull"]
 
 logger = logging.getLogger(__name__)
 

@@ -11,7 +11,7 @@ from rich.text import Text
 from ico3d.capture.capture import Capture
 from ico3d.capture.checking import head
 from ico3d.capture.checking.contact_sheet import contact_sheet
-from ico3d.capture.checking.finding import Finding
+from ico3d.capture.finding import Finding
 from ico3d.common.files import write_atomic
 from ico3d.common.spread import spread
 from ico3d.errors import CaptureError

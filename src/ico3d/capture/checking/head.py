@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ico3d.capture.capture import Capture
-from ico3d.capture.checking.finding import Finding
+from ico3d.capture.finding import Finding
 
 STEADY = (27, 28, 29, 30, 36, 39, 42, 45)
 """Landmarks that hardly move with the expression: nose bridge and eye corners."""

@@ -1,7 +1,7 @@
 """Examining the files of a DNA-Rendering recording without decoding a picture."""
 
-from ico3d.capture.checking.finding import Finding
 from ico3d.capture.dna.calibration import Device
+from ico3d.capture.finding import Finding
 from ico3d.capture.smc.file import SmcFile
 from ico3d.capture.smc.reader import examine_views
 

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.capture.capture import all_frames
-from ico3d.capture.checking.finding import Finding
 from ico3d.capture.decoding import unit
 from ico3d.capture.dna.annotations import BodyFits, SmplX, gender_of, person, row
 from ico3d.capture.dna.calibration import GROUPS, read_devices
@@ -15,6 +14,7 @@ from ico3d.capture.dna.examine import examine_files
 from ico3d.capture.dna.files import find_files
 from ico3d.capture.dna.kinect import Kinect
 from ico3d.capture.extras import opencv
+from ico3d.capture.finding import Finding
 from ico3d.capture.poses import turned
 from ico3d.capture.smc.file import SmcFile
 from ico3d.capture.smc.reader import SmcCapture, count_frames

@@ -44,8 +44,8 @@ class Track:
         from rich.console import Console
 
         from ico3d.capture.formats import open_capture
+        from ico3d.capture.headpose.track_file import check_writable
         from ico3d.capture.headtrack.sheet import check_name, write_sheet
-        from ico3d.capture.headtrack.track_file import check_writable
         from ico3d.errors import MissingExtraError
 
         try:

@@ -11,9 +11,9 @@ import numpy as np
 
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.mediapipe_face import MESH_LANDMARKS, CanonicalFace, Face, FaceReader
+from ico3d.capture.headpose.shape import similarity_fit
+from ico3d.capture.headpose.triangulation import Sightings, agreeing, robust, sightings
 from ico3d.capture.headtrack.crops import HEAD, Part, around, search
-from ico3d.capture.headtrack.shape import similarity_fit
-from ico3d.capture.headtrack.triangulation import Sightings, agreeing, robust, sightings
 from ico3d.errors import CaptureError
 
 SEES_FACE = np.cos(np.radians(100.0))

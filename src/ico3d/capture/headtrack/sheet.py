@@ -7,8 +7,8 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from ico3d.capture.capture import Capture
+from ico3d.capture.headpose.track_file import HeadTrack
 from ico3d.capture.headtrack.crops import READ_AT, Part, around
-from ico3d.capture.headtrack.track_file import HeadTrack
 from ico3d.common.files import write_atomic
 from ico3d.common.spread import spread
 from ico3d.errors import SettingsError

@@ -10,10 +10,10 @@ from ico3d.capture.face.expressions import BLENDSHAPES, eyes_of_blendshapes
 from ico3d.capture.face.landmarks import MULTI_PIE
 from ico3d.capture.face.mediapipe_face import canonical_face
 from ico3d.capture.formats import open_capture
+from ico3d.capture.headpose.shape import inverse, moved, rigid_head
+from ico3d.capture.headpose.smoothing import filled, filled_poses, smoothed_poses
+from ico3d.capture.headpose.track_file import HeadTrack
 from ico3d.capture.headtrack.faces import Finder, Head, finder
-from ico3d.capture.headtrack.shape import inverse, moved, rigid_head
-from ico3d.capture.headtrack.smoothing import filled, filled_poses, smoothed_poses
-from ico3d.capture.headtrack.track_file import HeadTrack
 from ico3d.capture.multiview.writing import shown
 from ico3d.capture.portrait.picture_poses import rigid_landmarks
 from ico3d.common.weights import model_file

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.capture.capture import Capture, Sound, all_frames, last_eleventh
-from ico3d.capture.checking.finding import Finding, missing_and_damaged
 from ico3d.capture.decoding import unit
 from ico3d.capture.face.expressions import BLENDSHAPES
-from ico3d.capture.headtrack.track_file import read_track
+from ico3d.capture.finding import Finding, missing_and_damaged
+from ico3d.capture.headpose.track_file import read_track
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import read_description
 from ico3d.capture.multiview.files import RecordedFiles

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from ico3d.capture.checking.finding import Finding
+from ico3d.capture.finding import Finding
 from ico3d.capture.smc.cameras import SmcCamera
 from ico3d.capture.smc.file import SmcFile
 from ico3d.capture.smc.reader import examine_views

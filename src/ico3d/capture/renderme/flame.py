@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ico3d.capture.headtrack.procrustes import fit_poses, procrustes
+from ico3d.capture.headpose.procrustes import fit_poses, procrustes
 from ico3d.capture.smc.file import SmcFile
 from ico3d.errors import CaptureError
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ico3d.capture.headtrack.triangulation import SPREAD, misses, robust, sightings
+from ico3d.capture.headpose.triangulation import SPREAD, misses, robust, sightings
 from ico3d.common.camera import Camera
 
 POINTS = 106

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.capture.capture import Sound, last_eleventh
-from ico3d.capture.checking.finding import Finding
 from ico3d.capture.decoding import largest_channel, unit
+from ico3d.capture.finding import Finding
 from ico3d.capture.renderme.calibration import frame_rate, read_cameras
 from ico3d.capture.renderme.examine import examine_files, mask_folder
 from ico3d.capture.renderme.files import find_files

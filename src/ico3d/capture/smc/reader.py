@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.capture.capture import Capture
-from ico3d.capture.checking.finding import Finding, missing_and_damaged
 from ico3d.capture.decoding import decoded
-from ico3d.capture.headtrack.from_landmarks import HeadMotion, head_from_landmarks
+from ico3d.capture.finding import Finding, missing_and_damaged
+from ico3d.capture.headpose.from_landmarks import HeadMotion, head_from_landmarks
 from ico3d.capture.poses import nearest_axis, turn_upright, turned, up_of_cameras
 from ico3d.capture.smc.cameras import SmcCamera
 from ico3d.capture.smc.file import SmcFile

@@ -14,7 +14,8 @@ WORTH_FILLING = 0.03
 VOXELS = 32
 """Voxels of a hull, across half of what the pictures hold."""
 HIDING = 3.0
-"""Voxels by which a point lies behind others to be hidden by them."""
+"""How many times their spacing (of a hull: its voxels' edge) points must lie behind others to be
+hidden by them: no hole between points is as wide, however they fell."""
 MOSTLY = 0.5
 """Share of the moments in which a camera must show the person at a place: shoulders stray from a
 head that turns, and some masks are wrong."""

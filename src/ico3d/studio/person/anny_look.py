@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 
 from ico3d.studio.person.smooth import smoothed
 from ico3d.studio.person.subject import Look, Material, Subject
-from ico3d.studio.picture.raster import vertex_normals
+from ico3d.studio.raster import vertex_normals
 
 # fmt: off
 LANDMARKS = (

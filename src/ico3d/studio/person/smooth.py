@@ -6,7 +6,7 @@ import numpy as np
 
 from ico3d.studio.person.skeleton import Skeleton
 from ico3d.studio.person.subject import Subject
-from ico3d.studio.picture.raster import vertex_normals
+from ico3d.studio.raster import vertex_normals
 
 BULGE = 0.75
 """How far split edges move from the flat triangle to the surface the normals tell of."""

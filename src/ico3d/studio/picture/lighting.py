@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from ico3d.studio.picture.paint import light_basis, light_screen
-from ico3d.studio.picture.raster import empty_buffers, rasterise
+from ico3d.studio.raster import empty_buffers, rasterise
 
 SHADOW_BIAS = 0.004
 """Metres behind the shadow map that are still lit: less speckles, more leaks."""

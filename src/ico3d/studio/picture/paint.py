@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 
 from ico3d.studio.person.hair import hair_edge, strand_frames
 from ico3d.studio.person.subject import CARDS, Subject
-from ico3d.studio.picture.raster import empty_buffers, rasterise, vertex_normals
+from ico3d.studio.raster import empty_buffers, rasterise, vertex_normals
 
 OPENINGS = (0.0, 0.12, 0.25, 0.45)
 """Weights of `jawOpen` at which occlusion is computed; frames blend between them."""

@@ -10,11 +10,11 @@ from typing import Literal
 
 import numpy as np
 
-from ico3d.capture.multiview.colmap import is_model, read_colmap
+from ico3d.capture.importing.colmap import is_model, read_colmap
+from ico3d.capture.importing.foreign import Foreign, Shot
+from ico3d.capture.importing.transforms import read_transforms
 from ico3d.capture.multiview.description import Description, Place
-from ico3d.capture.multiview.foreign import Foreign, Shot
 from ico3d.capture.multiview.reader import MultiviewCapture
-from ico3d.capture.multiview.transforms import read_transforms
 from ico3d.capture.multiview.writing import new_folder, shown
 from ico3d.capture.poses import nearest_axis, turn_upright, turned, up_of_cameras
 from ico3d.errors import CaptureError, SettingsError

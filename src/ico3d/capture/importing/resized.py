@@ -3,8 +3,8 @@
 import numpy as np
 
 from ico3d.capture.capture import Capture, Sound
-from ico3d.capture.checking.finding import Finding
 from ico3d.capture.extras import opencv
+from ico3d.capture.finding import Finding
 from ico3d.common.camera import Camera
 from ico3d.errors import SettingsError
 

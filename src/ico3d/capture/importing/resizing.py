@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.capture.formats import open_capture
-from ico3d.capture.headtrack.track_file import NAME as TRACK
-from ico3d.capture.headtrack.track_file import track_file
+from ico3d.capture.headpose.track_file import NAME as TRACK
+from ico3d.capture.headpose.track_file import track_file
+from ico3d.capture.importing.resized import ResizedCapture
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import Description, Place
 from ico3d.capture.multiview.parallel import View, each_camera
 from ico3d.capture.multiview.writing import new_folder
 from ico3d.capture.portrait.files import save_picture
-from ico3d.capture.resized import ResizedCapture
 from ico3d.common.camera import Camera
 
 

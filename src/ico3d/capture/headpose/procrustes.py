@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ico3d.capture.headtrack.shape import inverse, moved, rigid_fit
+from ico3d.capture.headpose.shape import inverse, moved, rigid_fit
 
 FEWEST_POINTS = 6
 """Points that a frame must show; fewer may lie on a line."""

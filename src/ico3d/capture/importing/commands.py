@@ -49,7 +49,7 @@ class Import:
         Raises:
             CaptureError: If the source is damaged or not known, or `out` exists.
         """
-        from ico3d.capture.multiview.importing import ImportSettings, import_recording
+        from ico3d.capture.importing.recording import ImportSettings, import_recording
 
         told = (self.consent, self.licence, self.shows)
         settings = ImportSettings(self.images, self.fps, self.scale, *told)
@@ -112,7 +112,7 @@ class Resize:
         Raises:
             CaptureError: If the source cannot be read, or `out` exists.
         """
-        from ico3d.capture.multiview.resizing import resize_capture
+        from ico3d.capture.importing.resizing import resize_capture
 
         _say(resize_capture(self.source, self.out, self.height, self.workers), self.out)
 

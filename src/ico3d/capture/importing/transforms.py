@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.capture.decoding import size_of
+from ico3d.capture.importing.foreign import Foreign, Shot, fitted, inside
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.description import matrix, number, read_json
-from ico3d.capture.multiview.foreign import Foreign, Shot, fitted, inside
 from ico3d.capture.poses import rigid
 from ico3d.errors import CaptureError
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import solveh_banded
 from scipy.spatial.transform import Rotation
 
-from ico3d.capture.headtrack.procrustes import RigidMotion
+from ico3d.capture.headpose.procrustes import RigidMotion
 
 LONGEST_GAP = 5
 """Frames without a pose that are bridged between two that have one."""

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ico3d.capture.headtrack.procrustes import procrustes
-from ico3d.capture.headtrack.shape import inverse, moved
-from ico3d.capture.headtrack.whittaker import smoothed_poses
+from ico3d.capture.headpose.procrustes import procrustes
+from ico3d.capture.headpose.shape import inverse, moved
+from ico3d.capture.headpose.whittaker import smoothed_poses
 
 LANDMARKS = 68
 HOLDING = np.ones(LANDMARKS, bool)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ico3d.capture.importing.foreign import Foreign, Shot, fitted, inside
 from ico3d.capture.lens import Lens
-from ico3d.capture.multiview.foreign import Foreign, Shot, fitted, inside
 from ico3d.errors import CaptureError
 
 MODELS = {

@@ -3,9 +3,9 @@
 import numpy as np
 
 from ico3d.capture.capture import Capture, Sound
-from ico3d.capture.checking.finding import Finding
 from ico3d.capture.face.expressions import BLENDSHAPES
-from ico3d.capture.headtrack.track_file import HeadTrack, read_track
+from ico3d.capture.finding import Finding
+from ico3d.capture.headpose.track_file import HeadTrack, read_track
 from ico3d.capture.surface.head import head_hull
 from ico3d.errors import CaptureError
 

@@ -8,8 +8,8 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from ico3d.capture.checking.finding import Finding
 from ico3d.capture.face.expressions import BLENDSHAPES
+from ico3d.capture.finding import Finding
 from ico3d.common.expression import EYE_NAMES
 from ico3d.common.files import write_atomic
 from ico3d.errors import CaptureError
