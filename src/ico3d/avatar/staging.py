@@ -11,6 +11,7 @@ from ico3d.avatar.render_bundle import visitor_camera
 from ico3d.bundle.manifest import CameraInfo, Provenance
 from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera
+from ico3d.common.spread import spread
 from ico3d.errors import BundleError
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
@@ -183,8 +184,8 @@ def _roughness(poses: np.ndarray) -> float:
 def _asymmetry(capture: Capture, camera: int) -> float:
     """How far the nose's tip is from the middle between both jaw ends; 1 where unknown."""
     values = []
-    for frame in np.linspace(0, capture.num_frames - 1, 8).astype(int):
-        landmarks = capture.landmarks(camera, int(frame))
+    for frame in spread(capture.num_frames, 8):
+        landmarks = capture.landmarks(camera, frame)
         if landmarks is not None and np.isfinite(landmarks).all():
             left, right = np.linalg.norm(landmarks[[0, 16]] - landmarks[30], axis=1)
             values.append(abs(left - right) / max(left + right, 1e-9))

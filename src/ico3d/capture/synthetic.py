@@ -21,11 +21,6 @@ READABLE = (1, 2)
 NEEDED = ("format", "version", "fps", "num_frames", "blendshape_names", "cameras", "sources")
 
 
-def is_synthetic(path: Path) -> bool:
-    """Whether a folder holds a synthetic capture."""
-    return (path / "capture.json").is_file()
-
-
 class SyntheticCapture(Capture):
     """A synthetic person recorded by `ico3d capture synthetic`, with exact truth."""
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -69,7 +70,10 @@ class Video:
             stream = container.streams.video[0]
             stream.thread_type = "AUTO"
             first = None
-            for frame in _decode(self, container, stream):
+            for frame in decoded_frames(container, stream):
+                if frame is None:
+                    self.damaged += 1
+                    continue
                 self.decoded += 1
                 seconds = frame.time if frame.time is not None else (first or 0.0) + self.decoded
                 first = seconds if first is None else first
@@ -150,7 +154,9 @@ def read_sound(path: Path) -> Sound | None:
 def _sound_frames(path: Path, container, stream) -> Iterator:
     """The decoded pieces of a sound, for as long as it keeps to what is taken."""
     samples = 0
-    for frame in _decode(None, container, stream):
+    for frame in decoded_frames(container, stream):
+        if frame is None:
+            continue
         samples += frame.samples
         check_claim(path, Claim(frame.sample_rate, frame.layout.nb_channels, samples))
         yield frame
@@ -172,8 +178,16 @@ def _shifted(samples: np.ndarray, later: int) -> np.ndarray:
     return samples[-later:].astype(np.float32)
 
 
-def _decode(video: Video | None, container, stream) -> Iterator:
-    """Decodes packet by packet, so that a damaged one costs only itself."""
+def decoded_frames(container: Any, stream: Any) -> Iterator[Any]:
+    """Decodes packet by packet, so that a damaged one costs only itself.
+
+    Args:
+        container: An open file of PyAV, from where it stands.
+        stream: The pictures or the sound in it.
+
+    Yields:
+        Frames of PyAV; None for a packet that is damaged.
+    """
     from av.error import FFmpegError
 
     packets = container.demux(stream)
@@ -183,9 +197,7 @@ def _decode(video: Video | None, container, stream) -> Iterator:
             if packet is None:
                 return
             frames = packet.decode()
-        except (FFmpegError, EOFError):
-            if video is None:
-                continue
-            video.damaged += 1
+        except (FFmpegError, EOFError, OSError):
+            yield None
             continue
         yield from frames

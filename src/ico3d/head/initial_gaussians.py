@@ -101,10 +101,10 @@ def _moments(capture: Capture) -> list[Moment]:
 
 def _seen(capture: Capture, points: np.ndarray) -> np.ndarray:
     """The points (P', 3) of (P, 3) that lie within some picture: others would never be trained."""
-    frames = capture.split.train[:: max(1, len(capture.split.train) // 8)]
+    train = capture.split.train
     cameras = [
         view_of(capture, index, frame).camera
-        for frame in frames
+        for frame in (train[place] for place in spread(len(train), 8))
         for index in range(len(capture.cameras))
     ]
     inside = in_pictures(points, cameras).any(0)  # (P,)

@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import KW_ONLY, asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -24,7 +24,7 @@ GAUSSIAN_AXES = {"means": 0, "quats": 0, "log_scales": 0, "basis": 1}
 
 @dataclass(frozen=True)
 class HeadShape:
-    """What decides the sizes of a head model's parameters.
+    """What decides the sizes of a head model's parameters; training takes them from its settings.
 
     Attributes:
         expression_size: B, values that drive the head.
@@ -39,9 +39,10 @@ class HeadShape:
 
     expression_size: int
     variant: Variant = "full"
-    features: int = 32
-    hidden: int = 64
-    frequencies: int = 6
+    _: KW_ONLY
+    features: int
+    hidden: int
+    frequencies: int
     box_center: tuple[float, float, float] = (0.0, 0.0, 0.0)
     box_size: float = 1.0
 

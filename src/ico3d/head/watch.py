@@ -9,6 +9,7 @@ from torch import Tensor
 from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera
 from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
+from ico3d.common.spread import spread
 from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack
 from ico3d.head.model import HeadModel
 from ico3d.head.views import Picture, head_pose, staged
@@ -86,11 +87,11 @@ class WatchedHead:
 
     def _found_sliders(self) -> list[Slider]:
         """Those that move most first."""
-        frames = torch.linspace(0, self.frames - 1, min(SAMPLES, self.frames)).int().tolist()
+        frames = spread(self.frames, SAMPLES)
         expressions = torch.stack([self._expression(frame) for frame in frames])  # (S, B)
-        spread = expressions.std(0, correction=0)  # (B,)
-        moving = [name for name, index in self._inputs.items() if spread[index] > STILL]
-        moving.sort(key=lambda name: -float(spread[self._inputs[name]]))
+        motion = expressions.std(0, correction=0)  # (B,)
+        moving = [name for name, index in self._inputs.items() if motion[index] > STILL]
+        moving.sort(key=lambda name: -float(motion[self._inputs[name]]))
         columns = {name: expressions[:, self._inputs[name]] for name in moving[:MOST_SLIDERS]}
         return [
             Slider(name, round(float(values.min()), 3), round(float(values.max()), 3))

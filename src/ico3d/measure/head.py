@@ -13,6 +13,7 @@ from torch import Tensor
 from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera
 from ico3d.common.psnr import psnr
+from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 from ico3d.head.expressions import ExpressionTrack
 from ico3d.head.model_folder import TrainedHead
@@ -141,7 +142,7 @@ def squareness(camera: Camera) -> float:
 
 def most_frontal_camera(capture: Capture, frames: Sequence[int]) -> int:
     """The camera that faces the head most squarely, averaged over some of the frames."""
-    some = frames[:: max(1, len(frames) // 16)]
+    some = [frames[place] for place in spread(len(frames), 16)]
 
     def average(camera: int) -> float:
         return float(np.mean([squareness(view_of(capture, camera, f).camera) for f in some]))

@@ -9,6 +9,7 @@ from ico3d.capture.capture import Capture
 from ico3d.capture.pictures import View
 from ico3d.capture.surface.hull import Silhouette, focus, looked_at, visual_hull
 from ico3d.common.camera import Camera
+from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 from ico3d.scene.model import StaticScene, scene_on_points
 from ico3d.scene.settings import SceneSettings
@@ -49,7 +50,7 @@ def initial_scene(
     Raises:
         CaptureError: If there is nothing to start from.
     """
-    some = _spread(views.train)
+    some = [views.train[place] for place in spread(len(views.train), SAMPLED_VIEWS)]
     count = min(settings.initial_gaussians, settings.max_gaussians)
     surface = None if views.only == "background" else _surface(capture, views, some)
     if views.only == "person":
@@ -65,12 +66,6 @@ def initial_scene(
     colors = _colors(points, views, some)
     opacity, scale = settings.initial_opacity, settings.initial_scale
     return Start(scene_on_points(points, colors, settings.sh_degree, opacity, scale), extent)
-
-
-def _spread(views: Sequence[View]) -> list[View]:
-    """Some of the views, evenly spread."""
-    places = np.linspace(0, len(views) - 1, min(SAMPLED_VIEWS, len(views)))
-    return [views[int(place)] for place in places]
 
 
 def _surface(capture: Capture, views: SceneViews, some: Sequence[View]) -> np.ndarray | None:
@@ -121,17 +116,17 @@ def _reach(capture: Capture, some: Sequence[View]) -> float:
     Raises:
         CaptureError: If all cameras stand in one place.
     """
-    spread = _camera_spread(some)
-    if spread == 0:
+    apart = _camera_spread(some)
+    if apart == 0:
         raise CaptureError(
             f"{capture.path}: all pictures were taken from one place: depth cannot be seen."
         )
     cameras = [view.camera for view in some]
     middle = focus(cameras)
     if middle is None:
-        return 2 * spread
+        return 2 * apart
     depth = float(np.median([camera.project(middle)[1] for camera in cameras]))
-    return depth if depth > 0 else 2 * spread
+    return depth if depth > 0 else 2 * apart
 
 
 def _in_front(

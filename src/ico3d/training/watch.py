@@ -15,6 +15,7 @@ import torch
 from torch import Tensor
 
 from ico3d.common.camera import Camera
+from ico3d.common.spread import spread
 from ico3d.errors import MissingExtraError
 from ico3d.splat import harmonics, quaternions
 from ico3d.splat.gaussians import Gaussians
@@ -217,8 +218,8 @@ def _placed(gaussians: Gaussians) -> tuple[np.ndarray, float]:
 
 def _up(subject: Watchable) -> np.ndarray:
     """(3,) where the cameras of the frames have up, on average."""
-    frames = np.unique(np.linspace(0, subject.frames - 1, UP_SAMPLES).astype(int))
-    downs = [subject.camera(int(frame)).world_to_camera[1, :3] for frame in frames]
+    frames = spread(subject.frames, UP_SAMPLES)
+    downs = [subject.camera(frame).world_to_camera[1, :3] for frame in frames]
     up = -np.mean(downs, 0)
     return up / max(float(np.linalg.norm(up)), 1e-6)
 

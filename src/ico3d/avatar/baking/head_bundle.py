@@ -9,7 +9,7 @@ import numpy as np
 from ico3d.avatar import staging
 from ico3d.avatar.baking import head_cost
 from ico3d.avatar.baking.samples import Samples
-from ico3d.avatar.baking.shader_head import MAX_RANK, BakeSettings, HeadBaker, megabytes_per_10k
+from ico3d.avatar.baking.shader_head import BakeSettings, HeadBaker, megabytes_per_10k
 from ico3d.avatar.render_bundle import baked_gaussians
 from ico3d.bundle.format import HEAD, LICENSES, POSES, SPEECH, THUMBNAIL, write_bundle
 from ico3d.bundle.head import BakedHead, poses_to_bytes
@@ -29,8 +29,10 @@ from ico3d.speech.encoder import load_encoder
 from ico3d.speech.export import export_speech, make_servable
 from ico3d.speech.network import SpeechAdaptor
 
-RANKS = (16, 20, 24, 28, MAX_RANK)
-"""Tried in this order. Not fewer: means over views would not notice that rare blinks are lost."""
+RANKS = (16, 20, 24, 28, 32)
+"""Ranks that are tried where none is asked for, in this order. Not fewer: means over views would
+not notice that rare blinks are lost. Not more: with 38 + 4·K bytes per Gaussian, 32 is the largest
+that keeps `MAX_MEGABYTES`; what a bundle can hold at most says `ico3d.bundle.limits`."""
 MAX_MEGABYTES = 1.7
 """MB of head.safetensors per 10,000 Gaussians, at most."""
 MEASURED_VIEWS = 40
@@ -79,7 +81,8 @@ def bake(
     """
     report("sampling the exact head …")
     chosen = settings or BakeSettings()
-    baker = HeadBaker(head.model, samples.expressions, samples.importance, rank or MAX_RANK, chosen)
+    most = rank or RANKS[-1]
+    baker = HeadBaker(head.model, samples.expressions, samples.importance, most, chosen)
     results = []
     for candidate in (rank,) if rank else RANKS:
         baked = baker.baked(candidate)

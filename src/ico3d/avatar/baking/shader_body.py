@@ -6,10 +6,10 @@ import numpy as np
 import torch
 
 from ico3d.avatar.baking.motion_clusters import Channel, components, group
-from ico3d.avatar.baking.shader_head import LEAST_ALPHA
 from ico3d.avatar.moving import MovingBody
 from ico3d.bundle.body import QUAT_UNIT, BakedWindow
 from ico3d.errors import BundleError
+from ico3d.splat.convention import MIN_ALPHA
 from ico3d.splat.gaussians import Gaussians
 
 _INT16 = 32767
@@ -56,7 +56,7 @@ class WindowBaker:
         """
         span = body.windows[index]
         first = body.window_gaussians(index, 0.0).detach()
-        kept = first.drawable() & (first.opacities >= LEAST_ALPHA)
+        kept = first.drawable() & (first.opacities >= MIN_ALPHA)
         if not kept.any():
             raise BundleError(f"window {index} has no Gaussian that is ever seen: train it again.")
         self._rgba = _display_colours(first[kept])

@@ -9,15 +9,13 @@ from ico3d.avatar.baking.distil import CoefficientNetwork, augmented, distil
 from ico3d.avatar.baking.lowrank import LowRank, factorise
 from ico3d.avatar.baking.quantise import quantise
 from ico3d.bundle.head import BakedHead
+from ico3d.common.spread import spread
 from ico3d.errors import BundleError
 from ico3d.head.model import HeadModel
+from ico3d.splat.convention import MIN_ALPHA
 
 CLIP = 8.0
 """Logits beyond ±8 differ by less than 1/2,980 in the picture."""
-LEAST_ALPHA = 1 / 255
-"""A splat under this alpha is never drawn (splat.render)."""
-MAX_RANK = 32
-"""The largest rank within 1.7 MB per 10,000 Gaussians (38 + 4·K bytes each)."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +45,7 @@ class HeadBaker:
         model: HeadModel,
         expressions: np.ndarray,
         importance: np.ndarray,
-        rank: int = MAX_RANK,
+        rank: int,
         settings: BakeSettings = BakeSettings(),
     ):
         """Samples the model.
@@ -57,14 +55,14 @@ class HeadBaker:
             expressions: (T, B) those of the training frames.
             importance: (N, 4) weights of logit errors.
             rank: The largest that `baked` will be asked for.
-            settings: See there.
+            settings: Of the fit.
 
         Raises:
             BundleError: If no Gaussian is ever opaque enough to be drawn.
         """
-        chosen = _spread(expressions, settings.max_frames)
+        chosen = expressions[spread(len(expressions), settings.max_frames)]
         samples = sample_logits(model, chosen)  # (T, N, 4)
-        self._kept = (samples[:, :, 3] > np.log(LEAST_ALPHA / (1 - LEAST_ALPHA))).any(axis=0)
+        self._kept = (samples[:, :, 3] > np.log(MIN_ALPHA / (1 - MIN_ALPHA))).any(axis=0)
         if not self._kept.any():
             raise BundleError("the head has no Gaussian that is ever seen: train it again.")
         self._model, self._weights = model, importance[self._kept]
@@ -129,13 +127,6 @@ def _geometry(model: HeadModel, kept: np.ndarray) -> dict[str, np.ndarray]:
         "quats": quats.astype(np.float16),
         "scales": log_scales.astype(np.float16),
     }
-
-
-def _spread(expressions: np.ndarray, count: int) -> np.ndarray:
-    """At most `count` rows, evenly spread."""
-    if len(expressions) <= count:
-        return expressions
-    return expressions[np.linspace(0, len(expressions) - 1, count).round().astype(int)]
 
 
 def _flat(samples: np.ndarray) -> np.ndarray:

@@ -20,9 +20,6 @@ from ico3d.splat.gaussians import Gaussians
 GRID, MLP = "grid.", "mlp."
 """What the names of the shared tensors begin with."""
 
-MOVED = 10
-"""Δμ 3, Δr 4, Δs 3."""
-
 
 @dataclass(frozen=True)
 class Deformation:

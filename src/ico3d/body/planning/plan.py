@@ -13,7 +13,6 @@ from ico3d.body.planning.flow import clip_flow
 from ico3d.body.planning.windows import Window, cut
 from ico3d.capture.capture import Capture
 from ico3d.common.files import write_atomic
-from ico3d.errors import ModelError
 
 BLOCKS = "▁▂▃▄▅▆▇█"
 
@@ -91,24 +90,6 @@ def make_plan(
 def save_plan(plan: Plan, path: Path) -> None:
     """Writes a plan as JSON."""
     write_atomic(path, json.dumps(asdict(plan), indent=1).encode())
-
-
-def load_plan(path: Path) -> Plan:
-    """Reads a plan.
-
-    Raises:
-        ModelError: If there is none, or it is damaged.
-    """
-    try:
-        values = json.loads(path.read_text())
-        values["windows"] = tuple(Window(**window) for window in values["windows"])
-        values["motion"] = tuple(map(float, values["motion"]))
-        values["settings"] = PlanSettings(**values["settings"])
-        return Plan(**values)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise ModelError(
-            f"{path} is no plan of windows ({error}): make it with ico3d train body --plan."
-        ) from error
 
 
 def print_plan(plan: Plan, console: Console) -> None:

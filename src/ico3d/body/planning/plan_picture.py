@@ -11,6 +11,7 @@ from ico3d.body.planning.plan import Plan
 from ico3d.body.planning.windows import Window
 from ico3d.capture.capture import Capture
 from ico3d.common.files import write_atomic
+from ico3d.common.spread import spread
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -89,8 +90,7 @@ def _shown(windows: Sequence[Window]) -> list[int]:
     ends = [windows[0].first, *(window.last for window in windows)]
     frames = sorted({*ends, *(window.center for window in windows)})
     frames = frames if len(frames) <= MOST_PICTURES else ends
-    places = np.linspace(0, len(frames) - 1, min(len(frames), MOST_PICTURES)).round().astype(int)
-    return [frames[place] for place in places]
+    return [frames[place] for place in spread(len(frames), MOST_PICTURES)]
 
 
 def _person(capture: Capture, camera: int, frames: list[int]) -> tuple[slice, slice]:

@@ -21,6 +21,7 @@ from ico3d.body.training.prepare_window import Begin, begin_window, continued_wi
 from ico3d.body.training.views import BodyViews
 from ico3d.capture.capture import Capture
 from ico3d.capture.formats import open_capture
+from ico3d.capture.pictures import train_cameras
 from ico3d.common.device import DeviceName
 from ico3d.errors import ModelError
 from ico3d.splat.device import computing_device
@@ -184,8 +185,7 @@ def finetune_window(
     device = computing_device(job.device)
     model.to(device)
     previous.to(device)
-    held_out = capture.split.test_cameras
-    cameras = [camera for i, camera in enumerate(capture.cameras) if i not in held_out]
+    cameras = [capture.cameras[index] for index in train_cameras(capture)]
     pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
     seed = job.seed + 1_000 * task.index + 500
     companion = job.companion.open(device) if job.companion else None

@@ -62,7 +62,7 @@ def check_name(path: Path) -> None:
 def _row(capture: Capture, track: HeadTrack, frame: int) -> list[Image.Image]:
     """One frame in cameras that saw the face, evenly chosen."""
     seen = np.flatnonzero(track.views[frame])
-    chosen = seen[np.unique(np.linspace(0, len(seen) - 1, CAMERAS).round().astype(int))]
+    chosen = seen[spread(len(seen), CAMERAS)]
     return [_tile(capture, track, int(camera), frame) for camera in chosen]
 
 

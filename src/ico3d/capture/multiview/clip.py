@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ico3d.capture.video import decoded_frames
 from ico3d.errors import CaptureError, MissingExtraError
 
 MOST_OPEN = 4
@@ -147,7 +148,7 @@ class _Decoder:
                 return self._last
         for start in index.starts(time):
             self._container.seek(start, stream=self._stream, backward=True)
-            self._frames, self._broken = _decoded(self._container, self._stream), False
+            self._frames, self._broken = decoded_frames(self._container, self._stream), False
             if self._advance(time):
                 return self._last
         return None
@@ -210,22 +211,3 @@ class _Packet:
         self.pts = packet.pts
         self.dts = packet.pts if packet.dts is None else packet.dts  # Matroska has none
         self.is_keyframe, self.is_discard = packet.is_keyframe, packet.is_discard
-
-
-def _decoded(container: Any, stream: Any) -> Iterator[Any]:
-    """Frames from where the container stands; None for a packet that is damaged."""
-    from av.error import FFmpegError
-
-    packets = container.demux(stream)
-    while True:
-        try:
-            packet = next(packets, None)
-            if packet is None:
-                return
-            frames = packet.decode()
-        except EOFError:
-            return
-        except (FFmpegError, OSError):
-            yield None
-            continue
-        yield from frames

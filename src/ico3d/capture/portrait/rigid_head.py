@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ico3d.common.spread import spread
+
 FOCAL_GUESS = 2.3
 """Focal length over the longer image side of a usual portrait video."""
 FOCAL_SPREAD = 0.4
@@ -82,7 +84,7 @@ def fit(
     Returns:
         The track; its poses are as noisy as the landmarks (see `alignment`).
     """
-    chosen = np.unique(np.linspace(0, len(landmarks) - 1, FIT_FRAMES).round().astype(int))
+    chosen = spread(len(landmarks), FIT_FRAMES)
     track = _start(start[chosen], shape, image_size, focal)
     track = replace(track, sigmas=1.0 / np.maximum(rigidity, 0.05))
     for _ in range(30):

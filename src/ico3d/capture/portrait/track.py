@@ -37,6 +37,7 @@ from ico3d.capture.surface.first_points import face_points, silhouette_points
 from ico3d.capture.video import Video, open_video, read_sound
 from ico3d.common.camera import Camera
 from ico3d.common.device import DeviceName
+from ico3d.common.spread import spread
 from ico3d.common.weights import model_file
 from ico3d.errors import CaptureError
 
@@ -237,7 +238,7 @@ def _save_mattes(work: Path, readings: Readings) -> tuple[float, float]:
     """Person, parts, clean plate, composites: share of background seen, and how much it moves."""
     landmarks = np.stack(readings.landmarks)
     models, colours = _learn(work, readings, landmarks)
-    chosen = set(_spread(len(readings.frames), SAMPLES))
+    chosen = set(spread(len(readings.frames), SAMPLES))
     images, alphas = [], []
     steps = progress(range(len(readings.frames)), "cutting out the person", console=console)
     for index in steps:
@@ -263,7 +264,7 @@ def _learn(
     work: Path, readings: Readings, landmarks: np.ndarray
 ) -> tuple[cutout.Models, parsing.PartColours]:
     """Colours of background, person and parts, from a dozen frames."""
-    chosen = _spread(len(readings.frames), 12)
+    chosen = spread(len(readings.frames), 12)
     whole = [load_uint8(work / "ori_imgs" / f"{readings.frames[i]}.jpg") for i in chosen]
     images = [cutout.working(image) for image in whole]
     faces = landmarks[chosen] * (images[0].shape[1] / whole[0].shape[1])
@@ -393,8 +394,3 @@ def load_uint8(path: Path) -> np.ndarray:
     """A picture as uint8."""
     with Image.open(path) as picture:
         return np.asarray(picture)
-
-
-def _spread(total: int, count: int) -> list[int]:
-    """At most `count` indices spread evenly over `total`."""
-    return np.unique(np.linspace(0, total - 1, count).round().astype(int)).tolist()

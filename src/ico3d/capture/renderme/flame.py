@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from ico3d.capture.headpose.procrustes import fit_poses, procrustes
 from ico3d.capture.smc.file import SmcFile
+from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 
 VERTICES = 5023
@@ -123,8 +124,7 @@ class FlameFits:
         Its axes are the model's in the first of them (+x to the person's left, +y up, +z forward),
         its origin is the middle of its vertices.
         """
-        spread = np.linspace(0, len(self.frames) - 1, min(MEASURED, len(self.frames)))
-        frames = [self.frames[index] for index in spread.round().astype(int)]
+        frames = [self.frames[index] for index in spread(len(self.frames), MEASURED)]
         meshes = np.stack([self.vertices(frame) for frame in frames])  # type: ignore[arg-type]
         axes = self._axes(frames[0])
         heights = meshes[0] @ axes[:, 1]  # (V,)
