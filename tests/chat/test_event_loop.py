@@ -200,8 +200,8 @@ async def test_nothing_is_looked_up_on_the_event_loop(bundle, monkeypatch):
         return counted
 
     for kind, name in (
-        (services.Service, "make"),
-        (services.Service, "described"),
+        (services.ChosenService, "make"),
+        (services.ChosenService, "described"),
         (services.Chosen, "dictation"),
     ):
         monkeypatch.setattr(kind, name, looked_up(getattr(kind, name)))

@@ -12,7 +12,7 @@ from pipecat.frames.frames import EndWorkerFrame
 from pipecat.processors.frame_processor import FrameDirection
 
 from ico3d.chat.parts import make_parts
-from ico3d.chat.services import Service
+from ico3d.chat.services import ChosenService
 from ico3d.chat.serving.server import open_avatar
 from ico3d.chat.wire.protocol import VERSION as VERSION
 from ico3d.chat.wire.protocol import Error, Speech, Text, Welcome
@@ -43,7 +43,7 @@ def failing(kind, error):
     errors = [error]
 
     def adapt(avatar):
-        service: Service = getattr(avatar.services, kind)
+        service: ChosenService = getattr(avatar.services, kind)
 
         def make(options, context):
             if errors:
@@ -167,10 +167,10 @@ async def test_a_pipeline_that_ends_takes_its_session_along(bundle, told, end, a
 async def test_a_fault_of_ours_is_told_and_not_met_again(bundle, told, monkeypatch):
     secret = "my secret"
 
-    async def ask(conversation, text):
+    async def ask(entrance, text):
         raise ZeroDivisionError(text)
 
-    monkeypatch.setattr("ico3d.chat.conversation.Conversation.ask", ask)
+    monkeypatch.setattr("ico3d.chat.listener.PageInput.ask", ask)
     async with serving(bundle) as (url, sessions):
         page, _ = await open_page(url, microphone=False)
         await page.send(Text(secret))

@@ -1,26 +1,9 @@
 import numpy as np
-from hypothesis import given
-from hypothesis import strategies as st
-from scipy.signal import savgol_filter
 
 from ico3d.common.expression import EYE_NAMES
-from ico3d.speech.eyes import EyeBehaviour, smooth_eyes
+from ico3d.speech.eyes import EyeBehaviour
 
 LEFT, RIGHT = EYE_NAMES.index("eyeBlinkLeft"), EYE_NAMES.index("eyeBlinkRight")
-
-
-@given(st.integers(5, 40), st.integers(0, 1000))
-def test_smoothing_is_savitzky_golay(count, seed):
-    values = np.random.default_rng(seed).uniform(0, 1, (count, 7))
-    np.testing.assert_allclose(smooth_eyes(values), savgol_filter(values, 5, 3, axis=0), atol=1e-12)
-
-
-def test_smoothing_keeps_cubics_and_short_tracks():
-    t = np.linspace(-1, 1, 20)[:, None]
-    cubic = 2 * t**3 - t**2 + 0.5 * t + 1
-    np.testing.assert_allclose(smooth_eyes(cubic), cubic, atol=1e-12)
-    short = np.arange(8.0).reshape(4, 2)
-    np.testing.assert_array_equal(smooth_eyes(short), short)
 
 
 def test_behaviour_depends_on_seed_and_time_only():

@@ -1,4 +1,4 @@
-// Written by `python -m ico3d.chat.wire.typescript`. Edit src/ico3d/chat/wire/protocol.py instead.
+// Written by `python -m ico3d.chat.generating`. Edit src/ico3d/chat/wire/protocol.py instead.
 
 export const VERSION = 4;
 export const MICROPHONE_RATE = 16000; // Hz
@@ -68,7 +68,7 @@ export interface AudioMessage {
   type: "audio";
   /** Index of the first sample since the microphone opened; where it jumps, the page left sound out that the network did not carry. */
   sample: number;
-  /** (n,) int16 at 16 kHz, at most 1 s. */
+  /** (n,) int16 at 16 kHz, at most 1 s; 20-100 ms serve best. */
   pcm: Int16Array;
   /** The utterance that left the loudspeaker when the last sample was recorded; null in silence. */
   playing: number | null;
@@ -292,6 +292,16 @@ export interface Matrix {
   rows: number;
   columns: number;
   values: Float32Array;
+}
+
+/** What is done with each of some messages: the compiler misses none. */
+export type Handlers<M extends ServerMessage> = {
+  [Type in M["type"]]: (message: Extract<M, { type: Type }>) => void;
+};
+
+/** Does what there is to be done with a message. */
+export function handle<M extends ServerMessage>(message: M, handlers: Handlers<M>): void {
+  (handlers[message.type as M["type"]] as (message: M) => void)(message);
 }
 
 type Header = { type: string } & Record<string, unknown>;

@@ -64,7 +64,9 @@ NOTHING_HEARD = 3.0  # s without a sign of the recogniser after which a turn is 
 class Conversation:
     """A running pipeline: takes the page's messages, and sends its own to `Page`."""
 
-    def __init__(self, avatar: Avatar, page: Page, visitor: Visitor, ended: Callable[[], None]):
+    def __init__(
+        self, avatar: Avatar, page: Page, visitor: Visitor, ended: Callable[[], None], seed: int
+    ):
         """A conversation that has not started.
 
         Args:
@@ -72,8 +74,9 @@ class Conversation:
             page: Where its messages go.
             visitor: Counts what happens.
             ended: Called if the pipeline ends without having been closed.
+            seed: Decides what eyes, brows and body do by chance.
         """
-        self._avatar, self._page, self._ended = avatar, page, ended
+        self._avatar, self._page, self._ended, self._seed = avatar, page, ended, seed
         self._now = now = asyncio.get_running_loop().time  # for all that waits and measures
         self.activity = Activity(now)
         self._timing = TurnObserver(now, page.send, visitor.turn, visitor.failed)
@@ -82,7 +85,7 @@ class Conversation:
         self._input = PageInput()
         self._captions = Captions(page)
         gestures = avatar.animation and Gestures(
-            avatar.animation, page, self._utterances, avatar.settings.gestures
+            avatar.animation, page, self._utterances, avatar.settings.gestures, seed
         )
         self._echo, self._gestures = EchoGuard(), gestures
         self._speaker = Speaker(page, self._utterances, self._echo.sent, gestures, now)
@@ -207,7 +210,7 @@ class Conversation:
         forget(self._context, self._avatar.settings.memory)
 
     def _pipeline(self, parts: Parts) -> Pipeline:
-        settings, face = self._avatar.settings, make_face(self._avatar)
+        settings, face = self._avatar.settings, make_face(self._avatar, self._seed)
         turns, run = settings.turns, at_once if face.is_remote else self._avatar.workers.run
         trusted = not self._avatar.services.recognition.provider.stand_in
         chosen = strategies(parts.turn, turns, trusted, self._speaker.hush, self._now)
@@ -261,12 +264,12 @@ class Conversation:
             voice.add_event_handler("on_tts_request", requested)
 
 
-def make_face(avatar: Avatar) -> Face:
+def make_face(avatar: Avatar, seed: int) -> Face:
     """The face of one session, whose mouth another machine may move."""
     settings, remote = avatar.settings.expression, None
     if settings.use == "remote" and avatar.speech is not None:
         remote = RemoteMouth(settings, avatar.speech, avatar.speech_sha256)
-    return Face(avatar.head, avatar.speech, remote=remote)
+    return Face(avatar.head, avatar.speech, seed, remote)
 
 
 def aggregators(

@@ -18,7 +18,7 @@ from pipecat.processors.frame_processor import FrameProcessor
 from ico3d.bundle.animation import Animation
 from ico3d.bundle.manifest import HeadInfo, Persona
 from ico3d.chat.observing.failures import cause
-from ico3d.chat.services import Chosen, Service
+from ico3d.chat.services import Chosen, ChosenService
 from ico3d.chat.services.provider import Context, WarmsUp
 from ico3d.chat.settings.conversation import ChatSettings
 from ico3d.chat.turns.detector import Ear
@@ -95,7 +95,7 @@ def make_parts(avatar: Avatar) -> Parts:
         ear, turn = Ear(turns.pause), EagerSmartTurn(turns.pause, params=params)
     made = {}
     for kind in ("recognition", "language", "voice"):
-        service: Service = getattr(services, kind)
+        service: ChosenService = getattr(services, kind)
         with _explained(f"{kind} with {service.provider.title}"):
             made[kind] = service.make(context)
     with _explained("a service"):

@@ -18,7 +18,8 @@ EYE_NAMES = (
 )
 """The seven eye and brow values that complete the expression vector (ARKit names, 0 to 1)."""
 
-_LIDS = [i for i, name in enumerate(EYE_NAMES) if "Blink" in name]
+LIDS = [i for i, name in enumerate(EYE_NAMES) if "Blink" in name]
+"""Which of them are the eyelids."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class EyeRange:
 def eye_range(recorded: np.ndarray) -> EyeRange:
     """What a recording (T, 7) tells: brows rest at their usual place, lids as open as they get."""
     rest = np.median(recorded, axis=0)  # (7,)
-    rest[_LIDS] = np.percentile(recorded[:, _LIDS], 10, axis=0)
+    rest[LIDS] = np.percentile(recorded[:, LIDS], 10, axis=0)
     most = np.maximum(recorded.max(axis=0), rest)
     return EyeRange(*(tuple(round(float(value), 6) for value in row) for row in (rest, most)))
 

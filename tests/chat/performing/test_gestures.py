@@ -122,7 +122,10 @@ def test_a_requested_gesture_comes_first(direction):
 
 def test_what_was_requested_can_be_forgotten():
     page, utterances = Recorder(), Utterances()
-    gestures, same = Gestures(ANIMATION, page, utterances), Gestures(ANIMATION, page, utterances)
+    gestures, same = (
+        Gestures(ANIMATION, page, utterances, True, 0),
+        Gestures(ANIMATION, page, utterances, True, 0),
+    )
     assert gestures.names == ["gesture-1", "gesture-2", "gesture-3"]
     gestures.request("gesture-3")
     gestures.forget()
@@ -137,7 +140,7 @@ def test_what_was_requested_can_be_forgotten():
 
 
 def test_a_held_body_has_no_gestures():
-    assert Gestures(ANIMATION, Recorder(), Utterances(), moving=False).names == []
+    assert Gestures(ANIMATION, Recorder(), Utterances(), moving=False, seed=0).names == []
 
 
 def test_without_gestures_the_body_is_held_at_rest():
@@ -149,7 +152,7 @@ def test_without_gestures_the_body_is_held_at_rest():
 
 def test_a_stopped_utterance_gets_no_motion_and_the_next_one_begins_where_the_body_is():
     page, utterances = Recorder(), Utterances()
-    gestures = Gestures(ANIMATION, page, utterances)
+    gestures = Gestures(ANIMATION, page, utterances, True, 0)
     for utterance in (utterances.begin(), utterances.begin()):
         utterances.made(utterance, 8 * SPEECH_RATE)
         for position, place in [(0.0, 2.0), (0.2, 2.2), (0.4, 2.4)]:
@@ -163,7 +166,7 @@ def test_a_stopped_utterance_gets_no_motion_and_the_next_one_begins_where_the_bo
 
 def test_a_body_that_stands_may_start_in_any_direction():
     page, utterances = Recorder(), Utterances()
-    gestures = Gestures(ANIMATION, page, utterances)
+    gestures = Gestures(ANIMATION, page, utterances, True, 0)
     utterances.made(utterances.begin(), 30 * SPEECH_RATE, complete=True)
     for position in (0.1, 0.3):
         gestures.clock(Clock(0, position, 3.9), position)

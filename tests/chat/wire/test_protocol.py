@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ico3d.chat.conversation import Conversation
-from ico3d.chat.wire import protocol, typescript
+from ico3d.chat.generating import reference, shared, typescript
+from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import (
     OversizedError,
     decode_client,
@@ -193,7 +194,23 @@ def test_every_message_of_a_page_has_a_handler():
     assert set(handlers) - {object} == set(protocol.CLIENT_MESSAGES)
 
 
-def test_the_viewers_file_is_up_to_date():
-    assert typescript.TARGET.read_text(encoding="utf-8") == (typescript.typescript()), (
-        "run python -m ico3d.chat.wire.typescript"
-    )
+@pytest.mark.parametrize(
+    ("target", "made"),
+    [
+        (typescript.TARGET, typescript.typescript),
+        (shared.TARGET, shared.typescript),
+        (reference.TARGET, reference.markdown),
+    ],
+    ids=["protocol.ts", "shared.ts", "protocol.md"],
+)
+def test_what_is_generated_is_up_to_date(target, made):
+    assert target.read_text(encoding="utf-8") == made(), "run python -m ico3d.chat.generating"
+
+
+def test_the_page_names_every_message_and_field():
+    page = reference.markdown()
+    for kind in (*protocol.CLIENT_MESSAGES, *protocol.SERVER_MESSAGES):
+        (row,) = [
+            line for line in page.splitlines() if line.startswith(f"| `{kind.__name__.lower()}`")
+        ]
+        assert all(f"`{name}` (" in row for name in field_types(kind))

@@ -1,4 +1,5 @@
 import { PageError } from '../errors.ts';
+import { BUNDLE_FORMAT, BUNDLE_VERSION, HEADS_ONLY, LID_NAMES, LIDS, MAX_CLUSTERS, MAX_GAUSSIANS } from '../shared.ts';
 
 /** Where the visitor starts, world space. */
 export interface StartCamera {
@@ -52,12 +53,7 @@ export interface Manifest {
   persona: { name: string; greeting: string };
 }
 
-const FORMAT = 'ico3d-bundle';
-const VERSION = 2;
-const HEADS_ONLY = 1; // the version before bodies
 const MOST_LAYERS = 48; // basis vectors of a window; WebGL2 promises 256 layers of a texture
-const MOST_GAUSSIANS = 1_000_000;
-const MOST_CLUSTERS = 256;
 
 /**
  * Checks a parsed manifest as far as the page relies on it.
@@ -66,9 +62,9 @@ const MOST_CLUSTERS = 256;
  */
 export function checkManifest(value: unknown): Manifest {
   const manifest = value as Manifest & { format?: string; version?: number };
-  if (manifest?.format !== FORMAT) throw new PageError('manifest.json is not that of an avatar bundle.');
-  if (manifest.version !== VERSION && manifest.version !== HEADS_ONLY) {
-    throw new PageError(`This avatar has format version ${manifest.version}; the page reads up to ${VERSION}.`);
+  if (manifest?.format !== BUNDLE_FORMAT) throw new PageError('manifest.json is not that of an avatar bundle.');
+  if (manifest.version !== BUNDLE_VERSION && manifest.version !== HEADS_ONLY) {
+    throw new PageError(`This avatar has format version ${manifest.version}; the page reads up to ${BUNDLE_VERSION}.`);
   }
   const { head, camera, background } = manifest;
   const body = manifest.body ?? null;
@@ -97,8 +93,8 @@ function checkBody(body: BodyInfo): void {
     const { first, last, ranks } = window;
     const begins = i ? body.windows[i - 1]!.last : 0;
     if (first !== begins || !Number.isInteger(last) || last <= first) bad(`body.windows[${i}]`);
-    if (!isCount(window.num_gaussians, MOST_GAUSSIANS)) bad(`body.windows[${i}].num_gaussians`);
-    if (!isCount(window.num_clusters, MOST_CLUSTERS)) bad(`body.windows[${i}].num_clusters`);
+    if (!isCount(window.num_gaussians, MAX_GAUSSIANS)) bad(`body.windows[${i}].num_gaussians`);
+    if (!isCount(window.num_clusters, MAX_CLUSTERS)) bad(`body.windows[${i}].num_clusters`);
     const counted = isNumbers(ranks, 3) && ranks.every((rank) => isCount(rank, MOST_LAYERS));
     if (!counted || ranks[0] + ranks[1] + ranks[2] > MOST_LAYERS) bad(`body.windows[${i}].ranks`);
   });
@@ -127,7 +123,7 @@ function bad(field: string): never {
 }
 
 /** Indices of the two eyelid values in the expression, or none. */
-export function blinkIndices(head: HeadInfo): number[] {
-  if (head.eye_offset !== null) return [head.eye_offset + 5, head.eye_offset + 6]; // behind five brow values
-  return ['eyeBlinkLeft', 'eyeBlinkRight'].map((n) => head.expression_names.indexOf(n)).filter((i) => i >= 0);
+export function blinkIndices({ eye_offset, expression_names }: HeadInfo): number[] {
+  if (eye_offset !== null) return LIDS.map((lid) => eye_offset + lid);
+  return LID_NAMES.map((name) => expression_names.indexOf(name)).filter((index) => index >= 0);
 }

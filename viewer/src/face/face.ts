@@ -14,7 +14,7 @@ export interface Heard {
   paused?: boolean; // silent for a moment; it may go on
 }
 
-/** The face's one decision: speech while sound is heard, rest otherwise, eased between. */
+/** The face's one decision: speech while sound is heard, rest otherwise, eased between. Lids go on blinking. */
 export class Face implements Director {
   private readonly idle: IdleFace;
   private readonly heard: () => Heard | null;
@@ -52,6 +52,7 @@ export class Face implements Director {
     if (heard) heard.track.at(heard.seconds + DISPLAY_LEAD, this.target);
     else this.idle.at(now, this.target);
     mix(this.from, this.target, smooth((now - this.changedAt) / EASE), this.shown);
+    this.idle.setLids(now, this.shown); // those of the speech would blink beside those at rest
     const changed = this.shown.some((value, i) => value !== out[i]);
     out.set(this.shown);
     return changed;

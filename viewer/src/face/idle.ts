@@ -1,15 +1,13 @@
-const CLOSING = 0.07; // s
-const CLOSED = 0.04;
-const OPENING = 0.15;
-const PAUSES = [2, 6] as const; // s between blinks
-const BLINK_LENGTH = CLOSING + CLOSED + OPENING;
+import { BLINK } from '../shared.ts';
 
-/** The resting face: the neutral expression, and a blink now and then. */
+const LENGTH = BLINK.closing + BLINK.closed + BLINK.opening; // s
+
+/** The resting face: the neutral expression, and lids that blink at rest and in speech. */
 export class IdleFace {
   private readonly neutral: Float32Array;
   private readonly lids: number[];
   private readonly random: () => number;
-  private nextBlink = 1;
+  private blink = 1; // s, when the latest or the next one begins
 
   /**
    * @param neutral (B,) expression with open eyes
@@ -21,22 +19,33 @@ export class IdleFace {
     this.random = random;
   }
 
-  /** The expression at a time that only runs forward. */
+  /** The expression at rest. */
   at(seconds: number, out: Float32Array): void {
-    if (seconds > this.nextBlink + BLINK_LENGTH) {
-      this.nextBlink = seconds + PAUSES[0] + (PAUSES[1] - PAUSES[0]) * this.random();
-    }
-    const closed = lidClosure(seconds - this.nextBlink);
     out.set(this.neutral);
+    this.setLids(seconds, out);
+  }
+
+  /**
+   * Puts the lids into any expression: one series of blinks, whatever the face does besides.
+   *
+   * @param seconds of a clock that only runs forward
+   */
+  setLids(seconds: number, out: Float32Array): void {
+    while (seconds > this.blink + LENGTH) this.blink += this.pause();
+    const closed = lidClosure(seconds - this.blink);
     for (const i of this.lids) out[i] = this.neutral[i]! + (1 - this.neutral[i]!) * closed;
+  }
+
+  /** Seconds from one blink to the next: log-normal, within bounds. */
+  private pause(): number {
+    const normal = Math.sqrt(-2 * Math.log(1 - this.random())) * Math.cos(2 * Math.PI * this.random());
+    return Math.min(Math.max(BLINK.median * Math.exp(BLINK.spread * normal), BLINK.shortest), BLINK.longest);
   }
 }
 
 /** How far the lids are closed, 0 to 1, `seconds` after a blink began. */
 export function lidClosure(seconds: number): number {
-  if (seconds <= 0 || seconds >= BLINK_LENGTH) return 0;
-  if (seconds < CLOSING) return smooth(seconds / CLOSING);
-  return 1 - smooth(Math.max(0, seconds - CLOSING - CLOSED) / OPENING);
+  return smooth(seconds / BLINK.closing) - smooth((seconds - BLINK.closing - BLINK.closed) / BLINK.opening);
 }
 
 /** Eases from 0 to 1 with no jump in speed. */

@@ -1,6 +1,5 @@
+import { LEAKY_SLOPE } from '../shared.ts';
 import type { Network } from './baked.ts';
-
-const NEGATIVE_SLOPE = 0.02;
 
 /**
  * The basis coefficients of an expression: c(e) = LeakyReLU(e·w1 + b1)·w2 + b2.
@@ -14,7 +13,7 @@ export function coefficients(network: Network, expression: Float32Array, out: Fl
   for (let h = 0; h < hidden; h++) {
     let sum = b1[h]!;
     for (let b = 0; b < inputs; b++) sum += expression[b]! * w1[b * hidden + h]!;
-    const active = sum < 0 ? NEGATIVE_SLOPE * sum : sum;
+    const active = sum < 0 ? LEAKY_SLOPE * sum : sum;
     for (let k = 0; k < outputs; k++) out[k]! += active * w2[h * outputs + k]!;
   }
 }

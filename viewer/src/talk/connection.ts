@@ -3,6 +3,7 @@ import {
   encode,
   RESUME_SECONDS,
   VERSION,
+  type AckMessage,
   type ClientMessage,
   type ErrorMessage,
   type ServerMessage,
@@ -26,9 +27,12 @@ export interface Ending {
   wait: number | null;
 }
 
+/** What the server says once the line is up: all but what keeps the line itself. */
+export type SessionMessage = Exclude<ServerMessage, WelcomeMessage | AckMessage>;
+
 /** What a connection tells its owner. */
 export interface ConnectionEvents {
-  message(message: ServerMessage): void;
+  message(message: SessionMessage): void;
   /**
    * The line is up.
    *

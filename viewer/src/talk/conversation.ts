@@ -1,6 +1,6 @@
 import { Player } from '../audio/player.ts';
-import type { Offer, ServerMessage, Services, StateMessage, WelcomeMessage } from '../protocol.ts';
-import { Connection, type Ending } from './connection.ts';
+import { handle, type Handlers, type Offer, type Services, type StateMessage, type WelcomeMessage } from '../protocol.ts';
+import { Connection, type Ending, type SessionMessage } from './connection.ts';
 import { TurnTimer } from './latency.ts';
 import { VoiceInput, type VoiceView } from './voice-input.ts';
 
@@ -40,12 +40,28 @@ export class Conversation {
   private readonly connection: Connection;
   private readonly voice: VoiceInput;
   private readonly timer = new TurnTimer();
+  private readonly handlers: Handlers<SessionMessage> = {
+    state: ({ state }) => this.show(state),
+    transcript: ({ text, final }) => this.transcript(text, final),
+    answer: ({ text }) => this.view.answer(text),
+    speech: (message) => this.player.play(message),
+    timeline: ({ utterance, points }) => this.gestures?.plan(utterance, points),
+    end: ({ utterance, samples }) => this.player.end(utterance, samples),
+    stop: ({ utterance }) => this.player.stop(utterance),
+    pause: ({ utterance }) => {
+      this.player.pause(utterance);
+      this.reportHeard();
+    },
+    resume: ({ utterance }) => this.player.resume(utterance),
+    metrics: ({ name, values }) => this.view.metrics(name, values),
+    error: ({ message }) => this.view.notice(message),
+  };
   private state: StateMessage['state'] = 'idle'; // of the server
 
   constructor(url: string, view: ConversationView) {
     this.view = view;
     this.connection = new Connection(url, {
-      message: (message) => this.receive(message),
+      message: (message) => handle(message, this.handlers),
       welcome: (message, replaced) => this.welcome(message, replaced),
       lost: () => view.state('connecting'),
       stalled: (stalls) => this.stalled(stalls),
@@ -135,34 +151,6 @@ export class Conversation {
   private show(state: StateMessage['state']): void {
     this.state = state;
     this.view.state(state);
-  }
-
-  private receive(message: ServerMessage): void {
-    switch (message.type) {
-      case 'state':
-        return this.show(message.state);
-      case 'transcript':
-        return this.transcript(message.text, message.final);
-      case 'answer':
-        return this.view.answer(message.text);
-      case 'speech':
-        return this.player.play(message);
-      case 'timeline':
-        return this.gestures?.plan(message.utterance, message.points);
-      case 'end':
-        return this.player.end(message.utterance, message.samples);
-      case 'stop':
-        return this.player.stop(message.utterance);
-      case 'pause':
-        this.player.pause(message.utterance);
-        return this.reportHeard();
-      case 'resume':
-        return this.player.resume(message.utterance);
-      case 'metrics':
-        return this.view.metrics(message.name, message.values);
-      case 'error':
-        return this.view.notice(message.message);
-    }
   }
 
   private transcript(text: string, final: boolean): void {

@@ -42,9 +42,6 @@ export interface Spread {
   p95: number;
 }
 
-/** What lies between a question's end and its answer, in the order in which it happens. */
-export const PARTS = ['vad', 'turn', 'token', 'clause', 'voice', 'expression', 'send'] as const;
-
 /** Times of the last turns, by part. */
 export class Latencies {
   private readonly values = new Map<string, number[]>();

@@ -1,9 +1,10 @@
-import { Latencies, PARTS } from '../talk/latency.ts';
+import { LATENCY_PARTS } from '../shared.ts';
+import { Latencies } from '../talk/latency.ts';
 import { byId } from './elements.ts';
 
 const PERIOD = 1000; // ms between updates
 
-const NAMES: Record<(typeof PARTS)[number], string> = {
+const NAMES: Record<(typeof LATENCY_PARTS)[number], string> = {
   vad: 'notice silence',
   turn: 'end of turn',
   token: 'first word',
@@ -50,7 +51,7 @@ export class Panel {
 
   /** One row for each part: its bar shows where in the whole it lies, as a rule. */
   private draw(): void {
-    const parts = PARTS.map((part) => ({ name: NAMES[part], spread: this.latencies.spread(part) }));
+    const parts = LATENCY_PARTS.map((part) => ({ name: NAMES[part], spread: this.latencies.spread(part) }));
     const heard = this.latencies.spread('heard');
     const whole = Math.max(heard?.p50 ?? 0, parts.reduce((sum, { spread }) => sum + (spread?.p50 ?? 0), 0), 1);
     let start = 0;

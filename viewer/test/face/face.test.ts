@@ -74,6 +74,39 @@ describe('the face', () => {
   });
 });
 
+test('one series of blinks runs through rest, speech and rest again', () => {
+  let now = 0;
+  let heard: Heard | null = null;
+  const draw = () => (seed = (seed * 16807) % 2147483647) / 2147483647;
+  const neutral = Float32Array.of(0.1, 0.5);
+  let seed = 5;
+  const face = new Face(2, new IdleFace(neutral, [0], draw), () => heard, () => now);
+  const twin = new IdleFace(neutral, [0], draw);
+  const track = new ExpressionTrack(FPS);
+  track.add(0, matrix([0.9, 1], [0.2, 1]));
+  const [shown, alone] = [new Float32Array(2), new Float32Array(2)];
+  const blinks: [number, boolean][] = [];
+  let spoken = false;
+  const seen: number[] = [];
+  for (let tick = 0; tick < 60 * 100; tick++) {
+    now = tick / 100;
+    spoken = Math.floor(now / 1.3) % 2 === 1;
+    heard = spoken ? { utterance: Math.floor(now), seconds: now % 1, track } : null;
+    face.expression(shown);
+    seen.push(shown[0]!);
+    if (shown[0]! > 0.99 && seen.at(-2)! <= 0.99) blinks.push([now, spoken]);
+  }
+  seed = 5;
+  seen.forEach((lid, tick) => {
+    twin.at(tick / 100, alone);
+    expect(lid).toBe(alone[0]);
+  });
+  const pauses = blinks.slice(1).map(([at], i) => at - blinks[i]![0]);
+  expect(Math.min(...pauses)).toBeGreaterThan(1.98);
+  expect(Math.max(...pauses)).toBeLessThan(6.02);
+  expect(new Set(blinks.map(([, spoken]) => spoken)).size).toBe(2); // in rest and in speech
+});
+
 describe('a resting face', () => {
   test('blinks every few seconds and closes its lids fully', () => {
     const idle = new IdleFace(Float32Array.of(0.1, 0.5), [0], () => 0.5);

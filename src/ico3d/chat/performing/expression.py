@@ -43,6 +43,7 @@ class ExpressionProcessor(FrameProcessor):
         self._face, self._utterances, self._run = face, utterances, run
         self._in_answer = False
         self._utterance: int | None = None
+        self._opened = time.monotonic()  # when the session began; eyes run on its time
         self._reset()
 
     def _reset(self) -> None:
@@ -88,7 +89,7 @@ class ExpressionProcessor(FrameProcessor):
             self._utterance = self._utterances.begin()
             self._start = time.monotonic()
         if self._sentence is None:
-            self._sentence = Sentence(self._face, self._next_row, self._start % 1e5)
+            self._sentence = Sentence(self._face, self._next_row, self._start - self._opened)
         pcm = np.frombuffer(frame.audio, np.int16)
         for at in range(0, len(pcm), STEP):
             due = self._due(self._sentence)

@@ -38,7 +38,7 @@ class Face:
         self,
         info: HeadInfo,
         model: SpeechModel | None,
-        seed: int = 0,
+        seed: int,
         remote: RemoteMouth | None = None,
     ):
         """A face.

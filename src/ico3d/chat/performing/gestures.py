@@ -32,8 +32,8 @@ class Gestures:
         animation: Animation,
         page: Page,
         utterances: Utterances,
-        moving: bool = True,
-        seed: int = 0,
+        moving: bool,
+        seed: int,
     ):
         """The motion of one session.
 

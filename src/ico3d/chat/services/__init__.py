@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from ico3d.chat.services import language, recognition, voice
-from ico3d.chat.services.choosing import Service, chosen
+from ico3d.chat.services.choosing import ChosenService, chosen
 from ico3d.chat.services.provider import Table
 from ico3d.chat.services.recognition import browser
 from ico3d.chat.settings.conversation import ChatSettings, Choice
@@ -27,9 +27,9 @@ TABLES: Mapping[str, Table] = {
 class Chosen:
     """The services that the settings name."""
 
-    recognition: Service
-    language: Service
-    voice: Service
+    recognition: ChosenService
+    language: ChosenService
+    voice: ChosenService
 
     def described(self) -> protocol.Services:
         """As the page is told."""
@@ -62,7 +62,7 @@ def choose(settings: ChatSettings, voices: Mapping[str, str] | None = None) -> C
     )
 
 
-def with_voice(service: Service, choice: Choice, voices: Mapping[str, str]) -> Service:
+def with_voice(service: ChosenService, choice: Choice, voices: Mapping[str, str]) -> ChosenService:
     """A service that speaks with the persona's voice, unless the settings name another."""
     names = [n for n, provider in voice.PROVIDERS.items() if provider is service.provider]
     own = next((voices[name] for name in names if name in voices), None)

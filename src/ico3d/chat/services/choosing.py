@@ -13,7 +13,7 @@ from ico3d.errors import SettingsError
 
 
 @dataclass(frozen=True)
-class Service:
+class ChosenService:
     """A provider with its options.
 
     Attributes:
@@ -35,7 +35,7 @@ class Service:
         return protocol.Service(name[:LONGEST_NAME], self.provider.stand_in)
 
 
-def chosen(table: Table, choice: Choice, kind: str) -> Service:
+def chosen(table: Table, choice: Choice, kind: str) -> ChosenService:
     """A service by its name, or the first of the table that works here.
 
     Args:
@@ -55,10 +55,10 @@ def chosen(table: Table, choice: Choice, kind: str) -> Service:
         names = " or ".join((*table, BEST))
         raise SettingsError(f"chat settings: {kind} '{choice.use}' is unknown, use {names}.")
     where = f"chat settings: {kind} '{choice.use}'"
-    return Service(provider, filled(provider.settings, choice.options, where))
+    return ChosenService(provider, filled(provider.settings, choice.options, where))
 
 
-def best(table: Table, kind: str) -> Service:
+def best(table: Table, kind: str) -> ChosenService:
     """The first of a table that works here.
 
     Raises:
@@ -69,5 +69,5 @@ def best(table: Table, kind: str) -> Service:
         options = provider.settings()
         hindrance = provider.hindrance(options)
         if not hindrance:
-            return Service(provider, options)
+            return ChosenService(provider, options)
     raise SettingsError(f"no {kind} works here; the last one needs this: {hindrance}")

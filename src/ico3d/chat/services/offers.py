@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from ico3d.chat.services import TABLES, Chosen, Service, chosen, with_voice
+from ico3d.chat.services import TABLES, Chosen, ChosenService, chosen, with_voice
 from ico3d.chat.settings.conversation import ChatSettings, Choice
 from ico3d.chat.wire import protocol
 
@@ -30,7 +30,7 @@ def offers(settings: ChatSettings, voices: Mapping[str, str]) -> list[protocol.O
     return found
 
 
-def named(settings: ChatSettings, voices: Mapping[str, str], kind: str, key: str) -> Service:
+def named(settings: ChatSettings, voices: Mapping[str, str], kind: str, key: str) -> ChosenService:
     """A service of a table, as the settings and the persona describe it where they do.
 
     Raises:

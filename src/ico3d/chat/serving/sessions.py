@@ -34,7 +34,8 @@ class Session:
         """A session whose conversation has not started; `ended` is told if that breaks off."""
         self.id = secrets.token_urlsafe(16)
         self.page = Page()
-        self.conversation = Conversation(avatar, self.page, visitor, lambda: ended(self))
+        seed = secrets.randbits(32)  # no two visitors see the same blinks and gestures
+        self.conversation = Conversation(avatar, self.page, visitor, lambda: ended(self), seed)
         self.parts: Parts | None = None  # once it has started
         self.expiry: asyncio.TimerHandle | None = None  # while its page is away
         self.idle_check: asyncio.TimerHandle | None = None

@@ -8,13 +8,12 @@ import json
 from pathlib import Path
 from typing import Any
 
-from docstring_parser import DocstringStyle, parse
-
 from ico3d.bundle.persona import Persona
 from ico3d.chat.remote.limits import Limits
 from ico3d.chat.services import TABLES
 from ico3d.chat.services.provider import Provider
 from ico3d.chat.settings.conversation import ChatSettings, Choice, described, entry_kind_of
+from ico3d.common.docstrings import notes, summary
 
 TARGET = Path(__file__).parents[4] / "docs" / "settings.md"
 
@@ -132,17 +131,6 @@ def default(field: dataclasses.Field) -> str:
 def written(value: Any) -> str:
     """A value as TOML has it; of tables the empty one only."""
     return json.dumps(value, ensure_ascii=False)
-
-
-def notes(kind: type) -> dict[str, str]:
-    """What each field of a dataclass is, from its docstring."""
-    params = parse(kind.__doc__ or "", DocstringStyle.GOOGLE).params
-    return {param.arg_name: " ".join((param.description or "").split()) for param in params}
-
-
-def summary(kind: type) -> str:
-    """The first sentence of a dataclass."""
-    return parse(kind.__doc__ or "", DocstringStyle.GOOGLE).short_description or ""
 
 
 if __name__ == "__main__":

@@ -40,6 +40,6 @@ class Tensor:
 
 Count = Annotated[int, Range(0, MAX_EXACT)]
 Seconds = Annotated[float, Range(0, 1e7)]
-Sentence = Annotated[str, Length(0, 4000)]
+Words = Annotated[str, Length(0, 4000)]
 Name = Annotated[str, Length(1, LONGEST_NAME)]
 Milliseconds = Annotated[float, Range(-1e7, 1e7)]

@@ -1,7 +1,7 @@
 """The vocabulary of the wire: every message between page and server, and the limits.
 
 `codec.py` encodes, decodes and checks by the annotations in this file, the one source, and
-`python -m ico3d.chat.wire.typescript` writes `viewer/src/protocol.ts` from them.
+`python -m ico3d.chat.generating` writes `viewer/src/protocol.ts` and `docs/protocol.md` from them.
 """
 
 from dataclasses import dataclass, field
@@ -17,11 +17,10 @@ from ico3d.chat.wire.marks import (
     Name,
     Range,
     Seconds,
-    Sentence,
     Tensor,
+    Words,
 )
-from ico3d.chat.wire.protocol_services import Dictation, Offer, Services
-from ico3d.chat.wire.protocol_services import Service as Service
+from ico3d.chat.wire.protocol_services import Dictation, Offer, Service, Services
 
 VERSION = 4
 MICROPHONE_RATE = 16_000  # Hz, PCM16 mono from the page
@@ -61,7 +60,7 @@ class Audio:
     Attributes:
         sample: Index of the first sample since the microphone opened; where it jumps, the page
             left sound out that the network did not carry.
-        pcm: (n,) int16 at 16 kHz, at most 1 s.
+        pcm: (n,) int16 at 16 kHz, at most 1 s; 20-100 ms serve best.
         playing: The utterance that left the loudspeaker when the last sample was recorded; null
             in silence.
         position: Seconds of it that had been heard by then; 0 in silence.
@@ -135,7 +134,7 @@ class Heard:
     """
 
     result: Count
-    text: Sentence
+    text: Words
     final: bool
 
 
@@ -168,7 +167,7 @@ class Welcome:
     session: Annotated[str, Length(1, 64)]
     resumed: bool
     services: Services
-    notices: Annotated[list[Sentence], Length(0, 8)]
+    notices: Annotated[list[Words], Length(0, 8)]
     dictation: Dictation | None
     offers: Annotated[list[Offer], Length(0, 64)] = field(default_factory=list)
 
@@ -207,7 +206,7 @@ class Transcript:
         final: False while he still speaks: the next one replaces this one.
     """
 
-    text: Sentence
+    text: Words
     final: bool
 
 
@@ -223,7 +222,7 @@ class Answer:
 
     utterance: Count
     first_sample: Count
-    text: Sentence
+    text: Words
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,7 +334,7 @@ class Error:
         again: Whether, after a fatal one, a new session may succeed: the page offers to try again.
     """
 
-    message: Sentence
+    message: Words
     fatal: bool
     again: bool = False
 
@@ -358,3 +357,5 @@ ServerMessage = (
 )
 CLIENT_MESSAGES = get_args(ClientMessage)
 SERVER_MESSAGES = get_args(ServerMessage)
+PARTS = (Service, Services, Dictation, Offer)
+"""Dataclasses that messages hold."""

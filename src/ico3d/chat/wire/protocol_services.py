@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from ico3d.chat.wire.marks import Length, Name, Sentence
+from ico3d.chat.wire.marks import Length, Name, Words
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Offer:
     kind: Literal["recognition", "language", "voice"]
     key: Name
     name: Name
-    hindrance: Sentence
+    hindrance: Words
 
 
 @dataclass(frozen=True)

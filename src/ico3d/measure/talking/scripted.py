@@ -28,7 +28,7 @@ from pipecat.services.stt_service import STTService
 from pipecat.services.tts_service import TTSService
 from pipecat.utils.time import time_now_iso8601
 
-from ico3d.chat.services import Chosen, Service
+from ico3d.chat.services import Chosen, ChosenService
 from ico3d.chat.services.provider import Context, Provider
 from ico3d.chat.wire.protocol import SPEECH_RATE
 
@@ -71,7 +71,7 @@ class Script:
             return Voice(replace(script, pitch=next(pitches)))
 
         makes = (partial(made, Recognition), partial(made, Language), voice)
-        return Chosen(*(Service(Provider("scripted", Script, make), self) for make in makes))
+        return Chosen(*(ChosenService(Provider("scripted", Script, make), self) for make in makes))
 
 
 class Recognition(STTService):

@@ -20,7 +20,7 @@ from pipecat.services.stt_service import SegmentedSTTService
 from pipecat.tests.utils import SleepFrame, run_test
 from pipecat.utils.time import time_now_iso8601
 
-from ico3d.chat.services import Service, choose
+from ico3d.chat.services import ChosenService, choose
 from ico3d.chat.services.provider import Provider
 from ico3d.chat.services.recognition import openai, sphinx, whisper
 from ico3d.chat.services.recognition.segments import BLANK, Segments
@@ -124,7 +124,7 @@ async def test_the_words_of_all_pieces_are_one_turn(bundle, question):
     pieces = ("What", "is", "your", "name?", "", "", "")
 
     def adapt(avatar):
-        listener = Service(Provider("cut", Script, lambda s, _: Cut(s)), Script(0.3, pieces))
+        listener = ChosenService(Provider("cut", Script, lambda s, _: Cut(s)), Script(0.3, pieces))
         return silent(replace(avatar, services=replace(avatar.services, recognition=listener)))
 
     async with serving(bundle, adapt=adapt) as (url, _):

@@ -9,7 +9,7 @@ from pipecat.frames.frames import TranscriptionFrame
 from pipecat.services.stt_service import SegmentedSTTService
 from pipecat.utils.time import time_now_iso8601
 
-from ico3d.chat.services import Service
+from ico3d.chat.services import ChosenService
 from ico3d.chat.services.provider import Provider
 from ico3d.chat.services.recognition.segments import Segments
 from ico3d.chat.wire.protocol import Answer, Speech, State, Transcript
@@ -58,7 +58,7 @@ def scripted(delay, *words):
     provider = Provider("script", Script, lambda script, _: Recogniser(longest=10.0, script=script))
 
     def adapt(avatar):
-        service = Service(provider, Script(delay, words))
+        service = ChosenService(provider, Script(delay, words))
         services = replace(avatar.services, recognition=service)
         return silent(replace(avatar, services=services))
 

@@ -23,7 +23,7 @@ from pipecat.services.stt_service import STTService
 from pipecat.utils.time import time_now_iso8601
 
 from ico3d.chat.frames import message_in
-from ico3d.chat.services.choosing import Service, chosen
+from ico3d.chat.services.choosing import ChosenService, chosen
 from ico3d.chat.services.provider import Context, Table
 from ico3d.chat.services.recognition.segments import blank
 from ico3d.chat.settings.conversation import BEST, Choice
@@ -160,7 +160,7 @@ def hindrance(settings: Settings) -> str:
     )
 
 
-def fallback(table: Table, settings: Settings) -> Service | None:
+def fallback(table: Table, settings: Settings) -> ChosenService | None:
     """The recogniser of the server for browsers that have none.
 
     Args:

@@ -1,6 +1,6 @@
 """Writes `viewer/src/protocol.ts` from `protocol.py`: constants, types, encode and decode.
 
-Run `python -m ico3d.chat.wire.typescript` after each change of the protocol.
+Run `python -m ico3d.chat.generating` after each change of the protocol.
 """
 
 import types
@@ -13,6 +13,7 @@ import numpy as np
 
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import field_types, is_binary, kind_of, tensor_of
+from ico3d.common.docstrings import about, notes
 
 TARGET = Path(__file__).parents[4] / "viewer" / "src" / "protocol.ts"
 
@@ -30,11 +31,10 @@ CONSTANTS = {
     "MAX_AHEAD_SECONDS": "",
 }
 
-NESTED = (protocol.Service, protocol.Services, protocol.Dictation, protocol.Offer)
-"""Parts of messages."""
+NESTED = protocol.PARTS
 
 HEAD = """\
-// Written by `python -m ico3d.chat.wire.typescript`. Edit src/ico3d/chat/wire/protocol.py instead.
+// Written by `python -m ico3d.chat.generating`. Edit src/ico3d/chat/wire/protocol.py instead.
 """
 
 CODEC = """\
@@ -43,6 +43,16 @@ export interface Matrix {
   rows: number;
   columns: number;
   values: Float32Array;
+}
+
+/** What is done with each of some messages: the compiler misses none. */
+export type Handlers<M extends ServerMessage> = {
+  [Type in M["type"]]: (message: Extract<M, { type: Type }>) => void;
+};
+
+/** Does what there is to be done with a message. */
+export function handle<M extends ServerMessage>(message: M, handlers: Handlers<M>): void {
+  (handlers[message.type as M["type"]] as (message: M) => void)(message);
 }
 
 type Header = { type: string } & Record<string, unknown>;
@@ -136,12 +146,12 @@ def typescript() -> str:
 
 def interface(kind: type, named: bool) -> str:
     """One dataclass as a documented interface."""
-    summary, notes = documentation(kind)
-    lines = [f"/** {summary} */", f"export interface {exported(kind)} {{"]
+    told = notes(kind)
+    lines = [f"/** {about(kind)} */", f"export interface {exported(kind)} {{"]
     if named:
         lines.append(f'  type: "{kind.__name__.lower()}";')
     for name, annotation in field_types(kind).items():
-        lines.append(f"  /** {notes[name]} */")
+        lines.append(f"  /** {told[name]} */")
         lines.append(f"  {name}: {translated(annotation)};")
     return "\n".join([*lines, "}", ""])
 
@@ -149,19 +159,6 @@ def interface(kind: type, named: bool) -> str:
 def exported(kind: type) -> str:
     """`Text` and `Error` are names that browsers use already."""
     return kind.__name__ + ("" if kind in NESTED else "Message")
-
-
-def documentation(kind: type) -> tuple[str, dict[str, str]]:
-    """The summary and the field notes of a docstring in Google style."""
-    text, _, attributes = (kind.__doc__ or "").partition("Attributes:")
-    notes, name = {}, ""
-    for line in attributes.splitlines():
-        head, colon, tail = line.strip().partition(": ")
-        if colon and line.startswith(" " * 8) and head.isidentifier():
-            name, notes[head] = head, tail
-        elif name and line.strip():
-            notes[name] += " " + line.strip()
-    return " ".join(text.split()), notes
 
 
 def translated(annotation: Any) -> str:
@@ -205,9 +202,3 @@ def tensors(messages: list[type]) -> str:
         pairs = [f'["{n}", "{np.dtype(mark.dtype).name}"]' for n, mark in marks.items() if mark]
         lines.append(f"  {kind.__name__.lower()}: [{', '.join(pairs)}],")
     return "\n".join([*lines, "};", ""])
-
-
-if __name__ == "__main__":
-    TARGET.parent.mkdir(parents=True, exist_ok=True)
-    TARGET.write_text(typescript(), encoding="utf-8")
-    print(f"wrote {TARGET}")

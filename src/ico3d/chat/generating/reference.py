@@ -1,0 +1,114 @@
+"""Writes `docs/protocol.md`: tables made from the messages, around the prose of `protocol.md`.
+
+Run `python -m ico3d.chat.generating` after each change of a message or of the prose. In the prose
+`$CLIENT`, `$SERVER` and `$PARTS` stand for tables, and other names in capitals for constants.
+"""
+
+import types
+import typing
+from dataclasses import is_dataclass
+from pathlib import Path
+from string import Template
+from typing import Any, Literal
+
+from ico3d.chat.serving import connection, limits
+from ico3d.chat.wire import protocol
+from ico3d.chat.wire.codec import field_types, is_binary, kind_of, tensor_of
+from ico3d.chat.wire.marks import Length, Range
+from ico3d.common.docstrings import about, notes
+
+TARGET = Path(__file__).parents[4] / "docs" / "protocol.md"
+PROSE = Path(__file__).with_name("protocol.md")
+
+HEAD = (
+    "<!-- Written by `python -m ico3d.chat.generating` from src/ico3d/chat/wire/protocol.py and "
+    "src/ico3d/chat/generating/protocol.md: edit those. -->\n"
+)
+TYPES = {int: "whole number", float: "number", str: "text", bool: "true or false"}
+HUGE = 1e7  # bounds beyond it only keep out what no sane page sends
+
+
+def markdown() -> str:
+    """The whole page."""
+    title, _, prose = PROSE.read_text(encoding="utf-8").partition("\n")
+    return f"{title}\n\n{HEAD}{Template(prose).substitute(values())}"
+
+
+def values() -> dict[str, Any]:
+    """What the names in the prose stand for."""
+    constants = {
+        name: f"{value:,}" if isinstance(value, int) else f"{value:g}"
+        for module in (connection, limits, protocol)
+        for name, value in vars(module).items()
+        if name.isupper() and isinstance(value, int | float)
+    }
+    return constants | {
+        "KIB_TEXT": protocol.MAX_TEXT_FRAME // 1024,
+        "KIB_BINARY": protocol.MAX_BINARY_FRAME // 1024,
+        "OVERTIME": f"{limits.AUDIO_RATE / protocol.MICROPHONE_RATE:g}",
+        "CLIENT": table(protocol.CLIENT_MESSAGES),
+        "SERVER": table(protocol.SERVER_MESSAGES),
+        "PARTS": "\n".join(map(part, protocol.PARTS)),
+    }
+
+
+def table(messages: tuple[type, ...]) -> str:
+    """All messages of one side, a row for each."""
+    return "\n".join(["| type | what it says | fields |", "|---|---|---|", *map(row, messages)])
+
+
+def row(message: type) -> str:
+    """One message."""
+    name = message.__name__.lower() + ("` (binary)" if is_binary(message) else "`")
+    told = about(message).replace(" (binary)", "")
+    return f"| `{name} | {cell(told)} | {cell('<br>'.join(fields(message)))} |"
+
+
+def part(kind: type) -> str:
+    """One dataclass that messages hold."""
+    return "\n  - ".join([f"- **{kind.__name__}**: {about(kind)}", *fields(kind)])
+
+
+def fields(kind: type) -> list[str]:
+    """The fields of a message or of a part of one: name, type and meaning."""
+    told = notes(kind)
+    return [
+        f"`{name}` ({described(note)}): {told[name]}" for name, note in field_types(kind).items()
+    ]
+
+
+def described(annotation: Any) -> str:
+    """An annotation for people, with its limits."""
+    tensor = tensor_of(annotation)
+    if tensor:
+        return f"{tensor.dims}-dimensional, at most {tensor.max_size:,} elements"
+    kind = kind_of(annotation)
+    bare, origin, arguments = kind.bare, kind.origin, kind.arguments
+    if origin in (types.UnionType, typing.Union):
+        return f"{described(arguments[0])}, or null"
+    if origin is Literal:
+        return " or ".join(f"`{value}`" for value in arguments)
+    if origin is list:
+        return f"list{bounds(kind.marks)}, of {described(arguments[0])}"
+    if origin is tuple:
+        return f"[{', '.join(map(described, arguments))}]"
+    if origin is dict:
+        return f"object{bounds(kind.marks)}, of {described(arguments[1])}"
+    if is_dataclass(bare):
+        return f"**{typing.cast(type, bare).__name__}**"
+    return TYPES[bare] + bounds(kind.marks)
+
+
+def bounds(marks: tuple) -> str:
+    """The limits of a value, as far as they tell something."""
+    for mark in marks:
+        if isinstance(mark, Length):
+            return f", {mark.low:,}–{mark.high:,}"
+        if isinstance(mark, Range) and 0 < abs(mark.low) < HUGE:
+            return f", ≥ {mark.low:g}"
+    return ""
+
+
+def cell(text: str) -> str:
+    """Text that may stand in a table."""
+    return text.replace("|", "\\|")

@@ -1,0 +1,54 @@
+"""Writes `viewer/src/shared.ts`: what Python and the page must agree on besides the messages.
+
+Run `python -m ico3d.chat.generating` after each change of one of these values.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from ico3d.bundle import evaluate, limits, manifest
+from ico3d.chat.observing.timing import PARTS
+from ico3d.common.expression import EYE_NAMES, LIDS
+from ico3d.speech import eyes
+
+TARGET = Path(__file__).parents[4] / "viewer" / "src" / "shared.ts"
+
+HEAD = "// Written by `python -m ico3d.chat.generating` from the files of `src/ico3d` named.\n"
+
+VALUES: tuple[tuple[str, str, Any], ...] = (
+    ("BUNDLE_FORMAT", "What a manifest calls itself; bundle/manifest.py.", manifest.FORMAT),
+    ("BUNDLE_VERSION", "The newest version of a manifest.", manifest.VERSION),
+    ("HEADS_ONLY", "The version of manifests before bodies.", manifest.HEADS_ONLY),
+    ("MAX_GAUSSIANS", "Of a head or a window of a body; bundle/limits.py.", limits.MAX_GAUSSIANS),
+    ("MAX_CLUSTERS", "Groups of Gaussians in a window that move alike.", limits.MAX_CLUSTERS),
+    ("LEAKY_SLOPE", "Of a head's coefficients; bundle/evaluate.py.", evaluate.LEAKY_SLOPE),
+    ("LID_NAMES", "The eyelids among blendshapes.", [EYE_NAMES[lid] for lid in LIDS]),
+    ("LIDS", "Their places in the eye and brow values; common/expression.py.", LIDS),
+    (
+        "BLINK",
+        "How a person blinks, in s; `spread` of the pauses' logarithms. Sources: speech/eyes.py.",
+        {
+            "closing": eyes.CLOSING,
+            "closed": eyes.CLOSED,
+            "opening": eyes.OPENING,
+            "median": eyes.PAUSE_MEDIAN,
+            "spread": eyes.PAUSE_SPREAD,
+            "shortest": eyes.SHORTEST_PAUSE,
+            "longest": eyes.LONGEST_PAUSE,
+        },
+    ),
+    ("LATENCY_PARTS", "Between a question and its answer, in order; observing/timing.py.", PARTS),
+)
+"""Name, what it is, value."""
+
+
+def typescript() -> str:
+    """The whole file."""
+    return "\n".join([HEAD, *(constant(*value) for value in VALUES)])
+
+
+def constant(name: str, about: str, value: Any) -> str:
+    """One documented constant; lists and records are as constant as numbers."""
+    fixed = " as const" if isinstance(value, list | tuple | dict) else ""
+    return f"/** {about} */\nexport const {name} = {json.dumps(value)}{fixed};\n"
