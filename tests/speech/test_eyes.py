@@ -1,7 +1,6 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.signal import savgol_filter
 
 from ico3d.common.expression import EYE_NAMES
 from ico3d.speech.eyes import EyeBehaviour, smooth_eyes
@@ -11,6 +10,8 @@ LEFT, RIGHT = EYE_NAMES.index("eyeBlinkLeft"), EYE_NAMES.index("eyeBlinkRight")
 
 @given(st.integers(5, 40), st.integers(0, 1000))
 def test_smoothing_is_savitzky_golay(count, seed):
+    from scipy.signal import savgol_filter
+
     values = np.random.default_rng(seed).uniform(0, 1, (count, 7))
     np.testing.assert_allclose(smooth_eyes(values), savgol_filter(values, 5, 3, axis=0), atol=1e-12)
 
