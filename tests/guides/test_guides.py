@@ -10,10 +10,10 @@ from guides import guide, recordings
 from guides.small import SMALL
 from ico3d.bundle.format import Bundle
 from ico3d.capture.formats import open_capture
+from support.needs import needs
 from support.shared import MODELS
 
-pytest.importorskip("anny")
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, needs("anny")]
 MODEL = "face_landmarker.task"
 
 

@@ -1,7 +1,6 @@
 """Training is killed, and killed again, and still gives the same head."""
 
 import json
-import multiprocessing
 import random
 import time
 from collections.abc import Callable
@@ -10,6 +9,7 @@ from pathlib import Path
 import pytest
 from safetensors.torch import load_file
 
+from ico3d.training.processes import fork_server
 from support.heads.train_tiny import SETTINGS, train_tiny
 
 pytestmark = pytest.mark.slow
@@ -21,9 +21,7 @@ KILLS = 5
 @pytest.fixture(scope="module")
 def processes():
     """Starts real processes in which everything heavy is imported already."""
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["support.heads.train_tiny", "torch.utils.tensorboard"])
-    return context
+    return fork_server("ico3d.head.train_head")
 
 
 def _started(processes, folder: Path, begun: int):

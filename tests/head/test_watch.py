@@ -22,8 +22,9 @@ from ico3d.head.train_head import HeadJob, train_head
 from ico3d.head.watch import WatchedHead
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.training.watch import RADIUS, LivePage
+from support.needs import needs
 
-viser = pytest.importorskip("viser")
+pytestmark = needs("viser")
 
 SETTINGS = dataclasses.replace(
     PRESETS["cpu"], steps=60, initial_gaussians=200, densify_from=100, checkpoint_every=25
@@ -35,6 +36,7 @@ class Browser:
     """Looks at a page and moves what is on it."""
 
     def __init__(self, port: int):
+        import viser
         from websockets.sync.client import connect
 
         self.html = urllib.request.urlopen(f"http://127.0.0.1:{port}", timeout=20).read()

@@ -14,9 +14,10 @@ from ico3d.speech.encoder import load_encoder
 from ico3d.speech.export import export_speech, make_servable
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions
+from support.needs import needs
 from support.users_weights import write_hubert
 
-transformers = pytest.importorskip("transformers")
+pytestmark = needs("transformers")
 
 
 def sound(seconds, rate=16000, seed=0):
@@ -56,6 +57,8 @@ def test_features_are_what_transformers_says_of_the_same_windows(folder):
     assert features.shape == (83, 64) and features.dtype == np.float32
     # row 47 is in window 9, which sees rows 25 … 55 and two vectors for each
     part = torch.from_numpy(samples[25 * 640 : 25 * 640 + SIZE].copy())
+    import transformers
+
     processor = transformers.Wav2Vec2FeatureExtractor(do_normalize=True)
     inputs = processor(part.numpy(), sampling_rate=16000, return_tensors="pt").input_values
     with torch.no_grad():

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ from ico3d.studio import recording
 from ico3d.studio.person.choice import load_subject
 from ico3d.studio.points import surface_points
 from ico3d.studio.recording import Recording, choose_views, record
+from support.needs import needs
 from support.recordings import synthetic_people
 from support.shared import SUBJECTS
 
@@ -195,7 +195,7 @@ def test_shared_subjects_close_and_open_their_lips(name):
     assert gaps["PP"] < 0.002 and gaps["aa"] > 0.012
 
 
-@pytest.mark.skipif(find_spec("anny") is None, reason="anny is not installed")
+@needs("anny")
 def test_anny_closes_and_opens_the_lips():
     subject = load_subject("anny")
     gaps = {}

@@ -4,16 +4,20 @@ import os
 import signal
 import sys
 import tempfile
-from pathlib import Path
 
 import pytest
 
 from ico3d.body.workers.cluster import RayCluster, share
 from ico3d.body.workers.jobs import train_windows
 from ico3d.errors import MissingExtraError, SettingsError
-from ico3d.training.log import METRICS
 from ico3d.training.run import CHECKPOINT
-from support.bodies.window_tasks import CHECKPOINT_EVERY, step_gone_on_from, tasks, wait_for
+from support.bodies.window_tasks import (
+    CHECKPOINT_EVERY,
+    step_gone_on_from,
+    tasks,
+    wait_for,
+    worker_of,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -69,17 +73,6 @@ def address():
         yield cluster.address
         cluster.shutdown()
     patch.undo()
-
-
-def worker_of(task) -> int:
-    """The process that writes a window's metrics."""
-    for link in Path("/proc").glob("[0-9]*/fd/*"):
-        try:
-            if link.readlink() == task.folder / METRICS:
-                return int(link.parts[2])
-        except OSError:
-            continue  # somebody else's, or closed in the meantime
-    raise AssertionError("nobody trains this window")
 
 
 class Disturbed(RayCluster):

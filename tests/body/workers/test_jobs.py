@@ -4,7 +4,6 @@ import multiprocessing
 import os
 import pickle
 import signal
-import subprocess
 import sys
 import time
 from collections import Counter
@@ -18,8 +17,15 @@ from ico3d.body.workers.processes import Processes, Worker
 from ico3d.errors import CaptureError, MissingExtraError, ModelError, SettingsError
 from ico3d.training.finite import NotFiniteError
 from ico3d.training.loop import saved_steps
+from ico3d.training.processes import fork_server
 from ico3d.training.run import CHECKPOINT
-from support.bodies.window_tasks import CHECKPOINT_EVERY, step_gone_on_from, tasks, wait_for
+from support.bodies.window_tasks import (
+    CHECKPOINT_EVERY,
+    step_gone_on_from,
+    tasks,
+    wait_for,
+    worker_of,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -53,9 +59,7 @@ def test_a_killed_worker_is_replaced_and_the_files_are_those_of_a_sequence(
     recorded, sequence, tmp_path, capsys, monkeypatch
 ):
     """Two at once, of two threads each; the second window's is lost in the middle of training."""
-    monkeypatch.setattr("torch.get_num_threads", lambda: 4)
-    for name, value in {"NUMBA_NUM_THREADS": "2", "OMP_WAIT_POLICY": "passive"}.items():
-        monkeypatch.setenv(name, value)  # the sequence had as many threads as the tests have
+    monkeypatch.setattr("torch.get_num_threads", lambda: 4)  # the sequence had one
     made = tasks(recorded, tmp_path)
     seconds = train_windows(made, Disturbed(2, made[1], killed))
     assert [task.file.read_bytes() for task in made] == sequence
@@ -80,11 +84,6 @@ def alive(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:
         return False
-
-
-def command_line(pid: str) -> str:
-    """What a process was started with."""
-    return Path(f"/proc/{pid}/cmdline").read_text()
 
 
 def test_ctrl_c_and_errors_end_all_workers_and_spare_checkpoints(recorded, tmp_path):
@@ -120,24 +119,24 @@ def test_an_error_of_the_program_is_shown_and_not_tried_again(recorded, tmp_path
     assert capfd.readouterr().err.count("ZeroDivisionError: division by zero") == 1
 
 
+def train_for_long(capture, folder):
+    """What somebody does who has a worker, and is killed."""
+    sys.stdout = open(os.devnull, "w")  # noqa: SIM115 (to the end)
+    long = tasks(capture, folder, "static", steps_per_frame=10_000)
+    train_windows(long[:1], Processes(1, False))
+
+
 def test_workers_end_with_the_one_who_started_them(recorded, tmp_path):
     """Even if that is killed: nobody would stop them, and who comes next writes the same files."""
-    command = (
-        "import sys; from pathlib import Path; from support.bodies.window_tasks import tasks;"
-        "from ico3d.body.workers.jobs import train_windows;"
-        "from ico3d.body.workers.processes import Processes;"
-        "made = tasks(*map(Path, sys.argv[1:]), 'static', steps_per_frame=10_000);"
-        "train_windows(made[:1], Processes(1, False))"
-    )
-    paths = os.pathsep.join(sys.path)
-    environment = {**os.environ, "PYTHONPATH": paths}
-    words = [sys.executable, "-c", command, str(recorded), str(tmp_path)]
-    with subprocess.Popen(words, env=environment, stdout=subprocess.DEVNULL) as parent:
-        wait_for(tasks(recorded, tmp_path)[0].folder / CHECKPOINT)
-        children = Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text().split()
-        worker = next(int(child) for child in children if "spawn_main" in command_line(child))
-        assert alive(worker)
-        parent.kill()
+    processes = fork_server("ico3d.body.workers.jobs")
+    parent = processes.Process(target=train_for_long, args=(recorded, tmp_path))
+    parent.start()
+    task = tasks(recorded, tmp_path)[0]
+    wait_for(task.folder / CHECKPOINT)
+    worker = worker_of(task)
+    assert alive(worker) and worker not in (parent.pid, os.getpid())
+    parent.kill()
+    parent.join()
     deadline = time.monotonic() + 60
     while alive(worker):
         assert time.monotonic() < deadline

@@ -16,10 +16,11 @@ from ico3d.capture.importing.resizing import resize_capture
 from ico3d.cli import main
 from ico3d.studio.picture import paint
 from ico3d.studio.recording import Recording, record
+from support.needs import needs
 from support.recordings import multiview_folders
 from support.shared import MODELS, SUBJECTS
 
-pytest.importorskip("mediapipe")
+pytestmark = needs("mediapipe")
 PERSON = SUBJECTS / "human_face_f.npz"
 
 

@@ -10,12 +10,13 @@ from ico3d.capture.checking.check import examine
 from ico3d.capture.formats import open_capture
 from ico3d.capture.portrait import photometric_poses
 from ico3d.cli import main
+from support.needs import needs
 from support.shared import MODELS, SHARED
 
 CLIP = SHARED / "clips" / "portrait_a.mp4"
 
 av = pytest.importorskip("av")
-pytest.importorskip("mediapipe")
+pytestmark = needs("mediapipe")
 needs_clip = pytest.mark.skipif(not CLIP.is_file(), reason="../shared/clips is not here")
 
 

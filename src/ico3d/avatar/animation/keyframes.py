@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from scipy.signal import find_peaks
 from scipy.spatial import KDTree
 
 from ico3d.avatar.moving import MovingBody
@@ -147,6 +146,8 @@ def find_actions(motion: Motion, rest: Rest) -> tuple[Action, ...]:
     slower they are than around; and how alike the speeds before and after are, for then motion
     that turns back looks like motion that goes on.
     """
+    from scipy.signal import find_peaks  # takes long to import
+
     dips, _ = find_peaks(-np.log(motion.speeds + 1e-4), prominence=np.log(DIP))
     spans = [_still_span(motion, int(dip)) for dip in dips]
     middles = {(first + last) // 2: (first, last) for first, last in spans}

@@ -15,6 +15,7 @@ import torch
 from ico3d.body.training.train_clip import WindowTask
 from ico3d.body.workers.jobs import Lost, work
 from ico3d.errors import Ico3dError, ModelError, SettingsError
+from ico3d.training.processes import fork_server
 
 GPUS = "CUDA_VISIBLE_DEVICES"
 
@@ -81,7 +82,7 @@ class Processes:
             )
         self.capacity = jobs
         self._threads = 1
-        self._context = multiprocessing.get_context("spawn")  # threads and CUDA survive no fork
+        self._context = fork_server("ico3d.body.workers.jobs")
         self._workers: list[Worker] = []
 
     def expect(self, windows: int) -> None:

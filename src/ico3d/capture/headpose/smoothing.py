@@ -6,7 +6,6 @@ average would flatten. Its window is a time, so that captures of all frame rates
 """
 
 import numpy as np
-from scipy.signal import savgol_coeffs
 from scipy.spatial.transform import Rotation, Slerp
 
 WINDOW = 0.3
@@ -68,6 +67,8 @@ def smoothed_poses(poses: np.ndarray, fps: float) -> np.ndarray:
     window = window_of(fps, count)
     if window == 1:
         return poses
+    from scipy.signal import savgol_coeffs  # takes long to import
+
     smooth = poses.copy()
     for frame in range(count):
         first = min(max(frame - window // 2, 0), count - window)

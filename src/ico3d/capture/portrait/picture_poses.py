@@ -15,7 +15,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
 from ico3d.capture.portrait import rigid_head
@@ -71,6 +70,8 @@ def _smooth(rotations: np.ndarray) -> np.ndarray:
     window, degree = SMOOTHING
     if len(rotations) < window:
         return rotations
+    from scipy.signal import savgol_filter  # takes long to import
+
     middle = Rotation.from_matrix(rotations).mean()
     turns = (middle.inv() * Rotation.from_matrix(rotations)).as_rotvec()  # (F, 3)
     smooth = savgol_filter(turns, window, degree, axis=0)

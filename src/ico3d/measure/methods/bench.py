@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
 from pathlib import Path
 from shutil import copytree
 
@@ -22,6 +21,7 @@ from ico3d.measure.body import evaluate_body
 from ico3d.splat.device import computing_device
 from ico3d.studio.recording import Recording, record
 from ico3d.training.changes import with_changes
+from ico3d.training.processes import fork_server
 
 SCORES = ("psnr_mask", "psnr_moving", "psnr", "ssim", "flicker", "num_gaussians", "train_seconds")
 """Metrics that a trial keeps."""
@@ -203,7 +203,7 @@ def _one_by_one(trials: Sequence[Trial]) -> Iterator[tuple[Trial, dict]]:
 def _at_a_time(trials: Sequence[Trial], jobs: int) -> Iterator[tuple[Trial, dict]]:
     """Several processes that share the cores; one that fails stops what has not begun."""
     threads = max(1, (os.cpu_count() or 1) // jobs)
-    with ProcessPoolExecutor(jobs, get_context("spawn"), _share, (threads,)) as pool:
+    with ProcessPoolExecutor(jobs, fork_server(__name__), _share, (threads,)) as pool:
         futures = {pool.submit(_logged, trial): trial for trial in trials}
         try:
             for future in as_completed(futures):
