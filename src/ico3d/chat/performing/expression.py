@@ -20,7 +20,7 @@ from pipecat.utils.text.base_text_aggregator import TextType
 from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame, Utterances
 from ico3d.chat.performing.face import MOST, ROW, Face, Piece, Sentence
 from ico3d.chat.wire.protocol import EXPRESSION_FPS
-from ico3d.chat.workers import Run
+from ico3d.chat.workers import Run, at_once
 
 STEP = 3 * MOST * ROW  # samples that go through the model at once: the first face comes early
 
@@ -31,16 +31,17 @@ class ExpressionProcessor(FrameProcessor):
     An utterance is one answer of the language model, or one text spoken outside of an answer.
     """
 
-    def __init__(self, face: Face, utterances: Utterances, run: Run):
+    def __init__(self, face: Face, utterances: Utterances | None = None, run: Run = at_once):
         """A processor for one session.
 
         Args:
             face: What moves.
-            utterances: Which answers there are.
-            run: Does what takes a while, in time for the row that it is for.
+            utterances: Which answers there are; by default only this processor counts them.
+            run: Does what takes a while, in time for the row that it is for; in any thread by
+                default.
         """
         super().__init__()
-        self._face, self._utterances, self._run = face, utterances, run
+        self._face, self._utterances, self._run = face, utterances or Utterances(), run
         self._in_answer = False
         self._utterance: int | None = None
         self._opened = time.monotonic()  # when the session began; eyes run on its time
