@@ -120,7 +120,7 @@ def head_rows(device: str, runs: int) -> dict[str, float]:
     rows, view = {}, camera(512, 512)
     for count in (12_000, 50_000):
         torch.manual_seed(0)
-        model = HeadModel(HeadShape(39), count)
+        model = HeadModel(HeadShape(39, features=32, hidden=64, frequencies=6), count)
         start = scene(count, "cpu")
         model.means.data = 0.3 * start.means
         model.log_scales.data = start.scales.log()

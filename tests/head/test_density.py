@@ -7,10 +7,11 @@ import torch
 
 from ico3d.errors import ModelError
 from ico3d.head.density import HeadDensity, Sampled
-from ico3d.head.model import GAUSSIAN_AXES, HeadModel, HeadShape
+from ico3d.head.model import GAUSSIAN_AXES, HeadModel
 from ico3d.head.settings import PRESETS
 from ico3d.splat.density import DensityStats
 from ico3d.training.optimiser import Optimiser
+from support.heads.shapes import head_shape
 
 SETTINGS = dataclasses.replace(
     PRESETS["cpu"], densify_from=0, densify_every=1, densify_until=9, densify_gradient=0.5,
@@ -26,7 +27,7 @@ def _sampled(opacities: list[float], contributions: list[float]):
 
 def _planned() -> tuple[HeadModel, HeadModel, Optimiser]:
     """Three Gaussians: one stays, a small one is cloned, a faint one dies; before and after."""
-    models = [HeadModel(HeadShape(2, features=4), 3) for _ in range(2)]
+    models = [HeadModel(head_shape(2, features=4), 3) for _ in range(2)]
     for model in models:
         model.log_scales.data.fill_(-9)
         numbers = torch.arange(3.0)
@@ -62,14 +63,14 @@ def test_moments_follow_and_those_of_clones_begin_at_zero():
 
 
 def test_a_head_that_faded_is_one_sentence():
-    model, density = HeadModel(HeadShape(2, features=4), 3), HeadDensity(SETTINGS, 0)
+    model, density = HeadModel(head_shape(2, features=4), 3), HeadDensity(SETTINGS, 0)
     density._stats = DensityStats.zeros(3)
     with pytest.raises(ModelError, match="all Gaussians have faded by step 1"):
         density.adapt(model, Optimiser(), _sampled([0, 0, 0], [9, 9, 9]), 1)
 
 
 def test_what_no_picture_shows_dies():
-    model, density = HeadModel(HeadShape(2, features=4), 3), HeadDensity(SETTINGS, 0)
+    model, density = HeadModel(head_shape(2, features=4), 3), HeadDensity(SETTINGS, 0)
     model.log_scales.data.fill_(-9)
     density._stats = DensityStats.zeros(3)
     model.means.data = torch.arange(3.0)[:, None].repeat(1, 3)

@@ -8,10 +8,11 @@ import torch
 
 from ico3d.common.expression import EyeRange
 from ico3d.head.expressions import eye_track
-from ico3d.head.model import HeadModel, HeadShape
+from ico3d.head.model import HeadModel
 from ico3d.head.model_folder import TrainedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
+from support.heads.shapes import head_shape
 from support.heads.tiny_capture import TinyCapture
 
 
@@ -47,7 +48,7 @@ def test_a_head_without_eyes_needs_none(eyeless, caplog, trained_with):
     encoder = load_encoder("builtin")
     adaptor = SpeechAdaptor(encoder.size, encoder.vectors)
     eyes = EyeRange() if trained_with else EyeRange(most=(0.0,) * 7)
-    model = HeadModel(HeadShape(39), 4)
+    model = HeadModel(head_shape(39), 4)
     head = TrainedHead(model, "speech", (), encoder.name, encoder.sha256, adaptor, {}, None, eyes)
     with caplog.at_level(logging.WARNING):
         head.track(eyeless)

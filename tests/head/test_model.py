@@ -6,15 +6,16 @@ import pytest
 import torch
 
 from ico3d.errors import ModelError
-from ico3d.head.model import HeadModel, HeadShape
+from ico3d.head.model import HeadModel
 from ico3d.training.checkpoint import save_tensors
+from support.heads.shapes import head_shape
 
 VARIANTS = ("full", "no-mlp", "no-blending", "static")
 
 
 def _model(variant: str, dtype=torch.float64, count: int = 5) -> HeadModel:
     torch.manual_seed(0)
-    model = HeadModel(HeadShape(3, variant, features=8, hidden=6, frequencies=2), count).to(dtype)
+    model = HeadModel(head_shape(3, variant, features=8, hidden=6, frequencies=2), count).to(dtype)
     model.means.data = torch.randn(count, 3, dtype=dtype)
     model.basis.data += torch.randn_like(model.basis)
     return model
@@ -30,7 +31,7 @@ def test_the_basis_has_a_row_per_expression_value_and_one_for_the_bias(variant, 
 
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_a_new_head_is_faint_whatever_the_expression(variant):
-    model = HeadModel(HeadShape(3, variant), 4)
+    model = HeadModel(head_shape(3, variant), 4)
     if model.shape.has_mlp:
         torch.nn.init.zeros_(model.opacity_branch.weight)
     for expression in (torch.zeros(3), torch.ones(3)):

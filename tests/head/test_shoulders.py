@@ -9,12 +9,13 @@ import torch
 from ico3d.common.camera import look_at
 from ico3d.errors import CaptureError
 from ico3d.head.initial_gaussians import initial_head
-from ico3d.head.model import HeadModel, HeadShape
+from ico3d.head.model import HeadModel
 from ico3d.head.settings import PRESETS
 from ico3d.head.train_head import HeadJob, train_head
 from ico3d.head.views import PictureCache
 from ico3d.measure.head import evaluate_head
 from ico3d.splat.render import render
+from support.heads.shapes import head_shape
 from support.recordings.two_balls import HEAD, TRUNK, TwoBalls, seen_by
 
 SETTINGS = dataclasses.replace(
@@ -124,7 +125,7 @@ def test_a_training_on_few_masked_pictures_is_refused(capture, tmp_path, monkeyp
 def test_no_gaussian_outgrows_what_density_control_allows():
     from ico3d.head.density import bound_scales
 
-    model = HeadModel(HeadShape(1, box_size=0.2), 3)
+    model = HeadModel(head_shape(1, box_size=0.2), 3)
     model.log_scales.data = torch.tensor([[0.001] * 3, [0.02] * 3, [0.5, 0.01, 0.001]]).log()
     bound_scales(model)
     expected = [[0.001] * 3, [0.02] * 3, [0.02, 0.01, 0.001]]

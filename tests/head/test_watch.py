@@ -16,12 +16,13 @@ from safetensors.torch import load_file
 from ico3d.common.expression import EYE_NAMES
 from ico3d.errors import MissingExtraError
 from ico3d.head.expressions import BlendshapeTrack, SpeechTrack
-from ico3d.head.model import HeadModel, HeadShape
+from ico3d.head.model import HeadModel
 from ico3d.head.settings import PRESETS
 from ico3d.head.train_head import HeadJob, train_head
 from ico3d.head.watch import WatchedHead
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.training.watch import RADIUS, LivePage
+from support.heads.shapes import head_shape
 from support.needs import needs
 
 pytestmark = needs("viser")
@@ -181,11 +182,11 @@ def test_the_scene_is_upright_and_of_its_size(page, head):
 def test_sliders_are_for_named_inputs_that_do_something(head):
     tiny, _ = head
     speech = SpeechTrack(tiny, np.zeros((40, 64), np.float32), SpeechAdaptor(64))
-    driven = HeadModel(HeadShape(speech.size), 5)
+    driven = HeadModel(head_shape(speech.size), 5)
     subject = WatchedHead(tiny, driven, speech)
     assert {slider.name for slider in subject.sliders} == set(EYE_NAMES)
     assert all((slider.low, slider.high) == (0, 0.2) for slider in subject.sliders)
-    static = HeadModel(HeadShape(3, "static"), 5)
+    static = HeadModel(head_shape(3, "static"), 5)
     track = BlendshapeTrack(tiny, tiny.blendshape_names)
     assert WatchedHead(tiny, static, track).sliders == []
 

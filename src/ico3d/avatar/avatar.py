@@ -24,7 +24,7 @@ HEAD, BODY, PLACEMENT = "head", "body", "placement.safetensors"
 
 @dataclass(frozen=True)
 class Placement:
-    """Where a head is on a body, frame by frame (design section 2).
+    """Where a head is on a body, frame by frame (docs/architecture.md, "Head poses").
 
     Attributes:
         canonical_from_head: (4, 4) G: a similarity from the space of the head's model to that of
@@ -61,7 +61,7 @@ class Placement:
 
 @dataclass
 class TrainedAvatar:
-    """A head that was fitted to a body: `Avatar(t, expression)` of the design.
+    """A head that was fitted to a body: Gaussians of the time and the expression.
 
     Attributes:
         head: Only those of its Gaussians that are drawn on the body, in the body's colours.

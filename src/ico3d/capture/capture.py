@@ -27,7 +27,7 @@ class Sound:
 
 @dataclass(frozen=True)
 class Split:
-    """Which pictures train and which test (design section 2); indices ascend.
+    """Which pictures train and which test (docs/architecture.md); indices ascend.
 
     Attributes:
         train: Frames to learn from.

@@ -111,7 +111,7 @@ def evaluate_body(
     images: Path | None = None,
     drawn: Drawn | None = None,
 ) -> dict:
-    """All metrics of design section 2 that a body has, those of pictures as means over them.
+    """All metrics that a body has (docs/architecture.md), those of pictures as means over them.
 
     The body is rendered over the capture's clean plates; where it has none, over black, and
     compared with the person cut out by the mask. `psnr_moving` is PSNR on the person's moving

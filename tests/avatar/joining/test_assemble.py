@@ -20,10 +20,11 @@ from ico3d.body.companion import Pruning
 from ico3d.body.training.optimise_window import BodyTrainer
 from ico3d.capture.capture import Capture
 from ico3d.errors import CaptureError, ModelError, SettingsError
-from ico3d.head.model import HeadModel, HeadShape
+from ico3d.head.model import HeadModel
 from ico3d.measure.body import evaluate_body
 from support.avatars.planted_person import ABROAD, FRAMES, NAMES, PlantedPerson, face, planted_head
 from support.avatars.tiny_joining import assembly_of
+from support.heads.shapes import head_shape
 
 
 class Stopped(Exception):
@@ -192,7 +193,7 @@ def test_what_is_missing_is_said(person, head, tmp_path):
         align(person, face(), print)
     (tmp_path / "head").mkdir()
     person.landmarks_3d = lambda frame: face()
-    plain = HeadModel(HeadShape(len(NAMES), "no-mlp"), 40)
+    plain = HeadModel(head_shape(len(NAMES), "no-mlp"), 40)
     region = HeadRegion.around(face())
     plain.means.data = torch.from_numpy(region.spheres[0, :3] + 0 * face()[:40]).float()
     replace(head, model=plain).save(tmp_path / "head")

@@ -1,16 +1,16 @@
 """The plan of windows, written and shown."""
 
 import json
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 from PIL import Image
 from rich.console import Console
 
-from ico3d.body.planning.plan import PlanSettings, load_plan, make_plan, print_plan, save_plan
+from ico3d.body.planning.plan import PlanSettings, make_plan, print_plan, save_plan
 from ico3d.body.planning.plan_picture import draw_plan
 from ico3d.body.planning.windows import Window
-from ico3d.errors import ModelError
 
 HEIGHTS = np.cumsum([0, *[0.0] * 4, *[0.1] * 3, *[0.0] * 3, *[-0.12] * 2])
 
@@ -31,22 +31,13 @@ def test_windows_follow_the_motion(planned):
     assert plan.busiest in (0, 1, 2, 3, 5, 6)
 
 
-def test_a_plan_is_written_and_read(planned, tmp_path):
+def test_a_plan_is_written_whole(planned, tmp_path):
     _, plan = planned
     file = tmp_path / "plan.json"
     save_plan(plan, file)
-    assert load_plan(file) == plan
     written = json.loads(file.read_text())
+    assert written == json.loads(json.dumps(asdict(plan)))
     assert written["windows"][1] == {"first": 4, "last": 9} and written["method"] == plan.method
-
-
-@pytest.mark.parametrize("text", [None, "{", "[]", '{"windows": []}', '{"windows": [{"a": 1}]}'])
-def test_a_damaged_plan_is_one_sentence(tmp_path, text):
-    file = tmp_path / "plan.json"
-    if text is not None:
-        file.write_text(text)
-    with pytest.raises(ModelError, match="plan of windows"):
-        load_plan(file)
 
 
 def test_a_plan_is_shown_as_a_table(planned):

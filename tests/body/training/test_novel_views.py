@@ -1,4 +1,4 @@
-"""Cameras between the recorded ones (body.md section 7)."""
+"""Cameras between the recorded ones for temporal fine-tuning."""
 
 import numpy as np
 import pytest

@@ -16,9 +16,10 @@ from ico3d.bundle.evaluate import logits
 from ico3d.bundle.format import Bundle
 from ico3d.capture.capture import Capture, all_frames
 from ico3d.common.camera import Camera, look_at
-from ico3d.head.model import HeadModel, HeadShape
+from ico3d.head.model import HeadModel
 from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.render import render
+from support.heads.shapes import head_shape
 
 MOMENTS = (0.0, 1.5, 3.0)
 """Seconds of the demo's motion."""
@@ -43,7 +44,7 @@ def demo() -> BakedAvatar:
 def head_abroad() -> TrainedHead:
     """The demo's head at rest as a head model of its own studio, without landmarks."""
     baked = demo().head
-    model = HeadModel(HeadShape(baked.expression_size, "static"), baked.num_gaussians)
+    model = HeadModel(head_shape(baked.expression_size, "static"), baked.num_gaussians)
     rest = logits(baked, np.zeros(baked.expression_size, np.float32))  # (N, 4)
     model.means.data = torch.tensor(baked.means)
     model.quats.data = torch.tensor(baked.quats.astype(np.float32))

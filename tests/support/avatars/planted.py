@@ -8,9 +8,10 @@ import torch
 from ico3d.capture.capture import Capture, Sound, last_eleventh
 from ico3d.common.camera import Camera, look_at
 from ico3d.common.expression import EyeRange, eye_range
-from ico3d.head.model import HeadModel, HeadShape
+from ico3d.head.model import HeadModel
 from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.render import render
+from support.heads.shapes import head_shape
 
 SIZE, FRAMES, COUNT = 48, 66, 300
 NOISE = 0.03  # standard deviation: about 30 dB
@@ -83,7 +84,7 @@ class PlantedCapture(Capture):
 def planted_model(size: int) -> HeadModel:
     """Random features on an ellipsoid; the last ten Gaussians are never seen."""
     generator = torch.Generator().manual_seed(0)
-    model = HeadModel(HeadShape(size), COUNT)
+    model = HeadModel(head_shape(size), COUNT)
     directions = torch.randn(COUNT, 3, generator=generator)
     directions /= directions.norm(dim=1, keepdim=True)
     model.means.data = directions * torch.tensor([0.08, 0.11, 0.09])

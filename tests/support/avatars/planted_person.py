@@ -12,10 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from ico3d.capture.capture import Capture, all_frames
 from ico3d.common.camera import Camera, look_at
-from ico3d.head.model import HeadModel, HeadShape
+from ico3d.head.model import HeadModel
 from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
+from support.heads.shapes import head_shape
 
 WIDTH, HEIGHT, CAMERAS, FRAMES = 40, 52, 10, 6
 NAMES = tuple(f"shape{i}" for i in range(10))
@@ -53,7 +54,7 @@ def face() -> np.ndarray:
 def planted_model(count: int = 500) -> HeadModel:
     """Colours that change softly over an ellipsoid, and a little with the expression."""
     generator = torch.Generator().manual_seed(0)
-    model = HeadModel(HeadShape(len(NAMES), frequencies=1, box_size=0.12), count)
+    model = HeadModel(head_shape(len(NAMES), frequencies=1, box_size=0.12), count)
     rng = np.random.default_rng(0)
     directions = rng.normal(size=(count, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)

@@ -5,17 +5,18 @@ import torch
 
 from ico3d.capture.capture import Capture, Split
 from ico3d.common.camera import Camera, look_at
-from ico3d.head.model import HeadModel, HeadShape
+from ico3d.head.model import HeadModel
 from ico3d.head.model_folder import TrainedHead
 from ico3d.head.views import view_of
 from ico3d.splat.render import render
+from support.heads.shapes import head_shape
 
 SIZE, ERROR = 32, 0.1
 
 
 def offset_head(size=1.0) -> TrainedHead:
     torch.manual_seed(0)
-    model = HeadModel(HeadShape(2, "no-mlp"), 40)
+    model = HeadModel(head_shape(2, "no-mlp"), 40)
     model.means.data = size * 0.1 * torch.randn(40, 3)
     model.log_scales.data.fill_(-3 + np.log(size))
     model.basis.data[:, :, :3] = torch.randn(3, 40, 3) - 1

@@ -1,4 +1,4 @@
-"""Principal components of a head's logits over expressions (design section 3, baked head)."""
+"""Principal components of a head's logits over expressions."""
 
 from dataclasses import dataclass
 

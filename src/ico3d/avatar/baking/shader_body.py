@@ -1,4 +1,4 @@
-"""Baking: the exact moving body → windows that a shader blends (docs/bundle.md)."""
+"""Baking: the exact moving body → windows that a shader blends (docs/bundle.md, body/0000 …)."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Baking: the exact head model → a head that a shader blends (design section 3)."""
+"""Baking: the exact head model → a head that a shader blends (docs/bundle.md, head.safetensors)."""
 
 from dataclasses import dataclass
 
