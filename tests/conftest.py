@@ -1,6 +1,7 @@
 """What holds for all tests."""
 
 import os
+from multiprocessing import forkserver
 
 import pytest
 
@@ -8,6 +9,17 @@ import pytest
 # this once, when it is imported; what tests start inherits it.
 for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")
+
+
+@pytest.fixture(scope="module")
+def two_threads():
+    """Processes that are started may have two threads each, as far as their environment goes."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("NUMBA_NUM_THREADS", "2")
+        patch.setenv("OMP_WAIT_POLICY", "passive")
+        forkserver._forkserver._stop()  # one that was started before has other variables
+        yield
+        forkserver._forkserver._stop()
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 from ico3d.avatar.baking import head_bundle, person_bundle
 from ico3d.avatar.baking.persona import load_persona
@@ -107,9 +108,22 @@ def test_the_visitor_sees_all_of_the_person_from_its_front(baked):
 
 
 def test_the_strip_shows_recorded_exact_and_baked(baked):
-    from PIL import Image
-
-    assert Image.open(baked[1]).size == (3 * SIZE, 4 * SIZE)
+    picture, capture = np.asarray(Image.open(baked[1])) / 255, baked[3]
+    assert picture.shape == (4 * SIZE, 3 * SIZE, 3)
+    tiles = picture.reshape(4, SIZE, 3, SIZE, 3).swapaxes(1, 2)  # (rows, columns, H, W, 3)
+    known = [
+        np.clip(capture.image(camera, frame), 0, 1)
+        for frame in range(FRAMES)
+        for camera in range(len(capture.cameras))
+    ]
+    shown = set()
+    for recorded, exact, cheap in tiles:
+        differences = [np.abs(recorded - one).max() for one in known]
+        shown.add(int(np.argmin(differences)))
+        assert min(differences) < 1 / 255
+        assert psnr(recorded, exact) == pytest.approx(-20 * np.log10(NOISE), abs=0.6)
+        assert psnr(exact, cheap) > 32 and not np.array_equal(exact, cheap)
+    assert len(shown) == 4  # each row shows another moment
 
 
 def test_a_head_moves_as_gaussians_do(avatar):

@@ -19,7 +19,7 @@ from support.bodies.window_tasks import (
     worker_of,
 )
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("two_threads")]
 
 
 def node(alive=True, **resources):

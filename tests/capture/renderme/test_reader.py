@@ -4,6 +4,7 @@ import cv2
 import h5py
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from ico3d.capture.formats import open_capture
 from support.recordings import faces, renderme_files
@@ -34,7 +35,13 @@ def test_annotations_in_the_folders_of_the_data_set(plain, tmp_path):
     for folder, kind in ((raw, "raw"), (anno, "anno")):
         folder.mkdir(parents=True)
         (folder / f"0026_e0_{kind}.smc").symlink_to(plain.with_name(f"0026_e0_{kind}.smc"))
-    assert open_capture(raw).world_from_head(0) is not None
+    apart, together = open_capture(raw), open_capture(plain)
+    for frame in range(4):
+        pose = together.world_from_head(frame)
+        np.testing.assert_array_equal(apart.world_from_head(frame), pose)
+        for camera in range(7):
+            np.testing.assert_array_equal(apart.mask(camera, frame), together.mask(camera, frame))
+    assert np.linalg.norm(pose - together.world_from_head(0)) > 1e-3  # the head moves
 
 
 def test_pictures_are_those_of_the_jpeg_decoder_and_mattes_keep_their_edges(plain):
@@ -152,7 +159,7 @@ def test_the_hull_takes_mattes_of_other_frames_where_a_frame_has_few(tmp_path):
             for frame in set(range(6)) - {turn}:
                 del file[f"Camera/{camera:02d}/mask/{frame}"]
     few = open_capture(thin).points(0)
-    near = np.linalg.norm(few[:, None] - all_views[None, ::5], axis=-1).min(1)
+    near, _ = KDTree(all_views[::5]).query(few)
     assert len(few) > 0.5 * len(all_views) and np.median(near) < 0.02
 
 
@@ -193,6 +200,14 @@ def test_speech_by_38_cameras_has_15_frames_per_second(tmp_path):
     )
 
 
-def test_expressions_have_no_sound_and_no_eyes(plain):
-    capture = open_capture(plain)
-    assert capture.audio() is None and capture.eyes(0) is None and capture.background(0) is None
+def test_what_was_not_recorded_is_not_made_up(plain, tmp_path):
+    """The same recording has sound until that is taken out; no part has eyes or clean plates."""
+    silent = open_capture(plain)
+    rig = renderme_files.Rig(sound=np.full(48_000, 0.25), sound_in="anno")
+    heard = open_capture(renderme_files.write_recording(tmp_path, rig))
+    assert len(heard.audio().samples) == 16_000 and heard.audio().samples[8000] > 0.2
+    for capture in (silent, heard):
+        assert capture.eyes(0) is None and capture.background(0) is None
+    with h5py.File(heard.path.with_name("0026_e0_anno.smc"), "a") as file:
+        del file["Camera/00/audio"]
+    assert silent.audio() is None and open_capture(heard.path).audio() is None

@@ -218,7 +218,7 @@ def _share(threads: int) -> None:
     import torch
 
     torch.set_num_threads(threads)
-    numba.set_num_threads(threads)
+    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore (set at run time)
 
 
 def _logged(trial: Trial) -> dict:
