@@ -42,7 +42,8 @@ class Connection:
             notices: What every page is told of the avatar.
         """
         self._socket, self._sessions, self._notices = socket, sessions, notices
-        self._limits, self._inlet = ConnectionLimits(), Inlet()
+        now = asyncio.get_running_loop().time
+        self._limits, self._inlet = ConnectionLimits(now), Inlet(now)
         self._outbox = Outbox()
 
     async def run(self) -> None:
