@@ -1,25 +1,13 @@
-import { join } from 'node:path';
-import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import type { Browser } from '../support/browser/browser.ts';
-import { runPython } from '../support/python.ts';
 import { readRecord, type Record } from '../support/browser/recorder.ts';
-import { scratchFolder } from '../support/scratch.ts';
-import { ChatServer } from '../support/servers/server.ts';
 import { finished, openPage, SENTENCE, SILENCE, until } from '../support/browser/talk.ts';
 
-let server: ChatServer;
-
-beforeAll(async () => {
-  const bundle = join(scratchFolder(), 'talking.ico3d');
-  runPython('references/talking_bundle.py', bundle);
-  server = await ChatServer.start(bundle);
-});
-
-afterAll(() => server?.stop());
+const { talkingUrl } = inject('shared');
 
 describe('a typed question', () => {
   let browser: Browser;
-  beforeAll(async () => (browser = await openPage(server.url)));
+  beforeAll(async () => (browser = await openPage(talkingUrl)));
   afterAll(() => browser?.close());
 
   test('is answered with words, sound and a moving face', async () => {
@@ -101,7 +89,7 @@ describe('a typed question', () => {
 });
 
 test('without a microphone the page says so and typing goes on', async () => {
-  const browser = await openPage(server.url);
+  const browser = await openPage(talkingUrl);
   await browser.context.clearPermissions();
   await browser.page.click('#microphone');
   const notice = browser.page.locator('#notices p').first();
@@ -112,7 +100,7 @@ test('without a microphone the page says so and typing goes on', async () => {
 });
 
 test('after a dropped connection the same session goes on', async () => {
-  const browser = await openPage(server.url);
+  const browser = await openPage(talkingUrl);
   const { page } = browser;
   await until(browser, finished(0), 30_000);
   await page.fill('#text', SENTENCE);

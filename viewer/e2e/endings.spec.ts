@@ -1,24 +1,23 @@
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { afterEach, beforeAll, expect, test } from 'vitest';
+import { afterEach, beforeAll, expect, inject, test } from 'vitest';
 import type { Browser } from '../support/browser/browser.ts';
+import { pauseDrawing } from '../support/browser/drawing.ts';
 import { runPython } from '../support/python.ts';
-import { microphones, pauseDrawing } from '../support/browser/recorder.ts';
+import { microphones } from '../support/browser/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
 import { ChatServer } from '../support/servers/server.ts';
 import { openPage, until } from '../support/browser/talk.ts';
 
 const folder = scratchFolder();
-const [bundle, silence] = [join(folder, 'talking.ico3d'), join(folder, 'silence.wav')];
+const silence = join(folder, 'silence.wav');
+const { talking, talkingUrl } = inject('shared');
 const IDLE = /^Nothing was said for 0\.05 min/;
 const FULL = /^all places are taken/;
 
 const opened: { close(): Promise<void> }[] = [];
 
-beforeAll(() => {
-  runPython('references/talking_bundle.py', bundle);
-  runPython('sound/voice.py', silence, '90');
-});
+beforeAll(() => void runPython('sound/voice.py', silence, '90'));
 
 afterEach(async () => {
   for (const browser of opened.splice(0)) await browser.close();
@@ -28,7 +27,7 @@ afterEach(async () => {
 async function serve(...settings: string[]): Promise<string> {
   const file = join(folder, 'talk.toml');
   writeFileSync(file, settings.join('\n'));
-  const server = await ChatServer.start(bundle, 0, '--settings', file);
+  const server = await ChatServer.start(talking, 0, '--settings', file);
   opened.push({ close: () => server.stop() });
   return server.url;
 }
@@ -96,7 +95,7 @@ test('whoever falls silent makes room; who waits for a place gets it, and both m
 });
 
 test('a microphone whose worklet does not load is shown as closed, and is', async () => {
-  const browser = await visit(await serve());
+  const browser = await visit(talkingUrl);
   const { page } = browser;
   await page.evaluate(() => {
     const { prototype } = AudioWorklet;

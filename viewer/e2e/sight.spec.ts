@@ -1,22 +1,20 @@
-import { existsSync } from 'node:fs';
 import type { CDPSession, Page } from 'playwright-core';
-import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
+import { drawSeldom } from '../support/browser/drawing.ts';
 import { seeChin, seeEyes } from '../support/browser/eyes.ts';
-import { DEMO } from '../support/references/portrait.ts';
-import { ChatServer } from '../support/servers/server.ts';
 
 const MOST_SCRIPT = 1.2e6; // bytes on the wire until she is seen
 
-describe.skipIf(!existsSync(DEMO))('first sight of the packaged demo', () => {
-  let server: ChatServer;
+const { demoUrl } = inject('shared');
+
+describe.skipIf(!demoUrl)('first sight of the packaged demo', () => {
   let browser: Browser;
   let page: Page;
   let network: CDPSession;
   const sent: { url: string; script: boolean; bytes: number }[] = []; // over the network: 0 bytes from the cache
 
   beforeAll(async () => {
-    server = await ChatServer.start(DEMO);
     browser = await Browser.launch({ width: 480, height: 300, calm: true });
     page = browser.page;
     network = await browser.context.newCDPSession(page);
@@ -29,13 +27,10 @@ describe.skipIf(!existsSync(DEMO))('first sight of the packaged demo', () => {
       if (answer) sent.push({ ...answer, bytes });
     });
     await network.send('Network.enable');
-    await browser.open(server.url);
+    await browser.open(demoUrl!);
   });
 
-  afterAll(async () => {
-    await browser?.close();
-    await server?.stop();
-  });
+  afterAll(() => browser?.close());
 
   /** The shape of the picture; waits until it is drawn and captions, which come first, are there. */
   async function resize(width: number, height: number): Promise<void> {
@@ -59,9 +54,10 @@ describe.skipIf(!existsSync(DEMO))('first sight of the packaged demo', () => {
     expect(bytes).toBeGreaterThan(1e5);
     expect(bytes).toBeLessThan(MOST_SCRIPT);
     sent.length = 0;
-    await browser.open(server.url);
+    await browser.open(demoUrl!);
+    await drawSeldom(page);
     expect(sent.filter(({ url }) => url.includes('/assets/')).map(({ bytes }) => bytes)).toEqual([0, 0]);
-    expect(sent.find(({ url }) => url === server.url)!.bytes).toBeGreaterThan(0);
+    expect(sent.find(({ url }) => url === demoUrl)!.bytes).toBeGreaterThan(0);
   });
 
   test.each([

@@ -1,6 +1,7 @@
 import { existsSync } from 'node:fs';
 import { join } from 'node:path';
 import { Browser, type BrowserOptions } from './browser.ts';
+import { drawSeldom } from './drawing.ts';
 import { REPOSITORY, runPython } from '../python.ts';
 import { readRecord, recordLoudness, recordWire, type Record } from './recorder.ts';
 
@@ -10,11 +11,12 @@ const RECORDING = join(REPOSITORY, '../shared/speech/new-home-in-the-stars-16k.w
 export const VOICE = 0.005; // level of the microphone above which somebody speaks
 export const SILENCE = 1e-4; // level of the avatar under which nothing is heard
 
-/** Opens the page of a server in a small window and records its conversation. */
+/** Opens the page of a server in a small window that draws nothing by itself, and records its conversation. */
 export async function openPage(url: string, options: BrowserOptions = {}): Promise<Browser> {
   const browser = await Browser.launch({ width: 320, height: 240, ...options });
   await recordWire(browser.context);
   await browser.open(url);
+  await drawSeldom(browser.page);
   await recordLoudness(browser.page);
   return browser;
 }

@@ -1,12 +1,12 @@
 import { afterAll, beforeAll, expect, test } from 'vitest';
-import { Browser } from '../support/browser/browser.ts';
-import { feed, noise } from '../support/sound/feeder.ts';
-import { lookAsBundled } from '../support/browser/pictures.ts';
-import { runPython } from '../support/python.ts';
-import { scratchFolder } from '../support/scratch.ts';
-import { servePage } from '../support/servers/static.ts';
-import { slope } from '../support/statistics.ts';
-import { comparePlacement, tap } from '../support/sound/tap.ts';
+import { Browser } from '../../support/browser/browser.ts';
+import { feed, noise } from '../../support/sound/feeder.ts';
+import { lookAsBundled } from '../../support/browser/pictures.ts';
+import { runPython } from '../../support/python.ts';
+import { scratchFolder } from '../../support/scratch.ts';
+import { servePage } from '../../support/servers/static.ts';
+import { slope } from '../../support/statistics.ts';
+import { comparePlacement, tap } from '../../support/sound/tap.ts';
 
 const RATE = 24_000;
 const TICK = 1 / 30;
