@@ -1,7 +1,7 @@
 import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import type { Browser } from '../support/browser/browser.ts';
 import { readRecord, type Record } from '../support/browser/recorder.ts';
-import { finished, openPage, SENTENCE, SILENCE, until } from '../support/browser/talk.ts';
+import { finished, openPage, SENTENCE, SHORTER, SILENCE, until } from '../support/browser/talk.ts';
 
 const { talkingUrl } = inject('shared');
 
@@ -103,13 +103,15 @@ test('after a dropped connection the same session goes on', async () => {
   const browser = await openPage(talkingUrl);
   const { page } = browser;
   await until(browser, finished(0), 30_000);
-  await page.fill('#text', SENTENCE);
+  await page.fill('#text', SHORTER);
   await page.keyboard.press('Enter');
   await until(browser, ({ received }) => received.some((m) => m.type === 'speech' && m.utterance === 1), 30_000);
   await page.evaluate(() => window.record!.sockets.at(-1)!.close());
   await until(browser, ({ received }) => received.filter(({ type }) => type === 'welcome').length === 2, 30_000);
   const record = await until(browser, finished(1), 60_000);
   const [first, second] = record.received.filter(({ type }) => type === 'welcome');
+  const last = record.received.findLast(({ type }) => type === 'speech');
+  expect(last!.at).toBeGreaterThan(second!.at); // there was something left to say
   expect(second).toMatchObject({ resumed: true, session: first!.session });
   const indices = new Set(record.received.filter(({ type }) => type === 'speech').map(({ index }) => index));
   expect(indices.size).toBe(Math.max(...([...indices] as number[])) + 1); // none is missing

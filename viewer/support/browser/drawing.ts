@@ -30,3 +30,8 @@ export function drawSeldom(page: Page, every = Infinity): Promise<void> {
 export function pauseDrawing(page: Page): Promise<void> {
   return page.evaluate(() => void window.ico3d!.stage.renderer.setAnimationLoop(null));
 }
+
+/** Waits for two refreshes of the screen: until input and the page's observers of itself have had their effect. */
+export function refreshed(page: Page): Promise<unknown> {
+  return page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+}

@@ -6,6 +6,7 @@ import { REPOSITORY, runPython } from '../python.ts';
 import { readRecord, recordLoudness, recordWire, type Record } from './recorder.ts';
 
 export const SENTENCE = 'we must find a new home in the stars'; // the persona of persona.json has a long answer to it
+export const SHORTER = 'tell me about yourself'; // and one of some seconds to this
 const RECORDING = join(REPOSITORY, '../shared/speech/new-home-in-the-stars-16k.wav');
 
 export const VOICE = 0.005; // level of the microphone above which somebody speaks
