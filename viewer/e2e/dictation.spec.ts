@@ -25,7 +25,9 @@ async function talk(script: () => void): Promise<Browser> {
   await browser.context.addInitScript(script);
   const page = await browser.open(server.url);
   await drawSeldom(page);
-  await page.waitForFunction(() => document.body.dataset.state === 'idle'); // the greeting is over
+  await page.waitForFunction(
+    () => document.getElementById('answer')!.textContent === 'Hello.' && document.body.dataset.state === 'idle',
+  ); // the greeting is over
   await page.click('#microphone');
   return browser;
 }
