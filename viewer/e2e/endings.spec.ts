@@ -12,7 +12,7 @@ import { openPage, until } from '../support/browser/talk.ts';
 const folder = scratchFolder();
 const silence = join(folder, 'silence.wav');
 const { talking, talkingUrl } = inject('shared');
-const IDLE = /^Nothing was said for 0\.05 min/;
+const IDLE = /^Nothing was said for 0\.04 min/;
 const FULL = /^all places are taken/;
 
 const opened: { close(): Promise<void> }[] = [];
@@ -56,16 +56,17 @@ async function says({ page }: Browser, sentence: RegExp): Promise<void> {
 const goes = ({ page }: Browser) => page.waitForFunction(() => document.getElementById('overlay')!.inert, undefined, { timeout: 60_000 });
 
 test('whoever falls silent makes room; who waits for a place gets it, and both may try again', async () => {
-  const url = await serve('max_sessions = 1', 'idle_minutes = 0.05');
+  const url = await serve('max_sessions = 1', 'idle_minutes = 0.04');
   const first = await visit(url);
+  // The first visitor goes on asking until the second one is there.
+  const asking = await first.page.evaluate(() => setInterval(() => window.ico3d!.conversation!.ask('Who are you?'), 500));
   await first.page.click('#microphone');
   await first.page.waitForFunction(() => document.getElementById('microphone')!.ariaPressed === 'true');
   expect(await microphones(first.page)).toEqual(['live']);
 
-  // The first visitor goes on asking until the second one is there.
-  const asking = await first.page.evaluate(() => setInterval(() => window.ico3d!.conversation!.ask('Who are you?'), 1000));
   const second = await visit(url);
   await says(second, FULL);
+  await first.page.evaluate((asking) => clearInterval(asking), asking);
   expect(await focused(second)).toBe('again');
   expect(await second.page.textContent('#overlay-wait')).toMatch(/^(Trying again in \d+ s|Connecting …)$/);
   for (let i = 0; i < 3; i++) {
@@ -73,7 +74,6 @@ test('whoever falls silent makes room; who waits for a place gets it, and both m
     expect(await focused(second)).toMatch(/^(again)?$/);
   }
 
-  await first.page.evaluate((asking) => clearInterval(asking), asking);
   await says(first, IDLE);
   expect(await first.page.textContent('#again')).toBe('Try again');
   expect(await focused(first)).toBe('again');
