@@ -1,4 +1,4 @@
-import type { Network } from './baked.ts';
+import type { Network } from '../bundle/baked-head.ts';
 
 const NEGATIVE_SLOPE = 0.02;
 
