@@ -44,7 +44,7 @@ async def main(bundle: Path = Path("demo"), text: str = "Hello.", out: Path = Pa
     person = Bundle.open(bundle_path(bundle))
     head, speech = open_face(person)
     voice = espeak.make(espeak.Settings(), Context(person.manifest.persona, head, None))
-    avatar = ExpressionProcessor(Face(head, speech))
+    avatar = ExpressionProcessor(Face(head, speech, seed=0))
     pipeline = Pipeline([voice, avatar, stage := Stage()])
     worker = PipelineWorker(pipeline, params=PipelineParams(audio_out_sample_rate=24_000))
     await worker.queue_frames([TTSSpeakFrame(text), EndFrame()])

@@ -1,7 +1,7 @@
 import { spawnSync } from 'node:child_process';
 import { existsSync } from 'node:fs';
 import { join } from 'node:path';
-import { PYTHON, REPOSITORY, runPython } from '../python.ts';
+import { ENVIRONMENT, PYTHON, REPOSITORY, runPython } from '../python.ts';
 
 const SHARED = join(REPOSITORY, '../shared');
 const CLIP = join(SHARED, 'clips/portrait_a.mp4');
@@ -9,9 +9,6 @@ const PERSONA = join(REPOSITORY, 'viewer/support/references/persona.json');
 
 /** Whether there is a real recording to make an avatar of. */
 export const hasClip = existsSync(CLIP);
-
-/** The avatar that comes in the package. */
-export const DEMO = join(REPOSITORY, 'src/ico3d/chat/data/demo.ico3d');
 
 const SHORT = ['steps=150', 'initial_gaussians=2500', 'max_gaussians=3000', 'densify_from=50', 'densify_until=100'];
 
@@ -26,15 +23,15 @@ export function makePortrait(folder: string): string {
 }
 
 /** The packaged avatar where there is one, else a random head: with something to say. */
-export function makeStandIn(folder: string): string {
+export function makeStandIn(folder: string, demo: string | null): string {
   const bundle = join(folder, 'stand-in.ico3d');
-  runPython('references/talking_bundle.py', bundle, ...(existsSync(DEMO) ? [DEMO] : []));
+  runPython('references/talking_bundle.py', bundle, ...(demo ? [demo] : []));
   return bundle;
 }
 
 function ico3d(...words: string[]): void {
   const began = Date.now();
-  const env = { ...process.env, ICO3D_MODELS: join(SHARED, 'models') };
+  const env = { ...ENVIRONMENT, ICO3D_MODELS: join(SHARED, 'models') };
   const done = spawnSync(PYTHON, ['-m', 'ico3d.cli', ...words], { cwd: REPOSITORY, env, encoding: 'utf8' });
   if (done.status !== 0) throw new Error(`ico3d ${words.join(' ')}: ${done.stdout}${done.stderr}`);
   console.log(`ico3d ${words[0]} took ${((Date.now() - began) / 1000).toFixed(1)} s`);
