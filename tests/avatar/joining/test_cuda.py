@@ -19,6 +19,7 @@ from ico3d.avatar.joining.seam import seam_scores
 from support.avatars.planted_person import FRAMES, PlantedPerson, face, planted_head
 from support.avatars.tiny_joining import RECOLOUR, assembly_of, parts_of
 from support.pretended_cuda import drawn, is_moved
+from support.settings import changed
 
 
 def test_colours_are_matched(cuda, head, abroad):
@@ -41,7 +42,7 @@ def test_an_avatar_is_assembled_and_measured(cuda, tmp_path, monkeypatch):
     (tmp_path / "head").mkdir()
     planted_head().save(tmp_path / "head")
     assembly = assembly_of(tmp_path / "head", color_steps=10)
-    small = replace(assembly.body, steps_per_frame=2, warmup_steps=2, checkpoint_every=9)
+    small = changed(assembly.body, {"steps_per_frame": 2, "warmup_steps": 2, "checkpoint_every": 9})
     assembly = replace(assembly, body=small, device="cuda")
     with drawn(monkeypatch) as pictures:
         avatar = assemble(capture, tmp_path / "out", assembly, said.append)
