@@ -22,7 +22,7 @@ import tyro
 from ico3d.avatar.avatar import Placement
 from ico3d.avatar.joining.assemble import align
 from ico3d.avatar.joining.cropping import cropped
-from ico3d.avatar.joining.found_placement import found_in_pictures
+from ico3d.avatar.joining.finding.found_placement import found_in_pictures
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.similarity import moved
 from ico3d.capture.capture import Capture

@@ -10,9 +10,9 @@ import torch
 from ico3d.avatar.avatar import Placement, TrainedAvatar
 from ico3d.avatar.joining.assemble import assemble
 from ico3d.avatar.joining.checking import write_checks
-from ico3d.avatar.joining.drawn_head import DrawnHead
 from ico3d.avatar.joining.face_views import face_views
-from ico3d.avatar.joining.found_placement import OverRecording, head_poses
+from ico3d.avatar.joining.finding.drawn_head import DrawnHead
+from ico3d.avatar.joining.finding.found_placement import OverRecording, head_poses
 from ico3d.avatar.joining.recolour import color_difference, recolour
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.seam import seam_scores

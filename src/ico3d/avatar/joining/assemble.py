@@ -20,7 +20,7 @@ from ico3d.avatar.joining.companion import SEAM, HeadSource
 from ico3d.avatar.joining.cropping import cropped, near_border
 from ico3d.avatar.joining.driving import head_poses, recorded_expressions
 from ico3d.avatar.joining.face_views import face_views
-from ico3d.avatar.joining.found_placement import found_in_pictures
+from ico3d.avatar.joining.finding.found_placement import found_in_pictures
 from ico3d.avatar.joining.recolour import RecolourSettings, color_difference, recolour
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.seam import largest_gap, seam_scores
