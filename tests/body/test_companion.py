@@ -287,7 +287,7 @@ def test_a_trained_body_goes_on_with_a_companion(folders, tmp_path):
     body = train_body(capture, tmp_path / "on", job)
     assert body.windows == (Window(0, FRAMES - 1),)
     assert not Ball().trespassing(body.models[0].at(0.5).means, 4).any()
-    with pytest.raises(SettingsError, match="another 'companion'"):
+    with pytest.raises(SettingsError, match=r"another 'companion\.points' \(30, not 3\)"):
         train_body(capture, tmp_path / "on", replace(job, companion=BallSource(3)))
 
 
