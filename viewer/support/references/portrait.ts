@@ -10,13 +10,14 @@ const PERSONA = join(REPOSITORY, 'viewer/support/references/persona.json');
 /** Whether there is a real recording to make an avatar of. */
 export const hasClip = existsSync(CLIP);
 
-const SHORT = ['steps=150', 'initial_gaussians=2500', 'max_gaussians=3000', 'densify_from=50', 'densify_until=100'];
+const SHORT =
+  '--steps 150 --initial.gaussians 2500 --density.max-gaussians 3000 --density.begin 50 --density.until 100';
 
 /** From a video of a person to an avatar that can be talked with: track, train, bake. */
 export function makePortrait(folder: string): string {
   const [capture, model, bundle] = ['capture', 'model', 'portrait.ico3d'].map((name) => join(folder, name));
   ico3d('capture', 'portrait', CLIP, capture!, '--size', '256', '--no-refine');
-  ico3d('train', 'head', capture!, model!, '--preset', 'cpu', '--set', ...SHORT);
+  ico3d('train', 'head', capture!, model!, '--preset', 'cpu', ...SHORT.split(' '));
   // Forced: half a minute of training need not reach what avatars for people must.
   ico3d('bake', model!, capture!, bundle!, '--persona', PERSONA, '--force');
   return bundle!;
