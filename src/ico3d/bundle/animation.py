@@ -6,6 +6,7 @@ plays start … end back and forth, and whoever speaks goes from action to actio
 
 import json
 from dataclasses import dataclass
+from typing import Any, cast
 
 from ico3d.bundle.decode import decode, encode, parse_json
 from ico3d.bundle.manifest import BodyInfo
@@ -115,7 +116,7 @@ class Animation:
         _require(len(data) <= MAX_BYTES, "it", f"have at most {MAX_BYTES} bytes")
         values = parse_json(data, ANIMATION)
         if isinstance(values, dict):
-            values.setdefault("quality", [])  # older bundles have none
+            cast(dict[str, Any], values).setdefault("quality", [])  # older bundles have none
         return decode(Animation, values, ANIMATION)
 
     def check_body(self, body: BodyInfo) -> None:

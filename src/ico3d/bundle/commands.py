@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import tyro
 
@@ -88,7 +88,8 @@ def _contents(bundle: "Bundle"):
 def _line(value: Any) -> str:
     """One value for people."""
     if isinstance(value, dict):
-        return ", ".join(f"{key}: {_line(part)}" for key, part in value.items())
+        parts = cast(dict[str, Any], value)
+        return ", ".join(f"{key}: {_line(part)}" for key, part in parts.items())
     if isinstance(value, list):
-        return "; ".join(map(_line, value)) or "–"
+        return "; ".join(map(_line, cast(list[Any], value))) or "–"
     return f"{value:,}" if isinstance(value, int) and not isinstance(value, bool) else str(value)

@@ -42,15 +42,16 @@ def decode(kind: type[T], value: Any, where: str) -> T:
     """
     if not isinstance(value, dict):
         raise BundleError(f"{where} must be an object, not {_describe(value)}.")
+    given = typing.cast(dict[str, Any], value)
     hints = typing.get_type_hints(kind)
     names = [field.name for field in dataclasses.fields(typing.cast(Any, kind))]
-    for key in value:
+    for key in given:
         if key not in names:
             raise BundleError(f"{where} has the unknown key {key[:40]!r}.")
     for name in names:
-        if name not in value:
+        if name not in given:
             raise BundleError(f"{where} lacks '{name}'.")
-    return kind(**{name: _decode(hints[name], value[name], f"{where}.{name}") for name in names})
+    return kind(**{name: _decode(hints[name], given[name], f"{where}.{name}") for name in names})
 
 
 def encode(value: Any) -> Any:
@@ -58,9 +59,9 @@ def encode(value: Any) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {f.name: encode(getattr(value, f.name)) for f in dataclasses.fields(value)}
     if isinstance(value, dict):
-        return {key: encode(entry) for key, entry in value.items()}
+        return {k: encode(v) for k, v in typing.cast(dict[str, Any], value).items()}
     if isinstance(value, tuple):
-        return [encode(entry) for entry in value]
+        return [encode(entry) for entry in typing.cast(tuple[Any, ...], value)]
     return value
 
 
@@ -74,29 +75,31 @@ def _decode(kind: Any, value: Any, where: str) -> Any:
     if origin is dict:
         return _decode_dict(arguments[1], value, where)
     if dataclasses.is_dataclass(kind):
-        return decode(typing.cast(type, kind), value, where)
+        return decode(typing.cast(type[Any], kind), value, where)
     return _decode_scalar(kind, value, where)
 
 
-def _decode_tuple(arguments: tuple, value: Any, where: str) -> tuple:
+def _decode_tuple(arguments: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:
     if not isinstance(value, list):
         raise BundleError(f"{where} must be a list, not {_describe(value)}.")
+    given = typing.cast(list[Any], value)
     if arguments[-1] is Ellipsis:
-        kinds = [arguments[0]] * len(value)
-    elif len(value) != len(arguments):
-        raise BundleError(f"{where} must have {len(arguments)} entries, not {len(value)}.")
+        kinds = [arguments[0]] * len(given)
+    elif len(given) != len(arguments):
+        raise BundleError(f"{where} must have {len(arguments)} entries, not {len(given)}.")
     else:
         kinds = list(arguments)
     return tuple(
         _decode(kind, entry, f"{where}[{i}]")
-        for i, (kind, entry) in enumerate(zip(kinds, value, strict=True))
+        for i, (kind, entry) in enumerate(zip(kinds, given, strict=True))
     )
 
 
-def _decode_dict(kind: Any, value: Any, where: str) -> dict:
+def _decode_dict(kind: Any, value: Any, where: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise BundleError(f"{where} must be an object, not {_describe(value)}.")
-    return {key: _decode(kind, entry, f"{where}[{key[:80]!r}]") for key, entry in value.items()}
+    given = typing.cast(dict[str, Any], value)
+    return {key: _decode(kind, entry, f"{where}[{key[:80]!r}]") for key, entry in given.items()}
 
 
 def _decode_scalar(kind: type, value: Any, where: str) -> Any:

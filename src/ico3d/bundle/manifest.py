@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 from ico3d.bundle import limits
 from ico3d.bundle.decode import decode, encode, parse_json
@@ -170,7 +170,7 @@ class Manifest:
     persona: Persona
     loss: Loss
     provenance: Provenance
-    files: dict[str, FileEntry] = field(default_factory=dict)
+    files: dict[str, FileEntry] = field(default_factory=dict[str, FileEntry])
     format: str = FORMAT
     version: int = VERSION
 
@@ -206,9 +206,10 @@ class Manifest:
 
 def _check_version(value: Any) -> None:
     """The format comes first: a newer version has other fields."""
-    if not isinstance(value, dict) or value.get("format") != FORMAT:
+    known = cast(dict[str, Any], value) if isinstance(value, dict) else {}
+    if known.get("format") != FORMAT:
         raise BundleError(f"{MANIFEST}: this is no ico3d bundle (format is not '{FORMAT}').")
-    if value.get("version") not in (HEADS_ONLY, VERSION):
+    if known.get("version") not in (HEADS_ONLY, VERSION):
         raise BundleError(
             f"{MANIFEST}: this program reads bundles of versions {HEADS_ONLY} and {VERSION} only."
         )

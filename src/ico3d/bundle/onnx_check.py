@@ -52,7 +52,7 @@ def check_onnx(data: bytes, name: str, input_name: str, output_name: str) -> Non
         BundleError: If it is no ONNX model, uses other operators, or refers to other files.
     """
     try:
-        graphs = []
+        graphs: list[memoryview] = []
         for field, value in _fields(memoryview(data)):
             if field == _FUNCTIONS:
                 raise BundleError(f"{name}: defines functions of its own.")

@@ -4,7 +4,7 @@ import re
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from ico3d.bundle.decode import decode, encode, parse_json
 from ico3d.bundle.limits import MAX_MANIFEST_BYTES, MAX_NOTES
@@ -36,7 +36,7 @@ class Persona:
     notes: tuple[str, ...] = ()
     manner: str = ""
     languages: tuple[str, ...] = ()
-    voice: dict[str, str] = field(default_factory=dict)
+    voice: dict[str, str] = field(default_factory=dict[str, str])
     forbidden: tuple[str, ...] = ()
 
 
@@ -55,7 +55,8 @@ def with_defaults(value: Any, required: tuple[str, ...] = REQUIRED) -> Any:
     if not isinstance(value, dict):
         return value
     known = encode(Persona(""))
-    return {key: v for key, v in known.items() if key not in required} | value
+    given = cast(dict[str, Any], value)
+    return {key: v for key, v in known.items() if key not in required} | given
 
 
 def read_persona(path: Path) -> Persona:

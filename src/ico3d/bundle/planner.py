@@ -146,7 +146,7 @@ class Planner:
             until = min(until, self._known)
         while self._time < until and not self._has_arrived():
             self._decide(until)
-        found = []
+        found: list[Point] = []
         while self._decided and self._decided[0][0] <= until:
             found.append(self._decided.popleft())
         return found

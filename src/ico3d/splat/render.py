@@ -8,6 +8,9 @@ can be drawn without it). A splat ends where its alpha is under
 is drawn. The projection's Jacobian is taken at most 0.3 half images outside of the picture.
 """
 
+# pyright: reportUnknownMemberType=false
+# (torch leaves some of its functions untyped)
+
 from collections.abc import Sequence
 
 import numpy as np

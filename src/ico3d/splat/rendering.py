@@ -1,5 +1,8 @@
 """What a render gives."""
 
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
+# (torch leaves some of its functions untyped)
+
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property

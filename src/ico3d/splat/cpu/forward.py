@@ -1,5 +1,10 @@
 """Splats to pixels: alpha compositing, tile by tile, front to back."""
 
+# pyright: reportMissingParameterType=false, reportUnknownParameterType=false
+# pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownMemberType=false
+# (numba finds the types of a kernel's arguments when it is called)
+
 from math import factorial
 
 import numba

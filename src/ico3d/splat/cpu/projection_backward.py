@@ -1,5 +1,10 @@
 """Gradients of the projection, through the low-pass compensation too."""
 
+# pyright: reportMissingParameterType=false, reportUnknownParameterType=false
+# pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownMemberType=false
+# (numba finds the types of a kernel's arguments when it is called)
+
 from math import sqrt
 
 import numba

@@ -98,7 +98,7 @@ class Population:
 
     parameters: dict[str, Tensor]
     moments: dict[str, Tensor]
-    axes: Mapping[str, int] = field(default_factory=dict)
+    axes: Mapping[str, int] = field(default_factory=dict[str, int])
 
     def __len__(self) -> int:
         """The number of Gaussians."""

@@ -96,7 +96,8 @@ def unpack(data: bytes) -> tuple[Header, dict[str, NDArray[np.uint8]]]:
         MissingExtraError: If it is of version 4 and the package zstandard is not installed.
     """
     header, packed = _unpack_gzip(data) if data[:2] == GZIP_MAGIC else _unpack_zstd(data)
-    sections, offset = {}, 0
+    sections: dict[str, NDArray[np.uint8]] = {}
+    offset = 0
     for name, width in header.sections.items():
         end = offset + header.count * width
         sections[name] = packed[offset:end].reshape(header.count, width)
