@@ -7,8 +7,8 @@ plays start … end back and forth, and whoever speaks goes from action to actio
 import json
 from dataclasses import dataclass
 
-from ico3d.bundle.decode import decode, encode, parse_json
 from ico3d.bundle.manifest import BodyInfo
+from ico3d.common.typed import Rules, fill, parse_json, plain
 from ico3d.errors import BundleError
 
 ANIMATION = "animation.json"
@@ -100,7 +100,7 @@ class Animation:
 
     def to_bytes(self) -> bytes:
         """The content of `animation.json`, the same bytes for the same animation."""
-        values = encode(self)
+        values = plain(self)
         names = [name for name in _ORDER if name != "quality" or self.quality]
         lines = [f" {json.dumps(name)}: {json.dumps(values[name])}" for name in names]
         return ("{\n" + ",\n".join(lines) + "\n}\n").encode()
@@ -113,10 +113,10 @@ class Animation:
             BundleError: In one sentence, if it is none or makes no sense.
         """
         _require(len(data) <= MAX_BYTES, "it", f"have at most {MAX_BYTES} bytes")
-        values = parse_json(data, ANIMATION)
+        values = parse_json(data, ANIMATION, BundleError)
         if isinstance(values, dict):
             values.setdefault("quality", [])  # older bundles have none
-        return decode(Animation, values, ANIMATION)
+        return fill(Animation, values, ANIMATION, Rules(BundleError))
 
     def check_body(self, body: BodyInfo) -> None:
         """Checks that this is the animation of a body.
