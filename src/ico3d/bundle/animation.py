@@ -27,8 +27,8 @@ class Rest:
     """The loop of somebody who waits: frames start … end, both inside, back and forth.
 
     Attributes:
-        start: Its first frame.
-        end: Its last frame, where every speech ends.
+        start: First frame of the loop.
+        end: Last frame of the loop, where every speech ends.
     """
 
     start: int

@@ -21,7 +21,7 @@ class Persona:
 
     Attributes:
         name: How it calls itself.
-        greeting: Its first words.
+        greeting: First words of the avatar.
         notes: What it knows: "question | question => answer", or a fact as a plain sentence, which
             only language models can use.
         manner: How it behaves and talks, in a sentence or two.

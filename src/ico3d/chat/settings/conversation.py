@@ -25,7 +25,7 @@ class Choice:
 
     Attributes:
         use: Name of the provider, or `best`.
-        options: Its own settings by name; the rest of the table.
+        options: Settings of the provider by name; the rest of the table.
     """
 
     use: str = BEST
@@ -227,8 +227,8 @@ class Setting:
 
     Attributes:
         table: The file, and the table in which it is.
-        name: Its name; empty for a table as a whole.
-        kind: What it must be.
+        name: Name of the setting; empty for a table as a whole.
+        kind: Type that its value must have.
     """
 
     table: str
