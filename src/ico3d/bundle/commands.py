@@ -56,7 +56,7 @@ def figures(bundle: "Bundle", path: Path) -> dict[str, Any]:
         `bytes` on disk; `head_gaussians`, null without a head; `body_windows`, how many, 0 without
         a body; `body_gaussians` of each window; `provenance`; and further facts.
     """
-    from ico3d.bundle.decode import encode
+    from ico3d.common.typed import plain
 
     manifest = bundle.manifest
     head, body, speech = manifest.head, manifest.body, manifest.speech
@@ -75,8 +75,8 @@ def figures(bundle: "Bundle", path: Path) -> dict[str, Any]:
         "body_seconds": last / body.fps if body else None,
         "animation": bundle.animation is not None,
         "background": bundle.background,
-        "loss": encode(manifest.loss),
-        "provenance": encode(manifest.provenance),
+        "loss": plain(manifest.loss),
+        "provenance": plain(manifest.provenance),
         "files": sizes,
     }
 

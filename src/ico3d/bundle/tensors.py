@@ -7,7 +7,7 @@ from typing import Any, cast
 import numpy as np
 from safetensors.numpy import save
 
-from ico3d.bundle.decode import parse_json
+from ico3d.common.typed import parse_json
 from ico3d.errors import BundleError
 
 _DTYPES = {
@@ -76,7 +76,7 @@ def _header(data: bytes, name: str) -> tuple[dict[str, Any], int]:
     (length,) = struct.unpack_from("<Q", data)
     if length > min(_MAX_HEADER_BYTES, len(data) - 8):
         raise BundleError(f"{name}: has a header of impossible length.")
-    header = parse_json(data[8 : 8 + length], name)
+    header = parse_json(data[8 : 8 + length], name, BundleError)
     if not isinstance(header, dict):
         raise BundleError(f"{name}: its header is not an object.")
     entries = cast(dict[str, Any], header)

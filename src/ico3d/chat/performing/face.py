@@ -104,7 +104,7 @@ class StillLips:
         return rows
 
     def finish(self) -> np.ndarray:
-        """Nothing is held back."""
+        """(0, 0): a mouth at rest holds no rows back."""
         return np.zeros((0, 0), np.float32)
 
 
