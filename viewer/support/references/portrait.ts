@@ -15,7 +15,7 @@ const SHORT = ['steps=150', 'initial_gaussians=2500', 'max_gaussians=3000', 'den
 /** From a video of a person to an avatar that can be talked with: track, train, bake. */
 export function makePortrait(folder: string): string {
   const [capture, model, bundle] = ['capture', 'model', 'portrait.ico3d'].map((name) => join(folder, name));
-  ico3d('capture', 'portrait', CLIP, capture!, '--size', '256', '--no-refine');
+  ico3d('capture', 'portrait', CLIP, capture!, '--size', '128', '--no-refine');
   ico3d('train', 'head', capture!, model!, '--preset', 'cpu', '--set', ...SHORT);
   // Forced: half a minute of training need not reach what avatars for people must.
   ico3d('bake', model!, capture!, bundle!, '--persona', PERSONA, '--force');
