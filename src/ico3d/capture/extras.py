@@ -9,7 +9,7 @@ def opencv(purpose: str) -> ModuleType:
     """The module cv2.
 
     Args:
-        purpose: What needs it, for the error.
+        purpose: What needs the package; the error begins with it.
 
     Raises:
         MissingExtraError: If it is not installed.
@@ -25,7 +25,7 @@ def hdf5(purpose: str) -> ModuleType:
     """The module h5py.
 
     Args:
-        purpose: What needs it, for the error.
+        purpose: What needs the package; the error begins with it.
 
     Raises:
         MissingExtraError: If it is not installed.

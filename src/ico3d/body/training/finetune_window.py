@@ -47,7 +47,7 @@ class FineTuner:
             model: Changed in place.
             previous: The window before; not changed.
             window: The frames of `model`.
-            pictures: Those of the window.
+            pictures: Pictures of the window's frames.
             cameras: The training cameras, between which novel ones lie.
             settings: Rates and weights.
             extent: Size of the person in metres.
@@ -64,7 +64,7 @@ class FineTuner:
 
     @property
     def model(self) -> WindowModel:
-        """What is trained."""
+        """The window's model, which is trained."""
         return self._learner.model
 
     def step(self, index: int) -> Mapping[str, float]:
@@ -84,7 +84,7 @@ class FineTuner:
         return self._learner.tensors()
 
     def place(self, name: str) -> torch.device:
-        """All are where the model is."""
+        """Every tensor of a checkpoint belongs on the model's device."""
         del name
         return self.model.device
 

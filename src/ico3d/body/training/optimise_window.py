@@ -44,7 +44,7 @@ class BodyTrainer:
 
     @property
     def model(self) -> WindowModel:
-        """What is trained."""
+        """The window's model, which is trained."""
         return self._learner.model
 
     def step(self, index: int) -> Mapping[str, float]:
@@ -75,7 +75,7 @@ class BodyTrainer:
         return self._learner.tensors() | gathered
 
     def place(self, name: str) -> torch.device:
-        """All are where the model is."""
+        """Every tensor of a checkpoint belongs on the model's device."""
         del name
         return self.model.device
 

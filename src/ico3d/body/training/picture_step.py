@@ -47,8 +47,8 @@ class Learner:
 
         Args:
             model: Changed in place.
-            window: Which frames.
-            pictures: Those of the window.
+            window: The window's frames.
+            pictures: Pictures of the window's frames.
             settings: Rates and weights.
             extent: Size of the person in metres; the means' rate refers to it.
             seed: All randomness follows from it and from the step's number.
@@ -108,7 +108,7 @@ class Learner:
 
         Args:
             index: Step just done.
-            steps: Of all of the training.
+            steps: Steps of the whole training.
         """
         if self._pruning is not None and self._pruning.due(index, steps):
             self._pruning.carry_out(self.model, self.population)
@@ -179,7 +179,7 @@ class Learner:
 
 
 def _group(name: str) -> str:
-    """Which learning rate a tensor has."""
+    """Name of the learning rate that a tensor has."""
     if name.startswith(MLP):
         return "mlp"
     if name.startswith(GRID):
