@@ -28,7 +28,7 @@ def ssim(rgb: Tensor, target: Tensor) -> Tensor:
 
     Args:
         rgb: (..., H, W, 3) in [0, 1].
-        target: Of the same shape.
+        target: Shaped as `rgb`.
 
     Returns:
         A scalar, 1 for equal images.

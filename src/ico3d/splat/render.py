@@ -91,7 +91,7 @@ def _poses(cameras: Sequence[Camera], world_to_camera: Tensor | None) -> Tensor:
 
 
 def _sound(gaussians: Gaussians) -> Gaussians:
-    """The same, but what is not finite made into something that nobody sees."""
+    """The Gaussians; those with values that are not finite become some that nobody sees."""
     sound = gaussians.drawable()
     if bool(sound.all()):
         return gaussians

@@ -174,7 +174,7 @@ def draw_backward(
 
     Args:
         records: (N, 9), as drawn.
-        tiles: As drawn.
+        tiles: The tiles that `draw` drew.
         image: (H, W, 3) that `draw` returned.
         light: (H, W) that `draw` returned.
         g_image: (H, W, 3) gradient with respect to the image.

@@ -179,7 +179,7 @@ def draw(records: np.ndarray, tiles: Tiles) -> tuple[np.ndarray, np.ndarray]:
 
     Args:
         records: (N, 9) of `splat_records`.
-        tiles: Of the same splats.
+        tiles: Which of these splats each tile shows.
 
     Returns:
         Image (H, W, 3) float32 on black, and the transmittance (H, W) that is left.

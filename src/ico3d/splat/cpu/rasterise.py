@@ -104,7 +104,7 @@ class Draw(torch.autograd.Function):
             conics: (C, N, 3).
             alphas: (C, N) opacities after the low-pass.
             colors: (C, N, 3).
-            tiles: One per camera.
+            tiles: Tiles of the pictures, one object per camera.
             absolute: (C, N, 2) that takes the means' gradients summed without signs, or None.
 
         Returns:

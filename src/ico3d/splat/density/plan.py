@@ -118,7 +118,7 @@ class Population:
         """Applies a plan to parameters and moments.
 
         Args:
-            plan: What becomes of the Gaussians.
+            plan: Which Gaussians are kept, copied or split.
             generator: On the CPU; decides where the parts of split ones lie.
         """
         old = self.parameters

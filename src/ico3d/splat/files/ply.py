@@ -27,7 +27,7 @@ class Element:
     """One table of a PLY file.
 
     Attributes:
-        name: What the header calls it.
+        name: What the header calls the table.
         count: Rows.
         properties: Columns in file order: name and numpy type without byte order.
         has_lists: Whether a column holds lists, so that the table's size is unknown.

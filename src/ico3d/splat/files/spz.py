@@ -67,7 +67,7 @@ def write(gaussians: RawGaussians, path: Path) -> None:
 
 
 def _affine(packed: NDArray[np.uint8], scale: float, offset: float) -> Floats:
-    """What bytes stand for."""
+    """Values that bytes stand for: scale · byte + offset."""
     values = packed.astype(np.float32)
     values *= scale
     values += offset

@@ -36,7 +36,7 @@ class Header:
     Attributes:
         version: 2, 3 or 4.
         count: Gaussians.
-        degree: Of the harmonics, 0 to 3.
+        degree: Degree of the spherical harmonics, 0 to 3.
         fractional_bits: Of the positions' fixed-point numbers.
         flags: 1 for trained with antialiasing; the others announce further data.
         streams: Number of streams, version 4 only.
