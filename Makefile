@@ -49,10 +49,10 @@ bench: install ## long quality and speed runs; figures go to docs/benchmarks.md
 clean:
 	rm -rf $(VENV) viewer/node_modules src/ico3d/chat/static
 
-$(VENV)/.serve: pyproject.toml scripts/setup.sh
+$(VENV)/.serve: pyproject.toml constraints.txt scripts/setup.sh
 	scripts/setup.sh serve
 
-$(VENV)/.develop: pyproject.toml scripts/setup.sh
+$(VENV)/.develop: pyproject.toml constraints.txt scripts/setup.sh
 	scripts/setup.sh develop
 
 viewer/node_modules/.package-lock.json: viewer/package-lock.json | $(VENV)/.serve

@@ -65,7 +65,7 @@ class Bench:
         model = self.out / f"{self.inputs}-{variant}-{seed}"
         steps = round(self.steps * STEP_FACTOR[variant])
         _ico3d("train", "head", self.capture, model, "--inputs", self.inputs, "--variant", variant,
-               "--seed", seed, "--preset", "cpu", "--set", f"steps={steps}")  # fmt: skip
+               "--seed", seed, "--preset", "cpu", "--steps", steps)  # fmt: skip
         measured = self.against or self.capture
         file = model / f"metrics-{measured.name}.json"
         if not file.exists():

@@ -8,8 +8,9 @@ OUT/variants.jpg shows recorded pictures and the variants, beside one another.
 """
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import torch
@@ -19,15 +20,16 @@ from rich.console import Console
 from rich.table import Table
 
 from ico3d.avatar.avatar import TrainedAvatar
-from ico3d.avatar.joining.assemble import Assembly, JoiningSettings, assemble
+from ico3d.avatar.joining.assemble import Assembly, assemble
 from ico3d.avatar.joining.face_views import face_views
 from ico3d.avatar.joining.region import HeadRegion
-from ico3d.body.settings import settings_for
+from ico3d.avatar.joining.settings import JoiningSettings
+from ico3d.body.settings import BodySettings
 from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera
 from ico3d.measure.methods.bench import open_clip
+from ico3d.measure.methods.settings import OURS, preset
 from ico3d.splat.render import render
-from ico3d.training.changes import with_changes
 
 VARIANTS = {
     "full": JoiningSettings(),
@@ -49,8 +51,8 @@ class Joining:
         out: Where avatars lie.
         frames: Of the capture, from its first on.
         seeds: How many.
-        set: Changes to the cpu preset of bodies, as name=value.
         json: Also write figures here.
+        settings: How the bodies are trained.
     """
 
     head: tyro.conf.Positional[Path]
@@ -58,19 +60,19 @@ class Joining:
     out: tyro.conf.Positional[Path]
     frames: int = 16
     seeds: int = 3
-    set: tuple[str, ...] = ()
     json: Path | None = None
+    settings: Annotated[BodySettings, tyro.conf.arg(name="")] = field(
+        default_factory=lambda: preset(OURS).without_finetuning()
+    )
 
     def run(self) -> None:
         """Assembles, measures, draws."""
         capture = open_clip(self.capture, self.frames)
-        body = replace(settings_for("cpu", "swings++"), finetune_steps=0, initial="hull")
-        body = with_changes(body, self.set)
         avatars: dict[str, list[TrainedAvatar]] = {}
         for seed in range(self.seeds):
             for name, joining in VARIANTS.items():
                 folder = self.out / f"{name.replace(' ', '-')}-{seed}"
-                assembly = Assembly(self.head, joining, body, seed)
+                assembly = Assembly(self.head, joining, self.settings, seed)
                 avatar = assemble(capture, folder, assembly, lambda words: None)
                 avatars.setdefault(name, []).append(avatar)
                 figures = {key: avatar.summary.get(key) for key in SCORES}

@@ -32,7 +32,7 @@ class Demo:
         head_frames: Frames of the head at 25 per second.
         body_frames: Frames of the body at 15 per second.
         size: Height of the pictures.
-        body: Changes to the cpu preset of the body, as name=value.
+        body: More options of ico3d assemble in one word, as --body="--steps 5000".
         jobs: Windows of the body that train at once.
         seed: Of recording and training.
     """
@@ -44,11 +44,9 @@ class Demo:
     head_frames: int = 1600
     body_frames: int = 76
     size: int = 384
-    body: tuple[str, ...] = (
-        "max_gaussians=9000",
-        "initial_gaussians=5000",
-        "steps_per_frame=250",
-        "finetune_steps=1500",
+    body: str = (
+        "--density.max-gaussians 9000 --initial.gaussians 5000 --steps-per-frame 250 "
+        "--finetune.steps 1500"
     )
     jobs: int = 2
     seed: int = 0
@@ -63,7 +61,7 @@ class Demo:
         self._record(work / "body-capture", self.body_frames, *rings, "--fps", 15)
         ico3d("train head", work / "head-capture", work / "head", "--inputs", "speech", *seed)
         parts = (work / "head", work / "body-capture", work / "avatar")
-        how = ("--set", *self.body, "--jobs", self.jobs, "--check", work / "check")
+        how = (*self.body.split(), "--jobs", self.jobs, "--check", work / "check")
         ico3d("assemble", *parts, *seed, *how)
         files = (work / "avatar", work / "head-capture", work / "body-capture", self.out)
         notices = ("--licences", *self.licences)

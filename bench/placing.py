@@ -11,8 +11,9 @@ head poses, so that G ought to be the identity. What WORK holds already is not m
 import json
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import torch
@@ -21,7 +22,7 @@ import tyro
 from ico3d.avatar.avatar import Placement
 from ico3d.avatar.joining.assemble import align
 from ico3d.avatar.joining.cropping import cropped
-from ico3d.avatar.joining.found_placement import found_in_pictures
+from ico3d.avatar.joining.finding.found_placement import found_in_pictures
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.similarity import moved
 from ico3d.capture.capture import Capture
@@ -29,7 +30,7 @@ from ico3d.capture.face.canonical import canonical_landmarks
 from ico3d.capture.formats import open_capture
 from ico3d.capture.importing.resized import ResizedCapture
 from ico3d.head.model_folder import TrainedHead
-from ico3d.head.settings import PRESETS
+from ico3d.head.settings import PRESETS, HeadSettings, Initial
 from ico3d.head.train_head import HeadJob, train_head
 
 SHOTS = {
@@ -40,6 +41,14 @@ SHOTS = {
 BELOW_CHIN = -0.12
 """Metres: the head's points begin above."""
 
+SHORT = replace(
+    PRESETS["cpu"],
+    steps=1_000,
+    initial=Initial(gaussians=5_000),
+    density=replace(PRESETS["cpu"].density, max_gaussians=7_000, until=800),
+)
+"""Settings of heads that are good enough to find a face in."""
+
 
 @dataclass(frozen=True)
 class Placing:
@@ -49,20 +58,15 @@ class Placing:
         subjects: Subject files (.npz) of ico3d capture synthetic, with a body.
         work: Folder for recordings and heads.
         seeds: Of recordings and trainings, per subject.
-        head: Changes to the cpu preset of the head, as name=value.
         json: Where to write the figures.
+        settings: How the heads are trained.
     """
 
     subjects: tyro.conf.Positional[tuple[Path, ...]]
     work: Path
     seeds: int = 3
-    head: tuple[str, ...] = (
-        "steps=1000",
-        "initial_gaussians=5000",
-        "max_gaussians=7000",
-        "densify_until=800",
-    )
     json: Path | None = None
+    settings: Annotated[HeadSettings, tyro.conf.arg(name="")] = SHORT
 
     def run(self) -> None:
         """Records, trains, places, measures."""
@@ -100,8 +104,7 @@ class Placing:
         """A head whose recording says little."""
         if (folder / "finished.json").exists():
             return TrainedHead.load(folder)
-        settings = PRESETS["cpu"].with_changes(self.head)
-        job = HeadJob("speech", "full", "builtin", seed, settings)
+        job = HeadJob("speech", "full", "builtin", seed, self.settings)
         return train_head(Unmarked(recording), folder, job)
 
 

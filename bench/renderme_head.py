@@ -36,7 +36,7 @@ class RenderMeHead:
         cameras: How many.
         views: Cameras that take each frame.
         size: Height of the pictures.
-        set: Changes to the cpu preset, as name=value.
+        options: More options of ico3d train head in one word, as --options="--steps 5000".
         seeds: A training for each.
         json: Where to write the figures.
     """
@@ -47,7 +47,7 @@ class RenderMeHead:
     cameras: int = 6
     views: int = 6
     size: int = 256
-    set: tuple[str, ...] = ()
+    options: str = ""
     seeds: tuple[int, ...] = (0,)
     json: Path | None = None
 
@@ -57,8 +57,7 @@ class RenderMeHead:
         for seed in self.seeds:
             head = self.work / f"head-{seed}"
             bundle, metrics = head / "head.ico3d", head / "metrics.json"
-            changes = ("--set", *self.set) if self.set else ()
-            timed("train head", recording, head, "--seed", seed, *changes)
+            timed("train head", recording, head, "--seed", seed, *self.options.split())
             timed("evaluate", head, recording, "--json", metrics, "--images", head / "images")
             timed("bake", head, recording, bundle, "--strip", head / "strip.png", "--force")
             loss = Bundle.open(bundle).manifest.loss

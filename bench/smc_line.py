@@ -39,8 +39,8 @@ class Line:
         body_cameras: Cameras of the body.
         head_size: Height of the head's pictures.
         body_size: Height of the body's pictures.
-        head: Changes to the cpu preset of the head, as name=value.
-        body: Changes to the cpu preset of the body.
+        head: More options of ico3d train head in one word, as --head="--steps 2500".
+        body: More options of ico3d assemble in one word.
         seed: Of recording and training.
         json: Where to write the times.
     """
@@ -53,8 +53,8 @@ class Line:
     body_cameras: int = 16
     head_size: int = 224
     body_size: int = 448
-    head: tuple[str, ...] = ("steps=2500",)
-    body: tuple[str, ...] = ("steps_per_frame=100", "finetune_steps=800")
+    head: str = "--steps 2500"
+    body: str = "--steps-per-frame 100 --finetune.steps 800"
     seed: int = 0
     json: Path | None = None
 
@@ -73,10 +73,10 @@ class Line:
             ("capture resize", (files[1], body, "--height", self.body_size)),
             ("capture track", (face, "--check", work / "face.jpg")),
             ("capture track", (body, "--check", work / "body.jpg")),
-            ("train head", (face, head, *seed, "--set", *self.head)),
+            ("train head", (face, head, *seed, *self.head.split())),
             (
                 "assemble",
-                (head, body, person, *seed, "--check", work / "check", "--set", *self.body),
+                (head, body, person, *seed, "--check", work / "check", *self.body.split()),
             ),
             ("evaluate", (person, body, "--images", work / "pictures")),
             ("bake", (person, face, body, bundle, "--strip", work / "strip.png", "--force")),

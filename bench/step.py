@@ -21,7 +21,7 @@ from ico3d.capture.formats import open_capture
 from ico3d.head.expressions import BlendshapeTrack
 from ico3d.head.initial_gaussians import initial_head
 from ico3d.head.optimise import HeadTrainer
-from ico3d.head.settings import PRESETS
+from ico3d.head.settings import PRESETS, Initial
 
 PARTS = {
     "projection": ("Project",),
@@ -69,7 +69,8 @@ class Bench:
     def _trainer(self) -> HeadTrainer:
         capture = open_capture(self.capture)
         settings = PRESETS["cpu"]
-        settings = replace(settings, initial_gaussians=self.gaussians, max_gaussians=self.gaussians)
+        density = replace(settings.density, max_gaussians=self.gaussians)
+        settings = replace(settings, initial=Initial(self.gaussians), density=density)
         track = BlendshapeTrack(capture, capture.blendshape_names or ())
         torch.manual_seed(0)
         model = initial_head(capture, settings, "full", track.size, np.random.default_rng(0))

@@ -36,11 +36,12 @@ def main(
         Synthetic(out / "capture", frames=frames, size=size).run()
     capture = open_capture(out / "capture")
 
+    cpu = PRESETS["cpu"]
     settings = replace(
-        PRESETS["cpu"],
+        cpu,
         steps=steps,
-        initial_gaussians=gaussians // 2,
-        max_gaussians=gaussians,
+        initial=replace(cpu.initial, gaussians=gaussians // 2),
+        density=replace(cpu.density, max_gaussians=gaussians),
     )
     job = HeadJob(inputs="speech", variant="full", encoder="builtin", seed=0, settings=settings)
     head = train_head(capture, out / "head", job)  # goes on where it was interrupted

@@ -28,6 +28,7 @@ def bundled(path: Path, size: int) -> tuple[Gaussians, Camera]:
     bundle = Bundle.open(bundle_path(path))
     head, poses = bundle.require_head()
     camera = visitor_camera(bundle.manifest.camera, size, size)
+    assert bundle.manifest.head is not None
     rest = bundle.manifest.head.idle_expression
     if bundle.manifest.body is not None:
         return avatar_gaussians(bundle, 0.0, rest), camera

@@ -42,15 +42,15 @@ class Stage(FrameProcessor):
 async def main(bundle: Path = Path("demo"), text: str = "Hello.", out: Path = Path("said")) -> None:
     """Writes OUT.npz: `sound` (S,) int16 at 24 kHz, `face` (T, B), 25 rows a second."""
     person = Bundle.open(bundle_path(bundle))
-    voice = espeak.make(espeak.Settings(), Context(person.manifest.persona, None, None))
-    avatar = ExpressionProcessor(Face(*open_face(person)))
+    head, speech = open_face(person)
+    voice = espeak.make(espeak.Settings(), Context(person.manifest.persona, head, None))
+    avatar = ExpressionProcessor(Face(head, speech, seed=0))
     pipeline = Pipeline([voice, avatar, stage := Stage()])
     worker = PipelineWorker(pipeline, params=PipelineParams(audio_out_sample_rate=24_000))
     await worker.queue_frames([TTSSpeakFrame(text), EndFrame()])
     runner = WorkerRunner(handle_sigint=False)
     await runner.add_workers(worker)
     await runner.run()
-
     sound = np.concatenate([piece.pcm for piece in stage.pieces])
     face = np.concatenate([piece.expressions for piece in stage.pieces])
     np.savez(out.with_suffix(".npz"), sound=sound, face=face)

@@ -10,13 +10,14 @@ import wave
 from pathlib import Path
 
 import tyro
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
+from websockets.sync.connection import Connection
 
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import decode_server, encode
 
 
-def answered(server: ClientConnection, question: str) -> tuple[bytes, list[str]]:
+def answered(server: Connection, question: str) -> tuple[bytes, list[str]]:
     """The answer's sound, and a line with seconds for each caption."""
     server.send(encode(protocol.Hello(protocol.VERSION, session=None, last_index=-1)))
     sound, captions, thought = b"", [], False

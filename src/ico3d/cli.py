@@ -2,7 +2,9 @@
 
 import importlib
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import tyro
 
@@ -66,12 +68,35 @@ VERBS: dict[str, Verb] = {
 }
 
 
-def usage() -> str:
-    """The list of verbs that `ico3d --help` prints."""
-    width = max(map(len, VERBS))
-    lines = [f"  {verb:<{width}}  {entry.help}" for verb, entry in VERBS.items()]
+def usage(group: str | None = None) -> str:
+    """The list of verbs that `ico3d --help` prints, or `ico3d GROUP` those of a group."""
+    verbs = [verb for verb in VERBS if group in (None, verb.split()[0])]
+    width = max(map(len, verbs))
+    lines = [f"  {verb:<{width}}  {VERBS[verb].help}" for verb in verbs]
     head = "usage: ico3d VERB ... (ico3d VERB --help tells the rest; ico3d --version)\n\n"
     return head + "\n".join(lines)
+
+
+def verb_of(words: Sequence[str]) -> str | None:
+    """The verb that words begin with, if they do."""
+    return next((v for v in VERBS if list(words[: len(v.split())]) == v.split()), None)
+
+
+def parsed(verb: str, words: Sequence[str]) -> Any:
+    """The settings that the words behind a verb mean; nothing is run.
+
+    A verb whose defaults depend on what words choose (a preset) has a method `defaults`.
+    """
+    entry = VERBS[verb]
+    kind = getattr(importlib.import_module(entry.module), entry.name)
+    default = kind.defaults(words) if hasattr(kind, "defaults") else tyro.MISSING_NONPROP
+    return tyro.cli(
+        kind,
+        prog=f"ico3d {verb}",
+        args=list(words),
+        default=default,
+        config=(tyro.conf.PositionalMetavarFromFieldName, tyro.conf.DisallowNone),
+    )
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -87,23 +112,29 @@ def main(arguments: list[str] | None = None) -> int:
     if words == ["--version"]:
         print(f"ico3d {__version__}")
         return 0
-    verb = next((v for v in VERBS if words[: len(v.split())] == v.split()), None)
+    verb = verb_of(words)
     if verb is None:
-        known = not words or words[0] in ("-h", "--help")
-        print(usage() if known else f"ico3d: no such verb: {' '.join(words[:2])}\n\n{usage()}")
-        return 0 if known else 2
-    entry = VERBS[verb]
+        return _list_verbs(words)
     try:
-        settings_class = getattr(importlib.import_module(entry.module), entry.name)
-        rest = words[len(verb.split()) :]
-        settings = tyro.cli(settings_class, prog=f"ico3d {verb}", args=rest)
-        settings.run()
+        parsed(verb, words[len(verb.split()) :]).run()
     except Ico3dError as error:
         print(f"ico3d: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         return 130
     return 0
+
+
+def _list_verbs(words: Sequence[str]) -> int:
+    """Prints the verbs there are, all of them or those of a group; the exit status."""
+    groups = {verb.split()[0] for verb in VERBS}
+    group = words[0] if words and words[0] in groups else None
+    asked = words[1:] if group else words
+    if not asked or asked[0] in ("-h", "--help"):
+        print(usage(group))
+        return 0
+    print(f"ico3d: no such verb: {' '.join(words[:2])}\n\n{usage(group)}")
+    return 2
 
 
 if __name__ == "__main__":

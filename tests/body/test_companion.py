@@ -23,6 +23,7 @@ from ico3d.splat.render import render
 from support.bodies.moving_capture import FRAMES, MovingCapture
 from support.bodies.tiny_training import SMALL, WINDOW
 from support.bodies.window_parts import canonical
+from support.settings import changed
 
 RADIUS = 0.13
 BALL = np.array([0.0, 0.35, 0.0])
@@ -81,7 +82,7 @@ def capture(tmp_path):
 
 def trainer_of(capture, companion, **changes):
     """A trainer beside a ball."""
-    settings = replace(settings_for("cpu", "swings++"), **(SMALL | changes))
+    settings = changed(settings_for("cpu", "swings++"), SMALL | changes)
     dynamic = lambda p: (p[:, 0] > 0.2).astype(float)  # noqa: E731
     begin = begin_window(capture, WINDOW, "swings++", settings, dynamic, 0, companion)
     views = BodyViews(capture, WINDOW.frames, 0.1)
@@ -154,7 +155,7 @@ def test_removal_is_due_every_hundred_steps():
 
 def test_nothing_begins_in_the_ball_and_more_about_it(capture):
     """All begin outside, as many as before less those inside, and the border's points besides."""
-    settings = replace(settings_for("cpu", "swings++"), **SMALL)
+    settings = changed(settings_for("cpu", "swings++"), SMALL)
     alone, beside = (
         begin_window(capture, WINDOW, "swings++", settings, lambda p: p[:, 0] > 0.2, 0, companion)
         for companion in (None, Ball())
@@ -246,7 +247,7 @@ def test_fine_tuning_removes_too(capture):
     """What moves the Gaussians stays frozen through it; the companion is in both pictures."""
     ball, after = Ball(), Window(4, 8)
     models = [trainer_of(capture, ball).model for _ in range(2)]
-    settings = replace(settings_for("cpu", "swings++"), **SMALL, finetune_steps=2 * PRUNE_EVERY)
+    settings = changed(settings_for("cpu", "swings++"), SMALL | {"finetune.steps": 2 * PRUNE_EVERY})
     views, cameras = BodyViews(capture, after.frames, 0.1), list(capture.cameras)
     tuner = FineTuner(models[1], models[0], after, views, cameras, settings, 0.7, 0, ball)
     goal = tuner._goal.means[-40:]
@@ -262,12 +263,12 @@ def test_fine_tuning_removes_too(capture):
     assert not models[1].gaussians["alpha"].requires_grad
 
 
-TINY = SMALL | {"longest_window": 16, "steps_per_frame": 4, "finetune_steps": 0, "width": 8}
+TINY = SMALL | {"windows.longest": 16, "steps_per_frame": 4, "finetune.steps": 0, "mlp.width": 8}
 
 
 def job_of(method="swings++", **about):
     """A training of a moment."""
-    return BodyJob(method, 0, replace(settings_for("cpu", method), **TINY), **about)
+    return BodyJob(method, 0, changed(settings_for("cpu", method), TINY), **about)
 
 
 @pytest.fixture(scope="module")
@@ -286,7 +287,7 @@ def test_a_trained_body_goes_on_with_a_companion(folders, tmp_path):
     body = train_body(capture, tmp_path / "on", job)
     assert body.windows == (Window(0, FRAMES - 1),)
     assert not Ball().trespassing(body.models[0].at(0.5).means, 4).any()
-    with pytest.raises(SettingsError, match="another 'companion'"):
+    with pytest.raises(SettingsError, match=r"another 'companion\.points' \(30, not 3\)"):
         train_body(capture, tmp_path / "on", replace(job, companion=BallSource(3)))
 
 

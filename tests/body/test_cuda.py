@@ -1,7 +1,5 @@
 """Bodies are trained, fine-tuned, and go on with that, where CUDA is."""
 
-from dataclasses import replace
-
 import pytest
 import torch
 
@@ -11,6 +9,7 @@ from ico3d.body.training.optimise_window import BodyTrainer
 from ico3d.body.training.train_clip import BodyJob, train_body
 from support.bodies.moving_capture import MovingCapture
 from support.bodies.tiny_training import TINY
+from support.settings import changed
 
 DEATHS = {BodyTrainer: 8, FineTuner: 4}
 """Steps before which a run is interrupted."""
@@ -18,7 +17,7 @@ DEATHS = {BodyTrainer: 8, FineTuner: 4}
 
 def _job(method: str, **changes) -> BodyJob:
     small = TINY | {"steps_per_frame": 2, "checkpoint_every": 3, "color_correction": True}
-    return BodyJob(method, 0, replace(settings_for("cpu", method), **(small | changes)))
+    return BodyJob(method, 0, changed(settings_for("cpu", method), small | changes))
 
 
 @pytest.mark.parametrize("method", ["swings++", "swings", "spacetime", "freetime"])

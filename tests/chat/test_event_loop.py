@@ -15,8 +15,7 @@ from ico3d.chat.settings.conversation import ChatSettings, Choice
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import VERSION, Error, Heard, Hello, Speech, Text, Welcome
 from ico3d.measure.talking.page import open_page
-
-from .conftest import OFFLINE, serving
+from support.chat.serving import OFFLINE, serving
 
 pytestmark = pytest.mark.slow
 

@@ -73,5 +73,5 @@ def test_a_long_talk_is_kept_in_bounds(bundle, monkeypatch, notes):
             await guest.leave()
         return sizes
 
-    sizes = run(monkeypatch, chat())
+    sizes = run(chat())
     assert max(sizes) <= 10 and min(sizes[5:]) >= 2

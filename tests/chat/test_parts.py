@@ -16,8 +16,7 @@ from ico3d.chat.settings.conversation import ChatSettings, Choice, Turns, read_s
 from ico3d.chat.wire.protocol import Answer, End, Speech, State, Stop, Transcript
 from ico3d.errors import SettingsError
 from ico3d.speech.runtime import SpeechModel
-
-from .conftest import OFFLINE
+from support.chat.serving import OFFLINE
 
 
 def test_playback_follows_the_pages_clock():

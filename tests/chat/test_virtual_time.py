@@ -41,7 +41,7 @@ def test_the_server_waits_for_nothing_but_its_services(bundle, question, monkeyp
             await guest.leave()
             return shares
 
-    shares = run(monkeypatch, talk())
+    shares = run(talk())
     print(f"the server's own share: {[round(1000 * share) for share in shares]} ms")
     assert max(shares) <= SHARE
 
@@ -62,7 +62,7 @@ def test_the_turn_is_timed_as_it_was(bundle, question, monkeypatch, speculate, t
             await guest.leave()
             return at - said, turn.values, played.values["voice_to_voice"]
 
-    took, parts, heard = run(monkeypatch, talk())
+    took, parts, heard = run(talk())
     assert parts["vad"] == pytest.approx(200, abs=1)
     assert parts["recognition"] == pytest.approx(300, abs=1)
     assert parts["turn"] == pytest.approx(400, abs=40)  # a chunk
@@ -97,7 +97,7 @@ def test_a_session_in_which_nothing_happens_ends_with_a_sentence(bundle, questio
                 await guest.leave()
             return ends, left
 
-    ends, left = run(monkeypatch, stay())
+    ends, left = run(stay())
     sentence = "Nothing was said for 1 min, so this conversation has ended."
     assert {error for _, error in ends.values()} == {Error(sentence, fatal=True, again=True)}
     assert ends[2][0] == pytest.approx(10 + 60, abs=0.5)
@@ -122,7 +122,7 @@ def test_without_a_limit_sessions_stay(bundle, monkeypatch):
             await guest.leave()
             return len(sessions)
 
-    assert run(monkeypatch, stay()) == 1
+    assert run(stay()) == 1
 
 
 @pytest.mark.parametrize("away", [0.0, 3.0, 29.9])
@@ -147,7 +147,7 @@ def test_after_a_drop_speech_goes_on_with_the_very_next_piece(bundle, monkeypatc
             await again.leave()
             return before, again.speech(), guest.speech() + [m for m in made if type(m) is Speech]
 
-    before, after, everything = run(monkeypatch, talk())
+    before, after, everything = run(talk())
     indices = [message.index for message in before + after]
     assert indices == list(range(len(indices)))
     assert sum(len(message.pcm) for message in before + after) == 8 * 24000
@@ -165,7 +165,7 @@ def test_a_session_waits_for_30_seconds(bundle, monkeypatch):
             await again.leave()
             return guest.session is again.session
 
-    assert run(monkeypatch, talk()) is False
+    assert run(talk()) is False
 
 
 def test_nobody_hears_another_ones_answer(bundle, monkeypatch):
@@ -185,7 +185,7 @@ def test_nobody_hears_another_ones_answer(bundle, monkeypatch):
                 await guest.leave()
             return heard
 
-    heard = run(monkeypatch, talk())
+    heard = run(talk())
     assert [{m.utterance for m in messages} for messages in heard] == [{0}, *[{0, 1}] * 2]
     for number, messages in enumerate(heard):
         assert {loudest(m.pcm) for m in messages if len(m.pcm) >= 2400} == {200 + 100 * number}
@@ -224,7 +224,7 @@ def test_nine_sessions_leave_no_more_behind_than_three(bundle, monkeypatch):
             assert len(sessions) == 0
             return sizes
 
-    (tasks, threads, memory), (more_tasks, more_threads, more_memory) = run(monkeypatch, visits())
+    (tasks, threads, memory), (more_tasks, more_threads, more_memory) = run(visits())
     print(f"{(more_memory - memory) / 6e6:.2f} MB for each of 6 sessions")
     assert more_tasks == tasks and more_threads <= threads
     assert more_memory - memory < 6 * 2e6  # what a session takes is five times that

@@ -41,6 +41,7 @@ def trained(tmp_path_factory):
     out = tmp_path_factory.mktemp("example")
     size = ["--frames", "22", "--size", "48", "--steps", "20", "--gaussians", "400"]
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("ico3d.studio.picture.paint.DIRECTIONS", 6)  # drawn sooner
         run(patch, "01_train_a_head.py", "--out", out, *size)
     return out
 

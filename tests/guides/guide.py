@@ -1,6 +1,5 @@
 """Reads the commands of a guide and runs them."""
 
-import importlib
 import re
 import shlex
 import subprocess
@@ -12,9 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import tyro
-
-from ico3d.cli import VERBS, main
+from ico3d import cli
 
 GUIDES = Path(__file__).parents[2] / "docs" / "guides"
 PATIENCE = 60
@@ -52,19 +49,19 @@ def other_commands(name: str) -> list[str]:
 def parsed(words: list[str]) -> Any:
     """The settings that a command's words mean; nothing is run."""
     verb = verb_of(words)
-    entry = VERBS[verb]
-    kind = getattr(importlib.import_module(entry.module), entry.name)
-    return tyro.cli(kind, args=words[1 + len(verb.split()) :])
+    return cli.parsed(verb, words[1 + len(verb.split()) :])
 
 
 def verb_of(words: list[str]) -> str:
     """Which verb of ico3d a command is.
 
     Raises:
-        StopIteration: If it is none: then the guide would not work.
+        AssertionError: If it is none: then the guide would not work.
     """
     assert words[0] == "ico3d", f"guides hold commands of ico3d alone, not {words[0]}"
-    return next(verb for verb in VERBS if words[1:][: len(verb.split())] == verb.split())
+    verb = cli.verb_of(words[1:])
+    assert verb is not None, f"there is no verb {words[1:3]}"
+    return verb
 
 
 def follow(
@@ -85,7 +82,7 @@ def follow(
             _visit([*words[1:], *small[verb].split()])
         else:
             print("+", shlex.join(words), flush=True)
-            assert main([*words[1:], *small.get(verb, "").split()]) == 0, shlex.join(words)
+            assert cli.main([*words[1:], *small.get(verb, "").split()]) == 0, shlex.join(words)
 
 
 def _visit(words: list[str]) -> None:

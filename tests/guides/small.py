@@ -3,12 +3,19 @@
 Each command of a guide runs as it stands there, with these words behind it.
 """
 
-STEPS = "steps=40 initial_gaussians=500 max_gaussians=600 densify_from=20 densify_every=20"
+HEAD = (
+    "--steps 40 --initial.gaussians 500 --density.max-gaussians 600 --density.begin 20 "
+    "--density.every 20 --network.hidden 16 --network.features 8"
+)
+BODY = (
+    "--steps-per-frame 5 --warmup-steps 10 --finetune.steps 10 --joining.color-steps 10 "
+    "--initial.gaussians 300 --density.max-gaussians 400 --joining.border-points 60 "
+    "--density.begin 10 --encoder.space 8"
+)
 SMALL = {
     "capture portrait": "--no-refine",
-    "train head": f"--set {STEPS} hidden=16 features=8",
-    "assemble": "--set steps_per_frame=5 warmup_steps=10 finetune_steps=10 color_steps=10 "
-    "initial_gaussians=300 max_gaussians=400 border_points=60 densify_from=10 grid_space=8",
+    "train head": HEAD,
+    "assemble": BODY,
     "bake": "--force",  # what has hardly been trained breaks the bounds of quality
     "render": "--size 64 --fps 5",
     "serve": "--port 0 --no-open",

@@ -1,7 +1,5 @@
 """Heads are trained, and go on being trained, where CUDA is."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 import torch
@@ -16,22 +14,25 @@ from ico3d.head.train_head import HeadJob, train_head
 from ico3d.head.watch import WatchedHead
 from ico3d.training.watch import _side_by_side
 from support.pretended_cuda import is_moved
+from support.settings import changed
 
-SETTINGS = dataclasses.replace(
+SETTINGS = changed(
     PRESETS["cpu"],
-    steps=16,
-    initial_gaussians=200,
-    max_gaussians=400,
-    densify_from=6,
-    densify_every=6,
-    densify_until=16,
-    densify_gradient=1e-5,
-    checkpoint_every=8,
+    {
+        "steps": 16,
+        "initial.gaussians": 200,
+        "density.max_gaussians": 400,
+        "density.begin": 6,
+        "density.every": 6,
+        "density.until": 16,
+        "density.gradient": 1e-5,
+        "checkpoint_every": 8,
+    },
 )
 
 
 def _job(inputs="blendshapes", variant="full", **changes) -> HeadJob:
-    return HeadJob(inputs, variant, "builtin", 0, dataclasses.replace(SETTINGS, **changes))
+    return HeadJob(inputs, variant, "builtin", 0, changed(SETTINGS, changes))
 
 
 @pytest.fixture
@@ -51,7 +52,9 @@ def test_every_variant_trains_there(cuda, tiny, tmp_path, variant):
 
 def test_a_perceptual_term_looks_at_pictures_there(cuda, vgg, tiny, tmp_path):
     """The paper's preset turns it on at step 10,000."""
-    head = train_head(tiny, tmp_path, _job(perceptual_weight=0.1, perceptual_from=2, steps=4))
+    head = train_head(
+        tiny, tmp_path, _job(**{"loss.perceptual": 0.1, "loss.perceptual_from": 2}, steps=4)
+    )
     assert is_moved(head.model.means)
 
 

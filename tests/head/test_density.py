@@ -1,7 +1,5 @@
 """Density control of a head: everything follows the plan."""
 
-import dataclasses
-
 import pytest
 import torch
 
@@ -12,11 +10,19 @@ from ico3d.head.settings import PRESETS
 from ico3d.splat.density import DensityStats
 from ico3d.training.optimiser import Optimiser
 from support.heads.shapes import head_shape
+from support.settings import changed
 
-SETTINGS = dataclasses.replace(
-    PRESETS["cpu"], densify_from=0, densify_every=1, densify_until=9, densify_gradient=0.5,
-    prune_opacity=0.01, max_gaussians=10,
-)  # fmt: skip
+SETTINGS = changed(
+    PRESETS["cpu"],
+    {
+        "density.begin": 0,
+        "density.every": 1,
+        "density.until": 9,
+        "density.gradient": 0.5,
+        "density.min_opacity": 0.01,
+        "density.max_gaussians": 10,
+    },
+)
 
 
 def _sampled(opacities: list[float], contributions: list[float]):
@@ -38,7 +44,7 @@ def _planned() -> tuple[HeadModel, HeadModel, Optimiser]:
     for name in GAUSSIAN_AXES:
         optimiser.moments[f"{name}.first"] = getattr(after, name).detach().clone() + 1
         optimiser.moments[f"{name}.second"] = getattr(after, name).detach().clone() + 2
-    density = HeadDensity(SETTINGS, 0)
+    density = HeadDensity(SETTINGS.density, 0)
     density._stats = DensityStats(torch.tensor([0.0, 1.0, 1.0]), torch.ones(3))
     density.adapt(after, optimiser, _sampled([0.9, 0.9, 0.001], [9, 9, 9]), 1)
     return before, after, optimiser
@@ -63,24 +69,24 @@ def test_moments_follow_and_those_of_clones_begin_at_zero():
 
 
 def test_a_head_that_faded_is_one_sentence():
-    model, density = HeadModel(head_shape(2, features=4), 3), HeadDensity(SETTINGS, 0)
+    model, density = HeadModel(head_shape(2, features=4), 3), HeadDensity(SETTINGS.density, 0)
     density._stats = DensityStats.zeros(3)
     with pytest.raises(ModelError, match="all Gaussians have faded by step 1"):
         density.adapt(model, Optimiser(), _sampled([0, 0, 0], [9, 9, 9]), 1)
 
 
 def test_what_no_picture_shows_dies():
-    model, density = HeadModel(head_shape(2, features=4), 3), HeadDensity(SETTINGS, 0)
+    model, density = HeadModel(head_shape(2, features=4), 3), HeadDensity(SETTINGS.density, 0)
     model.log_scales.data.fill_(-9)
     density._stats = DensityStats.zeros(3)
     model.means.data = torch.arange(3.0)[:, None].repeat(1, 3)
-    least = SETTINGS.prune_contribution * 9
+    least = SETTINGS.density.min_contribution * 9
     density.adapt(model, Optimiser(), _sampled([0.9] * 3, [18, 0.9 * least, 9]), 1)
     assert model.means[:, 0].tolist() == [0, 2]
 
 
 def test_what_was_gathered_survives_a_checkpoint():
-    density, other = HeadDensity(SETTINGS, 0), HeadDensity(SETTINGS, 0)
+    density, other = HeadDensity(SETTINGS.density, 0), HeadDensity(SETTINGS.density, 0)
     density._stats = DensityStats(torch.tensor([1.0, 2.0]), torch.tensor([3.0, 4.0]))
     other.restore(density.tensors())
     torch.testing.assert_close(other._stats.mean_gradient(), density._stats.mean_gradient())

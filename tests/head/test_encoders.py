@@ -1,6 +1,5 @@
 """Heads that listen with the encoders that users bring, from training to the server's face."""
 
-import dataclasses
 import warnings
 
 import numpy as np
@@ -12,6 +11,7 @@ from ico3d.head.train_head import HeadJob, train_head
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.export import export_speech, make_servable
 from ico3d.speech.runtime import open_speech
+from support.settings import changed
 from support.users_weights import write_ave, write_hubert
 
 
@@ -33,7 +33,7 @@ def encoder(request, tmp_path, monkeypatch):
 
 
 def test_a_head_learns_from_them_and_is_served_as_it_was_trained(tiny, tmp_path, encoder):
-    settings = dataclasses.replace(PRESETS["cpu"], steps=20, initial_gaussians=60)
+    settings = changed(PRESETS["cpu"], {"steps": 20, "initial.gaussians": 60})
     head = train_head(tiny, tmp_path / "model", HeadJob("speech", "full", encoder, 0, settings))
     loaded = TrainedHead.load(tmp_path / "model")
     track = loaded.track(tiny)

@@ -1,6 +1,5 @@
 """The loss: its parts, and the perceptual term with and without weights."""
 
-import dataclasses
 import json
 import logging
 
@@ -17,16 +16,19 @@ from ico3d.head.train_head import HeadJob, train_head
 from ico3d.head.views import Picture
 from ico3d.splat.losses import ssim
 from ico3d.splat.rendering import Drawing, Rendering
+from support.settings import changed
 
 PAPER = PRESETS["paper"]
 CPU = torch.device("cpu")
-SHORT = dataclasses.replace(
+SHORT = changed(
     PRESETS["cpu"],
-    steps=5,
-    initial_gaussians=50,
-    perceptual_weight=0.1,
-    perceptual_from=1,
-    checkpoint_every=2,
+    {
+        "steps": 5,
+        "initial.gaussians": 50,
+        "loss.perceptual": 0.1,
+        "loss.perceptual_from": 1,
+        "checkpoint_every": 2,
+    },
 )
 
 
@@ -41,7 +43,7 @@ def _images() -> tuple[torch.Tensor, torch.Tensor]:
 
 def test_l1_ssim_and_alpha_are_weighted():
     image, target = _images()
-    settings = dataclasses.replace(PAPER, steps=10, alpha_weight=0.5)
+    settings = changed(PAPER, {"steps": 10, "loss.alpha": 0.5})
     alpha, mask = torch.full((16, 20), 0.25), torch.ones(16, 20)
     loss = HeadLoss(settings, CPU)(_rendering(image, alpha), target, Picture(target, mask, None), 0)
     expected = 0.8 * (image - target).abs().mean() + 0.2 * (1 - ssim(image, target)) + 0.5 * 0.75
@@ -53,7 +55,7 @@ def test_a_torso_counts_by_its_weight():
     image.requires_grad_()
     torso = torch.zeros(16, 20)
     torso[8:] = 1
-    settings = dataclasses.replace(PAPER, steps=10, ssim_weight=0.0, torso_weight=0.25)
+    settings = changed(PAPER, {"steps": 10, "loss.ssim": 0.0, "loss.torso": 0.25})
     rendering = _rendering(image, torch.ones(16, 20))
     HeadLoss(settings, CPU)(rendering, target, Picture(target, None, torso), 0).backward()
     slopes = image.grad.abs()  # of 0.8·L1 over 16·20·3 numbers
@@ -119,7 +121,7 @@ def test_a_head_says_whether_the_perceptual_term_was_there(weights, models, tiny
     job = HeadJob("blendshapes", "full", "builtin", 0, SHORT)
     train_head(tiny, tmp_path / "head", job)
     settings = json.loads((tmp_path / "head" / "head.json").read_text())["summary"]["settings"]
-    assert settings["perceptual_weight"] == (0.1 if weights else 0.0)
+    assert settings["loss"]["perceptual"] == (0.1 if weights else 0.0)
     assert caplog.text.count("with weight 0") == (0 if weights else 1)
 
 
@@ -146,4 +148,4 @@ def test_a_run_goes_on_with_the_terms_it_began_with(first, models, tiny, tmp_pat
     else:
         _write_weights(models)
         head = train_head(tiny, tmp_path / "head", job)
-        assert head.summary["settings"]["perceptual_weight"] == 0
+        assert head.summary["settings"]["loss"]["perceptual"] == 0

@@ -17,15 +17,18 @@ from ico3d.measure.head import evaluate_head
 from ico3d.splat.render import render
 from support.heads.shapes import head_shape
 from support.recordings.two_balls import HEAD, TRUNK, TwoBalls, seen_by
+from support.settings import changed
 
-SETTINGS = dataclasses.replace(
+SETTINGS = changed(
     PRESETS["cpu"],
-    steps=300,
-    initial_gaussians=700,
-    max_gaussians=1100,
-    densify_from=40,
-    densify_every=40,
-    densify_until=200,
+    {
+        "steps": 300,
+        "initial.gaussians": 700,
+        "density.max_gaussians": 1100,
+        "density.begin": 40,
+        "density.every": 40,
+        "density.until": 200,
+    },
 )
 
 
@@ -69,7 +72,7 @@ def test_gaussians_begin_on_the_whole_person(capture, caplog):
         model = initial_head(capture, SETTINGS, "full", 1, np.random.default_rng(0))
     means = model.means.detach().numpy()
     on_trunk = float((np.linalg.norm(means, axis=1) > 1.2 * HEAD).mean())
-    assert len(means) == SETTINGS.initial_gaussians and 0.4 < on_trunk < 0.8
+    assert len(means) == SETTINGS.initial.gaussians and 0.4 < on_trunk < 0.8
     assert model.shape.box_size > 0.15  # positions are encoded, and sizes bounded, for all of it
     assert "leave out" in caplog.text
 

@@ -1,6 +1,5 @@
 """Training end to end on a tiny capture."""
 
-import dataclasses
 import json
 
 import numpy as np
@@ -16,22 +15,25 @@ from ico3d.head.train_head import HeadJob, train_head
 from ico3d.splat.render import render
 from ico3d.training.checkpoint import load_tensors
 from ico3d.training.finite import check_finite
+from support.settings import changed
 
-SETTINGS = dataclasses.replace(
+SETTINGS = changed(
     PRESETS["cpu"],
-    steps=160,
-    initial_gaussians=200,
-    max_gaussians=400,
-    densify_from=40,
-    densify_every=20,
-    densify_until=100,
-    densify_gradient=1e-5,
-    basis_weight_decay=0.0,  # what this capture shows is exact
+    {
+        "steps": 160,
+        "initial.gaussians": 200,
+        "density.max_gaussians": 400,
+        "density.begin": 40,
+        "density.every": 20,
+        "density.until": 100,
+        "density.gradient": 1e-5,
+        "rates.basis_weight_decay": 0.0,  # what this capture shows is exact
+    },
 )
 
 
 def _job(inputs="blendshapes", variant="full", **changes) -> HeadJob:
-    settings = dataclasses.replace(SETTINGS, **changes)
+    settings = changed(SETTINGS, changes)
     return HeadJob(inputs, variant, "builtin", 0, settings)
 
 
@@ -74,7 +76,7 @@ def _train_until(step: int, monkeypatch, capture, folder, job) -> None:
 
 @pytest.mark.parametrize("inputs", ["blendshapes", "speech"])
 def test_a_killed_run_resumes_to_the_same_weights(tiny, tmp_path, inputs, monkeypatch):
-    job = _job(inputs, steps=60, checkpoint_every=25, densify_from=10, densify_every=10)
+    job = _job(inputs, steps=60, checkpoint_every=25, **{"density.begin": 10, "density.every": 10})
     whole = train_head(tiny, tmp_path / "whole", job)
     _train_until(55, monkeypatch, tiny, tmp_path / "parts", job)
     resumed = train_head(tiny, tmp_path / "parts", job)
@@ -112,10 +114,28 @@ def test_a_saved_head_gives_the_same_expressions_and_gaussians(tiny, tmp_path):
     assert expression.shape == (39,)
     assert torch.equal(loaded.track(tiny).at(7), expression)
     assert torch.equal(loaded.model.logits(expression), head.model.logits(expression))
-    assert len(loaded.model) <= SETTINGS.max_gaussians
+    assert len(loaded.model) <= SETTINGS.density.max_gaussians
     recorded = np.stack([tiny.eyes(frame) for frame in tiny.split.train])
     assert loaded.eyes == head.eyes == eye_range(recorded)
     np.testing.assert_allclose(loaded.neutral()[32:], loaded.eyes.rest)
+
+
+def test_a_head_of_an_earlier_version_opens(tiny, tmp_path):
+    """Only its run is refused: settings had other names, in the model's file and in the run's."""
+    old = {"steps": 3, "l1_weight": 0.8, "basis_rate": 2.5e-3, "densify_until": 100}
+    head = train_head(tiny, tmp_path, _job(steps=3))
+    about = json.loads((tmp_path / "head.json").read_text())
+    assert about["summary"]["settings"]["loss"]["l1"] == 0.8
+    about["summary"]["settings"] = old
+    (tmp_path / "head.json").write_text(json.dumps(about))
+    run = json.loads((tmp_path / "settings.json").read_text())
+    del run["settings"]
+    (tmp_path / "settings.json").write_text(json.dumps(run | old))
+    loaded = TrainedHead.load(tmp_path)
+    assert loaded.summary["settings"] == old
+    assert torch.equal(loaded.model.means, head.model.means)
+    with pytest.raises(SettingsError, match="holds a run that an earlier version of ico3d began"):
+        train_head(tiny, tmp_path, _job(steps=3))
 
 
 def test_eyes_that_make_no_sense_are_refused(tiny, tmp_path):
@@ -184,16 +204,3 @@ def test_a_nan_in_a_picture_stops_before_anything_is_spoiled(tiny, tmp_path, mon
     tensors, state = load_tensors(tmp_path / "model" / "checkpoint.safetensors")
     assert state["step"] == 25
     check_finite(tensors)
-
-
-def test_settings_can_be_changed_by_name():
-    words = ("steps=7", "basis_rate=0.5", "optimiser=sgd", "compile=true", "mixed_precision=false")
-    changed = PRESETS["cpu"].with_changes(words)
-    assert (changed.steps, changed.basis_rate, changed.optimiser) == (7, 0.5, "sgd")
-    assert (changed.compile, changed.mixed_precision) == (True, False)
-    with pytest.raises(SettingsError, match="no setting 'stepz'"):
-        changed.with_changes(("stepz=7",))
-    with pytest.raises(SettingsError, match="steps takes int values"):
-        changed.with_changes(("steps=x",))
-    with pytest.raises(SettingsError, match="compile takes true or false"):
-        changed.with_changes(("compile=yes",))

@@ -1,6 +1,5 @@
 """Watching a head in training, as a browser does: over HTTP and viser's WebSocket."""
 
-import dataclasses
 import socket
 import sys
 import threading
@@ -24,11 +23,13 @@ from ico3d.speech.network import SpeechAdaptor
 from ico3d.training.watch import RADIUS, LivePage
 from support.heads.shapes import head_shape
 from support.needs import needs
+from support.settings import changed
 
 pytestmark = needs("viser")
 
-SETTINGS = dataclasses.replace(
-    PRESETS["cpu"], steps=60, initial_gaussians=200, densify_from=100, checkpoint_every=25
+SETTINGS = changed(
+    PRESETS["cpu"],
+    {"steps": 60, "initial.gaussians": 200, "density.begin": 100, "checkpoint_every": 25},
 )
 JOB = HeadJob("blendshapes", "full", "builtin", 0, SETTINGS)
 

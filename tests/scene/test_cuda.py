@@ -1,23 +1,22 @@
 """Scenes are trained, and go on being trained, where CUDA is."""
 
-import dataclasses
-
 import pytest
 import torch
 
 from ico3d.scene.optimise import SceneTrainer
-from ico3d.scene.settings import PRESETS
+from ico3d.scene.settings import settings_for
 from ico3d.scene.train_scene import SceneJob, train_scene
 from support.pretended_cuda import is_moved
+from support.settings import changed
 
 SMALL = {
     "steps": 26,
-    "initial_gaussians": 80,
-    "max_gaussians": 120,
-    "densify_from": 4,
-    "densify_every": 8,
-    "densify_until": 20,
-    "reset_every": 12,
+    "initial.gaussians": 80,
+    "density.max_gaussians": 120,
+    "density.begin": 4,
+    "density.every": 8,
+    "density.until": 20,
+    "density.reset_every": 12,
     "sh_every": 6,
     "checkpoint_every": 10,
 }
@@ -27,7 +26,7 @@ SMALL = {
 def test_an_interrupted_run_goes_on_there(cuda, still, tmp_path, strategy, monkeypatch):
     """To what it would have become."""
     capture = still(3)
-    settings = dataclasses.replace(PRESETS["cpu", strategy], **SMALL)
+    settings = changed(settings_for("cpu", strategy), SMALL)
     job = SceneJob("person", "all", strategy, 0, settings)
     whole = train_scene(capture, tmp_path / "whole", job)
     step = SceneTrainer.step

@@ -5,11 +5,11 @@ import pytest
 
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
-from ico3d.scene.settings import SceneSettings
+from ico3d.scene.settings import Density, Initial, SceneSettings
 from ico3d.scene.surface_points import initial_scene
 from ico3d.scene.views import SceneViews
 
-SETTINGS = SceneSettings(initial_gaussians=100, sh_degree=2, initial_opacity=0.3)
+SETTINGS = SceneSettings(sh_degree=2, initial=Initial(gaussians=100, opacity=0.3))
 
 
 def _start(capture, only, frames="all", settings=SETTINGS):
@@ -68,7 +68,8 @@ def test_colours_are_those_of_the_pictures(still):
 
 
 def test_never_more_than_the_cap(still):
-    start = _start(still(), "all", settings=SceneSettings(initial_gaussians=90, max_gaussians=40))
+    few = SceneSettings(initial=Initial(gaussians=90), density=Density(max_gaussians=40))
+    start = _start(still(), "all", settings=few)
     assert len(start.scene) == 40
 
 

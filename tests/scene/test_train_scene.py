@@ -1,7 +1,5 @@
 """Training of a scene end to end on a tiny capture."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 import torch
@@ -11,26 +9,26 @@ from ico3d.errors import ModelError, SettingsError
 from ico3d.measure.scene import evaluate_scene
 from ico3d.scene.model_folder import TrainedScene
 from ico3d.scene.optimise import SceneTrainer
-from ico3d.scene.settings import PRESETS
+from ico3d.scene.settings import settings_for
 from ico3d.scene.train_scene import SceneJob, train_scene
 from ico3d.splat.files.formats import read_gaussians
-from ico3d.training.changes import with_changes
 from support.captures import open_with
+from support.settings import changed
 
 SMALL = {
     "steps": 200,
-    "initial_gaussians": 120,
-    "max_gaussians": 300,
-    "densify_from": 20,
-    "densify_every": 20,
-    "densify_until": 120,
+    "initial.gaussians": 120,
+    "density.max_gaussians": 300,
+    "density.begin": 20,
+    "density.every": 20,
+    "density.until": 120,
     "sh_every": 100,
-    "position_rate": 2e-3,
+    "rates.position": 2e-3,
 }
 
 
 def _job(only="person", strategy="default", frames="all", **changes) -> SceneJob:
-    settings = dataclasses.replace(PRESETS["cpu", strategy], **{**SMALL, **changes})
+    settings = changed(settings_for("cpu", strategy), SMALL | changes)
     return SceneJob(only, frames, strategy, 0, settings)
 
 
@@ -57,7 +55,8 @@ def test_a_person_has_no_background(still, tmp_path):
 @pytest.mark.parametrize("strategy", ["default", "mcmc"])
 def test_a_killed_run_resumes_to_the_same_scene(still, tmp_path, strategy, monkeypatch):
     capture = still(3)
-    job = _job(strategy=strategy, steps=60, checkpoint_every=25, densify_from=10, reset_every=30)
+    often = {"checkpoint_every": 25, "density.begin": 10, "density.reset_every": 30}
+    job = _job(strategy=strategy, steps=60, **often)
     whole = train_scene(capture, tmp_path / "whole", job)
     step = SceneTrainer.step
 
@@ -94,10 +93,10 @@ def test_the_verb_trains_and_exports(still, tmp_path, monkeypatch):
     open_with(monkeypatch, lambda _: still(2))
     out = tmp_path / "model"
     words = ["train", "static", str(tmp_path), str(out), "--only", "person", "--frames", "0"]
-    changes = ["steps=20", "initial_gaussians=80", "sh_degree=2"]
+    words += ["--steps", "20", "--initial.gaussians", "80", "--sh-degree", "2"]
     for name in ("scene.ply", "scene.spz"):
-        assert cli.main([*words, "--set", *changes, "--export", str(tmp_path / name)]) == 0
-    assert cli.main([*words, "--set", *changes, "--export", "scene.obj"]) == 1
+        assert cli.main([*words, "--export", str(tmp_path / name)]) == 0
+    assert cli.main([*words, "--export", "scene.obj"]) == 1
     parameters = TrainedScene.load(out).scene.parameters
     ply, spz = (read_gaussians(tmp_path / name) for name in ("scene.ply", "scene.spz"))
     assert len(ply) == len(spz) == 80 and ply.degree == spz.degree == 2
@@ -146,5 +145,3 @@ def test_the_verb_names_what_is_wrong(tmp_path, capsys):
     words = ["train", "static", str(tmp_path / "no"), str(tmp_path / "out"), "--frames", "3"]
     assert cli.main(words) == 1
     assert "there is no capture at" in capsys.readouterr().err
-    with pytest.raises(SettingsError, match="no setting 'stepz'"):
-        with_changes(PRESETS["cpu", "mcmc"], ("stepz=1",))

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from ico3d.speech import corpus
-from ico3d.speech.augment import recorded
-from ico3d.speech.corpus import make_batch
+from ico3d.speech.training import corpus
+from ico3d.speech.training.augment import recorded
+from ico3d.speech.training.corpus import make_batch
 
 pytest.importorskip("espeakng_loader")
 

@@ -6,8 +6,8 @@ import torch
 
 from ico3d.measure.alignment import aligned, transcripts
 from ico3d.speech.encoder import BUILTIN_FILE, load_encoder
-from ico3d.speech.targets import ARTICULATION, articulation_track
-from ico3d.speech.training import load_readout
+from ico3d.speech.training.targets import ARTICULATION, articulation_track
+from ico3d.speech.training.train_encoder import load_readout
 from support.shared import SPEECH
 
 

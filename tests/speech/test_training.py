@@ -6,9 +6,10 @@ import torch
 
 from ico3d.cli import main
 from ico3d.errors import SettingsError
-from ico3d.speech import training
 from ico3d.speech.encoder import load_builtin
-from ico3d.speech.training import EncoderSettings, EncoderTraining, load_readout
+from ico3d.speech.training import train_encoder as training
+from ico3d.speech.training.settings import EncoderSettings
+from ico3d.speech.training.train_encoder import EncoderTraining, load_readout
 
 pytest.importorskip("espeakng_loader")
 
@@ -64,7 +65,7 @@ def test_lag_is_positive_when_late():
 
 
 def test_the_command_writes_an_encoder_and_its_card(tmp_path):
-    command = f"train speech {tmp_path} --encoder.steps 2 --encoder.batch 2 --test-batches 2"
+    command = f"train speech {tmp_path} --steps 2 --batch 2 --test-batches 2"
     assert main(command.split()) == 0
     encoder = load_builtin(tmp_path / "encoder.safetensors")
     card = json.loads((tmp_path / "encoder.json").read_text())

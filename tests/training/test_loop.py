@@ -108,6 +108,26 @@ def test_a_folder_keeps_to_its_settings(tmp_path):
         RunFolder(tmp_path, {"seed": 1, "steps": 10})
 
 
+def test_a_setting_that_differs_is_named_as_its_option(tmp_path):
+    job = {"seed": 0, "joining": {"pruning": True}, "settings": {"steps": 9, "loss": {"l1": 0.8}}}
+    RunFolder(tmp_path, job)
+    RunFolder(tmp_path, job)
+    for name, change in {
+        r"loss\.l1' \(0\.8, not 1": {"settings": {"steps": 9, "loss": {"l1": 1.0}}},
+        r"steps' \(9, not 8": {"settings": {"steps": 8, "loss": {"l1": 0.8}}},
+        r"joining\.pruning' \(True, not False": {"joining": {"pruning": False}},
+    }.items():
+        with pytest.raises(SettingsError, match=f"holds a run with another '{name}"):
+            RunFolder(tmp_path, job | change)
+
+
+def test_a_run_of_an_earlier_version_is_refused(tmp_path):
+    """Its settings had other names: nobody knows whether they are the same."""
+    RunFolder(tmp_path, {"seed": 0, "steps": 9, "l1_weight": 0.8})
+    with pytest.raises(SettingsError, match="holds a run that an earlier version of ico3d began"):
+        RunFolder(tmp_path, {"seed": 0, "settings": {"steps": 9, "loss": {"l1": 0.8}}})
+
+
 def test_tensors_and_state_survive_a_file(tmp_path):
     tensors = {"a": torch.arange(6.0).view(2, 3).T, "b": torch.tensor(3)}
     save_tensors(tmp_path / "x.safetensors", tensors, {"step": 3})

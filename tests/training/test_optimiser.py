@@ -2,7 +2,8 @@
 
 import torch
 
-from ico3d.training.optimiser import EPSILON, Optimiser, Rate
+from ico3d.training.optimiser import EPSILON, Optimiser
+from ico3d.training.rate import Rate
 
 
 def _gradients(count: int, shape: tuple[int, ...], dtype: torch.dtype) -> list[torch.Tensor]:

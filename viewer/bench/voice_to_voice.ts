@@ -5,8 +5,9 @@
 import { join } from 'node:path';
 import { expect, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
+import { pauseDrawing } from '../support/browser/drawing.ts';
 import { runPython } from '../support/python.ts';
-import { pauseDrawing, readRecord, recordLoudness, recordWire, type Record } from '../support/browser/recorder.ts';
+import { readRecord, recordLoudness, recordWire, type Record } from '../support/browser/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
 import { ChatServer } from '../support/servers/server.ts';
 import { quantile } from '../support/statistics.ts';

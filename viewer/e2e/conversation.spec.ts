@@ -1,25 +1,13 @@
-import { join } from 'node:path';
-import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import type { Browser } from '../support/browser/browser.ts';
-import { runPython } from '../support/python.ts';
 import { readRecord, type Record } from '../support/browser/recorder.ts';
-import { scratchFolder } from '../support/scratch.ts';
-import { ChatServer } from '../support/servers/server.ts';
-import { finished, openPage, SENTENCE, SILENCE, until } from '../support/browser/talk.ts';
+import { finished, openPage, SENTENCE, SHORTER, SILENCE, until } from '../support/browser/talk.ts';
 
-let server: ChatServer;
-
-beforeAll(async () => {
-  const bundle = join(scratchFolder(), 'talking.ico3d');
-  runPython('references/talking_bundle.py', bundle);
-  server = await ChatServer.start(bundle);
-});
-
-afterAll(() => server?.stop());
+const { talkingUrl } = inject('shared');
 
 describe('a typed question', () => {
   let browser: Browser;
-  beforeAll(async () => (browser = await openPage(server.url)));
+  beforeAll(async () => (browser = await openPage(talkingUrl)));
   afterAll(() => browser?.close());
 
   test('is answered with words, sound and a moving face', async () => {
@@ -101,7 +89,7 @@ describe('a typed question', () => {
 });
 
 test('without a microphone the page says so and typing goes on', async () => {
-  const browser = await openPage(server.url);
+  const browser = await openPage(talkingUrl);
   await browser.context.clearPermissions();
   await browser.page.click('#microphone');
   const notice = browser.page.locator('#notices p').first();
@@ -112,16 +100,18 @@ test('without a microphone the page says so and typing goes on', async () => {
 });
 
 test('after a dropped connection the same session goes on', async () => {
-  const browser = await openPage(server.url);
+  const browser = await openPage(talkingUrl);
   const { page } = browser;
   await until(browser, finished(0), 30_000);
-  await page.fill('#text', SENTENCE);
+  await page.fill('#text', SHORTER);
   await page.keyboard.press('Enter');
   await until(browser, ({ received }) => received.some((m) => m.type === 'speech' && m.utterance === 1), 30_000);
   await page.evaluate(() => window.record!.sockets.at(-1)!.close());
   await until(browser, ({ received }) => received.filter(({ type }) => type === 'welcome').length === 2, 30_000);
   const record = await until(browser, finished(1), 60_000);
   const [first, second] = record.received.filter(({ type }) => type === 'welcome');
+  const last = record.received.findLast(({ type }) => type === 'speech');
+  expect(last!.at).toBeGreaterThan(second!.at); // there was something left to say
   expect(second).toMatchObject({ resumed: true, session: first!.session });
   const indices = new Set(record.received.filter(({ type }) => type === 'speech').map(({ index }) => index));
   expect(indices.size).toBe(Math.max(...([...indices] as number[])) + 1); // none is missing

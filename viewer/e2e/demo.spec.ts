@@ -1,24 +1,18 @@
-import { existsSync } from 'node:fs';
-import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import type { Browser } from '../support/browser/browser.ts';
-import { DEMO } from '../support/references/portrait.ts';
 import { readMouth, watchMouth } from '../support/browser/mouth.ts';
-import { ChatServer } from '../support/servers/server.ts';
 import { finished, openPage, until } from '../support/browser/talk.ts';
 
-describe.skipIf(!existsSync(DEMO))('the packaged demo (needs src/ico3d/chat/data/demo.ico3d)', () => {
-  let server: ChatServer;
+const { demoUrl } = inject('shared');
+
+describe.skipIf(!demoUrl)('the packaged demo (needs src/ico3d/chat/data/demo.ico3d)', () => {
   let browser: Browser;
 
   beforeAll(async () => {
-    server = await ChatServer.start(DEMO);
-    browser = await openPage(server.url, { calm: true });
+    browser = await openPage(demoUrl!, { calm: true });
   });
 
-  afterAll(async () => {
-    await browser?.close();
-    await server?.stop();
-  });
+  afterAll(() => browser?.close());
 
   test('answers a typed question aloud, and its mouth moves', async () => {
     const { page } = browser;

@@ -1,7 +1,8 @@
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { afterAll, beforeAll, expect, test } from 'vitest';
+import { afterAll, beforeAll, expect, inject, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
+import { drawSeldom } from '../support/browser/drawing.ts';
 import { runPython } from '../support/python.ts';
 import { scratchFolder } from '../support/scratch.ts';
 import { ChatServer } from '../support/servers/server.ts';
@@ -11,11 +12,9 @@ const voice = join(folder, 'voice.wav');
 let server: ChatServer;
 
 beforeAll(async () => {
-  const bundle = join(folder, 'talking.ico3d');
-  runPython('references/talking_bundle.py', bundle);
-  runPython('sound/voice.py', voice, '3', ...Array.from({ length: 8 }, () => ['What is your name?', '4']).flat());
+  runPython('sound/voice.py', voice, '1', ...Array.from({ length: 8 }, () => ['What is your name?', '4']).flat());
   writeFileSync(join(folder, 'chat.toml'), 'recognition = "browser"\n');
-  server = await ChatServer.start(bundle, 0, '--settings', join(folder, 'chat.toml'));
+  server = await ChatServer.start(inject('shared').talking, 0, '--settings', join(folder, 'chat.toml'));
 }, 120_000);
 
 afterAll(() => server?.stop());
@@ -25,7 +24,10 @@ async function talk(script: () => void): Promise<Browser> {
   const browser = await Browser.launch({ microphone: voice });
   await browser.context.addInitScript(script);
   const page = await browser.open(server.url);
-  await page.waitForFunction(() => document.body.dataset.state === 'idle'); // the greeting is over
+  await drawSeldom(page);
+  await page.waitForFunction(
+    () => document.getElementById('answer')!.textContent === 'Hello.' && document.body.dataset.state === 'idle',
+  ); // the greeting is over
   await page.click('#microphone');
   return browser;
 }

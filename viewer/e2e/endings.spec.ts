@@ -1,24 +1,23 @@
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { afterEach, beforeAll, expect, test } from 'vitest';
+import { afterEach, beforeAll, expect, inject, test } from 'vitest';
 import type { Browser } from '../support/browser/browser.ts';
+import { pauseDrawing } from '../support/browser/drawing.ts';
 import { runPython } from '../support/python.ts';
-import { microphones, pauseDrawing } from '../support/browser/recorder.ts';
+import { microphones } from '../support/browser/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
 import { ChatServer } from '../support/servers/server.ts';
 import { openPage, until } from '../support/browser/talk.ts';
 
 const folder = scratchFolder();
-const [bundle, silence] = [join(folder, 'talking.ico3d'), join(folder, 'silence.wav')];
-const IDLE = /^Nothing was said for 0\.05 min/;
+const silence = join(folder, 'silence.wav');
+const { talking, talkingUrl } = inject('shared');
+const IDLE = /^Nothing was said for 0\.04 min/;
 const FULL = /^all places are taken/;
 
 const opened: { close(): Promise<void> }[] = [];
 
-beforeAll(() => {
-  runPython('references/talking_bundle.py', bundle);
-  runPython('sound/voice.py', silence, '90');
-});
+beforeAll(() => void runPython('sound/voice.py', silence, '90'));
 
 afterEach(async () => {
   for (const browser of opened.splice(0)) await browser.close();
@@ -28,7 +27,7 @@ afterEach(async () => {
 async function serve(...settings: string[]): Promise<string> {
   const file = join(folder, 'talk.toml');
   writeFileSync(file, settings.join('\n'));
-  const server = await ChatServer.start(bundle, 0, '--settings', file);
+  const server = await ChatServer.start(talking, 0, '--settings', file);
   opened.push({ close: () => server.stop() });
   return server.url;
 }
@@ -57,16 +56,17 @@ async function says({ page }: Browser, sentence: RegExp): Promise<void> {
 const goes = ({ page }: Browser) => page.waitForFunction(() => document.getElementById('overlay')!.inert, undefined, { timeout: 60_000 });
 
 test('whoever falls silent makes room; who waits for a place gets it, and both may try again', async () => {
-  const url = await serve('max_sessions = 1', 'idle_minutes = 0.05');
+  const url = await serve('max_sessions = 1', 'idle_minutes = 0.04');
   const first = await visit(url);
+  // The first visitor goes on asking until the second one is there.
+  const asking = await first.page.evaluate(() => setInterval(() => window.ico3d!.conversation!.ask('Who are you?'), 500));
   await first.page.click('#microphone');
   await first.page.waitForFunction(() => document.getElementById('microphone')!.ariaPressed === 'true');
   expect(await microphones(first.page)).toEqual(['live']);
 
-  // The first visitor goes on asking until the second one is there.
-  const asking = await first.page.evaluate(() => setInterval(() => window.ico3d!.conversation!.ask('Who are you?'), 1000));
   const second = await visit(url);
   await says(second, FULL);
+  await first.page.evaluate((asking) => clearInterval(asking), asking);
   expect(await focused(second)).toBe('again');
   expect(await second.page.textContent('#overlay-wait')).toMatch(/^(Trying again in \d+ s|Connecting …)$/);
   for (let i = 0; i < 3; i++) {
@@ -74,7 +74,6 @@ test('whoever falls silent makes room; who waits for a place gets it, and both m
     expect(await focused(second)).toMatch(/^(again)?$/);
   }
 
-  await first.page.evaluate((asking) => clearInterval(asking), asking);
   await says(first, IDLE);
   expect(await first.page.textContent('#again')).toBe('Try again');
   expect(await focused(first)).toBe('again');
@@ -96,7 +95,7 @@ test('whoever falls silent makes room; who waits for a place gets it, and both m
 });
 
 test('a microphone whose worklet does not load is shown as closed, and is', async () => {
-  const browser = await visit(await serve());
+  const browser = await visit(talkingUrl);
   const { page } = browser;
   await page.evaluate(() => {
     const { prototype } = AudioWorklet;

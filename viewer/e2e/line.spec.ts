@@ -1,5 +1,5 @@
 import { join } from 'node:path';
-import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import type { Browser } from '../support/browser/browser.ts';
 import { hasClip, makePortrait, makeStandIn } from '../support/references/portrait.ts';
 import { MICROPHONE_RATE } from '../src/protocol.ts';
@@ -21,7 +21,7 @@ describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a tal
   let onset: number; // of the words that interrupt
 
   beforeAll(async () => {
-    server = await ChatServer.start(hasClip ? makePortrait(folder) : makeStandIn(folder));
+    server = await ChatServer.start(hasClip ? makePortrait(folder) : makeStandIn(folder, inject('shared').demo));
     const voice = join(folder, 'voice.wav');
     makeVoice(voice);
     browser = await openPage(server.url, { microphone: voice, calm: true });

@@ -1,9 +1,12 @@
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, beforeEach, describe, expect, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
+import { refreshed } from '../support/browser/drawing.ts';
 import { feed, noise } from '../support/sound/feeder.ts';
 import { atRest, excess, headAt, makePerson, readSteps, settle, watchSteps } from '../support/references/person.ts';
+import { finished, openPage, SHORTER, until } from '../support/browser/talk.ts';
 import { crop, lookAsBundled, psnr, takePixels } from '../support/browser/pictures.ts';
+import { ChatServer } from '../support/servers/server.ts';
 import { servePage } from '../support/servers/static.ts';
 
 const WIDTH = 240;
@@ -115,7 +118,8 @@ describe('a whole person', () => {
 
   test('is met face to face on a phone, and can be seen from all around', async () => {
     await page.setViewportSize({ width: 195, height: 422 });
-    await page.waitForTimeout(1000);
+    await page.waitForFunction(() => window.ico3d!.stage.renderer.domElement.height === 422);
+    await refreshed(page);
     const eyes = await page.evaluate(async () => {
       const { stage, head } = window.ico3d!;
       await stage.still();
@@ -152,3 +156,41 @@ describe('a visitor who wants little motion', () => {
   });
 });
 
+describe('a whole person in a conversation', () => {
+  let server: ChatServer;
+
+  beforeAll(async () => {
+    server = await ChatServer.start(person.file);
+    browser = await openPage(server.url, { width: 128, height: 160 });
+    page = browser.page;
+  });
+
+  afterAll(async () => {
+    await browser?.close();
+    await server?.stop();
+  });
+
+  test('gestures while it answers, along what the server plans, and returns to rest', async () => {
+    await until(browser, finished(0), 60_000); // the greeting
+    await watchSteps(page);
+    await settle(page, person);
+    await page.fill('#text', SHORTER);
+    await page.keyboard.press('Enter');
+    const { received } = await until(browser, finished(1), 100_000);
+    const steps = await settle(page, person);
+
+    const plan = received.filter(({ type, utterance }) => type === 'timeline' && utterance === 1);
+    const points = plan.flatMap((message) => message.points as [number, number][]);
+    expect(points.length).toBeGreaterThan(5);
+    expect(points.at(-1)![1]).toBeCloseTo(person.rest[1], 3);
+    const spoken = steps.filter(({ heard }) => heard?.utterance === 1);
+    const away = spoken.filter((step) => !atRest(person, step));
+    expect(Math.max(...points.map(([, body]) => body))).toBeGreaterThan(person.rest[1] + 0.3);
+    expect(Math.max(...spoken.map(({ time }) => time))).toBeGreaterThan(person.rest[1] + 0.3);
+    expect(excess(steps, person.fastest)).toBeLessThan(1e-9);
+    for (const { time, head } of steps) {
+      headAt(person, time).forEach((value, k) => expect(head[k]).toBeCloseTo(value, 3));
+    }
+    console.log(`${spoken.length} pictures while it answers, ${away.length} of them away from rest`);
+  });
+});

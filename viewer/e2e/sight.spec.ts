@@ -1,22 +1,20 @@
-import { existsSync } from 'node:fs';
 import type { CDPSession, Page } from 'playwright-core';
-import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
+import { drawSeldom, refreshed } from '../support/browser/drawing.ts';
 import { seeChin, seeEyes } from '../support/browser/eyes.ts';
-import { DEMO } from '../support/references/portrait.ts';
-import { ChatServer } from '../support/servers/server.ts';
 
 const MOST_SCRIPT = 1.2e6; // bytes on the wire until she is seen
 
-describe.skipIf(!existsSync(DEMO))('first sight of the packaged demo', () => {
-  let server: ChatServer;
+const { demoUrl } = inject('shared');
+
+describe.skipIf(!demoUrl)('first sight of the packaged demo', () => {
   let browser: Browser;
   let page: Page;
   let network: CDPSession;
   const sent: { url: string; script: boolean; bytes: number }[] = []; // over the network: 0 bytes from the cache
 
   beforeAll(async () => {
-    server = await ChatServer.start(DEMO);
     browser = await Browser.launch({ width: 480, height: 300, calm: true });
     page = browser.page;
     network = await browser.context.newCDPSession(page);
@@ -29,15 +27,12 @@ describe.skipIf(!existsSync(DEMO))('first sight of the packaged demo', () => {
       if (answer) sent.push({ ...answer, bytes });
     });
     await network.send('Network.enable');
-    await browser.open(server.url);
+    await browser.open(demoUrl!);
   });
 
-  afterAll(async () => {
-    await browser?.close();
-    await server?.stop();
-  });
+  afterAll(() => browser?.close());
 
-  /** The shape of the picture; waits until it is drawn and captions, which come first, are there. */
+  /** The shape of the picture; waits until it is fitted and captions, which come first, are there. */
   async function resize(width: number, height: number): Promise<void> {
     await page.setViewportSize({ width, height });
     await page.waitForFunction(
@@ -49,7 +44,7 @@ describe.skipIf(!existsSync(DEMO))('first sight of the packaged demo', () => {
       `${width} ${height}`,
       { timeout: 60_000 },
     );
-    await page.waitForTimeout(300); // the observers of the page's parts
+    await refreshed(page);
   }
 
   test('needs little script, and none of it twice', async () => {
@@ -59,9 +54,10 @@ describe.skipIf(!existsSync(DEMO))('first sight of the packaged demo', () => {
     expect(bytes).toBeGreaterThan(1e5);
     expect(bytes).toBeLessThan(MOST_SCRIPT);
     sent.length = 0;
-    await browser.open(server.url);
+    await browser.open(demoUrl!);
+    await drawSeldom(page);
     expect(sent.filter(({ url }) => url.includes('/assets/')).map(({ bytes }) => bytes)).toEqual([0, 0]);
-    expect(sent.find(({ url }) => url === server.url)!.bytes).toBeGreaterThan(0);
+    expect(sent.find(({ url }) => url === demoUrl)!.bytes).toBeGreaterThan(0);
   });
 
   test.each([
@@ -92,13 +88,13 @@ describe.skipIf(!existsSync(DEMO))('first sight of the packaged demo', () => {
     const before = await seeEyes(page);
     await page.mouse.move(before.x * 300, before.y * 300);
     for (let notch = 0; notch < 3; notch++) await page.mouse.wheel(0, -250);
-    await page.waitForTimeout(300);
+    await refreshed(page);
     const after = await seeEyes(page);
     console.log(`eyes ${before.apart.toFixed(3)} wide, then ${after.apart.toFixed(3)}`);
     expect(after.apart / before.apart).toBeGreaterThan(1.8);
     expect(Math.hypot(after.x - before.x, after.y - before.y)).toBeLessThan(0.03);
     for (let notch = 0; notch < 5; notch++) await page.mouse.wheel(0, -250);
-    await page.waitForTimeout(300);
+    await refreshed(page);
     const last = await seeEyes(page);
     expect(last.apart).toBeGreaterThan(0.42); // the face fills the picture
     expect(Math.hypot(last.x - before.x, last.y - before.y)).toBeLessThan(0.06);
@@ -116,7 +112,7 @@ describe.skipIf(!existsSync(DEMO))('first sight of the packaged demo', () => {
     await touch('touchStart', -20, 20);
     for (let way = 25; way <= 40; way += 5) await touch('touchMove', -way, way);
     await touch('touchEnd');
-    await page.waitForTimeout(300);
+    await refreshed(page);
     const after = await seeEyes(page);
     expect(after.apart / before.apart).toBeGreaterThan(1.8);
     expect(after.apart / before.apart).toBeLessThan(2.2);

@@ -1,35 +1,29 @@
 import { join } from 'node:path';
-import { afterAll, beforeAll, expect, test } from 'vitest';
+import { afterAll, beforeAll, expect, inject, test } from 'vitest';
 import { MICROPHONE_CHUNK, MICROPHONE_RATE } from '../src/protocol.ts';
 import type { Browser } from '../support/browser/browser.ts';
-import { runPython } from '../support/python.ts';
-import { pauseDrawing, readRecord, type Heard } from '../support/browser/recorder.ts';
+import { pauseDrawing } from '../support/browser/drawing.ts';
+import { readRecord, type Heard } from '../support/browser/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
-import { ChatServer } from '../support/servers/server.ts';
 import { StallingLine } from '../support/servers/stalling.ts';
 import { quantile } from '../support/statistics.ts';
 import { finished, makeVoice, openPage, until } from '../support/browser/talk.ts';
 
 const STALL = 8000; // ms: more than a server takes at once of sound that comes late
 
-let server: ChatServer;
 let line: StallingLine;
 let browser: Browser;
 
 beforeAll(async () => {
-  const folder = scratchFolder();
-  const [bundle, voice] = [join(folder, 'talking.ico3d'), join(folder, 'voice.wav')];
-  runPython('references/talking_bundle.py', bundle);
+  const voice = join(scratchFolder(), 'voice.wav');
   makeVoice(voice);
-  server = await ChatServer.start(bundle);
-  line = await StallingLine.to(server.url);
+  line = await StallingLine.to(inject('shared').talkingUrl);
   browser = await openPage(line.url, { microphone: voice });
 });
 
 afterAll(async () => {
   await browser?.close();
   await line?.stop();
-  await server?.stop();
 });
 
 test('a network that stalls while the microphone is open brings no old sound, and the talk goes on', async () => {

@@ -9,9 +9,12 @@ export const PYTHON = process.env.ICO3D_PYTHON ?? `${REPOSITORY}.venv/bin/python
 
 if (!existsSync(PYTHON)) throw new Error(`no Python at ${PYTHON}: run make install or set ICO3D_PYTHON`);
 
+/** One thread for each: tests run side by side, and what they compute is small. */
+export const ENVIRONMENT = { ...process.env, OMP_NUM_THREADS: '1', OPENBLAS_NUM_THREADS: '1', NUMBA_NUM_THREADS: '1' };
+
 /** Runs a script of `support/` to its end; what it printed. */
 export function runPython(script: string, ...args: string[]): string {
   const path = `${REPOSITORY}viewer/support/${script}`;
   const stdio = ['ignore', 'pipe', 'inherit'] as const;
-  return execFileSync(PYTHON, [path, ...args], { cwd: REPOSITORY, stdio: [...stdio], encoding: 'utf8' });
+  return execFileSync(PYTHON, [path, ...args], { cwd: REPOSITORY, env: ENVIRONMENT, stdio: [...stdio], encoding: 'utf8' });
 }

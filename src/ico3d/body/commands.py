@@ -1,21 +1,40 @@
 """The verb `ico3d train body`."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from ico3d.body.settings import PRESETS, BodySettings, Method, settings_for
 from ico3d.common.device import DeviceName
+from ico3d.common.presets import PresetName, chosen
 from ico3d.errors import SettingsError
 
 if TYPE_CHECKING:
     from ico3d.body.training.train_clip import Runner
 
 
+@dataclass(frozen=True, kw_only=True)
+class BodyChoice:
+    """What the defaults of all other settings follow from.
+
+    Attributes:
+        preset: The paper's settings, or those sized for two CPU cores;
+            the defaults shown here are those of the preset that is chosen.
+        method: SWinGS++, or what it is compared with: a positional encoding in the place of its
+            encoder, one window without tuning, Gaussians that come and go by formulas (spacetime,
+            freetime), Gaussians that do not move within a window.
+    """
+
+    preset: PresetName = "cpu"
+    method: Method = "swings++"
+
+
 @dataclass(frozen=True)
-class TrainBody:
+class TrainBody(BodyChoice):
     """Trains SWinGS++ on a capture of a whole person in motion.
 
     The same command goes on where it was interrupted.
@@ -23,11 +42,6 @@ class TrainBody:
     Attributes:
         capture: A capture by calibrated, synchronised cameras, with masks.
         out: The model folder to write.
-        method: SWinGS++, or what it is compared with: a positional encoding in the place of its
-            encoder, one window without tuning, Gaussians that come and go by formulas, Gaussians
-            that do not move within a window.
-        preset: Settings of the paper, or sized for two CPU cores.
-        set: Changes to the preset, as name=value (names: ico3d.body.settings.BodySettings).
         seed: All randomness follows from it.
         device: Where to compute: by default with CUDA where that works, else on the CPU; machines
             of a Ray cluster decide for themselves.
@@ -36,33 +50,36 @@ class TrainBody:
         ray: Address of a Ray cluster that trains the windows, host:port or auto; the capture and
             the model folder must lie under the same path on all its machines.
         plan: Only measures motion and shows the windows.
+        settings: How the body is trained.
     """
 
     capture: tyro.conf.Positional[Path]
     out: tyro.conf.Positional[Path]
-    method: Literal["swings++", "swings", "4dgs", "spacetime", "freetime", "static"] = "swings++"
-    preset: Literal["cpu", "paper"] = "cpu"
-    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     seed: int = 0
     device: DeviceName = "auto"
     jobs: int = 1
     ray: str | None = None
     plan: bool = False
+    settings: Annotated[BodySettings, tyro.conf.arg(name="")] = PRESETS["cpu"]
+
+    @classmethod
+    def defaults(cls, words: Sequence[str]) -> "TrainBody":
+        """The verb with the settings of the preset and the method that words choose."""
+        choice = chosen(BodyChoice, words)
+        settings = settings_for(choice.preset, choice.method)
+        return cls(tyro.MISSING, tyro.MISSING, settings=settings)
 
     def run(self) -> None:
         """Trains, or goes on training; writes the model folder."""
         from rich.console import Console
 
-        from ico3d.body.settings import settings_for
         from ico3d.body.training.train_clip import BodyJob, plan_windows, train_body
         from ico3d.capture.formats import open_capture
         from ico3d.splat.device import decided
-        from ico3d.training.changes import with_changes
 
         device = self.device if self.ray else decided(self.device)
         runner = None if self.plan else runner_of(self.jobs, self.ray, device)
-        settings = with_changes(settings_for(self.preset, self.method), self.set)
-        job = BodyJob(self.method, self.seed, settings, device=device)
+        job = BodyJob(self.method, self.seed, self.settings, device=device)
         capture = open_capture(self.capture)
         if self.plan:
             plan_windows(capture, job, self.out)

@@ -3,7 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from ico3d.training.optimiser import Rate
+from ico3d.common.presets import PresetName
+from ico3d.training.rate import Rate
 
 Method = Literal["swings++", "swings", "4dgs", "spacetime", "freetime", "static"]
 """SWinGS++; SWinGS: a positional encoding in the place of the encoder; 4DGS: one window for the
@@ -19,170 +20,267 @@ ONE_WINDOW: tuple[Method, ...] = ("4dgs", "spacetime", "freetime")
 
 
 @dataclass(frozen=True)
+class Windows:
+    """Where the clip is cut into windows.
+
+    Attributes:
+        threshold: Motion that the frames of a window may add up to, cm² (how it is measured:
+            docs/bodies.md).
+        shortest: Frames that a window has at least.
+        longest: Frames that a window has at most.
+    """
+
+    threshold: float = 100.0
+    shortest: int = 6
+    longest: int = 16
+
+
+@dataclass(frozen=True)
+class Encoder:
+    """The encoding of place and time that the MLP reads.
+
+    Attributes:
+        space: Resolution of the encoder's coarsest planes along space, cells.
+        scales: Scales of the encoder, each of twice the resolution of the one before.
+        channels: Features per plane and scale.
+        bands: Octaves of the positional encoding that method swings has in the encoder's place.
+    """
+
+    space: int = 64
+    scales: int = 2
+    channels: int = 16
+    bands: int = 6
+
+
+@dataclass(frozen=True)
+class Mlp:
+    """The tunable MLP, which moves the Gaussians.
+
+    Attributes:
+        sets: Sets M of weights, which every Gaussian mixes for itself; 1 is a plain MLP.
+        width: Width of the hidden layers.
+        depth: Number of hidden layers.
+    """
+
+    sets: int = 2
+    width: int = 64
+    depth: int = 2
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Weights of the terms of the loss.
+
+    Attributes:
+        ssim: Weight λ_s of 1 − SSIM; the L1 difference has the weight λ_1 = 1 − λ_s.
+        mask: Weight λ_m of the L1 difference of rendered alpha and mask.
+        smoothness: Weight of the second differences of the encoder's planes. Not in the paper.
+        stillness: Weight of how far the encoder's planes along time are from 1, where nothing
+            moves. Not in the paper.
+    """
+
+    ssim: float = 0.2
+    mask: float = 0.1
+    smoothness: float = 0.0
+    stillness: float = 0.0
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Learning rates at the first step, and the factors to which they decay until the last one.
+
+    Attributes:
+        position: Learning rate of the Gaussians' centres, relative to the person's extent.
+        position_decay: Factor to which the rate of the centres has decayed at the last step.
+        rotation: Learning rate of the Gaussians' rotations (quaternions).
+        scale: Learning rate of the logarithms of the Gaussians' sizes.
+        opacity: Learning rate of the opacities' logits.
+        color: Learning rate of the colours' logits.
+        shape_decay: Factor to which the rates of rotations, sizes, opacities and colours have
+            decayed at the last step.
+        mlp: Learning rate of the MLP.
+        grid: Learning rate of the encoder's planes.
+        blend: Learning rate of α, by which a Gaussian mixes the MLP's sets of weights.
+        motion: Learning rate of the formulas that move the Gaussians of methods spacetime and
+            freetime.
+        motion_decay: Factor to which the rates of MLP, planes, α and formulas have decayed at the
+            last step.
+    """
+
+    position: float = 1.6e-4
+    position_decay: float = 0.01
+    rotation: float = 1e-3
+    scale: float = 5e-3
+    opacity: float = 5e-2
+    color: float = 1e-2
+    shape_decay: float = 1.0
+    mlp: float = 1e-4
+    grid: float = 1.6e-3
+    blend: float = 1e-4
+    motion: float = 1e-3
+    motion_decay: float = 0.1
+
+    def by_parameter(self) -> dict[str, Rate]:
+        """Learning rates by the name of the parameter; that of the means is per metre of extent."""
+        return {
+            "means": Rate(self.position, self.position_decay),
+            "quats": Rate(self.rotation, self.shape_decay),
+            "log_scales": Rate(self.scale, self.shape_decay),
+            "opacity_logits": Rate(self.opacity, self.shape_decay),
+            "color_logits": Rate(self.color, self.shape_decay),
+            "alpha": Rate(self.blend, self.motion_decay),
+            "mlp": Rate(self.mlp, self.motion_decay),
+            "grid": Rate(self.grid, self.motion_decay),
+            "motion": Rate(self.motion, self.motion_decay),
+        }
+
+
+@dataclass(frozen=True)
+class Initial:
+    """The Gaussians that a window's training begins with.
+
+    Attributes:
+        source: Where they begin: on the best surface that the capture allows, or on the visual
+            hull of the masks.
+        gaussians: How many.
+        opacity: Opacity of each, 0 to 1.
+        scale: Size of each, as a factor of its distance to its neighbours.
+        duration: How long Gaussians of methods spacetime and freetime last, as a part of the
+            window.
+    """
+
+    source: Source = "best"
+    gaussians: int = 50_000
+    opacity: float = 0.1
+    scale: float = 1.0
+    duration: float = 0.15
+
+
+@dataclass(frozen=True)
+class Density:
+    """Density control: when Gaussians multiply and die (3DGS, Kerbl et al. 2023, section 5).
+
+    Attributes:
+        max_gaussians: There are never more Gaussians than this in a window.
+        begin: First step at which Gaussians may multiply or die.
+        until: Part of a window's steps, 0 to 1, after which Gaussians neither multiply nor die.
+        every: Steps between two rounds of multiplying and dying.
+        gradient: Mean screen-space gradient (normalised device units) above which a Gaussian
+            multiplies: a small one is cloned, a large one split.
+        growth: Part of the Gaussians, 0 to 1, that multiplies in one round at most: those of the
+            strongest gradient.
+        absgrad: Sum screen-space gradients over a picture's pixels without their signs; four times
+            the threshold is usual then.
+        min_opacity: Gaussians whose opacity, 0 to 1, is below this die; those of method freetime
+            move to where they are needed.
+    """
+
+    max_gaussians: int = 200_000
+    begin: int = 500
+    until: float = 0.5
+    every: int = 100
+    gradient: float = 2e-4
+    growth: float = 1.0
+    absgrad: bool = False
+    min_opacity: float = 0.005
+
+
+@dataclass(frozen=True)
+class Finetune:
+    """Temporal fine-tuning, which makes each window agree with the one before.
+
+    Attributes:
+        steps: Optimisation steps per window; 0 for no fine-tuning.
+        consistency: Part of the steps, 0 to 1, that compare with the window before; the others
+            learn from recorded pictures.
+        begin: Where on the decay of the learning rates fine-tuning begins: 0 where training of the
+            window did, 1 where it ended.
+        mean: Part of the steps, 0 to 1, the last ones, whose mean Gaussians are the result; 0 for
+            the Gaussians of the last step.
+    """
+
+    steps: int = 20_000
+    consistency: float = 0.75
+    begin: float = 0.0
+    mean: float = 0.0
+
+
+@dataclass(frozen=True)
 class BodySettings:
     """How a body is trained; defaults are the paper's and, where it is silent, 3DGS's.
 
     Attributes:
-        motion_threshold: Motion that a window may add up to, cm²
-            (`ico3d.body.planning.flow.ClipFlow`).
-        shortest_window: Frames that a window has at least.
-        longest_window: Frames that it has at most.
-        initial: Where Gaussians begin: the best that the capture allows, or the visual hull.
-        initial_gaussians: Gaussians to start with, per window.
-        initial_opacity: Their opacity.
-        initial_scale: Their size, as a factor of their distance to one another.
-        max_gaussians: Never more than this many in a window.
         steps: Optimisation steps of a window, one picture each.
-        steps_per_frame: Where above 0: steps per frame of the window, in the place of `steps`.
-        warmup_steps: Steps on the window's centre frame alone, before anything moves.
-        ssim_weight: λ_s; λ_1 is 1 − λ_s.
-        mask_weight: λ_m, of the L1 difference of alpha and mask.
-        color_correction: Whether every camera learns an affine correction of colours, so that
-            cameras need not agree about them.
-        sets: M, sets of weights of the tunable MLP.
-        width: Width of the MLP.
-        depth: Its hidden layers.
-        bands: Octaves of the positional encoding (SWinGS).
-        grid_space: Resolution of the encoder's planes along space.
-        grid_scales: Scales of the encoder, each of twice the resolution of the one before.
-        grid_channels: Features per plane and scale.
-        smoothness_weight: Of the planes' second differences.
-        stillness_weight: Of the distance of time planes from 1.
-        position_rate: Learning rate of the means, times the scene's extent.
-        position_decay: What it decays to, as a factor.
-        rotation_rate: Learning rate of the quaternions.
-        scale_rate: Learning rate of the log scales.
-        opacity_rate: Learning rate of the opacity logits.
-        color_rate: Learning rate of the colour logits.
-        shape_decay: What these four decay to, as a factor.
-        mlp_rate: Learning rate of the MLP.
-        grid_rate: Learning rate of the planes.
-        blend_rate: Learning rate of α.
-        motion_rate: Learning rate of the formulas of Spacetime and FreeTime Gaussians.
-        duration: How long those last at the beginning, as a part of the window.
-        motion_decay: What these four decay to, as a factor.
-        densify_from: First step at which the number of Gaussians may change.
-        densify_until: Part of the steps after which it does not.
-        densify_every: Steps between two changes.
-        densify_gradient: Screen gradient above which a Gaussian clones or splits.
-        densify_growth: Part of the Gaussians that may do so at once, those of strongest gradient.
-        absgrad: Whether those gradients are summed over pixels without signs.
-        min_opacity: Below this a Gaussian dies.
-        finetune_steps: Steps of temporal fine-tuning per window; 0 for none.
-        consistency: Part of those steps that compare with the window before.
-        finetune_from: Where on the decay of the learning rates fine-tuning begins: 0 where training
-            did, 1 where that ended.
-        finetune_mean: Part of those steps, the last ones, with whose mean Gaussians they end; 0
-            for the last step's Gaussians as they are.
-        checkpoint_every: Steps between checkpoints.
-        cache_gib: Pictures kept in memory, in GiB; further ones are read again at each use.
+        steps_per_frame: Optimisation steps per frame of a window, in the place of --steps; 0 for
+            as many in each window.
+        warmup_steps: First steps of a window, on its middle frame alone: nothing moves yet.
+        color_correction: Let every camera learn an affine correction of colours, so that cameras
+            need not agree about them.
+        checkpoint_every: Steps from one checkpoint to the next.
+        cache_gib: Memory for recorded pictures, GiB; what does not fit is read again at each use.
+        windows: Where the clip is cut into windows.
+        encoder: The encoding of place and time that the MLP reads.
+        mlp: The tunable MLP, which moves the Gaussians.
+        loss: Weights of the terms of the loss.
+        rates: Learning rates, and the factors to which they decay.
+        initial: The Gaussians that a window's training begins with.
+        density: When Gaussians multiply and die (3DGS, Kerbl et al. 2023, section 5).
+        finetune: Temporal fine-tuning, which makes each window agree with the one before.
     """
 
-    motion_threshold: float = 100.0
-    shortest_window: int = 6
-    longest_window: int = 16
-    initial: Source = "best"
-    initial_gaussians: int = 50_000
-    initial_opacity: float = 0.1
-    initial_scale: float = 1.0
-    max_gaussians: int = 200_000
     steps: int = 30_000
     steps_per_frame: int = 0
     warmup_steps: int = 1_000
-    ssim_weight: float = 0.2
-    mask_weight: float = 0.1
     color_correction: bool = False
-    sets: int = 2
-    width: int = 64
-    depth: int = 2
-    bands: int = 6
-    grid_space: int = 64
-    grid_scales: int = 2
-    grid_channels: int = 16
-    smoothness_weight: float = 0.0
-    stillness_weight: float = 0.0
-    position_rate: float = 1.6e-4
-    position_decay: float = 0.01
-    rotation_rate: float = 1e-3
-    scale_rate: float = 5e-3
-    opacity_rate: float = 5e-2
-    color_rate: float = 1e-2
-    shape_decay: float = 1.0
-    mlp_rate: float = 1e-4
-    grid_rate: float = 1.6e-3
-    blend_rate: float = 1e-4
-    motion_rate: float = 1e-3
-    duration: float = 0.15
-    motion_decay: float = 0.1
-    densify_from: int = 500
-    densify_until: float = 0.5
-    densify_every: int = 100
-    densify_gradient: float = 2e-4
-    densify_growth: float = 1.0
-    absgrad: bool = False
-    min_opacity: float = 0.005
-    finetune_steps: int = 20_000
-    consistency: float = 0.75
-    finetune_from: float = 0.0
-    finetune_mean: float = 0.0
     checkpoint_every: int = 1_000
     cache_gib: float = 2.0
+    windows: Windows = Windows()
+    encoder: Encoder = Encoder()
+    mlp: Mlp = Mlp()
+    loss: Loss = Loss()
+    rates: Rates = Rates()
+    initial: Initial = Initial()
+    density: Density = Density()
+    finetune: Finetune = Finetune()
 
     def steps_of(self, frames: int) -> int:
         """Optimisation steps of a window of this many frames."""
         return self.steps_per_frame * frames if self.steps_per_frame else self.steps
 
-    def rates(self) -> dict[str, Rate]:
-        """Learning rates by the name of the parameter; that of the means is per metre of extent."""
-        shape, motion = self.shape_decay, self.motion_decay
-        return {
-            "means": Rate(self.position_rate, self.position_decay),
-            "quats": Rate(self.rotation_rate, shape),
-            "log_scales": Rate(self.scale_rate, shape),
-            "opacity_logits": Rate(self.opacity_rate, shape),
-            "color_logits": Rate(self.color_rate, shape),
-            "alpha": Rate(self.blend_rate, motion),
-            "mlp": Rate(self.mlp_rate, motion),
-            "grid": Rate(self.grid_rate, motion),
-            "motion": Rate(self.motion_rate, motion),
-        }
+    def without_finetuning(self) -> "BodySettings":
+        """The same, but that windows stay as they were trained."""
+        return replace(self, finetune=replace(self.finetune, steps=0))
 
 
-PAPER = BodySettings()
-CPU = BodySettings(
-    initial_gaussians=4_000,
-    max_gaussians=7_000,
-    initial_opacity=0.3,
-    steps=2_150,
-    warmup_steps=200,
-    grid_space=32,
-    grid_scales=2,
-    position_rate=1e-3,
-    position_decay=0.03,
-    rotation_rate=1e-3,
-    scale_rate=1e-2,
-    opacity_rate=3e-2,
-    color_rate=1e-2,
-    mlp_rate=2e-3,
-    grid_rate=2e-2,
-    blend_rate=1e-3,
-    motion_rate=5e-3,
-    densify_from=200,
-    densify_gradient=0.0,
-    densify_growth=0.12,
-    absgrad=True,
-    finetune_steps=3_500,
-    finetune_from=0.5,
-    finetune_mean=0.5,
-    checkpoint_every=500,
-)
+PRESETS: dict[PresetName, BodySettings] = {
+    "paper": BodySettings(),
+    "cpu": BodySettings(
+        steps=2_150,
+        warmup_steps=200,
+        checkpoint_every=500,
+        encoder=Encoder(space=32),
+        rates=Rates(
+            position=1e-3,
+            position_decay=0.03,
+            scale=1e-2,
+            opacity=3e-2,
+            mlp=2e-3,
+            grid=2e-2,
+            blend=1e-3,
+            motion=5e-3,
+        ),
+        initial=Initial(gaussians=4_000, opacity=0.3),
+        density=Density(max_gaussians=7_000, begin=200, gradient=0.0, growth=0.12, absgrad=True),
+        finetune=Finetune(steps=3_500, begin=0.5, mean=0.5),
+    ),
+}
 
 
-def settings_for(preset: Literal["paper", "cpu"], method: Method) -> BodySettings:
-    """The settings of a method; a baseline differs where its own paper does."""
-    settings = PAPER if preset == "paper" else CPU
+def settings_for(preset: PresetName, method: Method) -> BodySettings:
+    """The settings of a preset for a method: a baseline differs where its own paper does."""
+    settings = PRESETS[preset]
     if method == "swings":
-        return replace(settings, depth=4)
+        return replace(settings, mlp=replace(settings.mlp, depth=4))
     if method == "4dgs":
-        return replace(settings, sets=1)
+        return replace(settings, mlp=replace(settings.mlp, sets=1))
     return settings

@@ -221,12 +221,14 @@ class Conversation:
             [
                 self._input,
                 EchoFilter(self._echo),
-                VoiceDetector(parts.ear),
+                VoiceDetector(parts.vad),
                 parts.recognition,
                 self._captions,
                 user,
                 parts.language,
-                AnswerGuard(parts.recognition, parts.language, settings.patience, self._tongue()),
+                AnswerGuard(
+                    parts.recognition, parts.language, settings.patience, self._apology_language()
+                ),
                 ClauseProcessor(self._language()),
                 parts.voice,
                 ExpressionProcessor(face, self._utterances, run),
@@ -235,7 +237,7 @@ class Conversation:
             ]
         )
 
-    def _tongue(self) -> str:
+    def _apology_language(self) -> str:
         """Language of apologies."""
         return self._avatar.settings.patience.apologies or self._language() or "en"
 
@@ -255,7 +257,7 @@ class Conversation:
         """Keeps markup and failures from it, and takes the time at which a piece reaches it."""
         if isinstance(voice, TTSService):
             patience = self._avatar.settings.patience
-            endure(voice, patience.voice, self._tongue(), self._complain)
+            endure(voice, patience.voice, self._apology_language(), self._complain)
             voice.add_text_transformer(speakable)
 
             async def requested(*_):

@@ -21,7 +21,7 @@ from ico3d.chat.observing.failures import cause
 from ico3d.chat.services import Chosen, ChosenService
 from ico3d.chat.services.provider import Context, WarmsUp
 from ico3d.chat.settings.conversation import ChatSettings
-from ico3d.chat.turns.detector import Ear
+from ico3d.chat.turns.detector import EagerSilero
 from ico3d.chat.turns.eager import EagerSmartTurn
 from ico3d.chat.wire import protocol
 from ico3d.chat.workers import Workers
@@ -64,7 +64,7 @@ class Parts:
     """What takes a while to make, and what takes a while to find out.
 
     Attributes:
-        ear: Hears voices.
+        vad: Hears voices.
         turn: Tells whether a turn is over.
         recognition: Speech to text.
         language: Question to answer.
@@ -73,7 +73,7 @@ class Parts:
         dictation: How the browser is to recognise speech; None where the server does.
     """
 
-    ear: Ear
+    vad: EagerSilero
     turn: EagerSmartTurn
     recognition: FrameProcessor
     language: FrameProcessor
@@ -92,7 +92,7 @@ def make_parts(avatar: Avatar) -> Parts:
     context = Context(avatar.persona, avatar.head, avatar.animation)
     params = SmartTurnParams(stop_secs=turns.end_silence - turns.pause)
     with _explained("turn-taking"):
-        ear, turn = Ear(turns.pause), EagerSmartTurn(turns.pause, params=params)
+        vad, turn = EagerSilero(turns.pause), EagerSmartTurn(turns.pause, params=params)
     made = {}
     for kind in ("recognition", "language", "voice"):
         service: ChosenService = getattr(services, kind)
@@ -100,7 +100,7 @@ def make_parts(avatar: Avatar) -> Parts:
             made[kind] = service.make(context)
     with _explained("a service"):
         return Parts(
-            ear, turn, **made, services=services.described(), dictation=services.dictation()
+            vad, turn, **made, services=services.described(), dictation=services.dictation()
         )
 
 

@@ -1,5 +1,6 @@
 """The verb `ico3d train head`."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -7,10 +8,24 @@ from typing import Annotated, Literal
 import tyro
 
 from ico3d.common.device import DeviceName
+from ico3d.common.presets import PresetName, chosen
+from ico3d.head.settings import PRESETS, HeadSettings
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeadChoice:
+    """What the defaults of all other settings follow from.
+
+    Attributes:
+        preset: The paper's settings, or those sized for two CPU cores;
+            the defaults shown here are those of the preset that is chosen.
+    """
+
+    preset: PresetName = "cpu"
 
 
 @dataclass(frozen=True)
-class TrainHead:
+class TrainHead(HeadChoice):
     """Trains HeadGaS++ on a capture. The same command goes on where it was interrupted.
 
     Attributes:
@@ -19,37 +34,39 @@ class TrainHead:
         inputs: What drives the head: its own speech, or the capture's blendshapes.
         variant: The paper's model, or what it is compared with: colours and opacity blended
             directly, the expression fed to the MLP instead of blended, no expression at all.
-        preset: Settings of the paper, or sized for two CPU cores.
-        set: Changes to the preset, as name=value (names: ico3d.head.settings.HeadSettings).
         encoder: Speech encoder for speech-driven heads: builtin, ave (SyncTalk's) or hubert.
         seed: All randomness follows from it.
         device: Where to compute: by default with CUDA where that works, else on the CPU.
         watch: Shows the training in the browser while it lasts.
-        watch_port: Where, on this machine only; the next free port where it is taken.
+        watch_port: Port of that page, on this machine only; the next free one where it is taken.
+        settings: How the head is trained.
     """
 
     capture: tyro.conf.Positional[Path]
     out: tyro.conf.Positional[Path]
     inputs: Literal["speech", "blendshapes"] = "speech"
     variant: Literal["full", "no-mlp", "no-blending", "static"] = "full"
-    preset: Literal["cpu", "paper"] = "cpu"
-    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     encoder: str = "builtin"
     seed: int = 0
     device: DeviceName = "auto"
     watch: bool = False
     watch_port: int = 8080
+    settings: Annotated[HeadSettings, tyro.conf.arg(name="")] = PRESETS["cpu"]
+
+    @classmethod
+    def defaults(cls, words: Sequence[str]) -> "TrainHead":
+        """The verb with the settings of the preset that words choose."""
+        preset = chosen(HeadChoice, words).preset
+        return cls(tyro.MISSING, tyro.MISSING, settings=PRESETS[preset])
 
     def run(self) -> None:
         """Trains, or goes on training; writes the model folder."""
         from rich.console import Console
 
         from ico3d.capture.formats import open_capture
-        from ico3d.head.settings import PRESETS
         from ico3d.head.train_head import HeadJob, train_head
 
-        settings = PRESETS[self.preset].with_changes(self.set)
-        job = HeadJob(self.inputs, self.variant, self.encoder, self.seed, settings)
+        job = HeadJob(self.inputs, self.variant, self.encoder, self.seed, self.settings)
         port = self.watch_port if self.watch else None
         head = train_head(open_capture(self.capture), self.out, job, port, self.device)
         seconds = head.summary["train_seconds"]

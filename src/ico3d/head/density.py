@@ -9,7 +9,7 @@ from torch import Tensor
 
 from ico3d.errors import ModelError
 from ico3d.head.model import GAUSSIAN_AXES, HeadModel
-from ico3d.head.settings import HeadSettings
+from ico3d.head.settings import Density
 from ico3d.splat.density import (
     DensitySettings,
     DensityStats,
@@ -51,14 +51,14 @@ class Sampled:
 class HeadDensity:
     """Clones, splits and prunes; clones and parts copy F and f_0."""
 
-    def __init__(self, settings: HeadSettings, seed: int):
+    def __init__(self, settings: Density, seed: int):
         """Gathers nothing yet."""
         self._settings, self._seed = settings, seed
         self._stats = DensityStats.zeros(0)
 
     def observe(self, info: RenderInfo, step: int) -> None:
         """Gathers screen gradients after `backward`."""
-        if step >= self._settings.densify_until:
+        if step >= self._settings.until:
             return
         if len(self._stats.views) != info.radii.shape[1]:
             self._stats = DensityStats.zeros(info.radii.shape[1], info.radii.device)
@@ -83,16 +83,16 @@ class HeadDensity:
             ModelError: If no Gaussian is left.
         """
         settings = self._settings
-        due = settings.densify_from <= step < settings.densify_until
-        if not due or step % settings.densify_every:
+        due = settings.begin <= step < settings.until
+        if not due or step % settings.every:
             return
         thresholds = DensitySettings(
             max_gaussians=settings.max_gaussians,
-            gradient_threshold=settings.densify_gradient,
+            gradient_threshold=settings.gradient,
             clone_below=CLONE_BELOW * model.shape.box_size,
-            prune_opacity=settings.prune_opacity,
+            prune_opacity=settings.min_opacity,
             prune_scale=PRUNE_ABOVE * model.shape.box_size,
-            prune_contribution=settings.prune_contribution,
+            prune_contribution=settings.min_contribution,
         )
         seen = sample(step)
         plan = densify_plan(
@@ -100,8 +100,8 @@ class HeadDensity:
         )
         if len(plan) == 0:
             raise ModelError(
-                f"all Gaussians have faded by step {step}: lower mlp_rate, or give "
-                "the capture masks and raise alpha_weight."
+                f"all Gaussians have faded by step {step}: lower --rates.mlp, or "
+                "give the capture masks and raise --loss.alpha."
             )
         generator = torch.Generator().manual_seed(hash((self._seed, step)) % 2**63)
         _carry_out(plan, model, optimiser, generator)

@@ -46,14 +46,14 @@ def initial_head(
     if surface is None or len(surface) < 4 or not np.isfinite(surface).all():
         raise CaptureError(f"{capture.path} has no finite surface points to start from.")
     seen = _seen(capture, np.asarray(surface, np.float64))  # (P', 3)
-    points = _whole_person(capture, seen, settings.initial_gaussians, rng)  # (N, 3)
+    points = _whole_person(capture, seen, settings.initial.gaussians, rng)  # (N, 3)
     low, high = points.min(0), points.max(0)
     shape = HeadShape(
         expression_size=expression_size,
         variant=variant,
-        features=settings.features,
-        hidden=settings.hidden,
-        frequencies=settings.frequencies,
+        features=settings.network.features,
+        hidden=settings.network.hidden,
+        frequencies=settings.network.frequencies,
         box_center=tuple(((low + high) / 2).tolist()),
         box_size=float((high - low).max() / 2),
     )

@@ -31,10 +31,10 @@ class HeadLoss:
             device: Where the pictures will be.
         """
         self._perceptual: Callable[[Tensor, Tensor], Tensor] | None = None
-        if settings.perceptual_weight and settings.steps > settings.perceptual_from:
+        if settings.loss.perceptual and settings.steps > settings.loss.perceptual_from:
             self._perceptual = _perceptual_term(device)
             if self._perceptual is None:
-                settings = replace(settings, perceptual_weight=0.0)
+                settings = _without_perceptual(settings)
         self.settings = settings
 
     def go_on(self, perceptual_weight: float) -> None:
@@ -43,14 +43,14 @@ class HeadLoss:
         Raises:
             ModelError: If the run had it, and VGG's weights are not there any more.
         """
-        if perceptual_weight and not self.settings.perceptual_weight:
+        if perceptual_weight and not self.settings.loss.perceptual:
             raise ModelError(
                 "this run began with the perceptual term, and the weights of VGG are not there "
                 "any more: put them back, or train into another folder."
             )
         if not perceptual_weight:
             self._perceptual = None
-            self.settings = replace(self.settings, perceptual_weight=0.0)
+            self.settings = _without_perceptual(self.settings)
 
     def __call__(self, rendering: Rendering, target: Tensor, picture: Picture, step: int) -> Tensor:
         """The loss of one picture.
@@ -64,18 +64,22 @@ class HeadLoss:
         Returns:
             A scalar.
         """
-        settings = self.settings
+        weights = self.settings.loss
         image = rendering.rgb  # (1, H, W, 3)
-        if settings.torso_weight != 1 and picture.torso is not None:
-            ignored = ((1 - settings.torso_weight) * picture.torso)[..., None]  # (H, W, 1)
+        if weights.torso != 1 and picture.torso is not None:
+            ignored = ((1 - weights.torso) * picture.torso)[..., None]  # (H, W, 1)
             image = image + ignored * (target - image)
-        loss = settings.l1_weight * l1(image, target[None])
-        loss = loss + settings.ssim_weight * (1 - ssim(image, target[None]))
-        if settings.alpha_weight and picture.mask is not None:
-            loss = loss + settings.alpha_weight * (rendering.alpha[0] - picture.mask).abs().mean()
-        if self._perceptual is not None and step >= settings.perceptual_from:
-            loss = loss + settings.perceptual_weight * self._perceptual(image[0], target)
+        loss = weights.l1 * l1(image, target[None])
+        loss = loss + weights.ssim * (1 - ssim(image, target[None]))
+        if weights.alpha and picture.mask is not None:
+            loss = loss + weights.alpha * (rendering.alpha[0] - picture.mask).abs().mean()
+        if self._perceptual is not None and step >= weights.perceptual_from:
+            loss = loss + weights.perceptual * self._perceptual(image[0], target)
         return loss
+
+
+def _without_perceptual(settings: HeadSettings) -> HeadSettings:
+    return replace(settings, loss=replace(settings.loss, perceptual=0.0))
 
 
 def _perceptual_term(device: torch.device) -> Callable[[Tensor, Tensor], Tensor] | None:

@@ -28,7 +28,7 @@ GEOMETRY = ("means", "quats", "log_scales")
 LEAST_TOLD = 0.5
 """Share of the pictures that must tell the person from what is behind, if any does."""
 FEW_FRAMES = 100
-"""Training frames that `basis_weight_decay` is meant for."""
+"""Training frames that `rates.basis_weight_decay` is meant for."""
 SAMPLES = 16
 """Views that density control looks at."""
 
@@ -64,7 +64,7 @@ class HeadTrainer:
         if not self._views:
             raise CaptureError(f"{capture.path} has no picture among its training frames.")
         few = FEW_FRAMES / len(capture.split.train)
-        self._weight_decay = settings.basis_weight_decay * few**4
+        self._weight_decay = settings.rates.basis_weight_decay * few**4
         shape = model.shape
         self._space = {
             "box": [*map(float, shape.box_center), float(shape.box_size)],
@@ -72,7 +72,7 @@ class HeadTrainer:
         }
         self._loss = HeadLoss(settings, model.device)
         self._optimiser = Optimiser(settings.optimiser)
-        self._density = HeadDensity(settings, seed)
+        self._density = HeadDensity(settings.density, seed)
         self._decode = accelerated(
             model.decode, model.device, settings.mixed_precision, settings.compile
         )
@@ -91,7 +91,8 @@ class HeadTrainer:
         expression = self._expression(view)  # (B,)
         features = self._features(expression)  # (N, w)
         gaussians = self.model.gaussians(self._decode(features, expression))
-        rendering = render(gaussians, [view.camera], background, absgrad=self._settings.absgrad)
+        absgrad = self._settings.density.absgrad
+        rendering = render(gaussians, [view.camera], background, absgrad=absgrad)
         loss = self._loss(rendering, target, picture, index)
         loss.backward()
         self._density.observe(rendering.info, index)
@@ -116,7 +117,7 @@ class HeadTrainer:
 
     def state(self) -> dict:
         """The weight of the perceptual term, and the space; randomness follows from the step."""
-        return {"perceptual_weight": self.settings.perceptual_weight, "space": self._space}
+        return {"perceptual_weight": self.settings.loss.perceptual, "space": self._space}
 
     def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
         """Takes back what `tensors` and `state` gave.
@@ -129,7 +130,7 @@ class HeadTrainer:
                 "the run was begun by an earlier version, or the recording's points, masks or head "
                 "poses have changed since: train in an empty folder."
             )
-        self._loss.go_on(state.get("perceptual_weight", self.settings.perceptual_weight))
+        self._loss.go_on(state.get("perceptual_weight", self.settings.loss.perceptual))
         self.model.resize(tensors["model.means"].shape[0])
         self.model.load_state_dict(_below("model.", tensors))
         if self.adaptor is not None:
@@ -169,7 +170,7 @@ class HeadTrainer:
     def _update(self, expression: Tensor, features: Tensor, index: int) -> None:
         """One optimiser step on everything."""
         progress = index / self._settings.steps
-        groups = self._settings.rates(self.model.shape.has_mlp)
+        groups = self._settings.rates.by_parameter(self.model.shape.has_mlp)
         rates = {name: rate.at(progress) for name, rate in groups.items()}
         rates["means"] *= self.model.shape.box_size
         weights = self.model.row_weights(expression)

@@ -72,9 +72,7 @@ def train_head(
         ModelError: If training diverges.
         MissingExtraError: If it is to be watched and viser is not installed.
     """
-    about = asdict(job)
-    about |= {"capture": str(capture.path.resolve()), **about.pop("settings")}
-    run = RunFolder(folder, about)
+    run = RunFolder(folder, {"capture": str(capture.path.resolve()), **asdict(job)})
     if run.finished() is not None:
         return TrainedHead.load(folder)
     place = computing_device(device)

@@ -1,12 +1,15 @@
 """The verbs `ico3d evaluate` and `ico3d bench`."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 import tyro
 
+from ico3d.body.settings import BodySettings, Method
 from ico3d.common.device import DeviceName
+from ico3d.measure.methods.settings import OURS, preset
 
 if TYPE_CHECKING:
     from ico3d.avatar.avatar import TrainedAvatar
@@ -220,9 +223,6 @@ class BenchExpression:
         )
 
 
-Method = Literal["swings++", "swings", "4dgs", "spacetime", "freetime", "static"]
-
-
 @dataclass(frozen=True)
 class BenchBody:
     """Trains SWinGS++ and what it is compared with on one recording, and measures all of them.
@@ -239,23 +239,26 @@ class BenchBody:
         frames: Only so many of the first frames; all by default.
         finetune: Fine-tune SWinGS++ in the end, and measure before and after; the table shows it
             as it was before.
-        set: Changes to the cpu preset of all methods, as name=value.
         device: Where to compute: by default with CUDA where that works, else on the CPU.
         jobs: Trainings at a time; they share the cores.
         json: File for the figures.
+        settings: How SWinGS++ is trained; the other methods alike, except where their own papers
+            differ. What is set here holds for all of them.
     """
 
     capture: tyro.conf.Positional[Path | None] = None
     subject: Path | None = None
     folder: Path = Path("bench-body")
     seeds: int = 1
-    methods: tuple[Method, ...] = ("swings++", "swings", "4dgs", "spacetime", "freetime", "static")
+    methods: tuple[Method, ...] = get_args(Method)
     frames: int | None = None
     finetune: bool = False
-    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     device: DeviceName = "auto"
     jobs: int = 1
     json: Path | None = None
+    settings: Annotated[BodySettings, tyro.conf.arg(name="")] = field(
+        default_factory=partial(preset, OURS)
+    )
 
     def run(self) -> None:
         """Prints the table and margins, writes the figures.
@@ -276,7 +279,7 @@ class BenchBody:
             self._recording(),
             self.frames,
             self.folder,
-            self.set,
+            self.settings,
             self.finetune,
             decided(self.device),
         )

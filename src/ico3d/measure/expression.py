@@ -17,14 +17,14 @@ from ico3d.common.weights import cached
 from ico3d.errors import SettingsError
 from ico3d.measure.alignment import aligned, transcripts
 from ico3d.measure.lips import lip_correlation, lip_lag_ms
-from ico3d.speech.augment import recorded
-from ico3d.speech.corpus import utterance
 from ico3d.speech.encoder import FrozenEncoder, load_encoder
 from ico3d.speech.export import export_encoder, export_speech
 from ico3d.speech.mel import FPS, RATE
 from ico3d.speech.network import AudioEncoder, SpeechAdaptor
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions, open_speech
-from ico3d.speech.targets import ARTICULATION, articulation_track
+from ico3d.speech.training.augment import recorded
+from ico3d.speech.training.corpus import utterance
+from ico3d.speech.training.targets import ARTICULATION, articulation_track
 
 SLICE, STEP = RATE * 160 // 1000, RATE * 600 // 1000
 """Samples that arrive at a time: short slices, and what the server takes of a voice at once."""

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from ico3d.capture.pictures import View
 from ico3d.scene.model import NAMES, StaticScene
-from ico3d.scene.settings import SceneSettings
+from ico3d.scene.settings import SceneSettings, StrategyName
 from ico3d.scene.surface_points import Start
 from ico3d.scene.views import Example, SceneViews
 from ico3d.splat.density import (
@@ -19,7 +19,6 @@ from ico3d.splat.density import (
     Population,
     Schedule,
     Strategy,
-    StrategyName,
 )
 from ico3d.splat.losses import photometric, tensor_psnr
 from ico3d.splat.render import render
@@ -51,7 +50,7 @@ class SceneTrainer:
         self._extent = start.extent
         self._optimiser = Optimiser()
         self._strategy = density_control(strategy, settings, seed, start.extent)
-        self._rates = settings.rates()
+        self._rates = settings.rates.by_parameter()
         for parameter in self.scene.parameters.values():
             parameter.requires_grad_()
 
@@ -69,7 +68,7 @@ class SceneTrainer:
             self.scene.gaussians(degree),
             [view.camera],
             example.behind,
-            absgrad=self._settings.absgrad,
+            absgrad=self._settings.density.absgrad,
         )
         loss = self._loss(rendering, example)
         (loss + self._strategy.penalty(self._population)).backward()
@@ -127,7 +126,7 @@ class SceneTrainer:
         image, target = rendering.rgb, example.target[None]  # (1, H, W, 3)
         if example.weight is not None:
             image = target + example.weight[..., None] * (image - target)
-        return photometric(image, target, self._settings.ssim_weight)
+        return photometric(image, target, self._settings.loss.ssim)
 
     def _update(self, index: int) -> None:
         """One optimiser step on every parameter that has a gradient."""
@@ -145,21 +144,22 @@ def density_control(
     name: StrategyName, settings: SceneSettings, seed: int, extent: float
 ) -> Strategy:
     """The strategy of that name, with thresholds for a scene of this extent in metres."""
-    schedule = Schedule(settings.densify_from, settings.densify_until, settings.densify_every)
+    density, mcmc = settings.density, settings.mcmc
+    schedule = Schedule(density.begin, density.until, density.every)
     if name == "mcmc":
         chain = McmcSettings(
-            max_gaussians=settings.max_gaussians,
-            min_opacity=settings.min_opacity,
-            noise_rate=settings.noise_rate,
-            opacity_weight=settings.opacity_weight,
-            scale_weight=settings.scale_weight,
+            max_gaussians=density.max_gaussians,
+            min_opacity=density.min_opacity,
+            noise_rate=mcmc.noise,
+            opacity_weight=mcmc.opacity,
+            scale_weight=mcmc.scale,
         )
         return McmcStrategy(schedule, chain, seed, extent)
     thresholds = DensitySettings(
-        max_gaussians=settings.max_gaussians,
-        gradient_threshold=settings.densify_gradient,
+        max_gaussians=density.max_gaussians,
+        gradient_threshold=density.gradient,
         clone_below=CLONE_BELOW * extent,
-        prune_opacity=settings.min_opacity,
+        prune_opacity=density.min_opacity,
         prune_scale=PRUNE_ABOVE * extent,
     )
-    return DefaultStrategy(schedule, thresholds, seed, settings.reset_every)
+    return DefaultStrategy(schedule, thresholds, seed, density.reset_every)

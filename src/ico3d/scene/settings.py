@@ -1,12 +1,124 @@
 """Settings of static scenes: those of 3DGS, and those sized for two CPU cores."""
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
-from ico3d.splat.density import StrategyName
-from ico3d.training.optimiser import Rate
+from ico3d.common.presets import PresetName
+from ico3d.training.rate import Rate
+
+StrategyName = Literal["default", "mcmc"]
+"""How Gaussians multiply: as in 3DGS, or as a Markov chain (Kheradmand et al. 2024)."""
 
 REST_FACTOR = 1 / 20
 """Harmonics above degree 0 learn slower by this, as in 3DGS."""
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Weights of the terms of the loss.
+
+    Attributes:
+        ssim: Weight λ of 1 − SSIM; the L1 difference has the weight 1 − λ (3DGS).
+    """
+
+    ssim: float = 0.2
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Learning rates at the first step, and the factors to which they decay until the last one.
+
+    Attributes:
+        position: Learning rate of the Gaussians' centres, relative to the scene's extent.
+        position_decay: Factor to which the rate of the centres has decayed at the last step.
+        color: Learning rate of the constant spherical harmonic; the others learn at a twentieth of
+            it.
+        opacity: Learning rate of the opacities' logits.
+        scale: Learning rate of the logarithms of the Gaussians' sizes.
+        rotation: Learning rate of the Gaussians' rotations (quaternions).
+        shape_decay: Factor to which the rates of colours, opacities, sizes and rotations have
+            decayed at the last step; 1 in 3DGS.
+    """
+
+    position: float = 1.6e-4
+    position_decay: float = 0.01
+    color: float = 2.5e-3
+    opacity: float = 5e-2
+    scale: float = 5e-3
+    rotation: float = 1e-3
+    shape_decay: float = 1.0
+
+    def by_parameter(self) -> dict[str, Rate]:
+        """The learning rates by parameter; that of the means is relative to the extent."""
+        return {
+            "means": Rate(self.position, self.position_decay),
+            "quats": Rate(self.rotation, self.shape_decay),
+            "log_scales": Rate(self.scale, self.shape_decay),
+            "opacity_logits": Rate(self.opacity, self.shape_decay),
+            "f_dc": Rate(self.color, self.shape_decay),
+            "f_rest": Rate(self.color * REST_FACTOR, self.shape_decay),
+        }
+
+
+@dataclass(frozen=True)
+class Initial:
+    """The Gaussians that training begins with.
+
+    Attributes:
+        gaussians: How many.
+        opacity: Opacity of each, 0 to 1.
+        scale: Size of each, as a factor of its distance to its neighbours.
+    """
+
+    gaussians: int = 100_000
+    opacity: float = 0.1
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class Density:
+    """Density control: when Gaussians multiply and die (3DGS, Kerbl et al. 2023, section 5).
+
+    Attributes:
+        max_gaussians: There are never more Gaussians than this.
+        begin: First step at which Gaussians may multiply or die.
+        until: Step from which on Gaussians neither multiply nor die.
+        every: Steps between two rounds of multiplying and dying.
+        gradient: Strategy default: mean screen-space gradient (normalised device units) above which
+            a Gaussian multiplies: a small one is cloned, a large one split.
+        absgrad: Strategy default: sum screen-space gradients over a picture's pixels without their
+            signs; four times the threshold is usual then.
+        reset_every: Strategy default: steps from one reset of all opacities to the next; 0 for no
+            resets.
+        min_opacity: Gaussians whose opacity, 0 to 1, is below this die (strategy default) or move
+            to where a living one is (strategy mcmc).
+    """
+
+    max_gaussians: int = 1_000_000
+    begin: int = 500
+    until: int = 15_000
+    every: int = 100
+    gradient: float = 2e-4
+    absgrad: bool = False
+    reset_every: int = 3_000
+    min_opacity: float = 0.005
+
+
+@dataclass(frozen=True)
+class Mcmc:
+    """The strategy mcmc (Kheradmand et al. 2024); without effect on the strategy default.
+
+    Attributes:
+        noise: Strength λ_noise of the noise on the centres, as a factor of their learning rate and
+            of their Gaussian's covariance.
+        opacity: Weight λ_o of the mean opacity in the loss: what is not needed fades.
+        scale: Weight λ_Σ of the mean size, relative to the scene's extent, in the loss: what is not
+            needed shrinks.
+    """
+
+    noise: float = 5e5
+    opacity: float = 0.01
+    scale: float = 0.01
 
 
 @dataclass(frozen=True)
@@ -15,107 +127,63 @@ class SceneSettings:
 
     Attributes:
         steps: Optimisation steps, one picture each.
-        ssim_weight: λ of (1 − λ)·L1 + λ·(1 − SSIM).
-        sh_degree: Degree of the spherical harmonics, 0 to 3.
+        sh_degree: Degree of the spherical harmonics, 0 to 3: how colours depend on where one looks
+            from.
         sh_every: Steps after which the next degree begins to learn.
-        position_rate: Learning rate of the means, times the scene's extent.
-        position_decay: What it decays to, as a factor.
-        color_rate: Learning rate of the constant harmonic; the others learn at a twentieth.
-        opacity_rate: Learning rate of the opacity logits.
-        scale_rate: Learning rate of the log scales.
-        rotation_rate: Learning rate of the quaternions.
-        late_decay: What colour, opacity, scale and rotation rates decay to, as a factor.
-        initial_gaussians: Gaussians to start with.
-        initial_opacity: Their opacity.
-        initial_scale: Their size, as a factor of their distance to one another.
-        max_gaussians: Never more than this many.
-        densify_from: First step at which their number may change.
-        densify_until: It does not from this step on.
-        densify_every: Steps between two changes.
-        densify_gradient: Strategy default: screen gradient above which a Gaussian clones or splits.
-        absgrad: Strategy default: whether those gradients are summed over pixels without signs.
-        reset_every: Strategy default: steps between two opacity resets; 0 for none.
-        min_opacity: Below this a Gaussian dies (default) or moves to a living one (mcmc).
-        noise_rate: Strategy mcmc: noise on the means, times their learning rate and covariance.
-        opacity_weight: Strategy mcmc: weight of the mean opacity in the loss.
-        scale_weight: Strategy mcmc: weight of the mean scale, relative to the scene's extent.
-        checkpoint_every: Steps between checkpoints.
-        cache_gib: Pictures kept in memory, in GiB; further ones are read again at each use.
+        checkpoint_every: Steps from one checkpoint to the next.
+        cache_gib: Memory for recorded pictures, GiB; what does not fit is read again at each use.
+        loss: Weights of the terms of the loss.
+        rates: Learning rates, and the factors to which they decay.
+        initial: The Gaussians that training begins with.
+        density: When Gaussians multiply and die (3DGS, Kerbl et al. 2023, section 5).
+        mcmc: For --strategy mcmc alone (Kheradmand et al. 2024).
     """
 
     steps: int = 30_000
-    ssim_weight: float = 0.2
     sh_degree: int = 3
     sh_every: int = 1_000
-    position_rate: float = 1.6e-4
-    position_decay: float = 0.01
-    color_rate: float = 2.5e-3
-    opacity_rate: float = 5e-2
-    scale_rate: float = 5e-3
-    rotation_rate: float = 1e-3
-    late_decay: float = 1.0
-    initial_gaussians: int = 100_000
-    initial_opacity: float = 0.1
-    initial_scale: float = 1.0
-    max_gaussians: int = 1_000_000
-    densify_from: int = 500
-    densify_until: int = 15_000
-    densify_every: int = 100
-    densify_gradient: float = 2e-4
-    absgrad: bool = False
-    reset_every: int = 3_000
-    min_opacity: float = 0.005
-    noise_rate: float = 5e5
-    opacity_weight: float = 0.01
-    scale_weight: float = 0.01
     checkpoint_every: int = 1_000
     cache_gib: float = 2.0
-
-    def rates(self) -> dict[str, Rate]:
-        """The learning rates by parameter; that of the means is relative to the extent."""
-        return {
-            "means": Rate(self.position_rate, self.position_decay),
-            "quats": Rate(self.rotation_rate, self.late_decay),
-            "log_scales": Rate(self.scale_rate, self.late_decay),
-            "opacity_logits": Rate(self.opacity_rate, self.late_decay),
-            "f_dc": Rate(self.color_rate, self.late_decay),
-            "f_rest": Rate(self.color_rate * REST_FACTOR, self.late_decay),
-        }
+    loss: Loss = Loss()
+    rates: Rates = Rates()
+    initial: Initial = Initial()
+    density: Density = Density()
+    mcmc: Mcmc = Mcmc()
 
 
-_PAPER = SceneSettings()
-_CPU = SceneSettings(
-    steps=3_000,
-    sh_degree=1,
-    sh_every=500,
-    position_rate=1.6e-3,
-    color_rate=1e-2,
-    scale_rate=1e-2,
-    rotation_rate=5e-3,
-    late_decay=0.1,
-    initial_gaussians=6_000,
-    max_gaussians=12_000,
-    densify_from=300,
-    densify_until=2_000,
-    densify_gradient=8e-4,
-    absgrad=True,
-    reset_every=0,
-    checkpoint_every=500,
-)
-
-PRESETS: dict[tuple[str, StrategyName], SceneSettings] = {
-    ("paper", "default"): _PAPER,
-    ("paper", "mcmc"): replace(
-        _PAPER, densify_until=25_000, initial_opacity=0.5, initial_scale=0.1
-    ),
-    ("cpu", "default"): _CPU,
-    ("cpu", "mcmc"): replace(
-        _CPU,
-        densify_until=2_500,
-        initial_opacity=0.5,
-        initial_scale=0.5,
-        noise_rate=5e3,
-        opacity_weight=0.002,
+PRESETS: dict[PresetName, SceneSettings] = {
+    "paper": SceneSettings(),
+    "cpu": SceneSettings(
+        steps=3_000,
+        sh_degree=1,
+        sh_every=500,
+        checkpoint_every=500,
+        rates=Rates(position=1.6e-3, color=1e-2, scale=1e-2, rotation=5e-3, shape_decay=0.1),
+        initial=Initial(gaussians=6_000),
+        density=Density(
+            max_gaussians=12_000,
+            begin=300,
+            until=2_000,
+            gradient=8e-4,
+            absgrad=True,
+            reset_every=0,
+        ),
+        mcmc=Mcmc(noise=5e3, opacity=0.002),
     ),
 }
-"""By name of the preset and of the strategy."""
+
+_MCMC: dict[PresetName, tuple[int, float]] = {"paper": (25_000, 0.1), "cpu": (2_500, 0.5)}
+"""The last step of density control, and the initial size of Gaussians."""
+
+
+def settings_for(preset: PresetName, strategy: StrategyName) -> SceneSettings:
+    """The settings of a preset for a strategy: mcmc begins otherwise, and adapts for longer."""
+    settings = PRESETS[preset]
+    if strategy == "default":
+        return settings
+    until, scale = _MCMC[preset]
+    return replace(
+        settings,
+        initial=replace(settings.initial, opacity=0.5, scale=scale),
+        density=replace(settings.density, until=until),
+    )

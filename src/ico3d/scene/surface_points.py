@@ -51,7 +51,8 @@ def initial_scene(
         CaptureError: If there is nothing to start from.
     """
     some = [views.train[place] for place in spread(len(views.train), SAMPLED_VIEWS)]
-    count = min(settings.initial_gaussians, settings.max_gaussians)
+    initial = settings.initial
+    count = min(initial.gaussians, settings.density.max_gaussians)
     surface = None if views.only == "background" else _surface(capture, views, some)
     if views.only == "person":
         surface = _hull(views, some) if surface is None else surface
@@ -64,8 +65,8 @@ def initial_scene(
         points = np.concatenate(parts)
         extent = CAMERA_MARGIN * _camera_spread(some)
     colors = _colors(points, views, some)
-    opacity, scale = settings.initial_opacity, settings.initial_scale
-    return Start(scene_on_points(points, colors, settings.sh_degree, opacity, scale), extent)
+    degree, opacity, scale = settings.sh_degree, initial.opacity, initial.scale
+    return Start(scene_on_points(points, colors, degree, opacity, scale), extent)
 
 
 def _surface(capture: Capture, views: SceneViews, some: Sequence[View]) -> np.ndarray | None:

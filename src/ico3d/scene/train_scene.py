@@ -9,10 +9,9 @@ from ico3d.capture.capture import Capture
 from ico3d.common.device import DeviceName
 from ico3d.scene.model_folder import TrainedScene
 from ico3d.scene.optimise import SceneTrainer
-from ico3d.scene.settings import SceneSettings
+from ico3d.scene.settings import SceneSettings, StrategyName
 from ico3d.scene.surface_points import initial_scene
 from ico3d.scene.views import Frames, Only, SceneViews
-from ico3d.splat.density import StrategyName
 from ico3d.splat.device import computing_device
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.run import RunFolder
@@ -56,9 +55,7 @@ def train_scene(
         SettingsError: If the folder holds a run with other settings, or CUDA does not work.
         ModelError: If training diverges.
     """
-    about = asdict(job)
-    about |= {"capture": str(capture.path.resolve()), **about.pop("settings")}
-    run = RunFolder(folder, about)
+    run = RunFolder(folder, {"capture": str(capture.path.resolve()), **asdict(job)})
     if run.finished() is not None:
         return TrainedScene.load(folder)
     place = computing_device(device)

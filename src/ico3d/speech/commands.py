@@ -3,11 +3,15 @@
 import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Literal, TextIO
+from typing import TYPE_CHECKING, Annotated, Literal, TextIO
 
 import tyro
 
-from ico3d.speech.training import EncoderSettings, EncoderTraining, evaluate, save_encoder
+from ico3d.speech.training.settings import EncoderSettings
+
+if TYPE_CHECKING:
+    from ico3d.speech.training.corpus import Batch
+    from ico3d.speech.training.train_encoder import EncoderTraining
 
 
 @dataclass(frozen=True)
@@ -19,34 +23,39 @@ class TrainSpeech:
     Attributes:
         out: Folder for encoder.safetensors, encoder.json (how it was made, how good it is) and
             metrics.jsonl.
-        encoder: How it is trained.
-        test_batches: Batches of held-out voices, languages and words that it is measured on.
+        test_batches: Batches of held-out voices, languages and words that the encoder is measured
+            on.
+        settings: How the encoder is trained.
     """
 
     out: tyro.conf.Positional[Path]
-    encoder: EncoderSettings = field(default_factory=EncoderSettings)
     test_batches: int = 32
+    settings: Annotated[EncoderSettings, tyro.conf.arg(name="")] = field(
+        default_factory=EncoderSettings
+    )
 
     def run(self) -> None:
         """Trains, measures, writes."""
         from rich import print as show
 
+        from ico3d.speech.training.train_encoder import EncoderTraining, evaluate, save_encoder
+
         self.out.mkdir(parents=True, exist_ok=True)
-        training = EncoderTraining(self.encoder, self.out / "checkpoint.pt")
+        training = EncoderTraining(self.settings, self.out / "checkpoint.pt")
         self._train(training)
         network, readout = training.finished()
         measured = evaluate(network, readout, self._held_out())
         save_encoder(self.out, network, readout, self._card(measured))
         show(measured)
 
-    def _train(self, training: EncoderTraining) -> None:
+    def _train(self, training: "EncoderTraining") -> None:
         """Runs the optimisation under a progress bar, with a line of metrics per step."""
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
         from rich.progress import TimeRemainingColumn as Remaining
 
         columns = (BarColumn(), MofNCompleteColumn(), Remaining(), TextColumn("{task.description}"))
         with Progress(*columns) as bar, self._metrics(training.step) as metrics:
-            task = bar.add_task("", total=self.encoder.steps)
+            task = bar.add_task("", total=self.settings.steps)
             for numbers in training.run():
                 metrics.write(json.dumps({"step": training.step, **numbers}) + "\n")
                 metrics.flush()
@@ -61,24 +70,29 @@ class TrainSpeech:
         file.writelines(lines[:step])
         return file
 
-    def _held_out(self):
+    def _held_out(self) -> "list[Batch]":
         """Batches that no training sees."""
         import numpy as np
 
-        from ico3d.speech.corpus import make_batch
+        from ico3d.speech.training.corpus import make_batch
 
-        random = np.random.default_rng([self.encoder.seed, 2**32 - 1])
-        size, seconds = self.encoder.batch, self.encoder.seconds
+        random = np.random.default_rng([self.settings.seed, 2**32 - 1])
+        size, seconds = self.settings.batch, self.settings.seconds
         return [make_batch(random, size, seconds, held_out=True) for _ in range(self.test_batches)]
 
     def _card(self, measured: dict) -> dict:
         """What encoder.json tells."""
-        from ico3d.speech.corpus import HELD_OUT_LANGUAGES, HELD_OUT_VARIANTS, LANGUAGES, VARIANTS
+        from ico3d.speech.training.corpus import (
+            HELD_OUT_LANGUAGES,
+            HELD_OUT_VARIANTS,
+            LANGUAGES,
+            VARIANTS,
+        )
 
-        hours = self.encoder.steps * self.encoder.batch * self.encoder.seconds / 3600
+        hours = self.settings.steps * self.settings.batch * self.settings.seconds / 3600
         return {
             "made_by": "ico3d train speech",
-            "settings": asdict(self.encoder),
+            "settings": asdict(self.settings),
             "data": "random words read by espeak-ng, with simulated voices, rooms and noise",
             "hours_of_sound": round(hours, 1),
             "languages": sorted(set(LANGUAGES)),
@@ -87,7 +101,7 @@ class TrainSpeech:
                 "languages": list(HELD_OUT_LANGUAGES),
                 "voices": list(HELD_OUT_VARIANTS),
                 "words": "every eighth of words.txt",
-                "seconds": self.test_batches * self.encoder.batch * self.encoder.seconds,
+                "seconds": self.test_batches * self.settings.batch * self.settings.seconds,
                 **measured,
             },
         }

@@ -6,7 +6,6 @@ large tensors must be one pass through memory.
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -21,23 +20,6 @@ EPSILON = 1e-15
 """As in 3D Gaussian splatting: gradients of positions are far below Adam's usual 1e-8."""
 BLOCK = 4096
 """Numbers that a thread updates at a time."""
-
-
-@dataclass(frozen=True)
-class Rate:
-    """A learning rate that decays exponentially.
-
-    Attributes:
-        initial: The rate at step 0.
-        decay: The factor it has reached at the last step.
-    """
-
-    initial: float
-    decay: float = 1.0
-
-    def at(self, progress: float) -> float:
-        """The rate when `progress` (0 to 1) of the steps are done."""
-        return self.initial * self.decay**progress
 
 
 class Optimiser:

@@ -11,6 +11,8 @@ from ico3d.errors import ModelError, SettingsError
 from ico3d.training.checkpoint import load_state, load_tensors, save_tensors
 
 CHECKPOINT = "checkpoint.safetensors"
+NESTED = "settings"
+"""What the command line sets lies under this name; older runs have it among the rest."""
 
 
 class RunFolder:
@@ -37,18 +39,22 @@ class RunFolder:
         if not file.exists():
             write_atomic(file, json.dumps(self.settings, indent=1).encode())
             return
-        earlier = json.loads(file.read_text())
-        differing = [
-            key
-            for key in sorted({*earlier, *self.settings})
-            if earlier.get(key) != self.settings.get(key)
-        ]
-        if differing:
+        self._check_same(json.loads(file.read_text()))
+
+    def _check_same(self, earlier: dict) -> None:
+        """Raises SettingsError if the folder's run was started with other settings."""
+        if NESTED in self.settings and NESTED not in earlier:
             raise SettingsError(
-                f"{path} holds a run with another '{differing[0]}' "
-                f"({earlier.get(differing[0])}, not {self.settings.get(differing[0])}): "
-                "choose another folder, or remove it to start afresh."
+                f"{self.path} holds a run that an earlier version of ico3d began, whose settings "
+                "had other names: choose another folder, or remove it to start afresh."
             )
+        before, now = _flat(earlier), _flat(self.settings)
+        for name in sorted({*before, *now}):
+            if before.get(name) != now.get(name):
+                raise SettingsError(
+                    f"{self.path} holds a run with another '{name}' ({before.get(name)}, not "
+                    f"{now.get(name)}): choose another folder, or remove it to start afresh."
+                )
 
     @property
     def _checkpoint_file(self) -> Path:
@@ -83,3 +89,14 @@ def checkpoint_state(folder: Path) -> dict | None:
         return load_state(folder / CHECKPOINT)
     except ModelError:
         return None
+
+
+def _flat(settings: Mapping, prefix: str = "") -> dict[str, object]:
+    """Settings by the names that the command line has for them."""
+    found: dict[str, object] = {}
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            found |= _flat(value, "" if name == NESTED else f"{prefix}{name}.")
+        else:
+            found[prefix + name] = value
+    return found

@@ -8,13 +8,14 @@ import pytest
 import torch
 from PIL import Image
 
+from ico3d import cli
 from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.joining import assemble as module
-from ico3d.avatar.joining.assemble import JoiningSettings, align, assemble, measured
+from ico3d.avatar.joining.assemble import align, assemble, measured
 from ico3d.avatar.joining.checking import write_checks
-from ico3d.avatar.joining.command import Assemble
 from ico3d.avatar.joining.companion import HeadSource
 from ico3d.avatar.joining.region import HeadRegion
+from ico3d.avatar.joining.settings import JoiningSettings
 from ico3d.avatar.joining.similarity import moved
 from ico3d.body.companion import Pruning
 from ico3d.body.training.optimise_window import BodyTrainer
@@ -90,7 +91,7 @@ def test_a_finished_avatar_is_only_read(made):
     assert {file: file.stat().st_mtime_ns for file in times} == times
     for seconds in (0.0, 0.2):
         assert torch.equal(again.gaussians(seconds).means, avatar.gaussians(seconds).means)
-    with pytest.raises(SettingsError, match="another 'border_points'"):
+    with pytest.raises(SettingsError, match=r"another 'joining\.border_points' \(60, not 9\)"):
         assemble(capture, folder / "out", assembly_of(folder / "head", border_points=9), print)
 
 
@@ -197,7 +198,7 @@ def test_what_is_missing_is_said(person, head, tmp_path):
     region = HeadRegion.around(face())
     plain.means.data = torch.from_numpy(region.spheres[0, :3] + 0 * face()[:40]).float()
     replace(head, model=plain).save(tmp_path / "head")
-    with pytest.raises(ModelError, match=r"no network .* assemble with --set match_colors=false"):
+    with pytest.raises(ModelError, match=r"no network .* assemble with --joining.no-match-colors"):
         assemble(person, tmp_path / "b", assembly_of(tmp_path / "head"), print)
 
 
@@ -208,18 +209,21 @@ def test_impossible_settings_are_refused(change):
         JoiningSettings(**change)
 
 
-def test_the_command_sorts_its_settings(tmp_path):
+def test_the_command_sorts_its_settings(tmp_path, capsys):
     """Some are the joining's, the rest the body's; going on from a body takes fewer steps."""
-    words = ("pruning=false", "steps=900", "border_points=5")
-    command = Assemble(tmp_path, tmp_path, tmp_path, preset="paper", set=words)
-    assembly = command._assembly()
+    places = [str(tmp_path)] * 3 + ["--preset", "paper"]
+    words = ["--joining.no-pruning", "--steps", "900", "--joining.border-points", "5"]
+    assembly = cli.parsed("assemble", [*places, *words]).assembly()
     assert assembly.joining == JoiningSettings(pruning=False, border_points=5)
     assert assembly.body.steps == 900 and assembly.body.warmup_steps == 1000
-    on = replace(command, body=tmp_path / "body", set=())._assembly()
+    on = cli.parsed("assemble", [*places, "--body", str(tmp_path / "body")]).assembly()
     assert (on.body.steps, on.body.warmup_steps) == (10_000, 0)
     assert on.about(tmp_path)["continued"] == str(tmp_path / "body")
-    with pytest.raises(SettingsError, match="no setting 'colour_steps'"):
-        replace(command, set=("colour_steps=3",))._assembly()
+    assert cli.main(["assemble", *places, "--joining.color-steps", "0"]) == 1
+    assert "color_steps=0" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        cli.main(["assemble", *places, "--joining.colour-steps", "3"])
+    assert "--joining.color-steps" in capsys.readouterr().err
 
 
 def test_a_planted_capture_is_a_capture(abroad):

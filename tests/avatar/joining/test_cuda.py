@@ -10,15 +10,16 @@ import torch
 from ico3d.avatar.avatar import Placement, TrainedAvatar
 from ico3d.avatar.joining.assemble import assemble
 from ico3d.avatar.joining.checking import write_checks
-from ico3d.avatar.joining.drawn_head import DrawnHead
 from ico3d.avatar.joining.face_views import face_views
-from ico3d.avatar.joining.found_placement import OverRecording, head_poses
+from ico3d.avatar.joining.finding.drawn_head import DrawnHead
+from ico3d.avatar.joining.finding.found_placement import OverRecording, head_poses
 from ico3d.avatar.joining.recolour import color_difference, recolour
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.seam import seam_scores
 from support.avatars.planted_person import FRAMES, PlantedPerson, face, planted_head
 from support.avatars.tiny_joining import RECOLOUR, assembly_of, parts_of
 from support.pretended_cuda import drawn, is_moved
+from support.settings import changed
 
 
 def test_colours_are_matched(cuda, head, abroad):
@@ -41,7 +42,7 @@ def test_an_avatar_is_assembled_and_measured(cuda, tmp_path, monkeypatch):
     (tmp_path / "head").mkdir()
     planted_head().save(tmp_path / "head")
     assembly = assembly_of(tmp_path / "head", color_steps=10)
-    small = replace(assembly.body, steps_per_frame=2, warmup_steps=2, checkpoint_every=9)
+    small = changed(assembly.body, {"steps_per_frame": 2, "warmup_steps": 2, "checkpoint_every": 9})
     assembly = replace(assembly, body=small, device="cuda")
     with drawn(monkeypatch) as pictures:
         avatar = assemble(capture, tmp_path / "out", assembly, said.append)

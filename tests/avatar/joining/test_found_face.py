@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ico3d.avatar.joining import found_face
 from ico3d.avatar.joining.assemble import place_head
+from ico3d.avatar.joining.finding import found_face
 from ico3d.avatar.joining.similarity import canonical_from_head, moved, scale_of
 from ico3d.avatar.render_bundle import baked_gaussians
 from ico3d.errors import ModelError

@@ -41,7 +41,7 @@ def test_head_poses_that_are_not_the_heads(face_model, packaged_demo, tmp_path, 
 
 def test_no_face_at_all(face_model, monkeypatch, tmp_path):
     """A ball of many colours is no head."""
-    monkeypatch.setattr("ico3d.avatar.joining.first_look.DIRECTIONS", 5)
+    monkeypatch.setattr("ico3d.avatar.joining.finding.first_look.DIRECTIONS", 5)
     person = PlantedPerson(tmp_path / "capture")
     assembly = saved(replace(planted_head(), landmarks=None), tmp_path / "head")
     with pytest.raises(ModelError, match="no view drawn of this head, from all sides, shows a fac"):

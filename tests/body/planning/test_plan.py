@@ -8,9 +8,10 @@ import pytest
 from PIL import Image
 from rich.console import Console
 
-from ico3d.body.planning.plan import PlanSettings, make_plan, print_plan, save_plan
+from ico3d.body.planning.plan import make_plan, print_plan, save_plan
 from ico3d.body.planning.plan_picture import draw_plan
 from ico3d.body.planning.windows import Window
+from ico3d.body.settings import Windows
 
 HEIGHTS = np.cumsum([0, *[0.0] * 4, *[0.1] * 3, *[0.0] * 3, *[-0.12] * 2])
 
@@ -18,7 +19,7 @@ HEIGHTS = np.cumsum([0, *[0.0] * 4, *[0.1] * 3, *[0.0] * 3, *[-0.12] * 2])
 @pytest.fixture
 def planned(moving_ball, tmp_path):
     capture = moving_ball(HEIGHTS)
-    return capture, make_plan(capture, PlanSettings(50.0, 3, 6), tmp_path / "model")
+    return capture, make_plan(capture, Windows(50.0, 3, 6), tmp_path / "model")
 
 
 def test_windows_follow_the_motion(planned):
@@ -68,7 +69,7 @@ def test_a_plan_is_drawn(planned, tmp_path):
 
 def test_a_clip_of_one_frame_is_drawn(moving_ball, tmp_path):
     capture = moving_ball([0.0])
-    plan = make_plan(capture, PlanSettings(100.0, 6, 16), tmp_path)
+    plan = make_plan(capture, Windows(100.0, 6, 16), tmp_path)
     assert plan.windows == (Window(0, 0),) and plan.motion == ()
     print_plan(plan, Console(quiet=True))
     draw_plan(plan, capture, tmp_path / "plan.png")

@@ -1,7 +1,5 @@
 """Temporal fine-tuning."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import torch
@@ -15,6 +13,7 @@ from ico3d.splat.initial import in_pictures
 from ico3d.splat.render import render
 from support.bodies.moving_capture import MovingCapture
 from support.bodies.tiny_training import SMALL, trainer_of
+from support.settings import changed
 
 BEFORE, AFTER = Window(0, 4), Window(4, 8)
 
@@ -39,9 +38,9 @@ def models(capture):
 
 def tuner_of(capture, models, consistency, **changes):
     """Fine-tuning of the second of two windows."""
-    settings = replace(settings_for("cpu", "swings++"), **SMALL)
-    settings = replace(settings, finetune_steps=120, finetune_from=0.0, consistency=consistency)
-    settings = replace(settings, **changes)
+    settings = changed(settings_for("cpu", "swings++"), SMALL)
+    tuning = {"finetune.steps": 120, "finetune.begin": 0.0, "finetune.consistency": consistency}
+    settings = changed(settings, tuning | changes)
     cameras = [c for i, c in enumerate(capture.cameras) if i not in capture.split.test_cameras]
     pictures = BodyViews(capture, AFTER.frames, 0.1)
     return FineTuner(models[1], models[0], AFTER, pictures, cameras, settings, 0.7, 0)
@@ -82,13 +81,13 @@ def test_windows_grow_together(capture, models):
 def test_it_ends_with_a_mean(capture, models):
     """Of the Gaussians of the second half of the steps."""
     start = {n: v.detach().clone() for n, v in models[1].gaussians.items()}
-    plain = tuner_of(capture, models, 0.75, finetune_steps=60, finetune_mean=0.0)
+    plain = tuner_of(capture, models, 0.75, **{"finetune.steps": 60, "finetune.mean": 0.0})
     every = []
     for index in range(60):
         plain.step(index)
         every.append(models[1].gaussians["means"].detach().clone())
     models[1].gaussians = start
-    averaged = tuner_of(capture, models, 0.75, finetune_steps=60, finetune_mean=0.5)
+    averaged = tuner_of(capture, models, 0.75, **{"finetune.steps": 60, "finetune.mean": 0.5})
     for index in range(60):
         averaged.step(index)
     found = models[1].gaussians["means"].detach()
@@ -98,7 +97,7 @@ def test_it_ends_with_a_mean(capture, models):
 
 def test_rates_begin_where_they_are_told(capture, models, monkeypatch):
     """Half-way down at first, at the end of their decay at last."""
-    tuner = tuner_of(capture, models, 0.75, finetune_from=0.5)
+    tuner = tuner_of(capture, models, 0.75, **{"finetune.begin": 0.5})
     learner, seen = tuner._learner, []
     monkeypatch.setattr(learner, "update", seen.append)
     for index in (0, 60, 120):

@@ -119,7 +119,7 @@ def test_cameras_that_see_other_colors_are_corrected(capture):
     picture, plate = capture.image, capture.background
     capture.image = lambda c, f: picture(c, f) * (0.8 if c == 1 else 1.0)
     capture.background = lambda c: plate(c) * (0.8 if c == 1 else 1.0)
-    trainer = trainer_of(capture, color_correction=True, motion_rate=2e-2)
+    trainer = trainer_of(capture, color_correction=True, **{"rates.motion": 2e-2})
     for index in range(250):
         trainer.step(index)
     affine = trainer.tensors()["affine"].detach()

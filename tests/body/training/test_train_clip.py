@@ -39,8 +39,18 @@ def test_the_folder_holds_the_body(trained):
         assert torch.equal(a.at(0.4).means, b.at(0.4).means)
     files = [entry["file"] for entry in json.loads((folder / "body.json").read_text())["windows"]]
     assert files[0].startswith("windows/") and files[1].startswith("finetuned/")
-    assert loaded.summary["settings"]["max_gaussians"] == 90
+    assert loaded.summary["settings"]["density"]["max_gaussians"] == 90
     assert loaded.summary["capture"]["kind"] == "moving"
+
+
+def test_a_body_of_an_earlier_version_opens(trained):
+    """Settings had other names."""
+    _, folder, body = trained
+    about = json.loads((folder / "body.json").read_text())
+    about["summary"]["settings"] = {"max_gaussians": 90, "grid_space": 4}
+    (folder / "old.json").write_text(json.dumps(about))
+    old = TrainedBody.load(folder, "old.json")
+    assert torch.equal(old.gaussians(0.1).means, body.gaussians(0.1).means)
 
 
 def test_a_finished_run_is_loaded(trained):
@@ -48,15 +58,15 @@ def test_a_finished_run_is_loaded(trained):
     capture, folder, body = trained
     again = train_body(capture, folder, job())
     assert torch.equal(again.models[1].at(0.5).means, body.models[1].at(0.5).means)
-    with pytest.raises(SettingsError, match="max_gaussians"):
-        train_body(capture, folder, job(max_gaussians=80))
+    with pytest.raises(SettingsError, match=r"another 'density\.max_gaussians' \(90, not 80\)"):
+        train_body(capture, folder, job(**{"density.max_gaussians": 80}))
 
 
 def test_the_same_seed_gives_the_same_body(trained, tmp_path):
     """And another seed another one."""
     capture, _, body = trained
-    same = train_body(capture, tmp_path / "same", job(finetune_steps=0))
-    other = train_body(capture, tmp_path / "other", job(finetune_steps=0, seed=1))
+    same = train_body(capture, tmp_path / "same", job(**{"finetune.steps": 0}))
+    other = train_body(capture, tmp_path / "other", job(**{"finetune.steps": 0}, seed=1))
     first = [some.models[0].at(1.0).means for some in (body, same, other)]
     assert torch.equal(first[0], first[1])
     assert first[0].shape != first[2].shape or not torch.equal(first[0], first[2])

@@ -99,7 +99,7 @@ def test_ctrl_c_and_errors_end_all_workers_and_spare_checkpoints(recorded, tmp_p
     saved = saved_steps(first.folder)
     assert CHECKPOINT_EVERY <= saved < first.steps
     second.folder.mkdir()
-    (second.folder / "settings.json").write_text("{}")
+    (second.folder / "settings.json").write_text('{"settings": {}}')
     with pytest.raises(SettingsError, match="holds a run with another '"):
         train_windows([first, second], Processes(2, True))
     assert not multiprocessing.active_children()

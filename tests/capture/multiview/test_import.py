@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from ico3d.capture.formats import open_capture
-from ico3d.capture.importing.recording import ImportSettings, import_recording
+from ico3d.capture.importing.recording import import_recording
+from ico3d.capture.importing.settings import ImportSettings
 from ico3d.capture.multiview.reader import MultiviewCapture
 from ico3d.cli import main
 from ico3d.errors import CaptureError, SettingsError
@@ -262,6 +263,8 @@ def test_the_command(tmp_path, capsys):
     assert main(["capture", "import", str(tmp_path / "none"), str(out)]) == 1
     assert main(["capture", "import", str(out), str(tmp_path / "more")]) == 1
     assert "neither transforms.json nor" in capsys.readouterr().err
+    assert main(["capture", "import", str(root), str(tmp_path / "flat"), "--scale", "0"]) == 1
+    assert "fps and scale must be above 0, not 25 and 0." in capsys.readouterr().err
     with pytest.raises(SettingsError):
         ImportSettings(scale=0)
 

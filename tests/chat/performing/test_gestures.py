@@ -21,8 +21,7 @@ from ico3d.chat.wire.protocol import (
 )
 from ico3d.errors import SettingsError
 from ico3d.measure.talking.page import Player, open_page
-
-from ..conftest import serving
+from support.chat.serving import serving
 
 ANIMATION = Animation(
     15.0, 60, Rest(0, 20), (Action(28, 0.9), Action(36, 0.7), Action(50, 0.5)), 0.6, 1.2

@@ -17,8 +17,7 @@ from ico3d.chat.wire.protocol import End, Speech, Text
 from ico3d.measure.talking.page import open_page
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions
 from support.chat.remote import expression_app, serving
-
-from ..conftest import serving as serving_avatar
+from support.chat.serving import serving as serving_avatar
 
 RATE = 24_000
 LONG, SHORT = 5.0, 0.3  # s to wait for a server that answers, and for one that does not

@@ -15,8 +15,7 @@ from ico3d.chat.serving.sessions import Sessions
 from ico3d.chat.settings.conversation import ChatSettings, Choice
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import VERSION, Hello, Offer, Welcome
-
-from ..conftest import serving
+from support.chat.serving import serving
 
 MISSING = "its weights are not here: fetch them."
 OFFLINE = ChatSettings(

@@ -8,7 +8,7 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 
-from ico3d.chat.serving.limits import FORGIVEN, Inlet, Limits
+from ico3d.chat.serving.limits import FORGIVEN, ConnectionLimits, Inlet
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import MICROPHONE_CHUNK, VERSION, Answer, Audio, Error, Hello
 from ico3d.errors import ProtocolError
@@ -43,13 +43,13 @@ def check(limits, sound):
 
 
 def test_a_page_may_be_clumsy_a_few_times_only():
-    limits = Limits(Time())
+    limits = ConnectionLimits(Time())
     assert [limits.forgive() for _ in range(FORGIVEN)] == [True] * (FORGIVEN - 1) + [False]
 
 
 def test_clumsiness_is_forgotten():
     time = Time()
-    limits = Limits(time)
+    limits = ConnectionLimits(time)
     for _ in range(100):
         assert limits.forgive()
         time.now += 10.0
@@ -57,7 +57,7 @@ def test_clumsiness_is_forgotten():
 
 def test_rates_are_limited_by_the_clock():
     time = Time()
-    limits = Limits(time)
+    limits = ConnectionLimits(time)
     for _ in range(200):
         limits.check_frame("{}")
     with pytest.raises(ProtocolError):
@@ -72,7 +72,7 @@ def test_rates_are_limited_by_the_clock():
 @pytest.mark.parametrize("seconds", [1.0, 5.0, 20.0, 59.0])
 def test_sound_that_a_stall_held_back_breaks_no_rule(seconds):
     time = Time()
-    limits = Limits(time)
+    limits = ConnectionLimits(time)
     for _ in range(10):
         time.now += seconds
         for sound in spoken(seconds):
@@ -82,7 +82,7 @@ def test_sound_that_a_stall_held_back_breaks_no_rule(seconds):
 @pytest.mark.parametrize("speed", [2.0, 4.0, 100.0])
 def test_sound_at_several_times_real_time_is_a_flood(speed):
     time = Time()
-    limits, sent = Limits(time), 0.0
+    limits, sent = ConnectionLimits(time), 0.0
     with pytest.raises(ProtocolError, match="more"):
         while sent < 600:
             time.now += CHUNK / speed

@@ -26,8 +26,7 @@ from ico3d.chat.wire.protocol import Ack, Audio, Error, Hello, Speech, Text, Wel
 from ico3d.cli import main
 from ico3d.errors import BundleError, SettingsError
 from ico3d.measure.talking.page import open_page
-
-from ..conftest import serving
+from support.chat.serving import serving
 
 pytestmark = pytest.mark.slow
 

@@ -9,8 +9,7 @@ from websockets.asyncio.client import connect
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import VERSION, Answer, Error, Hello, Speech, State, Stop, Text
 from ico3d.measure.talking.page import open_page
-
-from ..conftest import OFFLINE, serving
+from support.chat.serving import OFFLINE, serving
 
 
 async def dropped(page):

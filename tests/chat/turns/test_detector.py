@@ -9,7 +9,7 @@ import soxr
 
 from ico3d.chat.frames import VoiceFrame
 from ico3d.chat.settings.conversation import Turns
-from ico3d.chat.turns.detector import Ear, Timbre
+from ico3d.chat.turns.detector import EagerSilero, Timbre
 from ico3d.chat.turns.floor import Floor, Verdict
 from ico3d.chat.turns.phrases import phrases
 from ico3d.chat.wire.protocol import MICROPHONE_CHUNK as PIECE
@@ -33,7 +33,7 @@ def audible(samples, share=0.02):
     return samples[loud[0] : loud[-1] + 1]
 
 
-EAR = Ear(Turns().pause)
+EAR = EagerSilero(Turns().pause)
 EAR.set_sample_rate(RATE)
 
 

@@ -8,7 +8,7 @@ from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnal
 from pipecat.audio.vad.vad_analyzer import VADState
 
 from ico3d.chat.settings.conversation import Turns
-from ico3d.chat.turns.detector import Ear
+from ico3d.chat.turns.detector import EagerSilero
 from ico3d.chat.turns.eager import EagerSmartTurn
 from ico3d.chat.wire.protocol import MICROPHONE_CHUNK as PIECE
 from ico3d.chat.wire.protocol import MICROPHONE_RATE as RATE
@@ -58,7 +58,7 @@ async def verdict(analyzer):
 )
 async def test_the_early_verdict_is_that_on_the_whole_pause(text, voice, monkeypatch):
     sound = np.pad(spoken(text, voice), (RATE // 2, RATE))
-    ear, eager, plain = Ear(PAUSE), EagerSmartTurn(PAUSE), LocalSmartTurnAnalyzerV3()
+    ear, eager, plain = EagerSilero(PAUSE), EagerSmartTurn(PAUSE), LocalSmartTurnAnalyzerV3()
     eager.set_sample_rate(RATE)
     ear.set_sample_rate(RATE)
     plain.set_sample_rate(RATE)

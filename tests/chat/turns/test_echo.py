@@ -6,7 +6,7 @@ import soxr
 from pipecat.audio.vad.vad_analyzer import VADState
 
 from ico3d.chat.settings.conversation import Turns
-from ico3d.chat.turns.detector import Ear
+from ico3d.chat.turns.detector import EagerSilero
 from ico3d.chat.turns.echo import EchoGuard, similarity
 from ico3d.chat.wire.protocol import MICROPHONE_CHUNK as PIECE
 from ico3d.common.espeak import synthesize
@@ -76,7 +76,7 @@ def guarded(microphone, jitter=0.03):
 
 async def voices(sound):
     """Seconds at which Silero hears a voice or is sure of one."""
-    ear = Ear(Turns().pause)
+    ear = EagerSilero(Turns().pause)
     ear.set_sample_rate(NEAR)
     hints, sure = [], []
     for at in range(0, len(sound) - PIECE + 1, PIECE):

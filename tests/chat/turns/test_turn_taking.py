@@ -28,7 +28,7 @@ from ico3d.chat.wire.protocol import (
     Welcome,
 )
 from ico3d.common.espeak import synthesize
-from ico3d.measure.talking.page import SCHEDULING, Page, open_page
+from ico3d.measure.talking.page import SCHEDULING, SimulatedPage, open_page
 
 FADE = 0.02  # s that the page takes to fall silent
 UNKNOWN = "tell me something nobody has written down"  # its answer takes several seconds
@@ -116,7 +116,7 @@ async def test_the_button_ends_a_turn_at_once(served, question):
     await page.close()
 
 
-class EchoPage(Page):
+class EchoPage(SimulatedPage):
     """A page whose microphone stands before its loudspeaker, without echo cancellation."""
 
     DELAY, GAIN = 0.12, 0.35  # s; 9 dB down

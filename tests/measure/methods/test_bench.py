@@ -14,50 +14,57 @@ from ico3d.errors import SettingsError
 from ico3d.measure.commands import BenchBody
 from ico3d.measure.methods import bench as methods
 from ico3d.measure.methods.bench import Terms, Trial, mean, run_trials, summary
+from ico3d.measure.methods.settings import preset
 from ico3d.studio import recording as recording_module
 from ico3d.studio.picture import paint
 from support.bodies.moving_capture import FRAMES, MovingCapture
 from support.captures import open_with
 from support.made_trial import MadeTrial
 from support.recordings.synthetic_bodies import write_body
+from support.settings import changed
 
 pytestmark = pytest.mark.slow
 
 METHODS = ("swings++", "swings", "4dgs", "spacetime", "freetime", "static")
 WINDOWS = (Window(0, 13), Window(13, 26), Window(26, 40))
-TINY = (
-    "longest_window=6",
-    "shortest_window=3",
-    "initial_gaussians=60",
-    "max_gaussians=90",
-    "steps_per_frame=3",
-    "warmup_steps=4",
-    "densify_from=5",
-    "densify_every=5",
-    "grid_space=4",
-    "width=8",
-    "finetune_steps=6",
+TINY = {
+    "windows.longest": 6,
+    "windows.shortest": 3,
+    "initial.gaussians": 60,
+    "density.max_gaussians": 90,
+    "steps_per_frame": 3,
+    "warmup_steps": 4,
+    "density.begin": 5,
+    "density.every": 5,
+    "encoder.space": 4,
+    "mlp.width": 8,
+    "finetune.steps": 6,
+}
+
+
+@pytest.mark.parametrize(
+    "changes", [{}, {"steps_per_frame": 0, "steps": 700, "density.max_gaussians": 50}]
 )
-
-
-@pytest.mark.parametrize("changes", [(), ("steps_per_frame=0", "steps=700", "max_gaussians=50")])
 def test_all_have_the_same_gaussians_and_steps(changes):
-    terms = Terms(Path("c"), None, Path("f"), WINDOWS, changes, finetune=False)
+    ours = changed(preset("swings++"), changes)
+    terms = Terms(Path("c"), None, Path("f"), WINDOWS, ours, finetune=False)
     totals = set()
     for method in METHODS:
         settings = terms.settings(method)
-        assert settings.initial == "hull" and settings.finetune_steps == 0
+        assert settings.initial.source == "hull" and settings.finetune.steps == 0
         windows = (Window(0, 40),) if method in ONE_WINDOW else WINDOWS
         steps = sum(settings.steps_of(len(window)) for window in windows)
-        count, first = settings.max_gaussians, settings.initial_gaussians
+        count, first = settings.density.max_gaussians, settings.initial.gaussians
         totals.add((steps, len(windows) * count, len(windows) * first))
     assert len(totals) == 1
-    assert terms.settings("swings").depth > terms.settings("swings++").depth
+    most = changes.get("density.max_gaussians", 7_000)
+    assert terms.settings("static").density.max_gaussians == most
+    assert terms.settings("swings").mlp.depth > terms.settings("swings++").mlp.depth
 
 
 def test_only_swings_plus_plus_is_fine_tuned_and_elsewhere_than_without():
-    terms = Terms(Path("c"), None, Path("f"), WINDOWS, (), finetune=True)
-    tuned = {method for method in METHODS if terms.settings(method).finetune_steps}
+    terms = Terms(Path("c"), None, Path("f"), WINDOWS, preset("swings++"), finetune=True)
+    tuned = {method for method in METHODS if terms.settings(method).finetune.steps}
     assert tuned == {"swings++"}
     assert Trial("swings++", 2, terms).folder == Path("f/swings++-tuned-seed2")
     assert Trial("swings", 0, terms).folder == Path("f/swings-seed0")
@@ -109,7 +116,7 @@ def bench(tmp_path_factory):
             folder / "capture",
             folder=folder / "runs",
             methods=("swings++", "freetime", "static"),
-            set=TINY,
+            settings=changed(preset("swings++"), TINY),
             finetune=True,
             json=folder / "figures.json",
         )

@@ -7,7 +7,8 @@ import torch
 from scipy.spatial.transform import Rotation
 
 from ico3d.avatar.avatar import HEAD, PLACEMENT, load_placement
-from ico3d.avatar.joining.assemble import Assembly, JoiningSettings
+from ico3d.avatar.joining.assemble import Assembly
+from ico3d.avatar.joining.settings import JoiningSettings
 from ico3d.avatar.joining.similarity import moved
 from ico3d.avatar.render_bundle import BakedAvatar
 from ico3d.body.settings import settings_for

@@ -4,23 +4,25 @@ from dataclasses import replace
 from pathlib import Path
 
 from ico3d.avatar.avatar import Placement
-from ico3d.avatar.joining.assemble import Assembly, JoiningSettings
+from ico3d.avatar.joining.assemble import Assembly
 from ico3d.avatar.joining.driving import head_poses, recorded_expressions
 from ico3d.avatar.joining.face_views import face_views
 from ico3d.avatar.joining.recolour import RecolourSettings
 from ico3d.avatar.joining.region import HeadRegion
+from ico3d.avatar.joining.settings import JoiningSettings
 from ico3d.body.settings import settings_for
 from support.avatars.planted_person import face
+from support.settings import changed
 
 TINY = {
-    "initial_gaussians": 400,
-    "max_gaussians": 600,
+    "initial.gaussians": 400,
+    "density.max_gaussians": 600,
     "steps_per_frame": 35,
     "warmup_steps": 20,
-    "densify_from": 30,
-    "grid_space": 8,
-    "width": 16,
-    "finetune_steps": 0,
+    "density.begin": 30,
+    "encoder.space": 8,
+    "mlp.width": 16,
+    "finetune.steps": 0,
     "checkpoint_every": 60,
 }
 JOINING = JoiningSettings(color_steps=120, border_points=60)
@@ -29,7 +31,7 @@ RECOLOUR = RecolourSettings(steps=150)
 
 def assembly_of(head: Path, **joining) -> Assembly:
     """What to assemble in seconds."""
-    body = replace(settings_for("cpu", "swings++"), **TINY)
+    body = changed(settings_for("cpu", "swings++"), TINY)
     return Assembly(head, replace(JOINING, **joining), body, 0)
 
 

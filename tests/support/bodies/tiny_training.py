@@ -1,43 +1,42 @@
 """Trainings of windows and of whole clips in seconds."""
 
-from dataclasses import replace
-
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import settings_for
 from ico3d.body.training.optimise_window import BodyTrainer
 from ico3d.body.training.prepare_window import begin_window
 from ico3d.body.training.train_clip import BodyJob
 from ico3d.body.training.views import BodyViews
+from support.settings import changed
 
 WINDOW = Window(4, 8)
 SMALL = {
-    "initial_gaussians": 250,
-    "max_gaussians": 400,
+    "initial.gaussians": 250,
+    "density.max_gaussians": 400,
     "steps_per_frame": 50,
     "warmup_steps": 20,
-    "densify_from": 30,
-    "densify_every": 30,
-    "grid_space": 8,
-    "width": 32,
+    "density.begin": 30,
+    "density.every": 30,
+    "encoder.space": 8,
+    "mlp.width": 32,
 }
 TINY = {
-    "longest_window": 6,
-    "shortest_window": 3,
-    "initial_gaussians": 60,
-    "max_gaussians": 90,
+    "windows.longest": 6,
+    "windows.shortest": 3,
+    "initial.gaussians": 60,
+    "density.max_gaussians": 90,
     "steps_per_frame": 4,
     "warmup_steps": 4,
-    "densify_from": 5,
-    "densify_every": 5,
-    "grid_space": 4,
-    "width": 8,
-    "finetune_steps": 6,
+    "density.begin": 5,
+    "density.every": 5,
+    "encoder.space": 4,
+    "mlp.width": 8,
+    "finetune.steps": 6,
 }
 
 
 def trainer_of(capture, method="swings++", seed=0, window=WINDOW, **changes):
     """A trainer of the window in which the arm rises."""
-    settings = replace(settings_for("cpu", method), **(SMALL | changes))
+    settings = changed(settings_for("cpu", method), SMALL | changes)
     begin = begin_window(
         capture, window, method, settings, lambda p: (p[:, 0] > 0.2).astype(float), seed
     )
@@ -47,4 +46,4 @@ def trainer_of(capture, method="swings++", seed=0, window=WINDOW, **changes):
 
 def job(method="swings++", seed=0, **changes):
     """A training of a few seconds."""
-    return BodyJob(method, seed, replace(settings_for("cpu", method), **(TINY | changes)))
+    return BodyJob(method, seed, changed(settings_for("cpu", method), TINY | changes))

@@ -21,19 +21,19 @@ CHECKPOINT_EVERY = 10
 
 def tasks(capture: Path, folder: Path, method="swings++", **changes) -> list[WindowTask]:
     """Three tiny windows."""
-    small = {
-        "initial_gaussians": 200,
-        "max_gaussians": 400,
-        "steps_per_frame": STEPS_PER_FRAME,
-        "warmup_steps": 10,
-        "densify_from": 20,
-        "densify_every": 20,
-        "grid_space": 8,
-        "width": 32,
-        "cache_gib": 0.1,
-        "checkpoint_every": CHECKPOINT_EVERY,
-    }
-    job = BodyJob(method, 0, replace(settings_for("cpu", method), **(small | changes)))
+    settings = settings_for("cpu", method)
+    settings = replace(
+        settings,
+        steps_per_frame=STEPS_PER_FRAME,
+        warmup_steps=10,
+        cache_gib=0.1,
+        checkpoint_every=CHECKPOINT_EVERY,
+        initial=replace(settings.initial, gaussians=200),
+        density=replace(settings.density, max_gaussians=400, begin=20, every=20),
+        encoder=replace(settings.encoder, space=8),
+        mlp=replace(settings.mlp, width=32),
+    )
+    job = BodyJob(method, 0, replace(settings, **changes))
     return [
         WindowTask(capture, folder / f"{index:04d}", folder / "flow", window, index, job)
         for index, window in enumerate(WINDOWS)

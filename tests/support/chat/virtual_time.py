@@ -2,13 +2,19 @@
 
 Time stands still while anything runs, in the loop or in its threads. What a test measures is what
 the code waits for, whatever else the machine does.
+
+A folder whose tests run in such loops imports `pytest_asyncio_loop_factories` into its conftest.
 """
 
 import asyncio
+import contextlib
+import functools
 import selectors
 import time
+from unittest import mock
 
 CALENDAR = 1.7e9  # s: what `time.time` shows at 0
+DELIVERY = 0.0005  # s of real time within which what one socket sent has reached another
 
 
 class JumpingSelector(selectors.DefaultSelector):
@@ -20,14 +26,16 @@ class JumpingSelector(selectors.DefaultSelector):
         events = super().select(0)
         if events or (timeout is not None and timeout <= 0):
             return events
-        if self.loop.jobs or timeout is None:  # a thread works: its end is an event
+        if self.loop.jobs or timeout is None:  # a thread or a process works: its end is an event
             return super().select(10)
+        if len(self.get_map()) > 1 and (events := super().select(DELIVERY)):
+            return events
         self.loop.now += timeout
         return []
 
 
 class VirtualLoop(asyncio.SelectorEventLoop):
-    """Runs on virtual seconds."""
+    """Runs on virtual seconds; `time` shows them too as long as it runs."""
 
     def __init__(self):
         self.now, self.jobs = 1000.0, 0
@@ -39,6 +47,16 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def time(self):
         return self.now
 
+    def run_forever(self):
+        clocks = {
+            "monotonic": self.time,
+            "perf_counter": self.time,
+            "monotonic_ns": lambda: int(self.now * 1e9),
+            "time": lambda: CALENDAR + self.now,
+        }
+        with mock.patch.multiple(time, **clocks):
+            super().run_forever()
+
     def run_in_executor(self, executor, func, *args):
         future = super().run_in_executor(executor, func, *args)
         self.jobs += 1
@@ -49,12 +67,38 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         self.jobs -= 1
 
 
-def run(monkeypatch, coroutine):
-    """Runs a coroutine in virtual time, with `time` showing it too."""
-    loop = VirtualLoop()
-    monkeypatch.setattr(time, "monotonic", loop.time)
-    monkeypatch.setattr(time, "perf_counter", loop.time)
-    monkeypatch.setattr(time, "monotonic_ns", lambda: int(loop.now * 1e9))
-    monkeypatch.setattr(time, "time", lambda: CALENDAR + loop.now)
-    with asyncio.Runner(loop_factory=lambda: loop) as runner:
+@contextlib.contextmanager
+def standing_still():
+    """Within, virtual time stands still: what is awaited happens outside of the loop."""
+    loop = asyncio.get_running_loop()
+    if not isinstance(loop, VirtualLoop):
+        yield
+        return
+    loop.jobs += 1
+    try:
+        yield
+    finally:
+        loop.jobs -= 1
+
+
+def timeless(call):
+    """A coroutine function for which virtual time stands still."""
+
+    @functools.wraps(call)
+    async def called(*args, **options):
+        with standing_still():
+            return await call(*args, **options)
+
+    return called
+
+
+def run(coroutine):
+    """Runs a coroutine in virtual time."""
+    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
         return runner.run(coroutine)
+
+
+def pytest_asyncio_loop_factories(item):
+    """Tests run in virtual time, but for those that are marked as `real_time`."""
+    real = item.get_closest_marker("real_time")
+    return {"real time": asyncio.new_event_loop} if real else {"virtual time": VirtualLoop}

@@ -1,6 +1,5 @@
 """What the process does that tests kill: trains a tiny head, as `ico3d train head` does."""
 
-import dataclasses
 from pathlib import Path
 
 import numba
@@ -9,17 +8,20 @@ import torch
 from ico3d.head.settings import PRESETS
 from ico3d.head.train_head import HeadJob, train_head
 from support.heads.tiny_capture import TinyCapture
+from support.settings import changed
 
-SETTINGS = dataclasses.replace(
+SETTINGS = changed(
     PRESETS["cpu"],
-    steps=240,
-    initial_gaussians=200,
-    max_gaussians=400,
-    densify_from=20,
-    densify_every=20,
-    densify_until=130,
-    densify_gradient=1e-5,
-    checkpoint_every=3,
+    {
+        "steps": 240,
+        "initial.gaussians": 200,
+        "density.max_gaussians": 400,
+        "density.begin": 20,
+        "density.every": 20,
+        "density.until": 130,
+        "density.gradient": 1e-5,
+        "checkpoint_every": 3,
+    },
 )
 
 

@@ -1,6 +1,6 @@
+import type { Actor } from '../actor.ts';
 import type { BodyInfo } from '../bundle/manifest.ts';
 import type { Motion } from '../motion/motion.ts';
-import type { Actor } from '../stage/stage.ts';
 import { WindowGenerator } from './generator.ts';
 import { capacityOf, pack, type PackedWindow } from './packed.ts';
 import { Slots, type Shown, type Slot } from './slots.ts';

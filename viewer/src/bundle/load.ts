@@ -1,6 +1,6 @@
 import { PageError } from '../errors.ts';
-import { readBakedHead, type BakedHead } from '../head/baked.ts';
 import { checkAnimation, type AnimationInfo } from './animation.ts';
+import { readBakedHead, type BakedHead } from './baked-head.ts';
 import { checkManifest, type BodyInfo, type HeadInfo, type Manifest } from './manifest.ts';
 import { parseSafetensors, takeTensor } from './safetensors.ts';
 

@@ -1,5 +1,5 @@
 import { LEAKY_SLOPE } from '../shared.ts';
-import type { Network } from './baked.ts';
+import type { Network } from '../bundle/baked-head.ts';
 
 /**
  * The basis coefficients of an expression: c(e) = LeakyReLU(e·w1 + b1)·w2 + b2.

@@ -1,5 +1,5 @@
+import type { BakedHead } from '../bundle/baked-head.ts';
 import { blinkIndices, type HeadInfo } from '../bundle/manifest.ts';
-import type { BakedHead } from './baked.ts';
 import { coefficients } from './coefficients.ts';
 
 /**

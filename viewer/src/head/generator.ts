@@ -1,6 +1,6 @@
 import { dyno, SplatGenerator, SplatTransformer } from '@sparkjsdev/spark';
 import * as THREE from 'three';
-import type { BakedHead } from './baked.ts';
+import type { BakedHead } from '../bundle/baked-head.ts';
 import { coefficients } from './coefficients.ts';
 
 const WIDTH = 1024; // texels per row: one texel is one Gaussian

@@ -1,6 +1,6 @@
+import type { Actor } from '../actor.ts';
 import type { HeadFiles } from '../bundle/load.ts';
 import type { HeadInfo } from '../bundle/manifest.ts';
-import type { Actor } from '../stage/stage.ts';
 import { HeadGenerator } from './generator.ts';
 import { backAndForth, Poses } from './poses.ts';
 

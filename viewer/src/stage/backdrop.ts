@@ -1,8 +1,8 @@
 import { SplatMesh } from '@sparkjsdev/spark';
+import type { Actor } from '../actor.ts';
 import { BACKGROUNDS, loadFile } from '../bundle/load.ts';
 import type { Manifest } from '../bundle/manifest.ts';
 import { PageError } from '../errors.ts';
-import type { Actor } from './stage.ts';
 
 /** Fetches the splats behind the person, if the bundle has some; they stand still. */
 export async function makeBackdrop(manifest: Manifest, loaded: (bytes: number) => void): Promise<Actor | null> {

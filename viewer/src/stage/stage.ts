@@ -1,5 +1,6 @@
 import { SparkRenderer } from '@sparkjsdev/spark';
 import * as THREE from 'three';
+import type { Actor } from '../actor.ts';
 import type { Manifest } from '../bundle/manifest.ts';
 import { Orbit } from './orbit.ts';
 import { wholeBody } from './subject.ts';
@@ -7,15 +8,6 @@ import { wholeBody } from './subject.ts';
 export const TICK = 1 / 30; // s between changes
 const LEAST_FREE = 0.4; // of the height: what covers more lies over the face
 const LEAST_ALPHA = 1 / 255; // a splat ends where its alpha falls under this
-
-/** What moves on stage: a head, a body. */
-export interface Actor {
-  readonly objects: THREE.Object3D[]; // always the same ones
-  /** Goes on by `step` seconds, many after the page was hidden; returns false if it looks as before. */
-  tick(step: number): boolean;
-  /** A picture is about to be drawn; `now` in ms, performance clock. */
-  drawing?(now: number): void;
-}
 
 /** Canvas, camera and actors: draws what changed and nothing else. */
 export class Stage {

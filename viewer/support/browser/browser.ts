@@ -1,7 +1,7 @@
-import { mkdtempSync, rmSync } from 'node:fs';
-import { tmpdir } from 'node:os';
+import { copyFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { chromium, type BrowserContext, type Page } from 'playwright-core';
+import { chromium, type Browser as Chromium, type BrowserContext, type Page } from 'playwright-core';
+import { scratchFolder } from '../scratch.ts';
 
 const FLAGS = [
   '--headless=new',
@@ -13,26 +13,41 @@ const FLAGS = [
   '--disable-sync',
   '--use-angle=swiftshader',
   '--enable-unsafe-swiftshader',
+  '--autoplay-policy=no-user-gesture-required',
 ];
-const AUTOPLAY = '--autoplay-policy=no-user-gesture-required';
+/** What the fake microphone plays, once, each time that it is opened. */
+const HEARD = join(scratchFolder(), 'microphone.wav');
+const MICROPHONE = [
+  '--use-fake-device-for-media-stream',
+  '--use-fake-ui-for-media-stream',
+  `--use-file-for-fake-audio-capture=${HEARD}%noloop`,
+];
 
-/** How a browser is started. */
+/** How a browser is opened. */
 export interface BrowserOptions {
   width?: number;
   height?: number;
-  autoplay?: boolean; // sound without a click; default true
   calm?: boolean; // the visitor wants little motion: the head does not sway
   microphone?: string; // WAV that plays as the microphone, once
 }
 
-/** A software-rendered Chromium with one page. */
+/** Chromium without and with a microphone; each process of tests starts them once, they end with it. */
+const running = new Map<boolean, Promise<Chromium>>();
+
+function start(hasMicrophone: boolean): Promise<Chromium> {
+  return chromium.launch({
+    executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
+    headless: false, // the flag says it: playwright's own switch picks another build
+    args: hasMicrophone ? [...FLAGS, ...MICROPHONE] : FLAGS,
+  });
+}
+
+/** A visitor's browser, software-rendered, with one page; nobody else's cookies, cache or permissions. */
 export class Browser {
-  private readonly profile: string;
   readonly context: BrowserContext;
   readonly page: Page;
 
-  private constructor(profile: string, context: BrowserContext, page: Page) {
-    this.profile = profile;
+  private constructor(context: BrowserContext, page: Page) {
     this.context = context;
     this.page = page;
     page.on('console', (message) => {
@@ -42,23 +57,16 @@ export class Browser {
   }
 
   static async launch(options: BrowserOptions = {}): Promise<Browser> {
-    const { width = 320, height = 240, autoplay = true, calm = false, microphone } = options;
-    const profile = mkdtempSync(join(tmpdir(), 'ico3d-browser-'));
-    const args = [...FLAGS];
-    if (autoplay) args.push(AUTOPLAY);
-    if (microphone) {
-      args.push('--use-fake-device-for-media-stream', '--use-fake-ui-for-media-stream');
-      args.push(`--use-file-for-fake-audio-capture=${microphone}%noloop`);
-    }
-    const context = await chromium.launchPersistentContext(profile, {
-      executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
-      headless: false, // the flag says it: playwright's own switch picks another build
-      args,
+    const { width = 320, height = 240, calm = false, microphone } = options;
+    if (microphone) copyFileSync(microphone, HEARD);
+    const kind = microphone !== undefined;
+    if (!running.has(kind)) running.set(kind, start(kind));
+    const context = await (await running.get(kind)!).newContext({
       viewport: { width, height },
       deviceScaleFactor: 1,
       reducedMotion: calm ? 'reduce' : 'no-preference',
     });
-    return new Browser(profile, context, context.pages()[0] ?? (await context.newPage()));
+    return new Browser(context, await context.newPage());
   }
 
   /** Opens the page and waits until the avatar is on stage. */
@@ -68,8 +76,7 @@ export class Browser {
     return this.page;
   }
 
-  async close(): Promise<void> {
-    await this.context.close();
-    rmSync(this.profile, { recursive: true, force: true });
+  close(): Promise<void> {
+    return this.context.close();
   }
 }

@@ -7,7 +7,10 @@ export interface Eyes {
   apart: number; // from the outer end of one to that of the other
 }
 
-/** Finds the eyes on the picture itself: they are what changes when the lids of a still person close. */
+/**
+ * Finds the eyes on the picture itself: they are what changes when the lids of a still person close.
+ * The page draws seldom (`drawing.ts`).
+ */
 export function seeEyes(page: Page): Promise<Eyes> {
   return page.evaluate(async () => {
     const LIDS = [37, 38];
@@ -25,7 +28,7 @@ export function seeEyes(page: Page): Promise<Eyes> {
       head!.express(expression);
       await stage.still();
       const rgba = new Uint8Array(4 * width * height);
-      stage.draw();
+      window.draw!();
       gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, rgba);
       pictures.push(rgba);
     }

@@ -1,5 +1,6 @@
 import type { Page } from 'playwright-core';
 import type { Manifest } from '../../src/bundle/manifest.ts';
+import { drawSeldom } from './drawing.ts';
 
 /** The speech in the face's expression at one moment. */
 export interface Sight {
@@ -14,7 +15,6 @@ export interface Picture {
 }
 
 const PICTURE_EVERY = 400; // ms: software rendering takes its share of the processor from recogniser and voice
-const SETTLING = 1000; // ms
 
 declare global {
   interface Window {
@@ -26,18 +26,18 @@ declare global {
  * Watches the mouth of a face that is at rest now: its expression at each tick, and a picture now
  * and then; no others are drawn.
  */
-export function watchMouth(page: Page): Promise<void> {
-  return page.evaluate(async ([every, settling]) => {
+export async function watchMouth(page: Page): Promise<void> {
+  await drawSeldom(page);
+  await page.evaluate(async (every) => {
     const FEATURES = 32; // of speech; those of the eyes follow
     const { stage, head } = window.ico3d!;
     const { camera: start } = (await (await fetch('bundle/manifest.json')).json()) as Manifest;
     stage.orbit.look(start); // from there on nothing moves the camera
-    await new Promise((resolve) => setTimeout(resolve, settling)); // splats are sorted aside
+    await stage.still(); // well sorted as seen from there
+    stage.start();
     const record: NonNullable<Window['mouth']> = { sights: [], pictures: [] };
     window.mouth = record;
     const gl = stage.renderer.getContext();
-    const draw = stage.draw.bind(stage);
-    stage.draw = () => {};
     if (window.ico3d!.body) {
       // Of a whole person the face is but a few pixels: look closer, through the same lens.
       const { camera } = stage.orbit;
@@ -62,7 +62,7 @@ export function watchMouth(page: Page): Promise<void> {
       // Only the mouth may differ: lids reach into the lower half, and move lips after a short training.
       shown.set(expression.subarray(0, FEATURES));
       generator.express(shown);
-      draw();
+      window.draw!();
       generator.express(expression);
       const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight >> 1];
       const rgba = new Uint8Array(4 * width * height);
@@ -80,7 +80,7 @@ export function watchMouth(page: Page): Promise<void> {
       record.sights.push({ at, speech: Math.hypot(...rest.subarray(0, FEATURES).map((value, i) => value - expression[i]!)) });
       if (at - (record.pictures.at(-1)?.at ?? 0) > every) record.pictures.push({ at, change: change() });
     }, 33);
-  }, [PICTURE_EVERY, SETTLING] as const);
+  }, PICTURE_EVERY);
 }
 
 /** Everything watched so far. */

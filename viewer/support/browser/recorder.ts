@@ -32,6 +32,8 @@ export interface Record {
   streams: MediaStream[]; // of microphones; only in the page
 }
 
+const LISTS = ['microphone', 'received', 'loudness'] as const;
+
 declare global {
   interface Window {
     record?: Record;
@@ -93,17 +95,42 @@ export function recordLoudness(page: Page): Promise<void> {
   });
 }
 
-/** Everything recorded so far. */
+/** What has been read of each page's record. */
+const known = new WeakMap<Page, { origin: number; record: Record }>();
+
+/** Everything recorded so far; only what is new crosses from the page, as text, for this is asked often. */
 export async function readRecord(page: Page): Promise<Record> {
-  return page.evaluate(() => ({ ...window.record!, sockets: [], streams: [] }));
+  const before = known.get(page);
+  const counts = { microphone: 0, received: 0, loudness: 0 };
+  if (before) for (const list of LISTS) counts[list] = before.record[list].length;
+  const text = await page.evaluate(
+    ({ origin, counts }) => {
+      const { microphone, received, loudness } = window.record!;
+      const same = origin === performance.timeOrigin; // else another page was opened, with a record of its own
+      const later = <T>(list: T[], count: number) => list.slice(same ? count : 0);
+      return JSON.stringify({
+        origin: performance.timeOrigin,
+        microphone: later(microphone, counts.microphone),
+        received: later(received, counts.received),
+        loudness: later(loudness, counts.loudness),
+      });
+    },
+    { origin: before?.origin, counts },
+  );
+  const { origin, ...news } = JSON.parse(text) as { origin: number } & Pick<Record, (typeof LISTS)[number]>;
+  const old = before?.origin === origin ? before.record : { microphone: [], received: [], loudness: [] };
+  const record: Record = {
+    microphone: [...old.microphone, ...news.microphone],
+    received: [...old.received, ...news.received],
+    loudness: [...old.loudness, ...news.loudness],
+    sockets: [],
+    streams: [],
+  };
+  known.set(page, { origin, record });
+  return record;
 }
 
 /** The state of each microphone that the browser gave: it shows that it records while one is `live`. */
 export function microphones(page: Page): Promise<string[]> {
   return page.evaluate(() => window.record!.streams.flatMap((stream) => stream.getTracks().map(({ readyState }) => readyState)));
-}
-
-/** Stops drawing: software rendering takes its share of the processor from recogniser and voice. */
-export function pauseDrawing(page: Page): Promise<void> {
-  return page.evaluate(() => void window.ico3d!.stage.renderer.setAnimationLoop(null));
 }

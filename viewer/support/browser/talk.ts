@@ -1,20 +1,23 @@
 import { existsSync } from 'node:fs';
 import { join } from 'node:path';
 import { Browser, type BrowserOptions } from './browser.ts';
+import { drawSeldom } from './drawing.ts';
 import { REPOSITORY, runPython } from '../python.ts';
 import { readRecord, recordLoudness, recordWire, type Record } from './recorder.ts';
 
 export const SENTENCE = 'we must find a new home in the stars'; // the persona of persona.json has a long answer to it
+export const SHORTER = 'tell me about yourself'; // and one of some seconds to this
 const RECORDING = join(REPOSITORY, '../shared/speech/new-home-in-the-stars-16k.wav');
 
 export const VOICE = 0.005; // level of the microphone above which somebody speaks
 export const SILENCE = 1e-4; // level of the avatar under which nothing is heard
 
-/** Opens the page of a server in a small window and records its conversation. */
+/** Opens the page of a server in a small window that draws nothing by itself, and records its conversation. */
 export async function openPage(url: string, options: BrowserOptions = {}): Promise<Browser> {
   const browser = await Browser.launch({ width: 320, height: 240, ...options });
   await recordWire(browser.context);
   await browser.open(url);
+  await drawSeldom(browser.page);
   await recordLoudness(browser.page);
   return browser;
 }

@@ -1,6 +1,7 @@
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Page } from 'playwright-core';
+import { drawSeldom } from '../browser/drawing.ts';
 import { runPython } from '../python.ts';
 import { scratchFolder } from '../scratch.ts';
 
@@ -47,17 +48,23 @@ export interface Step {
   heard: { utterance: number; seconds: number } | null;
 }
 
+const DRAWN = 4; // every so many pictures one is drawn
+
 declare global {
   interface Window {
     steps?: Step[];
   }
 }
 
-/** Keeps what every further picture shows. */
-export function watchSteps(page: Page): Promise<void> {
-  return page.evaluate(() => {
+/**
+ * Keeps what every further picture shows; only some are drawn, for that takes most of the time, and
+ * enough that windows are sorted before they are seen.
+ */
+export async function watchSteps(page: Page): Promise<void> {
+  await drawSeldom(page, DRAWN);
+  await page.evaluate(() => {
     const { stage, body, head, conversation } = window.ico3d!;
-    const draw = Object.getPrototypeOf(stage).draw.bind(stage) as () => void;
+    const draw = stage.draw;
     const steps: Step[] = [];
     let at = 0;
     const tick = body!.tick.bind(body);
@@ -78,8 +85,8 @@ export function watchSteps(page: Page): Promise<void> {
 }
 
 /** What the pictures showed so far. */
-export function readSteps(page: Page): Promise<Step[]> {
-  return page.evaluate(() => window.steps!);
+export async function readSteps(page: Page): Promise<Step[]> {
+  return JSON.parse(await page.evaluate(() => JSON.stringify(window.steps))) as Step[];
 }
 
 /** Where the head belongs at a body time, (m, rad) as in `Step`. */

@@ -1,7 +1,7 @@
 import { spawnSync } from 'node:child_process';
 import { existsSync } from 'node:fs';
 import { join } from 'node:path';
-import { PYTHON, REPOSITORY, runPython } from '../python.ts';
+import { ENVIRONMENT, PYTHON, REPOSITORY, runPython } from '../python.ts';
 
 const SHARED = join(REPOSITORY, '../shared');
 const CLIP = join(SHARED, 'clips/portrait_a.mp4');
@@ -10,31 +10,29 @@ const PERSONA = join(REPOSITORY, 'viewer/support/references/persona.json');
 /** Whether there is a real recording to make an avatar of. */
 export const hasClip = existsSync(CLIP);
 
-/** The avatar that comes in the package. */
-export const DEMO = join(REPOSITORY, 'src/ico3d/chat/data/demo.ico3d');
-
-const SHORT = ['steps=150', 'initial_gaussians=2500', 'max_gaussians=3000', 'densify_from=50', 'densify_until=100'];
+const SHORT =
+  '--steps 150 --initial.gaussians 2500 --density.max-gaussians 3000 --density.begin 50 --density.until 100';
 
 /** From a video of a person to an avatar that can be talked with: track, train, bake. */
 export function makePortrait(folder: string): string {
   const [capture, model, bundle] = ['capture', 'model', 'portrait.ico3d'].map((name) => join(folder, name));
   ico3d('capture', 'portrait', CLIP, capture!, '--size', '256', '--no-refine');
-  ico3d('train', 'head', capture!, model!, '--preset', 'cpu', '--set', ...SHORT);
+  ico3d('train', 'head', capture!, model!, '--preset', 'cpu', ...SHORT.split(' '));
   // Forced: half a minute of training need not reach what avatars for people must.
   ico3d('bake', model!, capture!, bundle!, '--persona', PERSONA, '--force');
   return bundle!;
 }
 
 /** The packaged avatar where there is one, else a random head: with something to say. */
-export function makeStandIn(folder: string): string {
+export function makeStandIn(folder: string, demo: string | null): string {
   const bundle = join(folder, 'stand-in.ico3d');
-  runPython('references/talking_bundle.py', bundle, ...(existsSync(DEMO) ? [DEMO] : []));
+  runPython('references/talking_bundle.py', bundle, ...(demo ? [demo] : []));
   return bundle;
 }
 
 function ico3d(...words: string[]): void {
   const began = Date.now();
-  const env = { ...process.env, ICO3D_MODELS: join(SHARED, 'models') };
+  const env = { ...ENVIRONMENT, ICO3D_MODELS: join(SHARED, 'models') };
   const done = spawnSync(PYTHON, ['-m', 'ico3d.cli', ...words], { cwd: REPOSITORY, env, encoding: 'utf8' });
   if (done.status !== 0) throw new Error(`ico3d ${words.join(' ')}: ${done.stdout}${done.stderr}`);
   console.log(`ico3d ${words[0]} took ${((Date.now() - began) / 1000).toFixed(1)} s`);

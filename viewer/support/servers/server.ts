@@ -1,6 +1,6 @@
 import { spawn, type ChildProcess } from 'node:child_process';
 import { once } from 'node:events';
-import { PYTHON, REPOSITORY } from '../python.ts';
+import { ENVIRONMENT, PYTHON, REPOSITORY } from '../python.ts';
 
 const START_TIMEOUT = 60_000; // ms
 
@@ -17,7 +17,7 @@ export class ChatServer {
   /** @param more arguments of `ico3d serve` */
   static async start(bundle: string, port = 0, ...more: string[]): Promise<ChatServer> {
     const args = ['-m', 'ico3d.cli', 'serve', bundle, '--port', String(port), ...more];
-    const child = spawn(PYTHON, args, { cwd: REPOSITORY, stdio: ['ignore', 'pipe', 'inherit'] });
+    const child = spawn(PYTHON, args, { cwd: REPOSITORY, env: ENVIRONMENT, stdio: ['ignore', 'pipe', 'inherit'] });
     return new ChatServer(child, await readUrl(child));
   }
 

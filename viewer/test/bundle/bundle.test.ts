@@ -3,7 +3,7 @@ import { join } from 'node:path';
 import { describe, expect, test } from 'vitest';
 import { blinkIndices, checkManifest } from '../../src/bundle/manifest.ts';
 import { parseSafetensors } from '../../src/bundle/safetensors.ts';
-import { readBakedHead } from '../../src/head/baked.ts';
+import { readBakedHead } from '../../src/bundle/baked-head.ts';
 import { coefficients } from '../../src/head/coefficients.ts';
 import { arrayBuffer, makeReference } from '../../support/references/head.ts';
 

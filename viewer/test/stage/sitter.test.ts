@@ -2,7 +2,7 @@ import { Box3, Matrix4, Vector3 } from 'three';
 import { describe, expect, test } from 'vitest';
 import type { HeadFiles } from '../../src/bundle/load.ts';
 import type { HeadInfo, Manifest } from '../../src/bundle/manifest.ts';
-import type { BakedHead } from '../../src/head/baked.ts';
+import type { BakedHead } from '../../src/bundle/baked-head.ts';
 import { eyesOf } from '../../src/head/eyes.ts';
 import { sitterOf } from '../../src/stage/sitter.ts';
 import { random } from '../../support/random.ts';

@@ -20,17 +20,18 @@ from ico3d.avatar.joining.companion import SEAM, HeadSource
 from ico3d.avatar.joining.cropping import cropped, near_border
 from ico3d.avatar.joining.driving import head_poses, recorded_expressions
 from ico3d.avatar.joining.face_views import face_views
-from ico3d.avatar.joining.found_placement import found_in_pictures
+from ico3d.avatar.joining.finding.found_placement import found_in_pictures
 from ico3d.avatar.joining.recolour import RecolourSettings, color_difference, recolour
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.seam import largest_gap, seam_scores
+from ico3d.avatar.joining.settings import JoiningSettings
 from ico3d.avatar.joining.similarity import canonical_from_head, fit_in_words
 from ico3d.body.settings import BodySettings
 from ico3d.body.training.train_clip import BodyJob, Runner, train_body
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.canonical import canonical_landmarks
 from ico3d.common.device import DeviceName
-from ico3d.errors import CaptureError, ModelError, SettingsError
+from ico3d.errors import CaptureError, ModelError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.device import computing_device
 from ico3d.training.checkpoint import save_tensors
@@ -40,38 +41,6 @@ SEAM_REACH = 0.012
 """Metres to either side of the border in which the head's Gaussians show where it runs."""
 MEASURED = 60
 """Pictures by test cameras."""
-
-
-@dataclass(frozen=True)
-class JoiningSettings:
-    """How a head is put on a body.
-
-    Attributes:
-        match_colors: Whether the head takes on the light of the body's studio.
-        color_steps: Steps of that, one picture each.
-        color_rate: Its learning rate.
-        pruning: Whether the body's Gaussians are kept out of the face.
-        border_points: Gaussians about the border that each window begins with.
-    """
-
-    match_colors: bool = True
-    color_steps: int = 800
-    color_rate: float = 3e-2
-    pruning: bool = True
-    border_points: int = 400
-
-    def __post_init__(self):
-        """Checks the numbers.
-
-        Raises:
-            SettingsError: If one is impossible.
-        """
-        if self.color_steps < 1 or not self.color_rate > 0 or self.border_points < 0:
-            raise SettingsError(
-                f"color_steps={self.color_steps}, color_rate={self.color_rate}, border_points="
-                f"{self.border_points} are impossible: steps and rate are above 0, points not "
-                "below; match_colors=false leaves the colours as they are."
-            )
 
 
 @dataclass(frozen=True)
@@ -99,7 +68,11 @@ class Assembly:
         paths = {"head": str(self.head.resolve()), "capture": str(capture.resolve())}
         if self.continued:
             paths["continued"] = str(self.continued.resolve())
-        return paths | {"seed": self.seed} | asdict(self.joining) | asdict(self.body)
+        return paths | {
+            "seed": self.seed,
+            "joining": asdict(self.joining),
+            "settings": asdict(self.body),
+        }
 
 
 Say = Callable[[str], None]
@@ -233,7 +206,7 @@ def _match_colors(
     if not head.model.shape.has_mlp:
         raise ModelError(
             f"{assembly.head}: this variant of head has no network whose colours could be matched: "
-            "train one with --variant full, or assemble with --set match_colors=false."
+            "train one with --variant full, or assemble with --joining.no-match-colors."
         )
     joining, landmarks = assembly.joining, _landmarks(head, assembly.head)
     views = face_views(capture, placement, HeadRegion.around(landmarks), landmarks)

@@ -1,19 +1,37 @@
 """The verb `ico3d assemble`."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from ico3d.avatar.joining.settings import JoiningSettings
+from ico3d.body.settings import PRESETS, BodySettings
 from ico3d.common.device import DeviceName
+from ico3d.common.presets import PresetName, chosen
 
 if TYPE_CHECKING:
     from ico3d.avatar.joining.assemble import Assembly
 
 
+@dataclass(frozen=True, kw_only=True)
+class AssembleChoice:
+    """What the defaults of all other settings follow from.
+
+    Attributes:
+        preset: The paper's settings of the body, or those sized for two CPU cores;
+            the defaults shown here are those of the preset that is chosen.
+        body: A folder of ico3d train body on that capture, to go on from: a third of the steps.
+    """
+
+    preset: PresetName = "cpu"
+    body: Path | None = None
+
+
 @dataclass(frozen=True)
-class Assemble:
+class Assemble(AssembleChoice):
     """Puts a trained head on a person's body, and trains the body around it.
 
     Aligns the head with every frame, matches its colours to the light in which the body was
@@ -24,29 +42,36 @@ class Assemble:
         head: A model folder of ico3d train head.
         capture: A capture of the same person's whole body, with head poses and masks.
         out: The avatar's folder to write.
-        body: A folder of ico3d train body on that capture, to go on from: a third of the steps.
-        preset: Settings of the body: the paper's, or sized for two CPU cores.
-        set: Changes, as name=value (names: ico3d.avatar.joining.assemble.JoiningSettings and
-            ico3d.body.settings.BodySettings).
         check: Write pictures here that show the head drawn over the body's recordings.
         seed: All randomness follows from it.
         device: Where to compute: by default with CUDA where that works, else on the CPU; machines
             of a Ray cluster decide for themselves.
         jobs: Windows that train at once, each in a process of its own.
         ray: Address of a Ray cluster that trains the windows, host:port or auto.
+        joining: How the head is put on the body.
+        settings: How the body is trained.
     """
 
     head: tyro.conf.Positional[Path]
     capture: tyro.conf.Positional[Path]
     out: tyro.conf.Positional[Path]
-    body: Path | None = None
-    preset: Literal["cpu", "paper"] = "cpu"
-    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
     check: Path | None = None
     seed: int = 0
     device: DeviceName = "auto"
     jobs: int = 1
     ray: str | None = None
+    joining: JoiningSettings = field(default_factory=JoiningSettings)
+    settings: Annotated[BodySettings, tyro.conf.arg(name="")] = PRESETS["cpu"]
+
+    @classmethod
+    def defaults(cls, words: Sequence[str]) -> "Assemble":
+        """The verb with the settings of the preset that words choose, or a third of its steps."""
+        choice = chosen(AssembleChoice, words)
+        settings = PRESETS[choice.preset]
+        if choice.body is not None:
+            steps, per_frame = settings.steps // 3, settings.steps_per_frame // 3
+            settings = replace(settings, steps=steps, steps_per_frame=per_frame, warmup_steps=0)
+        return cls(tyro.MISSING, tyro.MISSING, tyro.MISSING, settings=settings)
 
     def run(self) -> None:
         """Assembles, or goes on with that.
@@ -66,7 +91,7 @@ class Assemble:
         console, capture = Console(), open_capture(self.capture)
         device = decided(self.device)
         runner = runner_of(self.jobs, self.ray, self.device if self.ray else device)
-        assembly = self._assembly()
+        assembly = self.assembly()
         assemble.prepare(capture, self.out, assembly, console.print)
         if self.check:
             write_checks(self.out, capture, self.check, torch.device(device))
@@ -77,29 +102,8 @@ class Assemble:
             f"{len(avatar.body.windows)} windows."
         )
 
-    def _assembly(self) -> "Assembly":
-        """What was asked for.
+    def assembly(self) -> "Assembly":
+        """What is asked for."""
+        from ico3d.avatar.joining.assemble import Assembly
 
-        Raises:
-            SettingsError: If a change is of nothing that there is.
-        """
-        from dataclasses import fields, replace
-
-        from ico3d.avatar.joining.assemble import Assembly, JoiningSettings
-        from ico3d.body.settings import settings_for
-        from ico3d.training.changes import with_changes
-
-        names = {field.name for field in fields(JoiningSettings)}
-        ours = tuple(change for change in self.set if change.partition("=")[0] in names)
-        theirs = tuple(change for change in self.set if change not in ours)
-        body = settings_for(self.preset, "swings++")
-        if self.body:
-            body = replace(
-                body,
-                steps=body.steps // 3,
-                steps_per_frame=body.steps_per_frame // 3,
-                warmup_steps=0,
-            )
-        joining = with_changes(JoiningSettings(), ours)
-        changed = with_changes(body, theirs)
-        return Assembly(self.head, joining, changed, self.seed, self.body, self.device)
+        return Assembly(self.head, self.joining, self.settings, self.seed, self.body, self.device)

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from ico3d.body.planning.flow import clip_flow
 from ico3d.body.planning.windows import Window, cut
+from ico3d.body.settings import Windows
 from ico3d.capture.capture import Capture
 from ico3d.common.files import write_atomic
 
@@ -18,21 +19,6 @@ BLOCKS = "▁▂▃▄▅▆▇█"
 
 if TYPE_CHECKING:
     import torch
-
-
-@dataclass(frozen=True)
-class PlanSettings:
-    """Where a clip is cut.
-
-    Attributes:
-        threshold: Motion that a window may add up to, cm² (`ClipFlow.motion`).
-        shortest: Frames that a window has at least.
-        longest: Frames that it has at most.
-    """
-
-    threshold: float
-    shortest: int
-    longest: int
 
 
 @dataclass(frozen=True)
@@ -53,7 +39,7 @@ class Plan:
     method: str
     fps: float
     busiest: int
-    settings: PlanSettings
+    settings: Windows
 
     def moved(self, window: Window) -> float:
         """What moves in a window altogether, cm²."""
@@ -62,7 +48,7 @@ class Plan:
 
 def make_plan(
     capture: Capture,
-    settings: PlanSettings,
+    settings: Windows,
     folder: Path,
     device: "torch.device | str" = "cpu",
 ) -> Plan:

@@ -57,24 +57,24 @@ def density_control(
     method: Method, settings: BodySettings, steps: int, seed: int, extent: float
 ) -> Strategy:
     """The strategy of a method, for a window of this extent in metres."""
-    until = round(settings.densify_until * steps)
-    schedule = Schedule(settings.densify_from, until, settings.densify_every)
+    density = settings.density
+    schedule = Schedule(density.begin, round(density.until * steps), density.every)
     if method == "freetime":
         chain = McmcSettings(
-            max_gaussians=settings.max_gaussians,
-            min_opacity=settings.min_opacity,
-            growth=1 + settings.densify_growth,
+            max_gaussians=density.max_gaussians,
+            min_opacity=density.min_opacity,
+            growth=1 + density.growth,
             noise_rate=0.0,
             opacity_weight=FADING,
             scale_weight=0.0,
         )
         return RelocationStrategy(schedule, chain, seed, extent)
     thresholds = DensitySettings(
-        max_gaussians=settings.max_gaussians,
-        gradient_threshold=settings.densify_gradient,
-        growth=settings.densify_growth,
+        max_gaussians=density.max_gaussians,
+        gradient_threshold=density.gradient,
+        growth=density.growth,
         clone_below=CLONE_BELOW * extent,
-        prune_opacity=settings.min_opacity,
+        prune_opacity=density.min_opacity,
         prune_scale=PRUNE_ABOVE * extent,
     )
     return DefaultStrategy(schedule, thresholds, seed, reset_every=0)

@@ -57,7 +57,7 @@ class FineTuner:
         for name, tensor in {**model.gaussians, **model.shared}.items():
             tensor.requires_grad_(name in CANONICAL)
         self._learner = Learner(model, window, pictures, settings, extent, seed, companion)
-        self._settings, self._cameras = settings, cameras
+        self._settings, self._cameras = settings.finetune, cameras
         self._shared = window.first
         with torch.no_grad():
             self._goal = self._learner.accompanied(previous.at(1.0), self._shared)
@@ -73,10 +73,10 @@ class FineTuner:
             values = self._agree(index)
         else:
             values = self._remember(index)
-        start, done = self._settings.finetune_from, index / self._settings.finetune_steps
+        start, done = self._settings.begin, index / self._settings.steps
         self._learner.update(start + (1 - start) * done)
         self._average(index)
-        self._learner.prune(index, self._settings.finetune_steps)
+        self._learner.prune(index, self._settings.steps)
         return values
 
     def tensors(self) -> dict[str, Tensor]:
@@ -99,8 +99,8 @@ class FineTuner:
 
     def _average(self, index: int) -> None:
         """Ends with a mean over many steps: single ones look at one moment, from one side."""
-        steps = self._settings.finetune_steps
-        first = round((1 - self._settings.finetune_mean) * steps)
+        steps = self._settings.steps
+        first = round((1 - self._settings.mean) * steps)
         if index >= first:
             self._learner.keep_mean(index - first)
             if index == steps - 1:

@@ -60,7 +60,7 @@ class BodyTrainer:
         self._strategy.observe(rendering.info.first(len(gaussians)), index)
         progress = index / self._steps
         learner.update(progress)
-        rate = self._settings.rates()["means"].at(progress)
+        rate = self._settings.rates.by_parameter()["means"].at(progress)
         self._strategy.adapt(learner.population, index, rate)
         learner.prune(index, self._steps)
         return {
@@ -93,13 +93,13 @@ class BodyTrainer:
 
     def _penalties(self) -> Tensor:
         """What density control and the planes' regularisers add to the loss."""
-        settings, model = self._settings, self.model
+        weights, model = self._settings.loss, self.model
         total = self._strategy.penalty(self._learner.population)
         planes = {n.removeprefix(GRID): p for n, p in model.shared.items() if n.startswith(GRID)}
-        if settings.smoothness_weight and planes:
-            total = total + settings.smoothness_weight * (
+        if weights.smoothness and planes:
+            total = total + weights.smoothness * (
                 space_smoothness(planes) + time_smoothness(planes)
             )
-        if settings.stillness_weight and planes:
-            total = total + settings.stillness_weight * time_change(planes)
+        if weights.stillness and planes:
+            total = total + weights.stillness * time_change(planes)
         return total

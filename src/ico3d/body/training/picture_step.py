@@ -59,7 +59,7 @@ class Learner:
         self.model, self.optimiser = model, Optimiser()
         self.views = pictures.views
         self._pictures, self._window, self._settings = pictures, window, settings
-        self._rates, self._extent, self._seed = settings.rates(), extent, seed
+        self._rates, self._extent, self._seed = settings.rates.by_parameter(), extent, seed
         cameras = 1 + max(view.camera_index for view in self.views)
         self.affine = torch.eye(3, 4, device=model.device).repeat(cameras, 1, 1)  # (C, 3, 4)
         self.affine.requires_grad_(settings.color_correction)
@@ -94,7 +94,7 @@ class Learner:
     def draw(self, gaussians: Gaussians, view: View, example: Example) -> Rendering:
         """The picture that a view's camera would take, with the companion in it."""
         seen = self._corrected(self.accompanied(gaussians, view.frame), view.camera_index)
-        absgrad = self._settings.absgrad
+        absgrad = self._settings.density.absgrad
         return render(seen, [view.camera], example.color, absgrad=absgrad)
 
     def accompanied(self, gaussians: Gaussians, frame: int) -> Gaussians:
@@ -115,9 +115,9 @@ class Learner:
 
     def loss(self, rendering: Rendering, example: Example) -> Tensor:
         """λ_1·L1 + λ_s·(1 − SSIM) + λ_m·L1 of the masks (paper, loss of the body)."""
-        settings = self._settings
-        picture = photometric(rendering.rgb, example.target[None], settings.ssim_weight)
-        return picture + settings.mask_weight * l1(rendering.alpha[0], example.mask)
+        weights = self._settings.loss
+        picture = photometric(rendering.rgb, example.target[None], weights.ssim)
+        return picture + weights.mask * l1(rendering.alpha[0], example.mask)
 
     def update(self, progress: float) -> None:
         """One optimiser step on every tensor that has a gradient.

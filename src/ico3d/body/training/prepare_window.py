@@ -71,7 +71,7 @@ def begin_window(
         CaptureError: If the masks of the cameras agree on no place.
     """
     rng = np.random.default_rng([seed, window.first])
-    count = min(settings.initial_gaussians, settings.max_gaussians)
+    count = min(settings.initial.gaussians, settings.density.max_gaussians)
     if method in ("spacetime", "freetime"):
         frames = range(window.first, window.last + 1)
     else:
@@ -111,7 +111,9 @@ def _clouds(
     rng: np.random.Generator,
 ) -> tuple[list[np.ndarray], str]:
     """Points (each, 3) of every frame, and where they come from."""
-    starts = [initial_points(capture, frame, each, rng, settings.initial) for frame in frames]
+    starts = [
+        initial_points(capture, frame, each, rng, settings.initial.source) for frame in frames
+    ]
     return [resampled(start.points, each, rng) for start in starts], starts[0].source
 
 
@@ -129,8 +131,8 @@ def _round(
 ) -> dict[str, Tensor]:
     """The canonical tensors of round Gaussians on points."""
     colors = [point_colors(p, capture, f) for p, f in zip(clouds, frames, strict=True)]
-    sizes = np.concatenate([spacing(cloud) for cloud in clouds]) * settings.initial_scale  # (P,)
-    count, opacity = len(sizes), settings.initial_opacity
+    sizes = np.concatenate([spacing(cloud) for cloud in clouds]) * settings.initial.scale  # (P,)
+    count, opacity = len(sizes), settings.initial.opacity
     color = torch.from_numpy(np.concatenate(colors).clip(0.02, 0.98)).float()  # (P, 3)
     return {
         "means": torch.from_numpy(np.concatenate(clouds)).float(),
@@ -156,7 +158,7 @@ def _motion(
     if method in ("spacetime", "freetime"):
         formula = SPACETIME if method == "spacetime" else FREETIME
         return formula, _formula_tensors(formula, settings, clouds)
-    sampled = [initial_points(capture, f, 500, rng, settings.initial) for f in _some(window)]
+    sampled = [initial_points(capture, f, 500, rng, settings.initial.source) for f in _some(window)]
     motion = deformation(method, settings, window, np.concatenate([s.points for s in sampled]))
     if motion.mlp.sets == 1:
         return motion, {}
@@ -177,15 +179,15 @@ def deformation(
     """The deformation of a window whose motion stays about points (P, 3)."""
     low, high = points.min(0), points.max(0)
     middle, half = (low + high) / 2, (high - low) / 2 * (1 + 2 * PADDING)
-    encoder = None
-    inputs = POSITIONS * (1 + 2 * settings.bands)
+    encoder, sizes = None, settings.encoder
+    inputs = POSITIONS * (1 + 2 * sizes.bands)
     if method != "swings":
-        space = tuple(settings.grid_space * 2**scale for scale in range(settings.grid_scales))
-        encoder = EncoderShape(space, len(window), settings.grid_channels)
+        space = tuple(sizes.space * 2**scale for scale in range(sizes.scales))
+        encoder = EncoderShape(space, len(window), sizes.channels)
         inputs = encoder.outputs
-    mlp = MlpShape(inputs, settings.width, settings.depth, sets=settings.sets)
+    mlp = MlpShape(inputs, settings.mlp.width, settings.mlp.depth, sets=settings.mlp.sets)
     box = tuple(middle.tolist()), tuple(half.tolist())
-    return Deformation(*box, mlp, encoder, settings.bands)
+    return Deformation(*box, mlp, encoder, sizes.bands)
 
 
 def _formula_tensors(
@@ -200,7 +202,7 @@ def _formula_tensors(
     path[:, 0] = torch.from_numpy(speed).float()
     tensors = {
         "center": center.float(),
-        "log_duration": torch.full((len(speed),), math.log(settings.duration)),
+        "log_duration": torch.full((len(speed),), math.log(settings.initial.duration)),
         "path": path,
     }
     return tensors | ({"turn": torch.zeros(len(speed), 4)} if formula.turning else {})

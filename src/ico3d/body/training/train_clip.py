@@ -11,7 +11,7 @@ from ico3d.body.companion import Companion, CompanionSource
 from ico3d.body.model_folder import ABOUT, UNTUNED, TrainedBody, load_window, save_window
 from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.flow import clip_flow, dynamic_weights
-from ico3d.body.planning.plan import Plan, PlanSettings, make_plan, print_plan, save_plan
+from ico3d.body.planning.plan import Plan, make_plan, print_plan, save_plan
 from ico3d.body.planning.plan_picture import draw_plan
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import ONE_WINDOW, BodySettings, Method
@@ -28,8 +28,6 @@ from ico3d.splat.device import computing_device
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.run import RunFolder
 
-FINETUNING = ("finetune_steps", "consistency", "finetune_from", "finetune_mean")
-"""Settings that windows do not depend on: fine-tuning can be done anew without training anew."""
 WINDOW_FILE = "window.safetensors"
 
 
@@ -175,7 +173,7 @@ def finetune_window(
     """
     job, window = task.job, task.window
     about = _about(task.capture, window, job)
-    run = RunFolder(task.folder, about | asdict(job.settings))
+    run = RunFolder(task.folder, about | {"settings": asdict(job.settings)})
     finished = run.finished()
     if finished is not None:
         return finished["train_seconds"]
@@ -193,7 +191,7 @@ def finetune_window(
         model, previous, window, pictures, cameras, job.settings, before["extent"], seed, companion
     )
     loop = LoopSettings(
-        job.settings.finetune_steps,
+        job.settings.finetune.steps,
         checkpoint_every=job.settings.checkpoint_every,
         label=f"fine-tuning window {task.index}",
     )
@@ -222,7 +220,7 @@ def train_body(
         SettingsError: If the folder holds a run with other settings.
         ModelError: If training diverges.
     """
-    run = RunFolder(folder, job.about(capture.path) | asdict(job.settings))
+    run = RunFolder(folder, job.about(capture.path) | {"settings": asdict(job.settings)})
     if run.finished() is not None:
         return TrainedBody.load(folder)
     if job.continued is not None:
@@ -237,7 +235,7 @@ def train_body(
     ]
     seconds = sum(runner(tasks) if runner else (train_window(task, capture) for task in tasks))
     body = _save(capture, folder, job, tasks, seconds)
-    if job.settings.finetune_steps and len(tasks) > 1:
+    if job.settings.finetune.steps and len(tasks) > 1:
         _save(capture, folder, job, tasks, seconds, UNTUNED)
         tuned = [replace(t, folder=folder / "finetuned" / f"{t.index:04d}") for t in tasks[1:]]
         for before, task, after in zip(tasks, tasks[1:], tuned, strict=False):
@@ -270,11 +268,7 @@ def _fitting(body: TrainedBody, capture: Capture, job: BodyJob) -> TrainedBody:
 
 def plan_windows(capture: Capture, job: BodyJob, folder: Path) -> Plan:
     """The windows of a clip, shown and drawn; methods of one window take all of it."""
-    settings = job.settings
-    bounds = PlanSettings(
-        settings.motion_threshold, settings.shortest_window, settings.longest_window
-    )
-    plan = make_plan(capture, bounds, folder, computing_device(job.device))
+    plan = make_plan(capture, job.settings.windows, folder, computing_device(job.device))
     if job.method in ONE_WINDOW:
         plan = replace(plan, windows=(Window(0, capture.num_frames - 1),))
     print_plan(plan, Console())
@@ -305,7 +299,7 @@ def _save(
 
 
 def _about(capture: Path, window: Window, job: BodyJob) -> dict:
-    """What a window's run is known by: what fine-tuning does comes later."""
+    """What a window's run is known by: fine-tuning can be done anew without training anew."""
     settings = asdict(job.settings)
-    kept = {name: value for name, value in settings.items() if name not in FINETUNING}
-    return job.about(capture) | asdict(window) | kept
+    del settings["finetune"]
+    return job.about(capture) | asdict(window) | {"settings": settings}

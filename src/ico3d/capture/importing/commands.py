@@ -3,9 +3,11 @@
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
+
+from ico3d.capture.importing.settings import ImportSettings
 
 MOST_WORKERS = 8
 """Each needs room for some large pictures."""
@@ -26,22 +28,14 @@ class Import:
     Attributes:
         source: A COLMAP sparse model (binary or text) or a folder around one, or transforms.json.
         out: Folder to make.
-        images: Folder of the pictures of a COLMAP model; `images` nearby by default.
-        fps: Frames per second of recordings whose frames have a time.
-        scale: Metres per unit of the source; COLMAP's worlds have any size.
-        consent: What the person agreed to; goes into the avatar's manifest.
-        licence: Licence of the recording; likewise.
-        shows: What fills the pictures: the whole body, or the head, to train one on.
+        settings: How the recording is taken over.
     """
 
     source: Annotated[Path, tyro.conf.Positional]
     out: Annotated[Path, tyro.conf.Positional]
-    images: Path | None = None
-    fps: float = 25.0
-    scale: float = 1.0
-    consent: str = "not stated"
-    licence: str = "not stated"
-    shows: Literal["body", "head"] = "body"
+    settings: Annotated[ImportSettings, tyro.conf.arg(name="")] = field(
+        default_factory=ImportSettings
+    )
 
     def run(self) -> None:
         """Runs it.
@@ -49,11 +43,9 @@ class Import:
         Raises:
             CaptureError: If the source is damaged or not known, or `out` exists.
         """
-        from ico3d.capture.importing.recording import ImportSettings, import_recording
+        from ico3d.capture.importing.recording import import_recording
 
-        told = (self.consent, self.licence, self.shows)
-        settings = ImportSettings(self.images, self.fps, self.scale, *told)
-        about = import_recording(self.source, self.out, settings)
+        about = import_recording(self.source, self.out, self.settings)
         _say(about, self.out)
 
 

@@ -3,21 +3,20 @@
 import re
 import shutil
 from collections import Counter
-from dataclasses import dataclass, replace
-from math import isfinite
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from ico3d.capture.importing.colmap import is_model, read_colmap
 from ico3d.capture.importing.foreign import Foreign, Shot
+from ico3d.capture.importing.settings import ImportSettings
 from ico3d.capture.importing.transforms import read_transforms
 from ico3d.capture.multiview.description import Description, Place
 from ico3d.capture.multiview.reader import MultiviewCapture
 from ico3d.capture.multiview.writing import new_folder, shown
 from ico3d.capture.poses import nearest_axis, turn_upright, turned, up_of_cameras
-from ico3d.errors import CaptureError, SettingsError
+from ico3d.errors import CaptureError
 
 NEARLY = np.cos(np.radians(20))
 """An axis of the source is taken to be meant as up if the cameras' mean is within 20° of it."""
@@ -25,38 +24,6 @@ UNEVEN = 0.1
 """Part of a frame by which times may be off."""
 MOST_GAPS = 10
 """Frames per frame that has a picture."""
-
-
-@dataclass(frozen=True)
-class ImportSettings:
-    """How a recording is taken over.
-
-    Attributes:
-        images: Folder of the pictures of a COLMAP model; looked for where None.
-        fps: Frames per second of recordings with times.
-        scale: Metres per unit of the source.
-        consent: What the person agreed to.
-        licence: Licence of the recording.
-        shows: What fills the pictures.
-    """
-
-    images: Path | None = None
-    fps: float = 25.0
-    scale: float = 1.0
-    consent: str = "not stated"
-    licence: str = "not stated"
-    shows: Literal["body", "head"] = "body"
-
-    def __post_init__(self):
-        """Checks the numbers.
-
-        Raises:
-            SettingsError: If frame rate or scale are not above 0.
-        """
-        if not (isfinite(self.fps) and self.fps > 0 and isfinite(self.scale) and self.scale > 0):
-            raise SettingsError(
-                f"fps and scale must be above 0, not {self.fps:g} and {self.scale:g}."
-            )
 
 
 def import_recording(source: Path, out: Path, settings: ImportSettings) -> Description:

@@ -23,7 +23,7 @@ class ServeModule:
     Recognition, language and voice speak the OpenAI-compatible API; expression has its own.
 
     Attributes:
-        kind: Which part.
+        kind: Which part: recognition, language, voice or expression.
         settings: TOML or JSON file that chooses its provider, as for `serve`.
         bundle: Whose persona language knows, and whose speech model expression runs.
         host: Address to listen on; other machines reach it only if it is not 127.0.0.1.

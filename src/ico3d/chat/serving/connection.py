@@ -8,7 +8,7 @@ from loguru import logger
 
 from ico3d.chat.observing.failures import cause
 from ico3d.chat.page import Outbox
-from ico3d.chat.serving.limits import Inlet, Limits
+from ico3d.chat.serving.limits import ConnectionLimits, Inlet
 from ico3d.chat.serving.sessions import BROKEN_OFF, FullError, Session, Sessions
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import OversizedError, decode_client, encode
@@ -42,7 +42,8 @@ class Connection:
             notices: What every page is told of the avatar.
         """
         self._socket, self._sessions, self._notices = socket, sessions, notices
-        self._limits, self._inlet = Limits(), Inlet()
+        now = asyncio.get_running_loop().time
+        self._limits, self._inlet = ConnectionLimits(now), Inlet(now)
         self._outbox = Outbox()
 
     async def run(self) -> None:

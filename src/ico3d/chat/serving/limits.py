@@ -46,7 +46,7 @@ class Bucket:
         return True
 
 
-class Limits:
+class ConnectionLimits:
     """The limits of one connection.
 
     Sound has wide ones: when a network that stalled comes back, all that the microphone made

@@ -14,6 +14,7 @@ from pipecat.services.tts_service import TTSService
 from pipecat.utils.errors import ErrorCategory
 
 from ico3d.chat.observing.failures import ReportedError
+from ico3d.chat.pipecat_internals import replace_run_tts
 from ico3d.chat.services.voice import espeak
 from ico3d.chat.supervision.apologies import apology, espeak_voice
 from ico3d.chat.wire.protocol import SPEECH_RATE
@@ -112,7 +113,7 @@ def endure(
 ) -> None:
     """Puts an `EnduringVoice` around a voice; pipecat has no place for one, so it is set here."""
     enduring = EnduringVoice(voice.run_tts, patience, language, complain)
-    setattr(voice, "run_tts", enduring.run_tts)  # noqa: B010
+    replace_run_tts(voice, enduring.run_tts)
 
 
 def silence(text: str) -> np.ndarray:

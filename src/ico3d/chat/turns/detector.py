@@ -26,7 +26,7 @@ KEPT = 100  # frames of a voice that are compared: 2 s
 AFTERGLOW = 1.0  # s of silence behind a voice that are told of, too
 
 
-class Ear(SileroVADAnalyzer):
+class EagerSilero(SileroVADAnalyzer):
     """Silero, which also tells what it hears before it is sure."""
 
     def __init__(self, pause: float):
@@ -105,10 +105,10 @@ class Timbre:
 class VoiceDetector(VADProcessor):
     """Tells when voices begin and end; while the button is held, that alone says so."""
 
-    def __init__(self, ear: Ear):
+    def __init__(self, vad: EagerSilero):
         """A detector for one session."""
-        super().__init__(vad_analyzer=ear)
-        self._ear = ear
+        super().__init__(vad_analyzer=vad)
+        self._vad = vad
         self._timbre = Timbre()
         self._heard = 0.0  # s
         self._silence = AFTERGLOW  # s since a voice
@@ -127,7 +127,7 @@ class VoiceDetector(VADProcessor):
             await self._hold()
 
     async def _tell(self, samples: np.ndarray) -> None:
-        seconds, voiced = len(samples) / MICROPHONE_RATE, self._ear.voiced
+        seconds, voiced = len(samples) / MICROPHONE_RATE, self._vad.voiced
         at, self._heard = self._heard, self._heard + seconds
         self._silence = 0.0 if voiced else self._silence + seconds
         if self._silence >= AFTERGLOW:
@@ -135,7 +135,7 @@ class VoiceDetector(VADProcessor):
             return
         self._timbre.hear(samples)
         plain, fading = self._timbre.is_plain, self._timbre.is_fading
-        await self.push_frame(VoiceFrame(at, seconds, voiced, plain, fading, self._ear.silence))
+        await self.push_frame(VoiceFrame(at, seconds, voiced, plain, fading, self._vad.silence))
 
     async def _hold(self) -> None:
         if self._held:

@@ -8,6 +8,7 @@ from pipecat.audio.turn.base_turn_analyzer import EndOfTurnState
 from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
 from pipecat.metrics.metrics import MetricsData, TurnMetricsData
 
+from ico3d.chat.pipecat_internals import judge_turn, keep_turn_sound, turn_sound
 from ico3d.chat.wire.protocol import MICROPHONE_RATE
 
 SOON = 0.09  # s of silence after which a voice may well have ended
@@ -41,8 +42,8 @@ class EagerSmartTurn(LocalSmartTurnAnalyzerV3):
     def append_audio(self, buffer: bytes, is_speech: bool) -> EndOfTurnState:
         """Takes more sound; pipecat keeps a voice from its beginning, however long it lasts."""
         state = super().append_audio(buffer, is_speech)
-        if len(self._audio_buffer) % TIDY == 0:
-            self._audio_buffer = self._latest(self._audio_buffer)
+        if len(turn_sound(self)) % TIDY == 0:
+            keep_turn_sound(self, self._latest(turn_sound(self)))
         return state
 
     def _latest(self, pieces: list[tuple[float, np.ndarray]]) -> list[tuple[float, np.ndarray]]:
@@ -59,11 +60,8 @@ class EagerSmartTurn(LocalSmartTurnAnalyzerV3):
         """Follows the voice: for how many seconds it has been silent."""
         if silence <= 0:
             self._forget()
-        elif self._early is None and SOON <= silence < self._pause and self._audio_buffer:
-            loop, sound = asyncio.get_running_loop(), self._foreseen(self._pause - silence)
-            self._early = loop.run_in_executor(
-                self._model_executor, self._process_speech_segment, sound
-            )
+        elif self._early is None and SOON <= silence < self._pause and turn_sound(self):
+            self._early = judge_turn(self, self._foreseen(self._pause - silence))
 
     async def analyze_end_of_turn(self) -> Verdict:
         """The verdict on the voice so far."""
@@ -88,9 +86,9 @@ class EagerSmartTurn(LocalSmartTurnAnalyzerV3):
 
     def _foreseen(self, seconds: float) -> list[tuple[float, np.ndarray]]:
         """What was heard, and the silence that is to come, made of the last of it."""
-        recent = np.concatenate([sound for _, sound in self._audio_buffer[-8:]])[-LAST:]
+        recent = np.concatenate([sound for _, sound in turn_sound(self)[-8:]])[-LAST:]
         silence = np.resize(recent[::-1], round(seconds * MICROPHONE_RATE))  # (S,) int16
-        return [*self._audio_buffer, (time.monotonic(), silence)]
+        return [*turn_sound(self), (time.monotonic(), silence)]
 
 
 def is_sure(found: MetricsData | None) -> bool:

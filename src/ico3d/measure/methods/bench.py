@@ -12,21 +12,20 @@ import numpy as np
 
 from ico3d.body.model_folder import UNTUNED, TrainedBody
 from ico3d.body.planning.windows import Window
-from ico3d.body.settings import ONE_WINDOW, BodySettings, Method, settings_for
+from ico3d.body.settings import ONE_WINDOW, BodySettings, Method
 from ico3d.body.training.train_clip import BodyJob, plan_windows, train_body
 from ico3d.capture.capture import Capture, all_frames
 from ico3d.capture.formats import open_capture
 from ico3d.common.device import DeviceName
 from ico3d.measure.body import evaluate_body
+from ico3d.measure.methods.settings import OURS, changed_alike
 from ico3d.splat.device import computing_device
 from ico3d.studio.recording import Recording, record
-from ico3d.training.changes import with_changes
 from ico3d.training.processes import fork_server
 
 SCORES = ("psnr_mask", "psnr_moving", "psnr", "ssim", "flicker", "num_gaussians", "train_seconds")
 """Metrics that a trial keeps."""
 PER_WINDOW = ("psnr_mask", "psnr_moving")
-OURS: Method = "swings++"
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class Terms:
         frames: Only so many of its first frames, or None for all.
         folder: Where trainings lie; a finished one is not repeated.
         windows: As SWinGS++ is trained in, and as all are reported on.
-        changes: To the cpu preset of every method, as name=value.
+        ours: How SWinGS++ is trained; what is not as in its preset holds for every method.
         finetune: Whether SWinGS++ is fine-tuned in the end.
         device: Where to compute.
     """
@@ -47,7 +46,7 @@ class Terms:
     frames: int | None
     folder: Path
     windows: tuple[Window, ...]
-    changes: tuple[str, ...]
+    ours: BodySettings
     finetune: bool
     device: DeviceName = "auto"
 
@@ -56,16 +55,16 @@ class Terms:
 
         Where that takes the clip as one window, it has the Gaussians and steps of all windows.
         """
-        settings = _settings(method, self.changes)
+        settings = changed_alike(method, self.ours)
         if not (self.finetune and method == OURS):
-            settings = replace(settings, finetune_steps=0)
+            settings = settings.without_finetuning()
         if method not in ONE_WINDOW:
             return settings
-        count = len(self.windows)
+        count, initial, density = len(self.windows), settings.initial, settings.density
         return replace(
             settings,
-            initial_gaussians=count * settings.initial_gaussians,
-            max_gaussians=count * settings.max_gaussians,
+            initial=replace(initial, gaussians=count * initial.gaussians),
+            density=replace(density, max_gaussians=count * density.max_gaussians),
             steps=sum(settings.steps_of(len(window)) for window in self.windows),
             steps_per_frame=0,
         )
@@ -82,7 +81,7 @@ class Trial:
     @property
     def folder(self) -> Path:
         """Where it is trained."""
-        tuned = "-tuned" if self.terms.settings(self.method).finetune_steps else ""
+        tuned = "-tuned" if self.terms.settings(self.method).finetune.steps else ""
         return self.terms.folder / f"{self.method}{tuned}-seed{self.seed}"
 
     def run(self) -> dict:
@@ -158,21 +157,16 @@ def terms_for(
     capture: Path,
     frames: int | None,
     folder: Path,
-    changes: Sequence[str],
+    settings: BodySettings,
     finetune: bool,
     device: DeviceName = "auto",
 ) -> Terms:
     """Cuts the clip into windows, once for all trials."""
     clip = open_clip(capture, frames)
     named = folder / (f"{clip.num_frames}-frames")
-    job = BodyJob(OURS, 0, _settings(OURS, tuple(changes)), device=device)
+    job = BodyJob(OURS, 0, settings, device=device)
     windows = plan_windows(clip, job, named).windows
-    return Terms(capture, frames, named, windows, tuple(changes), finetune, device)
-
-
-def _settings(method: Method, changes: tuple[str, ...]) -> BodySettings:
-    """The preset, but that nobody begins on true surface points."""
-    return with_changes(replace(settings_for("cpu", method), initial="hull"), changes)
+    return Terms(capture, frames, named, windows, settings, finetune, device)
 
 
 def run_trials(

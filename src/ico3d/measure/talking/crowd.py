@@ -11,7 +11,7 @@ from rich.table import Table
 from ico3d.chat.settings.conversation import ChatSettings
 from ico3d.chat.wire.protocol import SPEECH_RATE, End, Speech, Text
 from ico3d.errors import SettingsError
-from ico3d.measure.talking.page import SCHEDULING, Page, open_page
+from ico3d.measure.talking.page import SCHEDULING, SimulatedPage, open_page
 from ico3d.measure.talking.scripted import Script
 from ico3d.measure.talking.serving import serving_script
 
@@ -71,7 +71,7 @@ async def _visit(url: str, visitors: int, microphones: int) -> list[Visit]:
     return [Visit(tones(page), ahead(page)) for page in pages]
 
 
-async def _ask(page: Page, utterance: int, delay: float) -> None:
+async def _ask(page: SimulatedPage, utterance: int, delay: float) -> None:
     """The first question cuts the greeting short, which is number 0 once it is heard."""
     await asyncio.sleep(delay)
     await page.wait(Speech, timeout=PATIENCE)
@@ -80,7 +80,7 @@ async def _ask(page: Page, utterance: int, delay: float) -> None:
     await page.heard(utterance)
 
 
-def tones(page: Page) -> list[float]:
+def tones(page: SimulatedPage) -> list[float]:
     """The loudest tone of each piece of speech that is long enough to tell, Hz."""
     return [tone_of(m.pcm) for m in page.messages(Speech) if len(m.pcm) >= SPEECH_RATE // 10]
 
@@ -91,7 +91,7 @@ def tone_of(pcm: np.ndarray) -> float:
     return float(APART * round(int(heights.argmax()) / APART))
 
 
-def ahead(page: Page) -> list[float]:
+def ahead(page: SimulatedPage) -> list[float]:
     """Milliseconds by which pieces came before they were played; not of those that begin."""
     started: dict[int, float] = {}
     found = []

@@ -81,7 +81,7 @@ class Player:
         return Clock(self.utterance, position, 0.0)
 
 
-class Page:
+class SimulatedPage:
     """One connection. Everything that arrives is kept with its time in `log`."""
 
     def __init__(self, socket: ClientConnection, microphone: bool):
@@ -207,7 +207,7 @@ class Page:
 
 async def open_page(
     url: str, session: str | None = None, last_index: int = -1, microphone: bool = True
-) -> tuple[Page, Welcome]:
+) -> tuple[SimulatedPage, Welcome]:
     """Connects and says hello.
 
     Args:
@@ -218,7 +218,7 @@ async def open_page(
     """
     address = url.replace("http", "ws", 1).rstrip("/") + "/ws"
     socket = await connect(address, max_size=protocol.MAX_BINARY_FRAME)
-    page = Page(socket, microphone)
+    page = SimulatedPage(socket, microphone)
     await page.send(Hello(protocol.VERSION, session, last_index))
     _, welcome = await page.wait(Welcome)
     return page, welcome

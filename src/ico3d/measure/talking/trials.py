@@ -22,7 +22,7 @@ from ico3d.chat.wire.protocol import (
     Text,
 )
 from ico3d.measure.talking.host import stolen_seconds
-from ico3d.measure.talking.page import SCHEDULING, Page, open_page
+from ico3d.measure.talking.page import SCHEDULING, SimulatedPage, open_page
 
 FADE = 0.02  # s in which the page falls silent, by far more than 20 dB
 PATIENCE = 10.0  # s within which something must happen
@@ -90,7 +90,7 @@ async def visit(url: str):
     await page.close()
 
 
-async def peace(page: Page) -> None:
+async def peace(page: SimulatedPage) -> None:
     """Cuts an answer short and waits until nobody says anything."""
     end = time.monotonic() + PATIENCE
     since = -1
@@ -101,7 +101,7 @@ async def peace(page: Page) -> None:
         await asyncio.sleep(REST)
 
 
-async def ask(page: Page, sound: np.ndarray) -> Question | None:
+async def ask(page: SimulatedPage, sound: np.ndarray) -> Question | None:
     """Asks a question in real time; None if it was answered before its end or not at all."""
     since = len(page.log)
     said = page.say(sound)
@@ -122,7 +122,7 @@ async def ask(page: Page, sound: np.ndarray) -> Question | None:
     return answered and replace(answered, is_disturbed=stolen_seconds() != taken)
 
 
-async def interrupt(page: Page, sound: np.ndarray, after: float) -> Interruption:
+async def interrupt(page: SimulatedPage, sound: np.ndarray, after: float) -> Interruption:
     """Speaks over an answer that has been heard for `after` seconds."""
     utterance = await answer_heard(page, LONG, after)
     since = len(page.log)
@@ -143,7 +143,7 @@ async def interrupt(page: Page, sound: np.ndarray, after: float) -> Interruption
     return Interruption(1000 * duck, 1000 * max(duck, stop), len(late))
 
 
-async def assent(page: Page, sound: np.ndarray, after: float, whole: np.ndarray) -> Assent:
+async def assent(page: SimulatedPage, sound: np.ndarray, after: float, whole: np.ndarray) -> Assent:
     """Says "uh-huh" while an answer is heard, whose sound would be `whole` (S,)."""
     utterance = await answer_heard(page, SHORT, after)
     since = len(page.log)
@@ -162,7 +162,7 @@ async def assent(page: Page, sound: np.ndarray, after: float, whole: np.ndarray)
     return Assent(ended, 1000 * silence, ended and np.array_equal(heard, whole))
 
 
-async def whole_answer(page: Page) -> np.ndarray:
+async def whole_answer(page: SimulatedPage) -> np.ndarray:
     """The sound of the short answer that nobody disturbs, (S,) int16 at 24 kHz."""
     utterance = await answer_heard(page, SHORT, 0.1)
     await until(lambda: page.has_heard(utterance), 3 * PATIENCE)
@@ -170,7 +170,7 @@ async def whole_answer(page: Page) -> np.ndarray:
     return sound_of(page, utterance)
 
 
-async def answer_heard(page: Page, text: str, seconds: float) -> int:
+async def answer_heard(page: SimulatedPage, text: str, seconds: float) -> int:
     """Asks for something and listens for a while; the utterance that is being heard."""
     since = len(page.log)
     await page.send(Text(text))
@@ -187,7 +187,7 @@ async def until(condition: Callable[[], bool], seconds: float) -> bool:
     return condition()
 
 
-def first_speech(page: Page, since: int) -> dict[int, float]:
+def first_speech(page: SimulatedPage, since: int) -> dict[int, float]:
     """When each utterance began to arrive."""
     firsts: dict[int, float] = {}
     for at, message in page.log[since:]:
@@ -196,13 +196,15 @@ def first_speech(page: Page, since: int) -> dict[int, float]:
     return firsts
 
 
-def of_utterance(page: Page, utterance: int, since: int) -> list[tuple[float, ServerMessage]]:
+def of_utterance(
+    page: SimulatedPage, utterance: int, since: int
+) -> list[tuple[float, ServerMessage]]:
     """What came for an utterance, with its times."""
     log = page.log[since:]
     return [(at, m) for at, m in log if getattr(m, "utterance", None) == utterance]
 
 
-def sound_of(page: Page, utterance: int) -> np.ndarray:
+def sound_of(page: SimulatedPage, utterance: int) -> np.ndarray:
     """The samples of an utterance as its messages place them, (S,); silence where none came."""
     pieces = [m for m in page.messages(Speech) if m.utterance == utterance]
     sound = np.zeros(sum(len(m.pcm) for m in pieces), np.int16)
@@ -212,7 +214,7 @@ def sound_of(page: Page, utterance: int) -> np.ndarray:
     return sound
 
 
-def turns_told(page: Page, since: int) -> list[tuple[float, Metrics]]:
+def turns_told(page: SimulatedPage, since: int) -> list[tuple[float, Metrics]]:
     """What the server said of the times of turns, and when."""
     told = [(at, m) for at, m in page.log[since:] if isinstance(m, Metrics)]
     return [(at, metrics) for at, metrics in told if metrics.name == "turn"]

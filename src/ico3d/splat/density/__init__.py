@@ -25,7 +25,6 @@ from ico3d.splat.density.strategy import (
     McmcStrategy,
     Schedule,
     Strategy,
-    StrategyName,
 )
 
 __all__ = [
@@ -39,7 +38,6 @@ __all__ = [
     "Population",
     "Schedule",
     "Strategy",
-    "StrategyName",
     "apply_plan",
     "apply_plan_to_geometry",
     "apply_plan_to_state",

@@ -9,7 +9,6 @@ uninterrupted one) and, the default, without a cap; so of gsplat the relocation 
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import torch
 from torch import Tensor
@@ -26,8 +25,6 @@ from ico3d.splat.density.growth import (
 from ico3d.splat.density.plan import Plan, Population
 from ico3d.splat.density.relocation import relocated
 from ico3d.splat.rendering import RenderInfo
-
-StrategyName = Literal["default", "mcmc"]
 
 NOISE_SHARPNESS = 100.0
 """Noise fades as σ(100·(0.005 − o)): it shakes the almost transparent."""

@@ -16,8 +16,7 @@ from ico3d.chat.settings.conversation import ChatSettings, Choice
 from ico3d.chat.wire.protocol import Answer, Interrupt, Speech, Stop, Text
 from ico3d.errors import MissingModelError
 from ico3d.measure.talking.page import open_page
-
-from ...conftest import serving
+from support.chat.serving import serving
 
 pytest.importorskip("transformers")
 from support.chat.tiny_qwen import write_tiny_qwen

@@ -25,8 +25,7 @@ from ico3d.measure.talking.page import open_page
 from support.chat.remote import service_app
 from support.chat.remote import serving as serving_app
 from support.chat.scripted_server import Script, Thought, running
-
-from ...conftest import serving
+from support.chat.serving import serving
 
 pytestmark = pytest.mark.slow
 

@@ -14,9 +14,8 @@ from ico3d.chat.services.language.servers import language_models
 from ico3d.chat.settings.conversation import ChatSettings, Choice
 from ico3d.chat.wire.protocol import Answer, End, Text
 from ico3d.measure.talking.page import open_page
+from support.chat.serving import free_port, serving
 from support.chat.tiny_qwen import write_tiny_qwen
-
-from ...conftest import free_port, serving
 
 pytestmark = [
     pytest.mark.slow,

@@ -14,8 +14,8 @@ from ico3d.chat.services.provider import Provider
 from ico3d.chat.services.recognition.segments import Segments
 from ico3d.chat.wire.protocol import Answer, Speech, State, Transcript
 from ico3d.measure.talking.page import open_page
+from support.chat.serving import serving
 
-from ...conftest import serving
 from ...test_conversation import slowness
 
 

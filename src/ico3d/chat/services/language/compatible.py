@@ -15,6 +15,7 @@ from pipecat.processors.aggregators.llm_context import LLMContext
 from pipecat.services.openai.llm import OpenAILLMService
 
 from ico3d.chat.observing.failures import cause
+from ico3d.chat.pipecat_internals import push_text
 from ico3d.chat.services.language.reasoning import Parts, Thoughts, field_of, without_thoughts
 from ico3d.chat.settings.keys import is_openai
 
@@ -157,7 +158,7 @@ class CompatibleModel(OpenAILLMService):
 
     async def _tell(self, parts: Parts) -> None:
         if parts.said:
-            await self._push_llm_text(parts.said)
+            await push_text(self, parts.said)
 
     async def _asked(self, context: LLMContext) -> AsyncStream[ChatCompletionChunk]:
         """Asks; once more without functions if the server refuses those."""

@@ -34,6 +34,7 @@ from transformers import (
 )
 from transformers.utils.import_utils import is_torch_cuda_available
 
+from ico3d.chat.pipecat_internals import check_schema, push_text, settings_of
 from ico3d.chat.services.language.reasoning import (
     Parts,
     Thoughts,
@@ -208,7 +209,7 @@ class InProcessModel(LLMService):
                     await self.stop_ttfb_metrics()
                     await self._tell(thoughts.push(text))
             if rest := thoughts.finish().said:
-                await self._push_llm_text(rest)
+                await push_text(self, rest)
         except Exception as error:
             await self.push_error(f"The language model failed: {error}", exception=error)
         finally:
@@ -222,7 +223,7 @@ class InProcessModel(LLMService):
         response_schema: dict[str, Any] | None = None,
     ) -> str | None:
         """A whole answer beside the conversation, such as a summary of it."""
-        self._check_response_schema(response_schema)
+        check_schema(self, response_schema)
         messages = await self._messages(context, system_instruction)
         most, temperature = self._limits()
         stream = self._loaded.stream(messages, max_tokens or most, temperature)
@@ -232,20 +233,20 @@ class InProcessModel(LLMService):
 
     def _limits(self) -> tuple[int, float | None]:
         """The longest answer, and the temperature, as whoever asks may have changed them."""
-        settings = self._settings
+        settings = settings_of(self)
         longest = assert_given(settings.max_tokens) or self._max_tokens
         return longest, assert_given(settings.temperature)
 
     async def _tell(self, parts: Parts) -> None:
         if parts.said:
-            await self._push_llm_text(parts.said)
+            await push_text(self, parts.said)
         else:
             await self.push_frame(LLMThoughtTextFrame(parts.thought))
 
     async def _messages(self, context: LLMContext, instruction: str | None) -> list[Any]:
         request = await self.get_llm_adapter().get_llm_invocation_params(
             context,
-            system_instruction=instruction or assert_given(self._settings.system_instruction),
+            system_instruction=instruction or assert_given(settings_of(self).system_instruction),
             convert_developer_to_user=True,  # chat templates do not know that role
         )
         return request["messages"]

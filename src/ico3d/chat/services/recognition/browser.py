@@ -23,6 +23,7 @@ from pipecat.services.stt_service import STTService
 from pipecat.utils.time import time_now_iso8601
 
 from ico3d.chat.frames import message_in
+from ico3d.chat.pipecat_internals import is_user_speaking, raise_event
 from ico3d.chat.services.choosing import ChosenService, chosen
 from ico3d.chat.services.provider import Context, Table
 from ico3d.chat.services.recognition.segments import blank
@@ -89,7 +90,7 @@ class BrowserRecognition(STTService):
         await self._stop_timer()
 
     async def _hear(self, heard: Heard) -> None:
-        belongs = self._user_speaking or self._now() - self._voice_until < LATE
+        belongs = is_user_speaking(self) or self._now() - self._voice_until < LATE
         if heard.result <= self._taken or not belongs or not heard.text.strip():
             return
         if heard.final:
@@ -97,13 +98,13 @@ class BrowserRecognition(STTService):
             return
         self._partial = heard
         await self.push_frame(InterimTranscriptionFrame(heard.text, "", time_now_iso8601()))
-        if not self._user_speaking:
+        if not is_user_speaking(self):
             await self._restart_timer()
 
     async def _take(self, heard: Heard) -> None:
         self._taken, self._partial, self._understood = heard.result, None, True
         words = TranscriptionFrame(heard.text.strip(), "", time_now_iso8601())
-        words.finalized = not self._user_speaking
+        words.finalized = not is_user_speaking(self)
         if words.finalized:
             await self._stop_timer()
         await self.push_frame(words)
@@ -143,7 +144,7 @@ class BrowserOrServer(ServiceSwitcher):
 
     async def _failed(self, _: FrameProcessor, error: ErrorFrame) -> None:
         """Whoever listens for errors knows this processor only."""
-        await self._call_event_handler("on_error", error)
+        await raise_event(self, "on_error", error)
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
         """Switches when it must."""

@@ -9,6 +9,7 @@ from pipecat.frames.frames import Frame, TranscriptionFrame
 from pipecat.services.openai.stt import OpenAISTTService
 from pipecat.utils.time import time_now_iso8601
 
+from ico3d.chat.pipecat_internals import client_of
 from ico3d.chat.services.client import client_options
 from ico3d.chat.services.recognition.openai_settings import WHERE, Settings
 from ico3d.chat.services.recognition.segments import Segments
@@ -28,7 +29,7 @@ class Transcriptions(OpenAISTTService):
             **rest,
         )
         self._options = options
-        self._client.max_retries = 1
+        client_of(self).max_retries = 1
 
     async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame, None]:
         """Transcribes a WAV file.
@@ -42,7 +43,7 @@ class Transcriptions(OpenAISTTService):
         file = ("speech.wav", audio, "audio/wav")
         try:
             async with asyncio.timeout(options.timeout):
-                answer = await self._client.audio.transcriptions.create(
+                answer = await client_of(self).audio.transcriptions.create(
                     file=file, model=options.model, **wanted
                 )
         except TimeoutError:

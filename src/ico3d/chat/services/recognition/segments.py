@@ -18,6 +18,7 @@ from pipecat.services.stt_service import SegmentedSTTService, STTService
 from pipecat.utils.errors import ErrorCategory
 from pipecat.utils.time import time_now_iso8601
 
+from ico3d.chat.pipecat_internals import is_user_speaking, keep_segment, segment, transcribe_segment
 from ico3d.errors import SettingsError
 
 BLANK = " "
@@ -93,20 +94,19 @@ class Segments(SegmentedSTTService):
         """Takes more sound; speech that goes on and on is handed over piece by piece."""
         await super().process_audio_frame(frame, direction)
         most = int(self._longest_speech * self.sample_rate) * 2
-        while self._user_speaking and len(self._audio_buffer) >= most:
-            await self._hand_over(quiet_place(self._audio_buffer[:most], self.sample_rate))
+        while is_user_speaking(self) and len(segment(self)) >= most:
+            await self._hand_over(quiet_place(segment(self)[:most], self.sample_rate))
 
     async def _hand_over(self, length: int) -> None:
         """Has so many bytes of what is being said transcribed; the rest belongs to what follows."""
-        rest = self._audio_buffer[length:]
+        rest = segment(self)[length:]
         if self._unanswered < MOST_WAITING:
-            del self._audio_buffer[length:]
+            del segment(self)[length:]
             self._unanswered += 1
-            await self._handle_user_stopped_speaking(VADUserStoppedSpeakingFrame())
-            self._user_speaking = True
+            await transcribe_segment(self)
         else:
             await self.push_error("the recogniser is slower than the visitor speaks.")
-        self._audio_buffer = rest
+        keep_segment(self, rest)
 
     async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame | None, None]:
         """Transcribes a stretch of speech; gives a signal from time to time until it is done."""
@@ -131,7 +131,7 @@ class Segments(SegmentedSTTService):
         """Passes a frame on; a transcript is final only if nothing more is on its way."""
         if isinstance(frame, TranscriptionFrame):
             frame.text = frame.text.strip() or BLANK
-            frame.finalized = not self._user_speaking and self._unanswered == 0
+            frame.finalized = not is_user_speaking(self) and self._unanswered == 0
         await STTService.push_frame(self, frame, direction)  # the class between says final to all
 
     async def _say_busy(self) -> None:

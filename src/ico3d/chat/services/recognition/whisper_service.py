@@ -4,6 +4,7 @@ from typing import Any
 
 from pipecat.services.whisper.stt import WhisperSTTService
 
+from ico3d.chat.pipecat_internals import use_model
 from ico3d.chat.services.recognition.segments import LONGEST_SPEECH, Segments
 
 LONGEST = 30.0  # s; a small machine with a long speech
@@ -35,5 +36,4 @@ class WhisperRecognition(Segments, WhisperSTTService):
         super().__init__(LONGEST, longest_speech, settings=settings)
 
     def _load(self):
-        # pipecat would load one for each session
-        self._model = Listener(self._shared)  # type: ignore[assignment]
+        use_model(self, Listener(self._shared))  # pipecat would load one for each session

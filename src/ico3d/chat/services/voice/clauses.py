@@ -15,6 +15,7 @@ from pipecat.utils.string import SENTENCE_ENDING_PUNCTUATION
 from pipecat.utils.text.base_text_aggregator import Aggregation, TextType
 from pipecat.utils.text.simple_text_aggregator import SimpleTextAggregator
 
+from ico3d.chat.pipecat_internals import aggregated, sentence_end, set_aggregated
 from ico3d.chat.services.voice.markup import EMOJI
 
 LEAST_WORDS = 2  # of a clause: a single word sounds torn off, and is over before more has come
@@ -47,6 +48,15 @@ class Clauses(SimpleTextAggregator):
         super().__init__(language=language)
         self._first = True
 
+    @property
+    def _rest(self) -> str:
+        """What has not been yielded yet."""
+        return aggregated(self)
+
+    @_rest.setter
+    def _rest(self, text: str) -> None:
+        set_aggregated(self, text)
+
     async def begin(self) -> None:
         """A new answer."""
         await self.reset()
@@ -62,7 +72,7 @@ class Clauses(SimpleTextAggregator):
 
     async def flush(self) -> Aggregation | None:
         """The rest of the answer, if there is one."""
-        rest = self._text.strip()
+        rest = self._rest.strip()
         await self.begin()
         return Aggregation(rest, TextType.SENTENCE) if rest else None
 
@@ -73,13 +83,13 @@ class Clauses(SimpleTextAggregator):
     async def _add(self, char: str) -> str | None:
         """The piece that a further character shows to be complete."""
         if char == "\n":
-            self._text += char
-            return await self._cut(len(self._text))
-        self._text += char
-        text = self._text
+            self._rest += char
+            return await self._cut(len(self._rest))
+        self._rest += char
+        text = self._rest
         if _EMOJI.fullmatch(char) or not await self._is_worth_a_look():
             return None
-        sentence = await self._check_sentence_with_lookahead(char)
+        sentence = await sentence_end(self, char)
         if sentence is not None:
             return await self._with_trailing(text)
         end = self._clause_end(char) if self._first else 0
@@ -88,14 +98,14 @@ class Clauses(SimpleTextAggregator):
 
     async def _is_worth_a_look(self) -> bool:
         """Not while there is only the number of a list's entry: it belongs to what follows."""
-        if not _LISTED.fullmatch(self._text):
+        if not _LISTED.fullmatch(self._rest):
             return True
-        await self._restart(self._text)
+        await self._restart(self._rest)
         return False
 
     async def _with_trailing(self, text: str) -> str:
         """The sentence that has just been cut off the front of `text`, and emoji behind it."""
-        rest = self._text
+        rest = self._rest
         trailing = _TRAILING.match(rest)
         if trailing:
             rest = rest[trailing.end() :]
@@ -106,30 +116,30 @@ class Clauses(SimpleTextAggregator):
         """Where the first clause ends; 0 if it is not complete. It is when something follows."""
         if char.isspace() or char in SENTENCE_ENDING_PUNCTUATION or re.fullmatch(_CLOSER, char):
             return 0
-        for mark in _CLAUSE.finditer(self._text[:-1]):
-            if _is_long_enough(self._text[: mark.end()]):
+        for mark in _CLAUSE.finditer(self._rest[:-1]):
+            if _is_long_enough(self._rest[: mark.end()]):
                 return mark.end()
-        words = list(re.finditer(r"\S+", self._text[:-1]))
-        is_new_word = self._text[-2:-1].isspace()
+        words = list(re.finditer(r"\S+", self._rest[:-1]))
+        is_new_word = self._rest[-2:-1].isspace()
         return words[-1].end() if is_new_word and len(words) >= MOST_WORDS else 0
 
     def _unmarked_end(self) -> int:
         """Where a sentence ends whose script marks ends by spaces; 0 if it does not yet."""
         least = LEAST_LETTERS if self._first else UNMARKED_LETTERS
-        for space in _UNMARKED.finditer(self._text[:-1]):
-            if _letters(self._text[: space.start()]) >= least:
+        for space in _UNMARKED.finditer(self._rest[:-1]):
+            if _letters(self._rest[: space.start()]) >= least:
                 return space.start()
         return 0
 
     async def _cut(self, end: int) -> str:
-        piece, rest = self._text[:end], self._text[end:]
+        piece, rest = self._rest[:end], self._rest[end:]
         await self._restart(rest)
         return piece
 
     async def _restart(self, text: str) -> None:
         """Forgets what it was waiting for."""
         await self.reset()
-        self._text = text
+        self._rest = text
 
 
 class ClauseProcessor(LLMTextProcessor):

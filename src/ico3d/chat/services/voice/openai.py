@@ -7,6 +7,7 @@ from pipecat.audio.utils import create_stream_resampler
 from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
 from pipecat.services.openai.tts import OpenAITTSService
 
+from ico3d.chat.pipecat_internals import audio_frames, client_of, use_resampler
 from ico3d.chat.services.provider import Context, lacks_server
 from ico3d.chat.services.voice.pieces import OPTIONS, STARVED, Prompt
 from ico3d.chat.settings.keys import check_key
@@ -67,22 +68,23 @@ class ServerVoice(Prompt, OpenAITTSService):
             settings=OpenAITTSService.Settings(model=settings.model, voice=settings.voice),
             **OPTIONS,
         )
-        self._client.max_retries = 1
+        client_of(self).max_retries = 1
         self._options = settings
-        # pipecat's forgets the sound before a pause of 0.2 s, which a server makes
-        self._resampler = create_stream_resampler(clear_after_secs=None)
+        self._continuous = create_stream_resampler(clear_after_secs=None)  # servers make pauses
+        use_resampler(self, self._continuous)
 
     async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame, None]:
         """Yields the sound as it comes, or the error that the server met."""
-        await self._resampler.reset()  # the piece before may have been interrupted
+        await self._continuous.reset()  # the piece before may have been interrupted
         options = self._options
-        request = self._client.audio.speech.with_streaming_response.create(
+        request = client_of(self).audio.speech.with_streaming_response.create(
             input=text, model=options.model, voice=options.voice, response_format="pcm"
         )
         try:
             async with request as response:
                 rate = self._rate_of(response.headers.get("content-type", ""))
-                async for frame in self._stream_audio_frames_from_iterator(
+                async for frame in audio_frames(
+                    self,
                     judged(response.iter_bytes(CHUNK), rate or SPEECH_RATE),
                     strip_wav_header=True,
                     in_sample_rate=rate,
@@ -90,15 +92,15 @@ class ServerVoice(Prompt, OpenAITTSService):
                 ):
                     yield frame
         except Exception as error:
-            where = self._client.base_url
+            where = client_of(self).base_url
             yield ErrorFrame(f"the voice server {where} did not speak: {error}", exception=error)
-        if rest := await self._resampler.flush():
+        if rest := await self._continuous.flush():
             yield TTSAudioRawFrame(rest, SPEECH_RATE, 1, context_id=context_id)
 
     async def cleanup(self) -> None:
         """Closes the connections."""
         await super().cleanup()
-        await self._client.close()
+        await client_of(self).close()
 
     def _rate_of(self, content_type: str) -> int | None:
         """Null for sound whose header tells it."""

@@ -10,6 +10,7 @@ from pipecat.frames.frames import ErrorFrame, Frame, TTSAudioRawFrame
 from pipecat.services.settings import TTSSettings
 from pipecat.services.tts_service import TTSService
 
+from ico3d.chat.pipecat_internals import mark_synchronous
 from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.errors import MissingExtraError
 
@@ -37,7 +38,7 @@ class Prompt(TTSService):
     ) -> None:
         """Passes on what `run_tts` yields."""
         await super().tts_process_generator(context_id, generator)
-        self._is_yielding_frames_synchronously = True
+        mark_synchronous(self)
 
 
 class PieceVoice(Prompt):

@@ -7,9 +7,9 @@ from importlib.resources import files
 import numpy as np
 
 from ico3d.common.espeak import Phoneme, synthesize
-from ico3d.speech.augment import recorded
 from ico3d.speech.mel import HOP, RATE, WINDOW, mel_spectrogram, resampled
-from ico3d.speech.targets import articulation_track, viseme_track
+from ico3d.speech.training.augment import recorded
+from ico3d.speech.training.targets import articulation_track, viseme_track
 
 
 def _names(text: str) -> tuple[str, ...]:

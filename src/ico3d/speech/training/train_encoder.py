@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -15,35 +15,15 @@ from torch.nn import functional
 from ico3d.common.files import write_atomic
 from ico3d.common.visemes import VISEMES
 from ico3d.errors import ModelError, SettingsError
-from ico3d.speech.corpus import Batch, make_batch
 from ico3d.speech.network import BUILTIN_SIZE, BuiltinEncoder, ConvBlock
-from ico3d.speech.targets import ARTICULATION
+from ico3d.speech.training.corpus import Batch, make_batch
+from ico3d.speech.training.settings import EncoderSettings
+from ico3d.speech.training.targets import ARTICULATION
 
 _SHIFTS = (-4, 0, 4)  # mel rows (50 ms): each window also tells what was and what comes
 _CHECKPOINT_EVERY = 50
 _READOUT = "readout."
 _STATISTICS_BATCHES = 8
-
-
-@dataclass(frozen=True)
-class EncoderSettings:
-    """How the built-in encoder is trained.
-
-    Attributes:
-        steps: Optimisation steps.
-        batch: Utterances per step.
-        seconds: Length of an utterance.
-        learning_rate: Highest rate of AdamW; it warms up over 5 % of the steps, then falls to 0.
-        articulation_weight: Weight of the squared articulation error against cross-entropy.
-        seed: Decides voices, texts, recordings and first weights.
-    """
-
-    steps: int = 600
-    batch: int = 8
-    seconds: float = 3.0
-    learning_rate: float = 2e-3
-    articulation_weight: float = 10.0
-    seed: int = 0
 
 
 class Readout(nn.Module):

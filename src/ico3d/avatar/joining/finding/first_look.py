@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ico3d.avatar.joining.drawn_head import DrawnHead
+from ico3d.avatar.joining.finding.drawn_head import DrawnHead
 from ico3d.avatar.joining.similarity import moved, scale_of
 from ico3d.capture.face.mediapipe_face import MESH_LANDMARKS, CanonicalFace, FaceReader
 from ico3d.capture.headpose.shape import similarity_fit

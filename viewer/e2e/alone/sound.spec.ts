@@ -1,16 +1,16 @@
 import { afterAll, beforeAll, expect, test } from 'vitest';
-import { Browser } from '../support/browser/browser.ts';
-import { feed, noise } from '../support/sound/feeder.ts';
-import { lookAsBundled } from '../support/browser/pictures.ts';
-import { runPython } from '../support/python.ts';
-import { scratchFolder } from '../support/scratch.ts';
-import { servePage } from '../support/servers/static.ts';
-import { slope } from '../support/statistics.ts';
-import { comparePlacement, tap } from '../support/sound/tap.ts';
+import { Browser } from '../../support/browser/browser.ts';
+import { feed, noise } from '../../support/sound/feeder.ts';
+import { lookAsBundled } from '../../support/browser/pictures.ts';
+import { runPython } from '../../support/python.ts';
+import { scratchFolder } from '../../support/scratch.ts';
+import { servePage } from '../../support/servers/static.ts';
+import { slope } from '../../support/statistics.ts';
+import { comparePlacement, tap } from '../../support/sound/tap.ts';
 
 const RATE = 24_000;
 const TICK = 1 / 30;
-const SECONDS = 60;
+const SECONDS = 30;
 const SIZE = 128; // pixels; in much smaller windows Chromium draws once a second
 
 let server: Awaited<ReturnType<typeof servePage>>;
@@ -67,7 +67,7 @@ test(`over ${SECONDS} s every sample is where it belongs and the face stays with
   const { pieces, begin, wrong, unseen, shifted } = await comparePlacement(page);
   expect({ wrong, shifted }).toEqual({ wrong: 0, shifted: 0 });
   expect(unseen / (SECONDS * RATE)).toBeLessThan(0.05);
-  expect(pieces).toBeGreaterThan(SECONDS * 5);
+  expect(pieces).toBeGreaterThan(300); // as many as the server makes of a minute
 
   // Face: what each picture shows against what is heard when it is drawn.
   const sights = await page.evaluate(() => (window as unknown as { sights: Sight[] }).sights);
@@ -82,9 +82,9 @@ test(`over ${SECONDS} s every sample is where it belongs and the face stays with
       `95 % within ${ms(sorted[Math.floor(0.95 * sorted.length)]!)}, drift ${ms(drift.perUnit * 60)} a minute ` +
       `± ${ms(drift.error * 60)}; ${wrong} of ${SECONDS * RATE} samples off, ${unseen} unseen, ${pieces} pieces`,
   );
-  expect(errors.length).toBeGreaterThan(SECONDS * 8);
+  expect(errors.length).toBeGreaterThan(480);
   expect(sorted[Math.floor(0.95 * sorted.length)]).toBeLessThan(TICK);
-  expect(Math.abs(drift.perUnit)).toBeLessThan(Math.max(3 * drift.error, 1e-4));
+  expect(Math.abs(drift.perUnit)).toBeLessThan(1e-4);
 });
 
 test('stop is silence within 30 ms, and what comes later of that utterance is dropped', async () => {

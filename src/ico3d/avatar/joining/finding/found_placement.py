@@ -10,7 +10,7 @@ import torch
 from ico3d.avatar.avatar import Placement
 from ico3d.avatar.joining.cropping import cropped
 from ico3d.avatar.joining.driving import head_poses
-from ico3d.avatar.joining.found_face import FaceSeeker, FoundFace, face_seeker
+from ico3d.avatar.joining.finding.found_face import FaceSeeker, FoundFace, face_seeker
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.similarity import canonical_from_head, fit_in_words
 from ico3d.capture.capture import Capture

@@ -1,5 +1,5 @@
-import type { HeadInfo } from '../bundle/manifest.ts';
-import { takeTensor, type Tensor } from '../bundle/safetensors.ts';
+import type { HeadInfo } from './manifest.ts';
+import { takeTensor, type Tensor } from './safetensors.ts';
 
 /** A baked head (`docs/bundle.md`): N Gaussians, K basis vectors, a small network from B values. */
 export interface BakedHead {

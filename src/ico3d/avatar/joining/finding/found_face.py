@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ico3d.avatar.joining.drawn_head import DrawnHead
-from ico3d.avatar.joining.first_look import LEAST_HELD, first_looks
+from ico3d.avatar.joining.finding.drawn_head import DrawnHead
+from ico3d.avatar.joining.finding.first_look import LEAST_HELD, first_looks
 from ico3d.avatar.joining.similarity import STEADY, moved, scale_of
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.landmarks import MULTI_PIE

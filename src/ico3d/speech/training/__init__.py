@@ -1,0 +1,1 @@
+"""How the built-in speech encoder is trained, on synthetic voices."""

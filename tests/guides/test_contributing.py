@@ -1,0 +1,44 @@
+"""CONTRIBUTING.md sends nobody to a place that is not there."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+ROW = re.compile(
+    r"^\| (?P<what>[^|]+) \| `(?P<file>[^`|]+)` \| (?P<names>`[^|]+`) \|$", re.MULTILINE
+)
+ROWS = [(row["file"], re.findall(r"`([^`]+)`", row["names"])) for row in ROW.finditer(TEXT)]
+
+
+def defined(tree, within=""):
+    """Names that Python code defines: of a module, and `Class.name` of its classes."""
+    for node in tree.body:
+        if isinstance(node, ast.ClassDef):
+            yield within + node.name
+            yield from defined(node, f"{within}{node.name}.")
+        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield within + node.name
+        else:
+            targets = getattr(node, "targets", [getattr(node, "target", None)])
+            yield from (within + t.id for t in targets if isinstance(t, ast.Name))
+
+
+def test_there_are_twenty_rows_and_no_other():
+    table = TEXT.partition("| to change | open | look for |\n")[2].partition("\n\n")[0]
+    assert len(ROWS) == len(table.splitlines()) - 1, "a row has another form than the others"
+    assert len(ROWS) >= 20
+
+
+@pytest.mark.parametrize(("file", "names"), ROWS, ids=lambda value: str(value))
+def test_what_is_sought_is_there(file, names):
+    text = (ROOT / file).read_text("utf-8")
+    if file.endswith(".py"):
+        there = set(defined(ast.parse(text)))
+        assert set(names) <= there, f"{file} defines no {set(names) - there}"
+    else:
+        for name in names:
+            assert re.search(rf"(?<!\w){re.escape(name)}\b", text), f"{file} has no {name}"

@@ -1,0 +1,40 @@
+"""Avatars as real servers in the test's own event loop."""
+
+import asyncio
+import contextlib
+
+from ico3d.chat.serving import server
+from ico3d.chat.serving.sessions import Sessions
+from ico3d.chat.settings.conversation import ChatSettings, Choice
+
+OFFLINE = ChatSettings(language=Choice("persona-notes"))
+
+
+def free_port():
+    """A port that nobody listens on."""
+    with server.bind("127.0.0.1", 0) as listener:
+        return listener.getsockname()[1]
+
+
+@contextlib.asynccontextmanager
+async def serving(
+    bundle, settings=None, resume_seconds=30.0, persona=None, adapt=lambda avatar: avatar
+):
+    """Yields the URL and the sessions of a running server; by default the offline one.
+
+    `adapt` changes what its sessions share.
+    """
+    listener = server.bind("127.0.0.1", 0)
+    avatar, sessions = None, None
+    if bundle.manifest.head:
+        avatar = adapt(server.open_avatar(bundle, settings or OFFLINE, persona))
+        sessions = Sessions(avatar, resume_seconds)
+    running = server.make_server(server.make_app(bundle, avatar, "127.0.0.1", sessions))
+    task = asyncio.create_task(running.serve(sockets=[listener]))
+    while not running.started:
+        await asyncio.sleep(0.01)
+    try:
+        yield server.address(listener), sessions
+    finally:
+        running.should_exit = True
+        await task

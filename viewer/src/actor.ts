@@ -1,0 +1,10 @@
+import type { Object3D } from 'three';
+
+/** What moves on stage: a head, a body. */
+export interface Actor {
+  readonly objects: Object3D[]; // always the same ones
+  /** Goes on by `step` seconds, many after the page was hidden; returns false if it looks as before. */
+  tick(step: number): boolean;
+  /** A picture is about to be drawn; `now` in ms, performance clock. */
+  drawing?(now: number): void;
+}

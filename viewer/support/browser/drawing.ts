@@ -1,0 +1,37 @@
+import type { Page } from 'playwright-core';
+
+declare global {
+  interface Window {
+    /** Draws what is on stage now; what the canvas holds may be read until the current task ends. */
+    draw?: () => void;
+  }
+}
+
+/**
+ * From now on the page draws each `every`-th picture only, by default none, unless `window.draw` is
+ * called: all but the picture goes on as before, and software rendering does not take the processor
+ * from what is tested.
+ *
+ * @param every pictures due for one that is drawn
+ */
+export function drawSeldom(page: Page, every = Infinity): Promise<void> {
+  return page.evaluate((every) => {
+    const { stage } = window.ico3d!;
+    const draw = () => Object.getPrototypeOf(stage).draw.call(stage) as void;
+    let due = 0;
+    window.draw = draw;
+    stage.draw = () => {
+      if (++due % every === 0) draw();
+    };
+  }, every);
+}
+
+/** Stops time on stage, too: faces stand still and nothing is drawn. */
+export function pauseDrawing(page: Page): Promise<void> {
+  return page.evaluate(() => void window.ico3d!.stage.renderer.setAnimationLoop(null));
+}
+
+/** Waits for two refreshes of the screen: until input and the page's observers of itself have had their effect. */
+export function refreshed(page: Page): Promise<unknown> {
+  return page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+}
