@@ -20,7 +20,7 @@ from support.needs import needs
 from support.recordings import multiview_folders
 from support.shared import MODELS, SUBJECTS
 
-pytestmark = needs("mediapipe")
+pytestmark = [pytest.mark.slow, needs("mediapipe")]
 PERSON = SUBJECTS / "human_face_f.npz"
 
 
@@ -100,7 +100,6 @@ def test_a_frame_without_pictures_is_interpolated(head, tmp_path, capsys):
     assert np.delete(degrees, 2).max() < 2.5 and metres.max() < 0.02
 
 
-@pytest.mark.slow
 def test_small_faces_in_pictures_of_a_whole_person_are_found(tmp_path):
     if not PERSON.is_file():
         pytest.skip("../shared/subjects is not here")
