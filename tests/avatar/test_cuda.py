@@ -20,6 +20,8 @@ from support.avatars.whole_person import WholeFilmed, head_recording, write_whol
 from support.captures import open_with
 from support.pretended_cuda import drawn
 
+pytestmark = pytest.mark.slow
+
 QUICK = BakeSettings(hidden=32, augmented=20, steps=40)
 
 

@@ -11,6 +11,8 @@ from support.bodies.moving_capture import MovingCapture
 from support.bodies.tiny_training import TINY
 from support.settings import changed
 
+pytestmark = pytest.mark.slow
+
 DEATHS = {BodyTrainer: 8, FineTuner: 4}
 """Steps before which a run is interrupted."""
 

@@ -2,20 +2,18 @@
 
 import re
 import shlex
-import subprocess
-import sys
+import threading
 import time
-import urllib.error
 import urllib.request
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from ico3d import cli
 
 GUIDES = Path(__file__).parents[2] / "docs" / "guides"
-PATIENCE = 60
-"""Seconds until a server must answer."""
 BLOCK = re.compile(r"^```bash\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"^```toml\n(# (\S+)\n.*?)^```$", re.MULTILINE | re.DOTALL)
 OTHERS = re.compile(r"^```sh\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -86,24 +84,30 @@ def follow(
 
 
 def _visit(words: list[str]) -> None:
-    """Serves until the avatar was seen once."""
-    command = [sys.executable, "-m", "ico3d.cli", *words]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
-        try:
-            assert server.stdout is not None
-            url = re.search(r"http://[\d.]+:\d+", server.stdout.readline())
-            assert url is not None, f"{words} served nothing"
-            assert b"ico3d-bundle" in _fetched(f"{url[0]}/bundle/manifest.json")
-        finally:
-            server.terminate()
+    """Serves, in this process, until the avatar was seen once."""
+    from ico3d.chat.serving import server
+
+    made, seen = server.make_server, []
+
+    def with_a_visitor(app):
+        running = made(app)
+        threading.Thread(target=_look, args=(running, seen), daemon=True).start()
+        return running
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(server, "make_server", with_a_visitor)
+        assert cli.main(words) == 0, f"{words} served nothing"
+    assert b"ico3d-bundle" in seen[0]
 
 
-def _fetched(url: str) -> bytes:
-    """The answer of a server that is about to start."""
-    for _ in range(PATIENCE):
-        try:
-            with urllib.request.urlopen(url, timeout=30) as answer:
-                return answer.read()
-        except urllib.error.URLError:
-            time.sleep(1)
-    raise AssertionError(f"{url} did not answer in {PATIENCE} s")
+def _look(running: Any, seen: list[bytes]) -> None:
+    """Reads what a server that is about to start says of its avatar, and ends it."""
+    try:
+        while not running.started:
+            time.sleep(0.01)
+        host, port = running.servers[0].sockets[0].getsockname()
+        url = f"http://{host}:{port}/bundle/manifest.json"
+        with urllib.request.urlopen(url, timeout=30) as answer:
+            seen.append(answer.read())
+    finally:
+        running.should_exit = True

@@ -1,5 +1,6 @@
 """The commands of docs/guides, as they stand there, on recordings of a few tiny pictures."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,8 @@ from PIL import Image
 
 from guides import guide, recordings
 from guides.small import SMALL
+from ico3d.avatar.baking import head_bundle
+from ico3d.avatar.baking.shader_head import BakeSettings
 from ico3d.bundle.format import Bundle
 from ico3d.capture.formats import open_capture
 from support.needs import needs
@@ -25,6 +28,12 @@ def face(tmp_path_factory):
 @pytest.fixture(scope="module")
 def body(face):
     return recordings.in_warm_light(face, face.with_name("body"))
+
+
+@pytest.fixture(autouse=True)
+def quick_bakes(monkeypatch):
+    """What is baked has hardly been trained: its small network need not be exact."""
+    monkeypatch.setattr(head_bundle, "BakeSettings", partial(BakeSettings, 32, steps=200))
 
 
 @pytest.fixture

@@ -16,6 +16,8 @@ from ico3d.training.watch import _side_by_side
 from support.pretended_cuda import is_moved
 from support.settings import changed
 
+pytestmark = pytest.mark.slow
+
 SETTINGS = changed(
     PRESETS["cpu"],
     {

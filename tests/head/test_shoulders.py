@@ -19,6 +19,8 @@ from support.heads.shapes import head_shape
 from support.recordings.two_balls import HEAD, TRUNK, TwoBalls, seen_by
 from support.settings import changed
 
+pytestmark = pytest.mark.slow
+
 SETTINGS = changed(
     PRESETS["cpu"],
     {

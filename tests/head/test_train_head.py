@@ -49,6 +49,7 @@ def _held_out_psnr(head: TrainedHead, capture) -> float:
     return float(-10 * np.log10(np.mean(errors)))
 
 
+@pytest.mark.slow
 def test_expressions_are_learnt_where_a_static_head_cannot(tiny, tmp_path):
     scores = {
         variant: _held_out_psnr(train_head(tiny, tmp_path / variant, _job(variant=variant)), tiny)

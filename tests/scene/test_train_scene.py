@@ -15,6 +15,8 @@ from ico3d.splat.files.formats import read_gaussians
 from support.captures import open_with
 from support.settings import changed
 
+pytestmark = pytest.mark.slow
+
 SMALL = {
     "steps": 200,
     "initial.gaussians": 120,

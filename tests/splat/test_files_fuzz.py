@@ -14,6 +14,8 @@ from ico3d.splat.files.formats import read_gaussians, write_gaussians
 from ico3d.splat.files.spz_container import FREE_BYTES
 from support.splats.gaussian_files import as_gsply, gsply, ply_bytes, random_gaussians, splat_bytes
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = 250  # for each of the eight formats
 MAX_SECONDS = 2
 MAX_MEMORY_PER_BYTE = 10

@@ -9,7 +9,7 @@ flow, losses and gradients are real, so that whole trainings run.
 """
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -17,7 +17,6 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 from torch.overrides import TorchFunctionMode
-from torch.utils._pytree import tree_flatten, tree_map_only
 
 from ico3d.common.camera import Camera
 from ico3d.splat.cpu.backend import draw_gaussians
@@ -44,14 +43,24 @@ def is_moved(tensor: Tensor) -> bool:
     return getattr(tensor, "_pretends", False)
 
 
+def _tensors(values: Iterable) -> list[Tensor]:
+    """The tensors in tuples, lists and dictionaries, in order."""
+    found: list[Tensor] = []
+    for value in values:
+        if isinstance(value, Tensor):
+            found.append(value)
+        elif isinstance(value, tuple | list):
+            found += _tensors(value)
+        elif isinstance(value, dict):
+            found += _tensors(value.values())
+    return found
+
+
 def _mark(value: Any, moved: bool) -> Any:
     """The tensors in a value, marked; others are left alone."""
-
-    def mark(tensor: Tensor) -> Tensor:
+    for tensor in _tensors((value,)):
         tensor._pretends = moved
-        return tensor
-
-    return tree_map_only(Tensor, mark, value)
+    return value
 
 
 class PretendedCuda(TorchFunctionMode):
@@ -59,7 +68,7 @@ class PretendedCuda(TorchFunctionMode):
 
     def __torch_function__(self, func, types, args=(), kwargs=None):
         kwargs = dict(kwargs or {})
-        given = [leaf for leaf in tree_flatten((args, kwargs))[0] if isinstance(leaf, Tensor)]
+        given = _tensors((args, kwargs))
         moved = any(map(is_moved, given))
         if func == Tensor.device.__get__:
             return CUDA if moved else func(*args)
@@ -148,8 +157,7 @@ def _marked_new(result: Any, given: list[Tensor], moved: bool) -> Any:
     known = {id(tensor) for tensor in given}
     if isinstance(result, Iterator):
         return iter([_marked_new(part, given, moved) for part in result])
-    leaves = [leaf for leaf in tree_flatten(result)[0] if isinstance(leaf, Tensor)]
-    for leaf in leaves:
+    for leaf in _tensors((result,)):
         if id(leaf) not in known:
             leaf._pretends = moved
     return result

@@ -22,6 +22,8 @@ from ico3d.splat.render import render
 from support.avatars.filmed_person import NOISE, SIZE, FilmedPerson
 from support.avatars.moving_body import FPS, MovingPerson
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def person() -> MovingPerson:

@@ -14,6 +14,8 @@ from ico3d.errors import BundleError
 from support.avatars.planted import driving
 from support.bundles.random_bundle import random_head
 
+pytestmark = pytest.mark.slow
+
 QUICK = BakeSettings(hidden=64, augmented=100, steps=300)
 
 

@@ -33,6 +33,8 @@ from support.avatars.whole_person import (
 from support.bundles.random_bundle import random_head
 from support.captures import open_with
 
+pytestmark = pytest.mark.slow
+
 QUICK = BakeSettings(hidden=64, augmented=100, steps=300)
 
 

@@ -27,6 +27,8 @@ from support.avatars.planted_person import ABROAD, FRAMES, NAMES, PlantedPerson,
 from support.avatars.tiny_joining import assembly_of
 from support.heads.shapes import head_shape
 
+pytestmark = pytest.mark.slow
+
 
 class Stopped(Exception):
     """Somebody has ended the process."""

@@ -21,6 +21,8 @@ from support.avatars.tiny_joining import RECOLOUR, assembly_of, parts_of
 from support.pretended_cuda import drawn, is_moved
 from support.settings import changed
 
+pytestmark = pytest.mark.slow
+
 
 def test_colours_are_matched(cuda, head, abroad):
     """To the same as on the CPU."""

@@ -14,6 +14,8 @@ from ico3d.errors import ModelError
 from ico3d.splat.gaussians import Gaussians
 from support.avatars.filmed_demo import FilmedDemo, away, demo, head_abroad, saved
 
+pytestmark = pytest.mark.slow
+
 
 def resting() -> Gaussians:
     """The demo's head in its own space."""

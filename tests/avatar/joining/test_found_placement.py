@@ -12,6 +12,8 @@ from ico3d.head.model_folder import TrainedHead
 from support.avatars.filmed_demo import FilmedDemo, away, head_abroad, saved
 from support.avatars.planted_person import PlantedPerson, planted_head
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_head_without_landmarks_is_joined(face_model, packaged_demo, tmp_path, monkeypatch):
     """In another studio, whose axes are others: within 2 mm; the avatar's head knows its face.

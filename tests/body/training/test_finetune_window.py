@@ -15,6 +15,8 @@ from support.bodies.moving_capture import MovingCapture
 from support.bodies.tiny_training import SMALL, trainer_of
 from support.settings import changed
 
+pytestmark = pytest.mark.slow
+
 BEFORE, AFTER = Window(0, 4), Window(4, 8)
 
 

@@ -36,6 +36,7 @@ def ends_error(capture, model):
     return masked_error(capture, model, 4) + masked_error(capture, model, 8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["swings++", "swings", "4dgs", "spacetime", "freetime"])
 def test_every_method_learns(capture, method):
     """The error at the window's ends falls, with fewer Gaussians than allowed."""
@@ -47,6 +48,7 @@ def test_every_method_learns(capture, method):
     assert ends_error(capture, trainer.model) < 0.9 * before
 
 
+@pytest.mark.slow
 def test_what_moves_is_learned(capture):
     """SWinGS++ is nearer to the truth than Gaussians that stand still."""
     trainers = trainer_of(capture), trainer_of(capture, "static")
@@ -71,6 +73,7 @@ def test_the_warm_up_moves_nothing(capture):
     assert not torch.equal(before["mlp.weight2"], trainer.model.shared["mlp.weight2"])
 
 
+@pytest.mark.slow
 def test_alpha_follows_density_control(capture):
     """Blending weights begin as the flow's mask and are cloned along with their Gaussians."""
     trainer = trainer_of(capture)
@@ -114,6 +117,7 @@ def test_resuming_repeats_the_uninterrupted_run(capture, method):
         assert torch.equal(value, resumed.tensors()[name]), name
 
 
+@pytest.mark.slow
 def test_cameras_that_see_other_colors_are_corrected(capture):
     """A camera whose pictures are darker by a fifth learns that factor, not the Gaussians."""
     picture, plate = capture.image, capture.background

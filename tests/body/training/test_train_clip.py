@@ -12,6 +12,8 @@ from ico3d.errors import SettingsError
 from support.bodies.moving_capture import FRAMES, MovingCapture
 from support.bodies.tiny_training import job
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory):

@@ -20,7 +20,7 @@ from support.needs import needs
 from support.recordings import multiview_folders
 from support.shared import MODELS, SUBJECTS
 
-pytestmark = needs("mediapipe")
+pytestmark = [pytest.mark.slow, needs("mediapipe")]
 PERSON = SUBJECTS / "human_face_f.npz"
 
 
@@ -100,12 +100,11 @@ def test_a_frame_without_pictures_is_interpolated(head, tmp_path, capsys):
     assert np.delete(degrees, 2).max() < 2.5 and metres.max() < 0.02
 
 
-@pytest.mark.slow
 def test_small_faces_in_pictures_of_a_whole_person_are_found(tmp_path):
     if not PERSON.is_file():
         pytest.skip("../shared/subjects is not here")
     shape = dict(subject=str(PERSON), rig="body", cameras=8, views_per_frame=8)
-    truth, folder = _recorded(tmp_path, frames=4, fps=15.0, size=576, **shape)
+    truth, folder = _recorded(tmp_path, frames=2, fps=15.0, size=576, **shape)
     assert main(["capture", "track", str(folder)]) == 0
     degrees, metres = _agreement(truth, open_capture(folder))
     assert degrees.max() < 2.0 and metres.max() < 0.005

@@ -16,7 +16,7 @@ from support.shared import MODELS, SHARED
 CLIP = SHARED / "clips" / "portrait_a.mp4"
 
 av = pytest.importorskip("av")
-pytestmark = needs("mediapipe")
+pytestmark = [pytest.mark.slow, needs("mediapipe")]
 needs_clip = pytest.mark.skipif(not CLIP.is_file(), reason="../shared/clips is not here")
 
 

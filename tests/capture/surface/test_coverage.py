@@ -7,6 +7,8 @@ from ico3d.capture.surface.coverage import find_gap
 from ico3d.capture.surface.hull import Silhouette
 from support.recordings import two_balls
 
+pytestmark = pytest.mark.slow
+
 SIZE, REACH = 96, 0.02
 PIXEL = 0.44 / SIZE
 """Metres, at the person."""

@@ -19,8 +19,8 @@ from ico3d.capture.capture import Capture, all_frames
 from ico3d.common.camera import Camera, look_at
 from ico3d.head.model import HeadModel
 from ico3d.head.model_folder import TrainedHead
-from ico3d.splat.render import render
 from support.heads.shapes import head_shape
+from support.photograph import photograph
 
 MOMENTS = (0.0, 1.5, 3.0)
 """Seconds of the demo's motion."""
@@ -102,7 +102,7 @@ class FilmedDemo(Capture):
         """(H, W, 3) before a wall."""
         person = self._person.gaussians(MOMENTS[frame], self._rest)
         wall = torch.tensor([0.5, 0.6, 0.7])
-        return render(person, [self.cameras[camera]], wall).rgb[0].clamp(0, 1).numpy()
+        return photograph(person, self.cameras[camera], wall)[0].clip(0, 1)
 
 
 def away(capture: FilmedDemo, folder: Path) -> float:

@@ -5,8 +5,8 @@ import torch
 
 from ico3d.capture.capture import Capture, all_frames
 from ico3d.common.camera import Camera, look_at
-from ico3d.splat.render import render
 from support.avatars.moving_body import FPS, MovingPerson
+from support.photograph import photograph
 
 SIZE, NOISE = 96, 0.03
 
@@ -32,15 +32,15 @@ class FilmedPerson(Capture):
     def _drawn(self, camera, frame):
         behind = torch.from_numpy(self.background(camera))
         gaussians = self.person.gaussians(frame / self.fps)
-        return render(gaussians, [self.cameras[camera]], behind)
+        return photograph(gaussians, self.cameras[camera], behind)
 
     def image(self, camera, frame):
-        picture = self._drawn(camera, frame).rgb[0].numpy()
+        picture, _ = self._drawn(camera, frame)
         noise = np.random.default_rng(frame).normal(0, NOISE, picture.shape)
         return (picture + noise).astype(np.float32)
 
     def mask(self, camera, frame):
-        return (self._drawn(camera, frame).alpha[0].numpy() > 0.5).astype(np.float32)
+        return (self._drawn(camera, frame)[1] > 0.5).astype(np.float32)
 
     def background(self, camera):
         return np.full((SIZE, SIZE, 3), (0.3, 0.4, 0.5), np.float32)

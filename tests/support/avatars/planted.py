@@ -10,8 +10,8 @@ from ico3d.common.camera import Camera, look_at
 from ico3d.common.expression import EyeRange, eye_range
 from ico3d.head.model import HeadModel
 from ico3d.head.model_folder import TrainedHead
-from ico3d.splat.render import render
 from support.heads.shapes import head_shape
+from support.photograph import photograph
 
 SIZE, FRAMES, COUNT = 48, 66, 300
 NOISE = 0.03  # standard deviation: about 30 dB
@@ -68,7 +68,7 @@ class PlantedCapture(Capture):
             gaussians = self.head.model(self.head.track(self).at(frame)).detach()
         view = self.cameras[camera].moved(self.world_from_head(frame))
         behind = torch.from_numpy(self.background(camera))
-        picture = render(gaussians, [view], behind).rgb[0].numpy()
+        picture, _ = photograph(gaussians, view, behind)
         noise = np.random.default_rng(frame).normal(0, NOISE, picture.shape)
         return np.clip(picture + noise, 0, 1).astype(np.float32)
 

@@ -15,8 +15,8 @@ from ico3d.common.camera import Camera, look_at
 from ico3d.head.model import HeadModel
 from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.gaussians import Gaussians, cat
-from ico3d.splat.render import render
 from support.heads.shapes import head_shape
+from support.photograph import photograph
 
 WIDTH, HEIGHT, CAMERAS, FRAMES = 40, 52, 10, 6
 NAMES = tuple(f"shape{i}" for i in range(10))
@@ -178,11 +178,11 @@ class PlantedPerson(Capture):
     def _picture(self, camera, frame):
         if (camera, frame) not in self._taken:
             plate = torch.from_numpy(self.background(camera))
-            self._taken[camera, frame] = render(self.person(frame), [self.cameras[camera]], plate)
+            self._taken[camera, frame] = photograph(self.person(frame), self.cameras[camera], plate)
         return self._taken[camera, frame]
 
     def image(self, camera, frame):
-        return self._picture(camera, frame).rgb[0].clamp(0, 1).numpy()
+        return self._picture(camera, frame)[0].clip(0, 1)
 
     def mask(self, camera, frame):
-        return self._picture(camera, frame).alpha[0].numpy()
+        return self._picture(camera, frame)[1]

@@ -8,7 +8,7 @@ import torch
 from ico3d.capture.capture import Capture, all_frames
 from ico3d.common.camera import Camera, look_at
 from ico3d.splat.gaussians import Gaussians
-from ico3d.splat.render import render
+from support.photograph import photograph
 
 HEIGHT, WIDTH, FRAMES, CAMERAS, POINTS = 40, 36, 9, 7, 500
 
@@ -64,10 +64,10 @@ class MovingCapture(Capture):
             torch.from_numpy(self._colors).float(),
         )
         plate = torch.from_numpy(self.background(camera))
-        return render(gaussians, [self.cameras[camera]], plate)
+        return photograph(gaussians, self.cameras[camera], plate)
 
     def image(self, camera, frame):
-        return self._drawn(camera, frame).rgb[0].numpy()
+        return self._drawn(camera, frame)[0]
 
     def mask(self, camera, frame):
-        return self._drawn(camera, frame).alpha[0].numpy()
+        return self._drawn(camera, frame)[1]

@@ -9,7 +9,7 @@ from ico3d.capture.capture import Capture, Sound, last_eleventh
 from ico3d.common.camera import Camera, look_at
 from ico3d.common.expression import EYE_NAMES
 from ico3d.splat.gaussians import Gaussians
-from ico3d.splat.render import render
+from support.photograph import photograph
 
 SIZE, FRAMES, POINTS = 48, 44, 300
 
@@ -50,6 +50,9 @@ class TinyCapture(Capture):
         return np.full(len(EYE_NAMES), 0.1 * (frame % 3), np.float32)
 
     def world_from_head(self, frame):
+        return self._pose(frame)
+
+    def _pose(self, frame):
         pose = np.eye(4)
         pose[0, 3] = 0.02 * np.sin(frame)
         return pose
@@ -64,12 +67,12 @@ class TinyCapture(Capture):
     def image(self, camera, frame):
         if frame % 2 != camera:
             return None
-        return self._render(camera, frame, self.background(camera)).rgb[0].numpy()
+        return self._render(camera, frame, self.background(camera))[0]
 
     def mask(self, camera, frame):
         if frame % 2 != camera:
             return None
-        return self._render(camera, frame, None).alpha[0].numpy()
+        return self._render(camera, frame, None)[1]
 
     def _render(self, camera, frame, background):
         colors = self._colors.copy()
@@ -84,5 +87,5 @@ class TinyCapture(Capture):
             colors=torch.from_numpy(colors).float(),
         )
         behind = None if background is None else torch.from_numpy(background)
-        view = self.cameras[camera].moved(self.world_from_head(frame))
-        return render(gaussians, [view], behind)
+        view = self.cameras[camera].moved(self._pose(frame))
+        return photograph(gaussians, view, behind)

@@ -8,7 +8,7 @@ import torch
 from ico3d.capture.capture import Capture, Split
 from ico3d.common.camera import Camera, look_at
 from ico3d.splat.gaussians import Gaussians
-from ico3d.splat.render import render
+from support.photograph import photograph
 
 SIZE, POINTS = 32, 150
 PLATE = 0.25
@@ -56,10 +56,10 @@ class Still(Capture):
         return np.full((SIZE, SIZE, 3), PLATE, np.float32)
 
     def image(self, camera, frame):
-        return self._render(camera, frame).rgb[0].clamp(0, 1).numpy()
+        return self._render(camera, frame)[0].clip(0, 1)
 
     def mask(self, camera, frame):
-        return self._render(camera, frame).alpha[0].numpy()
+        return self._render(camera, frame)[1]
 
     def _render(self, camera, frame):
         gaussians = Gaussians(
@@ -70,4 +70,4 @@ class Still(Capture):
             colors=torch.from_numpy(self.colors).float(),
         )
         view = self.cameras[camera].moved(self.world_from_head(frame))
-        return render(gaussians, [view], torch.full((3,), PLATE))
+        return photograph(gaussians, view, torch.full((3,), PLATE))
