@@ -3,7 +3,6 @@
 import asyncio
 import os
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,8 +24,9 @@ from ico3d.chat.wire.protocol import (
 )
 from ico3d.measure.talking.page import open_page
 from ico3d.measure.talking.questions import read_recording
+from support.shared import SPEECH
 
-STARS = Path(__file__).parents[3] / "shared" / "speech" / "new-home-in-the-stars-16k.wav"
+STARS = SPEECH / "new-home-in-the-stars-16k.wav"
 
 
 def slowness():
