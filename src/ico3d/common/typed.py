@@ -4,10 +4,10 @@ import json
 import math
 import types
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar, cast
 
 T = TypeVar("T")
 NAMES = {int: "a whole number", float: "a number", str: "a text", bool: "true or false"}
@@ -25,9 +25,9 @@ class Kind:
     """
 
     bare: Any
-    marks: tuple
+    marks: tuple[Any, ...]
     origin: Any
-    arguments: tuple
+    arguments: tuple[Any, ...]
 
     @property
     def optional(self) -> Any:
@@ -136,17 +136,18 @@ def fill_fields(kind: type, value: Any, where: Any, rules: Rules) -> dict[str, A
     """The fields of a dataclass by name, those left out excepted; else as `fill`."""
     if not isinstance(value, dict):
         raise rules.error(rules.wrong(where, kind_of(kind), value))
+    values = cast(dict[str, Any], value)
     notes = field_types(kind)
-    for name in value:
+    for name in values:
         if name not in notes:
             raise rules.error(rules.unknown(where, name, kind))
     for name in required(kind) if rules.defaults else notes:
-        if name not in value:
+        if name not in values:
             raise rules.error(rules.missing(where, name))
     return {
-        name: parsed(note, value[name], rules.field(where, name, kind_of(note)), rules)
+        name: parsed(note, values[name], rules.field(where, name, kind_of(note)), rules)
         for name, note in notes.items()
-        if name in value
+        if name in values
     }
 
 
@@ -171,7 +172,7 @@ def _parsed(kind: Kind, value: Any, where: Any, rules: Rules) -> Any:
     if kind.origin in (dict, Mapping):
         return _mapped(kind, value, where, rules)
     if is_dataclass(kind.bare):
-        return fill(typing.cast(type, kind.bare), value, where, rules)
+        return fill(cast(type, kind.bare), value, where, rules)
     if kind.origin is Literal:
         if isinstance(value, str) and value in kind.arguments:
             return value
@@ -182,13 +183,13 @@ def _parsed(kind: Kind, value: Any, where: Any, rules: Rules) -> Any:
 def _listed(kind: Kind, value: Any, where: Any, rules: Rules) -> Any:
     if not isinstance(value, list):
         raise rules.error(rules.wrong(where, kind, value))
-    entries = kind.arguments
+    values, entries = cast(list[Any], value), kind.arguments
     if kind.origin is list or entries[-1] is Ellipsis:
-        entries = (entries[0],) * len(value)
-    elif len(value) != len(entries):
-        raise rules.error(rules.count(where, len(entries), len(value)))
+        entries = (entries[0],) * len(values)
+    elif len(values) != len(entries):
+        raise rules.error(rules.count(where, len(entries), len(values)))
     made = [
-        parsed(entry, value[i], rules.entry(where, i), rules) for i, entry in enumerate(entries)
+        parsed(entry, values[i], rules.entry(where, i), rules) for i, entry in enumerate(entries)
     ]
     return made if kind.origin is list else tuple(made)
 
@@ -196,11 +197,12 @@ def _listed(kind: Kind, value: Any, where: Any, rules: Rules) -> Any:
 def _mapped(kind: Kind, value: Any, where: Any, rules: Rules) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise rules.error(rules.wrong(where, kind, value))
+    values = cast(dict[str, Any], value)
     if kind.arguments[1] is Any:
-        return value
+        return values
     return {
         key: parsed(kind.arguments[1], entry, rules.entry(where, key), rules)
-        for key, entry in value.items()
+        for key, entry in values.items()
     }
 
 
@@ -241,9 +243,9 @@ def plain(value: Any) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, dict):
-        return {key: plain(entry) for key, entry in value.items()}
+        return {key: plain(entry) for key, entry in cast(dict[str, Any], value).items()}
     if isinstance(value, list | tuple):
-        return [plain(entry) for entry in value]
+        return [plain(entry) for entry in cast(Sequence[Any], value)]
     return value
 
 
