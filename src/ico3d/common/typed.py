@@ -172,7 +172,7 @@ def _parsed(kind: Kind, value: Any, where: Any, rules: Rules) -> Any:
     if kind.origin in (dict, Mapping):
         return _mapped(kind, value, where, rules)
     if is_dataclass(kind.bare):
-        return fill(cast(type, kind.bare), value, where, rules)
+        return fill(cast(type[Any], kind.bare), value, where, rules)
     if kind.origin is Literal:
         if isinstance(value, str) and value in kind.arguments:
             return value

@@ -1,0 +1,41 @@
+"""Compiles the kernels of training once, before processes share the tests.
+
+A process that has just compiled a kernel may round otherwise than those that find it compiled, and
+processes that compile the same kernel at once leave either's. Trainings that must give the same
+files therefore start when all kernels lie in numba's cache.
+"""
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numba
+import torch
+
+from ico3d.body.training.train_clip import train_window
+from ico3d.head.train_head import HeadJob, train_head
+from support.bodies.recorded_capture import record
+from support.bodies.window_tasks import tasks
+from support.heads.tiny_capture import TinyCapture
+from support.heads.train_tiny import SETTINGS
+
+
+def main() -> None:
+    """Trains a head and the windows of a body, as briefly as touches every kernel."""
+    numba.set_num_threads(1)
+    torch.set_num_threads(1)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        brief = replace(SETTINGS, steps=45)
+        train_head(
+            TinyCapture(folder / "tiny"),
+            folder / "head",
+            HeadJob("blendshapes", "full", "builtin", 0, brief),
+        )
+        record(folder / "clip")
+        for task in tasks(folder / "clip", folder / "body", steps_per_frame=8):
+            train_window(task)
+
+
+if __name__ == "__main__":
+    main()
