@@ -93,8 +93,7 @@ def test_bundles_hold_what_a_persona_says_and_old_ones_stay_readable(packed):
 @pytest.fixture
 def packed(tmp_path):
     from ico3d.bundle.format import Bundle
-
-    from .random_bundle import write_random_bundle
+    from support.bundles.random_bundle import write_random_bundle
 
     write_random_bundle(tmp_path / "a.ico3d")
     return Bundle.open(tmp_path / "a.ico3d").manifest.to_json()

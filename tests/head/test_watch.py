@@ -95,7 +95,7 @@ def _free_port() -> int:
 @pytest.fixture(scope="module")
 def head(tmp_path_factory):
     """A capture, and a head that has learnt from it."""
-    from tiny_capture import TinyCapture
+    from support.heads.tiny_capture import TinyCapture
 
     tiny = TinyCapture(tmp_path_factory.mktemp("watch"))
     return tiny, train_head(tiny, tiny.path / "model", JOB)
