@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import soxr
+from anyio import to_thread
 from loguru import logger
 
 logger.remove()  # before pipecat is imported: it logs its start
@@ -61,10 +62,10 @@ async def served(bundle):
 
 
 @pytest.fixture(autouse=True)
-def decoders(monkeypatch):
-    """Time stands still while pocketsphinx decodes, in a process of its own."""
-    for name in ("_ask", "close"):
-        monkeypatch.setattr(SphinxProcess, name, timeless(getattr(SphinxProcess, name)))
+def outside(monkeypatch):
+    """Virtual time stands still for what happens in processes and in threads of anyio's."""
+    for place, name in ((SphinxProcess, "_ask"), (SphinxProcess, "close"), (to_thread, "run_sync")):
+        monkeypatch.setattr(place, name, timeless(getattr(place, name)))
 
 
 @pytest.fixture

@@ -8,16 +8,16 @@ import time
 from dataclasses import replace
 
 import pytest
-from websockets.asyncio.client import connect
 
 from ico3d.chat.services.language import local, openai
 from ico3d.chat.settings.conversation import ChatSettings, Choice
-from ico3d.chat.wire.codec import decode_server, encode
-from ico3d.chat.wire.protocol import VERSION, Error, Heard, Hello, Speech, Text, Welcome
+from ico3d.chat.wire.protocol import Error, Heard, Speech, Text, Welcome
 from ico3d.measure.talking.page import open_page
+from support.chat.pages import first_message
 from support.chat.serving import OFFLINE, serving
 
-pytestmark = pytest.mark.slow
+# Whether threads hold up the loop is measured against a thread that sleeps.
+pytestmark = [pytest.mark.slow, pytest.mark.real_time]
 
 LONGEST = 0.1  # s that the event loop may pause for longer than a thread that does nothing
 TRIES = 3  # a busy machine pauses now and then; what blocks does so every time
@@ -90,13 +90,6 @@ async def shortest_excess(scene):
             await scene()
         excesses.append(pauses.excess)
     return min(excesses)
-
-
-async def first_message(url):
-    """What a new page is told first."""
-    async with connect(url.replace("http", "ws") + "ws") as wire:
-        await wire.send(encode(Hello(VERSION, None, -1)))
-        return decode_server(await asyncio.wait_for(wire.recv(), 30))
 
 
 @pytest.mark.parametrize("how", ["local", "unnamed model"])

@@ -19,9 +19,8 @@ from ico3d.chat.wire.protocol import Error, Speech, Text, Welcome
 from ico3d.cli import main
 from ico3d.errors import Ico3dError, MissingModelError
 from ico3d.measure.talking.page import open_page
+from support.chat.pages import first_message
 from support.chat.serving import OFFLINE, free_port, serving
-
-from .test_event_loop import first_message
 
 pytestmark = pytest.mark.slow
 

@@ -7,6 +7,8 @@ import pytest
 
 from ico3d.chat.workers import Workers
 
+pytestmark = pytest.mark.real_time  # threads wait for what happens in the loop
+
 PATIENCE = 5.0  # s
 
 

@@ -42,7 +42,7 @@ export interface Dictation {
 export interface Offer {
   /** Which job. */
   kind: "recognition" | "language" | "voice";
-  /** Its name in settings and wishes. */
+  /** Name of the service in settings and wishes. */
   key: string;
   /** For the visitor's eyes, as in `services`. */
   name: string;
@@ -210,7 +210,7 @@ export interface EndMessage {
   type: "end";
   /** Which answer. */
   utterance: number;
-  /** Its length at 24 kHz. */
+  /** Length of the utterance at 24 kHz. */
   samples: number;
 }
 

@@ -19,7 +19,7 @@ AIR = 1.15
 AWAY = 3.5
 """Distance of an orbit, in halves of the person's larger side, where no capture says better."""
 ELEVATION = np.radians(8)
-"""Of an orbit above the person's middle, likewise."""
+"""Angle of an orbit above the person's middle, where no capture says better."""
 OPPOSITE = np.radians(179)
 """Turn between two key cameras from which on there is no shortest way."""
 FIELD_OF_VIEW = 40.0
@@ -164,7 +164,7 @@ def through(keys: Sequence[Camera], count: int) -> list[Camera]:
     Poses run along geodesics of SE(3), P·exp(s·log(P⁻¹·Q)), focal lengths geometrically.
 
     Args:
-        keys: Of one size.
+        keys: Key cameras of one picture size.
         count: How many cameras.
 
     Raises:

@@ -25,9 +25,9 @@ class View:
     """A camera at a time of a window; picture and mask where they were recorded.
 
     Attributes:
-        camera: In the world.
-        tau: In [0, 1].
-        background: (3,) or (H, W, 3).
+        camera: The camera in the world.
+        tau: Moment of the window, 0 to 1.
+        background: (3,) or (H, W, 3) what stands behind the person.
         truth: (H, W, 3), or None.
         mask: (H, W) the person, or None.
     """

@@ -54,7 +54,7 @@ class BakedAvatar:
     """A whole person as a viewer draws it.
 
     Attributes:
-        head: In the space of the head poses.
+        head: The baked head in the space of the head poses.
         window: Gives a window of the body by its number.
         spans: The windows' frames.
         fps: Frames per second.
@@ -169,10 +169,10 @@ def render_avatar(
     """Renders a whole person as a viewer does: (H, W, 3) float32 display RGB.
 
     Args:
-        bundle: Of a head and a body.
+        bundle: A bundle of a head and a body.
         body_seconds: Where in the body's motion.
         expression: (B,).
-        camera: In world space.
+        camera: The camera in world space.
         background: (3,) or (H, W, 3); the bundle's own colour by default.
 
     Raises:
@@ -209,7 +209,7 @@ def render_bundle(
     Args:
         bundle: The avatar.
         expression: (B,).
-        camera: In world space.
+        camera: The camera in world space.
         background: (3,) or (H, W, 3); the bundle's own colour by default.
         world_from_head: (4, 4); the bundle's first head pose by default.
 

@@ -73,14 +73,14 @@ class Pruning:
 
     @torch.no_grad()
     def carry_out(self, model: WindowModel, population: Population) -> int:
-        """Removes them, with their moments.
+        """Removes the Gaussians that trespass, with their moments.
 
         Args:
             model: The window's Gaussians.
-            population: The same, as density control sees them.
+            population: The body's Gaussians, as density control sees them.
 
         Returns:
-            How many there were.
+            How many Gaussians were removed.
         """
         trespass = self.trespassing(model)
         keep = torch.nonzero(~trespass)[:, 0]  # (K,)

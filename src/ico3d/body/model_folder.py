@@ -19,7 +19,7 @@ from ico3d.training.checkpoint import load_tensors, save_tensors
 ABOUT = "body.json"
 """The file by which a folder is known to hold a body."""
 UNTUNED = "untuned.json"
-"""The same for the windows as they were before temporal fine-tuning, where there was one."""
+"""The file that names the windows as they were before temporal fine-tuning, where there was one."""
 ROUNDING = 1e-6
 """Frames by which a time may miss its frame: 31 / 15 s is, in floats, after frame 31."""
 
@@ -56,7 +56,7 @@ class TrainedBody:
         models: One per window.
         windows: Which frames they show; neighbours share one.
         fps: Frames per second.
-        method: What moves the Gaussians.
+        method: The method that moves the Gaussians.
         summary: How it was made: provenance of the capture, seconds of training, settings.
     """
 
@@ -99,7 +99,7 @@ class TrainedBody:
         return self
 
     def save(self, folder: Path, files: Sequence[str], about: str = ABOUT) -> None:
-        """Writes `body.json` or its like, which names the windows' files in the folder."""
+        """Writes `body.json` (or a file of another name), which names the windows' files."""
         content = {
             "fps": self.fps,
             "method": self.method,

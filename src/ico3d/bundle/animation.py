@@ -6,9 +6,10 @@ plays start … end back and forth, and whoever speaks goes from action to actio
 
 import json
 from dataclasses import dataclass
+from typing import Any, cast
 
-from ico3d.bundle.decode import decode, encode, parse_json
 from ico3d.bundle.manifest import BodyInfo
+from ico3d.common.typed import Rules, fill, parse_json, plain
 from ico3d.errors import BundleError
 
 ANIMATION = "animation.json"
@@ -27,8 +28,8 @@ class Rest:
     """The loop of somebody who waits: frames start … end, both inside, back and forth.
 
     Attributes:
-        start: Its first frame.
-        end: Its last frame, where every speech ends.
+        start: First frame of the loop.
+        end: Last frame of the loop, where every speech ends.
     """
 
     start: int
@@ -100,7 +101,7 @@ class Animation:
 
     def to_bytes(self) -> bytes:
         """The content of `animation.json`, the same bytes for the same animation."""
-        values = encode(self)
+        values = plain(self)
         names = [name for name in _ORDER if name != "quality" or self.quality]
         lines = [f" {json.dumps(name)}: {json.dumps(values[name])}" for name in names]
         return ("{\n" + ",\n".join(lines) + "\n}\n").encode()
@@ -113,10 +114,10 @@ class Animation:
             BundleError: In one sentence, if it is none or makes no sense.
         """
         _require(len(data) <= MAX_BYTES, "it", f"have at most {MAX_BYTES} bytes")
-        values = parse_json(data, ANIMATION)
+        values = parse_json(data, ANIMATION, BundleError)
         if isinstance(values, dict):
-            values.setdefault("quality", [])  # older bundles have none
-        return decode(Animation, values, ANIMATION)
+            cast(dict[str, Any], values).setdefault("quality", [])  # older bundles have none
+        return fill(Animation, values, ANIMATION, Rules(BundleError))
 
     def check_body(self, body: BodyInfo) -> None:
         """Checks that this is the animation of a body.

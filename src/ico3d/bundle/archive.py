@@ -7,8 +7,9 @@ import stat
 import struct
 import zipfile
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from pathlib import Path
+from typing import BinaryIO
 
 from ico3d.bundle import limits
 from ico3d.common.files import write_atomic
@@ -129,7 +130,7 @@ def _walk(folder: Path, prefix: str, root: Path) -> Iterator[tuple[str, int]]:
                 raise BundleError(f"{name}: is not a regular file.")
 
 
-def _check_directory(file, path: Path) -> None:
+def _check_directory(file: BinaryIO, path: Path) -> None:
     """Refuses what makes zipfile read a huge directory: the end record must be the plain one."""
     size = file.seek(0, os.SEEK_END)
     if size > limits.MAX_BUNDLE_BYTES:
@@ -189,7 +190,7 @@ def _whole(data: bytes, size: int, name: str) -> bytes:
 
 
 @contextlib.contextmanager
-def _reading(name: str) -> Iterator[None]:
+def _reading(name: str) -> Generator[None, None, None]:
     """Whatever zipfile raises on damaged input becomes one sentence."""
     try:
         yield

@@ -90,6 +90,8 @@ def _ply_tables(lines: list[list[str]], name: str) -> tuple[dict[str, int], dict
                 widths[list(counts)[-1]] += _WIDTHS[kind]
             case [("element" | "property"), *_]:
                 raise BundleError(f"{name}: its header declares what no file of Gaussians has.")
+            case _:
+                pass
     return counts, widths
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import tyro
 
@@ -56,7 +56,7 @@ def figures(bundle: "Bundle", path: Path) -> dict[str, Any]:
         `bytes` on disk; `head_gaussians`, null without a head; `body_windows`, how many, 0 without
         a body; `body_gaussians` of each window; `provenance`; and further facts.
     """
-    from ico3d.bundle.decode import encode
+    from ico3d.common.typed import plain
 
     manifest = bundle.manifest
     head, body, speech = manifest.head, manifest.body, manifest.speech
@@ -75,8 +75,8 @@ def figures(bundle: "Bundle", path: Path) -> dict[str, Any]:
         "body_seconds": last / body.fps if body else None,
         "animation": bundle.animation is not None,
         "background": bundle.background,
-        "loss": encode(manifest.loss),
-        "provenance": encode(manifest.provenance),
+        "loss": plain(manifest.loss),
+        "provenance": plain(manifest.provenance),
         "files": sizes,
     }
 
@@ -88,7 +88,8 @@ def _contents(bundle: "Bundle"):
 def _line(value: Any) -> str:
     """One value for people."""
     if isinstance(value, dict):
-        return ", ".join(f"{key}: {_line(part)}" for key, part in value.items())
+        parts = cast(dict[str, Any], value)
+        return ", ".join(f"{key}: {_line(part)}" for key, part in parts.items())
     if isinstance(value, list):
-        return "; ".join(map(_line, value)) or "–"
+        return "; ".join(map(_line, cast(list[Any], value))) or "–"
     return f"{value:,}" if isinstance(value, int) and not isinstance(value, bool) else str(value)

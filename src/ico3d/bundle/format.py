@@ -203,10 +203,15 @@ def _check_listing(manifest: Manifest, archive: Archive) -> None:
 
 
 def _check_required(manifest: Manifest) -> None:
-    required = {THUMBNAIL} | ({SPEECH} if manifest.speech else set())
-    required |= {HEAD, POSES} if manifest.head else set()
-    required |= {window.file for window in manifest.body.windows} if manifest.body else set()
-    required |= {ANIMATION} if manifest.is_whole else set()
+    required = {THUMBNAIL}
+    if manifest.speech:
+        required |= {SPEECH}
+    if manifest.head:
+        required |= {HEAD, POSES}
+    if manifest.body:
+        required |= {window.file for window in manifest.body.windows}
+    if manifest.is_whole:
+        required |= {ANIMATION}
     for name in sorted(required - set(manifest.files)):
         raise BundleError(f"{name}: is missing.")
     for name in manifest.files:

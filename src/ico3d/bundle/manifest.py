@@ -2,11 +2,11 @@
 
 import json
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 from ico3d.bundle import limits
-from ico3d.bundle.decode import decode, encode, parse_json
 from ico3d.bundle.persona import Persona, check_persona, with_defaults, without_defaults
+from ico3d.common.typed import Rules, fill, parse_json, plain
 from ico3d.errors import BundleError
 
 FORMAT = "ico3d-bundle"
@@ -170,7 +170,7 @@ class Manifest:
     persona: Persona
     loss: Loss
     provenance: Provenance
-    files: dict[str, FileEntry] = field(default_factory=dict)
+    files: dict[str, FileEntry] = field(default_factory=dict[str, FileEntry])
     format: str = FORMAT
     version: int = VERSION
 
@@ -181,7 +181,7 @@ class Manifest:
 
     def to_json(self) -> bytes:
         """UTF-8 JSON, the same bytes for the same manifest."""
-        value = {**encode(self), "persona": without_defaults(self.persona)}
+        value = {**plain(self), "persona": without_defaults(self.persona)}
         return (json.dumps(value, indent=1, ensure_ascii=False) + "\n").encode()
 
     @staticmethod
@@ -193,22 +193,23 @@ class Manifest:
         """
         if len(data) > limits.MAX_MANIFEST_BYTES:
             raise BundleError(f"{MANIFEST}: is larger than {limits.MAX_MANIFEST_BYTES} bytes.")
-        value = parse_json(data, MANIFEST)
+        value = parse_json(data, MANIFEST, BundleError)
         _check_version(value)
         if value["version"] == HEADS_ONLY and "body" not in value:
             value = {**value, "version": VERSION, "body": None}
         if "persona" in value:
             value = {**value, "persona": with_defaults(value["persona"])}
-        manifest = decode(Manifest, value, MANIFEST)
+        manifest = fill(Manifest, value, MANIFEST, Rules(BundleError))
         check_manifest(manifest)
         return manifest
 
 
 def _check_version(value: Any) -> None:
     """The format comes first: a newer version has other fields."""
-    if not isinstance(value, dict) or value.get("format") != FORMAT:
+    known = cast(dict[str, Any], value) if isinstance(value, dict) else {}
+    if known.get("format") != FORMAT:
         raise BundleError(f"{MANIFEST}: this is no ico3d bundle (format is not '{FORMAT}').")
-    if value.get("version") not in (HEADS_ONLY, VERSION):
+    if known.get("version") not in (HEADS_ONLY, VERSION):
         raise BundleError(
             f"{MANIFEST}: this program reads bundles of versions {HEADS_ONLY} and {VERSION} only."
         )

@@ -45,14 +45,14 @@ def check_onnx(data: bytes, name: str, input_name: str, output_name: str) -> Non
     Args:
         data: The model.
         name: The file, for messages.
-        input_name: Its only input.
-        output_name: Its only output.
+        input_name: Name of the graph's only input.
+        output_name: Name of the graph's only output.
 
     Raises:
         BundleError: If it is no ONNX model, uses other operators, or refers to other files.
     """
     try:
-        graphs = []
+        graphs: list[memoryview] = []
         for field, value in _fields(memoryview(data)):
             if field == _FUNCTIONS:
                 raise BundleError(f"{name}: defines functions of its own.")

@@ -4,10 +4,10 @@ import re
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
-from ico3d.bundle.decode import decode, encode, parse_json
 from ico3d.bundle.limits import MAX_MANIFEST_BYTES, MAX_NOTES
+from ico3d.common.typed import Rules, fill, parse_json, plain
 from ico3d.errors import BundleError
 
 LANGUAGE = re.compile(r"[a-z]{2,3}(-[A-Za-z0-9]{2,8})*")
@@ -21,7 +21,7 @@ class Persona:
 
     Attributes:
         name: How it calls itself.
-        greeting: Its first words.
+        greeting: First words of the avatar.
         notes: What it knows: "question | question => answer", or a fact as a plain sentence, which
             only language models can use.
         manner: How it behaves and talks, in a sentence or two.
@@ -36,7 +36,7 @@ class Persona:
     notes: tuple[str, ...] = ()
     manner: str = ""
     languages: tuple[str, ...] = ()
-    voice: dict[str, str] = field(default_factory=dict)
+    voice: dict[str, str] = field(default_factory=dict[str, str])
     forbidden: tuple[str, ...] = ()
 
 
@@ -46,16 +46,17 @@ REQUIRED = ("name", "greeting", "notes")
 
 def without_defaults(persona: Persona) -> dict[str, Any]:
     """A persona as a bundle holds it: readable for programs that know the required ones only."""
-    plain, empty = encode(persona), encode(Persona(""))
-    return {key: v for key, v in plain.items() if key in REQUIRED or v != empty[key]}
+    values, empty = plain(persona), plain(Persona(""))
+    return {key: v for key, v in values.items() if key in REQUIRED or v != empty[key]}
 
 
 def with_defaults(value: Any, required: tuple[str, ...] = REQUIRED) -> Any:
     """Parsed JSON or TOML of a persona with the entries it may lack."""
     if not isinstance(value, dict):
         return value
-    known = encode(Persona(""))
-    return {key: v for key, v in known.items() if key not in required} | value
+    known = plain(Persona(""))
+    given = cast(dict[str, Any], value)
+    return {key: v for key, v in known.items() if key not in required} | given
 
 
 def read_persona(path: Path) -> Persona:
@@ -71,8 +72,12 @@ def read_persona(path: Path) -> Persona:
         raise BundleError(f"{path}: cannot be read ({error.strerror}).") from error
     if len(data) > MAX_MANIFEST_BYTES:
         raise BundleError(f"{path}: is larger than {MAX_MANIFEST_BYTES} bytes.")
-    value = parse_json(data, str(path)) if path.suffix == ".json" else _parse_toml(data, path)
-    persona = decode(Persona, with_defaults(value, ("name",)), str(path))
+    value = (
+        parse_json(data, str(path), BundleError)
+        if path.suffix == ".json"
+        else _parse_toml(data, path)
+    )
+    persona = fill(Persona, with_defaults(value, ("name",)), str(path), Rules(BundleError))
     check_persona(persona, str(path))
     _require(bool(persona.name.strip()), str(path), "name", "not be empty")
     for number, note in enumerate(persona.notes, 1):

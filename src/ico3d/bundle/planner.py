@@ -146,7 +146,7 @@ class Planner:
             until = min(until, self._known)
         while self._time < until and not self._has_arrived():
             self._decide(until)
-        found = []
+        found: list[Point] = []
         while self._decided and self._decided[0][0] <= until:
             found.append(self._decided.popleft())
         return found
@@ -215,7 +215,7 @@ class Planner:
 
     @property
     def _first_speed(self) -> float:
-        """That of a body in motion, within the limits; 0 if it stands still."""
+        """Speed at which the plan begins: within the limits, 0 if the body stands still."""
         if self._velocity == 0:
             return 0.0
         return min(max(abs(self._velocity), self._animation.min_speed), self._animation.max_speed)

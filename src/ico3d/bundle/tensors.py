@@ -2,12 +2,12 @@
 
 import struct
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from safetensors.numpy import save
 
-from ico3d.bundle.decode import parse_json
+from ico3d.common.typed import parse_json
 from ico3d.errors import BundleError
 
 _DTYPES = {
@@ -56,7 +56,7 @@ def decode_tensors(data: bytes, spec: Spec, name: str) -> dict[str, np.ndarray]:
         problem = "lacks" if odd in spec else "has the unknown"
         raise BundleError(f"{name}: {problem} tensor {odd[:40]!r}.")
     spans: list[tuple[int, int]] = []
-    tensors = {}
+    tensors: dict[str, np.ndarray] = {}
     for key, (dtype, shape) in spec.items():
         span = _check_entry(header[key], dtype, shape, f"{name}: '{key}'")
         if start + span[1] > len(data):
@@ -76,22 +76,25 @@ def _header(data: bytes, name: str) -> tuple[dict[str, Any], int]:
     (length,) = struct.unpack_from("<Q", data)
     if length > min(_MAX_HEADER_BYTES, len(data) - 8):
         raise BundleError(f"{name}: has a header of impossible length.")
-    header = parse_json(data[8 : 8 + length], name)
+    header = parse_json(data[8 : 8 + length], name, BundleError)
     if not isinstance(header, dict):
         raise BundleError(f"{name}: its header is not an object.")
-    header.pop("__metadata__", None)
-    return header, 8 + length
+    entries = cast(dict[str, Any], header)
+    entries.pop("__metadata__", None)
+    return entries, 8 + length
 
 
 def _check_entry(entry: Any, dtype: str, shape: tuple[int, ...], where: str) -> tuple[int, int]:
     """Compares one header entry with the expectation; returns its byte span."""
-    if not isinstance(entry, dict) or set(entry) != {"dtype", "shape", "data_offsets"}:
+    given = cast(dict[str, Any], entry) if isinstance(entry, dict) else {}
+    if set(given) != {"dtype", "shape", "data_offsets"}:
         raise BundleError(f"{where} has a malformed header entry.")
-    if entry["dtype"] != dtype or entry["shape"] != list(shape):
-        found = f"{entry['dtype']} {entry['shape']}"[:60]
+    if given["dtype"] != dtype or given["shape"] != list(shape):
+        found = f"{given['dtype']} {given['shape']}"[:60]
         raise BundleError(f"{where} must be {dtype} {list(shape)}, not {found}.")
-    span = entry["data_offsets"]
-    if not isinstance(span, list) or len(span) != 2 or not all(type(x) is int for x in span):
+    offsets = given["data_offsets"]
+    span = cast(list[Any], offsets) if isinstance(offsets, list) else []
+    if len(span) != 2 or not all(type(x) is int for x in span):
         raise BundleError(f"{where} has malformed offsets.")
     size = int(np.prod(shape)) * _DTYPES[dtype].itemsize
     if span[0] < 0 or span[1] - span[0] != size:

@@ -23,7 +23,7 @@ class Portrait:
         size: Longest short side of the pictures in pixels.
         refine: Correct the poses by the pictures of the whole head, a minute or more.
         consent: What the person agreed to; goes into the avatar's manifest.
-        licence: Licence of the recording; likewise.
+        licence: Licence of the recording; goes into the avatar's manifest.
         device: Where the poses are corrected: by default with CUDA where that works, else on the
             CPU.
     """

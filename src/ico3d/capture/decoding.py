@@ -17,7 +17,7 @@ def decoded(source: Path | bytes, what: str) -> np.ndarray:
 
     Args:
         source: A file, or what one holds.
-        what: Which picture, for the error.
+        what: What an error calls the picture.
 
     Returns:
         uint8 (H, W, 3) RGB, or (H, W, 4) where there is transparency.

@@ -12,8 +12,8 @@ class Finding:
 
     Attributes:
         what: What was examined.
-        level: How it is.
-        text: The finding.
+        level: `ok`, or how bad it is.
+        text: The finding in words.
     """
 
     what: str
@@ -28,7 +28,7 @@ def missing_and_damaged(
 
     Args:
         what: What was examined.
-        total: How many there should be.
+        total: How many files there should be.
         missing: (camera, frame) of those that are not there; a capture may lack views.
         damaged: (camera, frame) of those that cannot be pictures.
     """

@@ -14,8 +14,8 @@ class View:
     """One picture of one frame.
 
     Attributes:
-        camera_index: Which camera took it.
-        frame: Which frame.
+        camera_index: Number of the camera that took the picture.
+        frame: Number of the frame.
         camera: That camera, in the space of what is trained.
     """
 

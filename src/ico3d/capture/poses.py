@@ -48,7 +48,7 @@ def rigid(matrix: np.ndarray, what: str) -> np.ndarray:
     """A (4, 4) pose, its rotation made exact.
 
     Args:
-        matrix: As the file has it.
+        matrix: (4, 4) or (3, 4) as the file has it.
         what: Whose pose it is, for the error.
 
     Returns:

@@ -22,7 +22,7 @@ class Video:
     Attributes:
         path: The file.
         width: Width in pixels of what `frames` gives, display rotation applied.
-        height: Height likewise.
+        height: Height in pixels of what `frames` gives, display rotation applied.
         scale: Pixels given over pixels of the file.
         announced: Pictures the file says it has; 0 where it does not say.
         rate: Pictures per second it says it has on average; 0 where it does not say.

@@ -29,7 +29,7 @@ from ico3d.chat.parts import Avatar, Parts, make_aside
 from ico3d.chat.performing.expression import ExpressionProcessor
 from ico3d.chat.performing.face import Face
 from ico3d.chat.performing.gestures import Gestures
-from ico3d.chat.remote.mouth import RemoteMouth
+from ico3d.chat.performing.remote_mouth import RemoteMouth
 from ico3d.chat.services.voice.clauses import ClauseProcessor
 from ico3d.chat.services.voice.markup import speakable
 from ico3d.chat.settings.conversation import ChatSettings

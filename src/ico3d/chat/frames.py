@@ -38,7 +38,7 @@ class UtteranceEndFrame(DataFrame):
 
     Parameters:
         utterance: Which answer.
-        samples: Its length at 24 kHz.
+        samples: Length of its sound at 24 kHz.
     """
 
     utterance: int

@@ -69,7 +69,7 @@ class Parts:
         recognition: Speech to text.
         language: Question to answer.
         voice: Text to speech.
-        services: Their names, as the page is told.
+        services: Names of the three services, as the page is told.
         dictation: How the browser is to recognise speech; None where the server does.
     """
 

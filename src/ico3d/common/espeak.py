@@ -3,6 +3,9 @@
 The library (GPL-3) comes with the package `espeakng-loader` and is loaded when first used.
 """
 
+# pyright: reportMissingTypeStubs=false
+# (espeakng_loader is untyped)
+
 import _ctypes
 import contextlib
 import ctypes
@@ -10,9 +13,10 @@ import os
 import shutil
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -84,7 +88,7 @@ class Speech:
 
 
 @contextlib.contextmanager
-def _library() -> Iterator[tuple[ctypes.CDLL, int]]:
+def _library() -> Generator[tuple[ctypes.CDLL, int], None, None]:
     """A fresh instance of the library and its sample rate.
 
     espeak-ng carries phases from one utterance into the next, so that the same text sounds
@@ -135,7 +139,7 @@ def synthesize(
     blocks: list[np.ndarray] = []
     marks: list[tuple[int, str]] = []
 
-    def receive(samples, count, events):
+    def receive(samples: Any, count: int, events: Any) -> int:
         if count > 0:
             blocks.append(np.ctypeslib.as_array(samples, (count,)).copy())
         marks.extend(_phoneme_marks(events))
@@ -156,9 +160,9 @@ def synthesize(
     return Speech(samples, sample_rate, _timed(marks, samples, sample_rate))
 
 
-def _phoneme_marks(events) -> list[tuple[int, str]]:
+def _phoneme_marks(events: Any) -> list[tuple[int, str]]:
     """(sample, symbol) of the phonemes in one block's list of events."""
-    marks = []
+    marks: list[tuple[int, str]] = []
     index = 0
     while events[index].type:
         if events[index].type == _PHONEME:

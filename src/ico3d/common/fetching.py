@@ -1,11 +1,14 @@
 """Downloads weights: checked, atomic, with a progress bar; an interrupted one goes on."""
 
+# pyright: reportUnknownMemberType=false
+# (huggingface_hub leaves its options untyped)
+
 import contextlib
 import hashlib
 import os
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from http.client import HTTPException
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -117,7 +120,9 @@ def _write(read: Callable[[int], bytes], part: Path, have: int, total: int | Non
 
 
 @contextlib.contextmanager
-def _progress(name: str, have: int, total: int | None) -> Iterator[Callable[[int], None]]:
+def _progress(
+    name: str, have: int, total: int | None
+) -> Generator[Callable[[int], None], None, None]:
     """A bar; gives what moves it on by some bytes."""
     from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn
     from rich.progress import TimeRemainingColumn as Remaining

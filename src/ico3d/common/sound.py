@@ -4,6 +4,9 @@ A header of 44 bytes may claim any rate and any length: two kilobytes at 1 Hz ar
 sound, and 100 MB of samples. Every entrance of sound asks `fault` first.
 """
 
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
+# (soundfile is untyped)
+
 import struct
 import wave
 from dataclasses import dataclass

@@ -5,6 +5,10 @@ server does meanwhile: in the first moments of a sentence, with 0.7 s of sound t
 some 0.2 s.
 """
 
+# pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
+# pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
+# (pocketsphinx is untyped)
+
 import asyncio
 import signal
 import struct

@@ -108,7 +108,7 @@ class HeadDensity:
         self._stats = DensityStats.zeros(len(model), model.means.device)
 
     def tensors(self) -> dict[str, Tensor]:
-        """What has been gathered."""
+        """Gradients, and how many views gave them, since the last step of density control."""
         return {"gradient_sum": self._stats.gradient_sum, "views": self._stats.views}
 
     def restore(self, tensors: dict[str, Tensor]) -> None:

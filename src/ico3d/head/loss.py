@@ -20,7 +20,7 @@ class HeadLoss:
     """λ_1·L1 + λ_s·(1 − SSIM) + λ_p·VGG, and a term on alpha where masks exist.
 
     Attributes:
-        settings: What is really used.
+        settings: The settings, with the perceptual term off where VGG's weights are missing.
     """
 
     def __init__(self, settings: HeadSettings, device: torch.device):
@@ -56,9 +56,9 @@ class HeadLoss:
         """The loss of one picture.
 
         Args:
-            rendering: One camera's.
+            rendering: The picture of one camera.
             target: (H, W, 3) in [0, 1].
-            picture: What the target was made of.
+            picture: The recorded picture and masks that the target was made of.
             step: Number of the optimisation step.
 
         Returns:

@@ -32,7 +32,7 @@ class TrainedHead:
 
     Attributes:
         model: The Gaussians.
-        inputs: What drives it.
+        inputs: What drives the head: `speech` or `blendshapes`.
         blendshape_names: B names for `blendshapes`, else empty.
         encoder: Name of the speech encoder for `speech`, else empty.
         encoder_sha256: Of its weights: an adaptor fits no other.
@@ -165,7 +165,7 @@ def _eyes(values: dict | None) -> EyeRange:
 
     Raises:
         ValueError: If it is something else.
-        KeyError, TypeError: Likewise.
+        KeyError, TypeError: If values are missing or no lists.
     """
     if values is None:
         return EyeRange()

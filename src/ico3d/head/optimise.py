@@ -147,9 +147,9 @@ class HeadTrainer:
         return self._views[self._order[place]]
 
     def _staged(self, view: View, picture: Picture, index: int) -> tuple[Tensor, Tensor]:
-        """What to render over, and the picture over the same.
+        """The background to render over, and the recorded picture over that background.
 
-        Without a clean background, that is a random colour: no Gaussian can pass for background.
+        Where there is no clean plate, it is a random colour: no Gaussian can pass for background.
         """
         rng = np.random.default_rng([self._seed, index, 1])
         plate = self._pictures.background(view, picture.image.device)

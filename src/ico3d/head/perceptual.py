@@ -16,7 +16,7 @@ CHANNELS = (64, 64, 0, 128, 128, 0, 256, 256, 256)
 """Output channels of the convolutions up to relu3_3; 0 is a 2×2 max pooling."""
 
 MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
-"""Of ImageNet's colours."""
+"""Mean and standard deviation of ImageNet's colours, with which VGG was trained."""
 
 TAPS = (3, 8, 15)
 """Layers whose outputs are compared: relu1_2, relu2_2, relu3_3."""

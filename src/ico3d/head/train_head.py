@@ -59,7 +59,7 @@ def train_head(
     Args:
         capture: Where pictures, poses and expressions come from.
         folder: Model folder; also holds metrics and checkpoints.
-        job: What to train.
+        job: Inputs, variant, seed and settings.
         watch_port: Where a page shows the training while it lasts; None for nowhere.
         device: Where to compute; a run may go on elsewhere.
 

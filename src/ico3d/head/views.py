@@ -41,7 +41,7 @@ class Picture:
 def staged(
     picture: Picture, plate: Tensor | None, color: Tensor | None = None
 ) -> tuple[Tensor, Tensor]:
-    """What to render over, and the picture over the same: so the two compare.
+    """The background to render over, and the recorded picture over that background.
 
     Args:
         picture: What was recorded.

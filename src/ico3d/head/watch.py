@@ -86,7 +86,7 @@ class WatchedHead:
         return self._track.at(self._numbers[frame])
 
     def _found_sliders(self) -> list[Slider]:
-        """Those that move most first."""
+        """Sliders for the inputs that move in the recording, those that move most first."""
         frames = spread(self.frames, SAMPLES)
         expressions = torch.stack([self._expression(frame) for frame in frames])  # (S, B)
         motion = expressions.std(0, correction=0)  # (B,)

@@ -212,11 +212,11 @@ def _measured(
 def picture_scores(
     predicted: np.ndarray, truth: Truth, device: torch.device = CPU
 ) -> PictureScores:
-    """What one picture is worth.
+    """Metrics of one picture.
 
     Args:
         predicted: (H, W, 3) in [0, 1].
-        truth: What it should be.
+        truth: The recorded picture.
         device: Where LPIPS is computed.
     """
     scores = Scores({name: [] for name in QUALITY})

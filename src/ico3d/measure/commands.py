@@ -235,7 +235,7 @@ class BenchBody:
         subject: The person of the standard recording, an .npz file.
         folder: Where the recording and the trainings lie.
         seeds: How often each method is trained.
-        methods: Which.
+        methods: The methods to train.
         frames: Only so many of the first frames; all by default.
         finetune: Fine-tune SWinGS++ in the end, and measure before and after; the table shows it
             as it was before.

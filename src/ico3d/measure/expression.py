@@ -42,10 +42,10 @@ Hears = Callable[[np.ndarray, int], np.ndarray]
 
 @dataclass(frozen=True)
 class Recording:
-    """What a person said.
+    """A recording of a person who speaks.
 
     Attributes:
-        name: Of the file.
+        name: Name of the file.
         samples: (S,) at 16 kHz in [-1, 1].
         opening: (T,) how far the lips are open at i/25 s, 0 to 1, by forced alignment.
     """
@@ -57,7 +57,7 @@ class Recording:
 
 @dataclass(frozen=True)
 class Subject:
-    """What is measured.
+    """A speech model that is measured.
 
     Attributes:
         model: As a server runs it; encoders without an avatar have a random adaptor.

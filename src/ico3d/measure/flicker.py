@@ -51,7 +51,7 @@ def masked_difference(
 
     Args:
         first: (H, W, 3), before black.
-        second: Likewise.
+        second: (H, W, 3) the other picture.
         first_alpha: (H, W).
         second_alpha: (H, W).
     """

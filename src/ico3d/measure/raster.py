@@ -147,7 +147,7 @@ class Comparison:
     """Both rasterisers on one scene.
 
     Attributes:
-        gaussians: How many.
+        gaussians: Number of Gaussians in the scene.
         size: Image width and height in pixels.
         pairs: Splats times tiles that ours draws: what its cost should be proportional to.
         ours_binning_ms: Medians, as are those below.
@@ -192,12 +192,12 @@ class Comparison:
 
     @property
     def theirs_total_ms(self) -> float:
-        """The same of theirs."""
+        """Milliseconds of the opponent's picture and gradients."""
         return self.theirs_forward_ms + self.theirs_backward_ms
 
     @property
     def ratio(self) -> float:
-        """All of it, ours / theirs."""
+        """`ours_total_ms` / `theirs_total_ms`."""
         return self.ours_total_ms / self.theirs_total_ms
 
     def figures(self) -> dict[str, Any]:

@@ -97,7 +97,7 @@ def scene_on_points(
         points: (N, 3) metres.
         colors: (N, 3) in [0, 1].
         degree: Of the harmonics; those above 0 begin at 0.
-        opacity: Of all.
+        opacity: Opacity that all Gaussians begin with.
         scale: Size relative to the distance of neighbours.
     """
     count = len(points)

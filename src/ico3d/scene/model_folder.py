@@ -23,7 +23,7 @@ class TrainedScene:
     Attributes:
         scene: The Gaussians.
         only: What of the pictures it was trained on.
-        frames: Which frames.
+        frames: The frames that it was trained on.
         space: Where it lies: the capture's world, or canonical head space.
         summary: How it was made: provenance of the capture, seconds of training, settings.
     """

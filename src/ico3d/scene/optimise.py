@@ -89,7 +89,7 @@ class SceneTrainer:
         return named | {f"density.{name}": t for name, t in self._strategy.tensors().items()}
 
     def place(self, name: str) -> torch.device:
-        """All are where the scene is."""
+        """Every tensor of a checkpoint belongs on the scene's device."""
         del name
         return self.scene.device
 

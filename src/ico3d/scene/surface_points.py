@@ -28,7 +28,7 @@ CAMERA_MARGIN = 1.1
 
 @dataclass(frozen=True)
 class Start:
-    """What training begins with.
+    """What the training of a scene begins with.
 
     Attributes:
         scene: The Gaussians.

@@ -44,7 +44,7 @@ def train_scene(
     Args:
         capture: Where the pictures come from.
         folder: Model folder; also holds metrics and checkpoints.
-        job: What to train.
+        job: Which part of the pictures, which frames, seed and settings.
         device: Where to compute; a run may go on elsewhere.
 
     Returns:

@@ -24,7 +24,7 @@ The usual rule for static scenes (LLFF's)."""
 
 @dataclass(frozen=True)
 class Example:
-    """What one picture asks of a scene.
+    """A recorded picture as a scene learns from it.
 
     Attributes:
         target: (H, W, 3) what the rendering should be.
@@ -37,7 +37,7 @@ class Example:
     weight: Tensor | None
 
     def to(self, device: torch.device) -> "Example":
-        """The same on another device."""
+        """This example on another device."""
         parts = (self.target, self.behind, self.weight)
         return Example(*(None if part is None else part.to(device) for part in parts))  # type: ignore[arg-type]
 
@@ -51,7 +51,7 @@ class SceneViews:
 
     Attributes:
         path: Where the capture lies.
-        only: What of the pictures is wanted.
+        only: Which part of the pictures counts: the person, the background, or all.
         space: Where the scene lies.
         train: Views to learn from.
         test: Views to measure with: the capture's test frames, or of a single moment every 8th.
@@ -109,7 +109,7 @@ class SceneViews:
         return self._known_plates[index]
 
     def example(self, view: View, color: np.ndarray) -> Example:
-        """What a view asks for.
+        """The picture of a view, as the scene learns from it.
 
         Args:
             view: One of `train` or `test`.

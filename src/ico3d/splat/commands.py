@@ -36,6 +36,6 @@ class Convert:
 
 
 def _line(path: Path, kind: str, count: int, degree: int) -> str:
-    """What a file holds, in one line."""
+    """What a file of Gaussians holds, in one line."""
     size = path.stat().st_size
     return f"{path}: {kind}, {count:,} Gaussians, SH degree {degree}, {size:,} bytes"

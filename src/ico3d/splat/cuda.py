@@ -1,8 +1,14 @@
 """The CUDA side of `splat.render`: gsplat under the same contract."""
 
+# pyright: reportMissingImports=false, reportUnknownMemberType=false
+# pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
+# pyright: reportUnknownParameterType=false, reportUnknownLambdaType=false
+# (gsplat is untyped, and not installed everywhere)
+
 import re
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import torch
@@ -89,7 +95,7 @@ def draw_gaussians(
     rasterization = _rasterization()
     intrinsics = np.stack([camera.intrinsics for camera in cameras])  # (C, 3, 3)
 
-    def rasterise(mode: str) -> tuple[Tensor, Tensor, dict]:
+    def rasterise(mode: str) -> tuple[Tensor, Tensor, dict[str, Any]]:
         return rasterization(
             gaussians.means,
             gaussians.quats,

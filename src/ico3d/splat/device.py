@@ -1,5 +1,8 @@
 """Where to compute: the one place that decides, by trying."""
 
+# pyright: reportUnknownMemberType=false
+# (torch leaves some of its functions untyped)
+
 import sys
 from functools import cache
 

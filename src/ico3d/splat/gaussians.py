@@ -1,5 +1,9 @@
 """The Gaussian primitive: activated parameters, ready to render."""
 
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+# (torch leaves some of its functions untyped)
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 

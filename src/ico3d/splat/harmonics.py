@@ -1,5 +1,9 @@
 """Real spherical harmonics up to degree 3, in the order and with the signs of 3D Gaussian files."""
 
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+# (torch leaves some of its functions untyped)
+
 import torch
 from torch import Tensor
 

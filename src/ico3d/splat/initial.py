@@ -1,5 +1,9 @@
 """Round Gaussians on surface points: where every training starts."""
 
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false, reportMissingTypeStubs=false
+# (scipy is untyped)
+
 import math
 from collections.abc import Sequence
 

@@ -1,5 +1,12 @@
 """Image losses: L1 and SSIM (paper eq. 2 and 5, with 1 − SSIM)."""
 
+# pyright: reportIncompatibleMethodOverride=false, reportUnknownMemberType=false
+# pyright: reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+# (torch leaves some of its functions untyped)
+
+from typing import Any
+
 import torch
 from torch import Tensor
 from torch.autograd.function import once_differentiable
@@ -21,7 +28,7 @@ def ssim(rgb: Tensor, target: Tensor) -> Tensor:
 
     Args:
         rgb: (..., H, W, 3) in [0, 1].
-        target: Of the same shape.
+        target: Shaped as `rgb`.
 
     Returns:
         A scalar, 1 for equal images.
@@ -61,7 +68,7 @@ class _CpuSsim(torch.autograd.Function):
     """The fused kernel; the gradient is made along with the value."""
 
     @staticmethod
-    def forward(ctx, images, targets):
+    def forward(ctx: Any, images: Tensor, targets: Tensor) -> Tensor:
         from ico3d.splat.cpu.ssim import ssim_with_gradient
 
         pairs = zip(images.detach().contiguous(), targets.contiguous(), strict=True)
@@ -74,7 +81,7 @@ class _CpuSsim(torch.autograd.Function):
 
     @staticmethod
     @once_differentiable
-    def backward(ctx, g_value):
+    def backward(ctx: Any, g_value: Tensor) -> tuple[Tensor, None]:
         return ctx.gradient * g_value, None
 
 

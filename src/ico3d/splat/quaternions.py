@@ -1,5 +1,8 @@
 """Rotations as quaternions wxyz."""
 
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
+# (torch leaves some of its functions untyped)
+
 import torch
 from torch import Tensor
 

@@ -8,6 +8,9 @@ can be drawn without it). A splat ends where its alpha is under
 is drawn. The projection's Jacobian is taken at most 0.3 half images outside of the picture.
 """
 
+# pyright: reportUnknownMemberType=false
+# (torch leaves some of its functions untyped)
+
 from collections.abc import Sequence
 
 import numpy as np
@@ -88,7 +91,7 @@ def _poses(cameras: Sequence[Camera], world_to_camera: Tensor | None) -> Tensor:
 
 
 def _sound(gaussians: Gaussians) -> Gaussians:
-    """The same, but what is not finite made into something that nobody sees."""
+    """The Gaussians; those with values that are not finite become some that nobody sees."""
     sound = gaussians.drawable()
     if bool(sound.all()):
         return gaussians

@@ -1,5 +1,8 @@
 """What a render gives."""
 
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
+# (torch leaves some of its functions untyped)
+
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -62,7 +65,7 @@ class Drawing:
         rgb: (C, H, W, 3).
         alpha: (C, H, W).
         draw_depth: Gives (C, H, W), depth weighted by what each splat contributes.
-        info: For density control.
+        info: Where and how large the splats are, for density control.
     """
 
     rgb: Tensor
@@ -78,7 +81,7 @@ class Rendering:
     Attributes:
         rgb: (C, H, W, 3), over the background.
         alpha: (C, H, W): how much of the background is hidden.
-        drawing: The same on black.
+        drawing: The picture on black, and what was needed for it.
     """
 
     rgb: Tensor
@@ -87,7 +90,7 @@ class Rendering:
 
     @property
     def info(self) -> RenderInfo:
-        """What density control needs."""
+        """Where and how large the splats are, with their gradients: density control needs both."""
         return self.drawing.info
 
     @cached_property

@@ -32,7 +32,7 @@ from ico3d.studio.studio import Studio, backdrop
 
 POINTS = 6000
 BODY_POINTS = 4000
-"""In each frame."""
+"""Surface points that are written for each frame of a whole person."""
 UNFINISHED = "unfinished.json"
 """Settings of a recording that has not come to its end."""
 
@@ -76,7 +76,7 @@ class Recording:
 
 
 def record(recording: Recording, out: Path, workers: int) -> None:
-    """Records a person; the same call goes on where an earlier one was cut off.
+    """Records a person; a call with unchanged arguments goes on where an earlier one was cut off.
 
     Args:
         recording: What to record.

@@ -44,7 +44,7 @@ def cameras_of(subject: Subject, rig: str, count: int, size: int) -> tuple[Camer
     Args:
         subject: Its rest pose places the arcs.
         rig: One of `RIGS`.
-        count: How many.
+        count: How many cameras.
         size: Height of the pictures in pixels; those of a head are as wide.
     """
     if rig == "body":
@@ -73,7 +73,7 @@ def camera_arc(subject: Subject, rig: str, count: int, size: int) -> tuple[Camer
     Args:
         subject: Its rest pose places the rig.
         rig: One of `ARCS`.
-        count: How many.
+        count: How many cameras.
         size: Width and height of the pictures.
     """
     framing = ARCS[rig]

@@ -45,8 +45,8 @@ class Figure:
     """A person in one frame, as every camera sees them.
 
     Attributes:
-        scene: In canonical head space.
-        lights: As that space sees them.
+        scene: What is drawn, in canonical head space.
+        lights: The studio's lamps, in canonical head space.
         world_from_head: (4, 4).
     """
 
@@ -101,7 +101,7 @@ class Studio:
         return Figure(self._scene(vertices), lights, world_from_head)
 
     def picture(self, camera: Camera, figure: Figure) -> tuple[np.ndarray, np.ndarray]:
-        """One picture.
+        """Draws one picture.
 
         Returns:
             rgb (H, W, 3) float32 display values premultiplied by alpha, and alpha (H, W) float32,

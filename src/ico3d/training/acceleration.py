@@ -14,7 +14,7 @@ from ico3d.errors import SettingsError
 def accelerated(
     network: Callable[..., Tensor], device: torch.device, mixed_precision: bool, compiled: bool
 ) -> Callable[..., Tensor]:
-    """A network that computes the same, faster.
+    """A copy of a network that computes what the network does, faster.
 
     Only the network is touched: kernels and losses stay in float32, and so do the parameters,
     their gradients and what the network gives. bfloat16 has the range of float32, so that no loss

@@ -54,7 +54,7 @@ class Watch(Protocol):
 
 @dataclass(frozen=True)
 class LoopSettings:
-    """How long and how often.
+    """How many steps a loop makes, and how often it writes something.
 
     Attributes:
         steps: Optimisation steps.
@@ -75,9 +75,9 @@ def run_loop(
     """Runs all steps that are left; the caller marks the run finished.
 
     Args:
-        trainee: What to optimise.
+        trainee: The model with its optimiser.
         run: Where its checkpoint and metrics lie.
-        settings: How long and how often.
+        settings: How many steps, and how often something is written.
         watch: Told after each step; its time does not count.
 
     Returns:

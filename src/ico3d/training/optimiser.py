@@ -44,7 +44,7 @@ class Optimiser:
         Args:
             name: Key of its moments.
             value: The parameter, any shape, contiguous.
-            gradient: Of the same shape.
+            gradient: Shaped as the parameter.
             rate: Learning rate.
             weight_decay: Factor of the parameter added to its gradient (L2).
 

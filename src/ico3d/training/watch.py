@@ -25,7 +25,7 @@ HOST = "127.0.0.1"
 PERIOD = 1.0
 """Seconds between two updates of the page."""
 ANSWER = 0.1
-"""The same after somebody has moved something."""
+"""Seconds between two pictures after somebody has moved something."""
 
 RADIUS = 10.0
 """What the page shows is as large, in units of its scene: viser keeps covariances as 16-bit floats,
@@ -57,7 +57,7 @@ class Watchable(Protocol):
 
     Attributes:
         frames: How many frames there are to choose from.
-        sliders: What else can be changed.
+        sliders: Inputs besides the frame that a visitor can change.
     """
 
     frames: int

@@ -20,7 +20,8 @@ from ico3d.chat.wire.protocol import (
     Timeline,
 )
 from ico3d.errors import SettingsError
-from ico3d.measure.talking.page import Player, open_page
+from ico3d.measure.talking.page import open_page
+from support.chat.pages import FollowingPlayer
 from support.chat.serving import serving
 
 ANIMATION = Animation(
@@ -202,28 +203,6 @@ async def test_nothing_of_a_stopped_motion_follows_its_stop(person):
         await page.wait(Speech, since, where=lambda m: m.utterance == 1)
         assert {m.utterance for m in page.messages(Timeline, since)} <= {1}
         await page.close()
-
-
-class FollowingPlayer(Player):
-    """Its body stands at the rest's begin until it is told where to go."""
-
-    def __init__(self):
-        super().__init__()
-        self.points = []
-
-    def take(self, message, now):
-        super().take(message, now)
-        if isinstance(message, Timeline) and message.utterance == self.utterance:
-            self.points += message.points
-        elif isinstance(message, Stop):
-            self.points = []
-
-    def clock(self, now):
-        clock = super().clock(now)
-        if clock is None or not self.points:
-            return clock
-        place = float(np.interp(clock.position, *np.array(self.points).T))
-        return Clock(clock.utterance, clock.position, place)
 
 
 def test_the_settings_can_hold_the_body(tmp_path):

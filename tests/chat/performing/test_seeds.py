@@ -11,7 +11,7 @@ from support.chat.guests import Guest, open_sessions
 from support.chat.virtual_time import run
 
 
-def test_two_visitors_see_the_same_lips_and_other_brows(bundle, monkeypatch):
+def test_two_visitors_see_the_same_lips_and_other_brows(bundle):
     async def talk():
         async with open_sessions(bundle, Script(0, 0, 0).services(), ChatSettings()) as sessions:
             guests = [await Guest.enter(sessions) for _ in range(2)]
@@ -24,7 +24,7 @@ def test_two_visitors_see_the_same_lips_and_other_brows(bundle, monkeypatch):
                 await guest.leave()
             return faces
 
-    one, other = run(monkeypatch, talk())
+    one, other = run(talk())
     eyes = bundle.manifest.head.eye_offset
     assert len(one) > 50
     np.testing.assert_array_equal(one[:, :eyes], other[:, :eyes])

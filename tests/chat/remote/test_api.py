@@ -12,35 +12,23 @@ import pytest
 from pipecat.frames.frames import ErrorFrame, LLMContextFrame, LLMTextFrame
 from pipecat.processors.frame_processor import FrameProcessor
 
-from ico3d.bundle.manifest import Persona
 from ico3d.chat.remote.limits import Limits
 from ico3d.chat.remote.recognition import read_wav
-from ico3d.chat.services.language import persona
-from ico3d.chat.services.provider import Context
-from ico3d.chat.services.recognition import sphinx
 from ico3d.chat.services.voice import espeak
 from ico3d.errors import ProtocolError
-from support.chat.remote import service_app, serving
+from support.chat.remote import (
+    make_language,
+    make_recognition,
+    make_voice,
+    service_app,
+    serving,
+)
 
-ADA = Persona("Ada", "Hello.", ("who are you => I am Ada. I live in a box. Grüße, 你好!",))
-CONTEXT = Context(ADA, None, None)
 TEXT = "I am Ada. I live in a box."
 
 
 def client(url, **more):
     return openai.AsyncOpenAI(base_url=f"{url}v1", api_key="none", max_retries=0, **more)
-
-
-def make_voice():
-    return espeak.make(espeak.Settings(), CONTEXT)
-
-
-def make_language():
-    return persona.make(persona.Settings(), CONTEXT)
-
-
-def make_recognition():
-    return sphinx.make(sphinx.Settings(), CONTEXT)
 
 
 def wav(pcm, rate=16_000, channels=1, width=2):

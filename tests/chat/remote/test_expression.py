@@ -10,8 +10,8 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from ico3d.bundle.format import SPEECH
+from ico3d.chat.performing.remote_mouth import AVOIDED, RemoteMouth
 from ico3d.chat.remote.limits import Limits
-from ico3d.chat.remote.mouth import AVOIDED, RemoteMouth
 from ico3d.chat.settings.conversation import ChatSettings, Expression
 from ico3d.chat.wire.protocol import End, Speech, Text
 from ico3d.measure.talking.page import open_page

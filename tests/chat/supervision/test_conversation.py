@@ -13,10 +13,14 @@ from ico3d.chat.settings.conversation import ChatSettings, Choice, Patience
 from ico3d.chat.supervision.apologies import APOLOGIES
 from ico3d.chat.wire.protocol import Answer, End, Error, Speech, State, Text
 from ico3d.measure.talking.page import open_page
-from support.chat.remote import service_app, serving
+from support.chat.remote import (
+    make_language,
+    make_recognition,
+    make_voice,
+    service_app,
+    serving,
+)
 from support.chat.serving import serving as serving_avatar
-
-from ..remote.test_api import make_language, make_recognition, make_voice
 
 SORRY = {failed: sentence.split(". ")[0] + "." for failed, sentence in APOLOGIES["en"].items()}
 NO_VOICE = espeak.spoken(APOLOGIES["en"]["voice"], "en-us", espeak.Settings().rate)

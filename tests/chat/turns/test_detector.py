@@ -1,7 +1,6 @@
 """What real Silero hears of synthetic and real voices, measured in the microphone's own time."""
 
 import wave
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +14,8 @@ from ico3d.chat.turns.phrases import phrases
 from ico3d.chat.wire.protocol import MICROPHONE_CHUNK as PIECE
 from ico3d.chat.wire.protocol import MICROPHONE_RATE as RATE
 from ico3d.common.espeak import synthesize
+from support.shared import SPEECH
 
-SPEECH = Path(__file__).parents[4] / "shared" / "speech"
 VOICES = ("en-us", "en-us+f3", "en-us+m3", "en-us+m7")
 FADE = 0.02  # s that the page takes to fall silent
 

@@ -19,10 +19,9 @@ from ico3d.chat.wire.codec import (
     decode_client,
     decode_server,
     encode,
-    field_types,
-    kind_of,
     tensor_of,
 )
+from ico3d.common.typed import field_types, kind_of
 from ico3d.errors import ProtocolError
 
 

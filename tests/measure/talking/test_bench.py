@@ -3,7 +3,6 @@
 import json
 import os
 import wave
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +14,7 @@ from ico3d.measure.talking.bench import SCRIPT, TURNS, Results, figures, share
 from ico3d.measure.talking.page import Player
 from ico3d.measure.talking.questions import audible, broken_off, sayings
 from ico3d.measure.talking.trials import Assent, Interruption, Question, sound_of
-
-SPEECH = Path(__file__).parents[4] / "shared" / "speech"
+from support.shared import SPEECH
 
 
 def question(arrival, turn=100.0):

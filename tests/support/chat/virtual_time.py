@@ -14,6 +14,7 @@ import time
 from unittest import mock
 
 CALENDAR = 1.7e9  # s: what `time.time` shows at 0
+TICK = 1e-6  # s that every wait takes: what is shorter than a number's last digit would never end
 DELIVERY = 0.0005  # s of real time within which what one socket sent has reached another
 
 
@@ -46,6 +47,9 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
     def time(self):
         return self.now
+
+    def call_later(self, delay, callback, *args, context=None):
+        return super().call_later(max(delay, TICK), callback, *args, context=context)
 
     def run_forever(self):
         clocks = {

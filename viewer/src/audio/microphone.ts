@@ -24,15 +24,15 @@ export class Microphone {
     return this.recording !== null;
   }
 
-  /** What it records; null while it is closed. */
+  /** The sound of the device; null while the microphone is closed. */
   get track(): MediaStreamTrack | null {
     return this.recording?.track ?? null;
   }
 
   /**
-   * Asks for the microphone and opens it; whoever starts it meanwhile waits for the same.
+   * Asks for the microphone and opens it; calls that come while it opens wait for the same opening.
    *
-   * @returns whether it is open: not if it was stopped meanwhile
+   * @returns whether it is open: false if `stop` was called while it opened
    * @throws PageError saying what the visitor can do about it
    */
   start(): Promise<boolean> {

@@ -33,8 +33,8 @@ export class Recording {
   /**
    * Asks for the microphone and waits for its first sound.
    *
-   * @param onEnd it has closed by itself
-   * @param stopped closes it, now or later
+   * @param onEnd called when the recording has closed by itself
+   * @param stopped closes the recording, now or later
    * @throws PageError saying what the visitor can do about it
    */
   static async open(onChunk: OnChunk, onEnd: (error: PageError) => void, stopped: AbortSignal): Promise<Recording> {
@@ -87,7 +87,7 @@ export class Recording {
     this.onChunk(pcm, performance.now() - 1000 * age);
   }
 
-  /** From here on it ends by itself when the device, the browser or the worklet does. */
+  /** From here on the recording ends by itself when the device, the browser or the worklet fails. */
   private guard(onEnd: (error: PageError) => void): void {
     this.fail = (error) => {
       this.close();

@@ -13,7 +13,7 @@ export type Piece = Omit<SpeechMessage, 'type' | 'index'>;
 export interface Sink {
   /** The first frame for which something can still be scheduled. */
   now(): number;
-  /** Plays sound from a frame on; gives what ends it on another. */
+  /** Plays sound from a frame on; returns a function that ends it on the frame it is given. */
   play(pcm: Int16Array, start: number): (end: number) => void;
   /** Changes the volume from a frame on, within FADE frames. */
   fade(from: number, to: number, start: number): void;

@@ -83,7 +83,7 @@ export class Body implements Actor {
     await this.ready();
   }
 
-  /** How long before a window may be seen it has to be sorted, s. */
+  /** A window takes part in sorting from so many seconds before it may be seen. */
   private get soon(): number {
     const sorts = Math.max(...this.watches.map(({ took }) => took));
     return Math.max(WAKE, (MARGIN * sorts) / 1000);
@@ -93,7 +93,7 @@ export class Body implements Actor {
     this.objects[slot].hold(content);
   }
 
-  /** The slot that is not seen waits where it will appear: at its end next to the present. */
+  /** Poses the window in a slot: the seen one as it is now, the other one as it will be when it appears. */
   private pose(slot: Slot): boolean {
     const window = this.slots.windowIn(slot);
     if (window === null) return false;

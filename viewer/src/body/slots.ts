@@ -51,7 +51,7 @@ export class Slots<T> {
    * Decides what is seen of the body at a time, and gets what comes next.
    *
    * @param time s, of the body
-   * @param stops s: where it goes from there (`Motion.stops`)
+   * @param stops s: the times at which the body will turn around or stand (`Motion.stops`)
    * @param now s, of a clock that only runs forward
    * @returns null until the first window is there
    */
@@ -72,7 +72,7 @@ export class Slots<T> {
     return this.held[slot];
   }
 
-  /** What is wanted first and then: the way, and what is beside it, where motion may turn to. */
+  /** Windows in the order in which to fetch them: the wanted one, those on the body's way, those beside the wanted one. */
   private order(wanted: number, stops: readonly number[]): number[] {
     const { timeline } = this;
     return [...new Set([wanted, ...timeline.route(wanted, stops, AHEAD), ...timeline.beside(wanted)])];

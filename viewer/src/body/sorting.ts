@@ -1,4 +1,4 @@
-/** Of Spark: whether it sorts, and when the last sort began (ms, performance clock). */
+/** What a watch asks Spark: whether a sort runs now, and when the last one began (ms, performance clock). */
 export interface Sorter {
   readonly sorting: boolean;
   readonly lastSortTime: number;
@@ -11,7 +11,7 @@ const FORGETS = 0.8; // of how long a sort took, with every later one
  * that is drawn since, and end.
  */
 export class SortWatch {
-  /** ms that it took lately from the first picture of a change until it was sorted. */
+  /** How long it took lately from the first picture after a change until the sort of it had ended, ms. */
   took = Infinity;
   private readonly sorter: Sorter;
   private readonly now: () => number;

@@ -38,7 +38,7 @@ export class Timeline {
   /**
    * The windows that follow a window, at most `most`, on the way from stop to stop.
    *
-   * @param stops s; from one to the next it goes straight
+   * @param stops s: times at which the body turns around or stands; from one to the next it goes straight
    */
   route(window: number, stops: readonly number[], most: number): number[] {
     const route: number[] = [];

@@ -54,7 +54,7 @@ export class MotionDirector implements Motion {
     this.paths.set(utterance, path);
   }
 
-  /** A new session counts its utterances from the start. */
+  /** Drops all plans: a new session counts its utterances from 0. */
   reset(): void {
     this.paths.clear();
   }
@@ -88,7 +88,7 @@ export class MotionDirector implements Motion {
     this.glide.follow(time, spoken.paused ? 0 : pace, this.limit, step);
   }
 
-  /** What was planned before an utterance will not be heard any more. */
+  /** Begins an utterance: plans of earlier ones are dropped, for those will not be heard any more. */
   private begin(utterance: number): void {
     this.glide.leave();
     for (const old of this.paths.keys()) if (old < utterance) this.paths.delete(old);
@@ -102,7 +102,7 @@ export class MotionDirector implements Motion {
     this.glide.stand();
   }
 
-  /** From a gesture straight into the loop, to its far end. */
+  /** Goes back from a gesture into the rest loop, at first towards the loop's end that lies farther away. */
   private calm(): void {
     this.speaking = null;
     this.glide.leave();

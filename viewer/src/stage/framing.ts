@@ -2,7 +2,7 @@ import * as THREE from 'three';
 import type { StartCamera } from '../bundle/manifest.ts';
 import type { Sitter } from './sitter.ts';
 
-/** What there is to fill. */
+/** The shape of the picture that is to be filled. */
 export interface Picture {
   aspect: number; // width / height
   free: number; // share of the height, from above, that no control lies on
@@ -19,8 +19,8 @@ const ABOVE = 0.03; // m over the head
 const CHIN = 0.15; // m down from the eyes to under the chin
 
 /**
- * Head and chest, the eyes in the upper third, the face clear of all controls, nobody cut off where
- * there is more of them, and no empty space shown under those of whom only the head was recorded.
+ * Frames head and chest, the eyes in the upper third, the face clear of all controls. Under somebody
+ * of whom only the head was recorded, no empty space is shown.
  *
  * @param fov degrees, from top to bottom
  */

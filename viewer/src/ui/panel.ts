@@ -49,7 +49,7 @@ export class Panel {
     this.draw();
   }
 
-  /** One row for each part: its bar shows where in the whole it lies, as a rule. */
+  /** One row for each part of the latency; a bar shows which share of the whole it takes by its median, and after which parts. */
   private draw(): void {
     const parts = LATENCY_PARTS.map((part) => ({ name: NAMES[part], spread: this.latencies.spread(part) }));
     const heard = this.latencies.spread('heard');
@@ -83,7 +83,7 @@ export class Panel {
  * A row of the table.
  *
  * @param from where its bar begins, of the table's width
- * @param share how long it is
+ * @param share the bar's length, of the table's width
  */
 function makeRow(name: string, p50: number, p95: number, from: number, share: number): HTMLTableRowElement {
   const row = document.createElement('tr');

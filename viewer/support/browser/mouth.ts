@@ -30,11 +30,11 @@ export async function watchMouth(page: Page): Promise<void> {
   await drawSeldom(page);
   await page.evaluate(async (every) => {
     const FEATURES = 32; // of speech; those of the eyes follow
+    const SETTLED = 3; // pictures in a row that do not differ
     const { stage, head } = window.ico3d!;
     const { camera: start } = (await (await fetch('bundle/manifest.json')).json()) as Manifest;
     stage.orbit.look(start); // from there on nothing moves the camera
-    await stage.still(); // well sorted as seen from there
-    stage.start();
+    window.draw!(); // the camera's matrices are those of the last picture
     const record: NonNullable<Window['mouth']> = { sights: [], pictures: [] };
     window.mouth = record;
     const gl = stage.renderer.getContext();
@@ -69,7 +69,14 @@ export async function watchMouth(page: Page): Promise<void> {
       gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, rgba); // WebGL counts rows from below
       return rgba;
     };
-    const restPicture = lowerHalf();
+    let restPicture = lowerHalf();
+    for (let alike = 0; alike < SETTLED; ) {
+      // Splats are sorted aside: only then is this what is seen from there.
+      await new Promise((resolve) => setTimeout(resolve, 100));
+      const next = lowerHalf();
+      alike = next.every((level, i) => level === restPicture[i]) ? alike + 1 : 0;
+      restPicture = next;
+    }
     const change = () => {
       const differences = lowerHalf().map((level, i) => Math.abs(level - restPicture[i]!)).sort();
       const most = differences.subarray(-Math.ceil(differences.length / 100));

@@ -16,7 +16,7 @@ const SHORT =
 /** From a video of a person to an avatar that can be talked with: track, train, bake. */
 export function makePortrait(folder: string): string {
   const [capture, model, bundle] = ['capture', 'model', 'portrait.ico3d'].map((name) => join(folder, name));
-  ico3d('capture', 'portrait', CLIP, capture!, '--size', '256', '--no-refine');
+  ico3d('capture', 'portrait', CLIP, capture!, '--size', '128', '--no-refine');
   ico3d('train', 'head', capture!, model!, '--preset', 'cpu', ...SHORT.split(' '));
   // Forced: half a minute of training need not reach what avatars for people must.
   ico3d('bake', model!, capture!, bundle!, '--persona', PERSONA, '--force');

@@ -49,7 +49,7 @@ class Person(MovingBody, Protocol):
         ...
 
     def body_gaussians(self, seconds: float) -> Gaussians:
-        """The same without the head."""
+        """The person's body in the world at a time, without the head."""
         ...
 
 
@@ -60,7 +60,7 @@ class TrainedPerson:
     Attributes:
         body: What moves.
         avatar: What is seen; None for a body alone.
-        animation: Of the model's folder.
+        animation: What lies in the model's folder as `animation.json`; None where nothing does.
     """
 
     body: TrainedBody
@@ -83,7 +83,7 @@ class TrainedPerson:
         return self.avatar is not None
 
     def gaussians(self, seconds: float) -> Gaussians:
-        """With the head, if there is one."""
+        """Body and, if there is one, head in the world at a time."""
         return (self.avatar or self.body).gaussians(seconds)
 
     @torch.no_grad()

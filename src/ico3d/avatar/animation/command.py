@@ -138,8 +138,8 @@ def table(animation: "Animation", motion: "Motion", left_out: "Sequence[Action]"
     """The key frames as a table for the terminal, in the order of time.
 
     Args:
-        animation: What is played.
-        motion: Of the body.
+        animation: The rest loop and the actions that are played.
+        motion: How the body moves.
         left_out: Actions that are refused for how they look, or the way to them.
     """
     from rich.table import Table

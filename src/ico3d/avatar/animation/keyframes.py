@@ -60,7 +60,7 @@ class Motion:
         """Measures a body.
 
         Args:
-            body: Whose Gaussians are the same within a window.
+            body: The body; within a window its Gaussians stay the same ones.
             windows: What `window_places` yields, for callers that show how it goes.
         """
         speeds, places = [], []

@@ -45,8 +45,8 @@ def draw_sheet(
 
     Args:
         person: Who is animated.
-        animation: What is drawn.
-        motion: Of the person.
+        animation: The rest loop and the actions.
+        motion: How the person moves.
         left_out: Actions that are refused.
         cameras: Those of the recording, whose first one stands in front; None for the person's own
             front, or in a world with y up.
@@ -90,7 +90,7 @@ def key_frames(animation: Animation, left_out: Sequence[Action] = ()) -> dict[in
 
 
 def _colour(label: str) -> str:
-    """Of a picture's title."""
+    """Colour of a picture's title."""
     return REFUSED if "refused" in label else ACTION if "action" in label else REST
 
 

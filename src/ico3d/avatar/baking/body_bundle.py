@@ -59,9 +59,9 @@ class WindowResult:
     """A baked window, its file, and what it costs.
 
     Attributes:
-        window: What is drawn.
+        window: The baked window.
         data: The content of its file.
-        seconds: How long it plays.
+        seconds: How long the window plays.
         loss: Means over its pictures.
     """
 
@@ -72,7 +72,7 @@ class WindowResult:
 
     @property
     def bytes_per_gaussian(self) -> float:
-        """All of the file, over N."""
+        """Size of the window's file, divided by its number of Gaussians."""
         return len(self.data) / self.window.num_gaussians
 
     @property
@@ -125,7 +125,7 @@ def check(results: list[WindowResult]) -> None:
     """Refuses results that break a bound.
 
     Raises:
-        BundleError: With what was measured.
+        BundleError: If loss or size break a bound; the sentence says what was measured.
     """
     for index, result in enumerate(results):
         if not result.acceptable:

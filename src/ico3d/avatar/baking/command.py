@@ -172,7 +172,7 @@ class Bake:
         person_bundle.write(self._out, avatar, result, animation, body_capture, about)
 
     def _capture(self, index: int) -> "Capture | None":
-        """The one that was named in this place before the bundle, if any."""
+        """Opens the capture in this place of `files`, whose last is the bundle; None without."""
         from ico3d.capture.formats import open_capture
 
         return open_capture(self.files[index]) if index < len(self.files) - 1 else None
@@ -184,7 +184,7 @@ class Bake:
             self._refuse(f"--rank must lie between 1 and {MAX_RANK}, not {self.rank}.")
 
     def _body_persona(self) -> "Persona":
-        """The one that was given; bodies alone do not talk and need but a name."""
+        """The persona that was given; a body alone does not talk and needs only a name."""
         from dataclasses import replace
 
         from ico3d.avatar.baking.persona import load_persona

@@ -28,7 +28,7 @@ def augmented(expressions: np.ndarray, count: int, rng: np.random.Generator) -> 
 
     Args:
         expressions: (T, B).
-        count: How many to make.
+        count: How many expressions to make.
         rng: Source of randomness.
 
     Returns:

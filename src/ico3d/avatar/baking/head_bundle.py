@@ -73,8 +73,8 @@ def bake(
 
     Args:
         head: The exact head.
-        views: What to measure with.
-        samples: What it is baked from.
+        views: Pictures that the baked head is compared with.
+        samples: Expressions, and how much each value of a Gaussian matters.
         rank: K, or None to choose.
         report: Is told each result.
         settings: Of the fit; the usual ones where None.
@@ -99,7 +99,7 @@ def check(result: BakedResult) -> None:
     """Refuses a result that breaks a bound.
 
     Raises:
-        BundleError: With what was measured.
+        BundleError: If loss or size break a bound; the sentence says what was measured.
     """
     if not result.acceptable:
         raise BundleError(
@@ -125,7 +125,7 @@ def write(
         out: The file to write.
         name: The avatar's name.
         result: The baked head and its loss.
-        samples: What it was baked from.
+        samples: The samples that the head was baked from.
         head: The exact head, for its speech adaptor.
         capture: For motion, camera, background and provenance.
         persona: Who the avatar is.

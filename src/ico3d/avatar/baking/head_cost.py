@@ -31,7 +31,7 @@ class Reference:
     """One picture of the exact model, and what was recorded; pictures (H, W, 3) float16.
 
     Attributes:
-        camera: In canonical head space.
+        camera: The camera in canonical head space.
         expression: (B,) float32.
         background: (3,) or (H, W, 3), on the device that draws.
         exact: What the exact model shows.
@@ -95,7 +95,7 @@ def acceptable(loss: Loss) -> bool:
 
 
 def in_words(loss: Loss) -> str:
-    """For people."""
+    """A loss as a phrase for people."""
     against, lost = "", drop(loss)
     if lost is not None:
         against = (

@@ -43,10 +43,10 @@ class WholeResult:
     """A baked person and what it costs.
 
     Attributes:
-        person: What is drawn.
-        windows: Of its body, with their files.
-        idle: (B,) its face at rest.
-        loss: Means over pictures of the whole person.
+        person: The baked person, as viewers draw it.
+        windows: The baked windows of the body, with their files.
+        idle: (B,) the expression of the face at rest.
+        loss: What baking costs, means over pictures of the whole person.
     """
 
     person: BakedAvatar
@@ -64,7 +64,7 @@ def head_samples(
         avatar: The exact person.
         capture: The head's recording, whose training frames say how the face moves; without one,
             synthetic voices read what the persona says, besides what the body's recording holds.
-        persona: See there.
+        persona: Who the avatar is; its notes are read aloud where there is no recording.
 
     Raises:
         MissingExtraError: If there is no recording and espeak-ng is not installed.
@@ -101,7 +101,7 @@ def put_together(
     Args:
         avatar: The exact person.
         head: Baked in the space of the exact head's model.
-        windows: Of the body.
+        windows: The baked windows of the body.
         expressions: (T, B) what the face usually does.
         capture: The body's recording; None to measure against the exact person only.
     """
@@ -144,7 +144,7 @@ def check(result: WholeResult) -> None:
     """Refuses a whole person that breaks the bound.
 
     Raises:
-        BundleError: With what was measured.
+        BundleError: If the loss breaks the bound; the sentence says what was measured.
     """
     if (head_cost.drop(result.loss) or 0.0) > MAX_DROP:
         raise BundleError(
@@ -177,7 +177,7 @@ def with_quality(
     """An animation that knows how the baked body looks in each frame of its recording.
 
     Args:
-        animation: As found or edited.
+        animation: The rest loop and actions, as found or edited.
         avatar: The exact person, for the recorded expressions.
         person: The baked one, which will be played.
         capture: The body's recording; without one nothing is known.
@@ -208,7 +208,7 @@ def write(
         out: The file to write.
         avatar: The exact person.
         result: The baked one.
-        animation: How it moves.
+        animation: The rest loop and actions.
         capture: The body's recording, for camera and background; None where it is not at hand.
         about: Who it is, the avatar's name, and the text of LICENSES.txt (no such file where it
             is empty).

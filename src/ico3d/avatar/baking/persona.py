@@ -8,7 +8,7 @@ DEFAULT = Path(__file__).parents[1] / "data" / "persona.json"
 
 
 def load_persona(path: Path | None) -> Persona:
-    """Reads a persona's file (see `read_persona`); the one of the package where None.
+    """Reads a persona's file, or that of the package where none is given.
 
     Raises:
         BundleError: If it cannot be read, or an entry makes no sense.

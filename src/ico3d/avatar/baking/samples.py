@@ -30,7 +30,7 @@ _VOICES = ("en-us", "en-us+f3", "en-us+m3", "en-us+f5")
 
 @dataclass(frozen=True)
 class Samples:
-    """What a head is baked from.
+    """Expressions that a head is baked from.
 
     Attributes:
         expressions: (T, B) what it shall look right in.

@@ -34,7 +34,7 @@ Lips = Callable[[np.ndarray, int], np.ndarray]
 PORTRAIT = 2.8
 """Height of a portrait of a whole person, in heights of its head."""
 CHEST = 0.7
-"""How far the middle of the portrait is below that of the head, likewise."""
+"""How far the middle of a portrait is below that of the head, in heights of the head."""
 
 
 @dataclass(frozen=True)

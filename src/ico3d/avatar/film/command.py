@@ -46,7 +46,7 @@ class Render:
         size: Width and height in pixels, even numbers; one number for a square.
         background: Colour behind the person, as in HTML: a name or #rrggbb; by default the
             bundle's own, else a light grey.
-        seed: Of blinks and gestures.
+        seed: Blinks and gestures follow from it.
         device: Where to compute: by default with CUDA where that works, else on the CPU.
     """
 

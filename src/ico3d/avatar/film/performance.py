@@ -17,11 +17,11 @@ from ico3d.splat.gaussians import Gaussians
 
 @dataclass(frozen=True)
 class Performance:
-    """Somebody who moves (`film.Moving`) for so many seconds.
+    """Somebody who moves (`ico3d.avatar.moving.Moving`) for so many seconds.
 
     Attributes:
         actor: Who it is.
-        seconds: How long.
+        seconds: How long the performance lasts.
         expressions: (T, B) of the face, 25 rows per second.
         times: (P,) seconds of the film.
         body_times: (P,) seconds of the body's motion at these, straight between them.
@@ -53,7 +53,7 @@ def speech(actor: Actor, sound: Sound, seed: int) -> Performance:
     Args:
         actor: Who talks.
         sound: What is heard.
-        seed: Of blinks and gestures.
+        seed: Blinks and gestures follow from it.
 
     Raises:
         SettingsError: If no sound moves this face.
@@ -79,7 +79,7 @@ def motion(actor: Actor, seconds: float, seed: int) -> Performance:
     Args:
         actor: Who moves.
         seconds: How long the film lasts.
-        seed: Of blinks.
+        seed: Blinks follow from it.
     """
     still = np.zeros((int(seconds * FEATURE_RATE) + 1, 0), np.float32)  # (T, 0)
     turns = int(seconds // actor.seconds) if actor.seconds > 0 else 0

@@ -64,7 +64,7 @@ class Assembly:
     device: DeviceName = "auto"
 
     def about(self, capture: Path) -> dict:
-        """What a run of it is known by."""
+        """What an interrupted run must agree with to be gone on with."""
         paths = {"head": str(self.head.resolve()), "capture": str(capture.resolve())}
         if self.continued:
             paths["continued"] = str(self.continued.resolve())
@@ -94,7 +94,7 @@ def assemble(
     Args:
         capture: Of the whole person, with head poses.
         folder: The avatar's folder.
-        assembly: What to do.
+        assembly: Head, captures and settings.
         say: Told what was found.
         runner: Trains the windows; one after another in this process by default.
 
@@ -152,7 +152,7 @@ def align(capture: Capture, landmarks: np.ndarray, say: Say) -> Placement:
     """Where the head is in the world of the body's capture.
 
     Args:
-        capture: Of the body.
+        capture: The body's recording.
         landmarks: (68, 3) in the space of the head's model.
         say: Told how well they fit.
 

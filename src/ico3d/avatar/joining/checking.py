@@ -27,7 +27,7 @@ def write_checks(folder: Path, capture: Capture, out: Path, device: torch.device
 
     Args:
         folder: The avatar's folder; its head is placed already.
-        capture: Of the body.
+        capture: The body's recording.
         out: Where to write.
         device: Where to draw.
 

@@ -81,7 +81,7 @@ class HeadCompanion:
             placement: Where it is in every frame.
             expressions: (F, B).
             seam: (P, 3) places about its border, in the space of its model.
-            source: What to do about the border.
+            source: Where the head lies, and what the body's training does about its border.
 
         Raises:
             ModelError: If the head has no landmarks.

@@ -40,7 +40,7 @@ def near_border(head: TrainedHead, region: HeadRegion, reach: float) -> np.ndarr
 
     Args:
         head: As it was trained, on both sides of the border.
-        region: Which part is drawn.
+        region: Which part of the head is drawn.
         reach: Metres to either side.
     """
     means = head.model.means.detach().cpu().numpy().astype(np.float64)  # (N, 3)

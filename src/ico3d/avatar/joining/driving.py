@@ -44,8 +44,8 @@ def recorded_expressions(head: TrainedHead, capture: Capture, neutral: np.ndarra
     """(F, B) float32: what drives the head as the person looked while the body was recorded.
 
     Args:
-        head: Which.
-        capture: Of the whole person.
+        head: The head to drive.
+        capture: The recording of the whole person.
         neutral: (B,) for captures that tell nothing about the face.
     """
     try:

@@ -36,7 +36,7 @@ class FaceView:
     Attributes:
         frame: When.
         camera_index: Whose.
-        camera: Of the crop, in the world.
+        camera: The camera of the cropped picture, in the world.
         image: (H, W, 3).
         mask: (H, W) the person.
         steady: (H, W) 1 but for mouth and eyes, which look otherwise with every expression.
@@ -50,7 +50,7 @@ class FaceView:
     steady: Tensor
 
     def to(self, device: torch.device) -> "FaceView":
-        """The same on another device."""
+        """This view on another device."""
         names = ("image", "mask", "steady")
         return replace(self, **{name: getattr(self, name).to(device) for name in names})
 
@@ -66,7 +66,7 @@ def face_views(
     """Views of the face from in front, evenly spread over frames and cameras.
 
     Args:
-        capture: Of the whole person.
+        capture: The recording of the whole person.
         placement: Where the head is.
         region: Of the head's model, for where the face looks.
         landmarks: (68, 3) in the space of the head's model.

@@ -31,7 +31,7 @@ NEIGHBOURS, FRAMES = 6, 8
 MEMORY = 2**30
 """Bytes for what is made once per frame."""
 FLOATS = 14
-"""Of a Gaussian."""
+"""Numbers that describe a Gaussian."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class RecolourSettings:
     """How the colours are learnt.
 
     Attributes:
-        steps: One picture each.
+        steps: Optimisation steps, one picture each.
         rate: Learning rate of Adam; decays to a tenth.
         seed: Decides the order of the pictures.
     """
@@ -62,8 +62,8 @@ def recolour(
         model: Of the head, of a variant with a network; only its last colour layer changes.
         placement: Where the head is.
         expressions: (F, B) of the body's frames.
-        views: What to agree with.
-        settings: How.
+        views: Pictures of the body's recording, with which the head's colours shall agree.
+        settings: Steps and learning rates.
     """
     frozen = _Frozen(model, placement, expressions)
     layer = _Relit(model.color_branch)

@@ -40,10 +40,10 @@ def gap(
     hundredth, as single Gaussians are no hole.
 
     Args:
-        head: In the world.
-        body: In the world.
+        head: Gaussians of the head in the world.
+        body: Gaussians of the body in the world.
         world_from_head: (4, 4) where the head is.
-        region: Of the head's model.
+        region: Which part of the head's model is drawn.
     """
     drawn, (head, body) = (head, body), (head.to("cpu"), body.to("cpu"))
     local = moved(np.linalg.inv(world_from_head), head.means.double().numpy())  # (N, 3)
@@ -108,7 +108,7 @@ def seam_scores(avatar: TrainedAvatar, views: Sequence[FaceView]) -> SeamScores:
 
     Args:
         avatar: With the expressions that were recorded.
-        views: What was recorded.
+        views: Recorded pictures of the face.
 
     Raises:
         CaptureError: If no view shows the border.

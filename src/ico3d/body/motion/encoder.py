@@ -88,7 +88,7 @@ def encode(
     in space and at 0 and 1 in time. What lies outside has the features of the border.
 
     Args:
-        planes: As `initial_planes` makes them.
+        planes: The encoder's planes, in the layout that `initial_planes` makes.
         shape: Their sizes.
         positions: (N, 3), −1 … 1 inside the box.
         time: 0 … 1 within the window.

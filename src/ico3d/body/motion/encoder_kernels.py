@@ -170,7 +170,7 @@ def backward(xy, xz, yz, xt, yt, zt, positions, gradient, g_planes, g_lines, g_p
         positions: (N, 3).
         gradient: (N, groups, LANES) with respect to the features.
         g_planes: (hands, 3, S, S, groups, LANES) zeros; the sum over hands is the gradient.
-        g_lines: (hands, 3, S, groups, LANES) zeros; likewise.
+        g_lines: (hands, 3, S, groups, LANES) zeros; gradients are added to them.
         g_positions: (N, 3), added to.
     """
     places, count, hands = xy.shape[0], len(positions), len(g_planes)

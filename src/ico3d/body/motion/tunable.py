@@ -65,7 +65,7 @@ def initial_weights(shape: MlpShape, generator: torch.Generator) -> dict[str, Te
 
     Args:
         shape: Sizes.
-        generator: Of the numbers.
+        generator: Draws the weights.
 
     Returns:
         Per layer k of I inputs and O outputs: "weight{k}" (sets, I, O) and "bias{k}" (sets, O).
@@ -118,7 +118,7 @@ def _joined(weight: Tensor, bias: Tensor) -> Tensor:
 
 
 class _Mlp(torch.autograd.Function):
-    """The kernels; the same for any number of threads."""
+    """The kernels as a differentiable function; results do not depend on the number of threads."""
 
     @staticmethod
     def forward(ctx, shape: MlpShape, x: Tensor, alpha: Tensor, *tensors: Tensor) -> Tensor:

@@ -36,7 +36,7 @@ def _read(values, first, rows):
 
 @kernel()
 def _write(rows, first, values):
-    """What `_read` reads."""
+    """Writes a block of rows where `_read` reads them."""
     for p in range(min(BLOCK, values.shape[0] - first)):
         for k in range(values.shape[1]):
             values[first + p, k] = rows[k * BLOCK + p]

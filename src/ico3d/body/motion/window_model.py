@@ -47,7 +47,7 @@ class WindowModel:
     """The Gaussians of one window.
 
     Attributes:
-        motion: What moves them.
+        motion: What moves the Gaussians.
         gaussians: Per-Gaussian tensors by name, as stored: `means` (N, 3) metres, `quats` (N, 4)
             wxyz not normalised, `log_scales` (N, 3), `opacity_logits` (N,), `color_logits` (N, 3),
             and the motion's. Density control replaces them.
@@ -105,8 +105,8 @@ def activated(
     Args:
         values: `CANONICAL`.
         means: (N, 3) in the place of the stored ones.
-        quats: (N, 4) likewise.
-        log_scales: (N, 3) likewise.
+        quats: (N, 4) in the place of the stored ones.
+        log_scales: (N, 3) in the place of the stored ones.
         visibility: (N,) factors of the opacities.
     """
     opacities = values["opacity_logits"].sigmoid()  # (N,)

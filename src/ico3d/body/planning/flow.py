@@ -67,7 +67,7 @@ class ClipFlow:
     Attributes:
         span: Frames that were looked at; step i goes from frame span.first + i to the next.
         method: Name of the flow method.
-        cameras: One for each camera.
+        cameras: What moved in the pictures of each camera.
     """
 
     span: Window
@@ -109,7 +109,7 @@ def clip_flow(
     Args:
         capture: The recording; where it has no masks, all pixels count.
         folder: Where results are kept, one file per camera, and found again.
-        span: Which frames; else the whole clip.
+        span: Frames to measure; the whole clip by default.
         method: Estimates flow; else the best that is installed.
         device: Where that computes, if it can.
 
@@ -149,7 +149,7 @@ def dynamic_weights(
     Args:
         points: (P, 3) metres, in the world, on the surface at the window's centre frame.
         capture: The recording.
-        window: Which frames.
+        window: The window's frames.
         flow: What is known of the clip; else the window's frames are looked at.
 
     Returns:
@@ -190,7 +190,7 @@ class _Work:
     Attributes:
         capture: Where pictures come from.
         index: The camera's number.
-        span: Which frames.
+        span: Frames to measure.
         method: Estimates flow.
         pixel: Centimetres that a pixel of full size is wide.
         advance: Called after each step.

@@ -31,7 +31,7 @@ class Plan:
         method: Name of the flow method that measured it.
         fps: Frames per second.
         busiest: Number of the camera that saw most motion.
-        settings: What the clip was cut by.
+        settings: The bounds by which the clip was cut.
     """
 
     windows: tuple[Window, ...]

@@ -31,7 +31,7 @@ def draw_plan(plan: Plan, capture: Capture, path: Path) -> None:
     windows, seen by the busiest camera.
 
     Args:
-        plan: What to draw.
+        plan: The windows and the motion.
         capture: Where its pictures come from.
         path: The file.
     """
@@ -114,7 +114,7 @@ def _person(capture: Capture, camera: int, frames: list[int]) -> tuple[slice, sl
 def _picture(
     axes: "Axes", capture: Capture, camera: int, frame: int, box: tuple[slice, slice]
 ) -> None:
-    """One frame, cut out."""
+    """One frame, cut to rows and columns that hold the person."""
     image = capture.image(camera, frame)
     if image is not None:
         axes.imshow(np.clip(image[box], 0, 1))

@@ -26,7 +26,7 @@ class Window:
 
     @property
     def frames(self) -> range:
-        """All of its frames."""
+        """Numbers of all frames of the window."""
         return range(self.first, self.last + 1)
 
     @property

@@ -4,14 +4,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from ico3d.body.companion import Companion
 from ico3d.body.motion.window_model import CANONICAL, WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings
 from ico3d.body.training.novel_views import novel_camera
-from ico3d.body.training.picture_step import Learner
+from ico3d.body.training.picture_step import Learner, WindowTrainee
 from ico3d.body.training.views import MARGIN, BodyViews
 from ico3d.common.camera import Camera
 from ico3d.splat.gaussians import Gaussians
@@ -22,7 +21,7 @@ STILL_SEEN = 0.05
 """Opacity from which a Gaussian counts for where the person is in a picture."""
 
 
-class FineTuner:
+class FineTuner(WindowTrainee):
     """A `Trainee`: the canonical Gaussians of a window; all that moves them is frozen.
 
     Most steps compare the window's first moment with the previous window's last, which is the same
@@ -47,7 +46,7 @@ class FineTuner:
             model: Changed in place.
             previous: The window before; not changed.
             window: The frames of `model`.
-            pictures: Those of the window.
+            pictures: Pictures of the window's frames.
             cameras: The training cameras, between which novel ones lie.
             settings: Rates and weights.
             extent: Size of the person in metres.
@@ -56,16 +55,11 @@ class FineTuner:
         """
         for name, tensor in {**model.gaussians, **model.shared}.items():
             tensor.requires_grad_(name in CANONICAL)
-        self._learner = Learner(model, window, pictures, settings, extent, seed, companion)
+        super().__init__(Learner(model, window, pictures, settings, extent, seed, companion))
         self._settings, self._cameras = settings.finetune, cameras
         self._shared = window.first
         with torch.no_grad():
             self._goal = self._learner.accompanied(previous.at(1.0), self._shared)
-
-    @property
-    def model(self) -> WindowModel:
-        """What is trained."""
-        return self._learner.model
 
     def step(self, index: int) -> Mapping[str, float]:
         """Learns from the window before, or from a picture."""
@@ -78,24 +72,6 @@ class FineTuner:
         self._average(index)
         self._learner.prune(index, self._settings.steps)
         return values
-
-    def tensors(self) -> dict[str, Tensor]:
-        """Parameters and moments."""
-        return self._learner.tensors()
-
-    def place(self, name: str) -> torch.device:
-        """All are where the model is."""
-        del name
-        return self.model.device
-
-    def state(self) -> dict:
-        """Nothing beside the tensors: randomness follows from the step's number."""
-        return {}
-
-    def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
-        """Takes back what `tensors` gave."""
-        del state
-        self._learner.restore(tensors)
 
     def _average(self, index: int) -> None:
         """Ends with a mean over many steps: single ones look at one moment, from one side."""

@@ -62,7 +62,7 @@ def novel_camera(cameras: Sequence[Camera], rng: np.random.Generator) -> Camera:
     Args:
         cameras: The recorded ones; a single one, or one that looks away from all others, is
             given back as it is.
-        rng: All randomness.
+        rng: Draws the cameras and their weights.
     """
     poses = np.stack([camera.camera_to_world for camera in cameras])  # (C, 4, 4)
     chosen = _neighbourhood(

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 
-import torch
 from torch import Tensor
 
 from ico3d.body.companion import Companion
@@ -12,12 +11,12 @@ from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings, Method
 from ico3d.body.training.density import density_control
-from ico3d.body.training.picture_step import Learner
+from ico3d.body.training.picture_step import Learner, WindowTrainee
 from ico3d.body.training.views import BodyViews
 from ico3d.splat.losses import tensor_psnr
 
 
-class BodyTrainer:
+class BodyTrainer(WindowTrainee):
     """A `Trainee`: a window's model, density control, and the pictures."""
 
     def __init__(
@@ -34,18 +33,13 @@ class BodyTrainer:
         """Gets ready for the first step; arguments as for `Learner`."""
         for tensor in (*model.gaussians.values(), *model.shared.values()):
             tensor.requires_grad_()
-        self._learner = Learner(model, window, pictures, settings, extent, seed, companion)
+        super().__init__(Learner(model, window, pictures, settings, extent, seed, companion))
         self._settings = settings
         self._steps = settings.steps_of(len(window))
         self._strategy = density_control(method, settings, self._steps, seed, extent)
         deforms = isinstance(model.motion, Deformation)
         self._warmup = settings.warmup_steps if deforms else 0
         self._center = [v for v in self._learner.views if v.frame == window.center]
-
-    @property
-    def model(self) -> WindowModel:
-        """What is trained."""
-        return self._learner.model
 
     def step(self, index: int) -> Mapping[str, float]:
         """Renders one picture and learns from the difference."""
@@ -73,15 +67,6 @@ class BodyTrainer:
         """Parameters, moments, and what density control has gathered."""
         gathered = {f"density.{name}": t for name, t in self._strategy.tensors().items()}
         return self._learner.tensors() | gathered
-
-    def place(self, name: str) -> torch.device:
-        """All are where the model is."""
-        del name
-        return self.model.device
-
-    def state(self) -> dict:
-        """Nothing beside the tensors: randomness follows from the step's number."""
-        return {}
 
     def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
         """Takes back what `tensors` gave."""

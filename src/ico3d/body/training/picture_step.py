@@ -47,8 +47,8 @@ class Learner:
 
         Args:
             model: Changed in place.
-            window: Which frames.
-            pictures: Those of the window.
+            window: The window's frames.
+            pictures: Pictures of the window's frames.
             settings: Rates and weights.
             extent: Size of the person in metres; the means' rate refers to it.
             seed: All randomness follows from it and from the step's number.
@@ -108,7 +108,7 @@ class Learner:
 
         Args:
             index: Step just done.
-            steps: Of all of the training.
+            steps: Steps of the whole training.
         """
         if self._pruning is not None and self._pruning.due(index, steps):
             self._pruning.carry_out(self.model, self.population)
@@ -178,8 +178,39 @@ class Learner:
         return replace(gaussians, colors=gaussians.colors @ matrix.T + offset)
 
 
+class WindowTrainee:
+    """What training and fine-tuning of a window have in common as a `Trainee`."""
+
+    def __init__(self, learner: Learner):
+        """Takes over the window's model with its optimiser."""
+        self._learner = learner
+
+    @property
+    def model(self) -> WindowModel:
+        """The window's model, which is trained."""
+        return self._learner.model
+
+    def tensors(self) -> dict[str, Tensor]:
+        """Parameters and moments."""
+        return self._learner.tensors()
+
+    def place(self, name: str) -> torch.device:
+        """Every tensor of a checkpoint belongs on the model's device."""
+        del name
+        return self.model.device
+
+    def state(self) -> dict:
+        """Nothing beside the tensors: randomness follows from the step's number."""
+        return {}
+
+    def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
+        """Takes back what `tensors` gave."""
+        del state
+        self._learner.restore(tensors)
+
+
 def _group(name: str) -> str:
-    """Which learning rate a tensor has."""
+    """Name of the learning rate that a tensor has."""
     if name.startswith(MLP):
         return "mlp"
     if name.startswith(GRID):

@@ -30,7 +30,7 @@ POSITIONS = 4
 
 @dataclass(frozen=True)
 class Begin:
-    """What training begins with.
+    """What the training of a window begins with.
 
     Attributes:
         model: The Gaussians.
@@ -60,8 +60,8 @@ def begin_window(
 
     Args:
         capture: Where surface points or masks come from.
-        window: Which frames.
-        method: What moves the Gaussians.
+        window: The window's frames.
+        method: The method that moves the Gaussians.
         settings: How many, and the sizes of the deformation.
         dynamic: Tells which points move in this window.
         seed: Decides which points.

@@ -29,7 +29,7 @@ class Start:
 
     Attributes:
         points: (P, 3) metres, in the world.
-        source: What they come from, for the log.
+        source: What the points come from, for the log.
     """
 
     points: np.ndarray

@@ -67,9 +67,9 @@ class WindowTask:
         capture: Path of the capture.
         folder: Where the window's run lies.
         flow: Folder of the optical flow, shared by all windows.
-        window: Which frames.
+        window: The window's frames.
         index: Its number.
-        job: What to train.
+        job: Method, seed, settings and what to go on from.
     """
 
     capture: Path
@@ -91,7 +91,7 @@ class WindowTask:
 
     @property
     def label(self) -> str:
-        """What people read."""
+        """The window's name in progress bars and errors."""
         return f"window {self.index} (frames {self.window.first} to {self.window.last})"
 
 
@@ -103,7 +103,7 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     """Trains a window, or goes on with an interrupted run of the same settings.
 
     Args:
-        task: Which.
+        task: The window and how it is trained.
         capture: The opened capture, where the caller has it open already.
 
     Returns:
@@ -160,7 +160,7 @@ def _begin(
 def finetune_window(
     task: WindowTask, capture: Capture, trained: Path, previous: WindowModel
 ) -> float:
-    """Fine-tunes a window to agree with the one before, or goes on with that.
+    """Fine-tunes a window to agree with the one before, or goes on with an interrupted run.
 
     Args:
         task: Which; its folder is where the fine-tuning's run lies.
@@ -209,7 +209,7 @@ def train_body(
     Args:
         capture: Calibrated, synchronised cameras with masks.
         folder: Model folder; also holds the plan, and the run of every window.
-        job: What to train.
+        job: Method, seed, settings and what to go on from.
         runner: Trains the windows; one after another in this process by default.
 
     Returns:

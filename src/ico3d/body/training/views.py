@@ -17,7 +17,7 @@ MARGIN = 8
 
 @dataclass(frozen=True)
 class Example:
-    """What one picture asks of a body.
+    """A recorded picture as a body learns from it.
 
     Attributes:
         target: (H, W, 3) the person before `color`.
@@ -45,7 +45,7 @@ class BodyViews:
 
         Args:
             capture: Where pictures and masks come from.
-            frames: Which frames.
+            frames: Frames whose pictures train.
             cache_gib: Memory for pictures.
 
         Raises:

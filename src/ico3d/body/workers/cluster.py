@@ -74,7 +74,7 @@ class RayCluster:
         """How a worker ended.
 
         Raises:
-            Ico3dError: That it met.
+            Ico3dError: The error that ended the worker.
         """
         errors = self._ray.exceptions
         lost = (errors.WorkerCrashedError, errors.NodeDiedError, errors.OutOfMemoryError)
@@ -109,7 +109,7 @@ def share(nodes: Sequence[Mapping], windows: int, with_gpus: bool = True) -> dic
 
     Args:
         nodes: As Ray describes them: whether "Alive", and their "Resources".
-        windows: How many there are.
+        windows: How many windows are to be trained.
         with_gpus: Whether GPUs are wanted.
 
     Returns:

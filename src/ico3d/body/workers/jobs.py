@@ -58,7 +58,7 @@ class Crew(Protocol):
             The windows that have ended, with their seconds of training.
 
         Raises:
-            Ico3dError: That a worker met.
+            Ico3dError: The error that ended a worker.
         """
         ...
 
@@ -71,7 +71,7 @@ def train_windows(tasks: Sequence[WindowTask], crew: Crew) -> list[float]:
     """Trains windows, and shows how far they are.
 
     Args:
-        tasks: Which.
+        tasks: The windows to train.
         crew: Who does it; is stopped at the end, however that comes.
 
     Returns:
@@ -123,7 +123,7 @@ def work(task: WindowTask, threads: int) -> float | Ico3dError:
     """What a worker does; what a user can mend is a result, too.
 
     Args:
-        task: Which window.
+        task: The window to train.
         threads: Threads of its kernels.
     """
     torch.set_num_threads(threads)

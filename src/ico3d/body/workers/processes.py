@@ -37,10 +37,10 @@ class Worker:
     results: Connection
 
     def outcome(self) -> float | Lost:
-        """How it ended, which it has.
+        """How the worker ended; call it only after its end.
 
         Raises:
-            Ico3dError: That it met.
+            Ico3dError: The error that ended the worker.
             ModelError: If the program has an error.
         """
         try:
@@ -68,7 +68,7 @@ class Processes:
         """Starts nothing yet.
 
         Args:
-            jobs: How many work at once.
+            jobs: How many processes work at once.
             with_gpus: Whether each gets a GPU.
 
         Raises:
@@ -127,7 +127,7 @@ def _gpus() -> list[str]:
 
 
 def _main(sender: Connection, task: WindowTask, threads: int, gpu: str | None) -> None:
-    """What a process does."""
+    """The main function of a worker's process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all: the parent decides
     sys.stdout = open(os.devnull, "w")  # noqa: SIM115 (to the end); the parent draws for all
     threading.Thread(target=_end_with_parent, daemon=True).start()

@@ -82,8 +82,8 @@ class BodyFits:
 
         Args:
             file: The annotations; they must have a group SMPLx.
-            num_frames: Of the recording.
-            gender: Which body model was fitted.
+            num_frames: Frames of the recording.
+            gender: Gender of the SMPL-X model that was fitted.
             world_from_fit: (4, 4), see `SmplX`.
 
         Raises:

@@ -52,7 +52,7 @@ def read_devices(main: SmcFile, annotations: SmcFile) -> tuple[list[Device], lis
 
 
 def _device(annotations: SmcFile, group: str, number: int, size: tuple[int, int]) -> Device:
-    """One camera."""
+    """What the files say of one camera of a device."""
     inside, name = f"Camera_Parameter/{number:02d}", f"{number:02d}"
     camera = read_camera(annotations, inside, name, size, f"{group}/{number}/color")
     polynomial = annotations.numbers(f"{inside}/Color_Calibration", (3, 3))

@@ -10,7 +10,7 @@ FEWEST_POINTS = 6
 """Points that a frame must show; fewer may lie on a line."""
 ROUNDS = 40
 SPREAD_FLOOR = 1e-9
-"""Metres: points without any noise have weights that are finite all the same."""
+"""Least standard deviation of a point in metres: points without any noise have finite weights."""
 STEADY_QUARTER, STEADIEST = 0.25, 0.5
 """No point counts as steadier than half of what the steadiest quarter stray: it would be alone."""
 MEDIAN_LENGTH = 1.538

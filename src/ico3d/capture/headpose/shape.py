@@ -107,7 +107,7 @@ def rigid_head(points: np.ndarray, canonical: np.ndarray, steady: np.ndarray) ->
 
 
 def _in_canonical_space(head: RigidHead, canonical: np.ndarray, steady: np.ndarray) -> RigidHead:
-    """The same head, placed and turned like the canonical face scaled to its size."""
+    """A head placed and turned like the canonical face that is scaled to its size."""
     place = similarity_fit(canonical, head.shape[None], steady.astype(float))[0]
     place[:3, :3] /= np.cbrt(np.linalg.det(place[:3, :3]))
     shape = moved(inverse(place[None]), head.shape)[0]

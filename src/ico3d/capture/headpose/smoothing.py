@@ -28,7 +28,7 @@ def filled(values: np.ndarray, frames: np.ndarray, num_frames: int) -> np.ndarra
     Args:
         values: (K, ...) at the frames known.
         frames: (K,) ascending frame numbers.
-        num_frames: How many there are.
+        num_frames: How many frames the clip has.
 
     Returns:
         (num_frames, ...).
@@ -44,7 +44,7 @@ def filled_poses(poses: np.ndarray, frames: np.ndarray, num_frames: int) -> np.n
     Args:
         poses: Rigid, at the frames known.
         frames: (K,) ascending frame numbers.
-        num_frames: How many there are.
+        num_frames: How many frames the clip has.
     """
     every = np.tile(np.eye(4), (num_frames, 1, 1))
     every[:, :3, 3] = filled(poses[:, :3, 3], frames, num_frames)

@@ -48,7 +48,7 @@ class HeadTrack:
         return [(int(start), int(stop) - 1) for start, stop in edges.reshape(-1, 2)]
 
     def finding(self) -> Finding:
-        """Which frames are interpolated."""
+        """A line for `ico3d capture check` that tells which frames are interpolated."""
         found = self.gaps
         if not found:
             return Finding("head", "ok", f"tracked in all {len(self.views)} frames")

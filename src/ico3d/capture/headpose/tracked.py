@@ -50,15 +50,15 @@ class TrackedCapture(Capture):
         return self._track.world_from_head[self._index(frame)]
 
     def eyes(self, frame: int) -> np.ndarray:
-        """(7,) likewise."""
+        """(7,) tracked eye and brow values of a frame."""
         return self._track.eyes[self._index(frame)]
 
     def blendshapes(self, frame: int) -> np.ndarray:
-        """(52,) likewise."""
+        """(52,) tracked blendshapes of a frame."""
         return self._track.blendshapes[self._index(frame)]
 
     def landmarks_3d(self, frame: int) -> np.ndarray:
-        """(68, 3) likewise, in canonical head space, metres."""
+        """(68, 3) tracked landmarks of a frame in canonical head space, metres."""
         return self._track.landmarks[self._index(frame)]
 
     def landmarks(self, camera: int, frame: int) -> np.ndarray:
@@ -83,7 +83,7 @@ class TrackedCapture(Capture):
 
     @property
     def provenance(self) -> dict:
-        """Of the recording."""
+        """What the recording says of itself: the track adds nothing."""
         return self.whole.provenance
 
     def _index(self, frame: int) -> int:

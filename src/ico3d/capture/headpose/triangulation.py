@@ -15,7 +15,8 @@ from ico3d.common.camera import Camera
 SPREAD = 0.003
 """Metres by which landmarks of a face usually stray from where they are."""
 AGREEING = 0.012
-"""Metres by which half of a camera's landmarks may miss for it to show the same face."""
+"""Metres by which half of a camera's landmarks may miss those of others: else it shows another
+face."""
 LEAST_ANGLE = np.radians(4.0)
 """Rays that meet at a smaller angle leave the depth open."""
 ROUNDS = 8

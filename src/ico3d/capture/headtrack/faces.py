@@ -57,7 +57,7 @@ class Finder:
 
     Attributes:
         capture: The recording.
-        disagreements: How often cameras showed faces, but no two of them the same one.
+        disagreements: At how many moments cameras showed faces, but no two cameras the same face.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class Finder:
         Args:
             open_capture: Gives the capture; one that is open already, where there is one reader.
             canonical: MediaPipe's face.
-            readers: One for each thread.
+            readers: Face readers, one for each thread.
         """
         self.capture = open_capture()
         self._opened = [open_capture() for _ in self.capture.cameras]
@@ -91,7 +91,7 @@ class Finder:
         """The head of a frame.
 
         Args:
-            frame: Which.
+            frame: Number of the frame.
             before: The head a moment ago, if it was found.
 
         Returns:

@@ -20,7 +20,7 @@ SHOWN = 0.34
 AXIS = 0.1
 """Metres of the drawn head axes."""
 COLOURS = ((255, 60, 60), (60, 220, 60), (80, 150, 255))
-"""Of the axes x, y and z."""
+"""Colours in which the head's axes x, y and z are drawn."""
 FORMATS = {".jpg": "JPEG", ".jpeg": "JPEG", ".png": "PNG"}
 
 

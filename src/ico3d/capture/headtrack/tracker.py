@@ -29,7 +29,7 @@ class Report:
     """How well a head was tracked.
 
     Attributes:
-        num_frames: Of the recording.
+        num_frames: Frames of the recording.
         tracked: Frames that were measured.
         reprojection: Pixels between the landmarks of the track and those seen, on average.
         views: Cameras that tell of a tracked frame, on average.

@@ -64,7 +64,7 @@ def read_colmap(model: Path, images: Path) -> Foreign:
 
 
 def _shot(images: Path, poses: Path, lenses: dict[int, Lens], pose: Pose) -> Shot:
-    """One picture."""
+    """A picture of the model with its pose and lens."""
     name, camera, numbers = pose
     if camera not in lenses:
         raise CaptureError(f"{poses}: {name} names camera {camera}, which does not exist.")

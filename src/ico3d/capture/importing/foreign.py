@@ -20,7 +20,7 @@ class Shot:
 
     Attributes:
         file: Where it lies.
-        lens: Of the picture in its size.
+        lens: That of the picture, in the picture's size.
         camera_to_world: (4, 4) rigid, OpenCV axes, in units of the source.
         time: When it was taken, in any unit; None where all are of one moment.
         mask: A picture of the person's mask.

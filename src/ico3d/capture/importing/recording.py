@@ -32,7 +32,7 @@ def import_recording(source: Path, out: Path, settings: ImportSettings) -> Descr
     Args:
         source: A COLMAP model or a folder around one, or a transforms.json or its folder.
         out: Folder to make.
-        settings: How.
+        settings: What the source does not say itself.
 
     Returns:
         What was written.

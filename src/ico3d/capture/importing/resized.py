@@ -43,7 +43,7 @@ class ResizedCapture(Capture):
         return self._shrunk(self.whole.mask(camera, frame), camera)
 
     def head_mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """The part that is measured, likewise."""
+        """Where `psnr_mask` is measured, as large as the pictures."""
         return self._shrunk(self.whole.head_mask(camera, frame), camera)
 
     def background(self, camera: int) -> np.ndarray | None:
@@ -87,7 +87,7 @@ class ResizedCapture(Capture):
 
     @property
     def provenance(self) -> dict:
-        """Of the capture."""
+        """That of the capture with the larger pictures."""
         return self.whole.provenance
 
     def _shrunk(self, picture: np.ndarray | None, camera: int) -> np.ndarray | None:

@@ -63,7 +63,7 @@ def _place(camera: Camera) -> Place:
 
 
 def _write_view(capture: ResizedCapture, work: Path, camera: int, frame: int) -> int:
-    """One picture and its mask."""
+    """Writes one picture and its mask in the new size."""
     image = capture.image(camera, frame)
     if image is None:
         return 0
@@ -76,7 +76,7 @@ def _write_view(capture: ResizedCapture, work: Path, camera: int, frame: int) ->
 
 
 def _write_rest(capture: ResizedCapture, work: Path) -> None:
-    """What is not a view."""
+    """Writes what belongs to no single picture: plates, sound, points, the tracked head."""
     import soundfile
 
     for index, camera in enumerate(capture.cameras):

@@ -37,7 +37,7 @@ def read_transforms(file: Path) -> Foreign:
 
 
 def _shot(file: Path, content: dict, index: int, frame: object) -> Shot:
-    """One frame."""
+    """One entry of `frames` as a picture with its pose and lens."""
     where = f"{file}: frame {index}"
     if not isinstance(frame, dict) or not isinstance(frame.get("file_path"), str):
         raise CaptureError(f"{where} has no file_path.")

@@ -36,7 +36,7 @@ def matte(picture: np.ndarray, plate: np.ndarray) -> np.ndarray:
 
     Args:
         picture: uint8 RGB (H, W, 3).
-        plate: Likewise, of the same camera without the person.
+        plate: (H, W, 3), of the same camera without the person.
 
     Returns:
         uint8 (H, W), 255 on the person.
@@ -155,7 +155,7 @@ def soft_edge(picture: np.ndarray, plate: np.ndarray, inside: np.ndarray) -> np.
 
     Args:
         picture: float32 (H, W, 3).
-        plate: Likewise, in the exposure of the picture.
+        plate: (H, W, 3), without the person, in the exposure of the picture.
         inside: (H, W) bool.
     """
     cv2 = opencv(PURPOSE)

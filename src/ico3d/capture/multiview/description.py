@@ -40,7 +40,7 @@ class Description:
 
     Attributes:
         fps: Frames per second.
-        num_frames: How many.
+        num_frames: How many frames every camera took.
         places: The cameras.
         sources: What the recording was made from.
         consent: What the person agreed to.
@@ -108,7 +108,7 @@ def read_description(folder: Path) -> Description:
 
 
 def read_json(file: Path) -> dict:
-    """One JSON object.
+    """Reads a file that must hold one JSON object.
 
     Raises:
         CaptureError: If the file is missing or damaged.

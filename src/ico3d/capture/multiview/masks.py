@@ -24,7 +24,7 @@ def make_masks(folder: Path, workers: int) -> int:
         workers: Threads.
 
     Returns:
-        How many were written.
+        How many masks were written.
 
     Raises:
         CaptureError: If the folder has no clean plate, or a picture is damaged.

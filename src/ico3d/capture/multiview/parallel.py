@@ -17,10 +17,10 @@ def each_camera(
 
     Args:
         start: Gives the function for a camera, with all it needs opened for it alone.
-        cameras: Which.
+        cameras: Numbers of the cameras.
         num_frames: Frames of each.
         workers: Threads.
-        what: For the progress bar.
+        what: What the progress bar says.
 
     Returns:
         The sum of the counts.

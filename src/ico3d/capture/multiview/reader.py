@@ -87,15 +87,15 @@ class MultiviewCapture(Capture):
         return None if self._track is None else self._track.world_from_head[self._index(frame)]
 
     def eyes(self, frame: int) -> np.ndarray | None:
-        """(7,) likewise."""
+        """(7,) eye and brow values that `ico3d capture track` found; None where it did not run."""
         return None if self._track is None else self._track.eyes[self._index(frame)]
 
     def blendshapes(self, frame: int) -> np.ndarray | None:
-        """(52,) likewise."""
+        """(52,) blendshapes that `ico3d capture track` found; None where it did not run."""
         return None if self._track is None else self._track.blendshapes[self._index(frame)]
 
     def landmarks_3d(self, frame: int) -> np.ndarray | None:
-        """(68, 3) landmarks in canonical head space, metres, likewise."""
+        """(68, 3) landmarks in canonical head space, metres; None where no head was tracked."""
         return None if self._track is None else self._track.landmarks[self._index(frame)]
 
     def landmarks(self, camera: int, frame: int) -> np.ndarray | None:

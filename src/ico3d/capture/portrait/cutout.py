@@ -122,7 +122,7 @@ def cut(image: np.ndarray, landmarks: np.ndarray, models: Models) -> np.ndarray:
     Args:
         image: uint8 RGB (H, W, 3).
         landmarks: (478, 2) pixels.
-        models: What `learn` found.
+        models: The colours of person and background, as `learn` gives them.
 
     Returns:
         (H, W) float32 in [0, 1], 1 on the person.

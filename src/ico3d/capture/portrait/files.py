@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 
 DETAILS = "ico3d.json"
-"""What the layout has no place for."""
+"""File for what the talking-portrait layout has no place for."""
 OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 
 

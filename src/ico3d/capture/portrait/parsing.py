@@ -95,7 +95,7 @@ def parse(
         image: uint8 RGB (H, W, 3).
         alpha: (H, W) person.
         landmarks: (478, 2) pixels.
-        colours: What `learn_colours` found.
+        colours: The colours of the parts, as `learn_colours` gives them.
 
     Returns:
         uint8 RGB (H, W, 3).

@@ -36,7 +36,7 @@ WARM_UP = 0.05
 RATES = {"means": 1e-2, "quats": 2e-2, "log_scales": 3e-2, "colors": 5e-2, "opacities": 5e-2}
 """Learning rates; that of the means times half the size of the cloud."""
 DECAYS = {"means": 0.01, "quats": 0.1, "log_scales": 0.1, "colors": 0.1, "opacities": 0.1}
-"""What they decay to, as factors."""
+"""Factors to which the rates have decayed at the last step."""
 POSE_RATE, POSE_DECAY = 3e-3, 0.1
 """Radians; shifts learn by the same times `METRES_PER_RADIAN`."""
 METRES_PER_RADIAN = 1 / 6
@@ -57,7 +57,7 @@ class Look:
 
 @dataclass(frozen=True)
 class Refined:
-    """What came out.
+    """Corrected poses, and how much better pictures agree with them.
 
     Attributes:
         poses: (F, 4, 4) camera from head.
@@ -165,7 +165,7 @@ class _Fit:
         self._initial = [group["lr"] for group in self._cloud.param_groups]
 
     def update(self, loss: Tensor, step: int) -> None:
-        """One step."""
+        """One step of the optimisation."""
         done = step / self._steps
         for group, rate in zip(self._cloud.param_groups, self._initial, strict=True):
             group["lr"] = rate * DECAYS[group["name"]] ** done

@@ -41,7 +41,7 @@ class Track:
         center: (2,) principal point in pixels.
         shape: (K, 3) the person's landmarks at rest in canonical head space, metres.
         rotations: (F, 3, 3) camera from head, OpenGL axes.
-        translations: (F, 3) likewise, metres.
+        translations: (F, 3) metres, the head's origin in these camera axes.
         sigmas: (K,) pixels by which each landmark strays from the rigid head.
     """
 

@@ -76,8 +76,8 @@ class Readings:
 
     Attributes:
         landmarks: One (478, 2) per frame with a face, pixels.
-        blendshapes: One (52,) each.
-        poses: One (4, 4) each, rough.
+        blendshapes: (52,) for each frame in which a face was found.
+        poses: (4, 4) for each such frame, as the face detector guesses the head's pose.
         frames: The numbers of these frames.
         missing: The numbers of the frames without a face.
         names: Names of the blendshapes.
@@ -102,7 +102,7 @@ def track_portrait(video: Path, out: Path, settings: PortraitSettings) -> None:
     Args:
         video: A video file of one person, steady camera.
         out: Folder to make.
-        settings: How.
+        settings: Size, focal length and what goes into the manifest.
 
     Raises:
         CaptureError: If `out` exists, or the video cannot be read or shows no face.
@@ -130,7 +130,7 @@ def track_portrait(video: Path, out: Path, settings: PortraitSettings) -> None:
 
 
 def _write(work: Path, video: Video, model: Path, settings: PortraitSettings) -> None:
-    """All files of the capture."""
+    """Writes all files of the capture."""
     readings = _read_faces(work, video, model)
     notes = _notes(video, readings)
     canonical = canonical_face(model)

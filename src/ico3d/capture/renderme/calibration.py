@@ -9,7 +9,7 @@ from ico3d.errors import CaptureError
 FPS, MANY_FPS = 30.0, 15.0
 """Speech that many cameras recorded has every other frame."""
 MANY = 38
-"""How many they are."""
+"""How many cameras have pictures in a recording at `MANY_FPS`."""
 
 
 def read_cameras(raw: SmcFile, calibration: SmcFile) -> tuple[list[SmcCamera], list[str]]:
@@ -47,7 +47,7 @@ def frame_rate(
 
     Args:
         part: What was performed.
-        cameras: Those with pictures.
+        cameras: The cameras that have pictures.
         num_frames: How many frames each has.
         seconds: Length of the sound, which decides where there is one.
     """

@@ -69,7 +69,7 @@ class FlameFits:
 
         Args:
             file: The file with the group FLAME.
-            num_frames: Of the recording.
+            num_frames: Frames of the recording.
             upright: (3, 3) rotation from the world of the files to the capture's.
 
         Raises:

@@ -203,7 +203,7 @@ class RenderMe360(SmcCapture):
         return shape[0] / rate if shape and rate else None
 
     def _sample_rate(self) -> int | None:
-        """Of the sound."""
+        """Samples per second of the sound."""
         file = self._holding(SOUND)
         rate = file.numbers(f"{SOUND}/sample_rate", None)
         if rate is None:

@@ -15,7 +15,7 @@ PURPOSE = "reading SMC files"
 LARGEST = 256 * 2**20
 """Bytes that one piece may have; a damaged header can promise any number."""
 MOST_VALUES = 16
-"""That an attribute may have."""
+"""Values that an attribute may have."""
 DAMAGED = (OSError, KeyError, ValueError, TypeError, RuntimeError, OverflowError, MemoryError)
 """What h5py raises for files with damage."""
 
@@ -75,7 +75,7 @@ class SmcFile:
 
         Args:
             inside: The dataset.
-            count: How many to read.
+            count: How many values to read.
         """
         with self._guard(inside):
             node = self._find(inside)

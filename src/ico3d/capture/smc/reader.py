@@ -32,7 +32,7 @@ class SmcCapture(Capture):
         Args:
             path: The file that names the recording.
             devices: Its cameras.
-            num_frames: How many frames it has.
+            num_frames: How many frames the recording has.
         """
         self.path, self.num_frames = path, num_frames
         up = up_of_cameras([device.camera_to_world for device in devices])
@@ -134,7 +134,7 @@ def examine_views(what: str, file: SmcFile, folders: Mapping[str, str], num_fram
     """Whether every camera has every frame and each begins like a picture.
 
     Args:
-        what: What is examined.
+        what: What the report calls the pictures.
         file: Where.
         folders: Group of each camera's pictures, by its name.
         num_frames: Frames each should have.

@@ -50,7 +50,7 @@ def find_gap(points: np.ndarray, moments: Sequence[Moment], reach: float) -> Gap
 
     Args:
         points: (P, 3) known surface points.
-        moments: All in the space of the points.
+        moments: What was seen at some moments, in the space of the points.
         reach: Metres around a point that it accounts for.
 
     Returns:
@@ -139,7 +139,7 @@ class _Facing:
 
     Attributes:
         points: (S, 3).
-        edge: Of its voxels, metres.
+        edge: Edge of the hull's voxels, metres.
         ignored: Numbers of the cameras whose masks contradict all others.
     """
 

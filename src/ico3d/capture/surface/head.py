@@ -15,8 +15,8 @@ def head_hull(capture: Capture, frame: int) -> np.ndarray | None:
     """The visual hull of each camera's mask nearest in time: not all take all frames.
 
     Args:
-        capture: With masks and head poses.
-        frame: Which.
+        capture: A recording with masks and head poses.
+        frame: Number of the frame.
 
     Returns:
         (P, 3) in canonical head space, metres; None where poses, masks or a hull are lacking.
@@ -30,8 +30,8 @@ def head_silhouettes(capture: Capture, frame: int, among: Sequence[int]) -> dict
     """Each camera's mask nearest in time to a frame, as seen from canonical head space.
 
     Args:
-        capture: With masks and head poses.
-        frame: Which.
+        capture: A recording with masks and head poses.
+        frame: Number of the frame.
         among: Frames whose masks may be taken.
 
     Returns:

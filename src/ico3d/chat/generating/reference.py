@@ -13,9 +13,10 @@ from typing import Any, Literal
 
 from ico3d.chat.serving import connection, limits
 from ico3d.chat.wire import protocol
-from ico3d.chat.wire.codec import field_types, is_binary, kind_of, tensor_of
+from ico3d.chat.wire.codec import is_binary, tensor_of
 from ico3d.chat.wire.marks import Length, Range
 from ico3d.common.docstrings import about, notes
+from ico3d.common.typed import field_types, kind_of
 
 TARGET = Path(__file__).parents[4] / "docs" / "protocol.md"
 PROSE = Path(__file__).with_name("protocol.md")

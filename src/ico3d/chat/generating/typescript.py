@@ -12,8 +12,9 @@ from typing import Any, Literal
 import numpy as np
 
 from ico3d.chat.wire import protocol
-from ico3d.chat.wire.codec import field_types, is_binary, kind_of, tensor_of
+from ico3d.chat.wire.codec import is_binary, tensor_of
 from ico3d.common.docstrings import about, notes
+from ico3d.common.typed import field_types, kind_of
 
 TARGET = Path(__file__).parents[4] / "viewer" / "src" / "protocol.ts"
 

@@ -118,7 +118,7 @@ class Monitor:
         Args:
             session: Number of the session.
             number: Number of the turn in it.
-            turn: Its times.
+            turn: When each part of it was done.
         """
         parts = turn.parts()
         for part, milliseconds in parts.items():

@@ -83,7 +83,7 @@ class PipelineClock(BaseClock):
         return int(self._now() * 1e9)
 
     def start(self):
-        """It runs already."""
+        """Does nothing: the clock that is shown runs already."""
 
 
 class TurnObserver(BaseObserver):

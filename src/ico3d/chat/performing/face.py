@@ -8,7 +8,7 @@ import numpy as np
 from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.bundle.manifest import HeadInfo
 from ico3d.chat.performing.moods import Moods
-from ico3d.chat.remote.mouth import RemoteMouth
+from ico3d.chat.performing.remote_mouth import RemoteMouth
 from ico3d.chat.wire.protocol import EXPRESSION_FPS, SPEECH_RATE
 from ico3d.common.expression import expression_rows
 from ico3d.errors import BundleError
@@ -104,7 +104,7 @@ class StillLips:
         return rows
 
     def finish(self) -> np.ndarray:
-        """Nothing is held back."""
+        """(0, 0): a mouth at rest holds no rows back."""
         return np.zeros((0, 0), np.float32)
 
 

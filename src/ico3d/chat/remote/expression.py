@@ -1,9 +1,7 @@
 """`/v1/expressions`: a WebSocket that takes sound in pieces and gives the face that belongs to it.
 
-The server says `{"model": sha256, "rate": 24000, "fps": 25, "size": C}`. The text frame `start`
-begins a sound. Every binary frame (PCM16, mono, little-endian, at most 64 KiB) is answered by one
-binary frame with the rows known now ((n, C) float32, little-endian, n may be 0), and the text
-frame `finish` by the rows that are left. Rows are those of `StreamingExpressions`.
+What is said on it tells `ico3d.chat.wire.remote_expression`; rows are those of
+`StreamingExpressions`.
 """
 
 import asyncio
@@ -15,13 +13,11 @@ from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 
 from ico3d.chat.remote.door import BROKEN
 from ico3d.chat.wire.protocol import EXPRESSION_FPS, MAX_BINARY_FRAME, SPEECH_RATE
+from ico3d.chat.wire.remote_expression import FINISH, PATH, ROW, START
 from ico3d.common.expression import SPEECH_SIZE
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions
 
-PATH = "/v1/expressions"
-START, FINISH = "start", "finish"
 LARGEST = MAX_BINARY_FRAME  # bytes of one piece
-ROW = np.dtype("<f4")
 
 
 def add_routes(app: FastAPI, model: SpeechModel, sha256: str) -> None:

@@ -53,7 +53,7 @@ def wished(
 
     Args:
         services: Those of visitors without wishes.
-        settings: Their options, and those of others.
+        settings: Options of all services.
         voices: The persona's voice for each provider of voices.
         wishes: Keys of offers by kind.
         offered: What may be wished for.

@@ -135,7 +135,7 @@ class Sessions:
         return session
 
     def _broke_off(self, session: Session) -> None:
-        """Its pipeline ended by itself: nothing that the visitor says would be answered."""
+        """Ends a session whose pipeline ended by itself: no question would be answered."""
         self.monitor.failed("pipeline", "it ended by itself, and the conversation with it")
         session.page.end(Error(BROKEN_OFF, fatal=True, again=True))
         self._close_soon(session, "broken")

@@ -7,11 +7,11 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import UnionType
 from typing import Any, TypeVar, get_args, get_origin
 
 from ico3d.chat.settings.keys import check_key
 from ico3d.chat.settings.tools import Tool, check_tools
+from ico3d.common.typed import NAMES, Kind, Rules, fill, kind_of
 from ico3d.errors import SettingsError
 
 BEST = "best"
@@ -25,7 +25,7 @@ class Choice:
 
     Attributes:
         use: Name of the provider, or `best`.
-        options: Its own settings by name; the rest of the table.
+        options: Settings of the provider by name; the rest of the table.
     """
 
     use: str = BEST
@@ -218,42 +218,68 @@ def filled(kind: type[T], values: Mapping[str, Any], where: str) -> T:
     Raises:
         SettingsError: If a name is unknown or a value is of the wrong type.
     """
-    fields = {f.name: f.type for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
-    for name in values:
-        if name not in fields:
-            raise SettingsError(f"{where}: there is no setting '{name}', use {_any_of(fields)}.")
-    for name in _required(kind):
-        if name not in values:
-            raise SettingsError(f"{where}: '{name}' is missing.")
-    return kind(**{name: _value(fields[name], v, where, name) for name, v in values.items()})
+    return fill(kind, dict(values), Setting(where), SettingsRules(SettingsError))
 
 
-def _value(kind: Any, value: Any, where: str, name: str) -> Any:
-    kind = _given(kind)
-    if kind is Choice:
-        return _choice(value, where, name)
-    if dataclasses.is_dataclass(kind) and isinstance(value, dict):
-        return filled(kind, value, f"{where} [{name}]")  # type: ignore[arg-type]
-    entry_kind = entry_kind_of(kind)
-    if entry_kind is not None and isinstance(value, list):
-        if all(isinstance(entry, dict) for entry in value):
-            return tuple(filled(entry_kind, entry, f"{where} [[{name}]]") for entry in value)
-    elif kind == tuple[str, ...] and isinstance(value, list):
-        if all(isinstance(entry, str) for entry in value):
-            return tuple(value)
-    elif get_origin(kind) is Mapping and isinstance(value, dict):
-        return value
-    elif kind is float and type(value) is int:
-        return float(value)
-    elif type(value) is kind:
-        return value
-    raise SettingsError(f"{where}: '{name}' must be {described(kind)}.")
+@dataclass(frozen=True)
+class Setting:
+    """The place of a setting.
+
+    Attributes:
+        table: The file, and the table in which it is.
+        name: Name of the setting; empty for a table as a whole.
+        kind: Type that its value must have.
+    """
+
+    table: str
+    name: str = ""
+    kind: Any = None
+
+    @property
+    def inner(self) -> str:
+        """The table that the setting is, if it is one."""
+        if not self.name:
+            return self.table
+        name = f"[[{self.name}]]" if entry_kind_of(self.kind) else f"[{self.name}]"
+        return f"{self.table} {name}"
 
 
-def _given(kind: Any) -> Any:
-    """The type of a setting that may be left out, where it is given."""
-    kinds = [one for one in get_args(kind) if one is not type(None)]
-    return kinds[0] if isinstance(kind, UnionType) and len(kinds) == 1 else kind
+class SettingsRules(Rules):
+    """Settings may be left out; sentences name what there is."""
+
+    defaults, null, finite = True, False, False
+
+    def field(self, where: Setting, name: str, kind: Kind) -> Setting:
+        """A setting of a table."""
+        return Setting(where.inner, name, kind.bare)
+
+    def entry(self, where: Setting, key: int | str) -> Setting:
+        """Entries of a list are not told apart."""
+        return where
+
+    def unknown(self, where: Setting, name: str, kind: type) -> str:
+        """Refuses a name that no setting has."""
+        names = " or ".join(field.name for field in dataclasses.fields(kind))
+        return f"{where.inner}: there is no setting '{name}', use {names}."
+
+    def missing(self, where: Setting, name: str) -> str:
+        """Refuses a table without what it must have."""
+        return f"{where.inner}: '{name}' is missing."
+
+    def wrong(self, where: Setting, kind: Kind, value: Any) -> str:
+        """Refuses a value of another type."""
+        return f"{where.table}: '{where.name}' must be {described(where.kind)}."
+
+    def own(self, kind: Kind, value: Any, where: Setting) -> Any:
+        """A `Choice`, which may be a name alone."""
+        if kind.bare is not Choice:
+            return NotImplemented
+        if isinstance(value, str):
+            return Choice(value)
+        if not isinstance(value, dict) or not isinstance(value.get("use", BEST), str):
+            raise SettingsError(self.wrong(where, kind, value))
+        options = {key: entry for key, entry in value.items() if key != "use"}
+        return Choice(value.get("use", BEST), options)
 
 
 def entry_kind_of(kind: Any) -> Any:
@@ -262,36 +288,16 @@ def entry_kind_of(kind: Any) -> Any:
     return entry if dataclasses.is_dataclass(entry) else None
 
 
-def _required(kind: Any) -> list[str]:
-    missing = dataclasses.MISSING
-    fields = dataclasses.fields(kind)
-    return [f.name for f in fields if f.default is missing and f.default_factory is missing]
-
-
-def _choice(value: Any, where: str, name: str) -> Choice:
-    if isinstance(value, str):
-        return Choice(value)
-    if not isinstance(value, dict) or not isinstance(value.get("use", BEST), str):
-        raise SettingsError(f"{where}: '{name}' must be {described(Choice)}.")
-    options = {key: entry for key, entry in value.items() if key != "use"}
-    return Choice(value.get("use", BEST), options)
-
-
 def described(kind: Any) -> str:
     """The type of a setting, for people."""
-    kind = _given(kind)
+    kind = kind_of(kind).optional or kind
     if kind is Choice:
         return "a provider's name or a table with 'use'"
     if kind == tuple[str, ...]:
         return "a list of texts"
     if entry_kind_of(kind) is not None:
         return "a list of tables"
-    names = {str: "a text", int: "a whole number", float: "a number", bool: "true or false"}
-    return names.get(kind, "a table")
-
-
-def _any_of(names) -> str:
-    return " or ".join(names)
+    return NAMES.get(kind, "a table")
 
 
 def _parse(path: Path) -> dict[str, Any]:

@@ -72,7 +72,7 @@ class EchoGuard:
     """Decides for each piece of microphone sound whether it is nothing but echo."""
 
     def __init__(self):
-        """Nothing is known of the room."""
+        """A guard that knows nothing of the room's echo yet."""
         self.sent = SentSound()
         self._bands = Bands(MICROPHONE_RATE)
         self._rest = np.zeros(0)

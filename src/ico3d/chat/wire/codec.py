@@ -3,17 +3,17 @@
 import json
 import math
 import struct
-import types
 import typing
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import is_dataclass
 from functools import cache
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.marks import Length, Range, Tensor
 from ico3d.chat.wire.protocol import ClientMessage, ServerMessage
+from ico3d.common.typed import Kind, Rules, field_types, fill_fields, parsed, plain, refuse_constant
 from ico3d.errors import ProtocolError
 
 HEADER_LENGTH = struct.Struct("<I")
@@ -32,7 +32,8 @@ def encode(message: ClientMessage | ServerMessage) -> str | bytes:
     Raises:
         ProtocolError: If a field breaks its own limits or the frame is too long.
     """
-    header: dict[str, Any] = {"type": type(message).__name__.lower()}
+    name_of_type = type(message).__name__.lower()
+    header: dict[str, Any] = {}
     payload = []
     for name, annotation in field_types(type(message)).items():
         value = getattr(message, name)
@@ -43,7 +44,8 @@ def encode(message: ClientMessage | ServerMessage) -> str | bytes:
             header[name] = list(value.shape)
         else:
             header[name] = plain(value)
-    check_fields(type(message), header)
+    fill_fields(type(message), header, name_of_type, RULES)
+    header = {"type": name_of_type, **header}
     text = json.dumps(header, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     if not is_binary(type(message)):
         check_size(text.encode(), protocol.MAX_TEXT_FRAME)
@@ -86,8 +88,7 @@ def decode(frame: str | bytes, known: tuple[type, ...]) -> Any:
     if is_binary(message_type) != (payload is not None):
         kind = "binary" if is_binary(message_type) else "text"
         raise ProtocolError(f"{name}: this message travels in a {kind} frame.")
-    check_fields(message_type, header)
-    values = {key: rebuilt(header[key], kind) for key, kind in field_types(message_type).items()}
+    values = fill_fields(message_type, header, typing.cast(str, name), RULES)
     if payload is not None:
         values.update(read_tensors(message_type, header, payload))
     return message_type(**values)
@@ -105,11 +106,6 @@ def unpack(text: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise ProtocolError("a frame is not a JSON object.")
     return value
-
-
-def refuse_constant(name: str) -> None:
-    """NaN and Infinity are no JSON, whatever Python thinks."""
-    raise ValueError(name)
 
 
 def split_binary(frame: bytes) -> tuple[dict[str, Any], bytes]:
@@ -151,13 +147,6 @@ def read_tensors(message: type, header: dict[str, Any], payload: bytes) -> dict[
     return arrays
 
 
-@cache
-def field_types(message: type) -> dict[str, Any]:
-    """Annotations of a message's fields in order."""
-    hints = typing.get_type_hints(message, include_extras=True)
-    return {field.name: hints[field.name] for field in fields(message)}
-
-
 def tensor_of(annotation: Any) -> Tensor | None:
     """The `Tensor` mark of an annotation, if it has one."""
     marks = getattr(annotation, "__metadata__", ())
@@ -170,121 +159,57 @@ def is_binary(message: type) -> bool:
     return any(tensor_of(annotation) for annotation in field_types(message).values())
 
 
-def plain(value: Any) -> Any:
-    """Nested dataclasses and tuples as what JSON has."""
-    if is_dataclass(value):
-        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    return value
+class WireRules(Rules):
+    """A message has all its fields and no other; marks say what their values must be like."""
 
+    finite = False  # the ranges say so
 
-def rebuilt(value: Any, annotation: Any) -> Any:
-    """Checked JSON as the dataclasses and tuples that the annotation names."""
-    kind = kind_of(annotation)
-    if kind.origin in (types.UnionType, typing.Union):  # T | None
-        return None if value is None else rebuilt(value, kind.arguments[0])
-    if isinstance(kind.bare, type) and is_dataclass(kind.bare):
-        kinds = field_types(kind.bare)
-        return kind.bare(**{name: rebuilt(value[name], kinds[name]) for name in kinds})
-    if kind.origin is list:
-        return [rebuilt(item, kind.arguments[0]) for item in value]
-    if kind.origin is tuple:
-        return tuple(value)
-    return float(value) if kind.bare is float else value
+    def entry(self, where: str, key: int | str) -> str:
+        """Entries are not told apart."""
+        return where
 
+    def unknown(self, where: str, name: str, kind: type) -> str:
+        """Refuses a name that no field has."""
+        return f"{where}: unknown field {short(name)}."
 
-@dataclass(frozen=True)
-class Kind:
-    """An annotation taken apart.
+    def missing(self, where: str, name: str) -> str:
+        """Refuses a message without one of its fields."""
+        return f"{where}: field '{name}' is missing."
 
-    Attributes:
-        bare: The type in `Annotated[type, marks…]`.
-        marks: Its limits.
-        origin: `list` of a `list[int]`.
-        arguments: `int` of it.
-    """
+    def count(self, where: str, wanted: int, given: int) -> str:
+        """Refuses a list of another length."""
+        return f"{where}: must have {wanted} items."
 
-    bare: Any
-    marks: tuple
-    origin: Any
-    arguments: tuple
+    def wrong(self, where: str, kind: Kind, value: Any) -> str:
+        """Refuses a value of another type."""
+        if kind.origin is Literal:
+            return f"{where}: must be one of {', '.join(kind.arguments)}."
+        wanted = {list: list, tuple: list, dict: dict}.get(kind.origin, kind.bare)
+        name = "dict" if is_dataclass(wanted) else wanted.__name__
+        return f"{where}: must be {name}, not {type(value).__name__}."
 
+    def own(self, kind: Kind, value: Any, where: str) -> Any:
+        """The shape of an array, which its header field holds."""
+        if kind.bare is not np.ndarray:
+            return NotImplemented
+        check_shape(value, kind.marks[0], where)
+        return value
 
-@cache  # every field of every message asks
-def kind_of(annotation: Any) -> Kind:
-    """What an annotation says."""
-    bare, marks = annotation, ()
-    if typing.get_origin(annotation) is Annotated:
-        bare, marks = annotation.__origin__, annotation.__metadata__
-    return Kind(bare, marks, typing.get_origin(bare), typing.get_args(bare))
-
-
-def check_fields(message: type, header: dict[str, Any], where: str = "") -> None:
-    """Checks names, types and limits of a JSON object against a dataclass.
-
-    Raises:
-        ProtocolError: At the first field that breaks them.
-    """
-    where = where or message.__name__.lower()
-    kinds = field_types(message)
-    for name in header:
-        if name not in kinds and name != "type":
-            raise ProtocolError(f"{where}: unknown field {short(name)}.")
-    for name, annotation in kinds.items():
-        if name not in header:
-            raise ProtocolError(f"{where}: field '{name}' is missing.")
-        check_value(header[name], annotation, f"{where}.{name}")
-
-
-def check_value(value: Any, annotation: Any, where: str) -> None:
-    """Checks one JSON value against its annotation."""
-    kind = kind_of(annotation)
-    bare, marks, origin, arguments = kind.bare, kind.marks, kind.origin, kind.arguments
-    if origin in (types.UnionType, typing.Union):  # T | None
-        if value is not None:
-            check_value(value, arguments[0], where)
-    elif origin is Literal:
-        if not isinstance(value, str) or value not in arguments:
-            raise ProtocolError(f"{where}: must be one of {', '.join(arguments)}.")
-    elif origin in (list, tuple, dict):
-        check_items(value, origin, arguments, where)
-    elif bare is np.ndarray:
-        check_shape(value, marks[0], where)
-    elif is_dataclass(bare):
-        check_type(value, dict, where)
-        check_fields(typing.cast(type, bare), value, where)
-    else:
-        check_type(value, bare, where)
-    for mark in marks:
+    def check(self, value: Any, mark: Any, where: str) -> None:
+        """Checks a limit."""
         check_limit(value, mark, where)
 
 
-def check_items(value: Any, origin: type, arguments: tuple, where: str) -> None:
-    """Checks a list's, pair's or dictionary's items."""
-    check_type(value, dict if origin is dict else list, where)
-    if origin is tuple and len(value) != len(arguments):
-        raise ProtocolError(f"{where}: must have {len(arguments)} items.")
-    for item in value.values() if origin is dict else value:
-        check_value(item, arguments[-1], where)
+RULES = WireRules(ProtocolError)
 
 
 def check_shape(value: Any, tensor: Tensor, where: str) -> None:
     """Checks the shape that a header gives for an array."""
-    check_type(value, list, where)
+    for size in parsed(list[int], value, where, RULES):
+        check_limit(size, Range(0, tensor.max_size), where)
     if len(value) != tensor.dims:
         raise ProtocolError(f"{where}: must have {tensor.dims} dimensions.")
-    for size in value:
-        check_type(size, int, where)
-        check_limit(size, Range(0, tensor.max_size), where)
     check_limit(math.prod(value), Range(0, tensor.max_size), where)
-
-
-def check_type(value: Any, kind: type, where: str) -> None:
-    """Checks a JSON type; a bool is no number, a whole number is a float too."""
-    accepted = (int, float) if kind is float else kind
-    if not isinstance(value, accepted) or (isinstance(value, bool) and kind is not bool):
-        raise ProtocolError(f"{where}: must be {kind.__name__}, not {type(value).__name__}.")
 
 
 def check_limit(value: Any, mark: Any, where: str) -> None:

@@ -271,7 +271,7 @@ class End:
 
     Attributes:
         utterance: Which answer.
-        samples: Its length at 24 kHz.
+        samples: Length of the utterance at 24 kHz.
     """
 
     utterance: Count

@@ -40,7 +40,7 @@ class Offer:
 
     Attributes:
         kind: Which job.
-        key: Its name in settings and wishes.
+        key: Name of the service in settings and wishes.
         name: For the visitor's eyes, as in `services`.
         hindrance: What keeps it from working and what would mend it; empty if it works.
     """

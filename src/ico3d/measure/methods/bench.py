@@ -175,7 +175,7 @@ def run_trials(
     """Runs trials, in so many processes.
 
     Args:
-        trials: All of them.
+        trials: The trainings to run.
         jobs: Processes; with several, each writes what it says to `log.txt` in its folder.
         done: Called with every result when it comes.
 

@@ -10,7 +10,7 @@ from ico3d.measure.methods.bench import OURS, Trial
 
 
 def line(trial: Trial, result: dict) -> str:
-    """One result, when it comes."""
+    """One line about a trial that has just ended."""
     return (
         f"{trial.method}, seed {trial.seed}: {_number(result['psnr_mask'])} dB, "
         f"{result['train_seconds']:.0f} s"

@@ -59,8 +59,8 @@ def measure(
         bundle: The avatar.
         settings: Services and timing of the server; those of the scripted one are fixed.
         said: What the visitor says.
-        kinds: Which trials.
-        turns: How many of each kind.
+        kinds: Kinds of trials.
+        turns: How many trials of each kind.
         told: Called after each.
 
     Raises:
@@ -133,7 +133,7 @@ def share(question: trials.Question) -> float:
 
 
 def nth(sounds: list[np.ndarray], number: int) -> np.ndarray:
-    """They take turns."""
+    """The sentence of the n-th trial: sentences take turns."""
     return sounds[number % len(sounds)]
 
 
@@ -173,7 +173,7 @@ def spread(values: list[float]) -> dict[str, float]:
 
 
 def tables(figures: dict[str, Any]) -> list[Table]:
-    """For people to read."""
+    """The figures as tables for the terminal."""
     times, counts = Table("ms", "p50", "p95"), Table("trials", "")
     spans = {name: values for name, values in figures.items() if "p50" in values}
     for name, values in (spans | figures["parts"]).items():

@@ -85,7 +85,7 @@ class BenchSessions:
 
     Attributes:
         bundle: The avatar to serve, by a process of its own.
-        visitors: How many.
+        visitors: How many visitors talk at once.
         microphones: How many of them have theirs open, in a silent room: the server listens.
         json: File for the figures.
     """

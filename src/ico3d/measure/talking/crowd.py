@@ -45,7 +45,7 @@ def measure(
 
     Args:
         bundle: The avatar.
-        visitors: How many.
+        visitors: How many visitors talk at once.
         microphones: Of how many the microphone is open.
         script: What the voices say.
 
@@ -120,7 +120,7 @@ def figures(visits: list[Visit]) -> dict[str, Any]:
 
 
 def table(figures: dict[str, Any]) -> Table:
-    """For people to read."""
+    """The figures as a table for the terminal."""
     shown = Table("visitors at once", str(figures["visitors"]))
     shown.add_row("heard their own tone only", str(figures["heard_their_own_tone_only"]))
     shown.add_row("pieces of speech", str(figures["pieces"]))

@@ -22,7 +22,7 @@ class Stolen:
     cores: float | None = None
 
     def sentence(self) -> str:
-        """For people to read."""
+        """The share of stolen time as a sentence."""
         if self.cores is None:
             return "Whether the machine was this process' own is not known."
         return f"The host kept {self.cores:.2f} of {os.cpu_count()} cores from running meanwhile."

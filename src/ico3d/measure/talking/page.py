@@ -211,7 +211,7 @@ async def open_page(
     """Connects and says hello.
 
     Args:
-        url: Of the server, `http://…`.
+        url: Address of the server, `http://…`.
         session: The session to resume.
         last_index: Its last speech message.
         microphone: Open the microphone at once.

@@ -1,5 +1,9 @@
 """The CPU side of `splat.render`."""
 
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false
+# (torch leaves some of its functions untyped)
+
 from collections.abc import Sequence
 
 import torch

@@ -1,5 +1,10 @@
 """Gradients of the compositing: tiles once more, front to back."""
 
+# pyright: reportMissingParameterType=false, reportUnknownParameterType=false
+# pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownMemberType=false
+# (numba finds the types of a kernel's arguments when it is called)
+
 import numba
 import numpy as np
 
@@ -169,7 +174,7 @@ def draw_backward(
 
     Args:
         records: (N, 9), as drawn.
-        tiles: As drawn.
+        tiles: The tiles that `draw` drew.
         image: (H, W, 3) that `draw` returned.
         light: (H, W) that `draw` returned.
         g_image: (H, W, 3) gradient with respect to the image.

@@ -1,5 +1,10 @@
 """Splats to pixels: alpha compositing, tile by tile, front to back."""
 
+# pyright: reportMissingParameterType=false, reportUnknownParameterType=false
+# pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownMemberType=false
+# (numba finds the types of a kernel's arguments when it is called)
+
 from math import factorial
 
 import numba
@@ -174,7 +179,7 @@ def draw(records: np.ndarray, tiles: Tiles) -> tuple[np.ndarray, np.ndarray]:
 
     Args:
         records: (N, 9) of `splat_records`.
-        tiles: Of the same splats.
+        tiles: Which of these splats each tile shows.
 
     Returns:
         Image (H, W, 3) float32 on black, and the transmittance (H, W) that is left.

@@ -1,5 +1,10 @@
 """One Gaussian seen by one camera: the 2D covariance and what it is made of."""
 
+# pyright: reportMissingParameterType=false, reportUnknownParameterType=false
+# pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownMemberType=false
+# (numba finds the types of a kernel's arguments when it is called)
+
 from math import sqrt
 
 from ico3d.splat.convention import FRUSTUM_MARGIN

@@ -1,5 +1,10 @@
 """3D Gaussians to 2D ones, for several cameras at once (EWA splatting with a low-pass filter)."""
 
+# pyright: reportMissingParameterType=false, reportUnknownParameterType=false
+# pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownMemberType=false
+# (numba finds the types of a kernel's arguments when it is called)
+
 from math import log, sqrt
 
 import numba

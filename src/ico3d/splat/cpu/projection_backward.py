@@ -1,5 +1,10 @@
 """Gradients of the projection, through the low-pass compensation too."""
 
+# pyright: reportMissingParameterType=false, reportUnknownParameterType=false
+# pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownMemberType=false
+# (numba finds the types of a kernel's arguments when it is called)
+
 from math import sqrt
 
 import numba
@@ -79,7 +84,7 @@ def _pose_gradient(local, mean, j, g_x, g_y, g_camera):
         mean: (3,) in the world.
         j: The Jacobian's entries 00, 02, 11, 12.
         g_x: Gradient of the first row of Jacobian times rotation.
-        g_y: Of the second.
+        g_y: Gradient of the second row of Jacobian times rotation.
         g_camera: (12,) to add to.
     """
     for k in range(3):

@@ -1,6 +1,12 @@
 """The kernels as differentiable torch functions."""
 
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownArgumentType=false, reportUnknownParameterType=false
+# pyright: reportIncompatibleMethodOverride=false
+# (torch leaves some of its functions untyped, and so does numba)
+
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import torch
@@ -35,7 +41,17 @@ class Project(torch.autograd.Function):
     """Differentiable `cpu.projection.project`; the extents carry no gradient."""
 
     @staticmethod
-    def forward(ctx, means, quats, scales, opacities, cameras, width, height, antialiased):
+    def forward(
+        ctx: Any,
+        means: Tensor,
+        quats: Tensor,
+        scales: Tensor,
+        opacities: Tensor,
+        cameras: Tensor,
+        width: int,
+        height: int,
+        antialiased: bool,
+    ) -> tuple[Tensor, ...]:
         """Returns means2d, conics, opacities left, depths, extents as `project` does."""
         arrays = [_array(t) for t in (cameras, means, quats, scales, opacities)]
         results = project(*arrays, width=width, height=height, antialiased=antialiased)
@@ -46,7 +62,9 @@ class Project(torch.autograd.Function):
 
     @staticmethod
     @once_differentiable
-    def backward(ctx, g_means2d, g_conics, g_alphas, g_depths, _):
+    def backward(
+        ctx: Any, g_means2d: Tensor, g_conics: Tensor, g_alphas: Tensor, g_depths: Tensor, _: Tensor
+    ) -> tuple[Tensor | None, ...]:
         """Gradients of means, quats, scales, opacities and the cameras' poses."""
         gradients = torch.cat(
             [g_means2d, g_conics, g_alphas[..., None], g_depths[..., None]], -1
@@ -70,8 +88,14 @@ class Draw(torch.autograd.Function):
 
     @staticmethod
     def forward(
-        ctx, means2d, conics, alphas, colors, tiles: Sequence[Tiles], absolute: Tensor | None
-    ):
+        ctx: Any,
+        means2d: Tensor,
+        conics: Tensor,
+        alphas: Tensor,
+        colors: Tensor,
+        tiles: Sequence[Tiles],
+        absolute: Tensor | None,
+    ) -> tuple[Tensor, Tensor]:
         """Draws.
 
         Args:
@@ -80,7 +104,7 @@ class Draw(torch.autograd.Function):
             conics: (C, N, 3).
             alphas: (C, N) opacities after the low-pass.
             colors: (C, N, 3).
-            tiles: One per camera.
+            tiles: Tiles of the pictures, one object per camera.
             absolute: (C, N, 2) that takes the means' gradients summed without signs, or None.
 
         Returns:
@@ -95,7 +119,7 @@ class Draw(torch.autograd.Function):
 
     @staticmethod
     @once_differentiable
-    def backward(ctx, g_images, g_lights):
+    def backward(ctx: Any, g_images: Tensor, g_lights: Tensor) -> tuple[Tensor | None, ...]:
         """Gradients of means2d, conics, alphas, colors."""
         wanted = ctx.absolute is not None
         views = zip(*ctx.problem, _array(g_images), _array(g_lights), strict=True)

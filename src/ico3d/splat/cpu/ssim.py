@@ -1,5 +1,10 @@
 """SSIM and its gradient, fused: separable blurs over rows of interleaved RGB."""
 
+# pyright: reportMissingParameterType=false, reportUnknownParameterType=false
+# pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownMemberType=false
+# (numba finds the types of a kernel's arguments when it is called)
+
 import numba
 import numpy as np
 

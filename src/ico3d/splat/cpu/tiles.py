@@ -1,5 +1,10 @@
 """Which splats touch which tile, front to back."""
 
+# pyright: reportMissingParameterType=false, reportUnknownParameterType=false
+# pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
+# pyright: reportUnknownMemberType=false
+# (numba finds the types of a kernel's arguments when it is called)
+
 from dataclasses import dataclass
 from math import floor, log, sqrt
 

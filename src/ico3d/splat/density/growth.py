@@ -86,7 +86,7 @@ def contributions(gaussians: Gaussians, cameras: Sequence[Camera]) -> Tensor:
     """
     gaussians = gaussians.detach()
     one = gaussians.means.new_zeros(len(gaussians), 3).requires_grad_()
-    given = []
+    given: list[Tensor] = []
     for camera in cameras:
         colored = replace(gaussians, colors=one, sh=None)
         with torch.enable_grad():

@@ -98,7 +98,7 @@ class Population:
 
     parameters: dict[str, Tensor]
     moments: dict[str, Tensor]
-    axes: Mapping[str, int] = field(default_factory=dict)
+    axes: Mapping[str, int] = field(default_factory=dict[str, int])
 
     def __len__(self) -> int:
         """The number of Gaussians."""
@@ -118,7 +118,7 @@ class Population:
         """Applies a plan to parameters and moments.
 
         Args:
-            plan: What becomes of the Gaussians.
+            plan: Which Gaussians are kept, copied or split.
             generator: On the CPU; decides where the parts of split ones lie.
         """
         old = self.parameters

@@ -3,6 +3,9 @@
 Kheradmand et al., "3D Gaussian Splatting as Markov Chain Monte Carlo", 2024, section 4.2 and eq. 9.
 """
 
+# pyright: reportMissingImports=false, reportUnknownVariableType=false
+# (gsplat is untyped, and not installed everywhere)
+
 import importlib.util
 import math
 from functools import cache

@@ -36,7 +36,7 @@ class Schedule:
 
     Attributes:
         begin: First step at which it may.
-        until: It does not from this step on.
+        until: First step at which it may no longer.
         every: Steps between two changes.
     """
 

@@ -4,6 +4,7 @@ Layout and rounding follow PlayCanvas' splat-transform (MIT).
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,12 +30,12 @@ class _Range:
     low: Floats
     high: Floats
 
-    def at(self, chunk: NDArray, fraction: NDArray) -> NDArray:
+    def at(self, chunk: NDArray[Any], fraction: NDArray[Any]) -> NDArray[Any]:
         """Values (n, 3) at fractions (n, 3) of the way between the bounds of chunks (n,)."""
         return self.low[chunk] * (1 - fraction) + self.high[chunk] * fraction
 
 
-def read(tables: dict[str, NDArray]) -> RawGaussians:
+def read(tables: dict[str, NDArray[Any]]) -> RawGaussians:
     """Gaussians of a compressed PLY file's tables `chunk`, `vertex` and, where there is one, `sh`.
 
     Raises:
@@ -59,7 +60,7 @@ def read(tables: dict[str, NDArray]) -> RawGaussians:
     return result
 
 
-def _check(tables: dict[str, NDArray]) -> None:
+def _check(tables: dict[str, NDArray[Any]]) -> None:
     """Refuses tables that are no compressed Gaussians."""
     if "chunk" not in tables:
         raise GaussianFileError("a compressed PLY without the element 'chunk'")
@@ -74,7 +75,7 @@ def _check(tables: dict[str, NDArray]) -> None:
         raise GaussianFileError(f"{len(tables['sh'])} rows of harmonics for {count} Gaussians")
 
 
-def _range(chunks: NDArray, names: tuple[str, ...]) -> _Range:
+def _range(chunks: NDArray[Any], names: tuple[str, ...]) -> _Range:
     """Bounds of one kind; colours of old files have none and lie between 0 and 1."""
     present = chunks.dtype.names or ()
     low, high = ([f"{end}_{name}" for name in names] for end in ("min", "max"))
@@ -86,7 +87,7 @@ def _range(chunks: NDArray, names: tuple[str, ...]) -> _Range:
     return _Range(columns(chunks, low), columns(chunks, high))
 
 
-def _rest(table: NDArray | None, count: int) -> Floats:
+def _rest(table: NDArray[Any] | None, count: int) -> Floats:
     """Harmonics (N, K - 1, 3) above degree 0.
 
     Raises:
@@ -104,7 +105,11 @@ def _rest(table: NDArray | None, count: int) -> Floats:
 
 
 def _unpack(
-    packed: NDArray, chunk: NDArray, ranges: dict[str, _Range], result: RawGaussians, rows: slice
+    packed: NDArray[Any],
+    chunk: NDArray[Any],
+    ranges: dict[str, _Range],
+    result: RawGaussians,
+    rows: slice,
 ) -> None:
     """Writes Gaussians of packed words (n, 4) in chunks (n,) into rows of the result."""
     position, rotation, scale, color = packed.T
@@ -120,14 +125,14 @@ def _unpack(
     result.quats[rows] = _quats(rotation)
 
 
-def _fractions(words: NDArray, shifts: tuple[int, ...], bits: tuple[int, ...]) -> Floats:
+def _fractions(words: NDArray[Any], shifts: tuple[int, ...], bits: tuple[int, ...]) -> Floats:
     """Fields (n, len(bits)) of 32-bit words (n,) as fractions of their largest value."""
     masks = (1 << np.array(bits, np.uint32)) - 1
     parts = (words[:, None] >> np.array(shifts, np.uint32)) & masks
     return parts.astype(np.float32) / masks.astype(np.float32)
 
 
-def _quats(words: NDArray) -> Floats:
+def _quats(words: NDArray[Any]) -> Floats:
     """Unit quaternions wxyz (n, 4) of words (n,): which is largest, and the three others."""
     small = (_fractions(words, (20, 10, 0), (10, 10, 10)) - 0.5) * np.float32(np.sqrt(2))  # (n, 3)
     largest = (words >> 30).astype(np.intp)  # (n,)

@@ -3,6 +3,7 @@
 import re
 import warnings
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ class Element:
     """One table of a PLY file.
 
     Attributes:
-        name: What the header calls it.
+        name: What the header calls the table.
         count: Rows.
         properties: Columns in file order: name and numpy type without byte order.
         has_lists: Whether a column holds lists, so that the table's size is unknown.
@@ -34,7 +35,7 @@ class Element:
 
     name: str
     count: int
-    properties: dict[str, str] = field(default_factory=dict)
+    properties: dict[str, str] = field(default_factory=dict[str, str])
     has_lists: bool = False
 
 
@@ -63,7 +64,8 @@ def parse_header(data: bytes) -> Header:
     if end is None:
         looked_at = min(len(data), MAX_HEADER_BYTES)
         raise GaussianFileError(f"the PLY header does not end within its first {looked_at} bytes")
-    order, elements, offset = None, {}, 0
+    order, offset = None, 0
+    elements: dict[str, Element] = {}
     for line in data[: end.start()].split(b"\n"):
         words = line.decode("ascii", "replace").split()
         if words[:1] == ["format"]:
@@ -91,10 +93,11 @@ def _take_line(words: list[str], elements: dict[str, Element]) -> bool:
             known = name in properties
             properties[name] = _TYPES[kind]
             return not known
-    return False
+        case _:
+            return False
 
 
-def read_tables(data: bytes, header: Header) -> dict[str, NDArray]:
+def read_tables(data: bytes, header: Header) -> dict[str, NDArray[Any]]:
     """The tables of a PLY file as structured arrays (rows,), up to the first that holds lists.
 
     Binary tables are views of `data`.
@@ -115,9 +118,10 @@ def read_tables(data: bytes, header: Header) -> dict[str, NDArray]:
 
 def _read_binary(
     data: bytes, header: Header, elements: list[Element], complete: bool
-) -> dict[str, NDArray]:
+) -> dict[str, NDArray[Any]]:
     """Tables of the elements, which follow one another from the header's end."""
-    tables, offset = {}, header.size
+    tables: dict[str, NDArray[Any]] = {}
+    offset = header.size
     for element in elements:
         kinds = [(name, header.order + kind) for name, kind in element.properties.items()]
         row = np.dtype(kinds)
@@ -137,7 +141,7 @@ def _read_binary(
     return tables
 
 
-def _read_text(data: bytes, offset: int, elements: list[Element]) -> dict[str, NDArray]:
+def _read_text(data: bytes, offset: int, elements: list[Element]) -> dict[str, NDArray[Any]]:
     """Tables of float32 that stand as text from `offset` on."""
     wanted = sum(element.count * len(element.properties) for element in elements)
     if 2 * wanted > len(data) - offset + 1:  # a digit and a space each
@@ -146,7 +150,8 @@ def _read_text(data: bytes, offset: int, elements: list[Element]) -> dict[str, N
             f"{len(data)}: it is cut off or damaged"
         )
     numbers = _parse_numbers(data[offset:], wanted, offset)
-    tables, first = {}, 0
+    tables: dict[str, NDArray[Any]] = {}
+    first = 0
     for element in elements:
         last = first + element.count * len(element.properties)
         row = np.dtype([(name, "f4") for name in element.properties])
@@ -173,7 +178,9 @@ def _parse_numbers(text: bytes, count: int, offset: int) -> NDArray[np.float32]:
     return numbers
 
 
-def columns(table: NDArray, names: list[str] | tuple[str, ...], kind: str = "f4") -> NDArray:
+def columns(
+    table: NDArray[Any], names: list[str] | tuple[str, ...], kind: str = "f4"
+) -> NDArray[Any]:
     """Columns of a table as an array (rows, len(names)) of the given numpy type."""
     picked = np.empty((len(table), len(names)), kind)
     with np.errstate(over="ignore"):  # doubles above float32's range: not finite, refused later

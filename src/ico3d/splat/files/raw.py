@@ -1,6 +1,7 @@
 """Gaussians as files hold them: before activation, so that nothing is lost between two files."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import torch
@@ -175,17 +176,17 @@ def _property_name(field: str, where: tuple[int, ...], per_channel: int) -> str:
     return PROPERTIES[field][where[0] if where else 0]
 
 
-def logits(opacities: NDArray) -> Floats:
+def logits(opacities: NDArray[Any]) -> Floats:
     """Logits of opacities in [0, 1], any shape."""
     inside = np.clip(opacities, OPACITY_MARGIN, 1 - OPACITY_MARGIN, dtype=np.float64)
     return np.log(inside / (1 - inside)).astype(np.float32)
 
 
-def logarithms(scales: NDArray) -> Floats:
+def logarithms(scales: NDArray[Any]) -> Floats:
     """Logarithms of standard deviations, any shape; 0 counts as the smallest normal number."""
     return np.log(np.maximum(scales, np.finfo(np.float32).tiny)).astype(np.float32)
 
 
-def dc_of_colors(colors: NDArray) -> Floats:
+def dc_of_colors(colors: NDArray[Any]) -> Floats:
     """Harmonics of degree 0 (N, 3) of colours (N, 3) in [0, 1]."""
     return ((colors - 0.5) / harmonics.C0).astype(np.float32)

@@ -1,5 +1,7 @@
 """The `.splat` files of antimatter15's viewer: 32 bytes per Gaussian, no header."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,7 +28,7 @@ def looks_like(data: bytes, size: int) -> bool:
     )
 
 
-def _quats(rows: NDArray) -> NDArray:
+def _quats(rows: NDArray[Any]) -> NDArray[Any]:
     """Quaternions wxyz (n, 4) of rows (n,)."""
     return (rows["quats"].astype(np.float32) - 128) / 128
 

@@ -7,6 +7,7 @@ reference code (MIT), harmonics with all their 8 bits.
 
 import gzip
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,14 +67,14 @@ def write(gaussians: RawGaussians, path: Path) -> None:
 
 
 def _affine(packed: NDArray[np.uint8], scale: float, offset: float) -> Floats:
-    """What bytes stand for."""
+    """Values that bytes stand for: scale · byte + offset."""
     values = packed.astype(np.float32)
     values *= scale
     values += offset
     return values
 
 
-def _bytes(values: NDArray) -> NDArray[np.uint8]:
+def _bytes(values: NDArray[Any]) -> NDArray[np.uint8]:
     """Values rounded to the nearest byte."""
     return np.clip(np.round(values), 0, 255).astype(np.uint8)
 
@@ -132,7 +133,7 @@ def _pack_rotations(quats: Floats) -> NDArray[np.uint8]:
     largest = np.abs(unit).argmax(1)  # (N,)
     sign = np.where(np.take_along_axis(unit, largest[:, None], 1) < 0, -1, 1)
     unit = unit * sign  # the largest becomes positive: the same rotation
-    words = largest.astype(np.uint32)
+    words: NDArray[np.uint32] = largest.astype(np.uint32)
     for axis in range(4):
         size = np.minimum(np.round(np.abs(unit[:, axis]) / _SMALL), 511).astype(np.uint32)
         word = words << 10 | (unit[:, axis] < 0).astype(np.uint32) << 9 | size

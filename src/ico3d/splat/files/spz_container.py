@@ -36,7 +36,7 @@ class Header:
     Attributes:
         version: 2, 3 or 4.
         count: Gaussians.
-        degree: Of the harmonics, 0 to 3.
+        degree: Degree of the spherical harmonics, 0 to 3.
         fractional_bits: Of the positions' fixed-point numbers.
         flags: 1 for trained with antialiasing; the others announce further data.
         streams: Number of streams, version 4 only.
@@ -96,7 +96,8 @@ def unpack(data: bytes) -> tuple[Header, dict[str, NDArray[np.uint8]]]:
         MissingExtraError: If it is of version 4 and the package zstandard is not installed.
     """
     header, packed = _unpack_gzip(data) if data[:2] == GZIP_MAGIC else _unpack_zstd(data)
-    sections, offset = {}, 0
+    sections: dict[str, NDArray[np.uint8]] = {}
+    offset = 0
     for name, width in header.sections.items():
         end = offset + header.count * width
         sections[name] = packed[offset:end].reshape(header.count, width)

@@ -1,6 +1,7 @@
 """The PLY layout of the original 3D Gaussian Splatting code: one row of floats per Gaussian."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from ico3d.splat.files.raw import PROPERTIES, RawGaussians, rest_properties
 _DEGREES = {len(rest_properties(degree)): degree for degree in range(4)}
 
 
-def read(table: NDArray) -> RawGaussians:
+def read(table: NDArray[Any]) -> RawGaussians:
     """Gaussians of a PLY file's vertex table (N,), columns in any order, unknown ones ignored.
 
     Raises:
@@ -35,7 +36,7 @@ def read(table: NDArray) -> RawGaussians:
     )
 
 
-def by_coefficient(channels: NDArray) -> NDArray:
+def by_coefficient(channels: NDArray[Any]) -> NDArray[Any]:
     """Harmonics (N, K - 1, 3) of file columns (N, 3·(K - 1)): red's, then green's, then blue's."""
     per_channel = channels.shape[1] // 3
     return channels.reshape(len(channels), 3, per_channel).transpose(0, 2, 1)

@@ -61,7 +61,7 @@ def articulate(
     the neighbours ask for.
 
     Args:
-        phonemes: In the order of time.
+        phonemes: What is spoken, in the order of time.
         end: When the last one ends, seconds.
         visemes: Viseme name to (K,) blendshape weights.
         times: (F,) seconds.

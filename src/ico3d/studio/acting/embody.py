@@ -18,7 +18,7 @@ def embodied(
 
     Args:
         subject: A whole person.
-        acted: What the face does.
+        acted: The performance of the head alone.
         motion: One of `MOTIONS`.
         fps: Frames per second.
         seed: Decides what the body does.

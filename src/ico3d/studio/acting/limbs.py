@@ -17,7 +17,7 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Bend:
-    """How two bones lie.
+    """How the two bones of a limb lie.
 
     Attributes:
         upper: (F, 3) direction of the upper bone.
@@ -36,7 +36,7 @@ def reach(start: np.ndarray, end: np.ndarray, lengths: tuple[float, float], pole
     Args:
         start: (F, 3).
         end: (F, 3); nearer than the bones are long, or they only point to it.
-        lengths: Of both bones, metres.
+        lengths: Metres that the upper and the lower bone are long.
         pole: (F, 3) direction in which elbow or knee points.
     """
     first, second = lengths

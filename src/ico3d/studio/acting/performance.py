@@ -63,7 +63,7 @@ class Performance:
     Attributes:
         samples: (S,) float32 sound at `SOUND_RATE`; sample 0 belongs to frame 0.
         text: What is said.
-        phonemes: With times in seconds.
+        phonemes: What is spoken, with times in seconds.
         weights: (F, K) float32 blendshape weights.
         eyes: (F, 7) float32 in the order of `EYE_NAMES`.
         world_from_head: (F, 4, 4) float64.
@@ -97,7 +97,7 @@ def perform(
     Args:
         subject: Who speaks.
         text: What to say, repeated until the time is over; empty for a long text of its own.
-        frames: How many frames.
+        frames: How many frames to perform.
         fps: Frames per second.
         seed: Decides voice, order of sentences, blinks, brows and sway.
         lively: Whether the face shows moods and glances too, which the sound does not tell.

@@ -17,7 +17,7 @@ HEAD_MAP = (448, 0.24)
 """Texels along the side of a depth map, and half of it in metres: the head and the neck; what lies
 outside is lit."""
 BODY_MAP = (640, 1.1)
-"""Of a whole person."""
+"""Texels along the side of a depth map of a whole person, and half of it in metres."""
 NECK = -0.2
 """Height below which the occlusion of a whole person comes from the map of the body, metres."""
 BIAS = 1.4

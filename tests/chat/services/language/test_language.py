@@ -25,10 +25,9 @@ from ico3d.chat.wire.protocol import Answer, End, Interrupt, Speech, State, Stop
 from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
 from ico3d.errors import SettingsError
 from ico3d.measure.talking.page import open_page
+from support.chat.pages import FollowingPlayer
 from support.chat.scripted_server import Call, Script, running
 from support.chat.serving import serving
-
-from ...performing.test_gestures import FollowingPlayer
 
 ADA = Persona("Ada")
 

@@ -10,9 +10,8 @@ from ico3d.chat.settings.conversation import ChatSettings, Choice
 from ico3d.chat.wire.protocol import Answer, Deaf, Error, Heard, State, Transcript
 from ico3d.errors import SettingsError
 from ico3d.measure.talking.page import open_page
+from support.chat.recognisers import silent
 from support.chat.serving import serving
-
-from .test_segments import silent
 
 BROWSER = ChatSettings(recognition=Choice("browser", {"language": "en-US"}))
 

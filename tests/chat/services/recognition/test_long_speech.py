@@ -29,9 +29,8 @@ from ico3d.chat.turns.eager import EagerSmartTurn
 from ico3d.chat.wire.protocol import Answer, Transcript
 from ico3d.errors import SettingsError
 from ico3d.measure.talking.page import open_page
+from support.chat.recognisers import Script, Scripted, silent
 from support.chat.serving import serving
-
-from .test_segments import Script, Scripted, silent
 
 RATE = 16_000
 MINUTES = 10

@@ -1,56 +1,22 @@
 """Recognisers that listen first and transcribe then: the turn waits for them, and no longer."""
 
 import asyncio
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from pipecat.frames.frames import TranscriptionFrame
-from pipecat.services.stt_service import SegmentedSTTService
-from pipecat.utils.time import time_now_iso8601
 
 from ico3d.chat.services import ChosenService
 from ico3d.chat.services.provider import Provider
 from ico3d.chat.services.recognition.segments import Segments
 from ico3d.chat.wire.protocol import Answer, Speech, State, Transcript
 from ico3d.measure.talking.page import open_page
+from support.chat.recognisers import Script, Scripted, silent
 from support.chat.serving import serving
-
-from ...test_conversation import slowness
-
-
-@dataclass(frozen=True)
-class Script:
-    """What the recogniser says to each stretch of speech, and how long it takes."""
-
-    delay: float
-    words: tuple[str, ...]
-
-
-class Scripted(SegmentedSTTService):
-    """A recogniser of pipecat's kind: nothing where it heard nothing."""
-
-    def __init__(self, script: Script, **rest):
-        super().__init__(**rest)
-        self.script, self.stretches = script, 0
-
-    async def run_stt(self, audio):
-        self.stretches += 1
-        await asyncio.sleep(self.script.delay)
-        words = self.script.words[self.stretches - 1]
-        if words == "fails":
-            raise RuntimeError("no reason")
-        if words:
-            yield TranscriptionFrame(words, "", time_now_iso8601())
 
 
 class Recogniser(Segments, Scripted):
     pass
-
-
-def silent(avatar):
-    """Greets nobody."""
-    return replace(avatar, persona=replace(avatar.persona, greeting=""))
 
 
 def scripted(delay, *words):
@@ -84,7 +50,7 @@ async def test_the_turn_ends_with_its_transcript(bundle, question, given_up, del
         assert transcript.text == "What is your name?"
         _, thinking = await states(page, "listening", "thinking")
         assert at - said >= delay
-        assert thinking - at < 0.1 * slowness()
+        assert thinking - at < 0.1
         assert not given_up
         _, answer = await page.wait(Answer)
         assert answer.text == "I am Random."

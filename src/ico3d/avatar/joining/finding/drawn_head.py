@@ -29,8 +29,8 @@ class DrawnHead(Capture):
         """Puts a head before cameras.
 
         Args:
-            gaussians: In the world of the cameras.
-            cameras: Of any size each.
+            gaussians: The head in the world of the cameras.
+            cameras: Cameras that look at the head, each with pictures of any size.
         """
         self.gaussians, self.cameras = gaussians, tuple(cameras)
 

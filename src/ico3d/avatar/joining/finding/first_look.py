@@ -37,7 +37,7 @@ def first_looks(
     Args:
         gaussians: The head; the face may look anywhere, and the unit is not known.
         canonical: MediaPipe's face.
-        reader: Of faces in pictures.
+        reader: Finds faces in pictures.
 
     Yields:
         (4, 4) similarities from the space of the canonical face to that of the head.

@@ -121,7 +121,7 @@ class FaceSeeker:
         """The face of a recorded person, in the space of the head poses.
 
         Args:
-            capture: Of the person.
+            capture: The recording of the person.
             poses: (F, 4, 4) head poses.
 
         Returns:
@@ -203,7 +203,7 @@ def _cameras() -> list[Camera]:
 
 
 def _carried(head: Head, motion: np.ndarray) -> Head:
-    """The same head where a rigid motion (4, 4) takes it."""
+    """A head where a rigid motion (4, 4) takes it."""
     turn = motion[:3, :3]
     return Head(moved(motion, head.points), moved(motion, head.center), turn @ head.forward, {})
 

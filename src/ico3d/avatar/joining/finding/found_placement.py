@@ -28,7 +28,7 @@ class OverRecording(Capture):
         """Puts a head into a recording.
 
         Args:
-            capture: Of the whole person.
+            capture: The recording of the whole person.
             gaussians: The head in its own space.
             placement: Where it is.
         """
@@ -63,7 +63,7 @@ def found_in_pictures(
 
     Args:
         head: Whose capture had no landmarks.
-        capture: Of the body.
+        capture: The body's recording.
         folder: The head's, for messages.
         say: Told how well the pictures agree.
         device: Where the head is drawn.

@@ -48,7 +48,7 @@ class CompatibleModel(OpenAILLMService):
 
         Args:
             client: What the SDK's client is made with.
-            model: Its name.
+            model: Name of the model.
             instruction: Who it is.
             functions: Whether it may call functions.
             sampling: What else pipecat's settings say of a request.

@@ -69,7 +69,7 @@ class Loaded:
     Attributes:
         name: Where it came from.
         model: transformers' causal language model.
-        tokenizer: Its tokenizer, with a chat template.
+        tokenizer: Of the model, with a chat template.
         threads: Where it generates.
     """
 

@@ -54,7 +54,7 @@ def find(settings: Settings, seconds: float) -> tuple[str, str] | None:
 
 
 def hindrance(settings: Settings) -> str:
-    """That none answers now, if so."""
+    """Says so where no language server answers on this machine; empty where one does."""
     if find(settings, QUICK) is not None:
         return ""
     return f"none answers on the ports {', '.join(map(str, PORTS))}: start Ollama, for example."

@@ -59,7 +59,7 @@ def sentences(text: str) -> list[str]:
 
 @dataclass(frozen=True)
 class Settings:
-    """It has none."""
+    """A persona's notes need no settings."""
 
 
 def make(settings: Settings, context: Context) -> PersonaModel:

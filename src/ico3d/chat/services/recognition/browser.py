@@ -154,7 +154,7 @@ class BrowserOrServer(ServiceSwitcher):
 
 
 def hindrance(settings: Settings) -> str:
-    """It is never chosen by itself."""
+    """Why `best` never chooses the browser's recogniser: it must be asked for."""
     return (
         "the browser's maker may receive the sound: "
         'set [recognition] use = "browser" if that is wanted.'

@@ -12,7 +12,7 @@ KNOCK = 0.3  # s that a server may take to accept a connection
 
 
 def hindrance(settings: Settings) -> str:
-    """No server, no key, or a server that is not there."""
+    """What keeps a server from recognising: none named, no key, no answer; empty if none."""
     lacking = lacks_server(settings.url, settings.key_variable, "recognition")
     if lacking or not settings.url:
         return lacking

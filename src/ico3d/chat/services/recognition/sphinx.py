@@ -216,7 +216,7 @@ class Settings:
 
 
 def hindrance(settings: Settings) -> str:
-    """Its package."""
+    """What pocketsphinx lacks here; empty if it works."""
     return lacks_package("pocketsphinx", "chat")
 
 

@@ -97,7 +97,7 @@ class Clauses(SimpleTextAggregator):
         return await self._cut(end) if end else None
 
     async def _is_worth_a_look(self) -> bool:
-        """Not while there is only the number of a list's entry: it belongs to what follows."""
+        """Whether a piece may end here: not behind the number of a list's entry alone."""
         if not _LISTED.fullmatch(self._rest):
             return True
         await self._restart(self._rest)

@@ -81,7 +81,7 @@ def spoken(text: str, voice: str, rate: int) -> np.ndarray:
 
 
 def hindrance(settings: Settings) -> str:
-    """Its packages."""
+    """What espeak-ng lacks here, its packages included; empty if it works."""
     return lacks_package("espeakng_loader", "voice") or lacks_package("soxr", "chat")
 
 

@@ -59,7 +59,7 @@ def language(settings: Settings) -> str:
 
 
 def hindrance(settings: Settings) -> str:
-    """Its package and its weights."""
+    """What Kokoro lacks here, its package or its weights; empty if it works."""
     return lacks_package("kokoro_onnx", "kokoro") or lacks_weights("kokoro")
 
 

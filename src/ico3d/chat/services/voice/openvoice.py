@@ -210,7 +210,7 @@ engine = functools.cache(Engine)
 
 
 def hindrance(settings: Settings) -> str:
-    """Its packages and its weights."""
+    """What OpenVoice lacks here, packages or weights; empty if it works."""
     for package in ("melo", "openvoice"):
         if importlib.util.find_spec(package) is None:
             return f"{package} is not installed: {INSTALL}"

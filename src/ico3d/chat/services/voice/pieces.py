@@ -48,7 +48,7 @@ class PieceVoice(Prompt):
         """For one session.
 
         Args:
-            voice: Its name.
+            voice: Name of the voice.
             speak: A text as (S,) int16 samples at 24 kHz; called from threads.
         """
         super().__init__(

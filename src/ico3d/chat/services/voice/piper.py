@@ -52,7 +52,7 @@ def find_voice(settings: Settings) -> Path:
 
 
 def hindrance(settings: Settings) -> str:
-    """Its package and the voice's files."""
+    """What Piper lacks here, its package or the voice's files; empty if it works."""
     try:
         find_voice(settings)
     except MissingModelError as error:

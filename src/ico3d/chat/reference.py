@@ -1,6 +1,6 @@
 """Writes `docs/settings.md` from the dataclasses of the settings: every table and every key.
 
-Run `python -m ico3d.chat.settings.reference` after each change of one of them.
+Run `python -m ico3d.chat.reference` after each change of one of them.
 """
 
 import dataclasses
@@ -15,12 +15,12 @@ from ico3d.chat.services.provider import Provider
 from ico3d.chat.settings.conversation import ChatSettings, Choice, described, entry_kind_of
 from ico3d.common.docstrings import notes, summary
 
-TARGET = Path(__file__).parents[4] / "docs" / "settings.md"
+TARGET = Path(__file__).parents[3] / "docs" / "settings.md"
 
 HEAD = """\
 # Settings
 
-<!-- Written by `python -m ico3d.chat.settings.reference` from the dataclasses: edit those. -->
+<!-- Written by `python -m ico3d.chat.reference` from the dataclasses: edit those. -->
 
 Every table and key of the file that `ico3d serve`, `demo`, `serve-module` and `bench chat` take \
 as `--settings`, and of [the persona's file](#the-personas-file). TOML, or JSON if the name ends \

@@ -10,10 +10,10 @@ from loguru import logger
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
-from ico3d.chat.remote.expression import FINISH, PATH, ROW, START
 from ico3d.chat.settings.conversation import Expression
 from ico3d.chat.settings.keys import key_for
 from ico3d.chat.wire.protocol import EXPRESSION_FPS, SPEECH_RATE
+from ico3d.chat.wire.remote_expression import FINISH, PATH, ROW, START
 from ico3d.common.expression import SPEECH_SIZE
 from ico3d.errors import Ico3dError, ServiceError
 from ico3d.speech.runtime import SpeechModel, StreamingExpressions

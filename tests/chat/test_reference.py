@@ -6,9 +6,9 @@ import tomllib
 import pytest
 
 from ico3d.bundle.persona import Persona
+from ico3d.chat import reference
 from ico3d.chat.remote.limits import Limits
 from ico3d.chat.services import TABLES
-from ico3d.chat.settings import reference
 from ico3d.chat.settings.conversation import ChatSettings, filled
 from ico3d.chat.settings.tools import Tool
 
@@ -20,7 +20,7 @@ KINDS = list(dict.fromkeys([ChatSettings, *PARTS, *PROVIDERS, Tool, Persona, Lim
 
 def test_the_page_is_up_to_date():
     assert reference.TARGET.read_text(encoding="utf-8") == reference.markdown(), (
-        "run python -m ico3d.chat.settings.reference"
+        "run python -m ico3d.chat.reference"
     )
 
 
