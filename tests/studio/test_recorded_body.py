@@ -19,7 +19,7 @@ from ico3d.studio.person.subject import Material
 from ico3d.studio.picture import paint
 from ico3d.studio.recording import Recording, record
 from ico3d.studio.rigs import cameras_of
-from support.recordings import synthetic_bodies
+from support.recordings import synthetic_bodies, synthetic_people
 from support.shared import SUBJECTS
 
 HUMAN = SUBJECTS / "human_face_m.npz"
@@ -294,7 +294,7 @@ def test_a_head_of_version_1_can_still_be_read(person, tmp_path):
 def test_who_has_no_joints_cannot_be_whole(person, tmp_path):
     with pytest.raises(SettingsError, match="anny"):
         load_subject("anny", whole=True)
-    bust = synthetic_bodies.people.write_person(tmp_path / "bust.npz")
+    bust = synthetic_people.write_person(tmp_path / "bust.npz")
     with pytest.raises((CaptureError, SettingsError)):
         record(_settings(bust), tmp_path / "x", workers=1)
     with pytest.raises(SettingsError, match="motion"):

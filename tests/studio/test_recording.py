@@ -104,18 +104,24 @@ def test_outside_the_mask_the_picture_is_the_background(folder):
 
 
 def _block_face(weights):
-    """(81, 3) of the block head's face in closed form, by weights of its five shapes."""
+    """(81, 3) of the block head's face in closed form, by the weights of its shapes.
+
+    Its origin is as high as the eyes and as far back as the head's joint.
+    """
     across, up = np.linspace(-1, 1, 9)[np.arange(81) % 9], np.linspace(-1, 1, 9)[np.arange(81) // 9]
-    face = np.stack([0.08 * across, 1.5 + 0.12 * up, 0.1 - 0.04 * across**2], 1)
-    face[:18, 1] -= 0.03 * weights[0]  # the jaw: the two lowest rows
-    face[10:14, 1] -= 0.03 * weights[1:]  # lids and brows: a vertex each
+    face = np.stack([0.08 * across, 0.12 * up, 0.07 - 0.04 * across**2], 1)
+    face[:18, 1] -= 0.03 * weights["jawOpen"]  # the two lowest rows
+    face[10, 1] -= 0.03 * weights["eyeBlinkLeft"]
+    face[11, 1] -= 0.03 * weights["eyeBlinkRight"]
+    face[12:14, 1] -= 0.03 * weights["browInnerUp"]  # a vertex on either side
     return face
 
 
 def test_landmarks_are_the_projected_vertices(folder):
     capture, lowest = open_capture(folder), []
     for frame in (0, 7):
-        face = _block_face(capture.blendshapes(frame).astype(float))
+        values = capture.blendshapes(frame).astype(float)
+        face = _block_face(dict(zip(capture.blendshape_names, values, strict=True)))
         landmarks = face[np.arange(68)]
         landmarks[[61, 62, 63]], landmarks[[65, 66, 67]] = face[22], face[13]  # the lips
         lowest.append(landmarks[66, 1])
