@@ -17,26 +17,10 @@ from ico3d.chat.wire.protocol import Answer, Interrupt, Speech, Stop, Text
 from ico3d.errors import MissingModelError
 from ico3d.measure.talking.page import open_page
 from support.chat.serving import serving
+from support.needs import needs
 
-pytest.importorskip("transformers")
-from support.chat.tiny_qwen import write_tiny_qwen
-
-ANSWER = "My name is Ada. Nice to meet you, dear visitor!"
+pytestmark = needs("transformers")
 CONTEXT = Context(Persona("Ada"), None, None)
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    path = tmp_path_factory.mktemp("tiny")
-    write_tiny_qwen(path, ANSWER)
-    return path
-
-
-@pytest.fixture(scope="module")
-def endless(tmp_path_factory):
-    path = tmp_path_factory.mktemp("endless")
-    write_tiny_qwen(path, " one, two; three. Then", for_ever=True)
-    return path
 
 
 def settings_of(folder, **options):
@@ -100,11 +84,11 @@ async def test_tokens_stream_and_stop_when_nobody_reads_on(endless):
     assert len(made) == then < 2000
 
 
-async def test_summaries_are_inferred_beside_the_conversation(folder):
+async def test_summaries_are_inferred_beside_the_conversation(folder, answer):
     made = choose(settings_of(folder)).language.make(CONTEXT)
     context = LLMContext([{"role": "user", "content": "Conversation history: …"}])
-    assert await made.run_inference(context, 100, "Summarise.") == ANSWER
-    assert await made.run_inference(context, 3, "Summarise.") != ANSWER
+    assert await made.run_inference(context, 100, "Summarise.") == answer
+    assert await made.run_inference(context, 3, "Summarise.") != answer
 
 
 def test_a_failed_generation_ends_its_stream(folder):
@@ -145,17 +129,15 @@ def test_it_is_the_best_only_where_its_weights_are(folder, tmp_path, monkeypatch
     assert chosen(only, Choice(), "language").provider.title == "a model in this process"
 
 
-@pytest.mark.parametrize("opened", [False, True])
-async def test_its_thoughts_are_not_said(tmp_path, opened):
+async def test_its_thoughts_are_not_said(thinker, answer):
     from ico3d.chat.services.language.in_process import load
 
-    thought = "Hmm who asks ◁/think▷"  # all words of a tiny model must differ, marks too
-    write_tiny_qwen(tmp_path, (thought if opened else f"<reasoning>{thought}") + ANSWER)
+    folder, opened = thinker
     if opened:  # by the template, as that of some families does
-        tokenizer = load(str(tmp_path)).tokenizer
+        tokenizer = load(str(folder)).tokenizer
         tokenizer.chat_template += "{% if add_generation_prompt %}<reasoning>\n{% endif %}"
-        assert load(str(tmp_path)).opens
-    made = choose(settings_of(tmp_path)).language.make(CONTEXT)
+        assert load(str(folder)).opens
+    made = choose(settings_of(folder)).language.make(CONTEXT)
     asked = LLMContextFrame(LLMContext([{"role": "user", "content": "who are you?"}]))
     said = [frame.text async for frame in run(made, [asked], 60) if isinstance(frame, LLMTextFrame)]
-    assert "".join(said).strip() == ANSWER
+    assert "".join(said).strip() == answer

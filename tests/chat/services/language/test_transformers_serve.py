@@ -7,35 +7,28 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("transformers")
-from transformers.utils.import_utils import is_serve_available
-
 from ico3d.chat.services.language.servers import language_models
 from ico3d.chat.settings.conversation import ChatSettings, Choice
 from ico3d.chat.wire.protocol import Answer, End, Text
 from ico3d.measure.talking.page import open_page
 from support.chat.serving import free_port, serving
-from support.chat.tiny_qwen import write_tiny_qwen
+from support.needs import needs
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(
-        not is_serve_available(), reason="needs pip install 'transformers[serving]'"
-    ),
-]
-ANSWER = "My name is Ada. Nice to meet you, dear visitor!"
+pytestmark = [pytest.mark.slow, pytest.mark.real_time, needs("transformers")]
 STARTING = 300  # s that it may take on a busy machine: it imports torch
 
 
 @pytest.fixture(scope="module")
-def address(tmp_path_factory):
+def address(folder, tmp_path_factory):
     """Its URL and the model's name."""
-    folder = tmp_path_factory.mktemp("tiny")
-    write_tiny_qwen(folder, ANSWER)
+    from transformers.utils.import_utils import is_serve_available
+
+    if not is_serve_available():
+        pytest.skip("needs pip install 'transformers[serving]'")
     port = free_port()
     program = str(Path(sys.executable).with_name("transformers"))
     command = [program, "serve", str(folder), "--host", "127.0.0.1", "--port", str(port)]
-    log = folder.with_suffix(".log")
+    log = tmp_path_factory.mktemp("served") / "transformers.log"
     with log.open("wb") as file:
         process = subprocess.Popen([*command, "--device", "cpu"], stdout=file, stderr=file)
     url = f"http://127.0.0.1:{port}/v1"
