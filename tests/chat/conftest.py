@@ -1,5 +1,7 @@
 """Random bundles, a question, a server that serves them; all of it in virtual time."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import soxr
@@ -14,7 +16,7 @@ from ico3d.common.sphinx import SphinxProcess  # noqa: E402
 from support.bundles.random_body import write_random_body  # noqa: E402
 from support.bundles.random_bundle import write_random_bundle  # noqa: E402
 from support.bundles.random_whole import write_random_whole  # noqa: E402
-from support.chat.serving import serving  # noqa: E402
+from support.chat.serving import BROWSER, OFFLINE, serving  # noqa: E402
 from support.chat.virtual_time import pytest_asyncio_loop_factories, timeless  # noqa: E402, F401
 
 
@@ -58,6 +60,13 @@ def question():
 @pytest.fixture
 async def served(bundle):
     async with serving(bundle) as (url, sessions):
+        yield url, sessions
+
+
+@pytest.fixture
+async def typed(bundle):
+    """The same for visitors who type."""
+    async with serving(bundle, replace(OFFLINE, recognition=BROWSER)) as (url, sessions):
         yield url, sessions
 
 

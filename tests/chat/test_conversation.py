@@ -99,8 +99,8 @@ async def test_real_speech_is_transcribed_and_silences_the_avatar(served):
     await page.close()
 
 
-async def test_nothing_of_a_stopped_utterance_follows_its_stop(served):
-    url, _ = served
+async def test_nothing_of_a_stopped_utterance_follows_its_stop(typed):
+    url, _ = typed
     page, _ = await open_page(url, microphone=False)
     await page.wait(Speech)
     for number in range(1, 8):  # typed into the answer before, at ever other moments
@@ -120,8 +120,8 @@ async def test_nothing_of_a_stopped_utterance_follows_its_stop(served):
     await page.close()
 
 
-async def test_speech_runs_ahead_of_playback_but_not_too_far(served):
-    url, _ = served
+async def test_speech_runs_ahead_of_playback_but_not_too_far(typed):
+    url, _ = typed
     page, _ = await open_page(url, microphone=False)
     await page.heard(0)
     await page.send(Text("tell me something nobody has written down"))
@@ -134,8 +134,8 @@ async def test_speech_runs_ahead_of_playback_but_not_too_far(served):
     await page.close()
 
 
-async def test_interrupt_of_another_utterance_stops_nothing(served):
-    url, _ = served
+async def test_interrupt_of_another_utterance_stops_nothing(typed):
+    url, _ = typed
     page, _ = await open_page(url, microphone=False)
     await page.wait(Speech)
     await page.send(Interrupt(5))
@@ -158,8 +158,8 @@ async def test_a_cough_is_not_answered_and_ends_listening(served):
     await page.close()
 
 
-async def test_two_visitors_do_not_hear_each_other(served):
-    url, sessions = served
+async def test_two_visitors_do_not_hear_each_other(typed):
+    url, sessions = typed
     one, welcome_one = await open_page(url, microphone=False)
     two, welcome_two = await open_page(url, microphone=False)
     assert welcome_one.session != welcome_two.session and len(sessions) == 2
@@ -173,8 +173,8 @@ async def test_two_visitors_do_not_hear_each_other(served):
     await asyncio.gather(one.close(), two.close())
 
 
-async def test_typed_answers_come_at_once(served):
-    url, _ = served
+async def test_typed_answers_come_at_once(typed):
+    url, _ = typed
     page, _ = await open_page(url, microphone=False)
     await page.heard(0)
     asked = time.monotonic()

@@ -99,6 +99,7 @@ async def test_the_page_of_a_conversation_that_does_not_start_may_try_again(bund
     assert len([line for line in told if secret in line and "start failed: " in line]) == 3
 
 
+@pytest.mark.real_time  # a thread waits
 async def test_a_service_that_never_starts_is_not_waited_for(bundle):
     going_on = threading.Event()
 

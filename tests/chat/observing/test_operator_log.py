@@ -97,6 +97,8 @@ async def asked(page, text):
     await page.wait(Speech, since, where=lambda m: m.utterance > before, timeout=40)
 
 
+@pytest.mark.slow
+@pytest.mark.real_time  # the server is a process
 async def test_each_failure_is_one_line_without_what_was_said(bundle_path, tmp_path, question):
     async with serving(echoing()) as url:
         settings = tmp_path / "settings.toml"

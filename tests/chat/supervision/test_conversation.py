@@ -20,6 +20,7 @@ from support.chat.remote import (
     service_app,
     serving,
 )
+from support.chat.serving import BROWSER
 from support.chat.serving import serving as serving_avatar
 
 SORRY = {failed: sentence.split(". ")[0] + "." for failed, sentence in APOLOGIES["en"].items()}
@@ -55,6 +56,7 @@ class Fickle:
 @contextlib.asynccontextmanager
 async def talking(bundle, microphone=False, **services):
     """A page whose avatar says hello."""
+    services.setdefault("recognition", BROWSER)
     settings = ChatSettings(patience=QUICK, **services)
     async with serving_avatar(bundle, settings) as (url, _):
         page, _ = await open_page(url, microphone=microphone)
@@ -154,7 +156,7 @@ async def test_it_apologises_in_the_personas_language(bundle):
         persona = replace(avatar.persona, languages=("de",))
         return replace(avatar, persona=persona)
 
-    settings = ChatSettings(patience=QUICK, language=language_at(NOBODY))
+    settings = ChatSettings(BROWSER, language_at(NOBODY), patience=QUICK)
     async with serving_avatar(bundle, settings, adapt=german) as (url, _):
         page, _ = await open_page(url, microphone=False)
         await page.wait(Speech, timeout=60)

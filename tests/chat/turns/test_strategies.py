@@ -91,7 +91,8 @@ class Stage:
     def __init__(self, turns=Turns(), trusted=True):  # noqa: B008
         self.analyzer, self.context, self.hushed = Verdicts(), LLMContext(), []
         self.asked, self.said = Tap(), Tap()  # before and behind the language model
-        chosen = strategies(self.analyzer, turns, trusted, self.hushed.append)
+        now = asyncio.get_running_loop().time
+        chosen = strategies(self.analyzer, turns, trusted, self.hushed.append, now)
         user, assistant = LLMContextAggregatorPair(
             self.context,
             user_params=LLMUserAggregatorParams(

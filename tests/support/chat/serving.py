@@ -8,6 +8,8 @@ from ico3d.chat.serving.sessions import Sessions
 from ico3d.chat.settings.conversation import ChatSettings, Choice
 
 OFFLINE = ChatSettings(language=Choice("persona-notes"))
+BROWSER = Choice("browser", {"fallback": ""})
+"""Recognition for visitors who type: the server starts no decoder of its own."""
 
 
 def free_port():

@@ -27,14 +27,14 @@ from ico3d.errors import SettingsError
 from ico3d.measure.talking.page import open_page
 from support.chat.pages import FollowingPlayer
 from support.chat.scripted_server import Call, Script, running
-from support.chat.serving import serving
+from support.chat.serving import BROWSER, serving
 
 ADA = Persona("Ada")
 
 
 def settings_for(port, **others):
     options = {"url": f"http://127.0.0.1:{port}/v1", "model": "tiny"}
-    return ChatSettings(language=Choice("openai", options), **others)
+    return ChatSettings(BROWSER, Choice("openai", options), **others)
 
 
 @contextlib.asynccontextmanager

@@ -1,7 +1,10 @@
-"""The language model in process: a real Qwen2, tiny, through transformers' own API."""
+"""A real Qwen2, tiny: in this process through transformers' own API, and in one of its own."""
 
 import asyncio
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import pytest
 from pipecat.frames.frames import LLMContextFrame, LLMTextFrame
@@ -11,36 +14,22 @@ from ico3d.bundle.persona import Persona
 from ico3d.chat.remote.headless import run
 from ico3d.chat.services import choose, chosen
 from ico3d.chat.services.language import PROVIDERS, qwen
+from ico3d.chat.services.language.servers import language_models
 from ico3d.chat.services.provider import Context
 from ico3d.chat.settings.conversation import ChatSettings, Choice
-from ico3d.chat.wire.protocol import Answer, Interrupt, Speech, Stop, Text
+from ico3d.chat.wire.protocol import Answer, End, Interrupt, Speech, Stop, Text
 from ico3d.errors import MissingModelError
 from ico3d.measure.talking.page import open_page
-from support.chat.serving import serving
+from support.chat.serving import BROWSER, free_port, serving
+from support.needs import needs
 
-pytest.importorskip("transformers")
-from support.chat.tiny_qwen import write_tiny_qwen
-
-ANSWER = "My name is Ada. Nice to meet you, dear visitor!"
+pytestmark = needs("transformers")
 CONTEXT = Context(Persona("Ada"), None, None)
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    path = tmp_path_factory.mktemp("tiny")
-    write_tiny_qwen(path, ANSWER)
-    return path
-
-
-@pytest.fixture(scope="module")
-def endless(tmp_path_factory):
-    path = tmp_path_factory.mktemp("endless")
-    write_tiny_qwen(path, " one, two; three. Then", for_ever=True)
-    return path
+STARTING = 300  # s that it may take on a busy machine: it imports torch
 
 
 def settings_of(folder, **options):
-    return ChatSettings(language=Choice("qwen", {"model": str(folder), **options}))
+    return ChatSettings(BROWSER, Choice("qwen", {"model": str(folder), **options}))
 
 
 async def test_it_answers_aloud_and_is_loaded_once_for_all(bundle, folder):
@@ -100,11 +89,11 @@ async def test_tokens_stream_and_stop_when_nobody_reads_on(endless):
     assert len(made) == then < 2000
 
 
-async def test_summaries_are_inferred_beside_the_conversation(folder):
+async def test_summaries_are_inferred_beside_the_conversation(folder, answer):
     made = choose(settings_of(folder)).language.make(CONTEXT)
     context = LLMContext([{"role": "user", "content": "Conversation history: …"}])
-    assert await made.run_inference(context, 100, "Summarise.") == ANSWER
-    assert await made.run_inference(context, 3, "Summarise.") != ANSWER
+    assert await made.run_inference(context, 100, "Summarise.") == answer
+    assert await made.run_inference(context, 3, "Summarise.") != answer
 
 
 def test_a_failed_generation_ends_its_stream(folder):
@@ -145,17 +134,65 @@ def test_it_is_the_best_only_where_its_weights_are(folder, tmp_path, monkeypatch
     assert chosen(only, Choice(), "language").provider.title == "a model in this process"
 
 
-@pytest.mark.parametrize("opened", [False, True])
-async def test_its_thoughts_are_not_said(tmp_path, opened):
+async def test_its_thoughts_are_not_said(thinker, answer):
     from ico3d.chat.services.language.in_process import load
 
-    thought = "Hmm who asks ◁/think▷"  # all words of a tiny model must differ, marks too
-    write_tiny_qwen(tmp_path, (thought if opened else f"<reasoning>{thought}") + ANSWER)
+    folder, opened = thinker
     if opened:  # by the template, as that of some families does
-        tokenizer = load(str(tmp_path)).tokenizer
+        tokenizer = load(str(folder)).tokenizer
         tokenizer.chat_template += "{% if add_generation_prompt %}<reasoning>\n{% endif %}"
-        assert load(str(tmp_path)).opens
-    made = choose(settings_of(tmp_path)).language.make(CONTEXT)
+        assert load(str(folder)).opens
+    made = choose(settings_of(folder)).language.make(CONTEXT)
     asked = LLMContextFrame(LLMContext([{"role": "user", "content": "who are you?"}]))
     said = [frame.text async for frame in run(made, [asked], 60) if isinstance(frame, LLMTextFrame)]
-    assert "".join(said).strip() == ANSWER
+    assert "".join(said).strip() == answer
+
+
+@pytest.fixture(scope="module")
+def served_model(folder, tmp_path_factory):
+    """The URL of a real `transformers serve` and its model's name."""
+    from transformers.utils.import_utils import is_serve_available
+
+    if not is_serve_available():
+        pytest.skip("needs pip install 'transformers[serving]'")
+    port = free_port()
+    program = str(Path(sys.executable).with_name("transformers"))
+    command = [program, "serve", str(folder), "--host", "127.0.0.1", "--port", str(port)]
+    log = tmp_path_factory.mktemp("served") / "transformers.log"
+    with log.open("wb") as file:
+        process = subprocess.Popen([*command, "--device", "cpu"], stdout=file, stderr=file)
+    url = f"http://127.0.0.1:{port}/v1"
+    try:
+        until = time.monotonic() + STARTING
+        while not _answers(url):
+            assert process.poll() is None and time.monotonic() < until, log.read_text()
+            time.sleep(0.2)
+        yield url, str(folder)
+    finally:
+        process.terminate()
+        process.wait(20)
+
+
+def _answers(url):
+    import httpx
+
+    try:
+        return httpx.get(url.removesuffix("/v1") + "/health").status_code == 200
+    except httpx.HTTPError:
+        return False
+
+
+@pytest.mark.slow
+@pytest.mark.real_time  # the server is a process
+async def test_our_pipeline_talks_with_transformers_serve(bundle, served_model):
+    url, model = served_model
+    settings = ChatSettings(BROWSER, Choice("openai", {"url": url, "model": model}))
+    async with serving(bundle, settings) as (page_url, _):
+        page, _ = await open_page(page_url, microphone=False)
+        for utterance in (1, 2):
+            await page.send(Text("who are you?"))
+            await page.wait(End, where=lambda m, n=utterance: m.utterance == n)
+        said = [m.text for m in page.messages(Answer) if m.utterance == 2]
+        await page.close()
+    print(f"transformers serve said: {said}; it offers {language_models(url, 'none', 5.0)}")
+    assert said == ["My name is Ada.", "Nice to meet you, dear visitor!"]

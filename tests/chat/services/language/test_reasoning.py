@@ -25,7 +25,7 @@ from ico3d.measure.talking.page import open_page
 from support.chat.remote import service_app
 from support.chat.remote import serving as serving_app
 from support.chat.scripted_server import Script, Thought, running
-from support.chat.serving import serving
+from support.chat.serving import BROWSER, serving
 
 pytestmark = pytest.mark.slow
 
@@ -55,7 +55,7 @@ FORMS = {
 
 def settings_for(port, patience=None, **options):
     options = {"url": f"http://127.0.0.1:{port}/v1", "model": "tiny", **options}
-    return ChatSettings(language=Choice("openai", options), patience=patience or Patience())
+    return ChatSettings(BROWSER, Choice("openai", options), patience=patience or Patience())
 
 
 @contextlib.asynccontextmanager

@@ -8,22 +8,21 @@ from ico3d.chat.services.recognition.segments import BLANK
 from ico3d.chat.services.recognition.whisper import Settings, find, hindrance, make
 from ico3d.errors import MissingModelError, SettingsError
 from support.chat.listening import NOBODY, listen, noise
+from support.needs import needs
 
-pytest.importorskip("faster_whisper")
-pytest.importorskip("transformers")
-pytest.importorskip("torch")
+pytestmark = [needs("faster_whisper"), needs("transformers"), needs("torch")]
 
 SENTENCE = "Wie heißt du? 你好 1,5 %"
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def german(tmp_path_factory):
     from support.chat.tiny_whisper import write_whisper
 
     return write_whisper(tmp_path_factory.mktemp("german"), SENTENCE, "de")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def random(tmp_path_factory):
     from support.chat.tiny_whisper import write_whisper
 
