@@ -50,8 +50,12 @@ VERBS: dict[str, Verb] = {
     "render": Verb("ico3d.avatar.film.command", "Render", "film a person who talks or moves"),
     "convert": Verb("ico3d.splat.commands", "Convert", "convert files of 3D Gaussians"),
     "serve": Verb("ico3d.chat.commands", "Serve", "serve a bundle and talk with it"),
-    "weights list": Verb("ico3d.common.commands", "ListWeights", "weights that can be used"),
-    "weights fetch": Verb("ico3d.common.commands", "FetchWeights", "download some of them"),
+    "weights list": Verb(
+        "ico3d.common.downloads.commands", "ListWeights", "weights that can be used"
+    ),
+    "weights fetch": Verb(
+        "ico3d.common.downloads.commands", "FetchWeights", "download some of them"
+    ),
     "weights onnx": Verb("ico3d.speech.commands", "ExportEncoder", "make an encoder servable"),
     "serve-module": Verb(
         "ico3d.chat.remote.commands", "ServeModule", "serve one part of the conversation"

@@ -8,7 +8,7 @@ import pytest
 
 from ico3d.cli import main
 from ico3d.common import weights as room
-from ico3d.common.fetching import fetch_file, git_blob
+from ico3d.common.downloads.fetching import fetch_file, git_blob
 from ico3d.common.weights import RemoteFile, Weights
 from ico3d.errors import DownloadError
 

@@ -57,7 +57,7 @@ class FetchWeights:
         """
         from rich.console import Console
 
-        from ico3d.common.fetching import fetch
+        from ico3d.common.downloads.fetching import fetch
         from ico3d.common.weights import cached, weights_named
 
         console = Console()
