@@ -4,14 +4,19 @@ PY := $(VENV)/bin/python
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 export ICO3D_PYTHON := $(CURDIR)/$(PY)
 
-.PHONY: demo test install viewer lint page unit e2e bench clean
+.PHONY: demo test quick install viewer lint page unit e2e bench clean
 
 demo: $(VENV)/.serve src/ico3d/chat/static/index.html ## talk with the packaged avatar
 	$(VENV)/bin/ico3d demo
 
 test: install ## everything CI runs
-	$(MAKE) --no-print-directory -j 2 lint page # neither keeps time
+	$(MAKE) --no-print-directory -j 2 lint page $(VENV)/.kernels # none keeps time
 	$(MAKE) --no-print-directory unit e2e
+
+quick: install $(VENV)/.kernels ## what one runs while working: checks, and the tests that take no time
+	ruff check . && ruff format --check . && lint-imports
+	cd viewer && npm run --silent check && npm run --silent test
+	$(PY) -m pytest -n 2 --dist loadfile -m "not slow"
 
 install: $(VENV)/.develop src/ico3d/chat/static/index.html ## training, tracking, tests
 
@@ -25,10 +30,9 @@ lint: $(VENV)/.develop
 page: src/ico3d/chat/static/index.html
 	cd viewer && npm run --silent check && npm run --silent test
 
-unit: $(VENV)/.develop src/ico3d/chat/static/index.html
-	# one thread each: tiny problems lose more by waiting for one another than they gain;
+unit: $(VENV)/.develop $(VENV)/.kernels src/ico3d/chat/static/index.html
 	# three files at a time on two cores: talking with an avatar is mostly waiting
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(PY) -m pytest -n 3 --dist loadfile --no-loadscope-reorder --durations 15
+	$(PY) -m pytest -n 3 --dist loadfile --no-loadscope-reorder --durations 15
 
 e2e: $(VENV)/.develop src/ico3d/chat/static/index.html
 	cd viewer && npm run --silent e2e
@@ -54,6 +58,11 @@ $(VENV)/.serve: pyproject.toml constraints.txt scripts/setup.sh
 
 $(VENV)/.develop: pyproject.toml constraints.txt scripts/setup.sh
 	scripts/setup.sh develop
+
+KERNELS := $(shell grep -rl --include=*.py '^@kernel' src)
+$(VENV)/.kernels: $(VENV)/.develop $(KERNELS)
+	OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 PYTHONPATH=tests $(PY) -m support.compile_kernels >/dev/null
+	touch $@
 
 viewer/node_modules/.package-lock.json: viewer/package-lock.json | $(VENV)/.serve
 	cd viewer && npm ci --no-audit --no-fund --silent
