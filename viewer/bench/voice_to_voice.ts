@@ -21,7 +21,7 @@ const AUDIBLE = 1e-3; // level of the avatar
 test(`voice to voice over ${TURNS} turns`, async () => {
   const folder = scratchFolder();
   const [bundle, voice] = [join(folder, 'random.ico3d'), join(folder, 'voice.wav')];
-  runPython('../../tests/bundle/random_bundle.py', bundle, '--gaussians', '300');
+  runPython('../../tests/support/bundles/random_bundle.py', bundle, '--gaussians', '300');
   const parts = Array.from({ length: TURNS }, (_, i) => [QUESTIONS[i % QUESTIONS.length]!, String(PAUSE)]);
   runPython('sound/voice.py', voice, '6', ...parts.flat());
 

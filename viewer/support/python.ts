@@ -9,8 +9,14 @@ export const PYTHON = process.env.ICO3D_PYTHON ?? `${REPOSITORY}.venv/bin/python
 
 if (!existsSync(PYTHON)) throw new Error(`no Python at ${PYTHON}: run make install or set ICO3D_PYTHON`);
 
-/** One thread for each: tests run side by side, and what they compute is small. */
-export const ENVIRONMENT = { ...process.env, OMP_NUM_THREADS: '1', OPENBLAS_NUM_THREADS: '1', NUMBA_NUM_THREADS: '1' };
+/** One thread for each: tests run side by side, and what they compute is small. What Python's tests share is at hand. */
+export const ENVIRONMENT = {
+  ...process.env,
+  OMP_NUM_THREADS: '1',
+  OPENBLAS_NUM_THREADS: '1',
+  NUMBA_NUM_THREADS: '1',
+  PYTHONPATH: `${REPOSITORY}tests`,
+};
 
 /** Runs a script of `support/` to its end; what it printed. */
 export function runPython(script: string, ...args: string[]): string {

@@ -9,7 +9,6 @@ asked, OUT/pictures.u8 (T, H, W, 3).
 
 import argparse
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +19,6 @@ from ico3d.avatar.baking.shader_body import Shape, WindowBaker
 from ico3d.avatar.render_bundle import body_gaussians, render_body, visitor_camera
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import Loss, Persona, window_file
-
-sys.path.insert(0, str(Path(__file__).parents[3] / "tests"))
 from support.avatars.moving_body import FPS, MovingPerson
 
 BORDERS, SHAPE = (0, 15, 30, 45), Shape(8, (7, 5, 2))

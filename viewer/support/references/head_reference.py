@@ -8,15 +8,12 @@ OUT/attributes.f32 (E, N, 4: r, g, b, opacity) and, if asked, OUT/pictures.u8 (E
 
 import argparse
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
 
 from ico3d.bundle import evaluate
 from ico3d.bundle.format import Bundle
-
-sys.path.insert(0, str(Path(__file__).parents[3] / "tests"))
 from support.bundles.random_bundle import write_random_bundle
 
 NUM_EXPRESSIONS = 5

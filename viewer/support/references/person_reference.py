@@ -9,7 +9,6 @@ painted over the body, as if nothing of the body were before it.
 
 import argparse
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,8 +31,6 @@ from ico3d.splat.files.formats import write_gaussians
 from ico3d.splat.files.raw import RawGaussians
 from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
-
-sys.path.insert(0, str(Path(__file__).parents[3] / "tests"))
 from support.bundles.random_bundle import random_files, random_head, random_manifest
 
 FPS = 15.0

@@ -9,8 +9,6 @@ from pathlib import Path
 
 from ico3d.avatar.baking.persona import load_persona
 from ico3d.bundle.format import Bundle, write_bundle
-
-sys.path.insert(0, str(Path(__file__).parents[3] / "tests"))
 from support.bundles.random_bundle import random_files, random_head, random_manifest
 
 GAUSSIANS = 300
