@@ -27,7 +27,7 @@ DELIVERY = 0.0005  # s of real time within which what one socket sent has reache
 class JumpingSelector(selectors.DefaultSelector):
     """Looks for events without waiting; where there are none, time moves on."""
 
-    loop = None
+    loop: "VirtualLoop"
 
     def select(self, timeout=None):
         events = super().select(0)
