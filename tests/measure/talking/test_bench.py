@@ -161,6 +161,7 @@ def test_a_trial_with_real_servers(tmp_path):
     assert found["stolen_cores"] is None or found["stolen_cores"] >= 0
 
 
+@pytest.mark.slow
 async def test_trials_of_each_kind(demo):
     """All services are the real ones of the packaged avatar."""
     results, said = Results(), sayings(None)
