@@ -5,19 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import soxr
-from anyio import to_thread
 from loguru import logger
 
 logger.remove()  # before pipecat is imported: it logs its start
 
 from ico3d.bundle.format import Bundle  # noqa: E402
 from ico3d.common.espeak import synthesize  # noqa: E402
-from ico3d.common.sphinx import SphinxProcess  # noqa: E402
 from support.bundles.random_body import write_random_body  # noqa: E402
 from support.bundles.random_bundle import write_random_bundle  # noqa: E402
 from support.bundles.random_whole import write_random_whole  # noqa: E402
 from support.chat.serving import BROWSER, OFFLINE, serving  # noqa: E402
-from support.chat.virtual_time import pytest_asyncio_loop_factories, timeless  # noqa: E402, F401
+from support.chat.virtual_time import outside, pytest_asyncio_loop_factories  # noqa: E402, F401
 
 
 @pytest.fixture(scope="session")
@@ -68,13 +66,6 @@ async def typed(bundle):
     """The same for visitors who type."""
     async with serving(bundle, replace(OFFLINE, recognition=BROWSER)) as (url, sessions):
         yield url, sessions
-
-
-@pytest.fixture(autouse=True)
-def outside(monkeypatch):
-    """Virtual time stands still for what happens in processes and in threads of anyio's."""
-    for place, name in ((SphinxProcess, "_ask"), (SphinxProcess, "close"), (to_thread, "run_sync")):
-        monkeypatch.setattr(place, name, timeless(getattr(place, name)))
 
 
 @pytest.fixture

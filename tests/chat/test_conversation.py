@@ -52,6 +52,7 @@ async def greeted(page):
     return len(page.log)
 
 
+@pytest.mark.slow
 @pytest.mark.real_time
 async def test_spoken_question_is_understood_and_answered(served, question):
     """One of the three talks that run by the real clock."""

@@ -4,7 +4,6 @@ Servers are started in this process, visited once, and ended. What needs weights
 machine is not run: its words are parsed and its settings are read.
 """
 
-import importlib.util
 import json
 import os
 import shutil
@@ -19,6 +18,8 @@ import numpy as np
 import pytest
 import soundfile
 
+from guides import guide
+from guides.small import SMALL
 from ico3d.bundle.persona import read_persona
 from ico3d.chat.services import TABLES, choose
 from ico3d.chat.services.language.notes import Notes
@@ -31,18 +32,6 @@ from ico3d.common.espeak import synthesize
 from ico3d.common.weights import weights_named
 from ico3d.errors import BundleError, SettingsError
 
-pytestmark = pytest.mark.slow
-
-
-def _module(name):
-    """A file beside this one."""
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-guide, SMALL = _module("guide"), _module("small").SMALL
 STAND_INS = 'recognition = "pocketsphinx"\nlanguage = "persona-notes"\nvoice = "espeak-ng"\n'
 OUTSIDE = """
 import os, sys
@@ -247,6 +236,7 @@ def _networks_can_be_left():
     return tools and subprocess.run(command, capture_output=True).returncode == 0
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not _networks_can_be_left(), reason="no network can be left here")
 def test_a_conversation_asks_nobody_outside(tmp_path):
     """The guide's own check, with one question; and nobody even tries to call another machine."""

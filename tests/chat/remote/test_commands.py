@@ -26,6 +26,7 @@ def settings(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_a_module_is_a_process_that_the_sdk_talks_to(bundle_path, settings):
     words = ["serve-module", "voice", "--port", "0", "--key-variable", "SESAME"]
     words += ["--settings", str(settings), "--bundle", str(bundle_path)]

@@ -4,6 +4,7 @@ import asyncio
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 from contextlib import closing
@@ -19,7 +20,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from ico3d.bundle.persona import Persona
 from ico3d.chat.performing.face import open_face
 from ico3d.chat.serving.guard import is_own
-from ico3d.chat.serving.server import make_server
+from ico3d.chat.serving.server import bind, make_server
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import Ack, Audio, Error, Hello, Speech, Text, Welcome
@@ -27,8 +28,6 @@ from ico3d.cli import main
 from ico3d.errors import BundleError, SettingsError
 from ico3d.measure.talking.page import open_page
 from support.chat.serving import serving
-
-pytestmark = pytest.mark.slow
 
 
 @pytest.mark.parametrize(
@@ -222,6 +221,7 @@ async def test_every_binary_frame_is_acknowledged_also_a_refused_one(served):
     await page.close()
 
 
+@pytest.mark.slow
 def test_serve_prints_where_it_is_and_ends_on_interrupt(bundle_path, tmp_path):
     command = [sys.executable, "-m", "ico3d.cli", "serve", str(bundle_path), "--port", "0"]
     command += ["--log", str(tmp_path / "turns.jsonl")]
@@ -244,9 +244,22 @@ def test_serve_prints_where_it_is_and_ends_on_interrupt(bundle_path, tmp_path):
         assert (tmp_path / "turns.jsonl").read_text() == ""  # nobody has asked
 
 
-def test_a_taken_port_is_one_sentence():
-    from ico3d.chat.serving.server import bind
+async def test_small_messages_leave_at_once():
+    """None waits until the page has acknowledged the one before."""
+    accepted = asyncio.Queue()
+    listener = bind("127.0.0.1", 0)
+    port = listener.getsockname()[1]
+    async with await asyncio.start_server(lambda _, out: accepted.put(out), sock=listener):
+        _, page = await asyncio.open_connection("127.0.0.1", port)
+        served = await accepted.get()
+        own = served.get_extra_info("socket")
+        assert own.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+        for side in (page, served):
+            side.close()
+            await side.wait_closed()
 
+
+def test_a_taken_port_is_one_sentence():
     with closing(bind("127.0.0.1", 0)) as listener:
         listener.listen()
         with pytest.raises(SettingsError, match="--port"):
@@ -259,6 +272,7 @@ def test_a_bundle_that_is_none_is_one_sentence(tmp_path, capsys):
     assert capsys.readouterr().err.startswith("ico3d: ")
 
 
+@pytest.mark.slow
 def test_a_server_needs_no_torch(bundle_path):
     code = (
         "import sys; from ico3d.chat.serving import server; from ico3d.bundle.format import Bundle;"

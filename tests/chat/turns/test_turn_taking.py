@@ -74,6 +74,7 @@ async def test_uh_huh_pauses_and_nothing_is_lost(served):
     await page.close()
 
 
+@pytest.mark.slow
 @pytest.mark.real_time
 async def test_a_question_interrupts_and_is_answered(served, question):
     """One of the three talks that run by the real clock."""

@@ -1,19 +1,25 @@
 """`ico3d bench chat`: its figures from made trials, and trials against real servers."""
 
+import asyncio
 import json
 import os
 import wave
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from ico3d.bundle.format import Bundle
+from ico3d.chat.settings.conversation import ChatSettings
 from ico3d.chat.wire.protocol import Pause, Resume, Speech, Stop
 from ico3d.cli import main
 from ico3d.errors import CaptureError
-from ico3d.measure.talking.bench import SCRIPT, TURNS, Results, figures, share
+from ico3d.measure.talking.bench import SCRIPT, TURNS, Results, figures, share, shares, talk
 from ico3d.measure.talking.page import Player
 from ico3d.measure.talking.questions import audible, broken_off, sayings
 from ico3d.measure.talking.trials import Assent, Interruption, Question, sound_of
+from support.chat.serving import serving
 from support.shared import SPEECH
 
 
@@ -135,16 +141,50 @@ def test_recordings_that_cannot_be_used_are_one_sentence(tmp_path):
         path.unlink()
 
 
+@pytest.fixture(scope="module")
+def demo():
+    """The packaged avatar."""
+    return Bundle.open(Path("demo"))
+
+
 @pytest.mark.slow
-def test_trials_against_real_servers(tmp_path):
-    """One of each kind: the command, two server processes, the packaged avatar."""
+def test_a_trial_with_real_servers(tmp_path):
+    """One of the three talks that run by the real clock: the command, two server processes."""
     path = tmp_path / "chat.json"
-    assert main(["bench", "chat", "--turns", "1", "--json", str(path)]) == 0
+    asked = ["--kinds", "questions", "share", "--turns", "1", "--json", str(path)]
+    assert main(["bench", "chat", *asked]) == 0
     found = json.loads(path.read_text())
     slowness = max(1.0, os.getloadavg()[0])
-    assert found["trials"]["interruptions"] == 1 and found["trials"]["messages_after_stop"] == 0
-    assert found["trials"]["assents"] == found["trials"]["assents_lossless"] == 1
+    assert found["trials"]["questions_answered_in_order"] == found["trials"]["shares"] == 1
     assert 200 < found["voice_to_voice_ms"]["p50"] < 1300 * slowness
     assert -60 < found["server_share_ms"]["p50"] < 100 * slowness
     assert found["stolen_cores"] is None or found["stolen_cores"] >= 0
-    assert 0 < found["duck_ms"]["p50"] <= found["stop_ms"]["p50"] < 800 * slowness
+
+
+@pytest.mark.slow
+async def test_trials_of_each_kind(demo):
+    """All services are the real ones of the packaged avatar."""
+    results, said = Results(), sayings(None)
+    kinds = ("questions", "interruptions", "assent")
+    async with serving(demo, ChatSettings()) as (url, _):
+        await talk(url, said, kinds, 1, results, lambda kind: None)
+    found = figures(results)
+    assert found["trials"]["questions_answered_in_order"] == 1
+    assert found["trials"]["interruptions"] == 1 and found["trials"]["messages_after_stop"] == 0
+    assert found["trials"]["assents"] == found["trials"]["assents_lossless"] == 1
+    assert found["trials"]["assents_resumed"] == 1
+    assert 200 < found["voice_to_voice_ms"]["p50"] < 1300
+    assert 0 < found["duck_ms"]["p50"] <= found["stop_ms"]["p50"] < 800
+
+
+async def test_a_server_adds_little_to_what_its_services_take(demo):
+    def scripted(avatar):
+        return replace(avatar, services=SCRIPT.services())
+
+    results = Results()
+    async with serving(demo, ChatSettings(turns=TURNS), adapt=scripted) as (url, _):
+        began = asyncio.get_running_loop().time()
+        await shares(url, sayings(None), 2, results, lambda kind: None)
+        took = asyncio.get_running_loop().time() - began
+    assert -60 < figures(results)["server_share_ms"]["p95"] < 60
+    assert took < 20  # nobody waits for longer than until nothing is said

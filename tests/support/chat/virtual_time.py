@@ -3,7 +3,8 @@
 Time stands still while anything runs, in the loop or in its threads. What a test measures is what
 the code waits for, whatever else the machine does.
 
-A folder whose tests run in such loops imports `pytest_asyncio_loop_factories` into its conftest.
+A folder whose tests run in such loops imports `pytest_asyncio_loop_factories` and `outside` into
+its conftest.
 """
 
 import asyncio
@@ -13,6 +14,11 @@ import selectors
 import time
 from unittest import mock
 
+import pytest
+from anyio import to_thread
+
+from ico3d.common.sphinx import SphinxProcess
+
 CALENDAR = 1.7e9  # s: what `time.time` shows at 0
 TICK = 1e-6  # s that every wait takes: what is shorter than a number's last digit would never end
 DELIVERY = 0.0005  # s of real time within which what one socket sent has reached another
@@ -21,7 +27,7 @@ DELIVERY = 0.0005  # s of real time within which what one socket sent has reache
 class JumpingSelector(selectors.DefaultSelector):
     """Looks for events without waiting; where there are none, time moves on."""
 
-    loop = None
+    loop: "VirtualLoop"
 
     def select(self, timeout=None):
         events = super().select(0)
@@ -106,3 +112,10 @@ def pytest_asyncio_loop_factories(item):
     """Tests run in virtual time, but for those that are marked as `real_time`."""
     real = item.get_closest_marker("real_time")
     return {"real time": asyncio.new_event_loop} if real else {"virtual time": VirtualLoop}
+
+
+@pytest.fixture(autouse=True)
+def outside(monkeypatch):
+    """Virtual time stands still for what happens in processes and in threads of anyio's."""
+    for place, name in ((SphinxProcess, "_ask"), (SphinxProcess, "close"), (to_thread, "run_sync")):
+        monkeypatch.setattr(place, name, timeless(getattr(place, name)))

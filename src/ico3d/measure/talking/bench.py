@@ -87,16 +87,26 @@ def _measure(
     real: list[Kind] = [kind for kind in kinds if kind != "share"]
     if real:
         with serving(bundle, settings) as url:
-            asyncio.run(_talk(url, said, real, turns, results, told))
+            asyncio.run(talk(url, said, real, turns, results, told))
     if "share" in kinds:
         with serving_script(bundle, SCRIPT, ChatSettings(turns=TURNS)) as url:
-            asyncio.run(_shares(url, said, turns, results, told))
+            asyncio.run(shares(url, said, turns, results, told))
     return results
 
 
-async def _talk(
-    url: str, said: Sayings, kinds: list[Kind], turns: int, results: Results, told: Told
+async def talk(
+    url: str, said: Sayings, kinds: Sequence[Kind], turns: int, results: Results, told: Told
 ) -> None:
+    """Runs trials of some kinds with the avatar at a URL.
+
+    Args:
+        url: Of its server.
+        said: What the visitor says.
+        kinds: Which trials; not those of the server's share.
+        turns: How many of each kind.
+        results: Where what was measured goes.
+        told: Called after each.
+    """
     async with trials.visit(url) as page:
         whole = await trials.whole_answer(page) if "assent" in kinds else np.zeros(0)
         for kind in kinds:
@@ -114,7 +124,8 @@ async def _talk(
                 told(kind)
 
 
-async def _shares(url: str, said: Sayings, turns: int, results: Results, told: Told) -> None:
+async def shares(url: str, said: Sayings, turns: int, results: Results, told: Told) -> None:
+    """The same for the share of a server whose services have set delays."""
     async with trials.visit(url) as page:
         for number in range(turns):
             question = await trials.ask(page, broken_off(nth(said.questions, number)))

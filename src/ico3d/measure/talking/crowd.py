@@ -57,10 +57,11 @@ def measure(
     if not 0 <= microphones <= visitors:
         raise SettingsError("--microphones must be at most as many as --visitors.")
     with serving_script(bundle, script, ChatSettings(max_sessions=visitors)) as url:
-        return asyncio.run(_visit(url, visitors, microphones))
+        return asyncio.run(visit(url, visitors, microphones))
 
 
-async def _visit(url: str, visitors: int, microphones: int) -> list[Visit]:
+async def visit(url: str, visitors: int, microphones: int) -> list[Visit]:
+    """Lets visitors of the avatar at a URL ask, some of them with an open microphone."""
     opened = [await open_page(url, microphone=n < microphones) for n in range(visitors)]
     pages = [page for page, _ in opened]
     for utterance in (1, 2):

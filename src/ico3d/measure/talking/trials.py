@@ -10,6 +10,7 @@ import numpy as np
 
 from ico3d.chat.wire.protocol import (
     MICROPHONE_RATE,
+    Ack,
     Answer,
     End,
     Interrupt,
@@ -93,12 +94,13 @@ async def visit(url: str):
 async def peace(page: SimulatedPage) -> None:
     """Cuts an answer short and waits until nobody says anything."""
     end = time.monotonic() + PATIENCE
-    since = -1
-    while since < len(page.log) and time.monotonic() < end:
+    while time.monotonic() < end:
         since = len(page.log)
         if page.state in ("speaking", "thinking"):
             await page.send(Interrupt(None))
         await asyncio.sleep(REST)
+        if all(isinstance(message, Ack) for _, message in page.log[since:]):
+            return  # an open microphone is acknowledged all the time
 
 
 async def ask(page: SimulatedPage, sound: np.ndarray) -> Question | None:

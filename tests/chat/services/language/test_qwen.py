@@ -23,7 +23,7 @@ from ico3d.measure.talking.page import open_page
 from support.chat.serving import BROWSER, free_port, serving
 from support.needs import needs
 
-pytestmark = needs("transformers")
+pytestmark = [needs("transformers"), pytest.mark.slow]
 CONTEXT = Context(Persona("Ada"), None, None)
 STARTING = 300  # s that it may take on a busy machine: it imports torch
 
@@ -182,7 +182,6 @@ def _answers(url):
         return False
 
 
-@pytest.mark.slow
 @pytest.mark.real_time  # the server is a process
 async def test_our_pipeline_talks_with_transformers_serve(bundle, served_model):
     url, model = served_model

@@ -10,7 +10,7 @@ from ico3d.errors import MissingModelError, SettingsError
 from support.chat.listening import NOBODY, listen, noise
 from support.needs import needs
 
-pytestmark = [needs("faster_whisper"), needs("transformers"), needs("torch")]
+pytestmark = [needs("faster_whisper"), needs("transformers"), needs("torch"), pytest.mark.slow]
 
 SENTENCE = "Wie heißt du? 你好 1,5 %"
 
