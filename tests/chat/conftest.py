@@ -1,7 +1,5 @@
 """Random bundles, a question, a server that serves them; all of it in virtual time."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import soxr
@@ -14,7 +12,7 @@ from ico3d.common.espeak import synthesize  # noqa: E402
 from support.bundles.random_body import write_random_body  # noqa: E402
 from support.bundles.random_bundle import write_random_bundle  # noqa: E402
 from support.bundles.random_whole import write_random_whole  # noqa: E402
-from support.chat.serving import BROWSER, OFFLINE, serving  # noqa: E402
+from support.chat.serving import TYPED, serving  # noqa: E402
 from support.chat.virtual_time import outside, pytest_asyncio_loop_factories  # noqa: E402, F401
 
 
@@ -64,7 +62,7 @@ async def served(bundle):
 @pytest.fixture
 async def typed(bundle):
     """The same for visitors who type."""
-    async with serving(bundle, replace(OFFLINE, recognition=BROWSER)) as (url, sessions):
+    async with serving(bundle, TYPED) as (url, sessions):
         yield url, sessions
 
 

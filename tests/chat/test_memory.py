@@ -54,7 +54,7 @@ def test_the_latest_question_stays_however_long():
 
 
 @pytest.mark.parametrize("notes", [True, False])
-def test_a_long_talk_is_kept_in_bounds(bundle, monkeypatch, notes):
+def test_a_long_talk_is_kept_in_bounds(bundle, notes):
     """With notes, and with a model whose summaries fail."""
 
     async def chat():

@@ -20,7 +20,7 @@ from ico3d.cli import main
 from ico3d.errors import Ico3dError, MissingModelError
 from ico3d.measure.talking.page import open_page
 from support.chat.pages import first_message
-from support.chat.serving import OFFLINE, free_port, serving
+from support.chat.serving import OFFLINE, TYPED, free_port, serving
 
 UNREADY = "the avatar cannot talk now: something on the server does not start. Try again later."
 KINDS = ("recognition", "language", "voice")
@@ -140,7 +140,7 @@ async def declared_dead(conversation):
     [(cancelled, False), (killed, False), (declared_dead, False), (cancelled, True)],
 )
 async def test_a_pipeline_that_ends_takes_its_session_along(bundle, told, end, away):
-    async with serving(bundle, replace(OFFLINE, max_sessions=1)) as (url, sessions):
+    async with serving(bundle, replace(TYPED, max_sessions=1)) as (url, sessions):
         page, welcome = await open_page(url, microphone=False)
         await page.wait(Speech)
         if away:
@@ -169,7 +169,7 @@ async def test_a_fault_of_ours_is_told_and_not_met_again(bundle, told, monkeypat
         raise ZeroDivisionError(text)
 
     monkeypatch.setattr("ico3d.chat.listener.PageInput.ask", ask)
-    async with serving(bundle) as (url, sessions):
+    async with serving(bundle, TYPED) as (url, sessions):
         page, _ = await open_page(url, microphone=False)
         await page.send(Text(secret))
         _, error = await page.wait(Error)
@@ -182,7 +182,7 @@ async def test_a_fault_of_ours_is_told_and_not_met_again(bundle, told, monkeypat
 
 
 async def test_what_cannot_be_sent_does_not_end_the_talk(bundle, told):
-    async with serving(bundle) as (url, sessions):
+    async with serving(bundle, TYPED) as (url, sessions):
         page, welcome = await open_page(url, microphone=False)
         await page.wait(Speech)
         sessions._open[welcome.session].page.send(Error("x" * 100_000, fatal=False))

@@ -25,7 +25,7 @@ MOST_THREADS = 32  # threads that a loop's default executor has at most
 
 
 @pytest.mark.parametrize("script", [QUICK, Script(0.1, 0.3, 0.2)])
-def test_the_server_waits_for_nothing_but_its_services(bundle, question, monkeypatch, script):
+def test_the_server_waits_for_nothing_but_its_services(bundle, question, script):
     async def talk():
         async with open_sessions(bundle, script.services(), ChatSettings(turns=TURNS)) as sessions:
             guest = await Guest.enter(sessions)
@@ -47,7 +47,7 @@ def test_the_server_waits_for_nothing_but_its_services(bundle, question, monkeyp
 
 
 @pytest.mark.parametrize(("speculate", "token"), [(False, 400), (True, 300)])
-def test_the_turn_is_timed_as_it_was(bundle, question, monkeypatch, speculate, token):
+def test_the_turn_is_timed_as_it_was(bundle, question, speculate, token):
     """The turn is over 400 ms after silence was noticed; an early answer begins 100 ms before."""
     script = Script(recognition=0.3, language=0.4, voice=0.2)
     turns = replace(TURNS, speculate=speculate)
@@ -73,7 +73,7 @@ def test_the_turn_is_timed_as_it_was(bundle, question, monkeypatch, speculate, t
     assert heard == pytest.approx(parts["total"] + 50, abs=1)  # as the page schedules it
 
 
-def test_a_session_in_which_nothing_happens_ends_with_a_sentence(bundle, question, monkeypatch):
+def test_a_session_in_which_nothing_happens_ends_with_a_sentence(bundle, question):
     monitor = Monitor()
     settings = ChatSettings(idle_minutes=1)
     long = replace(QUICK, seconds=10.0)
@@ -113,7 +113,7 @@ def test_a_limit_that_is_none_is_one_sentence(minutes):
         ChatSettings(idle_minutes=minutes)
 
 
-def test_without_a_limit_sessions_stay(bundle, monkeypatch):
+def test_without_a_limit_sessions_stay(bundle):
     async def stay():
         services = QUICK.services()
         async with open_sessions(bundle, services, ChatSettings(idle_minutes=0)) as sessions:
@@ -155,7 +155,7 @@ def test_after_a_drop_speech_goes_on_with_the_very_next_piece(bundle, monkeypatc
         assert got is sent or (got.pcm == sent.pcm).all()
 
 
-def test_a_session_waits_for_30_seconds(bundle, monkeypatch):
+def test_a_session_waits_for_30_seconds(bundle):
     async def talk():
         async with open_sessions(bundle, QUICK.services()) as sessions:
             guest = await Guest.enter(sessions)
@@ -168,7 +168,7 @@ def test_a_session_waits_for_30_seconds(bundle, monkeypatch):
     assert run(talk()) is False
 
 
-def test_nobody_hears_another_ones_answer(bundle, monkeypatch):
+def test_nobody_hears_another_ones_answer(bundle):
     services = replace(QUICK, pitch=200.0, apart=100.0).services()
 
     async def talk():
@@ -199,7 +199,7 @@ def loudest(pcm):
     return int(tones[np.abs(waves @ pcm[:2400]).argmax()])
 
 
-def test_nine_sessions_leave_no_more_behind_than_three(bundle, monkeypatch):
+def test_nine_sessions_leave_no_more_behind_than_three(bundle):
     script = replace(QUICK, seconds=1.0)
 
     async def visit(sessions):

@@ -9,7 +9,7 @@ from websockets.asyncio.client import connect
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import VERSION, Answer, Error, Hello, Speech, State, Stop, Text
 from ico3d.measure.talking.page import open_page
-from support.chat.serving import OFFLINE, serving
+from support.chat.serving import TYPED, serving
 
 
 async def dropped(page):
@@ -19,7 +19,7 @@ async def dropped(page):
 
 
 async def test_a_dropped_page_gets_what_it_missed(bundle):
-    async with serving(bundle) as (url, sessions):
+    async with serving(bundle, TYPED) as (url, sessions):
         page, welcome = await open_page(url, microphone=False)
         await page.wait(Speech)
         await page.send(Text("nothing you know of, but a long answer"))
@@ -40,7 +40,7 @@ async def test_a_dropped_page_gets_what_it_missed(bundle):
 
 
 async def test_nothing_is_sent_ahead_while_the_page_is_away(bundle):
-    async with serving(bundle) as (url, _):
+    async with serving(bundle, TYPED) as (url, _):
         page, welcome = await open_page(url, microphone=False)
         await page.wait(Speech)
         await page.send(Text("nothing you know of, but a long answer"))
@@ -55,7 +55,7 @@ async def test_nothing_is_sent_ahead_while_the_page_is_away(bundle):
 
 
 async def test_what_was_stopped_is_not_sent_again(bundle):
-    async with serving(bundle) as (url, _):
+    async with serving(bundle, TYPED) as (url, _):
         page, welcome = await open_page(url, microphone=False)
         await page.wait(Speech)
         await page.send(Text("who are you"))
@@ -70,7 +70,7 @@ async def test_what_was_stopped_is_not_sent_again(bundle):
 
 
 async def test_a_second_connection_takes_the_session_over(bundle):
-    async with serving(bundle) as (url, sessions):
+    async with serving(bundle, TYPED) as (url, sessions):
         page, welcome = await open_page(url, microphone=False)
         again, second = await open_page(url, welcome.session, -1, microphone=False)
         assert second.resumed
@@ -111,7 +111,7 @@ async def emptied(sessions):
 
 
 async def test_an_expired_session_starts_anew(bundle):
-    async with serving(bundle, resume_seconds=0.1) as (url, sessions):
+    async with serving(bundle, TYPED, resume_seconds=0.1) as (url, sessions):
         page, welcome = await open_page(url, microphone=False)
         await dropped(page)
         await emptied(sessions)
@@ -131,7 +131,7 @@ async def refusal(url, session=None):
 
 
 async def test_a_dropped_visitor_keeps_his_place(bundle):
-    async with serving(bundle, replace(OFFLINE, max_sessions=2)) as (url, sessions):
+    async with serving(bundle, replace(TYPED, max_sessions=2)) as (url, sessions):
         (first, welcome), (second, _) = [await open_page(url, microphone=False) for _ in "12"]
         assert await refusal(url) == ("all places are taken: try again in a minute.", 1013)
         await dropped(first)
@@ -144,7 +144,7 @@ async def test_a_dropped_visitor_keeps_his_place(bundle):
 
 
 async def test_a_place_is_kept_for_so_long_and_then_given_away(bundle):
-    settings = replace(OFFLINE, max_sessions=1)
+    settings = replace(TYPED, max_sessions=1)
     async with serving(bundle, settings, resume_seconds=0.3) as (url, sessions):
         page, welcome = await open_page(url, microphone=False)
         await dropped(page)
@@ -160,7 +160,7 @@ async def test_a_place_is_kept_for_so_long_and_then_given_away(bundle):
 
 
 async def test_who_leaves_makes_room_at_once(bundle):
-    async with serving(bundle, replace(OFFLINE, max_sessions=1)) as (url, sessions):
+    async with serving(bundle, replace(TYPED, max_sessions=1)) as (url, sessions):
         for code in (1000, 1001):  # the visitor chose to; the tab was closed or loaded anew
             page, _ = await open_page(url, microphone=False)
             await page._socket.close(code)

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+from dataclasses import replace
 
 from ico3d.chat.serving import server
 from ico3d.chat.serving.sessions import Sessions
@@ -10,6 +11,7 @@ from ico3d.chat.settings.conversation import ChatSettings, Choice
 OFFLINE = ChatSettings(language=Choice("persona-notes"))
 BROWSER = Choice("browser", {"fallback": ""})
 """Recognition for visitors who type: the server starts no decoder of its own."""
+TYPED = replace(OFFLINE, recognition=BROWSER)
 
 
 def free_port():
