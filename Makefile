@@ -4,7 +4,7 @@ PY := $(VENV)/bin/python
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 export ICO3D_PYTHON := $(CURDIR)/$(PY)
 
-.PHONY: demo test quick install viewer lint page unit e2e bench clean
+.PHONY: demo test quick install viewer lint page unit e2e e2e-beside e2e-alone bench clean
 
 demo: $(VENV)/.serve src/ico3d/chat/static/index.html ## talk with the packaged avatar
 	$(VENV)/bin/ico3d demo
@@ -12,7 +12,8 @@ demo: $(VENV)/.serve src/ico3d/chat/static/index.html ## talk with the packaged 
 test: ## everything CI runs
 	$(MAKE) --no-print-directory -j 2 install # Python's packages and the page's, side by side
 	$(MAKE) --no-print-directory -j 2 lint page $(VENV)/.kernels # none keeps time
-	$(MAKE) --no-print-directory unit e2e
+	$(MAKE) --no-print-directory -j 2 unit e2e-beside # browsers mostly wait for speech
+	$(MAKE) --no-print-directory e2e-alone
 
 quick: $(VENV)/.kernels src/ico3d/chat/static/index.html ## what one runs while working: checks, and the tests that take no time
 	ruff check . && ruff format --check . && lint-imports
@@ -35,8 +36,13 @@ unit: $(VENV)/.develop $(VENV)/.kernels src/ico3d/chat/static/index.html
 	# three files at a time on two cores: talking with an avatar is mostly waiting
 	$(PY) -m pytest -n 3 --dist loadfile --no-loadscope-reorder --durations 15
 
-e2e: $(VENV)/.develop src/ico3d/chat/static/index.html
-	cd viewer && npm run --silent e2e
+e2e: e2e-beside e2e-alone ## the page in a real browser
+
+e2e-beside: $(VENV)/.develop src/ico3d/chat/static/index.html
+	cd viewer && npx vitest run --project e2e
+
+e2e-alone: $(VENV)/.develop src/ico3d/chat/static/index.html # judges milliseconds
+	cd viewer && npx vitest run --project 'e2e alone'
 
 SUBJECT ?= anny
 RESULTS ?= runs/bench
