@@ -4,7 +4,7 @@ PY := $(VENV)/bin/python
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 export ICO3D_PYTHON := $(CURDIR)/$(PY)
 
-.PHONY: demo test quick install viewer lint page unit e2e e2e-beside e2e-alone bench clean
+.PHONY: demo test quick quick-unit install viewer lint page unit e2e e2e-beside e2e-alone bench clean
 
 demo: $(VENV)/.serve src/ico3d/chat/static/index.html ## talk with the packaged avatar
 	$(VENV)/bin/ico3d demo
@@ -16,8 +16,10 @@ test: ## everything CI runs
 	$(MAKE) --no-print-directory e2e-alone
 
 quick: $(VENV)/.kernels src/ico3d/chat/static/index.html ## what one runs while working: checks, and the tests that take no time
-	ruff check . && ruff format --check . && lint-imports
-	cd viewer && npm run --silent check && npm run --silent test
+	ruff check . && ruff format --check .
+	$(MAKE) --no-print-directory -j 2 page quick-unit
+
+quick-unit:
 	$(PY) -m pytest -n 2 --dist loadfile -m "not slow"
 
 install: $(VENV)/.develop src/ico3d/chat/static/index.html ## training, tracking, tests

@@ -25,6 +25,8 @@ from support.bodies.tiny_training import SMALL, WINDOW
 from support.bodies.window_parts import canonical
 from support.settings import changed
 
+pytestmark = pytest.mark.slow
+
 RADIUS = 0.13
 BALL = np.array([0.0, 0.35, 0.0])
 """The upper end of the moving capture's trunk."""

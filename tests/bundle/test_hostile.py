@@ -17,6 +17,8 @@ from hypothesis import strategies as st
 from ico3d.bundle.format import Bundle
 from ico3d.errors import BundleError
 
+pytestmark = pytest.mark.slow
+
 RELAXED = settings(
     max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )

@@ -26,6 +26,8 @@ from ico3d.measure.talking.questions import read_recording
 from support.chat.pages import slowness
 from support.shared import SPEECH
 
+pytestmark = pytest.mark.slow
+
 STARS = SPEECH / "new-home-in-the-stars-16k.wav"
 
 

@@ -11,6 +11,8 @@ import pytest
 import ico3d.chat
 from ico3d.chat.pipecat_internals import OVERRIDDEN, TOUCHED
 
+pytestmark = pytest.mark.slow
+
 
 def pipecat_class(where):
     module, _, name = where.partition(":")

@@ -22,6 +22,8 @@ from ico3d.measure.talking.page import open_page
 from support.chat.pages import first_message
 from support.chat.serving import OFFLINE, TYPED, free_port, serving
 
+pytestmark = pytest.mark.slow
+
 UNREADY = "the avatar cannot talk now: something on the server does not start. Try again later."
 KINDS = ("recognition", "language", "voice")
 

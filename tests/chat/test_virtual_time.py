@@ -18,6 +18,8 @@ from ico3d.measure.talking.scripted import Script
 from support.chat.guests import Guest, open_sessions
 from support.chat.virtual_time import run
 
+pytestmark = pytest.mark.slow
+
 SHARE = 0.060  # s that a server may add to what its services take
 TURNS = Turns(pause=0.2, end_silence=0.6, speculate=False)
 QUICK = Script(0.0, 0.0, 0.0)

@@ -12,6 +12,8 @@ from ico3d.common.downloads.fetching import fetch_file, git_blob
 from ico3d.common.weights import RemoteFile, Weights
 from ico3d.errors import DownloadError
 
+pytestmark = pytest.mark.slow
+
 DATA = b"\x08" + hashlib.shake_256(b"weights").digest(300_000)
 SHA256 = hashlib.sha256(DATA).hexdigest()
 

@@ -9,6 +9,8 @@ import soxr
 from ico3d.common.espeak import synthesize
 from ico3d.common.sphinx import DecoderLostError, SphinxProcess
 
+pytestmark = pytest.mark.slow
+
 pocketsphinx = pytest.importorskip("pocketsphinx")
 
 

@@ -32,6 +32,8 @@ from ico3d.common.espeak import synthesize
 from ico3d.common.weights import weights_named
 from ico3d.errors import BundleError, SettingsError
 
+pytestmark = pytest.mark.slow
+
 STAND_INS = 'recognition = "pocketsphinx"\nlanguage = "persona-notes"\nvoice = "espeak-ng"\n'
 OUTSIDE = """
 import os, sys

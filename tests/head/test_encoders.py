@@ -14,6 +14,8 @@ from ico3d.speech.runtime import open_speech
 from support.settings import changed
 from support.users_weights import write_ave, write_hubert
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(params=["ave", "hubert"])
 def encoder(request, tmp_path, monkeypatch):

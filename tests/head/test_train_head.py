@@ -17,6 +17,8 @@ from ico3d.training.checkpoint import load_tensors
 from ico3d.training.finite import check_finite
 from support.settings import changed
 
+pytestmark = pytest.mark.slow
+
 SETTINGS = changed(
     PRESETS["cpu"],
     {

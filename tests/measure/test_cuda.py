@@ -19,6 +19,8 @@ from support.heads.offset_head import OffsetHead, offset_head
 from support.pretended_cuda import drawn
 from support.scenes.offset_scene import OffsetScene, offset_scene
 
+pytestmark = pytest.mark.slow
+
 
 def _same(found: dict, wanted: dict) -> None:
     """What was measured on either device, but for how long it took."""

@@ -13,6 +13,8 @@ from ico3d.speech.training.corpus import utterance
 from ico3d.speech.training.targets import ARTICULATION, articulation_track
 from support.shared import SPEECH
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def one_round(monkeypatch):

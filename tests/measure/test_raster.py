@@ -8,6 +8,8 @@ from ico3d.errors import SettingsError
 from ico3d.measure.raster import compare
 from support.shared import SHARED
 
+pytestmark = pytest.mark.slow
+
 OPPONENT = SHARED / "reference" / "raster_c" / "opponent.py"
 
 

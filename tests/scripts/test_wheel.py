@@ -15,6 +15,8 @@ import pytest
 
 import ico3d
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 BUILD = "import sys; from hatchling.build import build_wheel; print(build_wheel(sys.argv[1]))"
 STAND_INS = 'recognition = "pocketsphinx"\nlanguage = "persona-notes"\nvoice = "espeak-ng"\n'

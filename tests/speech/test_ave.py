@@ -16,6 +16,8 @@ from ico3d.speech.network import SpeechAdaptor
 from ico3d.speech.runtime import StreamingExpressions, open_speech
 from support.users_weights import write_ave
 
+pytestmark = pytest.mark.slow
+
 # channels in and out, kernel, stride, padding, residual
 LAYERS = [
     (1, 32, 3, (1, 1), 1, False),

@@ -5,6 +5,8 @@ from ico3d.speech.training import corpus
 from ico3d.speech.training.augment import recorded
 from ico3d.speech.training.corpus import make_batch
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("espeakng_loader")
 
 

@@ -17,7 +17,7 @@ from ico3d.speech.runtime import SpeechModel, StreamingExpressions
 from support.needs import needs
 from support.users_weights import write_hubert
 
-pytestmark = needs("transformers")
+pytestmark = [pytest.mark.slow, needs("transformers")]
 
 
 def sound(seconds, rate=16000, seed=0):

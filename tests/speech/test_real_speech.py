@@ -10,6 +10,8 @@ from ico3d.speech.training.targets import ARTICULATION, articulation_track
 from ico3d.speech.training.train_encoder import load_readout
 from support.shared import SPEECH
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def heard():

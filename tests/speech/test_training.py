@@ -11,6 +11,8 @@ from ico3d.speech.training import train_encoder as training
 from ico3d.speech.training.settings import EncoderSettings
 from ico3d.speech.training.train_encoder import EncoderTraining, load_readout
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("espeakng_loader")
 
 SETTINGS = EncoderSettings(steps=4, batch=2, seconds=1.0, seed=5)

@@ -15,6 +15,8 @@ from ico3d.splat.files.standard_ply import header, property_order
 from ico3d.splat.gaussians import Gaussians
 from support.splats.gaussian_files import as_gsply, gsply, ply_bytes, random_gaussians, same
 
+pytestmark = pytest.mark.slow
+
 FINITE = st.floats(width=32, allow_nan=False, allow_infinity=False)
 SCALES = st.floats(width=32, max_value=80, allow_nan=False, allow_infinity=False)
 

@@ -8,6 +8,8 @@ import torch
 from ico3d.splat.gaussians import Gaussians
 from support.splats.reference import camera_at, harmonic, render, scene
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("antialiased", [True, False])
 @pytest.mark.parametrize("coefficients", [0, 4, 16])

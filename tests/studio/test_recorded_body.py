@@ -22,6 +22,8 @@ from ico3d.studio.rigs import cameras_of
 from support.recordings import synthetic_bodies, synthetic_people
 from support.shared import SUBJECTS
 
+pytestmark = pytest.mark.slow
+
 HUMAN = SUBJECTS / "human_face_m.npz"
 FPS = 15.0
 

@@ -17,6 +17,8 @@ from support.needs import needs
 from support.recordings import synthetic_people
 from support.shared import SUBJECTS
 
+pytestmark = pytest.mark.slow
+
 
 def _settings(subject: Path, **changes) -> Recording:
     values = dict(rig="head", cameras=3, frames=11, views_per_frame=1, size=40, text="", seed=3)

@@ -22,6 +22,8 @@ from ico3d.splat.gaussians import Gaussians
 from support.avatars.filmed_person import FilmedPerson
 from support.avatars.moving_body import MovingPerson, Span
 
+pytestmark = pytest.mark.slow
+
 CLIP = Span(0, 22)
 HEAD, ARM = 1, 2
 DISSOLVED = range(9, 13)

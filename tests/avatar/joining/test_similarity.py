@@ -14,6 +14,8 @@ from ico3d.errors import ModelError
 from ico3d.splat import quaternions
 from support.avatars.planted_person import ABROAD, face
 
+pytestmark = pytest.mark.slow
+
 seeds = st.integers(0, 2**32 - 1)
 OUTLIERS = round(0.2 * len(STEADY))
 

@@ -14,6 +14,8 @@ from ico3d.body.planning.windows import Window
 from ico3d.errors import CaptureError, MissingExtraError
 from support.bodies.moving_ball import BALL, HEIGHT
 
+pytestmark = pytest.mark.slow
+
 STEPS = [0.0, 0.0, 0.01, 0.05, 0.0, 0.1]
 """Metres that the ball rises in each step."""
 

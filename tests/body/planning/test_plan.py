@@ -13,6 +13,8 @@ from ico3d.body.planning.plan_picture import draw_plan
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import Windows
 
+pytestmark = pytest.mark.slow
+
 HEIGHTS = np.cumsum([0, *[0.0] * 4, *[0.1] * 3, *[0.0] * 3, *[-0.12] * 2])
 
 

@@ -12,6 +12,8 @@ from ico3d.cli import main
 from ico3d.errors import CaptureError
 from support.recordings import multiview_folders
 
+pytestmark = pytest.mark.slow
+
 SIZE = (240, 360)
 """Width, height."""
 

@@ -1,6 +1,7 @@
 """Poses found by what pictures show."""
 
 import numpy as np
+import pytest
 import torch
 from scipy.spatial.transform import Rotation
 
@@ -9,6 +10,8 @@ from ico3d.capture.portrait.photometric_poses import Look, refine_poses, rigid_m
 from ico3d.common.camera import Camera
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
+
+pytestmark = pytest.mark.slow
 
 SIZE = 48
 CAMERA = Camera(SIZE, SIZE, np.array([[90.0, 0, 24], [0, 90, 24], [0, 0, 1]]), np.eye(4))

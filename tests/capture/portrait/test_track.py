@@ -4,6 +4,8 @@ from scipy.spatial.transform import Rotation
 
 from ico3d.capture.portrait import rigid_head
 
+pytestmark = pytest.mark.slow
+
 SIZE = (512, 512)
 
 

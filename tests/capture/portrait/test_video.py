@@ -6,6 +6,8 @@ import pytest
 from ico3d.capture.video import open_video, read_sound
 from ico3d.errors import CaptureError
 
+pytestmark = pytest.mark.slow
+
 av = pytest.importorskip("av")
 
 

@@ -15,6 +15,8 @@ from ico3d.cli import main as run
 from ico3d.errors import CaptureError
 from support.recordings import renderme_files
 
+pytestmark = pytest.mark.slow
+
 
 def fails(call, *words):
     with pytest.raises(CaptureError) as error:

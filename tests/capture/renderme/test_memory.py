@@ -12,6 +12,8 @@ import pytest
 from ico3d.capture.formats import open_capture
 from support.recordings import renderme_files
 
+pytestmark = pytest.mark.slow
+
 LOOK = textwrap.dedent(
     """
     import gc, json, sys, resource

@@ -11,6 +11,8 @@ from scipy.spatial import KDTree
 from ico3d.capture.formats import open_capture
 from support.recordings import faces, renderme_files
 
+pytestmark = pytest.mark.slow
+
 UP = np.diag([1.0, -1.0, -1.0, 1.0])
 """From the world of the files, which has +y down, to the capture's."""
 

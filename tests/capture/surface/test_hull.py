@@ -6,6 +6,8 @@ import pytest
 from ico3d.capture.surface.hull import Silhouette, focus, looked_at, visual_hull
 from ico3d.common.camera import Camera, look_at
 
+pytestmark = pytest.mark.slow
+
 CENTER, RADIUS, EDGE = np.array([0.1, 1.0, -0.05]), 0.3, 0.04
 
 

@@ -24,6 +24,8 @@ from ico3d.measure.talking.page import open_page
 from support.chat.pages import FollowingPlayer
 from support.chat.serving import serving
 
+pytestmark = pytest.mark.slow
+
 ANIMATION = Animation(
     15.0, 60, Rest(0, 20), (Action(28, 0.9), Action(36, 0.7), Action(50, 0.5)), 0.6, 1.2
 )

@@ -24,6 +24,8 @@ from support.chat.remote import (
     serving,
 )
 
+pytestmark = pytest.mark.slow
+
 TEXT = "I am Ada. I live in a box."
 
 

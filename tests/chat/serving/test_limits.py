@@ -14,6 +14,8 @@ from ico3d.chat.wire.protocol import MICROPHONE_CHUNK, VERSION, Answer, Audio, E
 from ico3d.errors import ProtocolError
 from ico3d.measure.talking.page import open_page
 
+pytestmark = pytest.mark.slow
+
 CHUNK = MICROPHONE_CHUNK / 16000  # s
 
 

@@ -29,6 +29,8 @@ from ico3d.errors import BundleError, SettingsError
 from ico3d.measure.talking.page import open_page
 from support.chat.serving import serving
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize(
     ("host", "origin", "own"),

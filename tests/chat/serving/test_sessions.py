@@ -4,12 +4,15 @@ import asyncio
 import threading
 from dataclasses import replace
 
+import pytest
 from websockets.asyncio.client import connect
 
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import VERSION, Answer, Error, Hello, Speech, State, Stop, Text
 from ico3d.measure.talking.page import open_page
 from support.chat.serving import TYPED, serving
+
+pytestmark = pytest.mark.slow
 
 
 async def dropped(page):

@@ -6,6 +6,7 @@ from dataclasses import replace
 from urllib.parse import urlsplit
 
 import numpy as np
+import pytest
 from starlette.responses import JSONResponse, PlainTextResponse
 
 from ico3d.chat.services.voice import espeak
@@ -22,6 +23,8 @@ from support.chat.remote import (
 )
 from support.chat.serving import BROWSER
 from support.chat.serving import serving as serving_avatar
+
+pytestmark = pytest.mark.slow
 
 SORRY = {failed: sentence.split(". ")[0] + "." for failed, sentence in APOLOGIES["en"].items()}
 NO_VOICE = espeak.spoken(APOLOGIES["en"]["voice"], "en-us", espeak.Settings().rate)

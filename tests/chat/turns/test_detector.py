@@ -16,6 +16,8 @@ from ico3d.chat.wire.protocol import MICROPHONE_RATE as RATE
 from ico3d.common.espeak import synthesize
 from support.shared import SPEECH
 
+pytestmark = pytest.mark.slow
+
 VOICES = ("en-us", "en-us+f3", "en-us+m3", "en-us+m7")
 FADE = 0.02  # s that the page takes to fall silent
 

@@ -11,6 +11,8 @@ from ico3d.chat.turns.echo import EchoGuard, similarity
 from ico3d.chat.wire.protocol import MICROPHONE_CHUNK as PIECE
 from ico3d.common.espeak import synthesize
 
+pytestmark = pytest.mark.slow
+
 NEAR, FAR = 16_000, 24_000  # Hz
 EARLY = ((0.004, 0.5), (0.011, 0.35), (0.023, 0.3))  # s and height of first reflections
 

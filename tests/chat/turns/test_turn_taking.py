@@ -31,6 +31,8 @@ from ico3d.common.espeak import synthesize
 from ico3d.measure.talking.page import SCHEDULING, SimulatedPage, open_page
 from support.chat.pages import slowness
 
+pytestmark = pytest.mark.slow
+
 FADE = 0.02  # s that the page takes to fall silent
 UNKNOWN = "tell me something nobody has written down"  # its answer takes several seconds
 

@@ -22,6 +22,8 @@ from ico3d.measure.talking.trials import Assent, Interruption, Question, sound_o
 from support.chat.serving import serving
 from support.shared import SPEECH
 
+pytestmark = pytest.mark.slow
+
 
 def question(arrival, turn=100.0):
     return Question(arrival + 50, arrival, {"turn": turn, "voice": arrival / 10})

@@ -14,6 +14,8 @@ from ico3d.measure.talking.crowd import SCRIPT, Visit, ahead, figures, measure, 
 from ico3d.measure.talking.scripted import tone
 from support.chat.serving import serving
 
+pytestmark = pytest.mark.slow
+
 ROWS = np.zeros((1, 39), np.float16)
 
 

@@ -29,6 +29,8 @@ from support.chat.pages import FollowingPlayer
 from support.chat.scripted_server import Call, Script, running
 from support.chat.serving import BROWSER, serving
 
+pytestmark = pytest.mark.slow
+
 ADA = Persona("Ada")
 
 

@@ -27,6 +27,8 @@ from support.chat.remote import serving as serving_app
 from support.chat.scripted_server import Script, Thought, running
 from support.chat.serving import BROWSER, serving
 
+pytestmark = pytest.mark.slow
+
 ADA = Persona("Ada")
 CONTEXT = Context(ADA, None, None)
 SORRY = APOLOGIES["en"]["language"].split(". ")[0] + "."

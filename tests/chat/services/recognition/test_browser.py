@@ -13,6 +13,8 @@ from ico3d.measure.talking.page import open_page
 from support.chat.recognisers import silent
 from support.chat.serving import serving
 
+pytestmark = pytest.mark.slow
+
 BROWSER = ChatSettings(recognition=Choice("browser", {"language": "en-US"}))
 
 

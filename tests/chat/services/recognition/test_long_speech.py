@@ -32,6 +32,8 @@ from ico3d.measure.talking.page import open_page
 from support.chat.recognisers import Script, Scripted, silent
 from support.chat.serving import serving
 
+pytestmark = pytest.mark.slow
+
 RATE = 16_000
 MINUTES = 10
 SECOND = np.random.default_rng(0).integers(-3000, 3000, RATE).astype(np.int16).tobytes()

@@ -14,6 +14,8 @@ from ico3d.measure.talking.page import open_page
 from support.chat.recognisers import Script, Scripted, silent
 from support.chat.serving import serving
 
+pytestmark = pytest.mark.slow
+
 
 class Recogniser(Segments, Scripted):
     pass
