@@ -1,6 +1,7 @@
 import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import type { Browser } from '../support/browser/browser.ts';
 import { readRecord, type Record } from '../support/browser/recorder.ts';
+import { slowness } from '../support/slowness.ts';
 import { finished, openPage, SENTENCE, SHORTER, SILENCE, until } from '../support/browser/talk.ts';
 
 const { talkingUrl } = inject('shared');
@@ -84,7 +85,7 @@ describe('a typed question', () => {
     const pressed = await page.evaluate(() => (window as unknown as { timeStamp: number }).timeStamp);
     const { loudness } = await readRecord(page);
     const last = loudness.findLast(({ level }) => level > SILENCE)!;
-    expect(last.at - pressed).toBeLessThan(250); // fade, the analyser's window, a busy machine
+    expect(last.at - pressed).toBeLessThan(250 * slowness()); // fade and the analyser's window
   });
 });
 

@@ -6,6 +6,7 @@ import { pauseDrawing } from '../support/browser/drawing.ts';
 import { readRecord, type Heard } from '../support/browser/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
 import { StallingLine } from '../support/servers/stalling.ts';
+import { slowness } from '../support/slowness.ts';
 import { quantile } from '../support/statistics.ts';
 import { finished, makeVoice, openPage, until } from '../support/browser/talk.ts';
 
@@ -64,7 +65,7 @@ test('a network that stalls while the microphone is open brings no old sound, an
   const delay = (chunks: Heard[]) => quantile(chunks.map(({ at, sample }) => at - (1000 * sample) / MICROPHONE_RATE), 0.5);
   const live = understood.microphone.filter(({ at }) => at > flowed + 1000);
   const before = microphone.filter(({ at }) => at < stalled);
-  expect(Math.abs(delay(live.slice(-60)) - delay(before))).toBeLessThan(100);
+  expect(Math.abs(delay(live.slice(-60)) - delay(before))).toBeLessThan(100 * slowness());
 
   await page.click('#microphone');
   await page.fill('#text', 'Who are you?');
