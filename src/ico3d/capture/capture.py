@@ -10,6 +10,7 @@ import numpy as np
 from ico3d.capture.finding import Finding
 from ico3d.common.camera import Camera
 from ico3d.common.expression import EYE_NAMES as EYE_NAMES
+from ico3d.rig.body_track import BodyTrack, read_body_track
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,14 @@ class Capture(ABC):
     def points(self, frame: int = 0) -> np.ndarray | None:
         """(P, 3) surface points of a frame: of bodies in the world, else in head space."""
         return None
+
+    def body_track(self) -> BodyTrack | None:
+        """How the person moved, as `ico3d capture pose` found it; None where it has not.
+
+        Raises:
+            CaptureError: If the track is damaged or belongs to another recording.
+        """
+        return read_body_track(self.path, self.num_frames, self.fps)
 
     def inspect(self) -> list[Finding]:
         """What is missing or damaged in the files of this format, found without decoding them."""

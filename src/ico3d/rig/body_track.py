@@ -1,0 +1,194 @@
+"""How a recorded person moved: a rig, its pose in every frame, and a mesh that hangs on it."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save
+
+from ico3d.common.files import write_atomic
+from ico3d.common.typed import parse_json
+from ico3d.errors import CaptureError
+from ico3d.rig.binding import INFLUENCES, Binding
+from ico3d.rig.quaternions import Array
+from ico3d.rig.rig import Rig
+
+NAME = "body_track.safetensors"
+VERSION = 1
+LONGEST = 1e3
+"""Metres; no root moves farther, and no vertex lies farther."""
+
+
+@dataclass(frozen=True, eq=False)
+class BodyTrack:
+    """A body through F frames.
+
+    Attributes:
+        rig: J joints at rest, in the person's own proportions.
+        fps: Frames per second; frame i is at i / fps seconds.
+        rotations: (F, J, 4) float32 wxyz of each joint about itself (`Rig.posed`).
+        roots: (F, 3) float32 metres that the root moves from rest to the world.
+        fitted: (F,) bool; the other frames are interpolated.
+        vertices: (V, 3) float32 metres, the template's surface in the person's shape at rest.
+        faces: (T, 3) int32 corners of its triangles, counter-clockwise seen from outside.
+        binding: Which joints carry the vertices.
+        source: What the template is and how it was fitted, for people.
+    """
+
+    rig: Rig
+    fps: float
+    rotations: np.ndarray
+    roots: np.ndarray
+    fitted: np.ndarray
+    vertices: np.ndarray
+    faces: np.ndarray
+    binding: Binding
+    source: str
+
+    @property
+    def num_frames(self) -> int:
+        """F."""
+        return len(self.rotations)
+
+    def joints(self) -> Array:
+        """(F, J, 3) places of the joints in the world, metres."""
+        return self.rig.posed(self.rotations, self.roots)[1]
+
+    def surface(self, frame: int) -> Array:
+        """(V, 3) the template's vertices in the world at a frame, metres."""
+        matrices = self.rig.matrices(self.rotations[frame], self.roots[frame])
+        return self.binding.skinned(self.vertices, matrices)
+
+    def to_bytes(self) -> bytes:
+        """The content of the file."""
+        about = {
+            "version": VERSION,
+            "fps": self.fps,
+            "names": self.rig.names,
+            "parents": self.rig.parents,
+            "source": self.source,
+        }
+        arrays = {
+            "joints": self.rig.joints.astype(np.float64),
+            "rotations": self.rotations.astype(np.float32),
+            "roots": self.roots.astype(np.float32),
+            "fitted": self.fitted.astype(np.uint8),
+            "vertices": self.vertices.astype(np.float32),
+            "faces": self.faces.astype(np.int32),
+            "vertex_joints": self.binding.joints,
+            "vertex_weights": self.binding.weights,
+        }
+        arrays = {name: np.ascontiguousarray(value) for name, value in arrays.items()}
+        return save(arrays, {"body_track": json.dumps(about)})
+
+
+def track_file(recording: Path) -> Path:
+    """Where the body track of a recording lies: in its folder, or beside it where it is a file."""
+    return recording / NAME if recording.is_dir() else recording.with_suffix(f".{NAME}")
+
+
+def write_body_track(track: BodyTrack, recording: Path) -> Path:
+    """Writes the track of a recording, whole or not at all.
+
+    Raises:
+        CaptureError: If nothing can be written where the recording lies.
+    """
+    file = track_file(recording)
+    try:
+        write_atomic(file, track.to_bytes())
+    except OSError as error:
+        raise CaptureError(
+            f"{file} cannot be written ({error.strerror}): a body track lies with its recording; "
+            f"make a copy of your own with ico3d capture resize {recording} OUT."
+        ) from error
+    return file
+
+
+def read_body_track(recording: Path, num_frames: int, fps: float) -> BodyTrack | None:
+    """Reads the body track of a recording.
+
+    Args:
+        recording: The `path` of its capture.
+        num_frames: Its frames.
+        fps: Its frames per second.
+
+    Returns:
+        The track, or None where there is none.
+
+    Raises:
+        CaptureError: If the file is damaged or belongs to another recording.
+    """
+    file = track_file(recording)
+    if not file.is_file():
+        return None
+    try:
+        track = _read(file)
+    except (OSError, SafetensorError, ValueError, KeyError, TypeError) as error:
+        raise CaptureError(
+            f"{file} is damaged ({error}): delete it and run ico3d capture pose again."
+        ) from error
+    if (track.num_frames, track.fps) != (num_frames, fps):
+        raise CaptureError(
+            f"{file} has {track.num_frames} frames at {track.fps:g} per second, the recording has "
+            f"{num_frames} at {fps:g}: delete it and run ico3d capture pose again."
+        )
+    return track
+
+
+def _read(file: Path) -> BodyTrack:
+    """The content of a file; any of several exceptions says that it is damaged."""
+    with cast(Any, safe_open(file, "numpy")) as content:  # untyped
+        text = cast(dict[str, str], content.metadata() or {}).get("body_track", "{}")
+        names = cast(list[str], content.keys())
+        arrays: dict[str, np.ndarray] = {name: content.get_tensor(name) for name in names}
+    about = cast(dict[str, Any], parse_json(text.encode(), file.name, ValueError))
+    if about.get("version") != VERSION:
+        raise ValueError(f"its version is {about.get('version')}, not {VERSION}")
+    rig = Rig(tuple(map(str, about["names"])), tuple(map(int, about["parents"])), arrays["joints"])
+    frames, vertices = len(arrays["rotations"]), len(arrays["vertices"])
+    shapes = {
+        "joints": (len(rig), 3),
+        "rotations": (frames, len(rig), 4),
+        "roots": (frames, 3),
+        "fitted": (frames,),
+        "vertices": (vertices, 3),
+        "faces": (len(arrays["faces"]), 3),
+        "vertex_joints": (vertices, INFLUENCES),
+        "vertex_weights": (vertices, INFLUENCES),
+    }
+    for name, shape in shapes.items():
+        if arrays[name].shape != shape:
+            raise ValueError(f"'{name}' must be {shape}, found {arrays[name].shape}")
+        if not np.isfinite(arrays[name]).all():
+            raise ValueError(f"'{name}' holds NaN or infinity")
+    _check_values(arrays, len(rig), vertices)
+    return BodyTrack(
+        rig,
+        float(about["fps"]),
+        arrays["rotations"],
+        arrays["roots"],
+        arrays["fitted"].astype(bool),
+        arrays["vertices"],
+        arrays["faces"],
+        Binding(arrays["vertex_joints"], arrays["vertex_weights"]),
+        str(about["source"]),
+    )
+
+
+def _check_values(arrays: dict[str, np.ndarray], joints: int, vertices: int) -> None:
+    """Refuses what is no pose: rotations that are none, corners and joints that are not there."""
+    if np.abs(np.linalg.norm(arrays["rotations"], axis=-1) - 1).max(initial=0) > 1e-3:
+        raise ValueError("'rotations' holds one that is not of length 1")
+    for name in ("roots", "vertices"):
+        if np.abs(arrays[name]).max(initial=0) > LONGEST:
+            raise ValueError(f"'{name}' reaches farther than {LONGEST:g} m")
+    faces, weights = arrays["faces"], arrays["vertex_weights"]
+    if faces.size and not (faces.min() >= 0 and faces.max() < vertices):
+        raise ValueError("'faces' names a vertex that is not there")
+    if arrays["vertex_joints"].max(initial=0) >= joints:
+        raise ValueError("'vertex_joints' names a joint that is not there")
+    if weights.min(initial=0) < 0 or np.abs(weights.sum(1) - 1).max(initial=0) > 1e-3:
+        raise ValueError("'vertex_weights' has a row that does not sum to 1")
