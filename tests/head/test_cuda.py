@@ -63,7 +63,8 @@ def test_a_perceptual_term_looks_at_pictures_there(cuda, vgg, tiny, tmp_path):
 def test_it_is_watched_there(cuda, tiny):
     """What a page shows of it can leave the device."""
     model = initial_head(tiny, SETTINGS, "full", 3, np.random.default_rng(0)).to(cuda)
-    watched = WatchedHead(tiny, model, BlendshapeTrack(tiny, tiny.blendshape_names))
+    track = BlendshapeTrack(tiny, tiny.blendshape_names)
+    watched = WatchedHead(HeadTrainer(tiny, model, track, None, SETTINGS, 0))
     assert is_moved(watched.gaussians(0, watched.values(0)).colors)
     assert _side_by_side(*watched.pictures(0)).shape == (48, 96, 3)
 

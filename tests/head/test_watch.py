@@ -16,6 +16,7 @@ from ico3d.common.expression import EYE_NAMES
 from ico3d.errors import MissingExtraError
 from ico3d.head.expressions import BlendshapeTrack, SpeechTrack
 from ico3d.head.model import HeadModel
+from ico3d.head.optimise import HeadTrainer
 from ico3d.head.settings import PRESETS
 from ico3d.head.train_head import HeadJob, train_head
 from ico3d.head.watch import WatchedHead
@@ -105,8 +106,13 @@ def head(tmp_path_factory):
 def page(head) -> Iterator[LivePage]:
     tiny, trained = head
     track = BlendshapeTrack(tiny, tiny.blendshape_names)
-    with LivePage(WatchedHead(tiny, trained.model, track), _free_port()) as page:
+    with LivePage(_watched(tiny, trained.model, track), _free_port()) as page:
         yield page
+
+
+def _watched(capture, model, track) -> WatchedHead:
+    """A head that is about to learn from a capture."""
+    return WatchedHead(HeadTrainer(capture, model, track, None, SETTINGS, 0))
 
 
 @pytest.fixture
@@ -184,12 +190,35 @@ def test_sliders_are_for_named_inputs_that_do_something(head):
     tiny, _ = head
     speech = SpeechTrack(tiny, np.zeros((40, 64), np.float32), SpeechAdaptor(64))
     driven = HeadModel(head_shape(speech.size), 5)
-    subject = WatchedHead(tiny, driven, speech)
+    subject = _watched(tiny, driven, speech)
     assert {slider.name for slider in subject.sliders} == set(EYE_NAMES)
     assert all((slider.low, slider.high) == (0, 0.2) for slider in subject.sliders)
     static = HeadModel(head_shape(3, "static"), 5)
     track = BlendshapeTrack(tiny, tiny.blendshape_names)
-    assert WatchedHead(tiny, static, track).sliders == []
+    assert _watched(tiny, static, track).sliders == []
+
+
+def test_only_frames_that_are_learnt_from_are_shown(head, monkeypatch):
+    """By the first camera that recorded them; what it looks at there is that picture."""
+    tiny, trained = head
+    whole, asked = type(tiny).image, []
+
+    def image(self, camera, frame):
+        asked.append((camera, frame))
+        return None if frame == 2 else whole(self, camera, frame)
+
+    monkeypatch.setattr(type(tiny), "image", image)
+    track = BlendshapeTrack(tiny, tiny.blendshape_names)
+    watched = _watched(tiny, trained.model, track)
+    assert watched.frames == len(tiny.split.train) - 1
+    pose = tiny.world_from_head(3)
+    seen = tiny.cameras[1].moved(pose).world_to_camera
+    np.testing.assert_array_equal(watched.camera(2).world_to_camera, seen)
+    assert watched.values(2) == dict(zip(track.names, tiny.blendshapes(3), strict=True))
+    before = len(asked)
+    recorded, _ = watched.pictures(2)
+    assert np.abs(recorded.numpy() - whole(tiny, 1, 3)).max() < 0.01
+    assert len(asked) == before  # the training has read it
 
 
 def test_watching_changes_nothing_of_what_is_learnt(head, tmp_path):

@@ -1,6 +1,7 @@
 """The Gaussians a head starts with."""
 
 import logging
+from collections.abc import Sequence
 
 import numpy as np
 import torch
@@ -8,6 +9,7 @@ import torch
 from ico3d.capture.capture import Capture
 from ico3d.capture.surface.coverage import Moment, find_gap
 from ico3d.capture.surface.head import head_silhouettes
+from ico3d.common.camera import Camera
 from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 from ico3d.head.model import HeadModel, HeadShape, Variant
@@ -15,12 +17,16 @@ from ico3d.head.settings import HeadSettings
 from ico3d.head.views import view_of
 from ico3d.splat.initial import in_pictures, resampled, spacing
 
+FRAMES = 8
+"""Spread over the training frames: some camera must see a surface point there."""
 MOMENTS = 4
 """Spread over the training frames: where the masks are compared with the surface points."""
 NEAREST = 16
 """Frames about such a moment among which each camera's mask is looked for."""
 REACH = 3.0
 """Spacings around a surface point that it accounts for."""
+LEAST_POINTS = 4
+"""Of a surface: a point's spacing is that to the three nearest."""
 LEAST_REACH = 0.01
 """Metres: how far a surface may lie off the masks' edges, however dense it is."""
 
@@ -43,10 +49,10 @@ def initial_head(
         CaptureError: If the capture has no surface points or one is not finite.
     """
     surface = capture.points()
-    if surface is None or len(surface) < 4 or not np.isfinite(surface).all():
+    if surface is None or len(surface) < LEAST_POINTS or not np.isfinite(surface).all():
         raise CaptureError(f"{capture.path} has no finite surface points to start from.")
-    seen = _seen(capture, np.asarray(surface, np.float64))  # (P', 3)
-    points = _whole_person(capture, seen, settings.initial.gaussians, rng)  # (N, 3)
+    points = _whole_person(capture, surface, settings.initial.gaussians, rng)  # (N, 3)
+    widths = spacing(points)  # (N,)
     low, high = points.min(0), points.max(0)
     shape = HeadShape(
         expression_size=expression_size,
@@ -59,7 +65,7 @@ def initial_head(
     )
     model = HeadModel(shape, len(points))
     model.means.data = torch.from_numpy(points).float()
-    model.log_scales.data = torch.from_numpy(np.log(spacing(points))).float()[:, None].repeat(1, 3)
+    model.log_scales.data = torch.from_numpy(np.log(widths)).float()[:, None].repeat(1, 3)
     return model
 
 
@@ -67,9 +73,14 @@ def _whole_person(
     capture: Capture, surface: np.ndarray, count: int, rng: np.random.Generator
 ) -> np.ndarray:
     """(count, 3) points on a surface (P, 3), and on what it leaves out of the person."""
+    train = capture.split.train
+    looked, compared = spread(len(train), FRAMES), spread(len(train), MOMENTS)
+    cameras = _cameras(capture, [train[place] for place in looked])
+    moments = _moments(capture, compared)
+    surface = _in_sight(capture, np.asarray(surface, np.float64), cameras)  # (P', 3)
     reach = max(REACH * float(np.quantile(spacing(surface), 0.9)), LEAST_REACH)
-    gap = find_gap(surface, _moments(capture), reach)
-    if len(gap.points) < 4:
+    gap = find_gap(surface, moments, reach)
+    if len(gap.points) < LEAST_POINTS:
         if gap.share:
             log.warning(
                 "%s: the surface points leave out %.0f %% of the person, and the masks do not "
@@ -88,10 +99,16 @@ def _whole_person(
     return np.concatenate(parts)
 
 
-def _moments(capture: Capture) -> list[Moment]:
-    """What the cameras saw of the person in some training frames, in canonical head space."""
+def _cameras(capture: Capture, frames: Sequence[int]) -> list[Camera]:
+    """Every camera in some frames, in canonical head space."""
+    numbers = range(len(capture.cameras))
+    return [view_of(capture, camera, frame).camera for frame in frames for camera in numbers]
+
+
+def _moments(capture: Capture, places: Sequence[int]) -> list[Moment]:
+    """What cameras saw of the person at these places among the training frames, in head space."""
     train, found = capture.split.train, []
-    for place in spread(len(train), MOMENTS):
+    for place in places:
         first = min(max(place - NEAREST // 2, 0), max(len(train) - NEAREST, 0))
         seen = head_silhouettes(capture, train[place], train[first : first + NEAREST])
         if seen:
@@ -99,15 +116,9 @@ def _moments(capture: Capture) -> list[Moment]:
     return found
 
 
-def _seen(capture: Capture, points: np.ndarray) -> np.ndarray:
+def _in_sight(capture: Capture, points: np.ndarray, cameras: Sequence[Camera]) -> np.ndarray:
     """The points (P', 3) of (P, 3) that lie within some picture: others would never be trained."""
-    train = capture.split.train
-    cameras = [
-        view_of(capture, index, frame).camera
-        for frame in (train[place] for place in spread(len(train), 8))
-        for index in range(len(capture.cameras))
-    ]
     inside = in_pictures(points, cameras).any(0)  # (P,)
-    if inside.sum() < 4:
+    if inside.sum() < LEAST_POINTS:
         raise CaptureError(f"{capture.path}: no camera sees the surface points; check the poses.")
     return points[inside]

@@ -40,6 +40,14 @@ class HeadTrainer:
     """A `Trainee`: the head, its optimiser, and the pictures it learns from.
 
     Every random choice of a step follows from the seed and the step's number.
+
+    Attributes:
+        model: The head.
+        track: What drives it.
+        adaptor: Turns speech features into speech values; None for heads driven otherwise.
+        pictures: Where pictures are read.
+        views: What it learns from, frame by frame.
+        poses: Tells the head space from others of the recording.
     """
 
     def __init__(
@@ -57,19 +65,15 @@ class HeadTrainer:
             CaptureError: If there is no picture to train on, or too few have a mask.
             SettingsError: If the model shall be compiled and there is no compiler.
         """
-        self.model, self.adaptor = model, adaptor
-        self._track, self._settings, self._seed = track, settings, seed
-        self._pictures = PictureCache(capture, settings.cache_gib)
-        self._views = self._pictures.views(capture.split.train, LEAST_TOLD)
-        if not self._views:
+        self.model, self.track, self.adaptor = model, track, adaptor
+        self._settings, self._seed = settings, seed
+        self.pictures = PictureCache(capture, settings.cache_gib)
+        self.views = self.pictures.views(capture.split.train, LEAST_TOLD)
+        if not self.views:
             raise CaptureError(f"{capture.path} has no picture among its training frames.")
         few = FEW_FRAMES / len(capture.split.train)
         self._weight_decay = settings.rates.basis_weight_decay * few**4
-        shape = model.shape
-        self._space = {
-            "box": [*map(float, shape.box_center), float(shape.box_size)],
-            "poses": poses_digest(capture),
-        }
+        self.poses = poses_digest(capture)
         self._loss = HeadLoss(settings, model.device)
         self._optimiser = Optimiser(settings.optimiser)
         self._density = HeadDensity(settings.density, seed)
@@ -86,7 +90,7 @@ class HeadTrainer:
     def step(self, index: int) -> Mapping[str, float]:
         """Renders one picture and learns from the difference."""
         view = self._view(index)
-        picture = self._pictures.picture(view, self.model.device)
+        picture = self.pictures.picture(view, self.model.device)
         background, target = self._staged(view, picture, index)
         expression = self._expression(view)  # (B,)
         features = self._features(expression)  # (N, w)
@@ -117,7 +121,7 @@ class HeadTrainer:
 
     def state(self) -> dict:
         """The weight of the perceptual term, and the space; randomness follows from the step."""
-        return {"perceptual_weight": self.settings.loss.perceptual, "space": self._space}
+        return {"perceptual_weight": self.settings.loss.perceptual, "space": self._space()}
 
     def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
         """Takes back what `tensors` and `state` gave.
@@ -125,7 +129,7 @@ class HeadTrainer:
         Raises:
             SettingsError: If it was begun in another space: weights would not fit their places.
         """
-        if state.get("space") != self._space:
+        if state.get("space") != self._space():
             raise SettingsError(
                 "the run was begun by an earlier version, or the recording's points, masks or head "
                 "poses have changed since: train in an empty folder."
@@ -138,13 +142,19 @@ class HeadTrainer:
         self._optimiser.moments = _below("moments.", tensors)
         self._density.restore(_below("density.", tensors))
 
+    def _space(self) -> dict:
+        """What weights and places in the folder's checkpoint are relative to."""
+        shape = self.model.shape
+        box = [*map(float, shape.box_center), float(shape.box_size)]
+        return {"box": box, "poses": self.poses}
+
     def _view(self, index: int) -> View:
         """Every view once per epoch, in an order of its own."""
-        epoch, place = divmod(index, len(self._views))
+        epoch, place = divmod(index, len(self.views))
         if place == 0 or not hasattr(self, "_order"):
             rng = np.random.default_rng([self._seed, epoch])
-            self._order = rng.permutation(len(self._views))
-        return self._views[self._order[place]]
+            self._order = rng.permutation(len(self.views))
+        return self.views[self._order[place]]
 
     def _staged(self, view: View, picture: Picture, index: int) -> tuple[Tensor, Tensor]:
         """The background to render over, and the recorded picture over that background.
@@ -152,12 +162,12 @@ class HeadTrainer:
         Where there is no clean plate, it is a random colour: no Gaussian can pass for background.
         """
         rng = np.random.default_rng([self._seed, index, 1])
-        plate = self._pictures.background(view, picture.image.device)
+        plate = self.pictures.background(view, picture.image.device)
         return staged(picture, plate, torch.from_numpy(rng.random(3)))
 
     def _expression(self, view: View) -> Tensor:
         """The expression (B,) of a view's frame, on the model's device."""
-        return self._track.at(view.frame).to(self.model.device)
+        return self.track.at(view.frame).to(self.model.device)
 
     def _features(self, expression: Tensor) -> Tensor:
         """Blended features that keep their gradient: the basis learns from it."""
@@ -212,9 +222,9 @@ class HeadTrainer:
     def _sampled(self, index: int) -> Sampled:
         """The head in some training frames."""
         rng = np.random.default_rng([self._seed, index, 2])
-        chosen = rng.choice(len(self._views), size=min(SAMPLES, len(self._views)), replace=False)
+        chosen = rng.choice(len(self.views), size=min(SAMPLES, len(self.views)), replace=False)
         opacities, given = [], []
-        for view in (self._views[i] for i in chosen):
+        for view in (self.views[i] for i in chosen):
             gaussians = self.model(self._expression(view))
             opacities.append(gaussians.opacities)
             given.append(contributions(gaussians, [view.camera])[0])

@@ -14,11 +14,10 @@ from ico3d.common.expression import EyeRange, eye_range
 from ico3d.errors import CaptureError
 from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack, SpeechTrack, speech_features
 from ico3d.head.initial_gaussians import initial_head
-from ico3d.head.model import HeadModel, Variant
+from ico3d.head.model import Variant
 from ico3d.head.model_folder import Inputs, TrainedHead
 from ico3d.head.optimise import HeadTrainer
 from ico3d.head.settings import HeadSettings
-from ico3d.head.views import poses_digest
 from ico3d.head.watch import WatchedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
@@ -84,13 +83,13 @@ def train_head(
     trainer = HeadTrainer(capture, model, track, adaptor, job.settings, job.seed)
     every = job.settings.checkpoint_every
     loop = LoopSettings(job.settings.steps, checkpoint_every=every, label="head")
-    with _page(capture, model, track, watch_port) as page:
+    with _page(trainer, watch_port) as page:
         seconds = run_loop(trainer, run, loop, page)
     names = track.names if isinstance(track, BlendshapeTrack) else ()
     summary = {
         "train_seconds": seconds,
         "capture": capture.provenance,
-        "recording": {"path": str(capture.path.resolve()), "poses": poses_digest(capture)},
+        "recording": {"path": str(capture.path.resolve()), "poses": trainer.poses},
         "settings": asdict(trainer.settings),
     }
     landmarks = canonical_landmarks(capture)
@@ -110,11 +109,9 @@ def _eyes(capture: Capture, track: ExpressionTrack) -> EyeRange:
     return eye_range(track.eyes[list(capture.split.train)].numpy())
 
 
-def _page(
-    capture: Capture, model: HeadModel, track: ExpressionTrack, port: int | None
-) -> AbstractContextManager[LivePage | None]:
+def _page(trainer: HeadTrainer, port: int | None) -> AbstractContextManager[LivePage | None]:
     """The page that shows the training, if there is to be one."""
-    return nullcontext() if port is None else LivePage(WatchedHead(capture, model, track), port)
+    return nullcontext() if port is None else LivePage(WatchedHead(trainer), port)
 
 
 def _inputs(

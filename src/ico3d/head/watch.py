@@ -2,17 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera
 from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
 from ico3d.common.spread import spread
 from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack
 from ico3d.head.model import HeadModel
-from ico3d.head.views import Picture, head_pose, staged
+from ico3d.head.optimise import HeadTrainer
+from ico3d.head.views import View, staged
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 from ico3d.training.watch import Slider
@@ -25,24 +24,27 @@ STILL = 1e-3
 
 
 class WatchedHead:
-    """A `Watchable`: the training frames of a capture, by the first camera that has the frame.
+    """A `Watchable`: the frames a head learns from, each as the first of its pictures shows it.
 
     Sliders are the named inputs that move most in the recording: blendshapes, or the eye values
     of a head driven by speech, whose sound features mean nothing by themselves. All other inputs
     are those of the frame.
     """
 
-    def __init__(self, capture: Capture, model: HeadModel, track: ExpressionTrack):
+    def __init__(self, trainer: HeadTrainer):
         """Looks at the expressions of some frames."""
-        self._capture, self._model, self._track = capture, model, track
-        self._numbers = capture.split.train
-        self.frames = len(self._numbers)
-        self._inputs = _named_inputs(model, track)
+        self._trainer = trainer
+        first: dict[int, View] = {}
+        for view in trainer.views:
+            first.setdefault(view.frame, view)
+        self._views = list(first.values())
+        self.frames = len(self._views)
+        self._inputs = _named_inputs(trainer.model, trainer.track)
         self.sliders: Sequence[Slider] = self._found_sliders()
 
     def camera(self, frame: int) -> Camera:
         """Who recorded a frame, in canonical head space."""
-        return self._view(frame, self._recorded(frame)[0])
+        return self._views[frame].camera
 
     def values(self, frame: int) -> Mapping[str, float]:
         """What the named inputs are in a frame."""
@@ -55,35 +57,21 @@ class WatchedHead:
         expression = self._expression(frame).clone()
         for name, value in values.items():
             expression[self._inputs[name]] = value
-        return self._model(expression)
+        return self._trainer.model(expression)
 
     @torch.no_grad()
     def pictures(self, frame: int) -> tuple[Tensor, Tensor]:
         """(H, W, 3) each, on the CPU: recorded and rendered."""
-        camera, recorded = self._recorded(frame)
-        plate = _tensor(self._capture.background(camera))
-        mask = _tensor(self._capture.mask(camera, self._numbers[frame]))
-        behind, cut = staged(Picture(recorded, mask, None), plate)
-        rendered = render(self.gaussians(frame, {}), [self._view(frame, camera)], behind).rgb[0]
-        return cut, rendered.cpu()
-
-    def _recorded(self, frame: int) -> tuple[int, Tensor]:
-        """The first camera that has a frame, and its picture; black where none has it."""
-        for camera in range(len(self._capture.cameras)):
-            image = self._capture.image(camera, self._numbers[frame])
-            if image is not None:
-                return camera, torch.from_numpy(image)
-        first = self._capture.cameras[0]
-        return 0, torch.zeros(first.height, first.width, 3)
-
-    def _view(self, frame: int, camera: int) -> Camera:
-        pose = head_pose(self._capture, self._numbers[frame])
-        return self._capture.cameras[camera].moved(pose)
+        view, device = self._views[frame], self._trainer.model.device
+        plate = self._trainer.pictures.background(view, device)
+        behind, recorded = staged(self._trainer.pictures.picture(view, device), plate)
+        rendered = render(self.gaussians(frame, {}), [view.camera], behind).rgb[0]
+        return recorded.cpu(), rendered.cpu()
 
     @torch.no_grad()
     def _expression(self, frame: int) -> Tensor:
         """(B,)."""
-        return self._track.at(self._numbers[frame])
+        return self._trainer.track.at(self._views[frame].frame)
 
     def _found_sliders(self) -> list[Slider]:
         """Sliders for the inputs that move in the recording, those that move most first."""
@@ -97,10 +85,6 @@ class WatchedHead:
             Slider(name, round(float(values.min()), 3), round(float(values.max()), 3))
             for name, values in columns.items()
         ]
-
-
-def _tensor(layer: np.ndarray | None) -> Tensor | None:
-    return None if layer is None else torch.from_numpy(layer)
 
 
 def _named_inputs(model: HeadModel, track: ExpressionTrack) -> dict[str, int]:

@@ -19,7 +19,6 @@ from ico3d.chat.wire.codec import (
     decode_client,
     decode_server,
     encode,
-    tensor_of,
 )
 from ico3d.common.typed import field_types, kind_of
 from ico3d.errors import ProtocolError
@@ -31,11 +30,10 @@ def characters(low, high):
 
 def values(annotation):
     """A strategy for all values that an annotation of the protocol allows."""
-    tensor = tensor_of(annotation)
-    if tensor:
-        return arrays(tensor)
     kind = kind_of(annotation)
     bare, marks, origin, arguments = kind.bare, kind.marks, kind.origin, kind.arguments
+    if bare is np.ndarray:
+        return arrays(marks[0])
     if origin is typing.Literal:
         return st.sampled_from(arguments)
     if origin is list:

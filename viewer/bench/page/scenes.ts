@@ -3,8 +3,7 @@ import { dyno, SplatMesh, type PackedSplats } from '@sparkjsdev/spark';
 import * as THREE from 'three';
 import type { BakedWindow } from '../../src/body/window.ts';
 import { readBakedWindow } from '../../src/body/window.ts';
-import { loadFile, loadHead, loadManifest } from '../../src/bundle/load.ts';
-import { parseSafetensors } from '../../src/bundle/safetensors.ts';
+import { BundleFiles, loadManifest } from '../../src/bundle/load.ts';
 import type { HeadFiles } from '../../src/bundle/load.ts';
 import { ExpressionTrack } from '../../src/face/track.ts';
 import { Poses } from '../../src/head/poses.ts';
@@ -82,13 +81,13 @@ function perform(): void {
 async function makeStill(): Promise<SplatMesh> {
   const manifest = await loadManifest();
   const info = manifest.body!.windows[0]!;
-  const file = await loadFile(manifest, info.file);
-  const window = readBakedWindow(parseSafetensors(file, info.file), manifest.body!, info);
-  const files = await loadHead(manifest, manifest.head!, () => {});
+  const files = new BundleFiles(manifest.files);
+  const window = readBakedWindow(await files.tensors(info.file), manifest.body!, info);
+  const head = await files.head(manifest.head!);
   const mesh = new SplatMesh({
     constructSplats: (splats) => {
       addBody(splats, window);
-      addHead(splats, files);
+      addHead(splats, head);
     },
     objectModifier: dyno.dynoBlock({ gsplat: dyno.Gsplat }, { gsplat: dyno.Gsplat }, ({ gsplat }) => ({ gsplat })),
   });

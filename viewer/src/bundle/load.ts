@@ -2,7 +2,7 @@ import { PageError } from '../errors.ts';
 import { checkAnimation, type AnimationInfo } from './animation.ts';
 import { readBakedHead, type BakedHead } from './baked-head.ts';
 import { checkManifest, type BodyInfo, type HeadInfo, type Manifest } from './manifest.ts';
-import { parseSafetensors, takeTensor } from './safetensors.ts';
+import { parseSafetensors, takeTensor, type Tensor } from './safetensors.ts';
 
 /** A head's files, checked and ready for the GPU. */
 export interface HeadFiles {
@@ -12,10 +12,11 @@ export interface HeadFiles {
 }
 
 /** The names that splats behind a person may have. */
-export const BACKGROUNDS = ['background.spz', 'background.ply'];
+const BACKGROUNDS = ['background.spz', 'background.ply'];
 
 const ROOT = 'bundle/';
 const HEAD_FILES = ['head.safetensors', 'head_poses.safetensors'] as const;
+const ANIMATION = 'animation.json';
 
 /** The thumbnail's address. */
 export const THUMBNAIL = `${ROOT}thumbnail.png`;
@@ -26,32 +27,69 @@ export async function loadManifest(): Promise<Manifest> {
   return checkManifest(await response.json().catch(() => null));
 }
 
-/** Fetches and checks a head; `onBytes` is called with the number of bytes that came. */
-export async function loadHead(
-  manifest: Manifest,
-  info: HeadInfo,
-  onBytes: (n: number) => void,
-): Promise<HeadFiles> {
-  const [head, poses] = await Promise.all(HEAD_FILES.map((name) => loadFile(manifest, name, onBytes)));
-  const poseTensors = parseSafetensors(poses!, HEAD_FILES[1]);
-  return {
-    info,
-    baked: readBakedHead(parseSafetensors(head!, HEAD_FILES[0]), info, HEAD_FILES[0]),
-    poses: takeTensor(poseTensors, 'world_from_head', 'F32', [info.num_poses, 4, 4], HEAD_FILES[1]).data as Float32Array,
-  };
-}
-
 /** Bytes that must come before there is somebody to see. */
 export function bytesToFirstSight({ head, body, files }: Manifest): number {
   const behind = BACKGROUNDS.filter((name) => name in files);
-  const names = [...behind, ...(head ? HEAD_FILES : []), ...(body ? [body.windows[0]!.file] : [])];
+  const names = [...behind, ...(head ? HEAD_FILES : []), ...(body ? [body.windows[0]!.file] : []), ...(head && body ? [ANIMATION] : [])];
   return names.reduce((sum, name) => sum + (files[name]?.size ?? 0), 0);
 }
 
-/** Fetches and checks how a whole person moves. */
-export async function loadAnimation(manifest: Manifest, body: BodyInfo): Promise<AnimationInfo> {
-  const text = new TextDecoder().decode(await loadFile(manifest, 'animation.json'));
-  return checkAnimation(parseJson(text), body);
+/** The files of a bundle, fetched when they are asked for; each must be as long as promised, and have the promised hash. */
+export class BundleFiles {
+  private readonly promised: Manifest['files'];
+  private readonly onBytes: (n: number) => void;
+
+  /**
+   * @param promised size and hash of each file
+   * @param onBytes called with the number of bytes that came
+   */
+  constructor(promised: Manifest['files'], onBytes: (n: number) => void = () => {}) {
+    this.promised = promised;
+    this.onBytes = onBytes;
+  }
+
+  /** A head, ready for the GPU. */
+  async head(info: HeadInfo): Promise<HeadFiles> {
+    const [head, poses] = await Promise.all(HEAD_FILES.map((name) => this.tensors(name)));
+    return {
+      info,
+      baked: readBakedHead(head!, info, HEAD_FILES[0]),
+      poses: takeTensor(poses!, 'world_from_head', 'F32', [info.num_poses, 4, 4], HEAD_FILES[1]).data as Float32Array,
+    };
+  }
+
+  /** How a whole person moves. */
+  async animation(body: BodyInfo): Promise<AnimationInfo> {
+    return checkAnimation(parseJson(new TextDecoder().decode(await this.bytes(ANIMATION))), body);
+  }
+
+  /** The splats behind the person, if there are some. */
+  async backdrop(): Promise<{ name: string; bytes: ArrayBuffer } | null> {
+    const name = BACKGROUNDS.find((file) => file in this.promised);
+    return name === undefined ? null : { name, bytes: await this.bytes(name) };
+  }
+
+  /** What a file holds, by name. */
+  async tensors(name: string): Promise<Map<string, Tensor>> {
+    return parseSafetensors(await this.bytes(name), name);
+  }
+
+  private async bytes(name: string): Promise<ArrayBuffer> {
+    const entry = this.promised[name];
+    if (!entry) throw new PageError(`manifest.json does not list ${name}.`);
+    const reader = (await get(name)).body!.getReader();
+    const bytes = new Uint8Array(entry.size);
+    let at = 0;
+    for (let part = await reader.read(); !part.done; part = await reader.read()) {
+      if (at + part.value.length > entry.size) throw new PageError(`${name} is longer than manifest.json says.`);
+      bytes.set(part.value, at);
+      at += part.value.length;
+      this.onBytes(part.value.length);
+    }
+    if (at !== entry.size) throw new PageError(`${name} is shorter than manifest.json says.`);
+    await checkHash(bytes, entry.sha256, name);
+    return bytes.buffer;
+  }
 }
 
 function parseJson(text: string): unknown {
@@ -71,32 +109,6 @@ async function get(name: string): Promise<Response> {
   }
   if (!response.ok) throw new PageError(`The server has no ${name} (status ${response.status}).`);
   return response;
-}
-
-/**
- * Fetches one file of the bundle; its size and hash must be those of the manifest.
- *
- * @param onBytes called with the number of bytes that came
- */
-export async function loadFile(
-  manifest: Manifest,
-  name: string,
-  onBytes: (n: number) => void = () => {},
-): Promise<ArrayBuffer> {
-  const entry = manifest.files[name];
-  if (!entry) throw new PageError(`manifest.json does not list ${name}.`);
-  const reader = (await get(name)).body!.getReader();
-  const bytes = new Uint8Array(entry.size);
-  let at = 0;
-  for (let part = await reader.read(); !part.done; part = await reader.read()) {
-    if (at + part.value.length > entry.size) throw new PageError(`${name} is longer than manifest.json says.`);
-    bytes.set(part.value, at);
-    at += part.value.length;
-    onBytes(part.value.length);
-  }
-  if (at !== entry.size) throw new PageError(`${name} is shorter than manifest.json says.`);
-  await checkHash(bytes, entry.sha256, name);
-  return bytes.buffer;
 }
 
 /** Compares the hash where the browser can compute one (HTTPS and localhost). */

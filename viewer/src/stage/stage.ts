@@ -1,9 +1,11 @@
 import { SparkRenderer } from '@sparkjsdev/spark';
 import * as THREE from 'three';
 import type { Actor } from '../actor.ts';
+import type { HeadFiles } from '../bundle/load.ts';
 import type { Manifest } from '../bundle/manifest.ts';
 import { Orbit } from './orbit.ts';
-import { wholeBody } from './subject.ts';
+import { sitterOf } from './sitter.ts';
+import { person, wholeBody } from './subject.ts';
 
 export const TICK = 1 / 30; // s between changes
 const LEAST_FREE = 0.4; // of the height: what covers more lies over the face
@@ -18,6 +20,7 @@ export class Stage {
   frames = 0; // drawn so far
   private covered = 0; // pixels at the lower edge that controls lie on
   private readonly canvas: HTMLCanvasElement;
+  private readonly manifest: Manifest;
   private readonly actors: Actor[] = [];
   private lastTick = 0; // s, on the grid of ticks
   private lastTime = 0; // s, when it really was
@@ -25,6 +28,7 @@ export class Stage {
 
   constructor(canvas: HTMLCanvasElement, manifest: Manifest) {
     this.canvas = canvas;
+    this.manifest = manifest;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: false, powerPreference: 'high-performance' });
     // Both sRGB: colours of the bundle are display values and are blended as they are.
     this.renderer.setClearColor(new THREE.Color().setRGB(...manifest.background, THREE.SRGBColorSpace));
@@ -39,6 +43,11 @@ export class Stage {
   add(actor: Actor): void {
     this.actors.push(actor);
     this.scene.add(...actor.objects);
+  }
+
+  /** Points the camera at somebody whose head rests at these rows of its poses. */
+  face(head: HeadFiles, resting: readonly number[]): void {
+    this.orbit.face(person(this.manifest, sitterOf(this.manifest, head, resting)));
   }
 
   /** Keeps faces clear of so many pixels at the lower edge. */

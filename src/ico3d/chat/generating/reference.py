@@ -11,9 +11,11 @@ from pathlib import Path
 from string import Template
 from typing import Any, Literal
 
+import numpy as np
+
 from ico3d.chat.serving import connection, limits
 from ico3d.chat.wire import protocol
-from ico3d.chat.wire.codec import is_binary, tensor_of
+from ico3d.chat.wire.codec import tensors_of
 from ico3d.chat.wire.marks import Length, Range
 from ico3d.common.docstrings import about, notes
 from ico3d.common.typed import field_types, kind_of
@@ -60,7 +62,7 @@ def table(messages: tuple[type, ...]) -> str:
 
 def row(message: type) -> str:
     """One message."""
-    name = message.__name__.lower() + ("` (binary)" if is_binary(message) else "`")
+    name = message.__name__.lower() + ("` (binary)" if tensors_of(message) else "`")
     told = about(message).replace(" (binary)", "")
     return f"| `{name} | {cell(told)} | {cell('<br>'.join(fields(message)))} |"
 
@@ -80,10 +82,10 @@ def fields(kind: type) -> list[str]:
 
 def described(annotation: Any) -> str:
     """An annotation for people, with its limits."""
-    tensor = tensor_of(annotation)
-    if tensor:
-        return f"{tensor.dims}-dimensional, at most {tensor.max_size:,} elements"
     kind = kind_of(annotation)
+    if kind.bare is np.ndarray:
+        tensor = kind.marks[0]
+        return f"{tensor.dims}-dimensional, at most {tensor.max_size:,} elements"
     bare, origin, arguments = kind.bare, kind.origin, kind.arguments
     if origin in (types.UnionType, typing.Union):
         return f"{described(arguments[0])}, or null"

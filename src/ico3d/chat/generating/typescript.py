@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ico3d.chat.wire import protocol
-from ico3d.chat.wire.codec import is_binary, tensor_of
+from ico3d.chat.wire.codec import tensors_of
 from ico3d.common.docstrings import about, notes
 from ico3d.common.typed import field_types, kind_of
 
@@ -164,10 +164,9 @@ def exported(kind: type) -> str:
 
 def translated(annotation: Any) -> str:
     """A Python annotation as a TypeScript type."""
-    tensor = tensor_of(annotation)
-    if tensor:
-        return "Int16Array" if tensor.dims == 1 else "Matrix"
     kind = kind_of(annotation)
+    if kind.bare is np.ndarray:
+        return "Int16Array" if kind.marks[0].dims == 1 else "Matrix"
     bare, origin, arguments = kind.bare, kind.origin, kind.arguments
     if origin in (types.UnionType, typing.Union):
         return f"{translated(arguments[0])} | null"
@@ -198,8 +197,8 @@ def server_types() -> str:
 def tensors(messages: list[type]) -> str:
     """The arrays in each binary message's payload, in order."""
     lines = ["const TENSORS: Record<string, readonly Tensor[]> = {"]
-    for kind in filter(is_binary, messages):
-        marks = {name: tensor_of(note) for name, note in field_types(kind).items()}
-        pairs = [f'["{n}", "{np.dtype(mark.dtype).name}"]' for n, mark in marks.items() if mark]
+    for kind in filter(tensors_of, messages):
+        marks = tensors_of(kind)
+        pairs = [f'["{n}", "{np.dtype(mark.dtype).name}"]' for n, mark in marks.items()]
         lines.append(f"  {kind.__name__.lower()}: [{', '.join(pairs)}],")
     return "\n".join([*lines, "};", ""])

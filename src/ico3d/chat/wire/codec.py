@@ -13,7 +13,16 @@ import numpy as np
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.marks import Length, Range, Tensor
 from ico3d.chat.wire.protocol import ClientMessage, ServerMessage
-from ico3d.common.typed import Kind, Rules, field_types, fill_fields, parsed, plain, refuse_constant
+from ico3d.common.typed import (
+    Kind,
+    Rules,
+    field_types,
+    fill_fields,
+    kind_of,
+    parsed,
+    plain,
+    refuse_constant,
+)
 from ico3d.errors import ProtocolError
 
 HEADER_LENGTH = struct.Struct("<I")
@@ -32,24 +41,19 @@ def encode(message: ClientMessage | ServerMessage) -> str | bytes:
     Raises:
         ProtocolError: If a field breaks its own limits or the frame is too long.
     """
-    name_of_type = type(message).__name__.lower()
-    header: dict[str, Any] = {}
-    payload = []
-    for name, annotation in field_types(type(message)).items():
-        value = getattr(message, name)
-        tensor = tensor_of(annotation)
-        if tensor:
-            value = np.ascontiguousarray(value, tensor.dtype)
-            payload.append(value.tobytes())
-            header[name] = list(value.shape)
-        else:
-            header[name] = plain(value)
-    fill_fields(type(message), header, name_of_type, RULES)
-    header = {"type": name_of_type, **header}
+    kind = type(message)
+    name = kind.__name__.lower()
+    tensors = tensors_of(kind)
+    arrays = {n: np.ascontiguousarray(getattr(message, n), t.dtype) for n, t in tensors.items()}
+    header = plain(message)
+    header.update({n: list(array.shape) for n, array in arrays.items()})
+    fill_fields(kind, header, name, RULES)
+    header = {"type": name, **header}
     text = json.dumps(header, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    if not is_binary(type(message)):
+    if not arrays:
         check_size(text.encode(), protocol.MAX_TEXT_FRAME)
         return text
+    payload = [array.tobytes() for array in arrays.values()]
     frame = b"".join([HEADER_LENGTH.pack(len(text.encode())), text.encode(), *payload])
     check_size(frame, protocol.MAX_BINARY_FRAME)
     return frame
@@ -85,12 +89,14 @@ def decode(frame: str | bytes, known: tuple[type, ...]) -> Any:
     message_type = by_name.get(name) if isinstance(name, str) else None
     if message_type is None:
         raise ProtocolError(f"unknown message type {short(name)}.")
-    if is_binary(message_type) != (payload is not None):
-        kind = "binary" if is_binary(message_type) else "text"
+    tensors = tensors_of(message_type)
+    if bool(tensors) != (payload is not None):
+        kind = "binary" if tensors else "text"
         raise ProtocolError(f"{name}: this message travels in a {kind} frame.")
-    values = fill_fields(message_type, header, typing.cast(str, name), RULES)
+    name = typing.cast(str, name)
+    values = fill_fields(message_type, header, name, RULES)
     if payload is not None:
-        values.update(read_tensors(message_type, header, payload))
+        values.update(read_tensors(tensors, header, payload, name))
     return message_type(**values)
 
 
@@ -130,33 +136,28 @@ def check_size(frame: bytes, limit: int) -> None:
         raise OversizedError(f"a frame of {len(frame)} bytes is over the limit of {limit}.")
 
 
-def read_tensors(message: type, header: dict[str, Any], payload: bytes) -> dict[str, np.ndarray]:
-    """Cuts the payload into the arrays whose shapes the header gives."""
+def read_tensors(
+    tensors: dict[str, Tensor], header: dict[str, Any], payload: bytes, where: str
+) -> dict[str, np.ndarray]:
+    """Cuts the payload of a message into the arrays whose shapes the header gives."""
     arrays, at = {}, 0
-    for name, annotation in field_types(message).items():
-        tensor = tensor_of(annotation)
-        if tensor:
-            shape, dtype = header[name], np.dtype(tensor.dtype)
-            size = math.prod(shape) * dtype.itemsize
-            if at + size > len(payload):
-                raise ProtocolError(f"{message.__name__.lower()}.{name}: the payload is too short.")
-            arrays[name] = np.frombuffer(payload[at : at + size], dtype).reshape(shape)
-            at += size
+    for name, tensor in tensors.items():
+        shape, dtype = header[name], np.dtype(tensor.dtype)
+        size = math.prod(shape) * dtype.itemsize
+        if at + size > len(payload):
+            raise ProtocolError(f"{where}.{name}: the payload is too short.")
+        arrays[name] = np.frombuffer(payload[at : at + size], dtype).reshape(shape)
+        at += size
     if at != len(payload):
-        raise ProtocolError(f"{message.__name__.lower()}: the payload is too long.")
+        raise ProtocolError(f"{where}: the payload is too long.")
     return arrays
 
 
-def tensor_of(annotation: Any) -> Tensor | None:
-    """The `Tensor` mark of an annotation, if it has one."""
-    marks = getattr(annotation, "__metadata__", ())
-    return next((mark for mark in marks if isinstance(mark, Tensor)), None)
-
-
 @cache
-def is_binary(message: type) -> bool:
-    """Whether a message carries arrays."""
-    return any(tensor_of(annotation) for annotation in field_types(message).values())
+def tensors_of(message: type) -> dict[str, Tensor]:
+    """The marks of the fields that are arrays; none for messages that travel as text."""
+    kinds = {name: kind_of(note) for name, note in field_types(message).items()}
+    return {name: kind.marks[0] for name, kind in kinds.items() if kind.bare is np.ndarray}
 
 
 class WireRules(Rules):
