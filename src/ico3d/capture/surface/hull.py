@@ -87,10 +87,8 @@ def visual_hull(silhouettes: Sequence[Silhouette], edge: float) -> Hull | None:
     origin = center - (cells - 1) / 2 * edge
     ignored = _bad(silhouettes, origin, edge, cells)
     stack = _Stack.of([s for index, s in enumerate(silhouettes) if index not in ignored])
-    occupied = _connected(
-        _carve(origin, edge, cells, 0, *stack.arrays) == 0,
-        _carve(origin, edge, cells, 0, *stack.arrays[:3], stack.surely) == 0,
-    )  # (cells, cells, cells)
+    carved = _carve(origin, edge, cells, 0, *stack.arrays) == 0  # (cells, cells, cells)
+    occupied = _connected(carved, _surely(carved, origin, edge, stack))
     return Hull(_surface(occupied, origin, edge, stack), ignored)
 
 
@@ -217,6 +215,14 @@ class _Filling:
         filled[row, column] = True
         near = binary_dilation(filled, np.ones((3, 3)))[1:-1, 1:-1]
         return float((near & self._mask).sum() / max(self._mask.sum(), 1))
+
+
+def _surely(occupied: np.ndarray, origin: np.ndarray, edge: float, stack: _Stack) -> np.ndarray:
+    """Those of the occupied voxels (n, n, n) bool that most pictures hold, (n, n, n) bool."""
+    centers = origin + np.argwhere(occupied) * edge  # (V, 3)
+    sure = np.zeros_like(occupied)
+    sure[occupied] = _within(centers, *stack.arrays[:3], stack.surely)
+    return sure
 
 
 def _connected(occupied: np.ndarray, sure: np.ndarray) -> np.ndarray:
