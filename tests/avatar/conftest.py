@@ -13,20 +13,17 @@ from ico3d.bundle.format import Bundle
 from ico3d.head.model_folder import TrainedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
-from support.avatars.planted import PlantedCapture, planted_eyes, planted_model
-
-
-def _blendshape_head(folder: Path) -> tuple[TrainedHead, PlantedCapture]:
-    capture = PlantedCapture(folder)
-    capture.blendshape_names = tuple(f"shape{i}" for i in range(10))
-    names = capture.blendshape_names
-    capture.head = TrainedHead(planted_model(10), "blendshapes", names, "", "", None, {})
-    return capture.head, capture
+from support.avatars.planted import (
+    PlantedCapture,
+    planted_blendshape_head,
+    planted_eyes,
+    planted_model,
+)
 
 
 @pytest.fixture
 def blendshape_head(tmp_path) -> tuple[TrainedHead, PlantedCapture]:
-    return _blendshape_head(tmp_path / "planted")
+    return planted_blendshape_head(tmp_path / "planted")
 
 
 def _speech_head(folder: Path) -> tuple[TrainedHead, PlantedCapture]:
@@ -43,7 +40,7 @@ def _speech_head(folder: Path) -> tuple[TrainedHead, PlantedCapture]:
 def baked(request, tmp_path_factory):
     """Head, capture and the opened bundle of both kinds."""
     folder = tmp_path_factory.mktemp("planted")
-    make = _speech_head if request.param == "speech" else _blendshape_head
+    make = _speech_head if request.param == "speech" else planted_blendshape_head
     head, capture = make(folder)
     views = head_cost.references(head, capture, (0.5, 0.5, 0.5), 6)
     quick = BakeSettings(hidden=64, augmented=100, steps=300)

@@ -38,6 +38,7 @@ def _await(process, condition: Callable[[], bool]) -> None:
     while not condition():
         assert process.is_alive(), f"training ended by itself: {process.exitcode}"
         assert time.monotonic() < deadline, "training stands still"
+        time.sleep(0.001)  # shorter than a checkpoint takes to be written
 
 
 def test_killed_five_times_it_gives_the_same_head_bit_for_bit(processes, tmp_path):

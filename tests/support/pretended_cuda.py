@@ -34,6 +34,9 @@ GIVEN_TO_ANY = {
 JOINING = {torch.cat, torch.stack, torch.concat, torch.hstack, torch.vstack}
 """What takes not even a single number of another device."""
 TO_NUMPY = {Tensor.numpy, Tensor.__array__}
+MOVING = {Tensor.to, Tensor.cuda}
+DEVICE, IS_CUDA, IS_CPU = Tensor.device.__get__, Tensor.is_cuda.__get__, Tensor.is_cpu.__get__
+SET_DATA = Tensor.data.__set__
 _NEW_PARAMETER = nn.Parameter.__new__
 INDEXING = {Tensor.__getitem__, Tensor.__setitem__}
 
@@ -70,24 +73,26 @@ class PretendedCuda(TorchFunctionMode):
         kwargs = dict(kwargs or {})
         given = _tensors((args, kwargs))
         moved = any(map(is_moved, given))
-        if func == Tensor.device.__get__:
-            return CUDA if moved else func(*args)
-        if func == Tensor.is_cuda.__get__:
+        if not moved and func not in MOVING and kwargs.get("device") is None:
+            return func(*args, **kwargs)  # nothing that pretends, and nothing that could
+        if func == DEVICE:
+            return CUDA
+        if func == IS_CUDA:
             return moved
-        if func == Tensor.is_cpu.__get__:
+        if func == IS_CPU:
             return not moved
         if func in TO_NUMPY and moved:
             raise TypeError("can't convert cuda:0 device type tensor to numpy. Use Tensor.cpu().")
         if func == Tensor.cpu:
             return _mark(args[0].clone() if moved else args[0], False)
-        if func in (Tensor.to, Tensor.cuda):
+        if func in MOVING:
             return _moving(func, args, kwargs)
         if func == Tensor.__deepcopy__:
             moved = is_moved(args[0])
         target = _target(kwargs, moved)
         _check(func, args, kwargs, given, target)
         result = func(*args, **kwargs)
-        if func == Tensor.data.__set__:
+        if func == SET_DATA:
             _mark(args[0], is_moved(args[1]))
         return _marked_new(result, given, target)
 

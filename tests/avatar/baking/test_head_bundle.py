@@ -11,7 +11,7 @@ from ico3d.avatar.render_bundle import render_bundle
 from ico3d.bundle.evaluate import logits
 from ico3d.bundle.manifest import Loss
 from ico3d.errors import BundleError
-from support.avatars.planted import driving
+from support.avatars.planted import driving, planted_blendshape_head
 from support.bundles.random_bundle import random_head
 
 pytestmark = pytest.mark.slow
@@ -29,19 +29,25 @@ def baker(head, capture, rank=16):
     return HeadBaker(head.model, recorded, np.ones((len(head.model), 4), np.float32), rank, QUICK)
 
 
-def test_baked_logits_are_the_exact_ones(blendshape_head):
-    head, capture = blendshape_head
-    baked = baker(head, capture).baked(16)
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    """A head that is driven by blendshapes, its capture, and its baker."""
+    head, capture = planted_blendshape_head(tmp_path_factory.mktemp("fitted"))
+    return head, capture, baker(head, capture)
+
+
+def test_baked_logits_are_the_exact_ones(fitted):
+    head, capture, maker = fitted
+    baked = maker.baked(16)
     for e in expressions(head, capture, capture.split.test):
         exact = head.model.logits(torch.from_numpy(e)).detach().clamp(-CLIP, CLIP).numpy()
         error = logits(baked, e) - exact
         assert np.sqrt(np.square(error).mean()) < 0.1 * exact.std()
 
 
-def test_a_higher_rank_is_better_and_larger(blendshape_head):
-    head, capture = blendshape_head
+def test_a_higher_rank_is_better_and_larger(fitted):
+    head, capture, maker = fitted
     views = head_cost.references(head, capture, (0.5, 0.5, 0.5), 6)
-    maker = baker(head, capture)
     losses = [head_cost.measure(maker.baked(rank), views) for rank in (1, 4, 16)]
     likeness = [loss.psnr_baked_vs_exact or 0.0 for loss in losses]
     assert likeness[0] + 2 < likeness[1] < likeness[2]
@@ -56,20 +62,19 @@ def test_gaussians_that_are_never_drawn_are_dropped(blendshape_head):
         baker(head, capture)
 
 
-def test_one_seed_gives_one_bundle(blendshape_head):
-    head, capture = blendshape_head
-    first, second = (baker(head, capture).baked(8).to_bytes() for _ in "ab")
+def test_one_seed_gives_one_bundle(fitted, blendshape_head):
+    first, second = (maker.baked(8).to_bytes() for maker in (fitted[2], baker(*blendshape_head)))
     assert first == second
 
 
-def test_measured_pictures_are_the_noise_apart(blendshape_head):
+def test_measured_pictures_are_the_noise_apart(fitted):
     """The exact model made the pictures, so its PSNR is that of the noise: −20·log10 σ."""
-    head, capture = blendshape_head
+    head, capture, maker = fitted
     views = head_cost.references(head, capture, (0.5, 0.5, 0.5), 6)
-    loss = head_cost.measure(baker(head, capture).baked(16), views)
+    loss = head_cost.measure(maker.baked(16), views)
     assert loss.psnr_exact == pytest.approx(-20 * np.log10(0.03), abs=0.3)
     assert loss.psnr_baked == pytest.approx(loss.psnr_exact, abs=0.3)
-    assert head_cost.strip(baker(head, capture).baked(2), views, 2).shape == (96, 144, 3)
+    assert head_cost.strip(maker.baked(2), views, 2).shape == (96, 144, 3)
 
 
 @pytest.mark.parametrize(

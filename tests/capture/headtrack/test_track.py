@@ -14,6 +14,7 @@ from ico3d.capture.formats import open_capture
 from ico3d.capture.headpose.track_file import NAME, read_track
 from ico3d.capture.importing.resizing import resize_capture
 from ico3d.cli import main
+from ico3d.studio import studio
 from ico3d.studio.picture import paint
 from ico3d.studio.recording import Recording, record
 from support.needs import needs
@@ -30,7 +31,9 @@ def model():
         pytest.skip("face_landmarker.task is not here: set ICO3D_MODELS")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ICO3D_MODELS", str(MODELS))
-        patch.setattr(paint, "DIRECTIONS", 6)  # light from few directions: drawn sooner
+        # Light from few directions, and one sample to a pixel: drawn sooner, and harder to track.
+        patch.setattr(paint, "DIRECTIONS", 6)
+        patch.setattr(studio, "SUPERSAMPLING", 1)
         yield
 
 
@@ -115,7 +118,7 @@ def test_small_faces_in_pictures_of_a_whole_person_are_found(tmp_path):
     [(3, "no frame shows a face to two cameras at least"), (1, "has one camera")],
 )
 def test_what_cannot_be_tracked_is_one_sentence(tmp_path, capsys, cameras, message):
-    folder = multiview_folders.write_folder(tmp_path / "noise", cameras)
+    folder = multiview_folders.write_folder(tmp_path / "noise", cameras, frames=1)
     assert main(["capture", "track", str(folder)]) == 1
     error = capsys.readouterr().err
     assert message in error and error.strip().count("\n") <= 1

@@ -28,11 +28,14 @@ class FilmedPerson(Capture):
             for i, eye in enumerate(eyes)
         )
         self.split = all_frames(self.num_frames, self.cameras)
+        self._taken = {}
 
     def _drawn(self, camera, frame):
-        behind = torch.from_numpy(self.background(camera))
-        gaussians = self.person.gaussians(frame / self.fps)
-        return photograph(gaussians, self.cameras[camera], behind)
+        if (camera, frame) not in self._taken:
+            behind = torch.from_numpy(self.background(camera))
+            gaussians = self.person.gaussians(frame / self.fps)
+            self._taken[camera, frame] = photograph(gaussians, self.cameras[camera], behind)
+        return self._taken[camera, frame]
 
     def image(self, camera, frame):
         picture, _ = self._drawn(camera, frame)

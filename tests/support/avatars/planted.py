@@ -1,5 +1,6 @@
 """A planted capture: its pictures are those of a known head model, with some noise."""
 
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -60,12 +61,16 @@ class PlantedCapture(Capture):
         wave = np.sin(2 * np.pi * (200 + 100 * np.sin(2 * times)) * times)
         return Sound((0.3 * wave * np.sin(3 * times) ** 2).astype(np.float32), 16000)
 
+    @cached_property
+    def _track(self):
+        """What moved the face of the head that was recorded."""
+        return self.head.track(self)
+
     def image(self, camera, frame):
         if frame % 2 != camera:
             return None
-        assert self.head is not None
         with torch.no_grad():
-            gaussians = self.head.model(self.head.track(self).at(frame)).detach()
+            gaussians = self.head.model(self._track.at(frame)).detach()
         view = self.cameras[camera].moved(self.world_from_head(frame))
         behind = torch.from_numpy(self.background(camera))
         picture, _ = photograph(gaussians, view, behind)
@@ -97,6 +102,14 @@ def planted_model(size: int) -> HeadModel:
     model.opacity_branch.bias.data.fill_(2.0)
     model.log_scales.data[-10:].fill_(np.log(1e-5))
     return model
+
+
+def planted_blendshape_head(folder: Path) -> tuple[TrainedHead, PlantedCapture]:
+    """A head that is driven by blendshapes, and its capture."""
+    capture = PlantedCapture(folder)
+    names = capture.blendshape_names = tuple(f"shape{i}" for i in range(10))
+    capture.head = TrainedHead(planted_model(10), "blendshapes", names, "", "", None, {})
+    return capture.head, capture
 
 
 def planted_eyes(capture: PlantedCapture) -> EyeRange:

@@ -116,16 +116,23 @@ def write_recording(
             made.attrs.update(num_device=len(numbers), num_frame=rig.frames, resolution=size)
             for camera in numbers:
                 data = encoded(picture(camera, 0, rig.size(camera)), "JPEG")
+                pictures = made.create_group(f"{camera}/color")
                 for frame in range(rig.frames):
                     if frame and not same_picture:
                         data = encoded(picture(camera, frame, rig.size(camera)), "JPEG")
-                    made.create_dataset(f"{camera}/color/{frame}", data=data)
+                    write_bytes(pictures, frame, data)
     with h5py.File(folder / f"{name}_annots.smc", "w") as file:
         for camera in rig.cameras:
             write_calibration(file.create_group(f"Camera_Parameter/{camera:02d}"), rig, camera)
         if rig.annotated:
             write_annotations(file, rig)
     return main
+
+
+def write_bytes(group: h5py.Group, number: int, data: np.ndarray) -> None:
+    """Writes 1-D uint8 as a data set of that number; `create_dataset` takes four times as long."""
+    space, kind = h5py.h5s.create_simple(data.shape), h5py.h5t.NATIVE_UINT8
+    h5py.h5d.create(group.id, str(number).encode(), kind, space).write(space, space, data)
 
 
 def groups(rig: Rig) -> dict[str, list[int]]:

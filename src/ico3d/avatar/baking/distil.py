@@ -1,6 +1,7 @@
 """The small network from expression to coefficients, fitted to what the exact model does."""
 
 import contextlib
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -9,8 +10,10 @@ import torch
 from torch import Tensor
 
 from ico3d.bundle.evaluate import LEAKY_SLOPE
+from ico3d.training.optimiser import Optimiser
 
-_BATCH = 512
+_BATCH, _RATE = 512, 1e-2
+_NAMES = ("w1", "b1", "w2", "b2")
 
 
 @dataclass(frozen=True)
@@ -104,16 +107,15 @@ def _descend(
     )
     for weight in weights:
         weight.requires_grad_(True)
-    optimiser = torch.optim.Adam(weights, lr=1e-2)
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
+    optimiser = Optimiser()  # torch's takes seconds to import what compiles
     w1, b1, w2, b2 = weights
-    for _ in range(steps):
-        optimiser.zero_grad()
+    for step in range(steps):
         batch = torch.randint(len(inputs), (_BATCH,), generator=generator)
         error = _hidden(inputs[batch], w1, b1) @ w2 + b2 - targets[batch]  # (batch, K)
-        error.square().sum(dim=1).mean().backward()
-        optimiser.step()
-        schedule.step()
+        gradients = torch.autograd.grad(error.square().sum(dim=1).mean(), weights)
+        rate = _RATE * 0.5 * (1 + math.cos(math.pi * step / steps))
+        for name, weight, gradient in zip(_NAMES, weights, gradients, strict=True):
+            optimiser.update(name, weight, gradient, rate)
     return w1.detach(), b1.detach(), w2.detach(), b2.detach()
 
 

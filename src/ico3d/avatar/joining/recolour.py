@@ -21,6 +21,7 @@ from ico3d.common.spread import spread
 from ico3d.head.model import HeadModel
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
+from ico3d.training.optimiser import Optimiser
 
 CERTAIN = 0.5
 """Part of a pixel that the head and the person must fill, to count."""
@@ -69,18 +70,19 @@ def recolour(
     layer = _Relit(model.color_branch)
     views = [view.to(model.device) for view in views]
     roughness = _roughness(model, [frozen.at(frame)[0] for frame in _some(views)])
-    optimiser = torch.optim.Adam(layer.parameters(), settings.rate)
-    decay = torch.optim.lr_scheduler.ExponentialLR(optimiser, 0.1 ** (1 / settings.steps))
+    optimiser, learnt = Optimiser(), dict(layer.named_parameters())
     rng = np.random.default_rng(settings.seed)
     order = np.concatenate(
         [rng.permutation(len(views)) for _ in range(-(-settings.steps // len(views)))]
     )
-    for index in track(order[: settings.steps], "matching colours", transient=True):
-        optimiser.zero_grad()
+    shown = track(order[: settings.steps], "matching colours", transient=True)
+    for step, index in enumerate(shown):
         penalty = ROUGHNESS * (layer.local @ roughness * layer.local).sum()
-        (_difference(layer, frozen, views[index]) + penalty).backward()
-        optimiser.step()
-        decay.step()
+        loss = _difference(layer, frozen, views[index]) + penalty
+        rate = settings.rate * 0.1 ** (step / settings.steps)
+        gradients = torch.autograd.grad(loss, list(learnt.values()))
+        for (name, value), gradient in zip(learnt.items(), gradients, strict=True):
+            optimiser.update(name, value, gradient, rate)
     layer.write(model.color_branch)
 
 

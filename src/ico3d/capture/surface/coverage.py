@@ -82,7 +82,9 @@ def visible(points: np.ndarray, camera: Camera, gap: float) -> np.ndarray:
     pixels, depths = camera.project(points)  # (P, 2), (P,)
     cell = gap * camera.intrinsics[0, 0] / max(float(np.median(depths)), gap)
     inside = (depths > 0) & np.isfinite(pixels).all(1)
-    _, cells = np.unique(np.floor(pixels[inside] / cell), axis=0, return_inverse=True)
+    column, row = np.floor(pixels[inside] / cell).T
+    # Pairs of numbers as complex ones: those are sorted far faster than rows of an array.
+    _, cells = np.unique(column + 1j * row, return_inverse=True)
     nearest = np.full(cells.max(initial=-1) + 1, np.inf)
     np.minimum.at(nearest, cells, depths[inside])
     found = np.zeros(len(points), bool)

@@ -87,10 +87,8 @@ def visual_hull(silhouettes: Sequence[Silhouette], edge: float) -> Hull | None:
     origin = center - (cells - 1) / 2 * edge
     ignored = _bad(silhouettes, origin, edge, cells)
     stack = _Stack.of([s for index, s in enumerate(silhouettes) if index not in ignored])
-    occupied = _connected(
-        _carve(origin, edge, cells, 0, *stack.arrays) == 0,
-        _carve(origin, edge, cells, 0, *stack.arrays[:3], stack.surely) == 0,
-    )  # (cells, cells, cells)
+    carved = _carve(origin, edge, cells, 0, *stack.arrays) == 0  # (cells, cells, cells)
+    occupied = _connected(carved, _surely(carved, origin, edge, stack))
     return Hull(_surface(occupied, origin, edge, stack), ignored)
 
 
@@ -219,6 +217,14 @@ class _Filling:
         return float((near & self._mask).sum() / max(self._mask.sum(), 1))
 
 
+def _surely(occupied: np.ndarray, origin: np.ndarray, edge: float, stack: _Stack) -> np.ndarray:
+    """Those of the occupied voxels (n, n, n) bool that most pictures hold, (n, n, n) bool."""
+    centers = origin + np.argwhere(occupied) * edge  # (V, 3)
+    sure = np.zeros_like(occupied)
+    sure[occupied] = _within(centers, *stack.arrays[:3], stack.surely)
+    return sure
+
+
 def _connected(occupied: np.ndarray, sure: np.ndarray) -> np.ndarray:
     """The parts of occupied voxels (n, n, n) bool that hold a sure one."""
     parts, _ = label(occupied)  # type: ignore (its stub knows two kinds of answers)
@@ -243,17 +249,19 @@ def _surface(occupied: np.ndarray, origin: np.ndarray, edge: float, stack: _Stac
 
 
 @njit(cache=True, nogil=True)
-def _look(x, y, z, projection, mask, height, width):
+def _look(x, y, z, c, projections, masks, sizes):
     """What a picture says of a point: 1 person, 0 background, -1 nothing."""
-    depth = projection[2, 0] * x + projection[2, 1] * y + projection[2, 2] * z + projection[2, 3]
+    # Elements of the whole arrays: a view of one picture's part takes longer than the rest.
+    p = projections
+    depth = p[c, 2, 0] * x + p[c, 2, 1] * y + p[c, 2, 2] * z + p[c, 2, 3]
     if depth <= 0.0:
         return -1
-    column = projection[0, 0] * x + projection[0, 1] * y + projection[0, 2] * z + projection[0, 3]
-    row = projection[1, 0] * x + projection[1, 1] * y + projection[1, 2] * z + projection[1, 3]
+    column = p[c, 0, 0] * x + p[c, 0, 1] * y + p[c, 0, 2] * z + p[c, 0, 3]
+    row = p[c, 1, 0] * x + p[c, 1, 1] * y + p[c, 1, 2] * z + p[c, 1, 3]
     column, row = column / depth, row / depth
-    if not (0.0 <= column < width and 0.0 <= row < height):
+    if not (0.0 <= column < sizes[c, 1] and 0.0 <= row < sizes[c, 0]):
         return -1
-    return 1 if mask[int(row), int(column)] else 0
+    return 1 if masks[c, int(row), int(column)] else 0
 
 
 @njit(cache=True, nogil=True)
@@ -261,7 +269,7 @@ def _misses(x, y, z, allowed, projections, masks, sizes, held):
     """Masks that exclude a point; more than allowed also where too few pictures hold it."""
     count, missed = 0, 0
     for c in range(len(projections)):
-        said = _look(x, y, z, projections[c], masks[c], sizes[c, 0], sizes[c, 1])
+        said = _look(x, y, z, c, projections, masks, sizes)
         count += said >= 0
         missed += said == 0
         if missed > allowed:
@@ -298,5 +306,5 @@ def _seen(points, projections, masks, sizes):
     for c in range(len(projections)):
         for p in range(len(points)):
             x, y, z = points[p]
-            said[c, p] = _look(x, y, z, projections[c], masks[c], sizes[c, 0], sizes[c, 1])
+            said[c, p] = _look(x, y, z, c, projections, masks, sizes)
     return said
