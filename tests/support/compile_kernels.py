@@ -1,15 +1,18 @@
-"""Compiles the kernels of training once, before processes share the tests.
+"""Compiles the kernels of training and the tests once, before processes share the tests.
 
 A process that has just compiled a kernel may round otherwise than those that find it compiled, and
 processes that compile the same kernel at once leave either's. Trainings that must give the same
-files therefore start when all kernels lie in numba's cache.
+files therefore start when all kernels lie in numba's cache. Tests and what they import are compiled
+beside them, for each of those processes would do so otherwise.
 """
 
+import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 import numba
+import pytest
 import torch
 
 from ico3d.body.training.train_clip import train_window
@@ -21,6 +24,13 @@ from support.heads.train_tiny import SETTINGS
 
 
 def main() -> None:
+    """Leaves Python's and numba's caches filled."""
+    compile_kernels()
+    if not sys.dont_write_bytecode:
+        pytest.main(["--collect-only"])  # its assertions are not Python's
+
+
+def compile_kernels() -> None:
     """Trains a head and the windows of a body, as briefly as touches every kernel."""
     numba.set_num_threads(1)
     torch.set_num_threads(1)

@@ -1,7 +1,7 @@
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, beforeEach, describe, expect, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
-import { refreshed } from '../support/browser/drawing.ts';
+import { drawSeldom, refreshed } from '../support/browser/drawing.ts';
 import { feed, noise } from '../support/sound/feeder.ts';
 import { atRest, excess, headAt, makePerson, readSteps, settle, watchSteps } from '../support/references/person.ts';
 import { finished, openPage, SHORTER, until } from '../support/browser/talk.ts';
@@ -120,9 +120,11 @@ describe('a whole person', () => {
     await page.setViewportSize({ width: 195, height: 422 });
     await page.waitForFunction(() => window.ico3d!.stage.renderer.domElement.height === 422);
     await refreshed(page);
+    await drawSeldom(page); // the camera tells where the visitor looks from
     const eyes = await page.evaluate(async () => {
       const { stage, head } = window.ico3d!;
       await stage.still();
+      window.draw!();
       return (1 - head!.generator.position.clone().project(stage.orbit.camera).y) / 2;
     });
     expect(eyes).toBeGreaterThan(0.2);

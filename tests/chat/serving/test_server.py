@@ -280,7 +280,7 @@ def test_a_server_needs_no_torch(bundle_path):
         "import sys; from ico3d.chat.serving import server; from ico3d.bundle.format import Bundle;"
         "from ico3d.chat.settings.conversation import ChatSettings;"
         f"server.open_avatar(Bundle.open({str(bundle_path)!r}), ChatSettings());"
-        "assert not {'torch', 'numba', 'scipy', 'transformers'} & set(sys.modules)"
+        "assert not {'torch', 'numba', 'scipy', 'transformers', 'openai'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
 

@@ -13,6 +13,7 @@ const FLAGS = [
   '--disable-sync',
   '--use-angle=swiftshader',
   '--enable-unsafe-swiftshader',
+  '--disable-gpu-compositing', // only WebGL is drawn by the software GPU, which is slow at putting a page together
   '--autoplay-policy=no-user-gesture-required',
 ];
 /** What the fake microphone plays, once, each time that it is opened. */

@@ -11,7 +11,7 @@ const PERSONA = join(REPOSITORY, 'viewer/support/references/persona.json');
 export const hasClip = existsSync(CLIP);
 
 const SHORT =
-  '--steps 150 --initial.gaussians 2500 --density.max-gaussians 3000 --density.begin 50 --density.until 100';
+  '--steps 150 --initial.gaussians 1000 --density.max-gaussians 1200 --density.begin 50 --density.until 100';
 
 /** From a video of a person to an avatar that can be talked with: track, train, bake. */
 export function makePortrait(folder: string): string {

@@ -13,7 +13,7 @@ from fastapi import FastAPI, Request
 from fastapi.responses import JSONResponse, StreamingResponse
 from pipecat.frames.frames import TTSAudioRawFrame
 
-from ico3d.chat.services.voice import openai
+from ico3d.chat.services.voice import openai, openai_service
 from ico3d.chat.serving import server
 from ico3d.chat.wire.protocol import SPEECH_RATE
 from ico3d.errors import SettingsError
@@ -243,7 +243,7 @@ async def test_a_header_that_claims_what_is_no_speech_is_an_error(
 
 
 async def test_a_voice_that_does_not_end_is_ended(speech, say, monkeypatch):
-    monkeypatch.setattr(openai, "REQUEST", 2.0, raising=False)
+    monkeypatch.setattr(openai_service, "REQUEST", 2.0)
 
     async def respond():
         data = bytes(10 * 2 * SPEECH_RATE)  # more than it takes
