@@ -3,6 +3,8 @@ VENV := .venv
 PY := $(VENV)/bin/python
 export PATH := $(CURDIR)/$(VENV)/bin:$(PATH)
 export ICO3D_PYTHON := $(CURDIR)/$(PY)
+# importing takes three times as long where every process compiles what it imports
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test quick quick-unit install viewer lint page unit e2e e2e-beside e2e-alone bench clean
 

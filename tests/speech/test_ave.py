@@ -134,14 +134,15 @@ def users(tmp_path_factory):
     return home, numbers, SpeechAdaptor(512)
 
 
-@pytest.fixture
-def at_home(users, monkeypatch):
-    monkeypatch.setenv("ICO3D_MODELS", str(users[0]))
-    monkeypatch.setenv("HOME", str(users[0]))
-    return users
+@pytest.fixture(scope="module")
+def at_home(users):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ICO3D_MODELS", str(users[0]))
+        patch.setenv("HOME", str(users[0]))
+        yield users
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def served(at_home):
     """The model as a server opens it, and its graph and encoder."""
     _, _, adaptor = at_home

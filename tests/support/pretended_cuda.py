@@ -24,21 +24,20 @@ from ico3d.splat.density import relocated
 from ico3d.splat.gaussians import Gaussians
 
 CUDA, CPU = torch.device("cuda", 0), torch.device("cpu")
+DEVICE, IS_CUDA, IS_CPU = Tensor.device.__get__, Tensor.is_cuda.__get__, Tensor.is_cpu.__get__
+SET_DATA = Tensor.data.__set__
 GIVEN_TO_ANY = {
     Tensor.copy_,
-    Tensor.data.__set__,
+    SET_DATA,
     Tensor.__deepcopy__,
     torch._has_compatible_shallow_copy_type,
 }
 """What may be given tensors of two devices."""
 JOINING = {torch.cat, torch.stack, torch.concat, torch.hstack, torch.vstack}
 """What takes not even a single number of another device."""
-TO_NUMPY = {Tensor.numpy, Tensor.__array__}
-MOVING = {Tensor.to, Tensor.cuda}
-DEVICE, IS_CUDA, IS_CPU = Tensor.device.__get__, Tensor.is_cuda.__get__, Tensor.is_cpu.__get__
-SET_DATA = Tensor.data.__set__
 _NEW_PARAMETER = nn.Parameter.__new__
 INDEXING = {Tensor.__getitem__, Tensor.__setitem__}
+_GROUPS = (tuple, list, dict)
 
 
 def is_moved(tensor: Tensor) -> bool:
@@ -52,10 +51,8 @@ def _tensors(values: Iterable) -> list[Tensor]:
     for value in values:
         if isinstance(value, Tensor):
             found.append(value)
-        elif isinstance(value, tuple | list):
-            found += _tensors(value)
-        elif isinstance(value, dict):
-            found += _tensors(value.values())
+        elif isinstance(value, _GROUPS) and value:
+            found += _tensors(value.values() if isinstance(value, dict) else value)
     return found
 
 
@@ -71,22 +68,10 @@ class PretendedCuda(TorchFunctionMode):
 
     def __torch_function__(self, func, types, args=(), kwargs=None):
         kwargs = dict(kwargs or {})
-        given = _tensors((args, kwargs))
+        given = _tensors((*args, kwargs))
         moved = any(map(is_moved, given))
-        if not moved and func not in MOVING and kwargs.get("device") is None:
-            return func(*args, **kwargs)  # nothing that pretends, and nothing that could
-        if func == DEVICE:
-            return CUDA
-        if func == IS_CUDA:
-            return moved
-        if func == IS_CPU:
-            return not moved
-        if func in TO_NUMPY and moved:
-            raise TypeError("can't convert cuda:0 device type tensor to numpy. Use Tensor.cpu().")
-        if func == Tensor.cpu:
-            return _mark(args[0].clone() if moved else args[0], False)
-        if func in MOVING:
-            return _moving(func, args, kwargs)
+        if func in _OF_DEVICES:
+            return _OF_DEVICES[func](func, args, kwargs, moved)
         if func == Tensor.__deepcopy__:
             moved = is_moved(args[0])
         target = _target(kwargs, moved)
@@ -97,7 +82,19 @@ class PretendedCuda(TorchFunctionMode):
         return _marked_new(result, given, target)
 
 
-def _moving(func: Callable, args: tuple, kwargs: dict) -> Tensor:
+def _numpy(func: Callable, args: tuple, kwargs: dict, moved: bool) -> Any:
+    """`Tensor.numpy`."""
+    if moved:
+        raise TypeError("can't convert cuda:0 device type tensor to numpy. Use Tensor.cpu().")
+    return func(*args, **kwargs)
+
+
+def _cpu(func: Callable, args: tuple, kwargs: dict, moved: bool) -> Tensor:
+    """`Tensor.cpu`."""
+    return _mark(args[0].clone() if moved else args[0], False)
+
+
+def _moving(func: Callable, args: tuple, kwargs: dict, _: bool) -> Tensor:
     """`Tensor.to` and `Tensor.cuda`."""
     tensor, rest = args[0], list(args[1:])
     moved = True if func == Tensor.cuda else is_moved(tensor)
@@ -119,6 +116,19 @@ def _moving(func: Callable, args: tuple, kwargs: dict) -> Tensor:
     if moved == is_moved(tensor):
         return _mark(result, moved)
     return _mark(result.clone() if result is tensor else result, moved)
+
+
+_OF_DEVICES: dict[Callable, Callable] = {
+    DEVICE: lambda func, args, kwargs, moved: CUDA if moved else func(*args),
+    IS_CUDA: lambda func, args, kwargs, moved: moved,
+    IS_CPU: lambda func, args, kwargs, moved: not moved,
+    Tensor.numpy: _numpy,
+    Tensor.__array__: _numpy,
+    Tensor.cpu: _cpu,
+    Tensor.to: _moving,
+    Tensor.cuda: _moving,
+}
+"""What asks for a tensor's device or changes it: function, arguments, whether any pretends."""
 
 
 def _target(kwargs: dict, moved: bool) -> bool:

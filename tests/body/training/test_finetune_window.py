@@ -1,5 +1,7 @@
 """Temporal fine-tuning."""
 
+from copy import deepcopy
+
 import numpy as np
 import pytest
 import torch
@@ -20,15 +22,15 @@ pytestmark = pytest.mark.slow
 BEFORE, AFTER = Window(0, 4), Window(4, 8)
 
 
-@pytest.fixture
-def capture(tmp_path):
+@pytest.fixture(scope="module")
+def capture(tmp_path_factory):
     """The swinging arm."""
-    return MovingCapture(tmp_path)
+    return MovingCapture(tmp_path_factory.mktemp("capture"))
 
 
-@pytest.fixture
-def models(capture):
-    """Two windows, trained apart."""
+@pytest.fixture(scope="module")
+def trained_apart(capture):
+    """Two windows."""
     trained = []
     for window, seed in ((BEFORE, 0), (AFTER, 1)):
         trainer = trainer_of(capture, seed=seed, window=window)
@@ -36,6 +38,12 @@ def models(capture):
             trainer.step(index)
         trained.append(trainer.model)
     return trained
+
+
+@pytest.fixture
+def models(trained_apart):
+    """Two windows, trained apart, to fine-tune."""
+    return deepcopy(trained_apart)
 
 
 def tuner_of(capture, models, consistency, **changes):

@@ -1,5 +1,7 @@
 """Training a window."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import torch
@@ -17,6 +19,25 @@ from support.bodies.tiny_training import WINDOW, trainer_of
 def capture(tmp_path):
     """The swinging arm."""
     return MovingCapture(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def learned(tmp_path_factory):
+    """Errors at a window's ends before and after its training, and how many Gaussians it has.
+
+    By method; each is trained when a test asks for it first.
+    """
+    capture = MovingCapture(tmp_path_factory.mktemp("capture"))
+
+    @cache
+    def errors(method):
+        trainer = trainer_of(capture, method)
+        before = ends_error(capture, trainer.model)
+        for index in range(250):
+            trainer.step(index)
+        return before, ends_error(capture, trainer.model), len(trainer.model)
+
+    return errors
 
 
 def masked_error(capture, model, frame):
@@ -38,24 +59,17 @@ def ends_error(capture, model):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["swings++", "swings", "4dgs", "spacetime", "freetime"])
-def test_every_method_learns(capture, method):
+def test_every_method_learns(learned, method):
     """The error at the window's ends falls, with fewer Gaussians than allowed."""
-    trainer = trainer_of(capture, method)
-    before = ends_error(capture, trainer.model)
-    for index in range(250):
-        trainer.step(index)
-    assert len(trainer.model) <= 400
-    assert ends_error(capture, trainer.model) < 0.9 * before
+    before, after, count = learned(method)
+    assert count <= 400
+    assert after < 0.9 * before
 
 
 @pytest.mark.slow
-def test_what_moves_is_learned(capture):
+def test_what_moves_is_learned(learned):
     """SWinGS++ is nearer to the truth than Gaussians that stand still."""
-    trainers = trainer_of(capture), trainer_of(capture, "static")
-    for trainer in trainers:
-        for index in range(250):
-            trainer.step(index)
-    moving, still = (ends_error(capture, trainer.model) for trainer in trainers)
+    moving, still = (learned(method)[1] for method in ("swings++", "static"))
     assert moving < 0.7 * still
 
 

@@ -7,7 +7,7 @@ import torch
 
 from ico3d.body.model_folder import TrainedBody
 from ico3d.body.planning.windows import Window
-from ico3d.body.training.train_clip import train_body
+from ico3d.body.training.train_clip import plan_windows, train_body
 from ico3d.errors import SettingsError
 from support.bodies.moving_capture import FRAMES, MovingCapture
 from support.bodies.tiny_training import job
@@ -31,6 +31,23 @@ def test_windows_cover_the_clip(trained):
     plan = json.loads((folder / "plan.json").read_text())
     assert [Window(**window) for window in plan["windows"]] == list(body.windows)
     assert (folder / "plan.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_plan_is_drawn_once(trained):
+    """And again where its picture is missing, or shows another."""
+    capture, folder, _ = trained
+    picture = folder / "plan.png"
+
+    def drawn(work):
+        before = picture.stat().st_ino
+        plan_windows(capture, work, folder)
+        return picture.stat().st_ino != before
+
+    longer = job(**{"windows.longest": 7})
+    assert [drawn(work) for work in (job(), longer, longer, job())] == [False, True, False, True]
+    picture.unlink()
+    plan_windows(capture, job(), folder)
+    assert picture.is_file()
 
 
 def test_the_folder_holds_the_body(trained):

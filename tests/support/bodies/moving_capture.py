@@ -11,6 +11,7 @@ from ico3d.splat.gaussians import Gaussians
 from support.photograph import photograph
 
 HEIGHT, WIDTH, FRAMES, CAMERAS, POINTS = 40, 36, 9, 7, 500
+_TAKEN: dict = {}
 
 
 class MovingCapture(Capture):
@@ -56,6 +57,15 @@ class MovingCapture(Capture):
         return np.full((HEIGHT, WIDTH, 3), 0.3 + 0.02 * camera, np.float32)
 
     def _drawn(self, camera, frame):
+        """Picture and mask; many tests ask for the same ones."""
+        lens = self.cameras[camera]
+        places = lens.intrinsics.tobytes(), lens.world_to_camera.tobytes()
+        key = camera, frame, lens.width, lens.height, *places
+        if key not in _TAKEN:
+            _TAKEN[key] = self._taken(camera, frame)
+        return tuple(layer.copy() for layer in _TAKEN[key])
+
+    def _taken(self, camera, frame):
         gaussians = Gaussians(
             torch.from_numpy(self.points(frame)).float(),
             torch.tensor([1.0, 0, 0, 0]).repeat(POINTS, 1),

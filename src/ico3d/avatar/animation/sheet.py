@@ -68,11 +68,12 @@ def draw_sheet(
     places = below.subplots(rows, COLUMNS, squeeze=False).ravel()
     camera = front(person, cameras)
     for place in places:
+        place.set(xticks=(), yticks=())  # those of hidden axes are laid out, too
         place.axis("off")
     pairs = zip(places, shown.items(), strict=False)
     for place, (frame, label) in track(pairs, "drawing", len(shown), transient=True):
         place.imshow(_picture(person, frame / animation.fps, camera))
-        place.set_title(label, fontsize=9, color=_colour(label))
+        place.set_title(label, fontsize=9, color=_colour(label), y=1.0)
     kind = "png" if path.suffix.lower() == ".png" else "jpeg"
     write_atomic(path, lambda file: figure.savefig(file, format=kind, dpi=100))
 

@@ -75,7 +75,16 @@ def make_plan(
 
 def save_plan(plan: Plan, path: Path) -> None:
     """Writes a plan as JSON."""
-    write_atomic(path, json.dumps(asdict(plan), indent=1).encode())
+    write_atomic(path, _written(plan))
+
+
+def is_saved(plan: Plan, path: Path) -> bool:
+    """Whether a file holds exactly this plan."""
+    return path.is_file() and path.read_bytes() == _written(plan)
+
+
+def _written(plan: Plan) -> bytes:
+    return json.dumps(asdict(plan), indent=1).encode()
 
 
 def print_plan(plan: Plan, console: Console) -> None:

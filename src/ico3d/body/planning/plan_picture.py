@@ -21,6 +21,8 @@ MOST_PICTURES = 14
 """Frames that are shown."""
 MARGIN = 0.05
 """Around the person, as a part of the picture."""
+TITLE = 1.0
+"""Where titles begin, in heights of their axes; matplotlib measures all ticks to find a place."""
 
 
 def draw_plan(plan: Plan, capture: Capture, path: Path) -> None:
@@ -79,8 +81,8 @@ def _curve(axes: "Axes", plan: Plan) -> None:
         ylim=(0, 1.3 * max(*plan.motion, 1e-9) if plan.motion else 1),
         xlabel="frame",
         ylabel="motion of a step, cm² per foreground pixel (bars)",
-        title=f"{len(plan.windows)} windows; motion by {plan.method}",
     )
+    axes.set_title(f"{len(plan.windows)} windows; motion by {plan.method}", y=TITLE)
     sums.set_ylim(0, 1.3 * max([bound, *map(plan.moved, plan.windows)]))
     sums.set_ylabel("sum within the window, cm² (lines); threshold (dashed)")
 
@@ -118,5 +120,6 @@ def _picture(
     image = capture.image(camera, frame)
     if image is not None:
         axes.imshow(np.clip(image[box], 0, 1))
-    axes.set_title(f"frame {frame}", fontsize=9)
+    axes.set_title(f"frame {frame}", fontsize=9, y=TITLE)
+    axes.set(xticks=(), yticks=())
     axes.axis("off")

@@ -11,7 +11,7 @@ from ico3d.body.companion import Companion, CompanionSource
 from ico3d.body.model_folder import ABOUT, UNTUNED, TrainedBody, load_window, save_window
 from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.flow import clip_flow, dynamic_weights
-from ico3d.body.planning.plan import Plan, make_plan, print_plan, save_plan
+from ico3d.body.planning.plan import Plan, is_saved, make_plan, print_plan, save_plan
 from ico3d.body.planning.plan_picture import draw_plan
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import ONE_WINDOW, BodySettings, Method
@@ -272,8 +272,10 @@ def plan_windows(capture: Capture, job: BodyJob, folder: Path) -> Plan:
     if job.method in ONE_WINDOW:
         plan = replace(plan, windows=(Window(0, capture.num_frames - 1),))
     print_plan(plan, Console())
-    save_plan(plan, folder / "plan.json")
-    draw_plan(plan, capture, folder / "plan.png")
+    told, picture = folder / "plan.json", folder / "plan.png"
+    if not (picture.is_file() and is_saved(plan, told)):  # a run that goes on has both
+        draw_plan(plan, capture, picture)
+        save_plan(plan, told)
     return plan
 
 
