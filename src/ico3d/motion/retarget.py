@@ -3,8 +3,8 @@
 A pose by role is (..., R, 4): each role's rotation about itself, from the *standard pose*, in which
 somebody stands with hanging arms, palms to the thighs, fingers straight. In the world a role is
 turned by C_r = C_parent · c_r; the bone that points along d in the standard pose points along
-C_r d, in every rig. A rig's rest differs: S_r is the rotation that takes what hangs on the role's joint
-from the rig's rest to the standard pose, so that its joint turns by C_r · S_r from rest.
+C_r d, in every rig. A rig's rest differs: S_r is the rotation that takes what hangs on the role's
+joint from the rig's rest to the standard pose, so that its joint turns by C_r · S_r from rest.
 """
 
 from dataclasses import dataclass
