@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ico3d.motion.clearance import way_out_of_head, way_out_of_trunk
-from ico3d.motion.gestures.hanging import hanging
 from ico3d.motion.gestures.script import Lean, Reach, Script
 from ico3d.motion.gestures.shapes import fingers, shape
 from ico3d.motion.limbs import reach
@@ -66,19 +65,19 @@ class _Arm:
     shapes: Array
 
 
-def solve(person: Person, script: Script) -> tuple[Array, tuple[str, ...]]:
+def solve(person: Person, script: Script, hung: Array) -> tuple[Array, tuple[str, ...]]:
     """Poses of a gesture.
 
     Args:
         person: Who makes it.
         script: What is to be done.
+        hung: (R, 4) by role, of the person with hanging arms (`hanging`).
 
     Returns:
         (F, R, 4) by role at `RATE` from 0 to the script's end, and the names of the roles that it
         moves; the others are as in the standard pose with hanging arms.
     """
     times = np.arange(round(script.end * RATE) + 1) / RATE
-    hung = hanging(person)
     poses = np.tile(hung, (len(times), 1, 1))  # (F, R, 4)
     moved: list[str] = []
     if script.lean:
