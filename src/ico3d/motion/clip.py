@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 from safetensors import SafetensorError, deserialize
 from safetensors.numpy import save
 
@@ -75,7 +76,7 @@ class Clip:
             raise ValueError(f"there is no role '{unknown[0]}'")
 
     @property
-    def roles(self) -> Array:
+    def roles(self) -> NDArray[np.integer]:
         """(M,) numbers of the roles that it moves."""
         return np.array([INDEX[role] for role in self.curves], int)
 

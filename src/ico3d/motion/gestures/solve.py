@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ico3d.motion.clearance import way_out_of_head, way_out_of_trunk
 from ico3d.motion.gestures.script import Lean, Reach, Script
@@ -23,6 +24,7 @@ from ico3d.rig.quaternions import (
     slerp,
 )
 
+Index = NDArray[np.integer]
 RATE = 60.0
 """Samples per second."""
 LIFT = np.radians(24.0)
@@ -41,7 +43,7 @@ def eased(part: Array) -> Array:
     return part**3 * (10 - 15 * part + 6 * part**2)
 
 
-def between(keys: Array, times: Array) -> tuple[Array, Array, Array]:
+def between(keys: Array, times: Array) -> tuple[Index, Index, Array]:
     """The keys (K,) before and after (F,) seconds, and (F,) how far it is between them."""
     after = np.clip(np.searchsorted(keys, times, side="right"), 1, len(keys) - 1)
     span = np.maximum(keys[after] - keys[after - 1], 1e-9)
@@ -167,8 +169,9 @@ def _interpolated(
     seconds = np.array([time for time, _ in keys])
     before, after, part = between(seconds, times)
     chins = _chins(person, poses[np.searchsorted(times, seconds - 0.5 / RATE)])  # (K, 3)
+    hanging = _hung(person, side, hung)
     rows = [
-        _hung(person, side, hung) if at is None else _at(person, side, at, chin)
+        hanging if at is None else _at(person, side, at, chin)
         for (_, at), chin in zip(keys, chins, strict=True)
     ]
 
