@@ -125,9 +125,12 @@ class Composer:
             begin = max(self._handed, self._free(self._wanted[0]))
             if begin >= until:
                 return
-            soonest = begin + clip.marks.stroke
+            name = self._wanted.pop(0)
+            busy = any(self._over.get(limb, begin) > begin for limb in self._limbs[name])
+            skip = clip.marks.stroke - self._taking_up(clip) if busy else 0.0
+            soonest = begin + clip.marks.stroke - skip
             near = [a.time for a in stresses if soonest <= a.time <= soonest + NEAR]
-            self._cue(self._wanted.pop(0), False, begin, near[0] if near else soonest)
+            self._cue(name, False, begin, near[0] if near else soonest, skip)
 
     def _decide(
         self, index: int, stresses: tuple[Accent, ...], meant: dict[int, str], until: float
@@ -154,14 +157,9 @@ class Composer:
         name = meant.get(accent.word)
         if name in self._clips and self._may_mean(name, accent.time):
             return name, False
-        draw = chance(self._seed, accent.word, 1)
-        for part, name, mirror in BEATS:
-            if draw < part:
-                break
-            draw -= part
         if not self._may_beat(index, stresses, meant):
             return None, False
-        return name, mirror
+        return _beat(chance(self._seed, accent.word, 1))
 
     def _may_mean(self, name: str, time: float) -> bool:
         last = max((self._struck.get(limb, -np.inf) for limb in self._limbs[name]), default=-np.inf)
@@ -201,7 +199,7 @@ class Composer:
             return begin, 0.0
         settled = max((self._struck.get(limb, -np.inf) + SETTLE for limb in used), default=-np.inf)
         if over > begin:  # hands are up: they go to where the stroke begins
-            lead = min(marks.stroke, max(TAKE_UP, marks.stroke - marks.ready + 0.1))
+            lead = self._taking_up(self._clips[name])
             if stroke - lead >= max(settled, self._handed):
                 return stroke - lead, marks.stroke - lead
             return None, 0.0
@@ -209,6 +207,11 @@ class Composer:
         if stroke - first >= marks.stroke / HURRY:
             return first, 0.0
         return None, 0.0
+
+    def _taking_up(self, clip: Clip) -> float:
+        """Seconds before its stroke from which hands that are up go on with a gesture."""
+        marks = clip.marks
+        return min(marks.stroke, max(TAKE_UP, marks.stroke - marks.ready + 0.1))
 
     def _used(self, name: str, mirror: bool) -> frozenset[str]:
         """The limbs of a gesture, mirrored or not."""
@@ -224,7 +227,7 @@ class Composer:
     def _cue(self, name: str, mirror: bool, begin: float, stroke: float, skip: float = 0.0) -> None:
         cue = Cue(len(self._cues), name, mirror, begin, stroke, skip)
         used = self._used(name, mirror)
-        for number, held in list(self._held.items()):
+        for held in list(self._held.values()):
             if self._used(held.name, held.mirror) & used:
                 self._release(held, max(begin + BLEND_IN, self._earliest(held)))
         self._cues.append(cue)
@@ -276,6 +279,15 @@ class Composer:
         over = end_of(self._clips[cue.name], time)
         for limb in self._used(cue.name, cue.mirror):
             self._over[limb] = over
+
+
+def _beat(draw: float) -> tuple[str, bool]:
+    """A gesture without a meaning of its own, and whether it is mirrored, by chance."""
+    for part, name, mirror in BEATS[:-1]:
+        if draw < part:
+            return name, mirror
+        draw -= part
+    return BEATS[-1][1:]
 
 
 def _moment(direction: Direction) -> tuple[float, int]:
