@@ -1,5 +1,7 @@
 """The living rest: feet stay, nothing repeats, one seed is one motion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,6 +14,7 @@ from ico3d.rig.quaternions import rotate
 from support.rigs import rig_of
 
 TIMES = np.arange(0, 30, 0.1)
+STANDING = living(rig_of("SMPL-X", 0.0), 0)
 
 
 @pytest.fixture(scope="module", params=["A", "T"])
@@ -59,16 +62,15 @@ def test_it_never_repeats(somebody):
 @settings(max_examples=8, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0, 1e5))
 def test_any_seed_at_any_time_is_calm_and_the_same_again(seed, start):
-    rig = rig_of("SMPL-X", 0.0)
     times = start + np.arange(0, 2, 0.02)
-    pose, root = living(rig, seed).at(times)
+    pose, root = replace(STANDING, seed=seed).at(times)
     assert np.isfinite(pose).all() and np.isfinite(root).all()
     np.testing.assert_allclose(np.linalg.norm(pose, axis=-1), 1, atol=1e-9)
     near = np.abs((pose[1:] * pose[:-1]).sum(-1)).clip(0, 1)
     assert np.degrees(2 * np.arccos(near)).max() / 0.02 < 25
-    again, _ = living(rig, seed).at(times[3])
+    again, _ = replace(STANDING, seed=seed).at(times[3])
     np.testing.assert_allclose(again, pose[3], atol=1e-12)
-    other, _ = living(rig, seed ^ 1).at(times)
+    other, _ = replace(STANDING, seed=seed ^ 1).at(times)
     assert np.abs(other - pose).max() > 1e-4
 
 

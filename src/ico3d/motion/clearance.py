@@ -22,7 +22,7 @@ def _trunk(person: Person) -> tuple[Array, Array, Array]:
     upper = np.array([0.0, shoulders[1] - COLLAR * person.height, shoulders[2]])
     lower[2] = upper[2] = shoulders[2] + DEPTH * person.height
     width, depth = person.thickness.torso
-    return lower, upper, person.height * np.array([width, width, depth])
+    return lower, upper, person.height * np.array([width, COLLAR, depth])
 
 
 def _outside(offset: Array, extents: Array) -> Array:

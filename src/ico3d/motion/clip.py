@@ -8,8 +8,8 @@ from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from safetensors import SafetensorError, deserialize
-from safetensors.numpy import save
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
 
 from ico3d.common.typed import parse_json
 from ico3d.errors import SettingsError
@@ -136,16 +136,11 @@ def from_bytes(content: bytes) -> dict[str, Clip]:
     try:
         size = int.from_bytes(content[:8], "little")
         header = cast(dict[str, Any], parse_json(content[8 : 8 + size], "clips", ValueError))
-        arrays = {name: _array(found) for name, found in deserialize(content)}
+        arrays = load(content)
         about = parse_json(header["__metadata__"]["clips"].encode(), "clips", ValueError)
         return _clips(cast(dict[str, Any], about), arrays)
     except (SafetensorError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise SettingsError(f"the file of gestures is damaged ({error}).") from error
-
-
-def _array(found: dict[str, Any]) -> np.ndarray:
-    kind = {"U16": "<u2", "I16": "<i2"}[found["dtype"]]
-    return np.frombuffer(found["data"], kind).reshape(found["shape"])
 
 
 def _clips(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[str, Clip]:
@@ -191,7 +186,7 @@ def from_json(text: str) -> Clip:
         curves: dict[str, Curve] = {}
         for role, curve in about["curves"].items():
             rotations = np.frombuffer(base64.b64decode(curve["rotations"]), "<i2").reshape(-1, 4)
-            curves[role] = unpacked(np.array(curve["times"], float), rotations)
+            curves[role] = unpacked(np.array(curve["times"], int), rotations)
         marks = Marks(**{k: float(v) for k, v in about["marks"].items()})
         return Clip(str(about["name"]), marks, _ordered(curves))
     except (ValueError, KeyError, TypeError, AttributeError) as error:

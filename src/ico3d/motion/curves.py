@@ -129,6 +129,8 @@ def unpacked(ticks: np.ndarray, rotations: np.ndarray) -> Curve:
     Raises:
         ValueError: If it is none.
     """
+    if rotations.dtype.kind not in "iu" or ticks.dtype.kind not in "iu":
+        raise ValueError("a curve's numbers are no whole ones")
     values = rotations.astype(np.float64) / SCALE
     if values.ndim != 2 or np.abs(np.linalg.norm(values, axis=-1) - 1).max(initial=0) > 1e-3:
         raise ValueError("a curve holds a rotation that is not of length 1")

@@ -14,6 +14,7 @@ from ico3d.motion.turning import about
 from ico3d.rig.quaternions import Array, from_rotvec, multiply
 from ico3d.rig.rig import Rig
 
+Turn = tuple[float, float, float]
 BREATH = 4.1
 """Seconds of a breath: 15 a minute, as people at rest."""
 WEIGHT = 9.7
@@ -77,7 +78,7 @@ class Living:
     def _wander(self, times: Array, period: float, channel: int) -> Array:
         return wander(times, period, self.seed, channel)
 
-    def _vector(self, times: Array, period: float, channel: int, degrees: tuple) -> Array:
+    def _vector(self, times: Array, period: float, channel: int, degrees: Turn) -> Array:
         """(..., 3) rotation vectors of so many degrees, each coordinate by itself."""
         rows = [self._wander(times, period, channel + i) for i in range(3)]
         return np.stack(rows, -1) * np.radians(degrees)
