@@ -75,8 +75,8 @@ def smoothed(levels: Array) -> Array:
     reach = round(3 * _SMOOTH / FRAME)
     window = np.exp(-0.5 * (np.arange(-reach, reach + 1) * FRAME / _SMOOTH) ** 2)
     padded = np.pad(levels, reach, constant_values=_FLOOR)
-    found: Array = np.convolve(padded, window / window.sum(), "valid")
-    return found
+    windows = np.lib.stride_tricks.sliding_window_view(padded, len(window))  # (n, 2 reach + 1)
+    return windows @ (window / window.sum())
 
 
 def _recent_loudest(levels: Array) -> Array:
