@@ -136,6 +136,25 @@ def test_the_same_seed_makes_the_same_gestures_another_one_others(clips):
     assert any(made[0] != other for other in made[1:])
 
 
+def test_an_interruption_lets_go_after_the_stroke_and_drops_what_has_not_begun(clips, rest):
+    words, levels = speech(3)
+    composer, performer = Composer(clips, 0), Performer(rest, clips)
+    composer.know(words, levels)
+    first = composer.directions(4.0)
+    performer.follow(first)
+    cues = [d for d in first if isinstance(d, Cue)]
+    now = cues[-1].begin + 0.1
+    let_go = composer.stop(now)
+    assert {d.number for d in first + let_go if isinstance(d, Release)} == {c.number for c in cues}
+    stroke = {cue.number: cue.stroke for cue in cues}
+    assert let_go and all(now <= d.time and stroke[d.number] <= d.time for d in let_go)
+    assert composer.directions(math.inf) == []
+    performer.follow(let_go)
+    performer.drop(cues[-1].begin)
+    pose, _ = performer.at(np.array([cues[-1].stroke + 5]))
+    np.testing.assert_allclose(pose, rest.at(np.array([cues[-1].stroke + 5]))[0], atol=1e-12)
+
+
 def test_without_sound_nobody_gestures(clips):
     composer = Composer(clips, 0)
     composer.know((), np.zeros(0))

@@ -118,6 +118,18 @@ class Composer:
         self._handed = max(self._handed, until)
         return sorted(self._new, key=_moment)
 
+    def stop(self, now: float) -> list[Direction]:
+        """Falls silent: nothing new begins, and what is held is let go once its stroke has arrived.
+
+        Args:
+            now: Seconds; gestures that begin later than this are for `Performer.drop`.
+        """
+        self._new = []
+        self._words, self._wanted = (), []
+        for cue in list(self._held.values()):
+            self._release(cue, max(now, self._earliest(cue)))
+        return sorted(self._new, key=_moment)
+
     def _make_wanted(self, until: float, stresses: tuple[Accent, ...]) -> None:
         """What was asked for comes first: its stroke on the next accent, where one is near."""
         while self._wanted:

@@ -50,6 +50,10 @@ class Performer:
             else:
                 self._cues.append(direction)
 
+    def drop(self, now: float) -> None:
+        """Forgets gestures that have not begun: what they belonged to was interrupted."""
+        self._cues = [cue for cue in self._cues if cue.begin < now]
+
     def at(self, times: Array, turn: Array | None = None) -> tuple[Array, Array]:
         """How the body is at seconds (T,).
 
