@@ -13,7 +13,7 @@ import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import tyro
@@ -172,7 +172,7 @@ def _shared(cue: Cue, other: Cue, clips: dict[str, Clip]) -> bool:
     return bool(one & two)
 
 
-def measure(bench: Stress) -> dict[str, float]:
+def measure(bench: Stress) -> dict[str, Any]:
     """Speaks, composes, performs and measures."""
     rest = living(rig_of(bench.subject), bench.seed)
     clips = library(rest.person)
@@ -208,7 +208,6 @@ def measure(bench: Stress) -> dict[str, float]:
     def median(parts: list[np.ndarray]) -> float:
         return round(1000 * float(np.median(np.concatenate(parts))), 1)
 
-    print(names)
     peak = np.concatenate(to_peak)
     return {
         "strokes": count,
@@ -219,6 +218,7 @@ def measure(bench: Stress) -> dict[str, float]:
         "median_ms_to_stressed_vowel": median(to_vowel),
         "by_chance_ms_to_stressed_vowel": median(chance_vowel),
         "cut_off": cut,
+        "gestures": names,
     }
 
 

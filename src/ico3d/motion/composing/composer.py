@@ -28,6 +28,8 @@ APART = (0.9, 2.0)
 """Seconds from one beat to the next, by chance, at least."""
 MEANT = 0.75
 """Seconds from a stroke to one that means something, at least."""
+LATE = 0.8
+"""Seconds by which a meaning may come after its word, where there was no time for it before."""
 AGAIN = 5.0
 """Seconds until the same meaning is shown again, at least."""
 FAINT = -9.0
@@ -150,15 +152,17 @@ class Composer:
         """Gives an accent a gesture, or none; False if there is still time for that."""
         accent = stresses[index]
         name, mirror = self._choice(index, stresses, meant)
-        if name is None:
-            self._next = accent.word + 1
-            return True
-        begin, skip = self._beginning(name, mirror, accent.time)
-        if begin is not None and begin >= until:
-            return False
+        if name is not None:
+            means = accent.word in meant
+            for chosen in (accent, *(_soon(index, stresses, meant) if means else ())):
+                begin, skip = self._beginning(name, mirror, chosen.time)
+                if begin is not None and begin >= until:
+                    return False
+                if begin is not None:
+                    self._cue(name, mirror, begin, chosen.time, skip)
+                    self._next = chosen.word + 1
+                    return True
         self._next = accent.word + 1
-        if begin is not None:
-            self._cue(name, mirror, begin, accent.time, skip)
         return True
 
     def _choice(
@@ -300,6 +304,16 @@ def _beat(draw: float) -> tuple[str, bool]:
             return name, mirror
         draw -= part
     return BEATS[-1][1:]
+
+
+def _soon(index: int, stresses: tuple[Accent, ...], meant: dict[int, str]) -> list[Accent]:
+    """Accents shortly after one, before any that means something itself."""
+    found: list[Accent] = []
+    for later in stresses[index + 1 :]:
+        if later.time - stresses[index].time > LATE or later.word in meant:
+            break
+        found.append(later)
+    return found
 
 
 def _moment(direction: Direction) -> tuple[float, int]:
