@@ -18,12 +18,9 @@ from ico3d.motion.living import Living, living
 from ico3d.motion.roles import INDEX, SIDES
 from ico3d.motion.turning import twist_angle
 from support.rigs import rig_of
+from support.spoken import speech
 
 pytestmark = pytest.mark.slow
-TEXT = (
-    "hello and welcome to the garden where we have three enormous trees that nobody planted "
-    "maybe you know who did it yes or no the smallest flower grows beside the second fountain"
-)
 FASTEST = 1000.0
 """Degrees a second that a joint turns at most, however gestures follow one another."""
 
@@ -36,20 +33,6 @@ def rest() -> Living:
 @pytest.fixture(scope="module")
 def clips(rest) -> dict[str, Clip]:
     return library(rest.person)
-
-
-def speech(seed: int) -> tuple[tuple[Word, ...], np.ndarray]:
-    """Words of random lengths, each with one peak of random loudness."""
-    rng = np.random.default_rng(seed)
-    words, now, level = [], 0.3, []
-    for text in TEXT.split():
-        length = float(rng.uniform(0.15, 0.5))
-        words.append(Word(text, now, now + length))
-        level.append((now + length / 2, float(rng.uniform(-16, 0)), length))
-        now += length + float(rng.choice([0.02, 0.02, 0.4]))
-    times = np.arange(0, now + 0.3, FRAME)
-    bumps = [loud - 25 * np.abs(times - at) / length for at, loud, length in level]
-    return tuple(words), np.maximum(np.max(bumps, 0), -70.0)
 
 
 def grown(clips, seed: int, step: float, ahead: float = 1.5) -> list[Direction]:

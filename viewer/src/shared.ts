@@ -27,5 +27,11 @@ export const LIDS = [5, 6] as const;
 /** How a person blinks, in s; `spread` of the pauses' logarithms. Sources: speech/eyes.py. */
 export const BLINK = {"closing": 0.07, "closed": 0.03, "opening": 0.1, "median": 3.4, "spread": 0.35, "shortest": 2.0, "longest": 6.0} as const;
 
+/** What joints are to gestures; motion/roles.py. */
+export const ROLES = ["hips", "spine", "chest", "neck", "head", "left_clavicle", "left_shoulder", "left_elbow", "left_wrist", "left_thumb1", "left_thumb2", "left_thumb3", "left_index1", "left_index2", "left_index3", "left_middle1", "left_middle2", "left_middle3", "left_ring1", "left_ring2", "left_ring3", "left_little1", "left_little2", "left_little3", "right_clavicle", "right_shoulder", "right_elbow", "right_wrist", "right_thumb1", "right_thumb2", "right_thumb3", "right_index1", "right_index2", "right_index3", "right_middle1", "right_middle2", "right_middle3", "right_ring1", "right_ring2", "right_ring3", "right_little1", "right_little2", "right_little3", "left_hip", "left_knee", "left_ankle", "right_hip", "right_knee", "right_ankle"] as const;
+
+/** The number of each role's parent; -1 for the hips. */
+export const ROLE_PARENTS = [-1, 0, 1, 2, 3, 2, 5, 6, 7, 8, 9, 10, 8, 12, 13, 8, 15, 16, 8, 18, 19, 8, 21, 22, 2, 24, 25, 26, 27, 28, 29, 27, 31, 32, 27, 34, 35, 27, 37, 38, 27, 40, 41, 0, 43, 44, 0, 46, 47] as const;
+
 /** Between a question and its answer, in order; observing/timing.py. */
 export const LATENCY_PARTS = ["vad", "turn", "token", "clause", "voice", "expression", "send"] as const;

@@ -9,13 +9,16 @@ export const PYTHON = process.env.ICO3D_PYTHON ?? `${REPOSITORY}.venv/bin/python
 
 if (!existsSync(PYTHON)) throw new Error(`no Python at ${PYTHON}: run make install or set ICO3D_PYTHON`);
 
-/** One thread for each: tests run side by side, and what they compute is small. What Python's tests share is at hand. */
+/**
+ * One thread for each: tests run side by side, and what they compute is small.
+ * This checkout and what its tests share come before what is installed.
+ */
 export const ENVIRONMENT = {
   ...process.env,
   OMP_NUM_THREADS: '1',
   OPENBLAS_NUM_THREADS: '1',
   NUMBA_NUM_THREADS: '1',
-  PYTHONPATH: `${REPOSITORY}tests`,
+  PYTHONPATH: `${REPOSITORY}src:${REPOSITORY}tests`,
 };
 
 /** Runs a script of `support/` to its end; what it printed. */

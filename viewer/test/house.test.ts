@@ -11,9 +11,11 @@ const MOST_FILES = 15; // beside sub-folders
 const ORDER = [
   ['protocol.ts', 'shared.ts', 'errors.ts', 'actor.ts'],
   ['bundle'],
+  ['rig'],
   ['head'],
   ['face'],
   ['motion'],
+  ['gesture'],
   ['body', 'stage', 'audio'],
   ['talk'],
   ['ui', 'cast.ts'],

@@ -118,13 +118,23 @@ def clip_of(
 
 def to_bytes(clips: dict[str, Clip]) -> bytes:
     """A safetensors file: `CLIP/ROLE/times` uint16 ms and `CLIP/ROLE/rotations` int16."""
+    return save(tensors_of(clips), {"clips": header_of(clips)})
+
+
+def tensors_of(clips: dict[str, Clip]) -> dict[str, np.ndarray]:
+    """The arrays of such a file."""
     arrays: dict[str, np.ndarray] = {}
     for name, clip in clips.items():
         for role, curve in clip.curves.items():
             ticks, rotations = packed(curve)
             arrays |= {f"{name}/{role}/times": ticks, f"{name}/{role}/rotations": rotations}
+    return arrays
+
+
+def header_of(clips: dict[str, Clip]) -> str:
+    """JSON in the header of such a file."""
     marks = {name: vars(clip.marks) for name, clip in clips.items()}
-    return save(arrays, {"clips": json.dumps({"version": VERSION, "marks": marks})})
+    return json.dumps({"version": VERSION, "marks": marks})
 
 
 def from_bytes(content: bytes) -> dict[str, Clip]:

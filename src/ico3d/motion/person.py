@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ico3d.motion.retarget import Retarget, retarget
-from ico3d.motion.roles import SIDES
+from ico3d.motion.roles import SIDES, Cast
 from ico3d.rig.quaternions import Array, rotate
 from ico3d.rig.rig import Rig
 
@@ -57,9 +57,19 @@ class Person:
         """Whose."""
         return self.retarget.rig
 
+    @property
+    def cast(self) -> Cast:
+        """Which joint plays which role."""
+        return self.retarget.cast
+
+    @property
+    def eyes(self) -> Array:
+        """(3,) between the eyes."""
+        return self.chin - self.height * CHIN
+
     def place(self, role: str) -> Array:
         """(3,) where a role's first joint is at rest."""
-        return self.retarget.cast.place(role)
+        return self.cast.place(role)
 
     def lengths(self, limb: tuple[str, str, str]) -> tuple[float, float]:
         """Metres between the three joints of a limb, by role."""
@@ -72,7 +82,7 @@ class Person:
 
     def hand(self, side: str) -> float:
         """Metres from the wrist to the middle finger's knuckle."""
-        if not self.retarget.cast.has_fingers(side):
+        if not self.cast.has_fingers(side):
             return HAND * self.height
         knuckle = self.place(f"{side}_middle1") - self.place(f"{side}_wrist")
         return float(np.linalg.norm(knuckle))
@@ -80,7 +90,7 @@ class Person:
     def posed(self, by_role: Array, root: Array) -> dict[str, Array]:
         """(..., 3) metres in the world where the first joint of each role is."""
         places = self.rig.posed(self.retarget.pose(by_role), root)[1]
-        return {role: places[..., j[0], :] for role, j in self.retarget.cast.joints.items()}
+        return {role: places[..., j[0], :] for role, j in self.cast.joints.items()}
 
     def carried(self, role: str, point: Array, rotations: Array, root: Array) -> Array:
         """(..., 3) where a point (..., 3) of rest space goes that hangs on a role's last joint.
@@ -92,7 +102,7 @@ class Person:
             root: (..., 3) metres that the root moves.
         """
         turned, places = self.rig.posed(rotations, root)
-        joint = self.retarget.cast.joints[role][-1]
+        joint = self.cast.joints[role][-1]
         at_rest = self.rig.joints[joint]
         return rotate(turned[..., joint, :], point - at_rest) + places[..., joint, :]
 

@@ -134,9 +134,9 @@ class Retarget:
             conjugate(before), multiply(first, self.standard[number])
         )
         for joint, share in zip(joints[1:], shares[1:], strict=True):
-            local[..., joint, :] = about(self._bone(role, joint), share * angle)
+            local[..., joint, :] = about(self.bone(role, joint), share * angle)
 
-    def _bone(self, role: str, joint: int) -> Array:
+    def bone(self, role: str, joint: int) -> Array:
         """(3,) direction at rest from a joint to where the role below begins."""
         child = ROLES[PARENTS.index(INDEX[role])]
         return unit(self.cast.place(child) - self.rig.joints[joint])

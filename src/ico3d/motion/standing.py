@@ -19,6 +19,21 @@ KNEE = 0.03
 
 
 @dataclass(frozen=True, eq=False)
+class Leg:
+    """A leg at rest.
+
+    Attributes:
+        limb: Roles of hip, knee and ankle.
+        lengths: Metres of its two bones.
+        rest: How they lie.
+    """
+
+    limb: tuple[str, str, str]
+    lengths: tuple[float, float]
+    rest: Bend
+
+
+@dataclass(frozen=True, eq=False)
 class Stance:
     """Where somebody's feet stand.
 
@@ -42,16 +57,21 @@ class Stance:
         hips = by_role[..., INDEX["hips"], :]  # (..., 4)
         middle = self.person.place("hips")
         for side in SIDES:
-            limb = (f"{side}_hip", f"{side}_knee", f"{side}_ankle")
+            leg = self.leg(side)
+            limb, rest = leg.limb, leg.rest
             start = middle + root + rotate(hips, self.person.place(limb[0]) - middle)
-            rest = _at_rest(self.person, limb)
             pole = np.broadcast_to(np.cross(rest.hinge, DOWNWARDS), start.shape) * -1.0
-            bend = reach(start, self.ankles[side], self.person.lengths(limb), pole)
+            bend = reach(start, self.ankles[side], leg.lengths, pole)
             upper = aligned((rest.upper, rest.hinge), (bend.upper, bend.hinge))
             lower = aligned((rest.lower, rest.hinge), (bend.lower, bend.hinge))
             by_role[..., INDEX[limb[0]], :] = multiply(conjugate(hips), upper)
             by_role[..., INDEX[limb[1]], :] = multiply(conjugate(upper), lower)
             by_role[..., INDEX[limb[2]], :] = conjugate(lower)
+
+    def leg(self, side: str) -> Leg:
+        """What is measured on a leg."""
+        limb = (f"{side}_hip", f"{side}_knee", f"{side}_ankle")
+        return Leg(limb, self.person.lengths(limb), _at_rest(self.person, limb))
 
 
 DOWNWARDS = np.array([0.0, -1.0, 0.0])

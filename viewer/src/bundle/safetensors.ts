@@ -3,9 +3,9 @@ import { floatFromHalf } from '../protocol.ts';
 
 /** One array of a safetensors file. */
 export interface Tensor {
-  dtype: 'F32' | 'F16' | 'I16' | 'I8' | 'U8';
+  dtype: 'F32' | 'F16' | 'I16' | 'U16' | 'I8' | 'U8';
   shape: number[];
-  data: Float32Array | Int16Array | Int8Array | Uint8Array; // half floats are widened on reading
+  data: Float32Array | Int16Array | Uint16Array | Int8Array | Uint8Array; // half floats are widened on reading
 }
 
 interface Entry {
@@ -14,8 +14,9 @@ interface Entry {
   data_offsets: [number, number];
 }
 
-const BYTES: Record<string, number> = { F32: 4, F16: 2, I16: 2, I8: 1, U8: 1 };
+const BYTES: Record<string, number> = { F32: 4, F16: 2, I16: 2, U16: 2, I8: 1, U8: 1 };
 const HEADER_LIMIT = 1 << 20;
+const METADATA = '__metadata__';
 
 /**
  * Reads a safetensors file (u64 header length, JSON header, data; little-endian).
@@ -24,22 +25,36 @@ const HEADER_LIMIT = 1 << 20;
  * @throws PageError if the file contradicts itself or holds a type that bundles do not use
  */
 export function parseSafetensors(buffer: ArrayBuffer, file: string): Map<string, Tensor> {
+  const { header, length } = readHeader(buffer, file);
+  const tensors = new Map<string, Tensor>();
+  for (const [name, entry] of Object.entries(header)) {
+    if (name !== METADATA) tensors.set(name, readTensor(buffer, 8 + length, entry as Entry, `${file}: ${name}`));
+  }
+  return tensors;
+}
+
+/**
+ * The texts in the header of a safetensors file.
+ *
+ * @param file name for error sentences
+ * @throws PageError if the file has no readable header
+ */
+export function parseMetadata(buffer: ArrayBuffer, file: string): Record<string, string> {
+  return (readHeader(buffer, file).header[METADATA] ?? {}) as Record<string, string>;
+}
+
+function readHeader(buffer: ArrayBuffer, file: string): { header: Record<string, unknown>; length: number } {
   if (buffer.byteLength < 8) throw new PageError(`${file} is too short for a safetensors file.`);
   const length = Number(new DataView(buffer).getBigUint64(0, true));
   if (length > HEADER_LIMIT || 8 + length > buffer.byteLength) {
     throw new PageError(`${file} ends before its header does.`);
   }
-  const header = parseHeader(new Uint8Array(buffer, 8, length), file);
-  const tensors = new Map<string, Tensor>();
-  for (const [name, entry] of Object.entries(header)) {
-    if (name !== '__metadata__') tensors.set(name, readTensor(buffer, 8 + length, entry, `${file}: ${name}`));
-  }
-  return tensors;
+  return { header: parseHeader(new Uint8Array(buffer, 8, length), file), length };
 }
 
-function parseHeader(bytes: Uint8Array, file: string): Record<string, Entry> {
+function parseHeader(bytes: Uint8Array, file: string): Record<string, unknown> {
   try {
-    return JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes)) as Record<string, Entry>;
+    return JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes)) as Record<string, unknown>;
   } catch {
     throw new PageError(`${file} has a header that is not JSON.`);
   }
@@ -57,6 +72,7 @@ function readTensor(buffer: ArrayBuffer, base: number, entry: Entry, where: stri
   if (dtype === 'I8') return { dtype, shape, data: new Int8Array(bytes) };
   if (dtype === 'U8') return { dtype, shape, data: new Uint8Array(bytes) };
   if (dtype === 'I16') return { dtype, shape, data: new Int16Array(bytes) };
+  if (dtype === 'U16') return { dtype, shape, data: new Uint16Array(bytes) };
   if (dtype === 'F16') return { dtype, shape, data: Float32Array.from(new Uint16Array(bytes), floatFromHalf) };
   return { dtype: 'F32', shape, data: new Float32Array(bytes) };
 }

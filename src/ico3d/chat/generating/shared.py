@@ -10,6 +10,7 @@ from typing import Any
 from ico3d.bundle import evaluate, limits, manifest
 from ico3d.chat.observing.timing import PARTS
 from ico3d.common.expression import EYE_NAMES, LIDS
+from ico3d.motion import roles
 from ico3d.speech import eyes
 
 TARGET = Path(__file__).parents[4] / "viewer" / "src" / "shared.ts"
@@ -38,6 +39,8 @@ VALUES: tuple[tuple[str, str, Any], ...] = (
             "longest": eyes.LONGEST_PAUSE,
         },
     ),
+    ("ROLES", "What joints are to gestures; motion/roles.py.", roles.ROLES),
+    ("ROLE_PARENTS", "The number of each role's parent; -1 for the hips.", roles.PARENTS),
     ("LATENCY_PARTS", "Between a question and its answer, in order; observing/timing.py.", PARTS),
 )
 """Name, what it is, value."""

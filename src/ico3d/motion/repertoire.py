@@ -1,0 +1,43 @@
+"""What a page needs to move somebody, as one file: their figure and their gestures."""
+
+import json
+from typing import Any, cast
+
+from safetensors.numpy import save
+
+from ico3d.common.typed import parse_json
+from ico3d.errors import SettingsError
+from ico3d.motion.clip import Clip, from_bytes, header_of, tensors_of
+from ico3d.motion.figure import alike, figure_of
+from ico3d.motion.living import Living, living
+from ico3d.rig.rig import Rig
+
+
+def repertoire_bytes(somebody: Living, clips: dict[str, Clip]) -> bytes:
+    """A safetensors file: clips as `clip.to_bytes` has them, the figure as JSON in the header.
+
+    Args:
+        somebody: Of the rig as the page has it, whose joints may have been rounded.
+        clips: By name.
+    """
+    figure = json.dumps(figure_of(somebody))
+    return save(tensors_of(clips), {"clips": header_of(clips), "figure": figure})
+
+
+def clips_for(content: bytes, rig: Rig) -> dict[str, Clip]:
+    """The clips of a file that was written for a rig.
+
+    Raises:
+        SettingsError: If the file is damaged, or its figure is not that of the rig.
+    """
+    clips = from_bytes(content)  # it is sound from here on, but for the figure
+    size = int.from_bytes(content[:8], "little")
+    header = cast(dict[str, Any], json.loads(content[8 : 8 + size]))
+    text = header["__metadata__"].get("figure", "")
+    try:
+        figure = parse_json(text.encode(), "the figure", ValueError)
+    except ValueError as error:
+        raise SettingsError("the file of gestures tells no figure.") from error
+    if not alike(figure_of(living(rig, 0)), figure):
+        raise SettingsError("the file of gestures was made for another rig.")
+    return clips

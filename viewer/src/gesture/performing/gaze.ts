@@ -1,0 +1,75 @@
+import { multiply, subtract, type Quat, type Vector } from '../../rig/quaternions.ts';
+import { about } from '../turning.ts';
+
+const RADIANS = Math.PI / 180;
+const TICK = 0.01; // s of a step: whatever asks, motion is the same
+const HEAD_YAW = 50 * RADIANS; // how far neck and head turn against the chest
+const HEAD_PITCH = 22 * RADIANS;
+const CHEST_YAW = 24 * RADIANS;
+const CHEST_FROM = 15 * RADIANS; // the angle from which on the chest turns, too
+const CHEST_PART = 0.4; // of what is beyond
+const HEAD_SPEED = 140 * RADIANS; // a second, at most
+const CHEST_SPEED = 45 * RADIANS;
+const HEAD_STIFF = 7; // 1/s
+const CHEST_STIFF = 3;
+const PITCH_PART = 0.75; // of the height of the visitor's eyes that the head follows
+
+/** An angle that follows a target, critically damped, no faster than a limit. */
+class Hinge {
+  angle = 0;
+  private speed = 0;
+  private readonly stiff: number;
+  private readonly fastest: number;
+
+  constructor(stiff: number, fastest: number) {
+    this.stiff = stiff;
+    this.fastest = fastest;
+  }
+
+  step(target: number): void {
+    const pull = this.stiff * this.stiff * (target - this.angle) - 2 * this.stiff * this.speed;
+    const most = this.stiff * this.fastest;
+    this.speed = clamp(this.speed + TICK * clamp(pull, most), this.fastest);
+    this.angle += TICK * this.speed;
+  }
+}
+
+/** Where chest and head are turned: to the visitor, as far and as fast as people do. */
+export class Gaze {
+  private steps = 0;
+  private yaw = 0;
+  private pitch = 0;
+  private readonly chest = new Hinge(CHEST_STIFF, CHEST_SPEED);
+  private readonly head = new Hinge(HEAD_STIFF, HEAD_SPEED);
+  private readonly nod = new Hinge(HEAD_STIFF, HEAD_SPEED);
+
+  /** The visitor is so many radians to the person's left, and downwards. */
+  look(yaw: number, pitch: number): void {
+    this.yaw = yaw;
+    this.pitch = pitch;
+  }
+
+  /** Turns of chest, neck and head at a time, s, not before the last one asked for. */
+  at(time: number): [Quat, Quat, Quat] {
+    for (; this.steps * TICK < time - 1e-9; this.steps++) this.step();
+    const half = multiply(about([0, 1, 0], 0.5 * this.head.angle), about([1, 0, 0], 0.5 * this.nod.angle));
+    return [about([0, 1, 0], this.chest.angle), half, half];
+  }
+
+  private step(): void {
+    const beyond = Math.max(Math.abs(this.yaw) - CHEST_FROM, 0) * CHEST_PART;
+    this.chest.step(Math.sign(this.yaw) * Math.min(beyond, CHEST_YAW));
+    this.head.step(clamp(this.yaw - this.chest.angle, HEAD_YAW));
+    this.nod.step(clamp(PITCH_PART * this.pitch, HEAD_PITCH));
+  }
+}
+
+/** Radians to the person's left, and downwards, from eyes to a visitor. */
+export function directionTo(eyes: Vector, visitor: Vector): [number, number] {
+  const [x, y, z] = subtract(visitor, eyes);
+  return [Math.atan2(x, z), -Math.atan2(y, Math.sqrt(x * x + z * z))];
+}
+
+function clamp(value: number, most: number): number {
+  return Math.min(Math.max(value, -most), most);
+}

@@ -1,0 +1,55 @@
+import { add, multiply, rotate, subtract, toMatrix, type Quat, type Vector } from './quaternions.ts';
+
+/** Joints in the world. */
+export interface Posed {
+  turned: Quat[]; // (J,4) from rest space to the world
+  places: Vector[]; // (J,3) m
+}
+
+/** Bones, as in `ico3d/rig/rig.py`: no joint is turned at rest, rotations are given in the axes of rest space. */
+export class Rig {
+  readonly parents: readonly number[]; // each before its children; -1 for joint 0, the only root
+  readonly joints: readonly Vector[]; // m, at rest
+
+  constructor(parents: readonly number[], joints: readonly Vector[]) {
+    this.parents = parents;
+    this.joints = joints;
+  }
+
+  /**
+   * Where each joint is and how it is turned.
+   *
+   * @param rotations of each joint about itself
+   * @param root m that the root moves
+   */
+  posed(rotations: readonly Quat[], root: Vector): Posed {
+    const turned: Quat[] = [rotations[0]!];
+    const places: Vector[] = [add(this.joints[0]!, root)];
+    for (let joint = 1; joint < this.parents.length; joint++) {
+      const parent = this.parents[joint]!;
+      const bone = subtract(this.joints[joint]!, this.joints[parent]!);
+      turned.push(multiply(turned[parent]!, rotations[joint]!));
+      places.push(add(places[parent]!, rotate(turned[parent]!, bone)));
+    }
+    return { turned, places };
+  }
+
+  /**
+   * What takes points that are bound to each joint from rest to the world.
+   *
+   * @returns (J,3,4) rotation and, in the last column, shift
+   */
+  matrices(rotations: readonly Quat[], root: Vector): Float64Array {
+    const { turned, places } = this.posed(rotations, root);
+    const found = new Float64Array(12 * turned.length);
+    for (const [joint, quat] of turned.entries()) {
+      const matrix = toMatrix(quat);
+      const shift = subtract(places[joint]!, rotate(quat, this.joints[joint]!));
+      for (let row = 0; row < 3; row++) {
+        found.set(matrix.slice(3 * row, 3 * row + 3), 12 * joint + 4 * row);
+        found[12 * joint + 4 * row + 3] = shift[row]!;
+      }
+    }
+    return found;
+  }
+}
