@@ -1,13 +1,17 @@
 import { beforeAll, describe, expect, test } from 'vitest';
+import { DISPLAY_LEAD } from '../../src/face/face.ts';
 import { Living } from '../../src/gesture/living.ts';
 import { chance, scrambled, wander } from '../../src/gesture/noise.ts';
+import { BodyLanguage } from '../../src/gesture/performing/body-language.ts';
+import type { Direction } from '../../src/gesture/performing/cues.ts';
 import { directionTo, Gaze } from '../../src/gesture/performing/gaze.ts';
 import { Listener, Loudness } from '../../src/gesture/performing/listening.ts';
 import { Performer } from '../../src/gesture/performing/performer.ts';
 import { readRepertoire, type Repertoire } from '../../src/gesture/repertoire.ts';
 import { Retarget } from '../../src/gesture/retarget.ts';
 import { aligned, arc, power, twistAngle } from '../../src/gesture/turning.ts';
-import { fromRotvec, multiply, rotate, slerp, toRotvec } from '../../src/rig/quaternions.ts';
+import type { Spoken } from '../../src/motion/director.ts';
+import { dotQuat, fromRotvec, multiply, rotate, slerp, toRotvec, type Quat } from '../../src/rig/quaternions.ts';
 import { Rig } from '../../src/rig/rig.ts';
 import { makeGestureReference, type GestureReference, type Moved, type Performance, type PersonReference } from '../../support/references/gestures.ts';
 
@@ -145,5 +149,182 @@ describe('people', () => {
     performer.follow(directions, clock);
     performer.stop(clock, now);
     expectMoved((i) => performer.at(moved.times[i]!), moved, 'interrupted');
+  });
+});
+
+describe('files of gestures', () => {
+  interface Header {
+    __metadata__: { clips: string; figure: string };
+    [tensor: string]: unknown;
+  }
+
+  /** The file of a person with another header, or with other bytes behind it. */
+  function changed(change: (header: Header) => void, data: (bytes: Uint8Array) => void = () => {}): ArrayBuffer {
+    const { file } = people[0]![1];
+    const length = Number(new DataView(file).getBigUint64(0, true));
+    const header = JSON.parse(new TextDecoder().decode(new Uint8Array(file, 8, length))) as Header;
+    change(header);
+    const text = new TextEncoder().encode(JSON.stringify(header));
+    const bytes = new Uint8Array(8 + text.length + file.byteLength - 8 - length);
+    new DataView(bytes.buffer).setBigUint64(0, BigInt(text.length), true);
+    bytes.set(text, 8);
+    bytes.set(new Uint8Array(file, 8 + length), 8 + text.length);
+    data(bytes.subarray(8 + text.length));
+    return bytes.buffer;
+  }
+
+  const read = (buffer: ArrayBuffer) => readRepertoire(buffer, 'gestures', people[0]![1].parents.length);
+
+  /** A change of the figure or of the clips in the header. */
+  function inHeader(key: 'clips' | 'figure', change: (value: any) => void): ArrayBuffer {
+    return changed(({ __metadata__ }) => {
+      const value = JSON.parse(__metadata__[key]);
+      change(value);
+      __metadata__[key] = JSON.stringify(value);
+    });
+  }
+
+  test('are read whatever their header', () => {
+    expect(read(changed(() => {})).clips.size).toBe(people[0]![2].clips.size);
+  });
+
+  test('without figure or clips are refused', () => {
+    expect(() => read(changed(({ __metadata__ }) => (__metadata__.figure = '{')))).toThrow('without its figure');
+    expect(() => read(changed((header) => delete (header as Partial<Header>).__metadata__))).toThrow('without its figure');
+    expect(() => read(inHeader('clips', (clips) => (clips.version = 2)))).toThrow('has version 2, not 1');
+    expect(() => read(people[0]![1].file.slice(0, 1000))).toThrow('gestures ends before');
+  });
+
+  test('whose curves are none are refused', () => {
+    const rename = (from: string, to: string) => (header: Header) => {
+      header[to] = header[from];
+      delete header[from];
+    };
+    expect(() => read(changed(rename('nod/head/rotations', 'nod/tail/rotations')))).toThrow('nod/tail/rotations');
+    expect(() => read(changed(rename('nod/head/times', 'nod/head/when')))).toThrow('nod/head/rotations');
+    expect(() => read(changed(() => {}, (bytes) => bytes.fill(0)))).toThrow(/are wrong/);
+    expect(() => read(inHeader('clips', ({ marks }) => (marks.nod.end = 0.01)))).toThrow('nod holds no gesture: its marks are wrong');
+    expect(() => read(inHeader('clips', ({ marks }) => (marks.nod.stroke = null)))).toThrow('marks are wrong');
+  });
+
+  test('of another rig, or with impossible figures, are refused', () => {
+    const damages: [string, (figure: any) => void][] = [
+      ['height', (figure) => (figure.height = null)],
+      ['eyes', (figure) => figure.eyes.pop()],
+      ['hung', (figure) => (figure.hung[3] = [0, 0, 0, 0])],
+      ['parts of head', (figure) => (figure.parts[4].joints = [999])],
+      ['parts of tail', (figure) => (figure.parts[4].role = 'tail')],
+      ['parts of left_shoulder', (figure) => (figure.parts.find(({ role }: any) => role === 'left_shoulder').axes = [[2, 0, 0]])],
+      ['legs.left', (figure) => (figure.legs.left.lengths = [0, 1])],
+      ['legs.right', (figure) => delete figure.legs.right],
+    ];
+    for (const [field, damage] of damages) {
+      expect(() => read(inHeader('figure', damage)), field).toThrow(`damaged: ${field} of the figure is wrong`);
+    }
+  });
+});
+
+describe('body language', () => {
+  const BEAT: Direction[] = [
+    { number: 0, name: 'beat_right', mirror: false, begin: 1, stroke: 1.65, skip: 0 },
+    { number: 0, time: 2.5 },
+  ];
+  const SHRUG: Direction = { number: 1, name: 'shrug', mirror: false, begin: 1, stroke: 1.8, skip: 0 };
+  let heard: Spoken | null;
+
+  function body(): { self: BodyLanguage; joint: (role: string) => Quat } {
+    heard = null;
+    const [, { parents, joints }, repertoire] = people[0]!;
+    const self = new BodyLanguage(new Rig(parents, joints), repertoire, 1, () => heard);
+    const number = (role: string) => repertoire.figure.parts.find((part) => part.role === role)!.joints[0]!;
+    return { self, joint: (role) => self.pose().rotations[number(role)]! };
+  }
+
+  /** Degrees between two rotations. */
+  function degrees(a: Quat, b: Quat): number {
+    return (360 / Math.PI) * Math.acos(Math.min(1, Math.abs(dotQuat(a, b))));
+  }
+
+  test('gestures with the sound, stands still with it, and goes on when the sound is over', () => {
+    const { self, joint } = body();
+    self.advance(20);
+    self.plan(3, BEAT);
+    const rest = joint('right_elbow');
+    heard = { utterance: 3, seconds: 1.65 - DISPLAY_LEAD };
+    self.advance(0.02);
+    const stroke = joint('right_elbow');
+    expect(degrees(stroke, rest)).toBeGreaterThan(30);
+    heard = { ...heard, paused: true };
+    self.advance(4);
+    expectAlike(joint('right_elbow'), stroke, 'paused');
+    heard = null;
+    self.advance(0.6);
+    expect(degrees(joint('right_elbow'), rest)).toBeGreaterThan(30);
+    self.advance(3);
+    expect(degrees(joint('right_elbow'), rest)).toBeLessThan(8);
+  });
+
+  test('does as Python does at the time of the sound', () => {
+    const [, { composed, parents, joints }, { figure, clips }] = people.find(([, person]) => person.composed)!;
+    const self = new BodyLanguage(new Rig(parents, joints), { figure, clips }, reference.seed, () => heard);
+    const performer = new Performer(new Living(figure, reference.seed), clips);
+    const retarget = new Retarget(new Rig(parents, joints), figure);
+    performer.follow(composed!.directions, { offset: 0 });
+    self.plan(0, composed!.directions);
+    const times = [...composed!.times].toSorted((a, b) => a - b);
+    for (const [i, time] of times.entries()) {
+      heard = { utterance: 0, seconds: time - DISPLAY_LEAD };
+      self.advance(time - (times[i - 1] ?? 0));
+      const wanted = performer.at(time);
+      expectAlike(self.pose().rotations, retarget.pose(wanted.pose), `${time} s`);
+      expectAlike(self.pose().root, wanted.root, `${time} s`);
+    }
+  });
+
+  test('lets go when it is interrupted, and never makes what nobody heard', () => {
+    const { self, joint } = body();
+    self.advance(20);
+    const rest = joint('right_elbow');
+    self.plan(0, [SHRUG]); // held until it is released
+    self.plan(1, [SHRUG]);
+    heard = { utterance: 1, seconds: 3 };
+    self.advance(0.02);
+    expect(degrees(joint('right_elbow'), rest)).toBeGreaterThan(30);
+    self.stop(1);
+    heard = null;
+    self.advance(4);
+    expect(degrees(joint('right_elbow'), rest)).toBeLessThan(8);
+    self.plan(0, [SHRUG]);
+    self.plan(1, [SHRUG]);
+    self.reset();
+    heard = { utterance: 0, seconds: 3 };
+    self.advance(0.02);
+    expect(degrees(joint('right_elbow'), rest)).toBeLessThan(8);
+  });
+
+  test('looks at the visitor', () => {
+    const { self, joint } = body();
+    const before = joint('head');
+    self.look([2, 1.6, 1]);
+    self.advance(1.5);
+    expect(degrees(joint('head'), before)).toBeGreaterThan(15);
+  });
+
+  test('nods to the visitor, but not while it speaks itself', () => {
+    const listen = (speaks: boolean) => {
+      const { self, joint } = body();
+      const { pcm } = reference.listening;
+      const angles: number[] = [];
+      const still = body();
+      heard = speaks ? { utterance: 0, seconds: 1 } : null;
+      for (let first = 0; first < 20 * 16_000; first += 1600) {
+        self.listen(pcm.subarray(first, first + 1600));
+        for (const one of [self, still.self]) one.advance(0.1);
+        angles.push(degrees(joint('head'), still.joint('head')));
+      }
+      return Math.max(...angles);
+    };
+    expect(listen(false)).toBeGreaterThan(2);
+    expect(listen(true)).toBeLessThan(1e-3);
   });
 });
