@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 import torch
 
+from ico3d.avatar.baked_body import window_gaussians
 from ico3d.avatar.baking import body_bundle, body_cost
 from ico3d.avatar.baking.shader_body import Shape, WindowBaker, aligned
-from ico3d.avatar.render_bundle import body_gaussians, render_body, visitor_camera, window_gaussians
+from ico3d.avatar.render_bundle import body_gaussians, render_body, visitor_camera
 from ico3d.body.model_folder import TrainedBody, save_window
 from ico3d.body.motion.formulas import SPACETIME
 from ico3d.body.motion.window_model import WindowModel

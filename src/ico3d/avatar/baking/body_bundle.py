@@ -1,12 +1,14 @@
 """From a trained body to a bundle that browsers play."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from ico3d.avatar import staging
+from ico3d.avatar.baked_body import window_gaussians
 from ico3d.avatar.baking import head_cost
 from ico3d.avatar.baking.body_cost import (
     HeadAt,
@@ -17,9 +19,8 @@ from ico3d.avatar.baking.body_cost import (
     window_pair,
 )
 from ico3d.avatar.baking.shader_body import SAMPLES_PER_FRAME, Shape, WindowBaker
-from ico3d.avatar.clip_views import recorded_views
+from ico3d.avatar.clip_views import At, recorded_views
 from ico3d.avatar.moving import MovingBody
-from ico3d.avatar.render_bundle import window_gaussians
 from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.format import LICENSES, THUMBNAIL, write_bundle
 from ico3d.bundle.manifest import (
@@ -187,7 +188,9 @@ def strip(body: MovingBody, results: list[WindowResult], capture: Capture | None
     """[recorded |] exact | baked of each window's begin, one below the other: uint8."""
     lines = []
     for index, (span, result) in enumerate(zip(body.windows, results, strict=True)):
-        probes = probe_views(ring_of_cameras(*seen_box(result.window)), span, 1)
+        probes = probe_views(
+            ring_of_cameras(*seen_box(partial(window_gaussians, result.window))), span, 1
+        )
         views = list(recorded_views(capture, span, 1)) if capture else probes
         pair = window_pair(body, index, result.window, None)
         lines.append(comparison_line(*pair, views[0]))
@@ -203,7 +206,7 @@ def _attempts(
     for shape in SHAPES:
         baked = baker.baked(shape)
         recorded = recorded_views(capture, span) if capture else []
-        probes = probe_views(ring_of_cameras(*seen_box(baked)), span)
+        probes = probe_views(ring_of_cameras(*seen_box(partial(window_gaussians, baked))), span)
         loss = measure_window(body, index, baked, recorded, probes, head)
         yield WindowResult(baked, baked.to_bytes(window_file(index)), seconds, loss)
 
@@ -221,7 +224,7 @@ def _best(attempts: Iterator[WindowResult]) -> WindowResult:
 
 def body_info(windows: list[BakedWindow], body: MovingBody) -> BodyInfo:
     """What the manifest says about a body."""
-    boxes = [seen_box(window, (0.0, 0.5, 1.0)) for window in windows]
+    boxes = [seen_box(partial(window_gaussians, window), (0.0, 0.5, 1.0)) for window in windows]
     infos = [
         WindowInfo(
             first=span.first,
@@ -240,15 +243,13 @@ def body_info(windows: list[BakedWindow], body: MovingBody) -> BodyInfo:
     )
 
 
-def seen_box(
-    window: BakedWindow, taus: tuple[float, ...] = (0.5,)
-) -> tuple[np.ndarray, np.ndarray]:
-    """Least and greatest coordinates of what is seen, but for a few strays."""
-    seen = window.rgba[:, 3] > 255 * _VISIBLE
-    points = np.concatenate(
-        [window.at(tau)[0][seen if seen.any() else slice(None)] for tau in taus]
-    )
-    low, high = np.percentile(points, (0.5, 99.5), axis=0)
+def seen_box(at: At, taus: Sequence[float] = (0.5,)) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest coordinates of what is seen at some times, but for a few strays."""
+    points = []
+    for gaussians in map(at, taus):
+        seen = gaussians.opacities > _VISIBLE
+        points.append(gaussians.means[seen if seen.any() else slice(None)].cpu().numpy())
+    low, high = np.percentile(np.concatenate(points), (0.5, 99.5), axis=0)
     return low, high
 
 

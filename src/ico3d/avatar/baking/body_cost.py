@@ -5,11 +5,11 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 import torch
 
+from ico3d.avatar.baked_body import window_gaussians
 from ico3d.avatar.baking.head_cost import mean_of
 from ico3d.avatar.baking.shader_body import SAMPLES_PER_FRAME
 from ico3d.avatar.clip_views import VIEWS, At, View, drawn
 from ico3d.avatar.moving import MovingBody, Span
-from ico3d.avatar.render_bundle import window_gaussians
 from ico3d.avatar.staging import NEUTRAL
 from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.manifest import Loss

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from ico3d.avatar import clip_views, staging
 from ico3d.avatar.animation import motion_quality
 from ico3d.avatar.animation.keyframes import Motion, find_animation, read_animation
 from ico3d.avatar.avatar import TrainedAvatar
+from ico3d.avatar.baked_body import WindowedBody
 from ico3d.avatar.baking import body_bundle, body_cost, head_bundle, head_cost
 from ico3d.avatar.baking.body_bundle import WindowResult
 from ico3d.avatar.baking.samples import (
@@ -108,9 +110,7 @@ def put_together(
     place = avatar.placement
     person = BakedAvatar(
         moved_head(head, place.canonical_from_head),
-        lambda index: windows[index].window,
-        avatar.body.windows,
-        avatar.fps,
+        WindowedBody(lambda index: windows[index].window, avatar.body.windows, avatar.fps),
         place.world_from_canonical,
     )
     idle = head_bundle.idle_expression(avatar.head, expressions)
@@ -282,8 +282,9 @@ def _probes(avatar: TrainedAvatar, person: BakedAvatar, count: int) -> list[clip
 def _box(person: BakedAvatar) -> tuple[np.ndarray, np.ndarray]:
     """Least and greatest coordinates of what is seen, in all frames where windows begin or end."""
     boxes = []
-    for index, span in enumerate(person.spans):
-        boxes.append(body_bundle.seen_box(person.window(index), (0.0, 0.5, 1.0)))
+    for index, span in enumerate(person.body.windows):
+        at = partial(person.body.window_gaussians, index)
+        boxes.append(body_bundle.seen_box(at, (0.0, 0.5, 1.0)))
         for frame in (span.first, span.last):
             boxes.append(_head_box(person, frame))
     low, high = zip(*boxes, strict=True)
