@@ -148,8 +148,22 @@ function checkSkinned(info: SkinnedInfo): void {
 }
 
 /** Frames of a body of windows. */
-export function framesOf({ windows }: BodyInfo): number {
+function framesOf({ windows }: BodyInfo): number {
   return windows.at(-1)!.last + 1;
+}
+
+/** What is alike in bodies of both kinds. */
+export interface AnyBody {
+  fps: number;
+  frames: number;
+  low: [number, number, number];
+  high: [number, number, number];
+}
+
+/** The body, of windows or on a skeleton, if there is one. */
+export function bodyOf({ body, skinned }: Pick<Manifest, 'body' | 'skinned'>): AnyBody | null {
+  if (body) return { fps: body.fps, frames: framesOf(body), low: body.low, high: body.high };
+  return skinned && { fps: skinned.fps, frames: skinned.num_frames, low: skinned.low, high: skinned.high };
 }
 
 function isCount(value: unknown, most: number): boolean {
