@@ -11,6 +11,7 @@ from ico3d.body.skinning.skinned import Pose, Skinned
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.skinned.posing import any_pose, recorded_pose
 from ico3d.rig.quaternions import from_rotvec
+from support.bodies.skinned_model import trained_like
 from support.bundles.random_skinned import random_skinned, write_random_skinned
 
 FPS = 15.0
@@ -23,34 +24,15 @@ def bundle(tmp_path_factory) -> Bundle:
     return Bundle.open(path)
 
 
-def trained(baked) -> tuple[Skinned, dict[str, torch.Tensor]]:
-    """The model of training that the bundle's numbers stand for."""
-    info, units = baked.info, baked.shape_scales.astype(np.float32)
-    shapes = baked.shapes.astype(np.float32).transpose(0, 2, 1)  # (N, 6, K)
-    arrays = {
-        "means": baked.means,
-        "quats": baked.quats / np.float32(32767),
-        "log_scales": baked.log_scales.astype(np.float32),
-        "opacity_logits": torch.logit(torch.from_numpy(baked.opacities / 255)).float(),
-        "color_logits": baked.color_logits.astype(np.float32),
-        "skin_joints": baked.joints.astype(np.int32),
-        "skin_logits": np.log(np.maximum(baked.weights / np.float32(255), 1e-12)),
-        "normals": baked.normals.astype(np.float32),
-        "shape_means": shapes[:, :3] * units[:, :1, None] / 1000,
-        "shape_colors": shapes[:, 3:] * units[:, 1:, None],
-        "rig_joints": baked.rig_joints,
-        "light": baked.light,
-    }
-    motion = Skinned(info.names, info.parents, info.num_frames, info.num_shapes, 1, True)
-    return motion, {name: torch.as_tensor(array) for name, array in arrays.items()}
-
-
 @pytest.mark.parametrize("recorded", [True, False])
 def test_a_baked_body_is_drawn_as_the_trained_one(recorded):
     baked = random_skinned(40)
     away = from_rotvec(np.random.default_rng(1).normal(0, 0.8, (5, 3)))
     pose = recorded_pose(baked, 2.4) if recorded else any_pose(baked, away, np.array([0.1, 0, -2]))
-    motion, values = trained(baked)
+    model = trained_like(baked)
+    motion = model.motion
+    assert isinstance(motion, Skinned)
+    values = {**model.gaussians, **model.shared}
     parts = (torch.from_numpy(part).float() for part in (pose.rotations, pose.root, pose.residual))
     expected, found = motion.drawn(values, Pose(*parts)), skinned_gaussians(baked, pose)
     torch.testing.assert_close(found.means, expected.means, atol=2e-5, rtol=0)

@@ -11,6 +11,7 @@ OUT/splats.f32 (per moment: N × (x, y, z, r, g, b, opacity)) and, if asked, OUT
 import argparse
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -47,7 +48,7 @@ def main() -> None:
         (time, recorded_pose(baked, time * baked.info.fps)) for time in times
     ]
     poses.append((None, any_pose(baked, unseen_pose(), ROOT)))
-    moments = [
+    moments: list[dict[str, Any]] = [
         {
             "time": time,
             **{name: values.ravel().tolist() for name, values in vars(pose).items()},
