@@ -2,8 +2,18 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from ico3d.motion.composing.accents import FRAME, Word, accents, loudness, smoothed, timed_words
+from ico3d.motion.composing.accents import (
+    FRAME,
+    GrowingLoudness,
+    Word,
+    accents,
+    loudness,
+    smoothed,
+    timed_words,
+)
 from ico3d.motion.composing.lexicon import meanings, requested, stressed
 from ico3d.motion.composing.listening import APART, Listener
 
@@ -115,3 +125,16 @@ def test_a_listener_nods_in_pauses_only_and_not_too_often():
     assert [nod for i in range(0, 4000, 33) for nod in pieces.hear(speech[i : i + 33])] == whole
     assert Listener(4).hear(speech) != whole
     assert Listener(3).hear(np.full(4000, -70.0)) == []
+
+
+@given(st.integers(0, 1000), st.sampled_from([16_000, 22_050, 24_000]))
+@settings(max_examples=10, deadline=None)
+def test_loudness_is_the_same_in_whatever_pieces_sound_comes(seed, rate):
+    random = np.random.default_rng(seed)
+    samples = random.normal(size=rate) * np.repeat(random.uniform(0, 0.3, 10), rate // 10)[:rate]
+    growing = GrowingLoudness(rate)
+    for piece in np.split(samples, np.sort(random.integers(0, rate, 12))):
+        growing.push(piece)
+    whole = loudness(samples, rate)
+    assert 0 <= len(whole) - len(growing.levels) <= 2
+    np.testing.assert_allclose(growing.levels, whole[: len(growing.levels)], atol=1e-6)

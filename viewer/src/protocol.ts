@@ -1,6 +1,6 @@
 // Written by `python -m ico3d.chat.generating`. Edit src/ico3d/chat/wire/protocol.py instead.
 
-export const VERSION = 4;
+export const VERSION = 5;
 export const MICROPHONE_RATE = 16000; // Hz
 export const MICROPHONE_CHUNK = 512; // samples of a message
 export const SPEECH_RATE = 24000; // Hz
@@ -48,6 +48,30 @@ export interface Offer {
   name: string;
   /** What keeps it from working and what would mend it; empty if it works. */
   hindrance: string;
+}
+
+/** A gesture to make; times are the utterance's. */
+export interface Cue {
+  /** Counts the cues of the utterance. */
+  number: number;
+  /** Of the gesture in the bundle. */
+  name: string;
+  /** Whether with the other hand. */
+  mirror: boolean;
+  /** When it begins. */
+  begin: number;
+  /** When its stroke arrives: on an accent. */
+  stroke: number;
+  /** Seconds of the gesture's beginning that are left out. */
+  skip: number;
+}
+
+/** A gesture that is held is let go. */
+export interface Release {
+  /** Of its cue. */
+  number: number;
+  /** When hands begin to come down, on the utterance's time. */
+  time: number;
 }
 
 /** First message of every connection. */
@@ -205,6 +229,17 @@ export interface TimelineMessage {
   points: [number, number][];
 }
 
+/** What a body on a skeleton does while it speaks; nothing that was sent is taken back. */
+export interface CuesMessage {
+  type: "cues";
+  /** Which answer. */
+  utterance: number;
+  /** Gestures to make, later ones upon earlier ones. */
+  cues: Cue[];
+  /** Of these or of earlier ones. */
+  releases: Release[];
+}
+
 /** All sound of an utterance has been sent. */
 export interface EndMessage {
   type: "end";
@@ -273,6 +308,7 @@ export type ServerMessage =
   | AnswerMessage
   | SpeechMessage
   | TimelineMessage
+  | CuesMessage
   | EndMessage
   | StopMessage
   | PauseMessage
@@ -280,7 +316,7 @@ export type ServerMessage =
   | MetricsMessage
   | ErrorMessage;
 
-const SERVER_TYPES = ["welcome", "ack", "state", "transcript", "answer", "speech", "timeline", "end", "stop", "pause", "resume", "metrics", "error"];
+const SERVER_TYPES = ["welcome", "ack", "state", "transcript", "answer", "speech", "timeline", "cues", "end", "stop", "pause", "resume", "metrics", "error"];
 
 const TENSORS: Record<string, readonly Tensor[]> = {
   audio: [["pcm", "int16"]],

@@ -18,8 +18,10 @@ from ico3d.bundle.manifest import MANIFEST, FileEntry, Manifest, check_manifest
 from ico3d.bundle.onnx_check import check_onnx
 from ico3d.bundle.packaged import bundle_path
 from ico3d.bundle.skinned.baked import BakedSkinned
+from ico3d.bundle.skinned.gestures import GESTURES, gestures_from
 from ico3d.bundle.skinned.info import SKINNED
 from ico3d.errors import BundleError
+from ico3d.motion.clip import Clip
 
 SPEECH = "speech.onnx"
 THUMBNAIL = "thumbnail.png"
@@ -35,6 +37,7 @@ class Bundle:
         world_from_head: (F, 4, 4) float32 head poses at `manifest.head.fps`: one per frame of the
             body, or, without a body, to be played back and forth; None without a head.
         skinned: The body on a skeleton, None where there is none.
+        gestures: What that body can do besides what was recorded; None where it cannot.
         animation: How a whole person moves; None where there is a head or a body only.
     """
 
@@ -42,6 +45,7 @@ class Bundle:
     head: BakedHead | None
     world_from_head: np.ndarray | None
     skinned: BakedSkinned | None
+    gestures: dict[str, Clip] | None
     animation: Animation | None
 
     def __init__(self, archive: Archive):
@@ -125,9 +129,11 @@ class Bundle:
             self.world_from_head = poses_from_bytes(self.read(POSES), info.num_poses)
         for index in range(len(self.manifest.body.windows) if self.manifest.body else 0):
             self.window(index)  # not kept: together they may be large
-        self.skinned = self.animation = None
+        self.skinned = self.gestures = self.animation = None
         if self.manifest.skinned is not None:
             self.skinned = BakedSkinned.from_bytes(self.read(SKINNED), self.manifest.skinned)
+            if GESTURES in self.manifest.files:
+                self.gestures = gestures_from(self.read(GESTURES), self.skinned.rig)
         if self.manifest.is_whole and self.manifest.any_body is not None:
             self.animation = Animation.from_bytes(self.read(ANIMATION))
             self.animation.check_body(self.manifest.any_body)
@@ -222,8 +228,9 @@ def _check_required(manifest: Manifest) -> None:
         required |= {ANIMATION}
     for name in sorted(required - set(manifest.files)):
         raise BundleError(f"{name}: is missing.")
+    possible = {LICENSES, *BACKGROUNDS, *([GESTURES] if manifest.skinned else [])}
     for name in manifest.files:
-        if name not in required | {LICENSES, *BACKGROUNDS}:
+        if name not in required | possible:
             raise BundleError(f"{name[:80]}: does not belong into this bundle.")
     if set(BACKGROUNDS) <= set(manifest.files):
         raise BundleError(f"a bundle holds one of {' and '.join(BACKGROUNDS)}, not both.")

@@ -19,13 +19,14 @@ from pipecat.turns.user_turn_strategies import UserTurnStrategies
 from pipecat.workers.runner import WorkerRunner
 
 from ico3d.chat.activity import Activity
-from ico3d.chat.frames import TypedFrame, Utterances
+from ico3d.chat.frames import SpeechFrame, TypedFrame, UtteranceEndFrame, Utterances
 from ico3d.chat.listener import Captions, PageInput
 from ico3d.chat.memory import forget, remembering
 from ico3d.chat.observing.monitor import Visitor
 from ico3d.chat.observing.timing import PipelineClock, TurnObserver
 from ico3d.chat.page import Page
 from ico3d.chat.parts import Avatar, Parts, make_aside
+from ico3d.chat.performing.cueing import Cueing
 from ico3d.chat.performing.expression import ExpressionProcessor
 from ico3d.chat.performing.face import Face
 from ico3d.chat.performing.gestures import Gestures
@@ -84,9 +85,7 @@ class Conversation:
         self._utterances = Utterances()
         self._input = PageInput()
         self._captions = Captions(page)
-        gestures = avatar.animation and Gestures(
-            avatar.animation, page, self._utterances, avatar.settings.gestures, seed
-        )
+        gestures = self._body()
         self._echo, self._gestures = EchoGuard(), gestures
         self._speaker = Speaker(page, self._utterances, self._echo.sent, gestures, now)
         self._worker: PipelineWorker | None = None
@@ -231,11 +230,20 @@ class Conversation:
                 ),
                 ClauseProcessor(self._language()),
                 parts.voice,
-                ExpressionProcessor(face, self._utterances, run),
+                ExpressionProcessor(face, self._utterances, run, self._made),
                 self._speaker,
                 assistant,
             ]
         )
+
+    def _body(self) -> Gestures | Cueing | None:
+        """Who moves the body: by gestures on its skeleton, else as it was recorded."""
+        avatar, moving = self._avatar, self._avatar.settings.gestures
+        if avatar.clips is not None:
+            return Cueing(avatar.clips, self._page, moving, self._seed)
+        if avatar.animation is None:
+            return None
+        return Gestures(avatar.animation, self._page, self._utterances, moving, self._seed)
 
     def _apology_language(self) -> str:
         """Language of apologies."""
@@ -244,6 +252,10 @@ class Conversation:
     def _language(self) -> str | None:
         """The persona's first."""
         return next(iter(self._avatar.persona.languages), None)
+
+    def _made(self, frame: SpeechFrame | UtteranceEndFrame) -> None:
+        if isinstance(self._gestures, Cueing):
+            self._gestures.read(frame)
 
     def _complain(self, sentence: str) -> None:
         self._page.send(Error(sentence, fatal=False))

@@ -26,6 +26,7 @@ from ico3d.chat.turns.eager import EagerSmartTurn
 from ico3d.chat.wire import protocol
 from ico3d.chat.workers import Workers
 from ico3d.errors import Ico3dError, ServiceError
+from ico3d.motion.clip import Clip
 from ico3d.speech.runtime import SpeechModel
 
 SLOWEST = 120.0  # s for a first answer, for which a server may load its model
@@ -46,6 +47,7 @@ class Avatar:
         settings: Services and timing.
         animation: How its body moves; None for a head alone.
         speech_sha256: Of the file of `speech`, by which a remote module knows that it is its own.
+        clips: Gestures of a body on a skeleton, by name; None where it is none, or has none.
         workers: Threads in which faces are made.
     """
 
@@ -56,6 +58,7 @@ class Avatar:
     settings: ChatSettings
     animation: Animation | None
     speech_sha256: str = ""
+    clips: dict[str, Clip] | None = None
     workers: Workers = field(default_factory=Workers)
 
 

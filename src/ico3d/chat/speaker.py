@@ -24,6 +24,7 @@ from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
 
 from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame, Utterances
 from ico3d.chat.page import Page
+from ico3d.chat.performing.cueing import Cueing
 from ico3d.chat.performing.gestures import Gestures
 from ico3d.chat.playback import Playback
 from ico3d.chat.turns.echo import SentSound
@@ -40,7 +41,7 @@ class Speaker(FrameProcessor):
         page: Page,
         utterances: Utterances,
         sent: SentSound,
-        gestures: Gestures | None = None,
+        gestures: Gestures | Cueing | None = None,
         now: Callable[[], float] = time.monotonic,
     ):
         """A speaker for one session.

@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from collections.abc import Callable
 
 import numpy as np
 from pipecat.frames.frames import (
@@ -31,7 +32,13 @@ class ExpressionProcessor(FrameProcessor):
     An utterance is one answer of the language model, or one text spoken outside of an answer.
     """
 
-    def __init__(self, face: Face, utterances: Utterances | None = None, run: Run = at_once):
+    def __init__(
+        self,
+        face: Face,
+        utterances: Utterances | None = None,
+        run: Run = at_once,
+        made: Callable[[SpeechFrame | UtteranceEndFrame], None] | None = None,
+    ):
         """A processor for one session.
 
         Args:
@@ -39,9 +46,11 @@ class ExpressionProcessor(FrameProcessor):
             utterances: Which answers there are; by default only this processor counts them.
             run: Does what takes a while, in time for the row that it is for; in any thread by
                 default.
+            made: Told of each piece when it is made, long before it is sent.
         """
         super().__init__()
         self._face, self._utterances, self._run = face, utterances or Utterances(), run
+        self._made = made
         self._in_answer = False
         self._utterance: int | None = None
         self._opened = time.monotonic()  # when the session began; eyes run on its time
@@ -113,7 +122,7 @@ class ExpressionProcessor(FrameProcessor):
             samples = self._next_row * ROW
             self._utterances.made(self._utterance, samples, complete=True)
             self._face.moods.forget()
-            await self.push_frame(UtteranceEndFrame(self._utterance, samples))
+            await self._hand_on(UtteranceEndFrame(self._utterance, samples))
         self._reset()
 
     async def _push(self, pieces: list[Piece]) -> None:
@@ -122,6 +131,11 @@ class ExpressionProcessor(FrameProcessor):
             row = piece.first_row
             assert self._utterance is not None
             self._utterances.made(self._utterance, row * ROW + len(piece.pcm))
-            await self.push_frame(
+            await self._hand_on(
                 SpeechFrame(self._utterance, row * ROW, row, piece.pcm, piece.expressions, text)
             )
+
+    async def _hand_on(self, frame: SpeechFrame | UtteranceEndFrame) -> None:
+        if self._made is not None:
+            self._made(frame)
+        await self.push_frame(frame)

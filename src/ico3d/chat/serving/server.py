@@ -53,7 +53,8 @@ def open_avatar(bundle: Bundle, settings: ChatSettings, persona: Persona | None 
     persona = persona or bundle.manifest.persona
     services = choose(settings, persona.voice)
     sha256 = bundle.manifest.files[SPEECH].sha256 if speech else ""
-    return Avatar(head, speech, persona, services, settings, bundle.animation, sha256)
+    moves = bundle.animation, sha256, bundle.gestures
+    return Avatar(head, speech, persona, services, settings, *moves)
 
 
 def make_app(

@@ -4,6 +4,7 @@ from pipecat.adapters.llm.schemas.tools_schema import ToolsSchema
 from pipecat.processors.aggregators.llm_context import NOT_GIVEN, NotGiven
 from pipecat.processors.frame_processor import FrameProcessor
 
+from ico3d.chat.performing.cueing import Cueing
 from ico3d.chat.performing.gestures import Gestures
 from ico3d.chat.performing.moods import Moods
 from ico3d.chat.settings.tools import Tool
@@ -13,7 +14,7 @@ from ico3d.chat.tools.http import http_function
 
 def functions(
     language: FrameProcessor,
-    gestures: Gestures | None,
+    gestures: Gestures | Cueing | None,
     moods: Moods | None,
     tools: tuple[Tool, ...],
     allow: tuple[str, ...],

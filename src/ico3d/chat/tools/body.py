@@ -15,6 +15,7 @@ from pipecat.frames.frames import (
 from pipecat.processors.frame_processor import FrameProcessor
 from pipecat.services.llm_service import FunctionCallParams
 
+from ico3d.chat.performing.cueing import Cueing
 from ico3d.chat.performing.gestures import Gestures
 from ico3d.chat.performing.moods import BROWS, Moods
 from ico3d.chat.settings.tools import OWN
@@ -58,7 +59,7 @@ class Said:
         return None
 
 
-def gesture_function(gestures: Gestures, said: Said) -> FunctionSchema:
+def gesture_function(gestures: Gestures | Cueing, said: Said) -> FunctionSchema:
     """`gesture(name)`."""
 
     async def call(params: FunctionCallParams) -> None:

@@ -20,9 +20,10 @@ from ico3d.chat.wire.marks import (
     Tensor,
     Words,
 )
+from ico3d.chat.wire.protocol_gestures import MAX_CUES, Cue, Release
 from ico3d.chat.wire.protocol_services import Dictation, Offer, Service, Services
 
-VERSION = 4
+VERSION = 5
 MICROPHONE_RATE = 16_000  # Hz, PCM16 mono from the page
 MICROPHONE_CHUNK = 512  # samples of a message: what Silero judges at once, so that none waits
 SPEECH_RATE = 24_000  # Hz, PCM16 mono to the page
@@ -266,6 +267,21 @@ class Timeline:
 
 
 @dataclass(frozen=True)
+class Cues:
+    """What a body on a skeleton does while it speaks; nothing that was sent is taken back.
+
+    Attributes:
+        utterance: Which answer.
+        cues: Gestures to make, later ones upon earlier ones.
+        releases: Of these or of earlier ones.
+    """
+
+    utterance: Count
+    cues: Annotated[list[Cue], Length(0, MAX_CUES)]
+    releases: Annotated[list[Release], Length(0, MAX_CUES)]
+
+
+@dataclass(frozen=True)
 class End:
     """All sound of an utterance has been sent.
 
@@ -348,6 +364,7 @@ ServerMessage = (
     | Answer
     | Speech
     | Timeline
+    | Cues
     | End
     | Stop
     | Pause
@@ -357,5 +374,5 @@ ServerMessage = (
 )
 CLIENT_MESSAGES = get_args(ClientMessage)
 SERVER_MESSAGES = get_args(ServerMessage)
-PARTS = (Service, Services, Dictation, Offer)
+PARTS = (Service, Services, Dictation, Offer, Cue, Release)
 """Dataclasses that messages hold."""

@@ -62,12 +62,47 @@ class Accent:
 def loudness(samples: np.ndarray, rate: int) -> Array:
     """(n,) decibels of sound (S,) in −1 … 1, every `FRAME` seconds; value i is at i · FRAME."""
     count = int(len(samples) / rate / FRAME)
-    half = max(1, round(0.5 * _WINDOW * rate))
+    return _decibels(samples, _middles(0, count, rate), _half(rate))
+
+
+def _half(rate: int) -> int:
+    """Samples of half a window."""
+    return max(1, round(0.5 * _WINDOW * rate))
+
+
+def _middles(first: int, last: int, rate: int) -> Array:
+    """(last − first,) samples in the middle of the windows of these values."""
+    return np.round(np.arange(first, last) * FRAME * rate).astype(int)
+
+
+def _decibels(samples: np.ndarray, middles: Array, half: int) -> Array:
+    """(n,) of the windows about (n,) samples."""
     power = np.concatenate([[0.0], np.cumsum(np.asarray(samples, float) ** 2)])
-    middle = np.round(np.arange(count) * FRAME * rate).astype(int)
-    first, last = np.maximum(middle - half, 0), np.minimum(middle + half, len(samples))
+    first, last = np.maximum(middles - half, 0), np.minimum(middles + half, len(samples))
     mean = (power[last] - power[first]) / np.maximum(last - first, 1)
     return np.maximum(10 * np.log10(np.maximum(mean, 1e-12)), _FLOOR)
+
+
+class GrowingLoudness:
+    """Loudness of sound that comes piece by piece."""
+
+    def __init__(self, rate: int):
+        """No sound yet, of a rate in Hz."""
+        self.levels: Array = np.zeros(0)
+        self._rate, self._half = rate, _half(rate)
+        self._kept, self._first = np.zeros(0), 0  # the last samples, and the first one's number
+
+    def push(self, samples: np.ndarray) -> None:
+        """Takes sound (S,) in −1 … 1; `levels` gets all values whose windows are known now."""
+        self._kept = np.concatenate([self._kept, samples])
+        count, known = len(self.levels), self._first + len(self._kept)
+        middles = _middles(count, int(known / self._rate / FRAME) + 1, self._rate)
+        middles = middles[middles + self._half <= known]
+        new = _decibels(self._kept, middles - self._first, self._half)
+        self.levels = np.concatenate([self.levels, new])
+        next_ = round((count + len(new)) * FRAME * self._rate)
+        past = max(next_ - self._half - self._first, 0)
+        self._kept, self._first = self._kept[past:], self._first + past
 
 
 def smoothed(levels: Array) -> Array:

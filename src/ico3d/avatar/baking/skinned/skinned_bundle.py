@@ -18,6 +18,7 @@ from ico3d.body.model_folder import TrainedBody
 from ico3d.body.skinning.skinned import Skinned
 from ico3d.bundle.manifest import Loss
 from ico3d.bundle.skinned.baked import BakedSkinned
+from ico3d.bundle.skinned.gestures import gesture_files
 from ico3d.bundle.skinned.info import SKINNED
 from ico3d.capture.capture import Capture
 from ico3d.errors import BundleError
@@ -43,7 +44,8 @@ class SkinnedResult:
     @property
     def parts(self) -> BodyParts:
         """What a bundle holds of it."""
-        return BodyParts(SkinnedBody(self.baked), {SKINNED: self.data}, self.baked.info, self.loss)
+        files = {SKINNED: self.data, **gesture_files(self.baked.rig)}
+        return BodyParts(SkinnedBody(self.baked), files, self.baked.info, self.loss)
 
     def __str__(self) -> str:
         """One line for people."""

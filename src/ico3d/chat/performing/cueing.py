@@ -1,0 +1,118 @@
+"""Gestures of a body on a skeleton: composed as sound is made, cued to the page that makes them."""
+
+from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame
+from ico3d.chat.page import Page
+from ico3d.chat.performing.script import Script
+from ico3d.chat.wire import protocol_gestures as wire
+from ico3d.chat.wire.protocol import Clock, Cues
+from ico3d.chat.wire.protocol_gestures import MAX_CUES
+from ico3d.motion.clip import Clip
+from ico3d.motion.composing.composer import Composer
+from ico3d.motion.composing.cues import Cue, Direction, Release
+from ico3d.motion.noise import scrambled
+
+LEAD = 0.8
+"""Seconds beyond what is heard up to which gestures are decided: cues come before they begin."""
+SOONEST = 0.15
+"""Seconds from the first that is heard of an utterance until a gesture begins."""
+
+
+class Cueing:
+    """Composes an utterance while the page says how far it has been heard."""
+
+    def __init__(self, clips: dict[str, Clip], page: Page, moving: bool, seed: int):
+        """The gestures of one session.
+
+        Args:
+            clips: By name.
+            page: Gets `Cues`.
+            moving: False lets the body stand while the face talks.
+            seed: Decides, with the number of an utterance, everything that is by chance.
+        """
+        self._clips, self._page, self._moving, self._seed = clips, page, moving, seed
+        self._scripts: dict[int, Script] = {}
+        self._wanted: list[str] = []
+        self._utterance = -1  # the last one that was heard
+        self._composer: Composer | None = None  # until all is handed out
+
+    def stop(self) -> None:
+        """Nothing is spoken any more: the page lets hands come down by itself."""
+        self._composer = None
+
+    @property
+    def names(self) -> list[str]:
+        """Gestures that can be asked for."""
+        return list(self._clips) if self._moving else []
+
+    def request(self, name: str) -> None:
+        """A gesture to make next, in what is spoken now or in the utterance that follows."""
+        self._wanted = [name]
+        self._hand_over()
+
+    def forget(self) -> None:
+        """What was asked for is not to be made any more, and what it was for is over."""
+        self._wanted = []
+        self.stop()
+
+    def read(self, frame: SpeechFrame | UtteranceEndFrame) -> None:
+        """Sound has been made, or all of an utterance."""
+        script = self._scripts.setdefault(frame.utterance, Script())
+        if isinstance(frame, SpeechFrame):
+            script.add(frame)
+        else:
+            script.end()
+
+    def clock(self, message: Clock, position: float) -> None:
+        """The page says where it is.
+
+        Args:
+            message: Of the utterance that is spoken.
+            position: Seconds of it that can have been heard.
+        """
+        script = self._scripts.get(message.utterance)
+        if not self._moving or script is None:
+            return
+        if message.utterance != self._utterance:
+            self._begin(message.utterance, position)
+        if self._composer is not None:
+            self._go_on(self._composer, script, position)
+
+    def _go_on(self, composer: Composer, script: Script, position: float) -> None:
+        composer.know(script.words, script.levels)
+        if script.complete:
+            composer.end(script.seconds)
+        ends = script.complete and script.seconds - position <= LEAD
+        self._send(composer.directions(float("inf") if ends else position + LEAD))
+        if ends:
+            self._composer = None  # what is asked for from now on is for the next utterance
+
+    def _begin(self, utterance: int, position: float) -> None:
+        """Composes another utterance; those before it are over."""
+        self._scripts = {n: script for n, script in self._scripts.items() if n >= utterance}
+        self._utterance = utterance
+        seed = scrambled(self._seed, utterance)
+        self._composer = Composer(self._clips, seed, position + SOONEST)
+        self._hand_over()
+
+    def _hand_over(self) -> None:
+        if self._composer is None:
+            return
+        for name in self._wanted:
+            self._composer.request(name)
+        self._wanted = []
+
+    def _send(self, directions: list[Direction]) -> None:
+        for first in range(0, len(directions), MAX_CUES):
+            some = directions[first : first + MAX_CUES]
+            cues = [_cue(one) for one in some if isinstance(one, Cue)]
+            releases = [_release(one) for one in some if isinstance(one, Release)]
+            self._page.send(Cues(self._utterance, cues, releases))
+
+
+def _cue(cue: Cue) -> wire.Cue:
+    times = (round(float(time), 4) for time in (cue.begin, cue.stroke, cue.skip))
+    return wire.Cue(cue.number, cue.name, cue.mirror, *times)
+
+
+def _release(release: Release) -> wire.Release:
+    return wire.Release(release.number, round(float(release.time), 4))
