@@ -1,10 +1,13 @@
 import { Body } from './body/body.ts';
+import { ActingBody } from './body/skinned/acting.ts';
 import { readBakedSkinned } from './body/skinned/baked.ts';
 import { SkinnedBody } from './body/skinned/body.ts';
 import { Timeline } from './body/timeline.ts';
 import { readBakedWindow } from './body/window.ts';
-import { BundleFiles, SKINNED } from './bundle/load.ts';
+import { BundleFiles, GESTURES, SKINNED } from './bundle/load.ts';
 import { bodyOf, type AnyBody, type BodyInfo, type HeadInfo, type Manifest, type SkinnedInfo } from './bundle/manifest.ts';
+import { BodyLanguage } from './gesture/performing/body-language.ts';
+import { readRepertoire } from './gesture/repertoire.ts';
 import { Head, sway, type Carrier } from './head/head.ts';
 import { MotionDirector, type Spoken } from './motion/director.ts';
 import type { Motion } from './motion/motion.ts';
@@ -17,6 +20,7 @@ export interface Cast {
   head?: Head;
   body?: Body; // of windows
   skinned?: SkinnedBody; // or on a skeleton
+  acting?: ActingBody; // which gestures as nobody recorded
   playback?: Playback;
   director?: MotionDirector;
 }
@@ -65,8 +69,30 @@ async function makePerson(
   const body = await makeBody(files, manifest, director, stage, ports.failed);
   const { start, end } = animation.rest;
   const resting = rows(calm ? end : start, end);
-  const head = await makeHead(files, info, stage, resting, () => (body.body ?? body.skinned!).time * info.fps);
-  return { head, ...body, director };
+  const acting = body.skinned && !calm ? await makeActing(files, body.skinned, manifest, end, stage, ports.heard) : null;
+  const row = acting ? () => end : () => (body.body ?? body.skinned!).time * info.fps;
+  const head = await makeHead(files, info, stage, resting, row);
+  if (acting) head.motion = () => acting.headMotion();
+  return { head, ...body, director, ...(acting ? { acting } : {}) };
+}
+
+/** Makes a body on a skeleton gesture, where the bundle has gestures for it. */
+async function makeActing(
+  files: BundleFiles,
+  body: SkinnedBody,
+  manifest: Manifest,
+  frame: number,
+  stage: Stage,
+  heard: CastPorts['heard'],
+): Promise<ActingBody | null> {
+  const file = await files.gestures();
+  if (!file) return null;
+  const rig = body.generator.skeleton.rig();
+  const repertoire = readRepertoire(file, GESTURES, manifest.skinned!.names.length);
+  const language = new BodyLanguage(rig, repertoire, Math.floor(2 ** 32 * Math.random()), heard);
+  const acting = new ActingBody(body, language, rig, repertoire.figure, frame, () => stage.orbit.camera.position.toArray());
+  stage.add(acting);
+  return acting;
 }
 
 /** @param resting the rows of its poses where the head is at rest */

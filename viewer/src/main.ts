@@ -1,6 +1,7 @@
 import type { SplatGenerator } from '@sparkjsdev/spark';
 import './style.css';
 import type { Body } from './body/body.ts';
+import type { ActingBody } from './body/skinned/acting.ts';
 import type { SkinnedBody } from './body/skinned/body.ts';
 import { bytesToFirstSight, loadManifest } from './bundle/load.ts';
 import { blinkIndices, bodyOf, type HeadInfo, type Manifest } from './bundle/manifest.ts';
@@ -28,6 +29,7 @@ declare global {
       head?: Head;
       body?: Body;
       skinned?: SkinnedBody;
+      acting?: ActingBody;
       director?: MotionDirector;
       conversation?: Conversation;
       splats: (generator: SplatGenerator) => Splats;
@@ -53,15 +55,16 @@ async function run(): Promise<void> {
   watchCover((pixels) => stage.keepClear(pixels));
   const page = makePage(overlay, () => stage.frames);
   const conversation = manifest.head ? new Conversation(socketUrl(location), page.view) : undefined;
-  const { head, body, skinned, playback, director } = await enter(manifest, stage, conversation);
+  const { head, body, skinned, acting, playback, director } = await enter(manifest, stage, conversation);
   const moving = body ?? skinned;
   if (moving && playback) new PlayerBar(moving, playback, 1 / bodyOf(manifest)!.fps);
 
-  window.ico3d = { stage, head, body, skinned, director, conversation, splats: (generator) => readSplats(stage, generator) };
+  window.ico3d = { stage, head, body, skinned, acting, director, conversation, splats: (generator) => readSplats(stage, generator) };
   if (head && conversation) {
     head.director = makeFace(manifest.head!, conversation);
     conversation.bodyTime = () => moving?.time ?? 0;
     conversation.gestures = director ?? null;
+    conversation.acting = acting?.language ?? null;
     await mayTalk(conversation);
   }
   overlay.hide();

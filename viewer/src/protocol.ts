@@ -1,4 +1,5 @@
 // Written by `python -m ico3d.chat.generating`. Edit src/ico3d/chat/wire/protocol.py instead.
+import { floatFromHalf } from "./half.ts";
 
 export const VERSION = 5;
 export const MICROPHONE_RATE = 16000; // Hz
@@ -394,14 +395,4 @@ function known(header: Header): ServerMessage {
 function matrix(shape: number[], words: Uint16Array): Matrix {
   const [rows = 0, columns = 0] = shape;
   return { rows, columns, values: Float32Array.from(words, floatFromHalf) };
-}
-
-/** IEEE 754 half precision to a number. */
-export function floatFromHalf(word: number): number {
-  const sign = word & 0x8000 ? -1 : 1;
-  const exponent = (word >> 10) & 0x1f;
-  const fraction = word & 0x3ff;
-  if (exponent === 0) return sign * fraction * 2 ** -24;
-  if (exponent === 31) return fraction ? NaN : sign * Infinity;
-  return sign * (1 + fraction / 1024) * 2 ** (exponent - 15);
 }

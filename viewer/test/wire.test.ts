@@ -1,7 +1,8 @@
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { expect, test } from 'vitest';
-import { decode, encode, floatFromHalf, type SpeechMessage } from '../src/protocol.ts';
+import { floatFromHalf } from '../src/half.ts';
+import { decode, encode, type SpeechMessage } from '../src/protocol.ts';
 import { runPython } from '../support/python.ts';
 import { arrayBuffer } from '../support/references/head.ts';
 import { scratchFolder } from '../support/scratch.ts';

@@ -21,6 +21,9 @@ const ANIMATION = 'animation.json';
 /** The file of a body on a skeleton. */
 export const SKINNED = 'body/skinned.safetensors';
 
+/** What such a body can do besides what was recorded. */
+export const GESTURES = 'body/gestures.safetensors';
+
 /** The thumbnail's address. */
 export const THUMBNAIL = `${ROOT}thumbnail.png`;
 
@@ -35,7 +38,7 @@ export function bytesToFirstSight({ head, body, skinned, files }: Manifest): num
   const behind = BACKGROUNDS.filter((name) => name in files);
   const names: string[] = [...behind, ...(head ? HEAD_FILES : [])];
   if (body) names.push(body.windows[0]!.file);
-  if (skinned) names.push(SKINNED);
+  if (skinned) names.push(SKINNED, ...(GESTURES in files ? [GESTURES] : []));
   if (head && (body || skinned)) names.push(ANIMATION);
   return names.reduce((sum, name) => sum + (files[name]?.size ?? 0), 0);
 }
@@ -73,6 +76,11 @@ export class BundleFiles {
   async backdrop(): Promise<{ name: string; bytes: ArrayBuffer } | null> {
     const name = BACKGROUNDS.find((file) => file in this.promised);
     return name === undefined ? null : { name, bytes: await this.bytes(name) };
+  }
+
+  /** The gestures of a body on a skeleton, if there are some. */
+  async gestures(): Promise<ArrayBuffer | null> {
+    return GESTURES in this.promised ? this.bytes(GESTURES) : null;
   }
 
   /** What a file holds, by name. */

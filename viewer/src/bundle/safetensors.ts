@@ -1,5 +1,5 @@
 import { PageError } from '../errors.ts';
-import { floatFromHalf } from '../protocol.ts';
+import { floatFromHalf } from '../half.ts';
 
 /** One array of a safetensors file. */
 export interface Tensor {

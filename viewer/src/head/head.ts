@@ -1,6 +1,8 @@
+import { Quaternion, Vector3, type Object3D } from 'three';
 import type { Actor } from '../actor.ts';
 import type { HeadFiles } from '../bundle/load.ts';
 import type { HeadInfo } from '../bundle/manifest.ts';
+import type { Quat, Vector } from '../rig/quaternions.ts';
 import { HeadGenerator } from './generator.ts';
 import { backAndForth, Poses } from './poses.ts';
 
@@ -12,6 +14,9 @@ export interface Director {
 
 /** Says, `step` seconds after it was asked last, at which row of its poses a head is. */
 export type Carrier = (step: number) => number;
+
+/** How far a head has moved rigidly from where its row has it: x goes to q·x + shift. */
+export type RigidMotion = readonly [Quat, Vector];
 
 /** A head alone sways as it was captured, back and forth for ever. */
 export function sway({ fps, num_poses: count }: HeadInfo): Carrier {
@@ -25,6 +30,8 @@ export class Head implements Actor {
   readonly objects: HeadGenerator[];
   readonly expression: Float32Array;
   director: Director | null = null;
+  /** What moves it on from its row; null where its rows say all. */
+  motion: (() => RigidMotion) | null = null;
   row = NaN; // of the poses, as shown
   private readonly carrier: Carrier;
   private readonly poses: Poses;
@@ -49,14 +56,21 @@ export class Head implements Actor {
   place(row: number): void {
     this.row = row;
     this.poses.apply(row, this.generator);
+    if (this.motion) move(this.generator, ...this.motion());
   }
 
   tick(step: number): boolean {
     const row = this.carrier(step);
-    const moved = row !== this.row;
+    const moved = row !== this.row || this.motion !== null;
     if (moved) this.place(row);
     const changed = this.director?.expression(this.expression) ?? false;
     if (changed) this.generator.express(this.expression);
     return changed || moved;
   }
+}
+
+function move({ position, quaternion }: Object3D, [w, x, y, z]: Quat, shift: Vector): void {
+  const turn = new Quaternion(x, y, z, w);
+  quaternion.premultiply(turn);
+  position.applyQuaternion(turn).add(new Vector3(...shift));
 }

@@ -1,5 +1,5 @@
 import type { SplatGenerator } from '@sparkjsdev/spark';
-import { floatFromHalf } from '../protocol.ts';
+import { floatFromHalf } from '../half.ts';
 import type { Stage } from './stage.ts';
 
 const WORDS = 4; // uint32 per texel

@@ -1,5 +1,5 @@
 import { Player } from '../audio/player.ts';
-import { handle, type Handlers, type Offer, type Services, type StateMessage, type WelcomeMessage } from '../protocol.ts';
+import { handle, type Cue, type Handlers, type Offer, type Release, type Services, type StateMessage, type WelcomeMessage } from '../protocol.ts';
 import { Connection, type Ending, type SessionMessage } from './connection.ts';
 import { TurnTimer } from './latency.ts';
 import { VoiceInput, type VoiceView } from './voice-input.ts';
@@ -10,6 +10,18 @@ export interface Gestures {
   plan(utterance: number, points: readonly [number, number][]): void;
   /** Utterances are counted from the start again. */
   reset(): void;
+}
+
+/** Who moves a body on a skeleton. */
+export interface Acting {
+  /** Takes what the server directs for an utterance. */
+  plan(utterance: number, directions: readonly (Cue | Release)[]): void;
+  /** An utterance was interrupted. */
+  stop(utterance: number): void;
+  /** Utterances are counted from the start again. */
+  reset(): void;
+  /** Sound of the visitor. */
+  listen(pcm: Int16Array): void;
 }
 
 const CLOCK_PERIOD = 200; // ms between reports of what has been heard
@@ -36,6 +48,7 @@ export class Conversation {
   /** Where the body is on its own time line; 0 without a body. */
   bodyTime: () => number = () => 0;
   gestures: Gestures | null = null;
+  acting: Acting | null = null;
   private readonly view: ConversationView;
   private readonly connection: Connection;
   private readonly voice: VoiceInput;
@@ -46,8 +59,12 @@ export class Conversation {
     answer: ({ text }) => this.view.answer(text),
     speech: (message) => this.player.play(message),
     timeline: ({ utterance, points }) => this.gestures?.plan(utterance, points),
+    cues: ({ utterance, cues, releases }) => this.acting?.plan(utterance, [...cues, ...releases]),
     end: ({ utterance, samples }) => this.player.end(utterance, samples),
-    stop: ({ utterance }) => this.player.stop(utterance),
+    stop: ({ utterance }) => {
+      this.player.stop(utterance);
+      this.acting?.stop(utterance);
+    },
     pause: ({ utterance }) => {
       this.player.pause(utterance);
       this.reportHeard();
@@ -69,6 +86,7 @@ export class Conversation {
     });
     const send = this.connection.send.bind(this.connection);
     this.voice = new VoiceInput(send, (at) => this.player.heard(at), view);
+    this.voice.onSound = (pcm) => this.acting?.listen(pcm);
     this.player.onStart = (_, delay) => this.answerStarts(performance.now() + 1000 * delay);
     this.player.onFinish = (utterance, seconds) => this.report(utterance, seconds);
     setInterval(() => this.reportHeard(), CLOCK_PERIOD);
@@ -146,6 +164,7 @@ export class Conversation {
   private silence(): void {
     this.player.reset();
     this.gestures?.reset();
+    this.acting?.reset();
   }
 
   private show(state: StateMessage['state']): void {

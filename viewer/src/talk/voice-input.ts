@@ -16,6 +16,8 @@ export interface VoiceView extends ListeningView {
 
 /** What the visitor says: the microphone and the button to talk, on their way to the server. */
 export class VoiceInput {
+  /** Takes the visitor's sound while it is sent. */
+  onSound: (pcm: Int16Array) => void = () => {};
   private readonly send: (message: ClientMessage) => boolean;
   private readonly heard: (at: number) => Heard | null;
   private readonly view: VoiceView;
@@ -140,6 +142,7 @@ export class VoiceInput {
     this.sample += pcm.length; // also of what is not sent
     if (this.state !== 'open' && !this.talking) return;
     this.meter.hear(pcm, end);
+    this.onSound(pcm);
     const heard = this.heard(end);
     const sounds = heard !== null && !heard.paused;
     const playing = sounds ? heard.utterance : null;

@@ -1,5 +1,6 @@
 import { beforeAll, describe, expect, test } from 'vitest';
 import { DISPLAY_LEAD } from '../../src/face/face.ts';
+import type { Figure } from '../../src/gesture/figure.ts';
 import { Living } from '../../src/gesture/living.ts';
 import { chance, scrambled, wander } from '../../src/gesture/noise.ts';
 import { BodyLanguage } from '../../src/gesture/performing/body-language.ts';
@@ -7,11 +8,12 @@ import type { Direction } from '../../src/gesture/performing/cues.ts';
 import { directionTo, Gaze } from '../../src/gesture/performing/gaze.ts';
 import { Listener, Loudness } from '../../src/gesture/performing/listening.ts';
 import { Performer } from '../../src/gesture/performing/performer.ts';
+import { jointMotion, Placement, type RigPose } from '../../src/gesture/placement.ts';
 import { readRepertoire, type Repertoire } from '../../src/gesture/repertoire.ts';
 import { Retarget } from '../../src/gesture/retarget.ts';
-import { aligned, arc, power, twistAngle } from '../../src/gesture/turning.ts';
+import { about, aligned, arc, power, twistAngle } from '../../src/gesture/turning.ts';
 import type { Spoken } from '../../src/motion/director.ts';
-import { dotQuat, fromRotvec, multiply, rotate, slerp, toRotvec, type Quat } from '../../src/rig/quaternions.ts';
+import { add, dotQuat, fromRotvec, multiply, rotate, slerp, subtract, toRotvec, type Quat, type Vector } from '../../src/rig/quaternions.ts';
 import { Rig } from '../../src/rig/rig.ts';
 import { makeGestureReference, type GestureReference, type Moved, type Performance, type PersonReference } from '../../support/references/gestures.ts';
 
@@ -326,5 +328,45 @@ describe('body language', () => {
     };
     expect(listen(false)).toBeGreaterThan(2);
     expect(listen(true)).toBeLessThan(1e-3);
+  });
+});
+
+describe('where somebody was recorded', () => {
+  /** The person of a reference, recorded turned by an angle, somewhere. */
+  function recorded(angle: number): { rig: Rig; figure: Figure; pose: RigPose; joint: (role: string) => number } {
+    const [, { parents, joints, retarget }, { figure }] = people[1]!;
+    const rotations = [...retarget.joints.at(-1)!]; // of the living rest
+    rotations[0] = multiply(about([0, 1, 0], angle), rotations[0]!);
+    const joint = (role: string) => figure.parts.find((part) => part.role === role)!.joints.at(-1)!;
+    return { rig: new Rig(parents, joints), figure, pose: { rotations, root: [3, 0.2, -1] }, joint };
+  }
+
+  test('they stand, feet and front as they were', () => {
+    const { rig, figure, pose, joint } = recorded(2);
+    const placement = new Placement(rig, figure, pose);
+    const living = new Living(figure, 9).at(77);
+    const stands = { rotations: new Retarget(rig, figure).pose(living.pose), root: living.root };
+    const ankles = ({ rotations, root }: RigPose) => {
+      const { places } = rig.posed(rotations, root);
+      return [places[joint('left_ankle')]!, places[joint('right_ankle')]!];
+    };
+    const [before, after] = [ankles(pose), ankles(placement.place(stands))];
+    for (const axis of [0, 1, 2]) {
+      expect(after[0]![axis]! + after[1]![axis]!).toBeCloseTo(before[0]![axis]! + before[1]![axis]!, 6);
+    }
+    const across = subtract(after[0]!, after[1]!); // from the right to the left foot
+    expect(Math.atan2(-across[2], across[0])).toBeCloseTo(2, 0.5);
+    expectAlike(ankles(stands), after.map((point) => placement.toRest(point)), 'toRest');
+  });
+
+  test('a joint carries what hangs on it', () => {
+    const [{ rig, pose: from, joint }, { pose: to }] = [recorded(2), recorded(-1)];
+    const [turn, shift] = jointMotion(rig, joint('head'), from, { ...to, root: [0, 0.1, 0.2] });
+    const chin: Vector = [0.05, 1.4, 0.1];
+    const carried = ({ rotations, root }: RigPose) => {
+      const { turned, places } = rig.posed(rotations, root);
+      return add(places[joint('head')]!, rotate(turned[joint('head')]!, subtract(chin, rig.joints[joint('head')]!)));
+    };
+    expectAlike(add(rotate(turn, carried(from)), shift), carried({ ...to, root: [0, 0.1, 0.2] }), 'chin');
   });
 });

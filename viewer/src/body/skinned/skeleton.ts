@@ -1,4 +1,5 @@
 import type { SkinnedInfo } from '../../bundle/manifest.ts';
+import { Rig } from '../../rig/rig.ts';
 import type { RecordedPoses } from './baked.ts';
 import { multiply, normalize, slerp, toMatrix } from './quaternions.ts';
 
@@ -43,6 +44,12 @@ export class Skeleton {
     this.local = new Float64Array(4 * joints);
     this.turned = new Float64Array(4 * joints);
     this.places = new Float64Array(3 * joints);
+  }
+
+  /** Its bones. */
+  rig(): Rig {
+    const { joints } = this.poses;
+    return new Rig(this.info.parents, this.info.parents.map((_, j) => [joints[3 * j]!, joints[3 * j + 1]!, joints[3 * j + 2]!]));
   }
 
   /** A pose to write into: the rest pose. */

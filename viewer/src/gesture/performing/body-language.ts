@@ -1,21 +1,16 @@
 import { DISPLAY_LEAD } from '../../face/face.ts';
 import type { Spoken } from '../../motion/director.ts';
-import { MICROPHONE_RATE } from '../../protocol.ts';
-import type { Quat, Vector } from '../../rig/quaternions.ts';
+import { MICROPHONE_RATE, type Cue } from '../../protocol.ts';
+import type { Vector } from '../../rig/quaternions.ts';
 import type { Rig } from '../../rig/rig.ts';
 import { Living } from '../living.ts';
+import type { RigPose } from '../placement.ts';
 import type { Repertoire } from '../repertoire.ts';
 import { Retarget } from '../retarget.ts';
-import { roundedRelease, type Cue, type Direction } from './cues.ts';
+import { roundedRelease, type Direction } from './cues.ts';
 import { directionTo, Gaze } from './gaze.ts';
 import { Listener, Loudness } from './listening.ts';
 import { Performer, type Clock } from './performer.ts';
-
-/** How a rig is posed: rotations of its joints about themselves, and metres that its root moves. */
-export interface RigPose {
-  rotations: Quat[]; // (J,4)
-  root: Vector;
-}
 
 /**
  * Moves somebody's rig: they stand, look at the visitor, nod, and gesture as the server directs.
@@ -65,7 +60,7 @@ export class BodyLanguage {
     for (const utterance of [...this.clocks.keys()]) this.stop(utterance);
   }
 
-  /** The visitor is there, m in the world. */
+  /** The visitor is there, m in rest space. */
   look(visitor: Vector): void {
     this.gaze.look(...directionTo(this.eyes, visitor));
   }

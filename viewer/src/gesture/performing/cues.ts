@@ -1,25 +1,11 @@
+import type { Cue, Release } from '../../protocol.ts';
 import type { Clip } from '../clip.ts';
 
 const BLEND_IN = 0.3; // s in which a gesture takes over
 const BLEND_OUT = 0.4; // s before its end in which it gives way
 const SETTLE = 0.15; // s that the end of a stroke stays at least: no stroke is cut off
 
-/** A gesture to make; times in seconds of the utterance that it belongs to. */
-export interface Cue {
-  number: number; // counts the cues of the utterance
-  name: string; // of the clip
-  mirror: boolean; // with the other hand
-  begin: number;
-  stroke: number; // when it arrives
-  skip: number; // s of the clip's beginning that are left out
-}
-
-/** A gesture that is held is let go. */
-export interface Release {
-  number: number; // of the cue
-  time: number; // when the retraction begins
-}
-
+/** A gesture to make, or one that is let go; seconds of the utterance that it belongs to. */
 export type Direction = Cue | Release;
 
 export function isCue(direction: Direction): direction is Cue {

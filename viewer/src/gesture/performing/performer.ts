@@ -1,10 +1,11 @@
 import { multiply, slerp, type Quat } from '../../rig/quaternions.ts';
+import type { Cue } from '../../protocol.ts';
 import { ROLES } from '../../shared.ts';
 import type { Clip } from '../clip.ts';
 import type { Living, Moment } from '../living.ts';
 import { indexOf } from '../roles.ts';
 import { power } from '../turning.ts';
-import { clipTime, endOf, isCue, roundedRelease, weight, type Cue, type Direction } from './cues.ts';
+import { clipTime, endOf, isCue, roundedRelease, weight, type Direction } from './cues.ts';
 
 /** Roles whose gestures come upon what the rest does; those of the others replace it. */
 const ADDED = ROLES.map((role) => /^(hips|spine|chest|neck|head|.*_clavicle)$/.test(role));

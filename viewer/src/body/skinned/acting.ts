@@ -1,0 +1,57 @@
+import type { Actor } from '../../actor.ts';
+import type { BodyLanguage } from '../../gesture/performing/body-language.ts';
+import { jointMotion, Placement, type RigPose } from '../../gesture/placement.ts';
+import type { Figure } from '../../gesture/figure.ts';
+import type { Quat, Vector } from '../../rig/quaternions.ts';
+import type { Rig } from '../../rig/rig.ts';
+import type { SkinnedBody } from './body.ts';
+import type { Pose } from './skeleton.ts';
+
+/** Lets a body on a skeleton do what its body language says, where it stood when it was recorded. */
+export class ActingBody implements Actor {
+  readonly objects = [];
+  readonly language: BodyLanguage;
+  private readonly body: SkinnedBody;
+  private readonly rig: Rig;
+  private readonly recorded: RigPose;
+  private readonly placement: Placement;
+  private readonly head: number; // joint
+  private readonly visitor: () => Vector;
+  private now: RigPose;
+
+  /**
+   * @param frame of the recording in which the person stands
+   * @param visitor where the visitor is, m in the world
+   */
+  constructor(body: SkinnedBody, language: BodyLanguage, rig: Rig, figure: Figure, frame: number, visitor: () => Vector) {
+    this.body = body;
+    this.language = language;
+    this.rig = rig;
+    this.visitor = visitor;
+    const pose = body.generator.skeleton.empty();
+    body.generator.skeleton.recorded(frame, pose);
+    this.recorded = this.now = rigPose(pose);
+    this.placement = new Placement(rig, figure, this.recorded);
+    this.head = figure.parts.find(({ role }) => role === 'head')!.joints.at(-1)!;
+  }
+
+  tick(step: number): boolean {
+    this.language.look(this.placement.toRest(this.visitor()));
+    this.language.advance(step);
+    this.now = this.placement.place(this.language.pose());
+    this.body.strike(this.now.rotations.flat(), this.now.root);
+    return true;
+  }
+
+  /** How far the head is from where it was recorded in the frame: x goes to q·x + shift. */
+  headMotion(): [Quat, Vector] {
+    return jointMotion(this.rig, this.head, this.recorded, this.now);
+  }
+}
+
+function rigPose({ rotations, root }: Pose): RigPose {
+  const quats = Array.from({ length: rotations.length / 4 }, (_, i): Quat => {
+    return [rotations[4 * i]!, rotations[4 * i + 1]!, rotations[4 * i + 2]!, rotations[4 * i + 3]!];
+  });
+  return { rotations: quats, root: [root[0]!, root[1]!, root[2]!] };
+}
