@@ -12,6 +12,7 @@ from pipecat.processors.aggregators.llm_context import LLMContext, NotGiven
 from pipecat.processors.aggregators.llm_response_universal import (
     LLMContextAggregatorPair,
     LLMUserAggregatorParams,
+    UserTurnStoppedMessage,
 )
 from pipecat.processors.frame_processor import FrameProcessor
 from pipecat.services.tts_service import TTSService
@@ -202,8 +203,17 @@ class Conversation:
         Added any sooner, the question would stand before the words of the interrupted answer.
         """
         self._context.add_message({"role": "user", "content": question.text})
+        self._asked(question.text)
         forget(self._context, self._avatar.settings.memory)
         await self._input.answer(question)
+
+    async def _said(self, _: object, __: object, message: UserTurnStoppedMessage) -> None:
+        self._asked(message.content)
+
+    def _asked(self, question: str) -> None:
+        """What the visitor wants to be told may also be something to be shown."""
+        if isinstance(self._gestures, Cueing):
+            self._gestures.asked(question)
 
     async def _answered(self, *_: object) -> None:
         forget(self._context, self._avatar.settings.memory)
@@ -215,6 +225,7 @@ class Conversation:
         chosen = strategies(parts.turn, turns, trusted, self._speaker.hush, self._now)
         self._context.set_tools(self._functions(parts.language, face))
         user, assistant = aggregators(chosen, settings, parts.language, self._context)
+        user.add_event_handler("on_user_turn_stopped", self._said)
         assistant.add_event_handler("on_assistant_turn_stopped", self._answered)
         return Pipeline(
             [

@@ -12,11 +12,18 @@ from safetensors.numpy import save
 from ico3d.bundle.format import Bundle, write_bundle
 from ico3d.bundle.manifest import VERSION, Manifest
 from ico3d.bundle.skinned.baked import BakedSkinned
+from ico3d.bundle.skinned.gestures import GESTURES, gesture_files
 from ico3d.bundle.skinned.info import SKINNED
+from ico3d.bundle.skinned.packing import packed_quats
 from ico3d.bundle.skinned.posing import any_pose, posed, recorded_pose
 from ico3d.errors import BundleError
+from ico3d.motion.gestures.library import library
+from ico3d.motion.living import living
+from ico3d.motion.repertoire import repertoire_bytes
 from support.bundles.random_body import body_manifest, random_windows
+from support.bundles.random_bundle import thumbnail
 from support.bundles.random_skinned import random_skinned, skinned_manifest, write_random_skinned
+from support.rigs import rig_of
 
 RELAXED = settings(
     max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
@@ -194,3 +201,31 @@ def test_a_missing_file_is_named(tmp_path):
         windows = replace(body_manifest(random_windows()), files={})
         names = {w.file: b"" for w in windows.body.windows} if windows.body else {}
         write_bundle(tmp_path / "a.ico3d", windows, names | {"thumbnail.png": b"", SKINNED: DATA})
+
+
+def test_gestures_belong_to_the_rig(tmp_path):
+    rig = rig_of("SMPL-X", 0.0)
+    joints = rig.joints.astype(np.float32)
+    info = replace(BAKED.info, names=rig.names, parents=rig.parents)
+    held = np.tile(packed_quats(np.array([[1.0, 0, 0, 0]])), (len(rig), 1))
+    baked = replace(BAKED, info=info, rig_joints=joints, held=held)
+    somebody = living(baked.rig, 0)
+    data = repertoire_bytes(somebody, library(somebody.person, ("nod",)))
+    files = {SKINNED: baked.to_bytes(), "thumbnail.png": thumbnail(), GESTURES: data}
+    write_bundle(tmp_path / "a.ico3d", skinned_manifest(baked), files)
+    gestures = Bundle.open(tmp_path / "a.ico3d").gestures
+    assert gestures is not None and list(gestures) == ["nod"]
+    other = replace(baked, rig_joints=1.1 * joints)
+    write_bundle(tmp_path / "b.ico3d", skinned_manifest(other), files | {SKINNED: other.to_bytes()})
+    with pytest.raises(BundleError, match="made for another rig"):
+        Bundle.open(tmp_path / "b.ico3d")
+    with pytest.raises(BundleError, match="does not belong"):
+        windows = body_manifest(random_windows())
+        assert windows.body is not None
+        of_windows = {window.file: b"" for window in windows.body.windows}
+        of_windows |= {name: files[name] for name in ("thumbnail.png", GESTURES)}
+        write_bundle(tmp_path / "c.ico3d", windows, of_windows)
+
+
+def test_a_rig_without_roles_has_no_gestures():
+    assert gesture_files(BAKED.rig) == {}

@@ -127,6 +127,18 @@ def test_what_is_asked_for_is_made_in_what_is_heard_or_in_what_follows():
     assert len(made) == 1 and made[0].begin < 0.3 + LEAD
 
 
+def test_who_asks_for_a_gesture_gets_it_with_the_answer():
+    page = Recorder()
+    cueing = Cueing(CLIPS, page, True, 3)
+    cueing.asked("What is a wave?")
+    cueing.asked("Can you wave at me?")
+    assert heard(cueing, page, until=0.5)[0][1].cues[0].name == "wave"
+    page, without = Recorder(), {name: one for name, one in CLIPS.items() if name != "wave"}
+    cueing = Cueing(without, page, True, 3)
+    cueing.asked("Can you wave at me?")
+    assert "wave" not in [cue.name for _, message in heard(cueing, page) for cue in message.cues]
+
+
 def test_a_body_that_is_to_stand_makes_no_gestures():
     page = Recorder()
     cueing = Cueing(CLIPS, page, False, 3)

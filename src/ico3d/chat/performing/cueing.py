@@ -9,6 +9,7 @@ from ico3d.chat.wire.protocol_gestures import MAX_CUES
 from ico3d.motion.clip import Clip
 from ico3d.motion.composing.composer import Composer
 from ico3d.motion.composing.cues import Cue, Direction, Release
+from ico3d.motion.composing.lexicon import requested
 from ico3d.motion.noise import scrambled
 
 LEAD = 0.8
@@ -48,6 +49,12 @@ class Cueing:
         """A gesture to make next, in what is spoken now or in the utterance that follows."""
         self._wanted = [name]
         self._hand_over()
+
+    def asked(self, question: str) -> None:
+        """What a visitor says: who asks for a gesture gets it with the answer."""
+        name = requested(question)
+        if name is not None and name in self.names:
+            self.request(name)
 
     def forget(self) -> None:
         """What was asked for is not to be made any more, and what it was for is over."""
