@@ -42,7 +42,7 @@ export class Stage {
   /** Adds an actor; before the start only, or Spark would hold its picture until it has sorted anew. */
   add(actor: Actor): void {
     this.actors.push(actor);
-    this.scene.add(...actor.objects);
+    for (const object of actor.objects) this.scene.add(object);
   }
 
   /** Points the camera at somebody whose head rests at these rows of its poses. */

@@ -17,7 +17,8 @@ export class ActingBody implements Actor {
   private readonly placement: Placement;
   private readonly head: number; // joint
   private readonly visitor: () => Vector;
-  private now: RigPose;
+  /** How it stands. */
+  pose: RigPose;
 
   /**
    * @param frame of the recording in which the person stands
@@ -28,9 +29,9 @@ export class ActingBody implements Actor {
     this.language = language;
     this.rig = rig;
     this.visitor = visitor;
-    const pose = body.generator.skeleton.empty();
-    body.generator.skeleton.recorded(frame, pose);
-    this.recorded = this.now = rigPose(pose);
+    const recorded = body.generator.skeleton.empty();
+    body.generator.skeleton.recorded(frame, recorded);
+    this.recorded = this.pose = rigPose(recorded);
     this.placement = new Placement(rig, figure, this.recorded);
     this.head = figure.parts.find(({ role }) => role === 'head')!.joints.at(-1)!;
   }
@@ -38,14 +39,14 @@ export class ActingBody implements Actor {
   tick(step: number): boolean {
     this.language.look(this.placement.toRest(this.visitor()));
     this.language.advance(step);
-    this.now = this.placement.place(this.language.pose());
-    this.body.strike(this.now.rotations.flat(), this.now.root);
+    this.pose = this.placement.place(this.language.pose());
+    this.body.strike(this.pose.rotations.flat(), this.pose.root);
     return true;
   }
 
   /** How far the head is from where it was recorded in the frame: x goes to q·x + shift. */
   headMotion(): [Quat, Vector] {
-    return jointMotion(this.rig, this.head, this.recorded, this.now);
+    return jointMotion(this.rig, this.head, this.recorded, this.pose);
   }
 }
 
