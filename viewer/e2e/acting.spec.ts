@@ -33,7 +33,7 @@ let names: string[];
 
 beforeAll(async () => {
   const folder = scratchFolder();
-  runPython('references/acting_person.py', folder);
+  runPython('references/gestures/acting_person.py', folder);
   server = await ChatServer.start(join(folder, 'person.ico3d'));
   browser = await openPage(server.url);
   page = browser.page;

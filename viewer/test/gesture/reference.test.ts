@@ -15,7 +15,7 @@ import { about, aligned, arc, power, twistAngle } from '../../src/gesture/turnin
 import type { Spoken } from '../../src/motion/director.ts';
 import { add, dotQuat, fromRotvec, multiply, rotate, slerp, subtract, toRotvec, type Quat, type Vector } from '../../src/rig/quaternions.ts';
 import { Rig } from '../../src/rig/rig.ts';
-import { makeGestureReference, type GestureReference, type Moved, type Performance, type PersonReference } from '../../support/references/gestures.ts';
+import { makeGestureReference, type GestureReference, type Moved, type Performance, type PersonReference } from '../../support/references/gestures/reference.ts';
 
 type Nested = number | readonly Nested[];
 

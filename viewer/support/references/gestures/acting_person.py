@@ -29,7 +29,7 @@ YAW = 0.5
 """Radians by which the person was turned to its left when recorded."""
 PLACE = np.array([0.4, 0.0, -0.3])
 """Metres from the origin."""
-PERSONA = Path(__file__).with_name("persona.json")
+PERSONA = Path(__file__).parents[1] / "persona.json"
 
 
 def recorded_body() -> BakedSkinned:

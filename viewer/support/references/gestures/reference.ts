@@ -1,10 +1,10 @@
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
-import type { Quat, Vector } from '../../src/rig/quaternions.ts';
-import type { Direction } from '../../src/gesture/performing/cues.ts';
-import { runPython } from '../python.ts';
-import { scratchFolder } from '../scratch.ts';
-import { arrayBuffer } from './head.ts';
+import type { Quat, Vector } from '../../../src/rig/quaternions.ts';
+import type { Direction } from '../../../src/gesture/performing/cues.ts';
+import { runPython } from '../../python.ts';
+import { scratchFolder } from '../../scratch.ts';
+import { arrayBuffer } from '../head.ts';
 
 /** A body at several times. */
 export interface Moved {
@@ -62,7 +62,7 @@ export interface GestureReference {
 /** Lets Python move them; takes some seconds. */
 export function makeGestureReference(): GestureReference {
   const folder = scratchFolder();
-  runPython('references/gesture_reference.py', folder);
+  runPython('references/gestures/gesture_reference.py', folder);
   const found = JSON.parse(readFileSync(join(folder, 'reference.json'), 'utf8')) as GestureReference;
   found.listening.pcm = new Int16Array(arrayBuffer(readFileSync(join(folder, 'sound.i16'))));
   for (const [name, person] of Object.entries(found.people)) {
