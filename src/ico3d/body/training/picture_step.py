@@ -12,6 +12,7 @@ from ico3d.body.motion.deformation import GRID, MLP
 from ico3d.body.motion.window_model import CANONICAL, WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings
+from ico3d.body.skinning.skinned import NETWORK, PER_FRAME
 from ico3d.body.training.views import BodyViews, Example
 from ico3d.capture.pictures import View
 from ico3d.splat.density import Population
@@ -132,8 +133,17 @@ class Learner:
             rate = self._rates[_group(name)].at(progress)
             if name == "means":
                 rate *= self._extent
-            self.optimiser.update(name, tensor, tensor.grad, rate)
+            if name in PER_FRAME:
+                self._update_frames(name, tensor, tensor.grad, rate)
+            else:
+                self.optimiser.update(name, tensor, tensor.grad, rate)
             tensor.grad = None
+
+    def _update_frames(self, name: str, value: Tensor, gradient: Tensor, rate: float) -> None:
+        """Updates the frames that were seen; the others' moments must not go on moving them."""
+        seen = gradient.flatten(1).any(1).nonzero()[:, 0]  # (S,)
+        for frame in seen.tolist():
+            self.optimiser.update(f"{name}.{frame}", value[frame], gradient[frame], rate)
 
     @torch.no_grad()
     def keep_mean(self, count: int) -> None:
@@ -215,5 +225,7 @@ def _group(name: str) -> str:
         return "mlp"
     if name.startswith(GRID):
         return "grid"
+    if name.startswith(NETWORK):
+        return "coefficients"
     formulas = ("center", "log_duration", "path", "turn", "affine")
     return "motion" if name in formulas else name

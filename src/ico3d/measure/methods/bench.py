@@ -12,7 +12,7 @@ import numpy as np
 
 from ico3d.body.model_folder import UNTUNED, TrainedBody
 from ico3d.body.planning.windows import Window
-from ico3d.body.settings import ONE_WINDOW, BodySettings, Method
+from ico3d.body.settings import ONE_WINDOW, SKINNED, BodySettings, Method
 from ico3d.body.training.train_clip import BodyJob, plan_windows, train_body
 from ico3d.capture.capture import Capture, all_frames
 from ico3d.capture.formats import open_capture
@@ -53,14 +53,16 @@ class Terms:
     def settings(self, method: Method) -> BodySettings:
         """The settings of a method.
 
-        Where that takes the clip as one window, it has the Gaussians and steps of all windows.
+        Where that takes the clip as one window, it has the Gaussians and steps of all windows;
+        on a skeleton those of one window are enough Gaussians.
         """
         settings = changed_alike(method, self.ours)
         if not (self.finetune and method == OURS):
             settings = settings.without_finetuning()
         if method not in ONE_WINDOW:
             return settings
-        count, initial, density = len(self.windows), settings.initial, settings.density
+        count = 1 if method in SKINNED else len(self.windows)
+        initial, density = settings.initial, settings.density
         return replace(
             settings,
             initial=replace(initial, gaussians=count * initial.gaussians),
