@@ -47,7 +47,7 @@ def test_it_begins_on_the_skin(capture):
 
 def test_poses_learn_from_pictures(capture):
     """The shoulder finds its place, and what never trains is as it was."""
-    trainer = trainer_of(capture, "skinned", window=CLIP, **{"rates.pose": 5e-3})
+    trainer = trainer_of(capture, "skinned", window=CLIP, **{"rates.pose": 1e-2})
     before = {n: trainer.model.shared[n].clone() for n in ("rig_joints", "pose_rotations")}
     for index in range(360):
         trainer.step(index)

@@ -18,8 +18,6 @@ LEFT = torch.tensor(
     ]
 ).float()
 """(4, 4, 4): contracted with a quaternion a along its last axis it is the matrix of b ↦ a·b."""
-JOINT_ROW = 9 + 3 + 16
-"""Numbers of a joint in a `transforms` table."""
 
 
 def unit(quats: Tensor) -> Tensor:
@@ -49,8 +47,8 @@ def posed_joints(
         root: (3,) metres that the root moves.
 
     Returns:
-        Rotations from rest space to the world as matrices (J, 3, 3) and as the left matrices
-        (J, 4, 4) of quaternions whose signs agree with their parents'; places (J, 3) in the world.
+        Rotations from rest space to the world as matrices (J, 3, 3) and as quaternions (J, 4)
+        whose signs agree with their parents'; places (J, 3) in the world.
     """
     depths, order, above = _levels(tuple(parents))
     local = unit(rotations)  # (J, 4)
@@ -62,18 +60,18 @@ def posed_joints(
     for members, parent in zip(depths[1:], above[1:], strict=True):
         levels.append(levels[-1][parent] @ both[members])  # (M, 2, 4, 4)
     world = torch.cat(levels)[order]  # (J, 2, 4, 4)
-    return world[:, 0, :3, :3], world[:, 1], world[:, 0, :3, 3]
+    return world[:, 0, :3, :3], world[:, 1, :, 0], world[:, 0, :3, 3]  # L(q)·1 is q
 
 
 def transforms(parents: Sequence[int], joints: Tensor, rotations: Tensor, root: Tensor) -> Tensor:
-    """(J, 28) what takes each joint's points from rest to the world.
+    """(J, 16) what takes each joint's points from rest to the world.
 
-    A row holds the rotation matrix R (9), the shift t (3) of x ↦ R·x + t, and the rotation's left
-    matrix (16). Arguments as for `posed_joints`.
+    A row holds the rotation matrix R (9), the shift t (3) of x ↦ R·x + t, and the rotation's
+    quaternion (4), whose sign agrees with its parent's. Arguments as for `posed_joints`.
     """
-    turned, left, places = posed_joints(parents, joints, rotations, root)
+    turned, quats, places = posed_joints(parents, joints, rotations, root)
     shift = places - (turned @ joints[:, :, None])[..., 0]  # (J, 3)
-    return torch.cat([turned.flatten(1), shift, left.flatten(1)], 1)  # (J, 28)
+    return torch.cat([turned.flatten(1), shift, quats], 1)  # (J, 16)
 
 
 @lru_cache(16)

@@ -5,21 +5,20 @@ from dataclasses import asdict, dataclass, replace
 
 import torch
 from torch import Tensor
-from torch.nn.functional import embedding_bag, normalize
+from torch.nn.functional import normalize
 
 from ico3d.body.motion.window_model import activated
 from ico3d.body.skinning import coefficients
+from ico3d.body.skinning.blending import blended
 from ico3d.body.skinning.kinematics import transforms
+from ico3d.body.skinning.light import lit
 from ico3d.rig import quaternions
-from ico3d.splat import harmonics
 from ico3d.splat.gaussians import Gaussians
 
 NETWORK = "coefficients."
 """What the names of the network's tensors begin with."""
 PER_FRAME = ("pose_rotations", "pose_roots")
 """Tensors of which a picture teaches one row."""
-LIGHTS = 8
-"""Spherical harmonics of degrees 1 and 2."""
 ON_FRAME = 1e-3
 """Part of a frame by which a time may miss it."""
 
@@ -120,19 +119,14 @@ class Skinned:
     def drawn(self, values: Mapping[str, Tensor], pose: Pose) -> Gaussians:
         """Activated Gaussians in a pose with the coefficients that it says."""
         table = transforms(self.parents, values["rig_joints"], pose.rotations, pose.root)
-        weights = values["skin_logits"].softmax(1)  # (N, 4)
-        mixed = embedding_bag(  # (N, 28)
-            values["skin_joints"], table, mode="sum", per_sample_weights=weights
-        )
-        turned = mixed[:, :9].unflatten(1, (3, 3))  # (N, 3, 3)
         means = values["means"]
         if pose.residual is not None:
             means = means + values["shape_means"] @ pose.residual  # (N, 3)
-        return activated(
-            {**values, "color_logits": self._colors(values, turned, pose)},
-            _applied(turned, means) + mixed[:, 9:12],
-            _applied(mixed[:, 12:].unflatten(1, (4, 4)), values["quats"]),
-        )
+        normals = values["normals"] if self.light else torch.zeros_like(means)
+        hung = (values["skin_joints"], values["skin_logits"])
+        posed = blended(table, *hung, means, values["quats"], normals)
+        colors = {"color_logits": self._colors(values, posed.normals, pose)}
+        return activated({**values, **colors}, posed.means, posed.quats)
 
     def about(self) -> dict:
         """Its kind and fields."""
@@ -149,12 +143,11 @@ class Skinned:
     def _network(self, values: Mapping[str, Tensor]) -> dict[str, Tensor]:
         return {layer: values[NETWORK + layer] for layer in coefficients.LAYERS}
 
-    def _colors(self, values: Mapping[str, Tensor], turned: Tensor, pose: Pose) -> Tensor:
-        """(N, 3) logits; turned (N, 3, 3) blended rotations, whose stretch does not matter."""
+    def _colors(self, values: Mapping[str, Tensor], normals: Tensor, pose: Pose) -> Tensor:
+        """(N, 3) logits of a surface that faces along normals (N, 3) of any length."""
         colors = values["color_logits"]
         if self.light:
-            normals = normalize(_applied(turned, values["normals"]), dim=1)  # (N, 3)
-            colors = colors + harmonics.basis(normals, 2)[:, 1:] @ values["light"]
+            colors = colors + lit(normalize(normals, dim=1), values["light"])
         if pose.residual is not None:
             colors = colors + values["shape_colors"] @ pose.residual  # (N, 3)
         return colors
@@ -163,11 +156,6 @@ class Skinned:
 def without_residual(pose: Pose) -> Pose:
     """The same pose with all coefficients 0."""
     return replace(pose, residual=None)
-
-
-def _applied(matrices: Tensor, vectors: Tensor) -> Tensor:
-    """(N, R) products of matrices (N, R, C) and vectors (N, C); faster than many small ones."""
-    return (matrices * vectors[:, None]).sum(2)
 
 
 def _between(a: Pose, b: Pose, part: float) -> Pose:

@@ -9,7 +9,8 @@ from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings
 from ico3d.body.skinning.coefficients import initial_network
-from ico3d.body.skinning.skinned import LIGHTS, NETWORK, Skinned
+from ico3d.body.skinning.light import LIGHTS
+from ico3d.body.skinning.skinned import NETWORK, Skinned
 from ico3d.body.skinning.template import Skin, sampled
 from ico3d.body.training.begin import Begin, round_gaussians, trespassing
 from ico3d.capture.capture import Capture
