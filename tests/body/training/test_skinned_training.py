@@ -24,11 +24,14 @@ def capture(tmp_path):
     return TrackedCapture(tmp_path, 12.0)
 
 
-def shoulder_errors(capture, trainer):
-    """Degrees by which the shoulder is wrong, by frame."""
+def shoulder_spread(capture, trainer):
+    """Standard deviation over frames of how far the shoulder is wrong, degrees.
+
+    What all frames have in common is nobody's error: the arm at rest may be turned as well.
+    """
     quats = trainer.model.shared["pose_rotations"].detach().numpy()[:, 1]  # (F, 4)
-    found = 2 * np.arctan2(quats[:, 3], quats[:, 0])
-    return [abs(np.degrees(angle - capture.angle(frame))) for frame, angle in enumerate(found)]
+    angles = 2 * np.arctan2(quats[:, 3], quats[:, 0])
+    return np.degrees(np.std(angles - [capture.angle(f) for f in range(FRAMES)]))
 
 
 def test_it_begins_on_the_skin(capture):
@@ -48,10 +51,11 @@ def test_it_begins_on_the_skin(capture):
 def test_poses_learn_from_pictures(capture):
     """The shoulder finds its place, and what never trains is as it was."""
     trainer = trainer_of(capture, "skinned", window=CLIP, **{"rates.pose": 1e-2})
+    assert shoulder_spread(capture, trainer) > 11
     before = {n: trainer.model.shared[n].clone() for n in ("rig_joints", "pose_rotations")}
     for index in range(360):
         trainer.step(index)
-    assert np.median(shoulder_errors(capture, trainer)) < 5
+    assert shoulder_spread(capture, trainer) < 5
     assert torch.equal(before["rig_joints"], trainer.model.shared["rig_joints"])
     assert 250 < len(trainer.model) <= 400
     assert trainer.model.gaussians["skin_joints"].dtype == torch.int32

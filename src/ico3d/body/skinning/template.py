@@ -31,6 +31,18 @@ class Skin:
         binding = Binding(self.binding.joints[index], self.binding.weights[index])
         return Skin(self.points[index], self.normals[index], binding)
 
+    @staticmethod
+    def joined(*parts: "Skin") -> "Skin":
+        """The points of several, one after the other."""
+        return Skin(
+            np.concatenate([part.points for part in parts]),
+            np.concatenate([part.normals for part in parts]),
+            Binding(
+                np.concatenate([part.binding.joints for part in parts]),
+                np.concatenate([part.binding.weights for part in parts]),
+            ),
+        )
+
     def posed(self, track: BodyTrack, frame: int) -> np.ndarray:
         """(P, 3) where the points are in the world at a frame."""
         matrices = track.rig.matrices(track.rotations[frame], track.roots[frame])

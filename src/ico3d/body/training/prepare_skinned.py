@@ -13,6 +13,8 @@ from ico3d.body.skinning.light import LIGHTS
 from ico3d.body.skinning.skinned import NETWORK, Skinned
 from ico3d.body.skinning.template import Skin, sampled
 from ico3d.body.training.begin import Begin, round_gaussians, trespassing
+from ico3d.body.training.standing_off import standing_off
+from ico3d.body.training.surface_points import initial_points
 from ico3d.capture.capture import Capture
 from ico3d.capture.pictures import train_cameras
 from ico3d.capture.surface.coverage import HIDING, visible
@@ -22,6 +24,8 @@ from ico3d.splat.initial import spacing
 
 SPARE = 3
 """Times as many points as are wanted are drawn: those that nobody sees are left out."""
+SURFACE = 10_000
+"""Points of the recorded surface among which what stands off the skin is sought."""
 LEAST_WEIGHT = 1e-3
 """Of a joint, before the logarithm: what does not carry a Gaussian may learn to."""
 
@@ -45,16 +49,14 @@ def begin_skinned(
     Raises:
         CaptureError: If there is no body track, or it misses all pictures.
     """
-    track, count = tracked(capture), settings.initial.gaussians
-    count = min(count, settings.density.max_gaussians)
+    track = tracked(capture)
+    count = min(settings.initial.gaussians, settings.density.max_gaussians)
     skin = _seen(sampled(track, SPARE * count, rng), track, capture, window.center)
+    skin = _dressed(skin, track, capture, window, count, settings, rng)
     places = skin.posed(track, window.center)  # (P, 3)
     if companion is not None:
         free = ~trespassing(companion, places, window.center)
         skin, places = skin[free], places[free]
-    if len(skin) > count:
-        chosen = np.sort(rng.choice(len(skin), count, replace=False))
-        skin, places = skin[chosen], places[chosen]
     generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
     motion, shared = _motion(track, window, settings, generator)
     gaussians = round_gaussians(capture, (window.center,), [places], settings)
@@ -91,6 +93,30 @@ def _seen(skin: Skin, track: BodyTrack, capture: Capture, frame: int) -> Skin:
             "delete it and run ico3d capture pose again."
         )
     return skin[seen]
+
+
+def _dressed(
+    skin: Skin,
+    track: BodyTrack,
+    capture: Capture,
+    window: Window,
+    count: int,
+    settings: BodySettings,
+    rng: np.random.Generator,
+) -> Skin:
+    """As many points as wanted: of the skin, and of what stands off it, by how much that is."""
+    frame, others = window.center, sorted({window.first, window.last})
+    start = initial_points(capture, frame, SURFACE, rng, settings.initial.source)
+    off = standing_off(skin, track, capture, start.points, frame, others)
+    beside = min(round(count * len(off) / SURFACE), len(off))
+    return Skin.joined(_some(off, beside, rng), _some(skin, count - beside, rng))
+
+
+def _some(skin: Skin, count: int, rng: np.random.Generator) -> Skin:
+    """At most so many of the points."""
+    if len(skin) <= count:
+        return skin
+    return skin[np.sort(rng.choice(len(skin), count, replace=False))]
 
 
 def _motion(
