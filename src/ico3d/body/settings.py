@@ -135,6 +135,7 @@ class Rates:
         shape_means: Learning rate of its residual shapes' places, metres.
         shape_colors: Learning rate of its residual shapes' colours, logits.
         light: Learning rate of its light.
+        coefficients: Learning rate of the network that tells how much of each shape a pose has.
         skin_decay: Factor to which the rates of weights, residual shapes, their network and light
             have decayed at the last step.
     """
@@ -158,6 +159,7 @@ class Rates:
     shape_means: float = 3e-3
     shape_colors: float = 5e-3
     light: float = 5e-3
+    coefficients: float = 2e-3
     skin_decay: float = 0.2
 
     def by_parameter(self) -> dict[str, Rate]:
@@ -178,7 +180,7 @@ class Rates:
             "shape_means": Rate(self.shape_means, self.skin_decay),
             "shape_colors": Rate(self.shape_colors, self.skin_decay),
             "light": Rate(self.light, self.skin_decay),
-            "coefficients": Rate(self.mlp, self.skin_decay),
+            "coefficients": Rate(self.coefficients, self.skin_decay),
         }
 
 
@@ -325,6 +327,10 @@ PRESETS: dict[PresetName, BodySettings] = {
 }
 
 
+STEPS_PER_FRAME = 150
+"""Of a skinned body on two CPU cores, whose clip is one window of any length."""
+
+
 def settings_for(preset: PresetName, method: Method) -> BodySettings:
     """The settings of a preset for a method: a baseline differs where its own paper does."""
     settings = PRESETS[preset]
@@ -333,9 +339,11 @@ def settings_for(preset: PresetName, method: Method) -> BodySettings:
     if method == "4dgs":
         return replace(settings, mlp=replace(settings.mlp, sets=1))
     if method in SKINNED:
-        skinning = settings.skinning
+        skinning, steps_per_frame = settings.skinning, settings.steps_per_frame
         if method == "hugs":
             skinning = replace(skinning, shapes=0, light=False)
+        if preset == "cpu":
+            steps_per_frame = STEPS_PER_FRAME
         rates = replace(settings.rates, position_decay=0.1, shape_decay=0.2)
-        return replace(settings, skinning=skinning, rates=rates)
+        return replace(settings, skinning=skinning, rates=rates, steps_per_frame=steps_per_frame)
     return settings

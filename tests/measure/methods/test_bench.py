@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ico3d.body.planning.windows import Window
-from ico3d.body.settings import ONE_WINDOW
+from ico3d.body.settings import ONE_WINDOW, SKINNED
 from ico3d.capture.formats import open_capture
 from ico3d.errors import SettingsError
 from ico3d.measure.commands import BenchBody
@@ -60,6 +60,18 @@ def test_all_have_the_same_gaussians_and_steps(changes):
     most = changes.get("density.max_gaussians", 7_000)
     assert terms.settings("static").density.max_gaussians == most
     assert terms.settings("swings").mlp.depth > terms.settings("swings++").mlp.depth
+
+
+@pytest.mark.parametrize("changes", [{}, {"steps": 700}, {"steps_per_frame": 20}])
+def test_a_skeleton_has_as_many_steps_but_the_gaussians_of_one_window(changes):
+    ours = changed(preset("swings++"), changes | {"density.max_gaussians": 500})
+    terms = Terms(Path("c"), None, Path("f"), WINDOWS, ours, finetune=False)
+    for method in SKINNED:
+        settings = terms.settings(method)
+        assert settings.steps_of(41) == sum(ours.steps_of(len(window)) for window in WINDOWS)
+        assert settings.density.max_gaussians == 500 and settings.initial.gaussians == 4_000
+        assert settings.finetune.steps == 0
+    assert not set(SKINNED) & set(BenchBody().methods)
 
 
 def test_only_swings_plus_plus_is_fine_tuned_and_elsewhere_than_without():

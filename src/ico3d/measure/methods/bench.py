@@ -67,7 +67,7 @@ class Terms:
             settings,
             initial=replace(initial, gaussians=count * initial.gaussians),
             density=replace(density, max_gaussians=count * density.max_gaussians),
-            steps=sum(settings.steps_of(len(window)) for window in self.windows),
+            steps=sum(self.ours.steps_of(len(window)) for window in self.windows),
             steps_per_frame=0,
         )
 
