@@ -7,6 +7,8 @@ import torch
 from ico3d.body.model_folder import TrainedBody
 from ico3d.body.planning.windows import Window
 from ico3d.body.skinning.skinned import Skinned
+from ico3d.body.skinning.template import sampled
+from ico3d.body.training.standing_off import standing_off
 from ico3d.body.training.train_clip import train_body
 from ico3d.errors import CaptureError
 from support.bodies.moving_capture import FRAMES, MovingCapture
@@ -46,6 +48,21 @@ def test_it_begins_on_the_skin(capture):
     assert (weights[:, 0] > 0.99).all()
     outward = model.gaussians["normals"][~arm] * means[~arm] / torch.tensor([0.16, 0.45, 0.12]) ** 2
     assert (outward.sum(1) > 0).all()
+
+
+def test_what_stands_off_the_skin_is_found(tmp_path):
+    """A hat on the trunk begins at rest; what other frames show to be empty does not."""
+    capture = TrackedCapture(tmp_path)
+    track, rng = capture.body_track(), np.random.default_rng(0)
+    skin = sampled(track, 800, rng)
+    bare = skin[skin.points[:, 1] < 0.3]
+    frame, last = CLIP.center, CLIP.last
+    surface = skin.posed(track, frame)
+    shape = standing_off(bare, track, capture, surface, frame, [0, last])
+    np.testing.assert_array_less(0.3, shape.points[:, 1])
+    assert len(shape) > 20
+    beside = surface + np.array([0.0, 0.0, 0.3])
+    assert len(standing_off(skin, track, capture, beside, frame, [0, last])) < 0.1 * len(beside)
 
 
 def test_poses_learn_from_pictures(capture):

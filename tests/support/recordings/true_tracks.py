@@ -29,6 +29,7 @@ def true_track(recording: Path, subject_file: Path) -> BodyTrack:
     frames, seed = settings["frames"], settings["seed"]
     acted = perform(subject, settings["text"], frames, fps, seed, settings["lively"])
     joints = embodied(subject, acted, settings["motion"], fps, seed).joints  # (F, J, 4, 4)
+    assert joints is not None
     bones, shift = subject.skeleton, subject.head_in_world
     turned = joints[..., :3, :3]
     local = turned.copy()  # (F, J, 3, 3)

@@ -98,8 +98,7 @@ class Skinned:
             return self._frame(values, frame)
         first = min(max(int(at), 0), self.frames - 2)
         with torch.no_grad():
-            ends = [self._frame(values, first), self._frame(values, first + 1)]
-        return _between(*ends, at - first)
+            return _between(self._frame(values, first), self._frame(values, first + 1), at - first)
 
     def posed(self, values: Mapping[str, Tensor], rotations: Tensor, root: Tensor) -> Gaussians:
         """Activated Gaussians in any pose.
@@ -160,8 +159,8 @@ def without_residual(pose: Pose) -> Pose:
 
 def _between(a: Pose, b: Pose, part: float) -> Pose:
     """A pose between two, part 0 to 1: joints turn on the shorter way."""
-    ends = [quaternions.normalized(p.rotations.double().cpu().numpy()) for p in (a, b)]
-    turned = torch.from_numpy(quaternions.slerp(*ends, part)).to(a.rotations)  # (J, 4)
+    one, other = (quaternions.normalized(p.rotations.double().cpu().numpy()) for p in (a, b))
+    turned = torch.from_numpy(quaternions.slerp(one, other, part)).to(a.rotations)  # (J, 4)
     residual = None
     if a.residual is not None and b.residual is not None:
         residual = torch.lerp(a.residual, b.residual, part)

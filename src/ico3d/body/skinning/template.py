@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from ico3d.rig.binding import Binding
 from ico3d.rig.body_track import BodyTrack
@@ -47,6 +48,22 @@ class Skin:
         """(P, 3) where the points are in the world at a frame."""
         matrices = track.rig.matrices(track.rotations[frame], track.roots[frame])
         return self.binding.skinned(self.points, matrices)
+
+    def pulled_back(self, places: np.ndarray, track: BodyTrack, frame: int) -> "Skin":
+        """Places in the world as points at rest that hang on the nearest of these points' joints.
+
+        Args:
+            places: (Q, 3) metres, about the person at the frame.
+            track: How the person moves.
+            frame: When the places are seen.
+        """
+        near = self[np.asarray(KDTree(self.posed(track, frame)).query(places)[1])]
+        matrices = track.rig.matrices(track.rotations[frame], track.roots[frame])  # (J, 4, 4)
+        weights, hung = near.binding.weights, matrices[near.binding.joints]
+        mixed = np.einsum("qk,qkab->qab", weights, hung)  # (Q, 4, 4)
+        world = np.concatenate([places, np.ones((len(places), 1))], 1)  # (Q, 4)
+        rest = np.linalg.solve(mixed, world[:, :, None])[:, :3, 0]  # (Q, 3)
+        return Skin(rest, near.normals, near.binding)
 
 
 def sampled(track: BodyTrack, count: int, rng: np.random.Generator) -> Skin:

@@ -44,7 +44,7 @@ def begin_skinned(
         window: The frames whose poses are trained.
         settings: How many Gaussians, and what they have besides.
         rng: Draws them.
-        companion: Where nothing begins.
+        companion: Where nothing begins; about its border more does.
 
     Raises:
         CaptureError: If there is no body track, or it misses all pictures.
@@ -53,10 +53,9 @@ def begin_skinned(
     count = min(settings.initial.gaussians, settings.density.max_gaussians)
     skin = _seen(sampled(track, SPARE * count, rng), track, capture, window.center)
     skin = _dressed(skin, track, capture, window, count, settings, rng)
-    places = skin.posed(track, window.center)  # (P, 3)
     if companion is not None:
-        free = ~trespassing(companion, places, window.center)
-        skin, places = skin[free], places[free]
+        skin = _beside(companion, skin, track, window.center, rng)
+    places = skin.posed(track, window.center)  # (P, 3)
     generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
     motion, shared = _motion(track, window, settings, generator)
     gaussians = round_gaussians(capture, (window.center,), [places], settings)
@@ -93,6 +92,15 @@ def _seen(skin: Skin, track: BodyTrack, capture: Capture, frame: int) -> Skin:
             "delete it and run ico3d capture pose again."
         )
     return skin[seen]
+
+
+def _beside(
+    companion: Companion, skin: Skin, track: BodyTrack, frame: int, rng: np.random.Generator
+) -> Skin:
+    """The points that do not trespass at a frame, and those of the companion's border."""
+    border = skin.pulled_back(companion.border(frame, rng), track, frame)
+    both = Skin.joined(skin, border)
+    return both[~trespassing(companion, both.posed(track, frame), frame)]
 
 
 def _dressed(

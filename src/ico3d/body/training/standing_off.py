@@ -40,14 +40,8 @@ def standing_off(
         frame: When the surface was seen.
         others: Frames at which the points must lie on the person, too.
     """
-    distance, nearest = KDTree(skin.posed(track, frame)).query(surface)  # (S,), (S,)
-    off = (distance > OFF) & (distance < FARTHEST)
-    near = skin[np.asarray(nearest)[off]]
-    matrices = track.rig.matrices(track.rotations[frame], track.roots[frame])  # (J, 4, 4)
-    mixed = np.einsum("pk,pkab->pab", near.binding.weights, matrices[near.binding.joints])
-    world = np.concatenate([surface[off], np.ones((len(near), 1))], 1)  # (P, 4)
-    rest = np.linalg.solve(mixed, world[:, :, None])[:, :3, 0]  # (P, 3)
-    found = Skin(rest, near.normals, near.binding)
+    distance, _ = KDTree(skin.posed(track, frame)).query(surface)  # (S,)
+    found = skin.pulled_back(surface[(distance > OFF) & (distance < FARTHEST)], track, frame)
     for other in others:
         found = found[_on_person(found.posed(track, other), capture, other)]
     return found
