@@ -239,6 +239,8 @@ class BenchBody:
         methods: The methods to train; skinned and hugs, which need a body track, only where they
             are named.
         frames: Only so many of the first frames; all by default.
+        unseen: Measure the frames that --frames leaves out, too: a body on a skeleton in the poses
+            of the body track, others as they were in the last trained frame.
         finetune: Fine-tune SWinGS++ in the end, and measure before and after; the table shows it
             as it was before.
         device: Where to compute: by default with CUDA where that works, else on the CPU.
@@ -254,6 +256,7 @@ class BenchBody:
     seeds: int = 1
     methods: tuple[Method, ...] = tuple(m for m in get_args(Method) if m not in SKINNED)
     frames: int | None = None
+    unseen: bool = False
     finetune: bool = False
     device: DeviceName = "auto"
     jobs: int = 1
@@ -284,6 +287,7 @@ class BenchBody:
             self.settings,
             self.finetune,
             decided(self.device),
+            self.unseen,
         )
         trials = [
             bench.Trial(method, seed, terms)

@@ -18,6 +18,7 @@ from ico3d.measure.methods.settings import preset
 from ico3d.studio import recording as recording_module
 from ico3d.studio.picture import paint
 from support.bodies.moving_capture import FRAMES, MovingCapture
+from support.bodies.tracked_capture import TrackedCapture
 from support.captures import open_with
 from support.made_trial import MadeTrial
 from support.recordings.synthetic_bodies import write_body
@@ -163,6 +164,27 @@ def test_the_same_command_trains_nothing_twice(bench):
     again = {path: path.stat().st_mtime_ns for path in folder.rglob("window.safetensors")}
     assert again == written and len(written) > 4
     assert first == second
+
+
+def test_frames_that_were_not_trained(tmp_path, monkeypatch, capsys):
+    """On a skeleton the body follows the track there; elsewhere it stays where it was."""
+    open_with(monkeypatch, TrackedCapture)
+    command = BenchBody(
+        tmp_path / "capture",
+        folder=tmp_path / "runs",
+        methods=("static", "hugs"),
+        settings=changed(preset("swings++"), TINY | {"steps_per_frame": 20}),
+        frames=6,
+        unseen=True,
+        json=tmp_path / "figures.json",
+    )
+    command.run()
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    still, hugs = (figures[method]["mean"]["unseen_psnr_mask"] for method in ("static", "hugs"))
+    assert hugs > still + 0.5
+    assert "frames not trained" in capsys.readouterr().out
+    with pytest.raises(SettingsError, match="--unseen needs --frames"):
+        replace(command, frames=None).run()
 
 
 def test_a_clip_of_a_capture(monkeypatch):
