@@ -86,7 +86,7 @@ class Skinning:
 
     shapes: int = 8
     hidden: int = 32
-    dropout: float = 0.3
+    dropout: float = 0.1
     light: bool = True
 
 
@@ -152,7 +152,7 @@ class Rates:
     blend: float = 1e-4
     motion: float = 1e-3
     motion_decay: float = 0.1
-    pose: float = 1.5e-3
+    pose: float = 1e-3
     root: float = 1e-3
     pose_decay: float = 0.05
     weights: float = 0.0
