@@ -154,9 +154,7 @@ class Skinned:
 
 def without_residual(pose: Pose) -> Pose:
     """The same pose with all coefficients 0; it does not learn to make up for them."""
-    return replace(
-        pose, rotations=pose.rotations.detach(), root=pose.root.detach(), residual=None
-    )
+    return replace(pose, rotations=pose.rotations.detach(), root=pose.root.detach(), residual=None)
 
 
 def _between(a: Pose, b: Pose, part: float) -> Pose:
