@@ -156,7 +156,7 @@ class Rates:
     root: float = 1e-3
     pose_decay: float = 0.05
     weights: float = 0.0
-    shape_means: float = 3e-3
+    shape_means: float = 2e-4
     shape_colors: float = 5e-3
     light: float = 5e-3
     coefficients: float = 2e-3
