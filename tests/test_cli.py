@@ -98,6 +98,10 @@ def test_presets_depend_on_method_and_strategy(preset):
     )
     assert (ours.mlp.depth, swings.mlp.depth, fourd.mlp.sets) == (2, 4, 1)
     assert parsed("train body", "--method", "swings", "--mlp.depth", "3").mlp.depth == 3
+    skinned, hugs = (parsed("train body", "--method", name) for name in ("skinned", "hugs"))
+    assert (skinned.skinning.shapes, skinned.skinning.light) == (8, True)
+    assert (hugs.skinning.shapes, hugs.skinning.light) == (0, False)
+    assert skinned.rates == hugs.rates and skinned.steps_of(100) >= ours.steps_of(100)
     default, mcmc = (parsed("train static", "--strategy", name) for name in ("default", "mcmc"))
     assert (default.initial.opacity, mcmc.initial.opacity) == (0.1, 0.5)
     assert mcmc.density.until > default.density.until

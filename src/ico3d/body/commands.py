@@ -26,7 +26,8 @@ class BodyChoice:
             the defaults shown here are those of the preset that is chosen.
         method: SWinGS++, or what it is compared with: a positional encoding in the place of its
             encoder, one window without tuning, Gaussians that come and go by formulas (spacetime,
-            freetime), Gaussians that do not move within a window.
+            freetime), Gaussians that do not move within a window, Gaussians on the skeleton of
+            ico3d capture pose, with residual shapes and light (skinned) or without (hugs).
     """
 
     preset: PresetName = "cpu"
@@ -35,7 +36,7 @@ class BodyChoice:
 
 @dataclass(frozen=True)
 class TrainBody(BodyChoice):
-    """Trains SWinGS++ on a capture of a whole person in motion.
+    """Trains SWinGS++, or another method, on a capture of a whole person in motion.
 
     The same command goes on where it was interrupted.
 

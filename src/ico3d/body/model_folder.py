@@ -7,8 +7,8 @@ from pathlib import Path
 
 import torch
 
-from ico3d.body.motion.opening import motion_from
 from ico3d.body.motion.window_model import WindowModel
+from ico3d.body.opening import motion_from
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import Method
 from ico3d.common.files import write_atomic

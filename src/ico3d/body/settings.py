@@ -6,16 +6,20 @@ from typing import Literal
 from ico3d.common.presets import PresetName
 from ico3d.training.rate import Rate
 
-Method = Literal["swings++", "swings", "4dgs", "spacetime", "freetime", "static"]
+Method = Literal["swings++", "swings", "4dgs", "spacetime", "freetime", "static", "skinned", "hugs"]
 """SWinGS++; SWinGS: a positional encoding in the place of the encoder; 4DGS: one window for the
 whole clip, the encoder, no tuning; Spacetime Gaussians and FreeTime: one window whose Gaussians
-come, move and go by formulas; static: Gaussians that do not move within a window."""
+come, move and go by formulas; static: Gaussians that do not move within a window; skinned: one
+window whose Gaussians hang on a skeleton, with residual shapes and light; hugs: without these."""
 
 Source = Literal["best", "hull"]
 """Where the Gaussians of a window begin: on the best surface that the capture can give (its own
 points, else the visual hull), or on the visual hull in any case."""
 
-ONE_WINDOW: tuple[Method, ...] = ("4dgs", "spacetime", "freetime")
+SKINNED: tuple[Method, ...] = ("skinned", "hugs")
+"""Methods whose Gaussians hang on a skeleton; they need a body track."""
+
+ONE_WINDOW: tuple[Method, ...] = ("4dgs", "spacetime", "freetime", *SKINNED)
 """Methods that take the whole clip as one window."""
 
 
@@ -68,6 +72,25 @@ class Mlp:
 
 
 @dataclass(frozen=True)
+class Skinning:
+    """What Gaussians on a skeleton have besides (methods skinned and hugs).
+
+    Attributes:
+        shapes: Residual shapes K, which move and colour each Gaussian as far as the pose asks for
+            them; 0 for none.
+        hidden: Width of the hidden layer of the network that tells how far.
+        dropout: Part of the steps, 0 to 1, that learn without the residual shapes, so that what
+            they do not know looks right, too.
+        light: Let colours depend on where the posed surface faces.
+    """
+
+    shapes: int = 8
+    hidden: int = 32
+    dropout: float = 0.1
+    light: bool = True
+
+
+@dataclass(frozen=True)
 class Loss:
     """Weights of the terms of the loss.
 
@@ -105,6 +128,15 @@ class Rates:
             freetime.
         motion_decay: Factor to which the rates of MLP, planes, α and formulas have decayed at the
             last step.
+        pose: Learning rate of a skinned body's poses, as quaternions.
+        root: Learning rate of where its root is, metres.
+        pose_decay: Factor to which the rates of poses and roots have decayed at the last step.
+        shape_means: Learning rate of its residual shapes' places, metres.
+        shape_colors: Learning rate of its residual shapes' colours, logits.
+        light: Learning rate of its light.
+        coefficients: Learning rate of the network that tells how much of each shape a pose has.
+        skin_decay: Factor to which the rates of residual shapes, their network and light have
+            decayed at the last step.
     """
 
     position: float = 1.6e-4
@@ -119,6 +151,14 @@ class Rates:
     blend: float = 1e-4
     motion: float = 1e-3
     motion_decay: float = 0.1
+    pose: float = 1e-3
+    root: float = 1e-3
+    pose_decay: float = 0.05
+    shape_means: float = 2e-4
+    shape_colors: float = 5e-3
+    light: float = 5e-3
+    coefficients: float = 2e-3
+    skin_decay: float = 0.2
 
     def by_parameter(self) -> dict[str, Rate]:
         """Learning rates by the name of the parameter; that of the means is per metre of extent."""
@@ -132,6 +172,12 @@ class Rates:
             "mlp": Rate(self.mlp, self.motion_decay),
             "grid": Rate(self.grid, self.motion_decay),
             "motion": Rate(self.motion, self.motion_decay),
+            "pose_rotations": Rate(self.pose, self.pose_decay),
+            "pose_roots": Rate(self.root, self.pose_decay),
+            "shape_means": Rate(self.shape_means, self.skin_decay),
+            "shape_colors": Rate(self.shape_colors, self.skin_decay),
+            "light": Rate(self.light, self.skin_decay),
+            "coefficients": Rate(self.coefficients, self.skin_decay),
         }
 
 
@@ -221,6 +267,7 @@ class BodySettings:
         windows: Where the clip is cut into windows.
         encoder: The encoding of place and time that the MLP reads.
         mlp: The tunable MLP, which moves the Gaussians.
+        skinning: What Gaussians on a skeleton have besides (methods skinned and hugs).
         loss: Weights of the terms of the loss.
         rates: Learning rates, and the factors to which they decay.
         initial: The Gaussians that a window's training begins with.
@@ -237,6 +284,7 @@ class BodySettings:
     windows: Windows = Windows()
     encoder: Encoder = Encoder()
     mlp: Mlp = Mlp()
+    skinning: Skinning = Skinning()
     loss: Loss = Loss()
     rates: Rates = Rates()
     initial: Initial = Initial()
@@ -276,6 +324,10 @@ PRESETS: dict[PresetName, BodySettings] = {
 }
 
 
+STEPS_PER_FRAME = 150
+"""Of a skinned body on two CPU cores, whose clip is one window of any length."""
+
+
 def settings_for(preset: PresetName, method: Method) -> BodySettings:
     """The settings of a preset for a method: a baseline differs where its own paper does."""
     settings = PRESETS[preset]
@@ -283,4 +335,12 @@ def settings_for(preset: PresetName, method: Method) -> BodySettings:
         return replace(settings, mlp=replace(settings.mlp, depth=4))
     if method == "4dgs":
         return replace(settings, mlp=replace(settings.mlp, sets=1))
+    if method in SKINNED:
+        skinning, steps_per_frame = settings.skinning, settings.steps_per_frame
+        if method == "hugs":
+            skinning = replace(skinning, shapes=0, light=False)
+        if preset == "cpu":
+            steps_per_frame = STEPS_PER_FRAME
+        rates = replace(settings.rates, position_decay=0.1, shape_decay=0.2)
+        return replace(settings, skinning=skinning, rates=rates, steps_per_frame=steps_per_frame)
     return settings

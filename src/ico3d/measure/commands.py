@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 import tyro
 
-from ico3d.body.settings import BodySettings, Method
+from ico3d.body.settings import SKINNED, BodySettings, Method
 from ico3d.common.device import DeviceName
 from ico3d.measure.methods.settings import OURS, preset
 
@@ -228,15 +228,19 @@ class BenchBody:
     """Trains SWinGS++ and what it is compared with on one recording, and measures all of them.
 
     As many Gaussians and steps for each: a method that takes the clip as one window has those of
-    all windows. All begin on the visual hull. The same command goes on where it was interrupted.
+    all windows; on a skeleton it has as many Gaussians as one window. All begin on the visual hull,
+    or on the skin. The same command goes on where it was interrupted.
 
     Attributes:
         capture: A recording of a whole person; by default one is made of --subject.
         subject: The person of the standard recording, an .npz file.
         folder: Where the recording and the trainings lie.
         seeds: How often each method is trained.
-        methods: The methods to train.
+        methods: The methods to train; skinned and hugs, which need a body track, only where they
+            are named.
         frames: Only so many of the first frames; all by default.
+        unseen: Measure the frames that --frames leaves out, too: a body on a skeleton in the poses
+            of the body track, others as they were in the last trained frame.
         finetune: Fine-tune SWinGS++ in the end, and measure before and after; the table shows it
             as it was before.
         device: Where to compute: by default with CUDA where that works, else on the CPU.
@@ -250,8 +254,9 @@ class BenchBody:
     subject: Path | None = None
     folder: Path = Path("bench-body")
     seeds: int = 1
-    methods: tuple[Method, ...] = get_args(Method)
+    methods: tuple[Method, ...] = tuple(m for m in get_args(Method) if m not in SKINNED)
     frames: int | None = None
+    unseen: bool = False
     finetune: bool = False
     device: DeviceName = "auto"
     jobs: int = 1
@@ -282,6 +287,7 @@ class BenchBody:
             self.settings,
             self.finetune,
             decided(self.device),
+            self.unseen,
         )
         trials = [
             bench.Trial(method, seed, terms)

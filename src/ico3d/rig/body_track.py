@@ -1,7 +1,7 @@
 """How a recorded person moved: a rig, its pose in every frame, and a mesh that hangs on it."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -52,6 +52,11 @@ class BodyTrack:
     def num_frames(self) -> int:
         """F."""
         return len(self.rotations)
+
+    def until(self, frames: int) -> "BodyTrack":
+        """The track of the first frames alone."""
+        parts = (self.rotations[:frames], self.roots[:frames], self.fitted[:frames])
+        return replace(self, rotations=parts[0], roots=parts[1], fitted=parts[2])
 
     def joints(self) -> Array:
         """(F, J, 3) places of the joints in the world, metres."""

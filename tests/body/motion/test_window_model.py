@@ -10,15 +10,17 @@ import torch
 from ico3d.body.motion.deformation import GRID, MLP
 from ico3d.body.motion.encoder import EncoderShape
 from ico3d.body.motion.formulas import FREETIME, SPACETIME, Still
-from ico3d.body.motion.opening import motion_from
 from ico3d.body.motion.tunable import MlpShape
 from ico3d.body.motion.window_model import WindowModel, activated
+from ico3d.body.opening import motion_from
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import settings_for
+from ico3d.body.skinning.skinned import Skinned
 from ico3d.body.training.prepare_window import PADDING, deformation
 from support.bodies.window_parts import ENCODED, POSITIONAL, canonical
 
-MOTIONS = [Still(), SPACETIME, FREETIME, ENCODED, POSITIONAL]
+SKINNED = Skinned(("root", "arm"), (-1, 0), 3, 8, 32, True)
+MOTIONS = [Still(), SPACETIME, FREETIME, ENCODED, POSITIONAL, SKINNED]
 
 
 def test_activation():

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ico3d.body.planning.windows import Window
-from ico3d.body.settings import ONE_WINDOW
+from ico3d.body.settings import ONE_WINDOW, SKINNED
 from ico3d.capture.formats import open_capture
 from ico3d.errors import SettingsError
 from ico3d.measure.commands import BenchBody
@@ -18,6 +18,7 @@ from ico3d.measure.methods.settings import preset
 from ico3d.studio import recording as recording_module
 from ico3d.studio.picture import paint
 from support.bodies.moving_capture import FRAMES, MovingCapture
+from support.bodies.tracked_capture import TrackedCapture
 from support.captures import open_with
 from support.made_trial import MadeTrial
 from support.recordings.synthetic_bodies import write_body
@@ -60,6 +61,18 @@ def test_all_have_the_same_gaussians_and_steps(changes):
     most = changes.get("density.max_gaussians", 7_000)
     assert terms.settings("static").density.max_gaussians == most
     assert terms.settings("swings").mlp.depth > terms.settings("swings++").mlp.depth
+
+
+@pytest.mark.parametrize("changes", [{}, {"steps": 700}, {"steps_per_frame": 20}])
+def test_a_skeleton_has_as_many_steps_but_the_gaussians_of_one_window(changes):
+    ours = changed(preset("swings++"), changes | {"density.max_gaussians": 500})
+    terms = Terms(Path("c"), None, Path("f"), WINDOWS, ours, finetune=False)
+    for method in SKINNED:
+        settings = terms.settings(method)
+        assert settings.steps_of(41) == sum(ours.steps_of(len(window)) for window in WINDOWS)
+        assert settings.density.max_gaussians == 500 and settings.initial.gaussians == 4_000
+        assert settings.finetune.steps == 0
+    assert not set(SKINNED) & set(BenchBody().methods)
 
 
 def test_only_swings_plus_plus_is_fine_tuned_and_elsewhere_than_without():
@@ -151,6 +164,27 @@ def test_the_same_command_trains_nothing_twice(bench):
     again = {path: path.stat().st_mtime_ns for path in folder.rglob("window.safetensors")}
     assert again == written and len(written) > 4
     assert first == second
+
+
+def test_frames_that_were_not_trained(tmp_path, monkeypatch, capsys):
+    """On a skeleton the body follows the track there; elsewhere it stays where it was."""
+    open_with(monkeypatch, TrackedCapture)
+    command = BenchBody(
+        tmp_path / "capture",
+        folder=tmp_path / "runs",
+        methods=("static", "hugs"),
+        settings=changed(preset("swings++"), TINY | {"steps_per_frame": 20}),
+        frames=6,
+        unseen=True,
+        json=tmp_path / "figures.json",
+    )
+    command.run()
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    still, hugs = (figures[method]["mean"]["unseen_psnr_mask"] for method in ("static", "hugs"))
+    assert hugs > still + 0.5
+    assert "frames not trained" in capsys.readouterr().out
+    with pytest.raises(SettingsError, match="--unseen needs --frames"):
+        replace(command, frames=None).run()
 
 
 def test_a_clip_of_a_capture(monkeypatch):

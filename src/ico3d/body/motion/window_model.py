@@ -39,7 +39,7 @@ class Motion(Protocol):
         ...
 
     def about(self) -> dict:
-        """What `ico3d.body.motion.opening.motion_from` makes it again from, JSON-serialisable."""
+        """What `ico3d.body.opening.motion_from` makes it again from, JSON-serialisable."""
         ...
 
 

@@ -10,9 +10,12 @@ from ico3d.body.motion.encoder import space_smoothness, time_change, time_smooth
 from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings, Method
+from ico3d.body.skinning.skinned import Skinned, without_residual
 from ico3d.body.training.density import density_control
 from ico3d.body.training.picture_step import Learner, WindowTrainee
 from ico3d.body.training.views import BodyViews
+from ico3d.capture.pictures import View
+from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.losses import tensor_psnr
 
 
@@ -31,8 +34,9 @@ class BodyTrainer(WindowTrainee):
         companion: Companion | None = None,
     ):
         """Gets ready for the first step; arguments as for `Learner`."""
-        for tensor in (*model.gaussians.values(), *model.shared.values()):
-            tensor.requires_grad_()
+        fixed = model.motion.fixed if isinstance(model.motion, Skinned) else ()
+        for name, tensor in {**model.gaussians, **model.shared}.items():
+            tensor.requires_grad_(name not in fixed)
         super().__init__(Learner(model, window, pictures, settings, extent, seed, companion))
         self._settings = settings
         self._steps = settings.steps_of(len(window))
@@ -47,7 +51,7 @@ class BodyTrainer(WindowTrainee):
         still = index < self._warmup and bool(self._center)
         view = learner.view(self._center if still else learner.views, index)
         example = learner.example(view, index)
-        gaussians = self.model.canonical() if still else self.model.at(learner.tau(view))
+        gaussians = self.model.canonical() if still else self._moved(view, index)
         rendering = learner.draw(gaussians, view, example)
         loss = learner.loss(rendering, example) + self._penalties()
         loss.backward()
@@ -62,6 +66,16 @@ class BodyTrainer(WindowTrainee):
             "psnr": tensor_psnr(rendering.rgb[0], example.target, example.mask),
             "gaussians": len(self.model),
         }
+
+    def _moved(self, view: View, index: int) -> Gaussians:
+        """The Gaussians when a view was taken; at times without what a pose adds to a body."""
+        tau, motion = self._learner.tau(view), self.model.motion
+        if not isinstance(motion, Skinned):
+            return self.model.at(tau)
+        values = {**self.model.gaussians, **self.model.shared}
+        pose = motion.pose_at(values, tau)
+        dropped = self._learner.random(index, 4).random() < self._settings.skinning.dropout
+        return motion.drawn(values, without_residual(pose) if dropped else pose)
 
     def tensors(self) -> dict[str, Tensor]:
         """Parameters, moments, and what density control has gathered."""

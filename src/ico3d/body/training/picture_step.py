@@ -1,5 +1,6 @@
 """What training and fine-tuning of a window share: a picture's loss, and learning from it."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -12,6 +13,7 @@ from ico3d.body.motion.deformation import GRID, MLP
 from ico3d.body.motion.window_model import CANONICAL, WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings
+from ico3d.body.skinning.skinned import NETWORK, PER_FRAME
 from ico3d.body.training.views import BodyViews, Example
 from ico3d.capture.pictures import View
 from ico3d.splat.density import Population
@@ -132,6 +134,10 @@ class Learner:
             rate = self._rates[_group(name)].at(progress)
             if name == "means":
                 rate *= self._extent
+            if name in PER_FRAME:
+                # A row has a gradient in one of F steps; Adam divides by the root of its mean
+                # square over all of them, and so makes steps that are √F times as large.
+                rate /= math.sqrt(len(tensor))
             self.optimiser.update(name, tensor, tensor.grad, rate)
             tensor.grad = None
 
@@ -215,5 +221,7 @@ def _group(name: str) -> str:
         return "mlp"
     if name.startswith(GRID):
         return "grid"
+    if name.startswith(NETWORK):
+        return "coefficients"
     formulas = ("center", "log_duration", "path", "turn", "affine")
     return "motion" if name in formulas else name

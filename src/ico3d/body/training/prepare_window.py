@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -16,31 +15,18 @@ from ico3d.body.motion.formulas import FREETIME, SPACETIME, Polynomial, Still
 from ico3d.body.motion.tunable import MlpShape
 from ico3d.body.motion.window_model import Motion, WindowModel
 from ico3d.body.planning.windows import Window
-from ico3d.body.settings import BodySettings, Method
-from ico3d.body.training.surface_points import initial_points, point_colors
+from ico3d.body.settings import SKINNED, BodySettings, Method
+from ico3d.body.training.begin import Begin, round_gaussians, trespassing
+from ico3d.body.training.prepare_skinned import begin_skinned
+from ico3d.body.training.surface_points import initial_points
 from ico3d.capture.capture import Capture
 from ico3d.splat.density import Population
-from ico3d.splat.initial import resampled, spacing
+from ico3d.splat.initial import resampled
 
 PADDING = 0.15
 """Of the box, as a part of its edge: what moves out of it would not be told apart any more."""
 POSITIONS = 4
 """Values that the positional encoding encodes: place and time."""
-
-
-@dataclass(frozen=True)
-class Begin:
-    """What the training of a window begins with.
-
-    Attributes:
-        model: The Gaussians.
-        extent: Half the longest edge of the person's box, metres.
-        source: Where the points come from, for people.
-    """
-
-    model: WindowModel
-    extent: float
-    source: str
 
 
 Dynamic = Callable[[np.ndarray], np.ndarray]
@@ -68,9 +54,11 @@ def begin_window(
         companion: Where nothing begins; about its border more does.
 
     Raises:
-        CaptureError: If the masks of the cameras agree on no place.
+        CaptureError: If the masks of the cameras agree on no place, or a skinned body has no track.
     """
     rng = np.random.default_rng([seed, window.first])
+    if method in SKINNED:
+        return begin_skinned(capture, window, settings, rng, companion)
     count = min(settings.initial.gaussians, settings.density.max_gaussians)
     if method in ("spacetime", "freetime"):
         frames = range(window.first, window.last + 1)
@@ -82,7 +70,7 @@ def begin_window(
         clouds = [_beside(companion, cloud, frame, rng) for cloud, frame in pairs]
     points = np.concatenate(clouds)  # (P, 3)
     motion, extra = _motion(method, settings, capture, window, clouds, dynamic, rng)
-    gaussians = _round(capture, frames, clouds, settings) | extra
+    gaussians = round_gaussians(capture, frames, clouds, settings) | extra
     generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
     shared = motion.initial(generator) if isinstance(motion, Deformation) else {}
     extent = float(np.ptp(points, axis=0).max() / 2)
@@ -122,25 +110,7 @@ def _beside(
 ) -> np.ndarray:
     """(Q, 3) points of a frame that do not trespass, and those of the companion's border."""
     places = np.concatenate([points, companion.border(frame, rng)])
-    trespass = companion.trespassing(torch.from_numpy(places).float(), frame)
-    return places[~trespass.cpu().numpy()]
-
-
-def _round(
-    capture: Capture, frames: Sequence[int], clouds: list[np.ndarray], settings: BodySettings
-) -> dict[str, Tensor]:
-    """The canonical tensors of round Gaussians on points."""
-    colors = [point_colors(p, capture, f) for p, f in zip(clouds, frames, strict=True)]
-    sizes = np.concatenate([spacing(cloud) for cloud in clouds]) * settings.initial.scale  # (P,)
-    count, opacity = len(sizes), settings.initial.opacity
-    color = torch.from_numpy(np.concatenate(colors).clip(0.02, 0.98)).float()  # (P, 3)
-    return {
-        "means": torch.from_numpy(np.concatenate(clouds)).float(),
-        "quats": torch.tensor([1.0, 0, 0, 0]).repeat(count, 1),
-        "log_scales": torch.from_numpy(np.log(sizes)).float()[:, None].repeat(1, 3),
-        "opacity_logits": torch.full((count,), math.log(opacity / (1 - opacity))),
-        "color_logits": color.logit(),
-    }
+    return places[~trespassing(companion, places, frame)]
 
 
 def _motion(

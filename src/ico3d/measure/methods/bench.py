@@ -12,13 +12,15 @@ import numpy as np
 
 from ico3d.body.model_folder import UNTUNED, TrainedBody
 from ico3d.body.planning.windows import Window
-from ico3d.body.settings import ONE_WINDOW, BodySettings, Method
+from ico3d.body.settings import ONE_WINDOW, SKINNED, BodySettings, Method
 from ico3d.body.training.train_clip import BodyJob, plan_windows, train_body
 from ico3d.capture.capture import Capture, all_frames
 from ico3d.capture.formats import open_capture
 from ico3d.common.device import DeviceName
+from ico3d.errors import SettingsError
 from ico3d.measure.body import evaluate_body
 from ico3d.measure.methods.settings import OURS, changed_alike
+from ico3d.measure.methods.unseen import unseen_scores
 from ico3d.splat.device import computing_device
 from ico3d.studio.recording import Recording, record
 from ico3d.training.processes import fork_server
@@ -40,6 +42,7 @@ class Terms:
         ours: How SWinGS++ is trained; what is not as in its preset holds for every method.
         finetune: Whether SWinGS++ is fine-tuned in the end.
         device: Where to compute.
+        unseen: Whether to measure the frames after these, too.
     """
 
     capture: Path
@@ -49,23 +52,26 @@ class Terms:
     ours: BodySettings
     finetune: bool
     device: DeviceName = "auto"
+    unseen: bool = False
 
     def settings(self, method: Method) -> BodySettings:
         """The settings of a method.
 
-        Where that takes the clip as one window, it has the Gaussians and steps of all windows.
+        Where that takes the clip as one window, it has the Gaussians and steps of all windows;
+        on a skeleton those of one window are enough Gaussians.
         """
         settings = changed_alike(method, self.ours)
         if not (self.finetune and method == OURS):
             settings = settings.without_finetuning()
         if method not in ONE_WINDOW:
             return settings
-        count, initial, density = len(self.windows), settings.initial, settings.density
+        count = 1 if method in SKINNED else len(self.windows)
+        initial, density = settings.initial, settings.density
         return replace(
             settings,
             initial=replace(initial, gaussians=count * initial.gaussians),
             density=replace(density, max_gaussians=count * density.max_gaussians),
-            steps=sum(settings.steps_of(len(window)) for window in self.windows),
+            steps=sum(self.ours.steps_of(len(window)) for window in self.windows),
             steps_per_frame=0,
         )
 
@@ -89,7 +95,8 @@ class Trial:
 
         Returns:
             `seed`, `SCORES`, each of `PER_WINDOW` as a list `…_per_window`; `tuned`: the same
-            after fine-tuning, where there was one.
+            after fine-tuning, where there was one; `unseen_psnr_mask` and `unseen_psnr_moving` of
+            frames after those that were trained, where that is asked for.
         """
         capture = open_clip(self.terms.capture, self.terms.frames)
         settings, device = self.terms.settings(self.method), self.terms.device
@@ -109,7 +116,11 @@ class Trial:
             f"{name}_per_window": [entry[name] for entry in found["per_window"]]
             for name in PER_WINDOW
         }
-        return {name: found[name] for name in SCORES} | lists
+        scores = {name: found[name] for name in SCORES} | lists
+        if self.terms.unseen:
+            whole = open_capture(self.terms.capture)
+            scores |= unseen_scores(body, whole, capture.num_frames)
+        return scores
 
 
 def record_standard(subject: Path, folder: Path, workers: int) -> Path:
@@ -148,6 +159,8 @@ def open_clip(path: Path, frames: int | None) -> Capture:
     """A capture, or its first frames only."""
     capture = open_capture(path)
     if frames is not None and frames < capture.num_frames:
+        track = capture.body_track()
+        capture.body_track = lambda: track and track.until(frames)  # type: ignore[method-assign]
         capture.num_frames = frames
         capture.split = all_frames(frames, capture.cameras)
     return capture
@@ -160,13 +173,20 @@ def terms_for(
     settings: BodySettings,
     finetune: bool,
     device: DeviceName = "auto",
+    unseen: bool = False,
 ) -> Terms:
-    """Cuts the clip into windows, once for all trials."""
+    """Cuts the clip into windows, once for all trials.
+
+    Raises:
+        SettingsError: If unseen frames are asked for and there are none.
+    """
+    if unseen and (frames is None or frames >= open_capture(capture).num_frames):
+        raise SettingsError(f"--unseen needs --frames N, fewer than {capture} has.")
     clip = open_clip(capture, frames)
     named = folder / (f"{clip.num_frames}-frames")
     job = BodyJob(OURS, 0, settings, device=device)
     windows = plan_windows(clip, job, named).windows
-    return Terms(capture, frames, named, windows, settings, finetune, device)
+    return Terms(capture, frames, named, windows, settings, finetune, device, unseen)
 
 
 def run_trials(

@@ -24,6 +24,8 @@ def tables(figures: dict) -> Iterator[Table]:
     yield _qualities(figures, methods, spans)
     if len(methods) > 1 and OURS in methods:
         yield _margins(figures["margins"], spans)
+    if any("unseen_psnr_mask" in figures[method]["mean"] for method in methods):
+        yield _unseen(figures, methods)
     if "finetune" in figures:
         yield _finetuning(figures["finetune"])
 
@@ -65,6 +67,16 @@ def _margins(margins: dict, spans: Sequence[str]) -> Table:
     for other, values in margins.items():
         windows = map(_number, values["psnr_mask_per_window"])
         table.add_row(other, _number(values["psnr_mask"]), _number(values["psnr_moving"]), *windows)
+    return table
+
+
+def _unseen(figures: dict, methods: Sequence[str]) -> Table:
+    table = Table("frames not trained", "person", "moving")
+    for method in methods:
+        mean = figures[method]["mean"]
+        table.add_row(
+            method, _number(mean["unseen_psnr_mask"]), _number(mean["unseen_psnr_moving"])
+        )
     return table
 
 

@@ -5,6 +5,7 @@ from ico3d.body.motion.encoder import EncoderShape
 from ico3d.body.motion.formulas import Polynomial, Still
 from ico3d.body.motion.tunable import MlpShape
 from ico3d.body.motion.window_model import Motion
+from ico3d.body.skinning.skinned import Skinned
 
 
 def motion_from(about: dict) -> Motion:
@@ -21,6 +22,9 @@ def motion_from(about: dict) -> Motion:
         return Still(**fields)
     if kind == "polynomial":
         return Polynomial(**fields)
+    if kind == "skinned":
+        names, parents = (tuple(fields.pop(name)) for name in ("names", "parents"))
+        return Skinned(names, parents, **fields)
     if kind == "deformation":
         grid = fields.pop("encoder")
         if grid is not None:

@@ -1,0 +1,86 @@
+"""Points on the template's surface at rest, and how they hang on the skeleton."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from ico3d.rig.binding import Binding
+from ico3d.rig.body_track import BodyTrack
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """P points of a person at rest.
+
+    Attributes:
+        points: (P, 3) metres in rest space.
+        normals: (P, 3) unit vectors out of the surface.
+        binding: Which joints carry the points.
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    binding: Binding
+
+    def __len__(self) -> int:
+        """P."""
+        return len(self.points)
+
+    def __getitem__(self, index: np.ndarray) -> "Skin":
+        """Those that a mask or an array of numbers selects."""
+        binding = Binding(self.binding.joints[index], self.binding.weights[index])
+        return Skin(self.points[index], self.normals[index], binding)
+
+    @staticmethod
+    def joined(*parts: "Skin") -> "Skin":
+        """The points of several, one after the other."""
+        return Skin(
+            np.concatenate([part.points for part in parts]),
+            np.concatenate([part.normals for part in parts]),
+            Binding(
+                np.concatenate([part.binding.joints for part in parts]),
+                np.concatenate([part.binding.weights for part in parts]),
+            ),
+        )
+
+    def posed(self, track: BodyTrack, frame: int) -> np.ndarray:
+        """(P, 3) where the points are in the world at a frame."""
+        matrices = track.rig.matrices(track.rotations[frame], track.roots[frame])
+        return self.binding.skinned(self.points, matrices)
+
+    def pulled_back(self, places: np.ndarray, track: BodyTrack, frame: int) -> "Skin":
+        """Places in the world as points at rest that hang on the nearest of these points' joints.
+
+        Args:
+            places: (Q, 3) metres, about the person at the frame.
+            track: How the person moves.
+            frame: When the places are seen.
+        """
+        near = self[np.asarray(KDTree(self.posed(track, frame)).query(places)[1])]
+        matrices = track.rig.matrices(track.rotations[frame], track.roots[frame])  # (J, 4, 4)
+        weights, hung = near.binding.weights, matrices[near.binding.joints]
+        mixed = np.einsum("qk,qkab->qab", weights, hung)  # (Q, 4, 4)
+        world = np.concatenate([places, np.ones((len(places), 1))], 1)  # (Q, 4)
+        rest = np.linalg.solve(mixed, world[:, :, None])[:, :3, 0]  # (Q, 3)
+        return Skin(rest, near.normals, near.binding)
+
+
+def sampled(track: BodyTrack, count: int, rng: np.random.Generator) -> Skin:
+    """Points that are spread evenly over the template's surface.
+
+    Args:
+        track: The template.
+        count: How many.
+        rng: Draws them.
+    """
+    corners = track.vertices[track.faces].astype(np.float64)  # (T, 3, 3)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # (T, 3)
+    areas = np.linalg.norm(across, axis=1)  # (T,)
+    chosen = rng.choice(len(areas), count, p=areas / areas.sum())  # (P,)
+    parts = rng.dirichlet(np.ones(3), count)  # (P, 3)
+    points = np.einsum("pc,pcd->pd", parts, corners[chosen])  # (P, 3)
+    normals = across[chosen] / np.maximum(areas[chosen, None], 1e-12)
+    dense = track.binding.dense(len(track.rig))[track.faces[chosen]]  # (P, 3, J)
+    binding = Binding.strongest(np.einsum("pc,pcj->pj", parts, dense))
+    return Skin(points, normals, binding)

@@ -1,0 +1,162 @@
+"""What the training of a skinned body begins with: the template's surface at rest."""
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ico3d.body.companion import Companion
+from ico3d.body.motion.window_model import WindowModel
+from ico3d.body.planning.windows import Window
+from ico3d.body.settings import BodySettings
+from ico3d.body.skinning.coefficients import initial_network
+from ico3d.body.skinning.light import LIGHTS
+from ico3d.body.skinning.skinned import NETWORK, Skinned
+from ico3d.body.skinning.template import Skin, sampled
+from ico3d.body.training.begin import Begin, round_gaussians, trespassing
+from ico3d.body.training.standing_off import standing_off
+from ico3d.body.training.surface_points import initial_points
+from ico3d.capture.capture import Capture
+from ico3d.capture.pictures import train_cameras
+from ico3d.capture.surface.coverage import HIDING, visible
+from ico3d.errors import CaptureError
+from ico3d.rig.body_track import BodyTrack
+from ico3d.splat.initial import spacing
+
+SPARE = 3
+"""Times as many points as are wanted are drawn: those that nobody sees are left out."""
+SURFACE = 10_000
+"""Points of the recorded surface among which what stands off the skin is sought."""
+LEAST_WEIGHT = 1e-3
+"""Of a joint, before the logarithm: what does not carry a Gaussian may learn to."""
+
+
+def begin_skinned(
+    capture: Capture,
+    window: Window,
+    settings: BodySettings,
+    rng: np.random.Generator,
+    companion: Companion | None = None,
+) -> Begin:
+    """Round Gaussians on the skin, as far as cameras see it at the window's centre frame.
+
+    Args:
+        capture: The recording, with a body track.
+        window: The frames whose poses are trained.
+        settings: How many Gaussians, and what they have besides.
+        rng: Draws them.
+        companion: Where nothing begins; about its border more does.
+
+    Raises:
+        CaptureError: If there is no body track, or it misses all pictures.
+    """
+    track = tracked(capture)
+    count = min(settings.initial.gaussians, settings.density.max_gaussians)
+    skin = _seen(sampled(track, SPARE * count, rng), track, capture, window.center)
+    skin = _dressed(skin, track, capture, window, count, settings, rng)
+    if companion is not None:
+        skin = _beside(companion, skin, track, window.center, rng)
+    places = skin.posed(track, window.center)  # (P, 3)
+    generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
+    motion, shared = _motion(track, window, settings, generator)
+    gaussians = round_gaussians(capture, (window.center,), [places], settings)
+    gaussians["means"] = torch.from_numpy(skin.points).float()
+    gaussians |= _hung(skin, motion)
+    extent = float(np.ptp(skin.points, axis=0).max() / 2)
+    return Begin(WindowModel(motion, gaussians, shared), extent, f"the skin of {track.source}")
+
+
+def tracked(capture: Capture) -> BodyTrack:
+    """How the person moved.
+
+    Raises:
+        CaptureError: If that is not known.
+    """
+    track = capture.body_track()
+    if track is None:
+        raise CaptureError(
+            f"{capture.path} has no body track, which --method skinned needs: make one with "
+            f"ico3d capture pose {capture.path}, or train with --method swings++, which needs none."
+        )
+    return track
+
+
+def _seen(skin: Skin, track: BodyTrack, capture: Capture, frame: int) -> Skin:
+    """The points that some training camera sees."""
+    places = skin.posed(track, frame)  # (P, 3)
+    gap = HIDING * float(np.median(spacing(places)))
+    cameras = [capture.cameras[index] for index in train_cameras(capture)]
+    seen = np.any([visible(places, camera, gap) for camera in cameras], axis=0)  # (P,)
+    if not seen.any():
+        raise CaptureError(
+            f"{capture.path}: the body track lies outside of all pictures at frame {frame}: "
+            "delete it and run ico3d capture pose again."
+        )
+    return skin[seen]
+
+
+def _beside(
+    companion: Companion, skin: Skin, track: BodyTrack, frame: int, rng: np.random.Generator
+) -> Skin:
+    """The points that do not trespass at a frame, and those of the companion's border."""
+    border = skin.pulled_back(companion.border(frame, rng), track, frame)
+    both = Skin.joined(skin, border)
+    return both[~trespassing(companion, both.posed(track, frame), frame)]
+
+
+def _dressed(
+    skin: Skin,
+    track: BodyTrack,
+    capture: Capture,
+    window: Window,
+    count: int,
+    settings: BodySettings,
+    rng: np.random.Generator,
+) -> Skin:
+    """As many points as wanted: of the skin, and of what stands off it, by how much that is."""
+    frame, others = window.center, sorted({window.first, window.last})
+    start = initial_points(capture, frame, SURFACE, rng, settings.initial.source)
+    off = standing_off(skin, track, capture, start.points, frame, others)
+    beside = min(round(count * len(off) / SURFACE), len(off))
+    return Skin.joined(_some(off, beside, rng), _some(skin, count - beside, rng))
+
+
+def _some(skin: Skin, count: int, rng: np.random.Generator) -> Skin:
+    """At most so many of the points."""
+    if len(skin) <= count:
+        return skin
+    return skin[np.sort(rng.choice(len(skin), count, replace=False))]
+
+
+def _motion(
+    track: BodyTrack, window: Window, settings: BodySettings, generator: torch.Generator
+) -> tuple[Skinned, dict[str, Tensor]]:
+    """The motion, and its shared tensors: poses as they were tracked."""
+    sizes, rig, frames = settings.skinning, track.rig, slice(window.first, window.last + 1)
+    motion = Skinned(rig.names, rig.parents, len(window), sizes.shapes, sizes.hidden, sizes.light)
+    shared = {
+        "rig_joints": torch.from_numpy(rig.joints).float(),
+        "pose_rotations": torch.from_numpy(track.rotations[frames]).float().clone(),
+        "pose_roots": torch.from_numpy(track.roots[frames]).float().clone(),
+    }
+    if motion.light:
+        shared["light"] = torch.zeros(LIGHTS, 3)
+    if motion.shapes:
+        network = initial_network(shared["pose_rotations"], motion.hidden, motion.shapes, generator)
+        shared |= {NETWORK + layer: value for layer, value in network.items()}
+    return motion, shared
+
+
+def _hung(skin: Skin, motion: Skinned) -> dict[str, Tensor]:
+    """What the motion hangs on the Gaussians; no residual yet."""
+    binding = skin.binding
+    logits = torch.from_numpy(binding.weights).float().clamp_min(LEAST_WEIGHT).log()  # (P, 4)
+    tensors = {
+        "skin_joints": torch.from_numpy(binding.joints.astype(np.int32)),
+        "skin_logits": logits,
+    }
+    if motion.light:
+        tensors["normals"] = torch.from_numpy(skin.normals).float()
+    if motion.shapes:
+        shape = len(skin), 3, motion.shapes
+        tensors |= {"shape_means": torch.zeros(shape), "shape_colors": torch.zeros(shape)}
+    return tensors
