@@ -38,7 +38,7 @@ def test_a_whole_person_reads_back(tmp_path):
     files = whole_files() | {"background.ply": ply()}
     write_bundle(tmp_path / "a.ico3d", whole_manifest(), files)
     bundle = Bundle.open(tmp_path / "a.ico3d")
-    assert bundle.manifest.is_whole and bundle.manifest.version == 2
+    assert bundle.manifest.is_whole and bundle.manifest.version == 3
     assert bundle.head is not None and bundle.window(1).num_gaussians == 23
     assert bundle.world_from_head.shape == (FRAMES, 4, 4)
     assert bundle.background == "background.ply"

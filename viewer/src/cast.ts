@@ -1,8 +1,10 @@
 import { Body } from './body/body.ts';
+import { readBakedSkinned } from './body/skinned/baked.ts';
+import { SkinnedBody } from './body/skinned/body.ts';
 import { Timeline } from './body/timeline.ts';
 import { readBakedWindow } from './body/window.ts';
-import { BundleFiles } from './bundle/load.ts';
-import type { BodyInfo, HeadInfo, Manifest } from './bundle/manifest.ts';
+import { BundleFiles, SKINNED } from './bundle/load.ts';
+import { bodyOf, type AnyBody, type BodyInfo, type HeadInfo, type Manifest, type SkinnedInfo } from './bundle/manifest.ts';
 import { Head, sway, type Carrier } from './head/head.ts';
 import { MotionDirector, type Spoken } from './motion/director.ts';
 import type { Motion } from './motion/motion.ts';
@@ -13,7 +15,8 @@ import type { Stage } from './stage/stage.ts';
 /** Who is on stage: a head, a body that plays, or a whole person whose body a director moves. */
 export interface Cast {
   head?: Head;
-  body?: Body;
+  body?: Body; // of windows
+  skinned?: SkinnedBody; // or on a skeleton
   playback?: Playback;
   director?: MotionDirector;
 }
@@ -34,22 +37,23 @@ export interface CastPorts {
  * @param calm the visitor wants little motion: only faces move
  */
 export async function makeCast(manifest: Manifest, stage: Stage, calm: boolean, ports: CastPorts): Promise<Cast> {
-  const { head, body } = manifest;
+  const { head } = manifest;
+  const body = bodyOf(manifest);
   const files = new BundleFiles(manifest.files, ports.loaded);
   const backdrop = await makeBackdrop(files);
   if (backdrop) stage.add(backdrop);
-  if (head && body) return makePerson(files, head, body, stage, calm, ports);
+  if (head && body) return makePerson(files, manifest, head, body, stage, calm, ports);
   if (head) return { head: await makeHead(files, head, stage, rows(0, calm ? 0 : head.num_poses - 1), calm ? () => 0 : sway(head)) };
-  const timeline = new Timeline(body!);
-  const playback = new Playback(timeline.duration, !calm);
-  return { playback, body: makeBody(files, body!, timeline, playback, stage, ports.failed) };
+  const playback = new Playback((body!.frames - 1) / body!.fps, !calm);
+  return { playback, ...(await makeBody(files, manifest, playback, stage, ports.failed)) };
 }
 
 /** Head and body as one: the body's time carries the head. */
 async function makePerson(
   files: BundleFiles,
+  manifest: Manifest,
   info: HeadInfo,
-  bodyInfo: BodyInfo,
+  bodyInfo: AnyBody,
   stage: Stage,
   calm: boolean,
   ports: CastPorts,
@@ -58,11 +62,11 @@ async function makePerson(
   const director = new MotionDirector(animation, () => ports.heard());
   if (calm) director.hold(animation.rest.end / animation.fps);
   // Before the head: it goes where the body is in the same tick.
-  const body = makeBody(files, bodyInfo, new Timeline(bodyInfo), director, stage, ports.failed);
+  const body = await makeBody(files, manifest, director, stage, ports.failed);
   const { start, end } = animation.rest;
   const resting = rows(calm ? end : start, end);
-  const head = await makeHead(files, info, stage, resting, () => body.time * info.fps);
-  return { head, body, director };
+  const head = await makeHead(files, info, stage, resting, () => (body.body ?? body.skinned!).time * info.fps);
+  return { head, ...body, director };
 }
 
 /** @param resting the rows of its poses where the head is at rest */
@@ -85,11 +89,28 @@ function rows(first: number, last: number): number[] {
   return Array.from({ length: last - first + 1 }, (_, i) => first + i);
 }
 
+/** The body of the bundle: of windows, or on a skeleton. */
+async function makeBody(
+  files: BundleFiles,
+  { body, skinned }: Manifest,
+  motion: Motion,
+  stage: Stage,
+  failed: CastPorts['failed'],
+): Promise<Pick<Cast, 'body' | 'skinned'>> {
+  if (skinned) return { skinned: await makeSkinned(files, skinned, motion, stage) };
+  return { body: makeWindows(files, body!, motion, stage, failed) };
+}
+
+async function makeSkinned(files: BundleFiles, info: SkinnedInfo, motion: Motion, stage: Stage): Promise<SkinnedBody> {
+  const skinned = new SkinnedBody(readBakedSkinned(await files.tensors(SKINNED), info, SKINNED), motion);
+  stage.add(skinned);
+  return skinned;
+}
+
 /** A body whose windows come from the server as they are needed. */
-function makeBody(
+function makeWindows(
   files: BundleFiles,
   info: BodyInfo,
-  timeline: Timeline,
   motion: Motion,
   stage: Stage,
   failed: CastPorts['failed'],
@@ -98,7 +119,7 @@ function makeBody(
     const window = info.windows[index]!;
     return readBakedWindow(await files.tensors(window.file), info, window);
   };
-  const body = new Body(info, timeline, motion, stage.spark, { load, failed });
+  const body = new Body(info, new Timeline(info), motion, stage.spark, { load, failed });
   stage.add(body);
   return body;
 }

@@ -1,8 +1,9 @@
 import type { SplatGenerator } from '@sparkjsdev/spark';
 import './style.css';
 import type { Body } from './body/body.ts';
+import type { SkinnedBody } from './body/skinned/body.ts';
 import { bytesToFirstSight, loadManifest } from './bundle/load.ts';
-import { blinkIndices, type HeadInfo, type Manifest } from './bundle/manifest.ts';
+import { blinkIndices, bodyOf, type HeadInfo, type Manifest } from './bundle/manifest.ts';
 import { makeCast, type Cast } from './cast.ts';
 import { PageError, sentenceOf } from './errors.ts';
 import { Face } from './face/face.ts';
@@ -26,6 +27,7 @@ declare global {
       stage: Stage;
       head?: Head;
       body?: Body;
+      skinned?: SkinnedBody;
       director?: MotionDirector;
       conversation?: Conversation;
       splats: (generator: SplatGenerator) => Splats;
@@ -51,13 +53,14 @@ async function run(): Promise<void> {
   watchCover((pixels) => stage.keepClear(pixels));
   const page = makePage(overlay, () => stage.frames);
   const conversation = manifest.head ? new Conversation(socketUrl(location), page.view) : undefined;
-  const { head, body, playback, director } = await enter(manifest, stage, conversation);
-  if (body && playback) new PlayerBar(body, playback, 1 / manifest.body!.fps);
+  const { head, body, skinned, playback, director } = await enter(manifest, stage, conversation);
+  const moving = body ?? skinned;
+  if (moving && playback) new PlayerBar(moving, playback, 1 / bodyOf(manifest)!.fps);
 
-  window.ico3d = { stage, head, body, director, conversation, splats: (generator) => readSplats(stage, generator) };
+  window.ico3d = { stage, head, body, skinned, director, conversation, splats: (generator) => readSplats(stage, generator) };
   if (head && conversation) {
     head.director = makeFace(manifest.head!, conversation);
-    conversation.bodyTime = () => body?.time ?? 0;
+    conversation.bodyTime = () => moving?.time ?? 0;
     conversation.gestures = director ?? null;
     await mayTalk(conversation);
   }

@@ -4,13 +4,19 @@
 export const BUNDLE_FORMAT = "ico3d-bundle";
 
 /** The newest version of a manifest. */
-export const BUNDLE_VERSION = 2;
+export const BUNDLE_VERSION = 3;
 
-/** The version of manifests before bodies. */
-export const HEADS_ONLY = 1;
+/** The oldest version that is read. */
+export const OLDEST_BUNDLE = 1;
 
 /** Of a head or a window of a body; bundle/limits.py. */
 export const MAX_GAUSSIANS = 1000000;
+
+/** Residual shapes of a body on a skeleton. */
+export const MAX_SHAPES = 8;
+
+/** Of a body's skeleton; rig/rig.py. */
+export const MAX_JOINTS = 256;
 
 /** Groups of Gaussians in a window that move alike. */
 export const MAX_CLUSTERS = 256;

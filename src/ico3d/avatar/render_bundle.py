@@ -1,8 +1,7 @@
 """Rendering baked avatars in Python: the picture that the page must show."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -10,14 +9,12 @@ import numpy as np
 import torch
 
 from ico3d.avatar.avatar import Placement
-from ico3d.avatar.moving import Span
-from ico3d.bundle.body import BakedWindow
+from ico3d.avatar.baked_body import BakedBody, body_of, gaussians_at
 from ico3d.bundle.evaluate import attributes
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.head import BakedHead
-from ico3d.bundle.manifest import BodyInfo, CameraInfo
+from ico3d.bundle.manifest import CameraInfo
 from ico3d.common.camera import Camera, look_at
-from ico3d.errors import BundleError
 from ico3d.splat import harmonics
 from ico3d.splat.files.formats import read_gaussians
 from ico3d.splat.gaussians import Gaussians, cat
@@ -36,53 +33,40 @@ def baked_gaussians(head: BakedHead, expression: np.ndarray) -> Gaussians:
     )
 
 
-def window_gaussians(window: BakedWindow, tau: float) -> Gaussians:
-    """The Gaussians (N) of a window of the body at τ in [0, 1], in the world."""
-    means, quats, scales = window.at(tau)
-    rgba = torch.from_numpy(window.rgba / np.float32(255))
-    return Gaussians(
-        means=torch.from_numpy(means),
-        quats=torch.from_numpy(quats),
-        scales=torch.from_numpy(scales),
-        opacities=rgba[:, 3],
-        colors=rgba[:, :3],
-    )
-
-
 @dataclass(frozen=True)
 class BakedAvatar:
     """A whole person as a viewer draws it.
 
     Attributes:
         head: The baked head in the space of the head poses.
-        window: Gives a window of the body by its number.
-        spans: The windows' frames.
-        fps: Frames per second.
+        body: The baked body.
         world_from_head: (F, 4, 4) rigid, one per frame.
     """
 
     head: BakedHead
-    window: Callable[[int], BakedWindow]
-    spans: Sequence[Span]
-    fps: float
+    body: BakedBody
     world_from_head: np.ndarray
 
     @staticmethod
     def of(bundle: Bundle) -> "BakedAvatar":
-        """The person in a bundle; its windows are read as they come.
+        """The person in a bundle.
 
         Raises:
             BundleError: If it lacks the body or the head.
         """
-        body = _require_body(bundle)
+        body = body_of(bundle)
         head, poses = bundle.require_head()
-        window = lru_cache(maxsize=2)(bundle.window)
-        return BakedAvatar(head, window, body.windows, body.fps, poses)
+        return BakedAvatar(head, body, poses)
+
+    @property
+    def fps(self) -> float:
+        """Frames per second."""
+        return self.body.fps
 
     @property
     def seconds(self) -> float:
         """How long the clip lasts."""
-        return self.spans[-1].last / self.fps
+        return self.body.windows[-1].last / self.fps
 
     def gaussians(self, seconds: float, expression: Sequence[float] | np.ndarray) -> Gaussians:
         """In the world, the body's Gaussians first; the body's time places the head.
@@ -97,21 +81,12 @@ class BakedAvatar:
 
     def body_gaussians(self, seconds: float) -> Gaussians:
         """The body alone, in the world."""
-        index, tau = place_in(self.spans, seconds * self.fps)
-        return window_gaussians(self.window(index), tau)
+        return gaussians_at(self.body, seconds)
 
 
 def pose_at(world_from_head: np.ndarray, frame: float) -> np.ndarray:
     """(4, 4) of poses (F, 4, 4) at a frame, which is clamped; between frames lerp and slerp."""
     return Placement(np.eye(4), world_from_head).pose(frame)
-
-
-def place_in(spans: Sequence[Span], frame: float) -> tuple[int, float]:
-    """The window that shows a frame, which is clamped to the clip, and τ in it."""
-    frame = min(max(frame, 0.0), spans[-1].last)
-    index = next(i for i, span in enumerate(spans) if frame <= span.last)
-    span = spans[index]
-    return index, (frame - span.first) / (span.last - span.first)
 
 
 def body_gaussians(bundle: Bundle, seconds: float) -> Gaussians:
@@ -120,15 +95,7 @@ def body_gaussians(bundle: Bundle, seconds: float) -> Gaussians:
     Raises:
         BundleError: If the bundle has no body.
     """
-    body = _require_body(bundle)
-    index, tau = place_in(body.windows, seconds * body.fps)
-    return window_gaussians(bundle.window(index), tau)
-
-
-def _require_body(bundle: Bundle) -> BodyInfo:
-    if bundle.manifest.body is None:
-        raise BundleError(f"the bundle of '{bundle.manifest.name}' has no body.")
-    return bundle.manifest.body
+    return gaussians_at(body_of(bundle), seconds)
 
 
 def avatar_gaussians(

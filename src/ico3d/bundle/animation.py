@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from ico3d.bundle.manifest import BodyInfo
+from ico3d.bundle.skinned.info import SkinnedInfo
 from ico3d.common.typed import Rules, fill, parse_json, plain
 from ico3d.errors import BundleError
 
@@ -119,14 +120,14 @@ class Animation:
             cast(dict[str, Any], values).setdefault("quality", [])  # older bundles have none
         return fill(Animation, values, ANIMATION, Rules(BundleError))
 
-    def check_body(self, body: BodyInfo) -> None:
+    def check_body(self, body: BodyInfo | SkinnedInfo) -> None:
         """Checks that this is the animation of a body.
 
         Raises:
             BundleError: If the frames are others.
         """
         _require(self.fps == body.fps, "fps", f"be the body's, {body.fps:g}")
-        frames = body.windows[-1].last + 1
+        frames = body.num_frames
         _require(self.num_frames == frames, "num_frames", f"be the body's, {frames}")
 
     @property

@@ -54,14 +54,15 @@ def figures(bundle: "Bundle", path: Path) -> dict[str, Any]:
 
     Returns:
         `bytes` on disk; `head_gaussians`, null without a head; `body_windows`, how many, 0 without
-        a body; `body_gaussians` of each window; `provenance`; and further facts.
+        a body or on a skeleton; `body_gaussians` of each window, or of the body on a skeleton;
+        `provenance`; and further facts.
     """
     from ico3d.common.typed import plain
 
     manifest = bundle.manifest
-    head, body, speech = manifest.head, manifest.body, manifest.speech
+    head, speech, moving = manifest.head, manifest.speech, manifest.any_body
+    windows = manifest.body.windows if manifest.body else ()
     sizes = {name: entry.size for name, entry in manifest.files.items()}
-    last = body.windows[-1].last if body else 0
     return {
         "name": manifest.name,
         "bytes": path.stat().st_size if path.is_file() else sum(map(len, _contents(bundle))),
@@ -70,9 +71,10 @@ def figures(bundle: "Bundle", path: Path) -> dict[str, Any]:
         "head_rank": head.rank if head else None,
         "inputs": head.inputs if head else None,
         "speech_encoder": speech.encoder if speech else None,
-        "body_windows": len(body.windows) if body else 0,
-        "body_gaussians": [window.num_gaussians for window in body.windows] if body else [],
-        "body_seconds": last / body.fps if body else None,
+        "body_windows": len(windows),
+        "body_gaussians": [part.num_gaussians for part in (*windows, manifest.skinned) if part],
+        "body_joints": manifest.skinned.num_joints if manifest.skinned else None,
+        "body_seconds": (moving.num_frames - 1) / moving.fps if moving else None,
         "animation": bundle.animation is not None,
         "background": bundle.background,
         "loss": plain(manifest.loss),

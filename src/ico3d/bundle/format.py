@@ -17,6 +17,8 @@ from ico3d.bundle.head import HEAD, POSES, BakedHead, poses_from_bytes
 from ico3d.bundle.manifest import MANIFEST, FileEntry, Manifest, check_manifest
 from ico3d.bundle.onnx_check import check_onnx
 from ico3d.bundle.packaged import bundle_path
+from ico3d.bundle.skinned.baked import BakedSkinned
+from ico3d.bundle.skinned.info import SKINNED
 from ico3d.errors import BundleError
 
 SPEECH = "speech.onnx"
@@ -32,12 +34,14 @@ class Bundle:
         head: The baked head, None where there is only a body.
         world_from_head: (F, 4, 4) float32 head poses at `manifest.head.fps`: one per frame of the
             body, or, without a body, to be played back and forth; None without a head.
+        skinned: The body on a skeleton, None where there is none.
         animation: How a whole person moves; None where there is a head or a body only.
     """
 
     manifest: Manifest
     head: BakedHead | None
     world_from_head: np.ndarray | None
+    skinned: BakedSkinned | None
     animation: Animation | None
 
     def __init__(self, archive: Archive):
@@ -121,10 +125,12 @@ class Bundle:
             self.world_from_head = poses_from_bytes(self.read(POSES), info.num_poses)
         for index in range(len(self.manifest.body.windows) if self.manifest.body else 0):
             self.window(index)  # not kept: together they may be large
-        self.animation = None
-        if self.manifest.is_whole and self.manifest.body is not None:
+        self.skinned = self.animation = None
+        if self.manifest.skinned is not None:
+            self.skinned = BakedSkinned.from_bytes(self.read(SKINNED), self.manifest.skinned)
+        if self.manifest.is_whole and self.manifest.any_body is not None:
             self.animation = Animation.from_bytes(self.read(ANIMATION))
-            self.animation.check_body(self.manifest.body)
+            self.animation.check_body(self.manifest.any_body)
         if self.background is not None:
             check_background(self.read(self.background), self.background)
         _check_thumbnail(self.read(THUMBNAIL))
@@ -210,6 +216,8 @@ def _check_required(manifest: Manifest) -> None:
         required |= {HEAD, POSES}
     if manifest.body:
         required |= {window.file for window in manifest.body.windows}
+    if manifest.skinned:
+        required |= {SKINNED}
     if manifest.is_whole:
         required |= {ANIMATION}
     for name in sorted(required - set(manifest.files)):

@@ -16,3 +16,8 @@ MAX_CLUSTERS = 256
 MAX_WINDOW_FRAMES = 1000
 MAX_SAMPLES_PER_FRAME = 8
 MAX_BACKGROUND_BYTES = 64 << 20
+MAX_SHAPES = 8
+MAX_POSED_FRAMES = 30_000
+"""Of a body on a skeleton: numbers of frames are kept in 16 bits."""
+MAX_KNOWN_POSES = 256
+"""A page compares every pose with each of them."""

@@ -6,13 +6,15 @@ from typing import Any, cast
 
 from ico3d.bundle import limits
 from ico3d.bundle.persona import Persona, check_persona, with_defaults, without_defaults
+from ico3d.bundle.skinned.info import SkinnedInfo, check_skinned
 from ico3d.common.typed import Rules, fill, parse_json, plain
 from ico3d.errors import BundleError
 
 FORMAT = "ico3d-bundle"
-VERSION = 2
-HEADS_ONLY = 1
-"""The version before bodies; its manifests lack `body` and are read as if it were null."""
+VERSION = 3
+SINCE = {"body": 2, "skinned": 3}
+"""Fields by the version that brought them: older manifests are read as if they were null."""
+OLDEST = 1
 MANIFEST = "manifest.json"
 
 
@@ -97,6 +99,11 @@ class BodyInfo:
         """S of a window."""
         return self.samples_per_frame * (window.last - window.first) + 1
 
+    @property
+    def num_frames(self) -> int:
+        """F of the whole clip."""
+        return self.windows[-1].last + 1
+
 
 def window_file(index: int) -> str:
     """Name of the file of window `index`."""
@@ -159,7 +166,10 @@ class Provenance:
 
 @dataclass(frozen=True)
 class Manifest:
-    """`manifest.json` of a head, a body, or both; `files` is filled in when it is written."""
+    """`manifest.json` of a head, a body, or both; `files` is filled in when it is written.
+
+    A body is either one of windows (`body`) or one on a skeleton (`skinned`).
+    """
 
     name: str
     head: HeadInfo | None
@@ -170,6 +180,7 @@ class Manifest:
     persona: Persona
     loss: Loss
     provenance: Provenance
+    skinned: SkinnedInfo | None = None
     files: dict[str, FileEntry] = field(default_factory=dict[str, FileEntry])
     format: str = FORMAT
     version: int = VERSION
@@ -177,7 +188,12 @@ class Manifest:
     @property
     def is_whole(self) -> bool:
         """Whether it is of a whole person: a head on a body."""
-        return self.head is not None and self.body is not None
+        return self.head is not None and self.any_body is not None
+
+    @property
+    def any_body(self) -> BodyInfo | SkinnedInfo | None:
+        """The body of either kind."""
+        return self.body or self.skinned
 
     def to_json(self) -> bytes:
         """UTF-8 JSON, the same bytes for the same manifest."""
@@ -195,8 +211,8 @@ class Manifest:
             raise BundleError(f"{MANIFEST}: is larger than {limits.MAX_MANIFEST_BYTES} bytes.")
         value = parse_json(data, MANIFEST, BundleError)
         _check_version(value)
-        if value["version"] == HEADS_ONLY and "body" not in value:
-            value = {**value, "version": VERSION, "body": None}
+        missing = {name for name, since in SINCE.items() if value["version"] < since} - set(value)
+        value = {**value, "version": VERSION, **dict.fromkeys(missing)}
         if "persona" in value:
             value = {**value, "persona": with_defaults(value["persona"])}
         manifest = fill(Manifest, value, MANIFEST, Rules(BundleError))
@@ -209,9 +225,9 @@ def _check_version(value: Any) -> None:
     known = cast(dict[str, Any], value) if isinstance(value, dict) else {}
     if known.get("format") != FORMAT:
         raise BundleError(f"{MANIFEST}: this is no ico3d bundle (format is not '{FORMAT}').")
-    if known.get("version") not in (HEADS_ONLY, VERSION):
+    if known.get("version") not in range(OLDEST, VERSION + 1):
         raise BundleError(
-            f"{MANIFEST}: this program reads bundles of versions {HEADS_ONLY} and {VERSION} only."
+            f"{MANIFEST}: this program reads bundles of versions {OLDEST} to {VERSION} only."
         )
 
 
@@ -221,14 +237,18 @@ def check_manifest(manifest: Manifest) -> None:
     Raises:
         BundleError: Naming the first field that is wrong.
     """
-    parts = manifest.head is not None or manifest.body is not None
-    _require(parts, "head", "be there where no body is")
-    if manifest.head is not None:
-        _check_head(manifest.head)
+    head, body = manifest.head, manifest.any_body
+    _require(head is not None or body is not None, "head", "be there where no body is")
+    once = manifest.body is None or manifest.skinned is None
+    _require(once, "skinned", "be null where a body of windows is")
+    if head is not None:
+        _check_head(head)
     if manifest.body is not None:
         _check_body(manifest.body)
-    if manifest.head is not None and manifest.body is not None:
-        _check_together(manifest.head, manifest.body)
+    if manifest.skinned is not None:
+        check_skinned(manifest.skinned, _require)
+    if head is not None and body is not None:
+        _check_together(head, body)
     _check_speech(manifest)
     _check_camera(manifest.camera)
     _require(all(0 <= c <= 1 for c in manifest.background), "background", "lie between 0 and 1")
@@ -270,10 +290,10 @@ def _check_body(body: BodyInfo) -> None:
         _check_window(body, index, window)
 
 
-def _check_together(head: HeadInfo, body: BodyInfo) -> None:
+def _check_together(head: HeadInfo, body: BodyInfo | SkinnedInfo) -> None:
     """A head on a body is placed frame by frame of the body."""
     _require(head.fps == body.fps, "head.fps", "be that of the body")
-    frames = body.windows[-1].last + 1
+    frames = body.num_frames
     _require(head.num_poses == frames, "head.num_poses", f"be {frames}, one per frame of the body")
 
 

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 import torch
 
+from ico3d.avatar.baked_body import window_gaussians
 from ico3d.avatar.baking import body_bundle, body_cost
 from ico3d.avatar.baking.shader_body import Shape, WindowBaker, aligned
-from ico3d.avatar.render_bundle import body_gaussians, render_body, visitor_camera, window_gaussians
+from ico3d.avatar.render_bundle import body_gaussians, render_body, visitor_camera
 from ico3d.body.model_folder import TrainedBody, save_window
 from ico3d.body.motion.formulas import SPACETIME
 from ico3d.body.motion.window_model import WindowModel
@@ -37,7 +38,8 @@ def filmed(person, tmp_path_factory):
     capture = FilmedPerson(person, folder / "capture")
     results = list(body_bundle.bake(person, capture))
     persona = Persona("Swinger", "", ())
-    body_bundle.write(folder / "a.ico3d", persona, results, person, capture, "A notice.")
+    parts = body_bundle.parts_of(results, person)
+    body_bundle.write(folder / "a.ico3d", persona, parts, person, capture, "A notice.")
     return person, capture, results, Bundle.open(folder / "a.ico3d")
 
 
@@ -107,7 +109,9 @@ def test_measured_pictures_are_the_noise_apart(filmed):
 
 def test_a_strip_shows_recorded_exact_and_baked(filmed):
     person, capture, results, _ = filmed
-    assert body_bundle.strip(person, results, capture).shape == (3 * SIZE, 3 * SIZE, 3)
+    assert body_bundle.strip(
+        person, body_bundle.parts_of(results, person).baked, capture
+    ).shape == (3 * SIZE, 3 * SIZE, 3)
 
 
 def test_the_bundle_holds_the_body(filmed):
@@ -160,7 +164,11 @@ def test_without_a_capture_it_is_measured_against_itself():
     short = MovingPerson(300, (0, 4))
     results = list(body_bundle.bake(short, None))
     assert results[0].drop is None and results[0].acceptable
-    assert body_bundle.strip(short, results, None).shape == (256, 512, 3)
+    assert body_bundle.strip(short, body_bundle.parts_of(results, short).baked, None).shape == (
+        1024,
+        512,
+        3,
+    )
 
 
 def test_what_costs_too_much_is_refused(filmed):

@@ -1,5 +1,5 @@
 import { PageError } from '../errors.ts';
-import type { BodyInfo } from './manifest.ts';
+import type { AnyBody } from './manifest.ts';
 
 /** What the page reads of `animation.json`; `docs/bundle.md` describes it whole. */
 export interface AnimationInfo {
@@ -17,10 +17,10 @@ const VERSION = 1;
  *
  * @throws PageError naming the first thing that is wrong
  */
-export function checkAnimation(value: unknown, body: BodyInfo): AnimationInfo {
+export function checkAnimation(value: unknown, body: AnyBody): AnimationInfo {
   const animation = value as AnimationInfo & { version?: number };
   if (animation?.version !== VERSION) bad('version');
-  const frames = body.windows.at(-1)!.last + 1;
+  const { frames } = body;
   if (animation.fps !== body.fps) bad('fps');
   if (animation.num_frames !== frames) bad('num_frames');
   const { rest, min_speed: slowest, max_speed: fastest } = animation;

@@ -1,7 +1,7 @@
 import { PageError } from '../errors.ts';
 import { checkAnimation, type AnimationInfo } from './animation.ts';
 import { readBakedHead, type BakedHead } from './baked-head.ts';
-import { checkManifest, type BodyInfo, type HeadInfo, type Manifest } from './manifest.ts';
+import { checkManifest, type AnyBody, type HeadInfo, type Manifest } from './manifest.ts';
 import { parseSafetensors, takeTensor, type Tensor } from './safetensors.ts';
 
 /** A head's files, checked and ready for the GPU. */
@@ -18,6 +18,9 @@ const ROOT = 'bundle/';
 const HEAD_FILES = ['head.safetensors', 'head_poses.safetensors'] as const;
 const ANIMATION = 'animation.json';
 
+/** The file of a body on a skeleton. */
+export const SKINNED = 'body/skinned.safetensors';
+
 /** The thumbnail's address. */
 export const THUMBNAIL = `${ROOT}thumbnail.png`;
 
@@ -28,9 +31,12 @@ export async function loadManifest(): Promise<Manifest> {
 }
 
 /** Bytes that must come before there is somebody to see. */
-export function bytesToFirstSight({ head, body, files }: Manifest): number {
+export function bytesToFirstSight({ head, body, skinned, files }: Manifest): number {
   const behind = BACKGROUNDS.filter((name) => name in files);
-  const names = [...behind, ...(head ? HEAD_FILES : []), ...(body ? [body.windows[0]!.file] : []), ...(head && body ? [ANIMATION] : [])];
+  const names: string[] = [...behind, ...(head ? HEAD_FILES : [])];
+  if (body) names.push(body.windows[0]!.file);
+  if (skinned) names.push(SKINNED);
+  if (head && (body || skinned)) names.push(ANIMATION);
   return names.reduce((sum, name) => sum + (files[name]?.size ?? 0), 0);
 }
 
@@ -59,7 +65,7 @@ export class BundleFiles {
   }
 
   /** How a whole person moves. */
-  async animation(body: BodyInfo): Promise<AnimationInfo> {
+  async animation(body: AnyBody): Promise<AnimationInfo> {
     return checkAnimation(parseJson(new TextDecoder().decode(await this.bytes(ANIMATION))), body);
   }
 

@@ -1,5 +1,15 @@
 import { PageError } from '../errors.ts';
-import { BUNDLE_FORMAT, BUNDLE_VERSION, HEADS_ONLY, LID_NAMES, LIDS, MAX_CLUSTERS, MAX_GAUSSIANS } from '../shared.ts';
+import {
+  BUNDLE_FORMAT,
+  BUNDLE_VERSION,
+  LID_NAMES,
+  LIDS,
+  MAX_CLUSTERS,
+  MAX_GAUSSIANS,
+  MAX_JOINTS,
+  MAX_SHAPES,
+  OLDEST_BUNDLE,
+} from '../shared.ts';
 
 /** Where the visitor starts, world space. */
 export interface StartCamera {
@@ -42,12 +52,27 @@ export interface BodyInfo {
   windows: WindowInfo[];
 }
 
+/** Counts and rig of a body on a skeleton. */
+export interface SkinnedInfo {
+  fps: number; // of the recorded poses
+  num_frames: number;
+  num_gaussians: number;
+  num_shapes: number;
+  num_moving: number; // joints that turn in the recording
+  num_known: number; // recorded poses that tell the coefficients of any other pose
+  names: string[]; // of joints
+  parents: number[]; // before their children, -1 for the root
+  low: [number, number, number]; // bounds of what is seen at any time, world space
+  high: [number, number, number];
+}
+
 /** What the page reads of `manifest.json`; `docs/bundle.md` describes it whole. */
 export interface Manifest {
   name: string;
   files: Record<string, { sha256: string; size: number }>;
   head: HeadInfo | null;
-  body: BodyInfo | null;
+  body: BodyInfo | null; // of windows
+  skinned: SkinnedInfo | null; // or on a skeleton
   camera: StartCamera;
   background: [number, number, number];
   persona: { name: string; greeting: string };
@@ -63,19 +88,23 @@ const MOST_LAYERS = 48; // basis vectors of a window; WebGL2 promises 256 layers
 export function checkManifest(value: unknown): Manifest {
   const manifest = value as Manifest & { format?: string; version?: number };
   if (manifest?.format !== BUNDLE_FORMAT) throw new PageError('manifest.json is not that of an avatar bundle.');
-  if (manifest.version !== BUNDLE_VERSION && manifest.version !== HEADS_ONLY) {
+  if (!(manifest.version! >= OLDEST_BUNDLE && manifest.version! <= BUNDLE_VERSION)) {
     throw new PageError(`This avatar has format version ${manifest.version}; the page reads up to ${BUNDLE_VERSION}.`);
   }
   const { head, camera, background } = manifest;
-  const body = manifest.body ?? null;
-  if (!head && !body) bad('head');
+  const body = manifest.body ?? null; // older manifests do not know of it
+  const skinned = manifest.skinned ?? null;
+  if (!head && !body && !skinned) bad('head');
+  if (body && skinned) bad('skinned');
   if (head) checkHead(head);
   if (body) checkBody(body);
-  if (head && body) checkTogether(head, body);
+  if (skinned) checkSkinned(skinned);
+  if (head && body) checkTogether(head, body.fps, framesOf(body));
+  if (head && skinned) checkTogether(head, skinned.fps, skinned.num_frames);
   for (const key of ['eye', 'target', 'up'] as const) if (!isNumbers(camera?.[key], 3)) bad(`camera.${key}`);
   if (!(camera.fov_y > 0 && camera.fov_y < 180)) bad('camera.fov_y');
   if (!isNumbers(background, 3)) bad('background');
-  return { ...manifest, body };
+  return { ...manifest, body, skinned };
 }
 
 function checkHead(head: HeadInfo): void {
@@ -101,9 +130,40 @@ function checkBody(body: BodyInfo): void {
 }
 
 /** A head is carried by its body: it has a pose for each of the body's frames. */
-function checkTogether(head: HeadInfo, body: BodyInfo): void {
-  if (head.fps !== body.fps) bad('head.fps');
-  if (head.num_poses !== body.windows.at(-1)!.last + 1) bad('head.num_poses');
+function checkTogether(head: HeadInfo, fps: number, frames: number): void {
+  if (head.fps !== fps) bad('head.fps');
+  if (head.num_poses !== frames) bad('head.num_poses');
+}
+
+function checkSkinned(info: SkinnedInfo): void {
+  if (!isPositive(info.fps)) bad('skinned.fps');
+  for (const key of ['low', 'high'] as const) if (!isNumbers(info[key], 3)) bad(`skinned.${key}`);
+  const { names, parents } = info;
+  if (!Array.isArray(names) || !isCount(names.length, MAX_JOINTS)) bad('skinned.names');
+  const tree = isNumbers(parents, names.length) && parents.every((parent, i) => Number.isInteger(parent) && parent < i && parent >= Math.min(i - 1, 0));
+  if (!tree) bad('skinned.parents');
+  const most = { num_frames: Infinity, num_gaussians: MAX_GAUSSIANS, num_shapes: MAX_SHAPES, num_moving: names.length, num_known: info.num_frames };
+  for (const [key, top] of Object.entries(most)) if (!isCount(info[key as keyof typeof most], top)) bad(`skinned.${key}`);
+  if (info.num_frames < 2) bad('skinned.num_frames');
+}
+
+/** Frames of a body of windows. */
+function framesOf({ windows }: BodyInfo): number {
+  return windows.at(-1)!.last + 1;
+}
+
+/** What is alike in bodies of both kinds. */
+export interface AnyBody {
+  fps: number;
+  frames: number;
+  low: [number, number, number];
+  high: [number, number, number];
+}
+
+/** The body, of windows or on a skeleton, if there is one. */
+export function bodyOf({ body, skinned }: Pick<Manifest, 'body' | 'skinned'>): AnyBody | null {
+  if (body) return { fps: body.fps, frames: framesOf(body), low: body.low, high: body.high };
+  return skinned && { fps: skinned.fps, frames: skinned.num_frames, low: skinned.low, high: skinned.high };
 }
 
 function isCount(value: unknown, most: number): boolean {

@@ -1,6 +1,6 @@
 import * as THREE from 'three';
 import type { HeadFiles } from '../bundle/load.ts';
-import type { Manifest } from '../bundle/manifest.ts';
+import { bodyOf, type Manifest } from '../bundle/manifest.ts';
 import { eyesOf } from '../head/eyes.ts';
 import { Poses } from '../head/poses.ts';
 
@@ -27,7 +27,9 @@ const LEVEL = 0.5; // of a direction's length: what is steeper does not say wher
  *
  * @param rows of the head's poses, where the head is at rest
  */
-export function sitterOf({ camera, body }: Manifest, files: HeadFiles, rows: readonly number[]): Sitter {
+export function sitterOf(manifest: Manifest, files: HeadFiles, rows: readonly number[]): Sitter {
+  const { camera } = manifest;
+  const body = bodyOf(manifest);
   const up = new THREE.Vector3(...camera.up).normalize();
   const [eyes, forward] = faceOf(files, rows);
   const start = new THREE.Vector3(...camera.eye);

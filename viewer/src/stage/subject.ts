@@ -1,5 +1,5 @@
 import * as THREE from 'three';
-import type { Manifest } from '../bundle/manifest.ts';
+import { bodyOf, type Manifest } from '../bundle/manifest.ts';
 import { boundsOf, boundsOfBody } from './bounds.ts';
 import { portrait, whole } from './framing.ts';
 import type { Subject } from './orbit.ts';
@@ -9,7 +9,9 @@ const FRONT = THREE.MathUtils.degToRad(75); // to either side: heads are recorde
 const NARROWEST = 0.45; // width / height that still holds a whole body
 
 /** What the camera sees while nobody is on stage yet, and of a body whose head is nowhere told. */
-export function wholeBody({ camera, body }: Manifest): Subject {
+export function wholeBody(manifest: Manifest): Subject {
+  const { camera } = manifest;
+  const body = bodyOf(manifest);
   const [low, high] = [body?.low ?? camera.target, body?.high ?? camera.target].map((corner) => new THREE.Vector3(...corner));
   const box = new THREE.Box3(low, high);
   return {
@@ -22,12 +24,13 @@ export function wholeBody({ camera, body }: Manifest): Subject {
 }
 
 /** Somebody with a face. */
-export function person({ camera, body }: Manifest, sitter: Sitter): Subject {
+export function person(manifest: Manifest, sitter: Sitter): Subject {
+  const { camera } = manifest;
   return {
     up: camera.up,
     framing: portrait(sitter, camera.fov_y),
     bounds: (start) => boundsOf(sitter, start, camera),
-    sideways: body ? Infinity : FRONT,
+    sideways: bodyOf(manifest) ? Infinity : FRONT,
     face: sitter.eyes,
   };
 }

@@ -1,4 +1,4 @@
-import type { Body } from '../body/body.ts';
+import type { Seen } from '../motion/motion.ts';
 import type { Playback } from '../motion/playback.ts';
 import { byId } from './elements.ts';
 import { icon } from './icons.ts';
@@ -7,7 +7,7 @@ const REFRESH = 100; // ms
 
 /** Play, pause and scrub: where a body is in its time. */
 export class PlayerBar {
-  private readonly body: Body;
+  private readonly body: { readonly shown: Seen | null };
   private readonly playback: Playback;
   private readonly button = byId<HTMLButtonElement>('play');
   private readonly scrub = byId<HTMLInputElement>('scrub');
@@ -15,7 +15,7 @@ export class PlayerBar {
   private resumes = false; // once the slider is let go
 
   /** @param frame s between two frames of the recording: a step of the arrow keys */
-  constructor(body: Body, playback: Playback, frame: number) {
+  constructor(body: PlayerBar['body'], playback: Playback, frame: number) {
     this.body = body;
     this.playback = playback;
     this.scrub.max = String(playback.duration);

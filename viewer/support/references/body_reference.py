@@ -38,7 +38,8 @@ def write_body(path: Path, count: int) -> None:
         seconds = (span.last - span.first) / FPS
         data = window.to_bytes(window_file(i))
         results.append(WindowResult(window, data, seconds, Loss(None, None, None)))
-    body_bundle.write(path, Persona("Swinger", "", ()), results, person, None, "")
+    parts = body_bundle.parts_of(results, person)
+    body_bundle.write(path, Persona("Swinger", "", ()), parts, person, None, "")
 
 
 def reference_of(bundle: Bundle, seconds: float) -> dict:

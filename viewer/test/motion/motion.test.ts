@@ -1,6 +1,6 @@
 import { describe, expect, test } from 'vitest';
 import { checkAnimation } from '../../src/bundle/animation.ts';
-import type { BodyInfo } from '../../src/bundle/manifest.ts';
+import type { AnyBody } from '../../src/bundle/manifest.ts';
 import { DISPLAY_LEAD } from '../../src/face/face.ts';
 import { MotionDirector, type Spoken } from '../../src/motion/director.ts';
 import { SpeechPath } from '../../src/motion/path.ts';
@@ -211,7 +211,7 @@ describe('while it speaks', () => {
 });
 
 describe('a damaged animation is refused in one sentence', () => {
-  const body = { fps: 15, windows: [{ last: 20 }, { last: 45 }] } as BodyInfo;
+  const body: AnyBody = { fps: 15, frames: 46, low: [0, 0, 0], high: [1, 1, 1] };
   test('while a good one is taken', () => expect(checkAnimation(ANIMATION, body)).toBe(ANIMATION));
   const cases: [string, unknown, RegExp][] = [
     ['nothing', null, /^animation.json: version is missing or does not fit the body\.$/],

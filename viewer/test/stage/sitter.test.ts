@@ -56,7 +56,7 @@ describe('who sits before the camera', () => {
   const poses = Float32Array.from([...rigid(-0.1, 1.5, -0.2), ...rigid(0.1, 1.5, 0.2)]);
   const files: HeadFiles = { info, baked: makeHead(), poses };
   const camera = { eye: [0.5, 1.2, 3], target: [0, 0.8, 0], up: [0, 2, 0], fov_y: 30 };
-  const body = { low: [-0.4, 0.02, -0.2], high: [0.4, 1.55, 0.5] };
+  const body = { low: [-0.4, 0.02, -0.2], high: [0.4, 1.55, 0.5], windows: [{ last: 1 }] };
   const whole = sitterOf({ camera, body } as unknown as Manifest, files, [0, 1]);
   const alone = sitterOf({ camera, body: null } as unknown as Manifest, files, [0, 1]);
 

@@ -10,13 +10,13 @@ import torch
 
 from ico3d.avatar.animation.keyframes import read_animation
 from ico3d.avatar.avatar import TrainedAvatar
+from ico3d.avatar.baked_body import body_of
 from ico3d.avatar.models import open_model
 from ico3d.avatar.moving import MovingBody, Span
-from ico3d.avatar.render_bundle import avatar_gaussians, body_gaussians, window_gaussians
+from ico3d.avatar.render_bundle import avatar_gaussians, body_gaussians
 from ico3d.body.model_folder import TrainedBody
 from ico3d.bundle.animation import Animation
 from ico3d.bundle.format import Bundle
-from ico3d.errors import BundleError
 from ico3d.splat.device import CPU
 from ico3d.splat.gaussians import Gaussians
 
@@ -112,12 +112,10 @@ class BakedPerson:
         Raises:
             BundleError: If there is none.
         """
-        body = self.bundle.manifest.body
-        if body is None:
-            raise BundleError(f"the bundle of '{self.bundle.manifest.name}' has no body.")
-        self.fps = body.fps
-        self.windows: Sequence[Span] = body.windows
-        self.seconds = body.windows[-1].last / body.fps
+        self.body = body_of(self.bundle)
+        self.fps = self.body.fps
+        self.windows: Sequence[Span] = self.body.windows
+        self.seconds = self.windows[-1].last / self.fps
         self.animation = self.bundle.animation
 
     @property
@@ -128,7 +126,7 @@ class BakedPerson:
 
     def window_gaussians(self, index: int, tau: float) -> Gaussians:
         """The Gaussians of a window."""
-        return window_gaussians(self.bundle.window(index), tau).to(self.device)
+        return self.body.window_gaussians(index, tau).to(self.device)
 
     @property
     def has_head(self) -> bool:

@@ -1,25 +1,30 @@
 """From a trained body to a bundle that browsers play."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import TypedDict
 
 import numpy as np
 
 from ico3d.avatar import staging
+from ico3d.avatar.baked_body import BakedBody, WindowedBody, window_gaussians
 from ico3d.avatar.baking import head_cost
 from ico3d.avatar.baking.body_cost import (
+    MAX_DROP,
+    MIN_LIKENESS,
     HeadAt,
     comparison_line,
+    loses_at_most,
     measure_window,
     probe_views,
     ring_of_cameras,
     window_pair,
 )
 from ico3d.avatar.baking.shader_body import SAMPLES_PER_FRAME, Shape, WindowBaker
-from ico3d.avatar.clip_views import recorded_views
+from ico3d.avatar.clip_views import At, recorded_views
 from ico3d.avatar.moving import MovingBody
-from ico3d.avatar.render_bundle import window_gaussians
 from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.format import LICENSES, THUMBNAIL, write_bundle
 from ico3d.bundle.manifest import (
@@ -31,6 +36,7 @@ from ico3d.bundle.manifest import (
     WindowInfo,
     window_file,
 )
+from ico3d.bundle.skinned.info import SkinnedInfo
 from ico3d.capture.capture import Capture
 from ico3d.errors import BundleError
 
@@ -44,14 +50,18 @@ SHAPES = (
 """Tried in this order for each window: about 73, 87, 102, 106, 109 bytes per Gaussian."""
 GOOD_DROP = 0.05
 """dB on the person, against ground truth, that ends the search."""
-MAX_DROP = 0.1
-"""dB that a baked window may lose."""
-MIN_LIKENESS = 42.5
-"""dB against the exact model, where there is no ground truth: a model that is 26 dB from the truth
-loses 0.1 dB by an independent error of this size."""
 MAX_BYTES = 110.0
 """Bytes per Gaussian and window, all told."""
 _VISIBLE = 0.1
+_STRIP_ROWS = 4
+"""Of a clip of few windows."""
+
+
+class BodyEntries(TypedDict):
+    """The fields of a manifest that tell of a body."""
+
+    body: BodyInfo | None
+    skinned: SkinnedInfo | None
 
 
 @dataclass(frozen=True)
@@ -93,9 +103,7 @@ class WindowResult:
     def _loses_at_most(self, drop: float) -> bool:
         if self.bytes_per_gaussian > MAX_BYTES:
             return False
-        if self.drop is None:
-            return (self.loss.psnr_baked_vs_exact or 0.0) >= MIN_LIKENESS
-        return self.drop <= drop
+        return loses_at_most(self.loss, drop)
 
     def __str__(self) -> str:
         """One line for people."""
@@ -105,6 +113,42 @@ class WindowResult:
             f"{window.num_gaussians} Gaussians, {self.seconds:.2f} s, {shape} components: "
             f"{head_cost.in_words(self.loss)}, {self.bytes_per_gaussian:.1f} bytes per Gaussian"
         )
+
+
+@dataclass(frozen=True)
+class BodyParts:
+    """A baked body as a bundle holds it.
+
+    Attributes:
+        baked: What viewers draw.
+        files: Content by name.
+        entry: What the manifest says about it.
+        loss: Means over its pictures.
+    """
+
+    baked: BakedBody
+    files: dict[str, bytes]
+    entry: BodyInfo | SkinnedInfo
+    loss: Loss
+
+    @property
+    def entries(self) -> BodyEntries:
+        """The manifest's fields."""
+        entry = self.entry
+        if isinstance(entry, SkinnedInfo):
+            return {"body": None, "skinned": entry}
+        return {"body": entry, "skinned": None}
+
+
+def parts_of(results: Sequence[WindowResult], body: MovingBody) -> BodyParts:
+    """The baked windows together."""
+    windows = [result.window for result in results]
+    return BodyParts(
+        WindowedBody(windows.__getitem__, body.windows, body.fps),
+        {window_file(i): result.data for i, result in enumerate(results)},
+        body_info(windows, body),
+        _mean_loss([result.loss for result in results]),
+    )
 
 
 def bake(
@@ -145,7 +189,7 @@ def megabits_per_second(results: list[WindowResult]) -> float:
 def write(
     out: Path,
     persona: Persona,
-    results: list[WindowResult],
+    parts: BodyParts,
     body: MovingBody,
     capture: Capture | None,
     notices: str,
@@ -155,42 +199,44 @@ def write(
     Args:
         out: The file to write.
         persona: Who it is; its name is the bundle's.
-        results: The baked windows.
-        body: The exact body, for its times.
+        parts: The baked body.
+        body: The exact body, for the provenance of its recording.
         capture: For camera, background and provenance; None where it is not at hand.
         notices: Text of LICENSES.txt; no such file where it is empty.
     """
-    windows = [result.window for result in results]
-    info = body_info(windows, body)
+    info = parts.entry
     camera = standing_camera(np.array(info.low), np.array(info.high), capture)
     background = staging.background_colour(capture, 0) if capture else staging.NEUTRAL
-    files = {window_file(i): result.data for i, result in enumerate(results)}
-    files[THUMBNAIL] = staging.thumbnail(window_gaussians(windows[0], 0.0), camera, background)
+    files = dict(parts.files)
+    first = parts.baked.window_gaussians(0, 0.0)
+    files[THUMBNAIL] = staging.thumbnail(first, camera, background)
     if notices:
         files[LICENSES] = notices.encode()
     about = capture.provenance if capture else body.summary.get("capture", {})
     manifest = Manifest(
         name=persona.name,
         head=None,
-        body=info,
+        **parts.entries,
         speech=None,
         camera=camera,
         background=background,
         persona=persona,
-        loss=_mean_loss([result.loss for result in results]),
+        loss=parts.loss,
         provenance=staging.provenance(about, "the body's recording"),
     )
     return write_bundle(out, manifest, files)
 
 
-def strip(body: MovingBody, results: list[WindowResult], capture: Capture | None) -> np.ndarray:
-    """[recorded |] exact | baked of each window's begin, one below the other: uint8."""
+def strip(body: MovingBody, baked: BakedBody, capture: Capture | None) -> np.ndarray:
+    """[recorded |] exact | baked of each window, one below the other: uint8."""
     lines = []
-    for index, (span, result) in enumerate(zip(body.windows, results, strict=True)):
-        probes = probe_views(ring_of_cameras(*seen_box(result.window)), span, 1)
-        views = list(recorded_views(capture, span, 1)) if capture else probes
-        pair = window_pair(body, index, result.window, None)
-        lines.append(comparison_line(*pair, views[0]))
+    count = max(1, _STRIP_ROWS // len(body.windows))
+    for index, span in enumerate(body.windows):
+        at = partial(baked.window_gaussians, index)
+        probes = probe_views(ring_of_cameras(*seen_box(at)), span, count)
+        views = recorded_views(capture, span, count) if capture else probes
+        pair = window_pair(body, index, at, None)
+        lines += [comparison_line(*pair, view) for view in views]
     return (np.vstack(lines).clip(0, 1) * 255 + 0.5).astype(np.uint8)
 
 
@@ -203,7 +249,7 @@ def _attempts(
     for shape in SHAPES:
         baked = baker.baked(shape)
         recorded = recorded_views(capture, span) if capture else []
-        probes = probe_views(ring_of_cameras(*seen_box(baked)), span)
+        probes = probe_views(ring_of_cameras(*seen_box(partial(window_gaussians, baked))), span)
         loss = measure_window(body, index, baked, recorded, probes, head)
         yield WindowResult(baked, baked.to_bytes(window_file(index)), seconds, loss)
 
@@ -221,7 +267,7 @@ def _best(attempts: Iterator[WindowResult]) -> WindowResult:
 
 def body_info(windows: list[BakedWindow], body: MovingBody) -> BodyInfo:
     """What the manifest says about a body."""
-    boxes = [seen_box(window, (0.0, 0.5, 1.0)) for window in windows]
+    boxes = [seen_box(partial(window_gaussians, window), (0.0, 0.5, 1.0)) for window in windows]
     infos = [
         WindowInfo(
             first=span.first,
@@ -240,15 +286,13 @@ def body_info(windows: list[BakedWindow], body: MovingBody) -> BodyInfo:
     )
 
 
-def seen_box(
-    window: BakedWindow, taus: tuple[float, ...] = (0.5,)
-) -> tuple[np.ndarray, np.ndarray]:
-    """Least and greatest coordinates of what is seen, but for a few strays."""
-    seen = window.rgba[:, 3] > 255 * _VISIBLE
-    points = np.concatenate(
-        [window.at(tau)[0][seen if seen.any() else slice(None)] for tau in taus]
-    )
-    low, high = np.percentile(points, (0.5, 99.5), axis=0)
+def seen_box(at: At, taus: Sequence[float] = (0.5,)) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest coordinates of what is seen at some times, but for a few strays."""
+    points = []
+    for gaussians in map(at, taus):
+        seen = gaussians.opacities > _VISIBLE
+        points.append(gaussians.means[seen if seen.any() else slice(None)].cpu().numpy())
+    low, high = np.percentile(np.concatenate(points), (0.5, 99.5), axis=0)
     return low, high
 
 

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     import torch
 
     from ico3d.avatar.avatar import TrainedAvatar
-    from ico3d.avatar.baking.body_bundle import WindowResult
+    from ico3d.avatar.baking.body_bundle import BodyParts, WindowResult
+    from ico3d.avatar.baking.body_cost import HeadAt
     from ico3d.body.model_folder import TrainedBody
     from ico3d.bundle.animation import Animation
     from ico3d.bundle.manifest import Persona
@@ -38,8 +39,9 @@ class Bake:
             a whole person is baked from what synthetic voices say.
         rank: Number of basis vectors of a head, 1 to 64; by default the smallest from 16 on that
             keeps the bounds: at most 0.3 dB lost against ground truth, at least 45 dB against the
-            exact model, at most 1.7 MB per 10,000 Gaussians. Bodies: at most 0.1 dB lost, at most
-            110 bytes per Gaussian and window. Whole persons: besides, at most 0.3 dB lost.
+            exact model, at most 1.7 MB per 10,000 Gaussians. Bodies: at most 0.1 dB lost; of
+            windows at most 110 bytes per Gaussian and window. Whole persons: besides, at most
+            0.3 dB lost.
         name: The avatar's name; by default the persona's, of bodies the bundle's.
         persona: TOML or JSON file that says who it is; for heads, by default that of the package.
         licences: Text files with notices that the sources ask for; they go into LICENSES.txt.
@@ -138,15 +140,15 @@ class Bake:
             self._refuse("--rank is for heads: what a body keeps is chosen window by window.")
         persona, notices = self._body_persona(), self._notices()
         capture = self._capture(0)
-        results = _watched(body_bundle.bake(body, capture), len(body.windows), report)
+        parts, check = _baked(body, capture, None, report)
         if self.strip:
-            _save_picture(body_bundle.strip(body, results, capture), self.strip)
+            _save_picture(body_bundle.strip(body, parts.baked, capture), self.strip)
         if not self.force:
-            body_bundle.check(results)
-        body_bundle.write(self._out, persona, results, body, capture, notices)
+            check()
+        body_bundle.write(self._out, persona, parts, body, capture, notices)
 
     def _bake_whole(self, avatar: "TrainedAvatar", report: Report) -> None:
-        from ico3d.avatar.baking import body_bundle, head_bundle, head_cost, person_bundle
+        from ico3d.avatar.baking import head_bundle, head_cost, person_bundle
         from ico3d.avatar.baking.persona import load_persona
 
         self._check_rank()
@@ -155,9 +157,9 @@ class Bake:
         head_capture, body_capture = self._capture(0), self._capture(1)
         samples, views = person_bundle.head_samples(avatar, head_capture, persona)
         head = head_bundle.bake(avatar.head, views, samples, self.rank, report)
-        windows = person_bundle.bake_windows(avatar, body_capture)
-        windows = _watched(windows, len(avatar.body.windows), report)
-        parts = (head.head, windows, samples.expressions)
+        head_at = person_bundle.head_at(avatar)
+        body, check = _baked(avatar.body, body_capture, head_at, report)
+        parts = (head.head, body, samples.expressions)
         result = person_bundle.put_together(avatar, *parts, body_capture)
         report(f"the whole person: {head_cost.in_words(result.loss)}.")
         if self.strip:
@@ -165,7 +167,7 @@ class Bake:
         animation = person_bundle.with_quality(animation, avatar, result.person, body_capture)
         if not self.force:
             head_bundle.check(head)
-            body_bundle.check(windows)
+            check()
             person_bundle.check(result)
             animation = _played(animation, report)
         about = (persona, self.name or persona.name, notices)
@@ -217,6 +219,24 @@ def _played(animation: "Animation", report: Report) -> "Animation":
     else:
         report("how the motion looks was not measured: that takes the body's recording.")
     return played
+
+
+def _baked(
+    body: "TrainedBody", capture: "Capture | None", head: "HeadAt | None", report: Report
+) -> "tuple[BodyParts, Callable[[], None]]":
+    """The baked body, and what refuses it where it costs too much."""
+    from functools import partial
+
+    from ico3d.avatar.baking import body_bundle
+    from ico3d.avatar.baking.skinned import skinned_bundle
+
+    if skinned_bundle.is_skinned(body):
+        result = skinned_bundle.bake(body, capture, head)
+        report(f"the body: {result}.")
+        return result.parts, partial(skinned_bundle.check, result)
+    windows = body_bundle.bake(body, capture, head)
+    results = _watched(windows, len(body.windows), report)
+    return body_bundle.parts_of(results, body), partial(body_bundle.check, results)
 
 
 def _watched(windows: "Iterator[WindowResult]", count: int, report: Report) -> "list[WindowResult]":

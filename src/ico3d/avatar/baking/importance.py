@@ -1,16 +1,19 @@
-"""How much the picture depends on each logit."""
+"""How much the picture depends on each logit, and on each Gaussian."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import torch
 
 from ico3d.common.camera import Camera
 from ico3d.head.model import HeadModel
+from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
 _FLOOR = 0.02
 """Least importance, of the mean: what these views do not show must still look right."""
+_STILL = ("means", "quats", "scales", "colors")
 
 
 def logit_importance(
@@ -45,9 +48,40 @@ def logit_importance(
         still = (gaussians.means, gaussians.quats, gaussians.scales)
         gaussians.means, gaussians.quats, gaussians.scales = (part.detach() for part in still)
         image = render(gaussians, [camera], background).rgb[0]  # (H, W, 3)
-        signs = torch.randint(0, 2, image.shape, generator=generator) * 2 - 1
-        (gradient,) = torch.autograd.grad((image * signs.to(image)).sum(), logits)
+        (gradient,) = torch.autograd.grad((image * _signs(image, generator)).sum(), logits)
         total += gradient.square()
     importance = (total / len(cameras)).sqrt().cpu().numpy()
     importance /= max(float(importance.mean()), 1e-12)
     return np.maximum(importance, _FLOOR).astype(np.float32)
+
+
+def gaussian_importance(
+    drawn: Iterable[tuple[Gaussians, Camera]], background: torch.Tensor, seed: int
+) -> np.ndarray:
+    """Root mean square change of the picture where a Gaussian is left out, to first order.
+
+    Estimated as in `logit_importance`, of opacities.
+
+    Args:
+        drawn: The same N Gaussians, some time posed and seen by some camera.
+        background: (3,) colour.
+        seed: Seed of the signs.
+
+    Returns:
+        (N,) float32.
+    """
+    generator = torch.Generator().manual_seed(seed)
+    squares: list[torch.Tensor] = []
+    for gaussians, camera in drawn:
+        opacities = gaussians.opacities.detach().requires_grad_(True)
+        still = {name: getattr(gaussians, name).detach() for name in _STILL}
+        shown = replace(gaussians, opacities=opacities, **still)
+        image = render(shown, [camera], background.to(opacities.device)).rgb[0]  # (H, W, 3)
+        (gradient,) = torch.autograd.grad((image * _signs(image, generator)).sum(), opacities)
+        squares.append((gradient * opacities.detach()).square())
+    return torch.stack(squares).mean(0).sqrt().cpu().numpy()  # (N,)
+
+
+def _signs(image: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
+    """1 and −1 at random, of the shape of a picture."""
+    return (torch.randint(0, 2, image.shape, generator=generator) * 2 - 1).to(image)

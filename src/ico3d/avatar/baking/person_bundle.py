@@ -1,7 +1,7 @@
 """From a whole person, a trained head on a trained body, to a bundle that browsers play."""
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from ico3d.avatar.animation import motion_quality
 from ico3d.avatar.animation.keyframes import Motion, find_animation, read_animation
 from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.baking import body_bundle, body_cost, head_bundle, head_cost
-from ico3d.avatar.baking.body_bundle import WindowResult
+from ico3d.avatar.baking.body_bundle import BodyParts
 from ico3d.avatar.baking.samples import (
     Samples,
     expressions_of,
@@ -21,12 +21,13 @@ from ico3d.avatar.baking.samples import (
     spoken_expressions,
     training_expressions,
 )
+from ico3d.avatar.moving import MOMENTS
 from ico3d.avatar.render_bundle import BakedAvatar
 from ico3d.body.planning.windows import Window
 from ico3d.bundle.animation import ANIMATION, Animation
 from ico3d.bundle.format import LICENSES, SPEECH, THUMBNAIL, write_bundle
 from ico3d.bundle.head import HEAD, POSES, BakedHead, poses_to_bytes
-from ico3d.bundle.manifest import CameraInfo, Loss, Manifest, Persona, window_file
+from ico3d.bundle.manifest import CameraInfo, Loss, Manifest, Persona
 from ico3d.capture.capture import Capture
 from ico3d.errors import BundleError
 from ico3d.splat.gaussians import Gaussians
@@ -44,13 +45,13 @@ class WholeResult:
 
     Attributes:
         person: The baked person, as viewers draw it.
-        windows: The baked windows of the body, with their files.
+        body: The baked body, with its files.
         idle: (B,) the expression of the face at rest.
         loss: What baking costs, means over pictures of the whole person.
     """
 
     person: BakedAvatar
-    windows: Sequence[WindowResult]
+    body: BodyParts
     idle: np.ndarray
     loss: Loss
 
@@ -82,17 +83,15 @@ def head_samples(
     )
 
 
-def bake_windows(avatar: TrainedAvatar, capture: Capture | None) -> Iterator[WindowResult]:
-    """Bakes the body, window after window, each measured with the exact head on it."""
-    return body_bundle.bake(
-        avatar.body, capture, lambda frame: avatar.head_gaussians(frame / avatar.fps)
-    )
+def head_at(avatar: TrainedAvatar) -> body_cost.HeadAt:
+    """The exact head, with which the baked body is measured."""
+    return lambda frame: avatar.head_gaussians(frame / avatar.fps)
 
 
 def put_together(
     avatar: TrainedAvatar,
     head: BakedHead,
-    windows: Sequence[WindowResult],
+    body: BodyParts,
     expressions: np.ndarray,
     capture: Capture | None,
 ) -> WholeResult:
@@ -101,20 +100,18 @@ def put_together(
     Args:
         avatar: The exact person.
         head: Baked in the space of the exact head's model.
-        windows: The baked windows of the body.
+        body: The baked body.
         expressions: (T, B) what the face usually does.
         capture: The body's recording; None to measure against the exact person only.
     """
     place = avatar.placement
     person = BakedAvatar(
         moved_head(head, place.canonical_from_head),
-        lambda index: windows[index].window,
-        avatar.body.windows,
-        avatar.fps,
+        body.baked,
         place.world_from_canonical,
     )
     idle = head_bundle.idle_expression(avatar.head, expressions)
-    return WholeResult(person, windows, idle, measure(avatar, person, capture))
+    return WholeResult(person, body, idle, measure(avatar, person, capture))
 
 
 def moved_head(head: BakedHead, a_from_b: np.ndarray) -> BakedHead:
@@ -220,12 +217,10 @@ def write(
     head = avatar.head
     person = replace(result.person, head=head_bundle.driven(result.person.head, head))
     start = person.gaussians(animation.rest.start / avatar.fps, result.idle)
-    body = body_bundle.body_info([window.window for window in result.windows], avatar.body)
-    animation.check_body(body)
+    animation.check_body(result.body.entry)
     camera = standing_camera(avatar, person, capture)
     background = staging.background_colour(capture, 0) if capture else staging.NEUTRAL
-    files = {window_file(i): window.data for i, window in enumerate(result.windows)}
-    files |= {
+    files = result.body.files | {
         HEAD: person.head.to_bytes(),
         POSES: poses_to_bytes(person.world_from_head),
         ANIMATION: animation.to_bytes(),
@@ -241,7 +236,7 @@ def write(
     manifest = Manifest(
         name=name,
         head=head_bundle.head_info(person.head, head, result.idle, avatar.fps, poses),
-        body=body,
+        **result.body.entries,
         speech=speech,
         camera=camera,
         background=background,
@@ -282,8 +277,10 @@ def _probes(avatar: TrainedAvatar, person: BakedAvatar, count: int) -> list[clip
 def _box(person: BakedAvatar) -> tuple[np.ndarray, np.ndarray]:
     """Least and greatest coordinates of what is seen, in all frames where windows begin or end."""
     boxes = []
-    for index, span in enumerate(person.spans):
-        boxes.append(body_bundle.seen_box(person.window(index), (0.0, 0.5, 1.0)))
+    taus = np.linspace(0, 1, max(3, MOMENTS // len(person.body.windows))).tolist()
+    for index, span in enumerate(person.body.windows):
+        at = partial(person.body.window_gaussians, index)
+        boxes.append(body_bundle.seen_box(at, taus))
         for frame in (span.first, span.last):
             boxes.append(_head_box(person, frame))
     low, high = zip(*boxes, strict=True)

@@ -75,7 +75,7 @@ def bundle_actor(bundle: Bundle) -> Actor:
         ModelError: If its speech model cannot be used.
     """
     manifest = bundle.manifest
-    head, body = manifest.head, manifest.body
+    head, body = manifest.head, manifest.any_body
     lips = None
     if speech := manifest.speech:
         about = speech.encoder, speech.sha256, speech.input
@@ -89,7 +89,7 @@ def bundle_actor(bundle: Bundle) -> Actor:
         points = [person.head.means @ pose[:3, :3].T + pose[:3, 3] for pose in poses]
         portrait = portrait_of(manifest.camera, np.concatenate(points))
     elif body is not None:
-        draw, seconds = lambda at, _: body_gaussians(bundle, at), body.windows[-1].last / body.fps
+        draw, seconds = lambda at, _: body_gaussians(bundle, at), (body.num_frames - 1) / body.fps
     else:
         draw, seconds = _swaying_head(bundle)
     at = head.eye_offset if head else None

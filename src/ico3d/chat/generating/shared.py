@@ -10,6 +10,7 @@ from typing import Any
 from ico3d.bundle import evaluate, limits, manifest
 from ico3d.chat.observing.timing import PARTS
 from ico3d.common.expression import EYE_NAMES, LIDS
+from ico3d.rig.rig import MOST_JOINTS
 from ico3d.speech import eyes
 
 TARGET = Path(__file__).parents[4] / "viewer" / "src" / "shared.ts"
@@ -19,8 +20,10 @@ HEAD = "// Written by `python -m ico3d.chat.generating` from the files of `src/i
 VALUES: tuple[tuple[str, str, Any], ...] = (
     ("BUNDLE_FORMAT", "What a manifest calls itself; bundle/manifest.py.", manifest.FORMAT),
     ("BUNDLE_VERSION", "The newest version of a manifest.", manifest.VERSION),
-    ("HEADS_ONLY", "The version of manifests before bodies.", manifest.HEADS_ONLY),
+    ("OLDEST_BUNDLE", "The oldest version that is read.", manifest.OLDEST),
     ("MAX_GAUSSIANS", "Of a head or a window of a body; bundle/limits.py.", limits.MAX_GAUSSIANS),
+    ("MAX_SHAPES", "Residual shapes of a body on a skeleton.", limits.MAX_SHAPES),
+    ("MAX_JOINTS", "Of a body's skeleton; rig/rig.py.", MOST_JOINTS),
     ("MAX_CLUSTERS", "Groups of Gaussians in a window that move alike.", limits.MAX_CLUSTERS),
     ("LEAKY_SLOPE", "Of a head's coefficients; bundle/evaluate.py.", evaluate.LEAKY_SLOPE),
     ("LID_NAMES", "The eyelids among blendshapes.", [EYE_NAMES[lid] for lid in LIDS]),

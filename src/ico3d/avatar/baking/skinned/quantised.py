@@ -1,0 +1,161 @@
+"""A trained body on a skeleton in the numbers that a bundle keeps."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from ico3d.body.motion.window_model import WindowModel
+from ico3d.body.skinning import coefficients
+from ico3d.body.skinning.skinned import NETWORK, Skinned
+from ico3d.bundle.limits import MAX_KNOWN_POSES
+from ico3d.bundle.skinned.baked import QUAT_UNIT, SCALE_UNITS, BakedSkinned
+from ico3d.bundle.skinned.info import SkinnedInfo
+from ico3d.bundle.skinned.packing import packed_quats, packed_rotations, packed_weights
+from ico3d.bundle.skinned.posing import kernel_width
+from ico3d.common.spread import spread
+
+STILL = 0.05
+"""Degrees that a joint may turn in the recording and yet be held."""
+_LEAST = 1e-6
+_CLEAR = 0.5 / 255
+"""Opacity that rounds to 0: such Gaussians are never drawn."""
+
+
+@dataclass(frozen=True)
+class Clip:
+    """What the manifest says besides of a body on a skeleton.
+
+    Attributes:
+        fps: Frames per second.
+        low: Least coordinates that its Gaussians' centres reach, metres.
+        high: Greatest coordinates.
+    """
+
+    fps: float
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+
+
+def quantised(model: WindowModel, clip: Clip, importance: np.ndarray) -> BakedSkinned:
+    """Rounds a body, its most important Gaussians first.
+
+    Args:
+        model: Its motion is `Skinned`.
+        clip: Rate and bounds.
+        importance: (N,) of each Gaussian.
+    """
+    motion = model.motion
+    assert isinstance(motion, Skinned)
+    shared = {name: value.detach().cpu() for name, value in model.shared.items()}
+    opacities = model.gaussians["opacity_logits"].detach().cpu().sigmoid().numpy()  # (N,)
+    order = np.argsort(-importance, kind="stable")
+    order = order[opacities[order] > _CLEAR]  # (N,) of those that are seen
+    values = {n: v.detach().cpu()[torch.from_numpy(order)] for n, v in model.gaussians.items()}
+    arrays = {name: value.numpy() for name, value in values.items()}
+    shapes = _shapes(motion, values, shared)
+    poses = _poses(shared, motion)
+    weights = values["skin_logits"].softmax(1).numpy()  # (N, 4)
+    strongest = np.argsort(-weights, axis=1, kind="stable")  # (N, 4)
+    normals = arrays["normals"] if motion.light else np.zeros_like(arrays["means"])
+    light = shared["light"].numpy() if motion.light else np.zeros((8, 3))
+    info = SkinnedInfo(
+        fps=clip.fps,
+        num_frames=motion.frames,
+        num_gaussians=len(order),
+        num_shapes=shapes.basis.shape[1],
+        num_moving=len(poses["moving"]),
+        num_known=len(poses["known"]),
+        names=motion.names,
+        parents=motion.parents,
+        low=clip.low,
+        high=clip.high,
+    )
+    return BakedSkinned(
+        means=shapes.means.astype(np.float32),
+        quats=packed_quats(arrays["quats"].astype(np.float64)),
+        log_scales=arrays["log_scales"].astype(np.float16),
+        color_logits=shapes.colors.astype(np.float16),
+        opacities=np.rint(opacities[order] * 255).astype(np.uint8),
+        normals=np.rint(normals * 127).astype(np.int8),
+        joints=np.take_along_axis(arrays["skin_joints"], strongest, 1).astype(np.uint8),
+        weights=packed_weights(np.take_along_axis(weights, strongest, 1)),
+        shapes=shapes.basis,
+        shape_scales=shapes.scales,
+        light=light.astype(np.float32),
+        rig_joints=shared["rig_joints"].numpy().astype(np.float32),
+        coefficients=shapes.coefficients.astype(np.float32),
+        info=info,
+        **poses,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Shapes:
+    """Residual shapes in eight bits.
+
+    Attributes:
+        means: (N, 3) with the mean of the residual.
+        colors: (N, 3) likewise.
+        basis: (N, K, 6) int8.
+        scales: (N, 2) float16.
+        coefficients: (F, K) of the recorded frames.
+    """
+
+    means: np.ndarray
+    colors: np.ndarray
+    basis: np.ndarray
+    scales: np.ndarray
+    coefficients: np.ndarray
+
+
+def _shapes(motion: Skinned, values: Mapping[str, Tensor], shared: Mapping[str, Tensor]) -> _Shapes:
+    """Shapes with coefficients about 0, whose lengths are comparable.
+
+    Weights of a mean sum to 1, so what all frames have in common may lie in the Gaussians
+    themselves, in poses that were never recorded as well. All shapes of a Gaussian share a scale:
+    each is as long as it is used.
+    """
+    means, colors = values["means"].numpy(), values["color_logits"].numpy()  # (N, 3)
+    if not motion.shapes:  # one that does nothing: a bundle has one at least
+        count, frames = len(means), motion.frames
+        empty = np.zeros((count, 1, 6), np.int8), np.zeros((count, 2), np.float16)
+        return _Shapes(means, colors, *empty, np.zeros((frames, 1)))
+    network = {layer: shared[NETWORK + layer] for layer in coefficients.LAYERS}
+    mixed = coefficients.network(network, shared["pose_rotations"]).double().numpy()  # (F, K)
+    basis = np.stack([values["shape_means"].numpy(), values["shape_colors"].numpy()], 1)
+    basis = basis.astype(np.float64).transpose(0, 3, 1, 2)  # (N, K, 2, 3)
+    middle = mixed.mean(axis=0)  # (K,)
+    common = np.einsum("k,nkpd->npd", middle, basis)  # (N, 2, 3)
+    sizes = np.maximum((mixed - middle).std(axis=0), _LEAST)  # (K,)
+    basis = basis * sizes[:, None, None]
+    units = np.array(SCALE_UNITS)
+    scales = np.abs(basis).max(axis=(1, 3)) / 127 / units  # (N, 2)
+    # Rounded upwards: a shape may not exceed 127 units.
+    scales = np.nextafter(scales.astype(np.float16), np.float16(np.inf))
+    whole = np.rint(basis / (scales * units)[:, None, :, None]).clip(-127, 127)
+    return _Shapes(
+        means + common[:, 0],
+        colors + common[:, 1],
+        whole.astype(np.int8).reshape(len(means), -1, 6),
+        scales,
+        (mixed - middle) / sizes,
+    )
+
+
+def _poses(shared: Mapping[str, Tensor], motion: Skinned) -> dict[str, np.ndarray]:
+    """The tensors of the recorded motion by name."""
+    turns = shared["pose_rotations"].double().numpy()  # (F, J, 4)
+    held, moving, rotations = packed_rotations(turns, STILL)
+    known = np.array(spread(motion.frames, MAX_KNOWN_POSES), np.int16)
+    width = kernel_width(rotations[known] / QUAT_UNIT)
+    return {
+        "held": held,
+        "moving": moving,
+        "rotations": rotations,
+        "roots": shared["pose_roots"].numpy().astype(np.float32),
+        "known": known,
+        "kernel_width": np.array([width], np.float32),
+    }

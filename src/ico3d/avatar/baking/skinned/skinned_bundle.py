@@ -1,0 +1,101 @@
+"""From a trained body on a skeleton to the parts of a bundle that browsers play."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import torch
+
+from ico3d.avatar import staging
+from ico3d.avatar.baked_body import SkinnedBody
+from ico3d.avatar.baking import body_cost, head_cost
+from ico3d.avatar.baking.body_bundle import BodyParts, seen_box
+from ico3d.avatar.baking.importance import gaussian_importance
+from ico3d.avatar.baking.skinned.quantised import Clip, quantised
+from ico3d.avatar.clip_views import recorded_views
+from ico3d.avatar.moving import MOMENTS
+from ico3d.body.model_folder import TrainedBody
+from ico3d.body.skinning.skinned import Skinned
+from ico3d.bundle.manifest import Loss
+from ico3d.bundle.skinned.baked import BakedSkinned
+from ico3d.bundle.skinned.info import SKINNED
+from ico3d.capture.capture import Capture
+from ico3d.errors import BundleError
+
+PROBES = 24
+"""Pictures by which the importance of Gaussians is told."""
+
+
+@dataclass(frozen=True)
+class SkinnedResult:
+    """A baked body on a skeleton, its file, and what it costs.
+
+    Attributes:
+        baked: The baked body.
+        data: The content of its file.
+        loss: Means over pictures.
+    """
+
+    baked: BakedSkinned
+    data: bytes
+    loss: Loss
+
+    @property
+    def parts(self) -> BodyParts:
+        """What a bundle holds of it."""
+        return BodyParts(SkinnedBody(self.baked), {SKINNED: self.data}, self.baked.info, self.loss)
+
+    def __str__(self) -> str:
+        """One line for people."""
+        info = self.baked.info
+        return (
+            f"{info.num_gaussians} Gaussians on {info.num_joints} joints, {info.num_shapes} "
+            f"shapes, {info.num_frames} poses of {info.num_moving} joints: "
+            f"{head_cost.in_words(self.loss)}, {len(self.data) / 1e6:.2f} MB, "
+            f"{len(self.data) / info.num_gaussians:.1f} bytes per Gaussian"
+        )
+
+
+def is_skinned(body: TrainedBody) -> bool:
+    """Whether a body is one on a skeleton."""
+    return isinstance(body.models[0].motion, Skinned)
+
+
+def bake(
+    body: TrainedBody, capture: Capture | None, head: body_cost.HeadAt | None = None
+) -> SkinnedResult:
+    """Bakes a body on a skeleton.
+
+    Args:
+        body: The exact body, of one window.
+        capture: Its recording, to measure with; None to measure against the exact body only.
+        head: The exact head on it, which is in the recorded pictures.
+    """
+    exact = partial(body.window_gaussians, 0)
+    with torch.no_grad():
+        low, high = seen_box(exact, np.linspace(0, 1, MOMENTS).tolist())
+    ring = body_cost.ring_of_cameras(low, high)
+    span = body.windows[0]
+    views = body_cost.probe_views(ring, span, PROBES)
+    poses = [(exact(view.tau), view.camera) for view in views]
+    importance = gaussian_importance(poses, views[0].background, 0)
+    clip = Clip(body.fps, staging.triple(low), staging.triple(high))
+    baked = quantised(body.models[0], clip, importance)
+    recorded = recorded_views(capture, span) if capture else []
+    pair = body_cost.window_pair(body, 0, partial(SkinnedBody(baked).window_gaussians, 0), head)
+    probes = body_cost.probe_views(ring, span)
+    return SkinnedResult(baked, baked.to_bytes(), body_cost.measure(*pair, recorded, probes))
+
+
+def check(result: SkinnedResult) -> None:
+    """Refuses a result that breaks a bound.
+
+    Raises:
+        BundleError: If the loss breaks a bound; the sentence says what was measured.
+    """
+    if not body_cost.loses_at_most(result.loss, body_cost.MAX_DROP):
+        raise BundleError(
+            f"baking the body costs too much ({result}; allowed are {body_cost.MAX_DROP} dB lost, "
+            f"{body_cost.MIN_LIKENESS} dB against exact where there is no capture): train it "
+            "longer, or use --force."
+        )

@@ -1,0 +1,1 @@
+"""Bodies on a skeleton in bundles: their manifest entry, their file and its evaluation."""

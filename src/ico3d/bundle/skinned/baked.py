@@ -1,0 +1,178 @@
+"""The file of a body on a skeleton (docs/bundle.md, body/skinned.safetensors)."""
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+
+from ico3d.bundle.skinned.info import SKINNED, SkinnedInfo
+from ico3d.bundle.tensors import Spec, decode_tensors, encode_tensors
+from ico3d.errors import BundleError
+from ico3d.rig.rig import Rig
+
+QUAT_UNIT = 32767
+"""What stands for 1 in quaternions."""
+WEIGHT_UNIT = 255
+"""The sum of a Gaussian's weights."""
+SCALE_UNITS = (1e-3, 1.0)
+"""Of `shape_scales`: millimetres, logits."""
+_UNEVEN = 1e-2
+"""By which the length of a quaternion may differ from 1."""
+_MAX_LENGTH = 1e4
+"""Metres; anything farther is no person, and overflows when it is squared in a shader."""
+_MAX_LOG_SCALE = 10.0
+_MAX_LOGIT = 1e4
+_MAX_COEFFICIENT = 1e4
+
+
+@dataclass(frozen=True, eq=False)
+class BakedSkinned:
+    """N Gaussians at rest that hang on J joints, and the poses in which they were recorded.
+
+    Gaussians come in the order of importance: the first n of them are the body for a device that
+    draws n.
+
+    Attributes:
+        means: (N, 3) float32 metres at rest.
+        quats: (N, 4) int16 wxyz in units of 1/32767, of length 1.
+        log_scales: (N, 3) float16, logarithms of metres.
+        color_logits: (N, 3) float16.
+        opacities: (N,) uint8 in units of 1/255.
+        normals: (N, 3) int8, where the surface faces at rest, of any length.
+        joints: (N, 4) uint8, which joints carry a Gaussian.
+        weights: (N, 4) uint8 in units of 1/255, with the sum 255.
+        shapes: (N, K, 6) int8 residual shapes: of position x, y, z at rest, of logits r, g, b.
+        shape_scales: (N, 2) float16, millimetres and logits per unit of the shapes.
+        light: (8, 3) float32, what spherical harmonics of degrees 1 and 2 of the posed normal add
+            to the logits r, g, b.
+        rig_joints: (J, 3) float32 metres at rest.
+        held: (J, 4) int16 wxyz: how joints are turned about themselves that never turn.
+        moving: (M,) uint8 ascending, the joints that turn.
+        rotations: (F, M, 4) int16 wxyz of these joints about themselves, in each recorded frame.
+        roots: (F, 3) float32 metres that the root moves from rest.
+        coefficients: (F, K) float32, how much of each residual shape a recorded frame has.
+        known: (P,) int16 ascending, the frames that tell the coefficients of any other pose.
+        kernel_width: (1,) float32 > 0, how far a pose reaches, in units of its features.
+    """
+
+    means: np.ndarray
+    quats: np.ndarray
+    log_scales: np.ndarray
+    color_logits: np.ndarray
+    opacities: np.ndarray
+    normals: np.ndarray
+    joints: np.ndarray
+    weights: np.ndarray
+    shapes: np.ndarray
+    shape_scales: np.ndarray
+    light: np.ndarray
+    rig_joints: np.ndarray
+    held: np.ndarray
+    moving: np.ndarray
+    rotations: np.ndarray
+    roots: np.ndarray
+    coefficients: np.ndarray
+    known: np.ndarray
+    kernel_width: np.ndarray
+    info: SkinnedInfo
+
+    @cached_property
+    def rig(self) -> Rig:
+        """Its J joints at rest."""
+        return self.info.rig(self.rig_joints)
+
+    def to_bytes(self) -> bytes:
+        """The content of `body/skinned.safetensors`.
+
+        Raises:
+            BundleError: If shapes or dtypes disagree with the manifest's entry, or a value is out
+                of range.
+        """
+        data = encode_tensors(self.tensors, _spec(self.info), SKINNED)
+        _check_values(self)
+        return data
+
+    @staticmethod
+    def from_bytes(data: bytes, info: SkinnedInfo) -> "BakedSkinned":
+        """Reads the file; the counts must be those of the manifest.
+
+        Raises:
+            BundleError: If anything does not fit.
+        """
+        baked = BakedSkinned(**decode_tensors(data, _spec(info), SKINNED), info=info)
+        _check_values(baked)
+        return baked
+
+    @property
+    def tensors(self) -> dict[str, np.ndarray]:
+        """What the file holds, by name."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "info"}
+
+
+def _spec(info: SkinnedInfo) -> Spec:
+    n, k, f = info.num_gaussians, info.num_shapes, info.num_frames
+    return {
+        "means": ("F32", (n, 3)),
+        "quats": ("I16", (n, 4)),
+        "log_scales": ("F16", (n, 3)),
+        "color_logits": ("F16", (n, 3)),
+        "opacities": ("U8", (n,)),
+        "normals": ("I8", (n, 3)),
+        "joints": ("U8", (n, 4)),
+        "weights": ("U8", (n, 4)),
+        "shapes": ("I8", (n, k, 6)),
+        "shape_scales": ("F16", (n, 2)),
+        "light": ("F32", (8, 3)),
+        "rig_joints": ("F32", (info.num_joints, 3)),
+        "held": ("I16", (info.num_joints, 4)),
+        "moving": ("U8", (info.num_moving,)),
+        "rotations": ("I16", (f, info.num_moving, 4)),
+        "roots": ("F32", (f, 3)),
+        "coefficients": ("F32", (f, k)),
+        "known": ("I16", (info.num_known,)),
+        "kernel_width": ("F32", (1,)),
+    }
+
+
+def _check_values(baked: BakedSkinned) -> None:
+    """Bounds what can come out in any pose, without evaluating."""
+    info = baked.info
+    _require(baked.joints.max() < info.num_joints, "'joints' names one that is not there")
+    sums = baked.weights.sum(axis=1, dtype=np.int32)
+    _require((sums == WEIGHT_UNIT).all(), f"'weights' must sum to {WEIGHT_UNIT}")
+    _require(_ascends(baked.moving, info.num_joints), "'moving' must name joints in order")
+    _require(_ascends(baked.known, info.num_frames), "'known' must name frames in order")
+    for name in ("quats", "held", "rotations"):
+        values = getattr(baked, name) / np.float64(QUAT_UNIT)
+        off = np.abs(np.linalg.norm(values, axis=-1) - 1).max()
+        _require(off <= _UNEVEN, f"'{name}' holds one that is no rotation")
+    bounds = {
+        "means": _MAX_LENGTH,
+        "roots": _MAX_LENGTH,
+        "color_logits": _MAX_LOGIT,
+        "light": _MAX_LOGIT,
+        "coefficients": _MAX_COEFFICIENT,
+    }
+    for name, most in bounds.items():
+        reach = np.abs(getattr(baked, name)).max()
+        _require(reach <= most, f"'{name}' is out of range, beyond {most:g}")
+    _require(baked.log_scales.max() <= _MAX_LOG_SCALE, f"exceeds exp({_MAX_LOG_SCALE:g}) m")
+    _require(baked.kernel_width[0] > 0, "'kernel_width' must be more than 0")
+    most = np.abs(baked.coefficients.astype(np.float64)).max(axis=0)  # (K,)
+    residual = np.einsum("k,nkd->nd", most, np.abs(baked.shapes.astype(np.float32)))  # (N, 6)
+    reach = np.stack([residual[:, :3].max(axis=1), residual[:, 3:].max(axis=1)], 1)  # (N, 2)
+    reach = reach * np.abs(baked.shape_scales.astype(np.float64)) * SCALE_UNITS
+    moved = reach[:, 0].max() <= _MAX_LENGTH and reach[:, 1].max() <= _MAX_LOGIT
+    _require(bool(moved), "its residual shapes are out of range")
+    assert baked.rig  # whose joints are checked as it is made
+
+
+def _ascends(numbers: np.ndarray, end: int) -> bool:
+    """Whether numbers are from 0 to `end` − 1, each once, in order."""
+    values = numbers.astype(np.int64)
+    return bool(values[0] >= 0 and values[-1] < end and (np.diff(values) > 0).all())
+
+
+def _require(holds: bool, sentence: str) -> None:
+    if not holds:
+        raise BundleError(f"{SKINNED}: {sentence}.")

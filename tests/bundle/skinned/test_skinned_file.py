@@ -1,0 +1,196 @@
+"""The file of a body on a skeleton, and what the manifest says about it."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from safetensors.numpy import save
+
+from ico3d.bundle.format import Bundle, write_bundle
+from ico3d.bundle.manifest import VERSION, Manifest
+from ico3d.bundle.skinned.baked import BakedSkinned
+from ico3d.bundle.skinned.info import SKINNED
+from ico3d.bundle.skinned.posing import any_pose, posed, recorded_pose
+from ico3d.errors import BundleError
+from support.bundles.random_body import body_manifest, random_windows
+from support.bundles.random_skinned import random_skinned, skinned_manifest, write_random_skinned
+
+RELAXED = settings(
+    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+BAKED = random_skinned()
+DATA = BAKED.to_bytes()
+VALID = json.loads(skinned_manifest(BAKED).to_json())
+
+
+def spoiled(name: str, value, at: int = 5) -> bytes:
+    tensors = {key: np.ascontiguousarray(array) for key, array in BAKED.tensors.items()}
+    tensors[name] = tensors[name].copy()
+    tensors[name].flat[at] = value
+    return save(tensors)
+
+
+def without(name: str) -> bytes:
+    return save({key: array for key, array in BAKED.tensors.items() if key != name})
+
+
+def test_a_bundle_reads_back_as_it_was_written(tmp_path):
+    manifest = write_random_skinned(tmp_path / "a.ico3d")
+    bundle = Bundle.open(tmp_path / "a.ico3d")
+    assert bundle.manifest == manifest and manifest.version == VERSION
+    assert bundle.skinned is not None and bundle.skinned.info == BAKED.info
+    for name, tensor in BAKED.tensors.items():
+        found = bundle.skinned.tensors[name]
+        np.testing.assert_array_equal(found, tensor)
+        assert found.dtype == tensor.dtype
+    with pytest.raises(BundleError, match="no window 0"):
+        bundle.window(0)
+
+
+def test_sixty_thousand_gaussians_are_under_seven_megabytes():
+    """With a minute of motion at 15 frames per second, on the largest number of shapes."""
+    baked = random_skinned(60_000, shapes=8, frames=900)
+    size = len(baked.to_bytes())
+    assert size < 7e6
+    assert size - 60_000 * 96 < 900 * (4 * 8 + 12 + 4 * 8) + 10_000  # 96 bytes per Gaussian
+
+
+def test_bodies_of_windows_are_read_as_before():
+    """A manifest of version 2 knows no skeletons."""
+    manifest = body_manifest(random_windows())
+    older = json.loads(manifest.to_json())
+    older["version"] = 2
+    del older["skinned"]
+    assert Manifest.from_json(json.dumps(older).encode()) == manifest
+    older["version"] = 3
+    with pytest.raises(BundleError, match="lacks 'skinned'"):
+        Manifest.from_json(json.dumps(older).encode())
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (without("rotations"), "lacks tensor 'rotations'"),
+        (spoiled("joints", 5), "'joints' names one that is not there"),
+        (spoiled("weights", 255), "'weights' must sum to 255"),
+        (spoiled("moving", 5, 3), "'moving' must name joints in order"),
+        (spoiled("moving", 1, 0), "'moving' must name joints in order"),
+        (spoiled("known", 6, 3), "'known' must name frames in order"),
+        (spoiled("known", -1, 0), "'known' must name frames in order"),
+        (spoiled("rotations", 32767, 4 * 4 + 2), "'rotations' holds one that is no rotation"),
+        (spoiled("rotations", 0, 4), "'rotations' holds one that is no rotation"),
+        (spoiled("held", -32768), "'held' holds one that is no rotation"),
+        (spoiled("quats", 32767, np.abs(BAKED.quats[0]).argmin()), "'quats' holds one"),
+        (spoiled("means", np.nan), "'means' holds a value that is not finite"),
+        (spoiled("means", 1e9), "'means' is out of range"),
+        (spoiled("roots", -1e9), "'roots' is out of range"),
+        (spoiled("roots", np.inf), "'roots' holds a value that is not finite"),
+        (spoiled("log_scales", 60000.0), "exceeds exp"),
+        (spoiled("log_scales", np.nan), "'log_scales' holds"),
+        (spoiled("color_logits", 60000.0), "'color_logits' is out of range"),
+        (spoiled("light", 1e30), "'light' is out of range"),
+        (spoiled("coefficients", 1e30), "'coefficients' is out of range"),
+        (spoiled("coefficients", 9e3), "residual shapes are out of range"),
+        (spoiled("coefficients", np.nan), "'coefficients' holds"),
+        (spoiled("shape_scales", 60000.0), "residual shapes are out of range"),
+        (spoiled("kernel_width", 0.0, 0), "'kernel_width' must be more than 0"),
+        (spoiled("rig_joints", 1e3), "a joint of the rig lies more than 10 m"),
+        (random_skinned(21).to_bytes(), "must be"),
+        (random_skinned(shapes=4).to_bytes(), "'shapes' must be"),
+        (random_skinned(frames=7).to_bytes(), "'rotations' must be"),
+        (DATA[:-1], "outside|must take"),
+        (DATA + b"x", "belong to no tensor"),
+        (b"", "too short"),
+    ],
+)
+def test_a_hostile_body_is_refused_in_one_sentence(data, message):
+    with pytest.raises(BundleError, match=message) as caught:
+        BakedSkinned.from_bytes(data, BAKED.info)
+    assert str(caught.value).startswith(SKINNED) and "\n" not in str(caught.value)
+
+
+@RELAXED
+@given(st.data())
+def test_a_damaged_body_is_refused_or_finite(data):
+    """Without its hash: whatever passes the checks can be drawn in any pose."""
+    damaged = bytearray(DATA)
+    for _ in range(data.draw(st.integers(1, 6))):
+        damaged[data.draw(st.integers(0, len(damaged) - 1))] ^= data.draw(st.integers(1, 255))
+    try:
+        baked = BakedSkinned.from_bytes(bytes(damaged), BAKED.info)
+    except BundleError:
+        return
+    away = np.random.default_rng(0).normal(size=(5, 4))
+    for pose in (recorded_pose(baked, 2.3), any_pose(baked, away, np.ones(3))):
+        drawn = posed(baked, pose)
+        assert all(np.isfinite(values).all() for values in vars(drawn).values())
+
+
+def changed(path: str, value) -> bytes:
+    manifest = json.loads(json.dumps(VALID))
+    place = manifest
+    *parents, last = path.split(".")
+    for key in parents:
+        place = place[int(key) if key.isdigit() else key]
+    place[int(last) if last.isdigit() else last] = value
+    return json.dumps(manifest).encode()
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        ("skinned", None, "head must be there where no body is"),
+        ("body", json.loads(body_manifest(random_windows()).to_json())["body"], "skinned must be"),
+        ("skinned.fps", 0, "skinned.fps"),
+        ("skinned.num_frames", 1, "num_frames"),
+        ("skinned.num_frames", 10**6, "num_frames"),
+        ("skinned.num_gaussians", 0, "num_gaussians"),
+        ("skinned.num_gaussians", 10**9, "num_gaussians"),
+        ("skinned.num_shapes", 0, "num_shapes"),
+        ("skinned.num_shapes", 9, "num_shapes"),
+        ("skinned.num_moving", 6, "num_moving"),
+        ("skinned.num_known", 7, "num_known"),
+        ("skinned.names", [], "num_moving"),
+        ("skinned.names.1", "root", "different names"),
+        ("skinned.names.1", "x" * 65, "skinned.names"),
+        ("skinned.names.1", 3, "a text"),
+        ("skinned.parents", [-1], "differ in number"),
+        ("skinned.parents.0", 0, "joint 0 of a rig is its root"),
+        ("skinned.parents.2", 2, "parents of a rig come before children"),
+        ("skinned.parents.2", -1, "parents of a rig come before children"),
+        ("skinned.low", [3, 3, 3], "skinned.low"),
+        ("skinned.more", 1, "unknown key 'more'"),
+    ],
+)
+def test_a_wrong_field_is_named(path, value, message):
+    with pytest.raises(BundleError, match=message):
+        Manifest.from_json(changed(path, value))
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=10),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner),
+    max_leaves=6,
+)
+fields = st.sampled_from([f"skinned.{key}" for key in VALID["skinned"]] + ["skinned.parents.3"])
+
+
+@given(fields, json_values)
+def test_any_value_anywhere_is_read_or_refused(path, value):
+    try:
+        Manifest.from_json(changed(path, value))
+    except BundleError as error:
+        assert "\n" not in str(error)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    manifest = skinned_manifest(BAKED)
+    with pytest.raises(BundleError, match=SKINNED):
+        write_bundle(tmp_path / "a.ico3d", manifest, {"thumbnail.png": b""})
+    with pytest.raises(BundleError, match="does not belong"):
+        windows = replace(body_manifest(random_windows()), files={})
+        names = {w.file: b"" for w in windows.body.windows} if windows.body else {}
+        write_bundle(tmp_path / "a.ico3d", windows, names | {"thumbnail.png": b"", SKINNED: DATA})

@@ -1,0 +1,100 @@
+import type { Page } from 'playwright-core';
+import { afterAll, beforeAll, describe, expect, test } from 'vitest';
+import type { Playback } from '../src/motion/playback.ts';
+import { Browser } from '../support/browser/browser.ts';
+import { psnr, takePixels, worst } from '../support/browser/pictures.ts';
+import { makeSkinned, type SkinnedMoment } from '../support/references/skinned.ts';
+import { ChatServer } from '../support/servers/server.ts';
+
+const WIDTH = 180;
+const HEIGHT = 240;
+const GAUSSIANS = 5000;
+const FEW = 2000; // the most important ones
+const TIMES = [0, 0.31, 1.2, 2];
+const LIKENESS = 45; // dB
+const reference = makeSkinned({ gaussians: GAUSSIANS, times: TIMES, few: FEW, pictures: `${WIDTH}x${HEIGHT}` });
+const pixels = 3 * WIDTH * HEIGHT;
+const unseen = reference.moments.at(-1)!;
+
+let server: ChatServer;
+let browser: Browser;
+let page: Page;
+
+beforeAll(async () => {
+  server = await ChatServer.start(reference.file);
+  browser = await Browser.launch({ width: WIDTH, height: HEIGHT });
+  page = await browser.open(server.url);
+});
+
+afterAll(async () => {
+  await browser?.close();
+  await server?.stop();
+});
+
+/** Compares what is drawn with what Python draws, splat by splat and as a picture. */
+async function expectAsInPython(moment: SkinnedMoment, picture: number, count = GAUSSIANS): Promise<void> {
+  await page.evaluate(() => window.ico3d!.stage.still());
+  const taken = await takePixels(page);
+  const splats = await page.evaluate(() => {
+    const { skinned, splats } = window.ico3d!;
+    const { centres, rgba } = splats(skinned!.generator);
+    return { centres: [...centres], rgba: [...rgba] };
+  });
+  expect(worst(moment.centres.subarray(0, 3 * count), splats.centres.slice(0, 3 * count))).toBeLessThan(1e-5);
+  expect(worst(moment.rgba.subarray(0, 4 * count), splats.rgba.slice(0, 4 * count))).toBeLessThan(1e-3);
+  const likeness = psnr(taken, reference.pictures!.subarray(picture * pixels, (picture + 1) * pixels));
+  console.log(`${moment.time ?? 'unseen'}, ${count} Gaussians: ${likeness.toFixed(1)} dB`);
+  expect(likeness).toBeGreaterThan(LIKENESS);
+}
+
+/** Takes the pose that was never recorded. */
+function strike(): Promise<void> {
+  return page.evaluate(({ rotations, root }) => window.ico3d!.skinned!.strike(rotations, root), unseen);
+}
+
+describe('a body on a skeleton alone, served by ico3d serve', () => {
+  test('has a player, and plays what was recorded there and back', async () => {
+    expect(await page.locator('#player').isVisible()).toBe(true);
+    expect(await page.locator('#composer').isVisible()).toBe(false);
+    expect(await page.textContent('#name')).toBe('Random');
+    expect(await page.evaluate(() => (window.ico3d!.skinned!.motion as Playback).duration)).toBeCloseTo(2);
+    await page.waitForFunction(() => {
+      const { skinned } = window.ico3d!;
+      const seen = ((window as { seen?: number[] }).seen ??= []);
+      seen.push(skinned!.time);
+      return Math.max(...seen) > 1.8 && skinned!.time < 1.6;
+    });
+  });
+
+  test.each(TIMES.map((time, i) => [time, i] as const))('at %f s it is what Python makes of it', async (time, i) => {
+    await page.evaluate((seconds) => window.ico3d!.skinned!.show(seconds), time);
+    await expectAsInPython(reference.moments[i]!, i);
+  });
+
+  test('in a pose that was never recorded it is what Python makes of it', async () => {
+    await strike();
+    await expectAsInPython(unseen, TIMES.length);
+  });
+
+  test('the most important Gaussians alone are a body, too', async () => {
+    await strike();
+    await page.evaluate((few) => window.ico3d!.skinned!.generator.limit(few), FEW);
+    await expectAsInPython(unseen, TIMES.length + 1, FEW);
+    await page.evaluate((all) => window.ico3d!.skinned!.generator.limit(all), GAUSSIANS);
+  });
+
+  test('goes on with the recording when the pose is let go', async () => {
+    await strike();
+    await page.evaluate(() => window.ico3d!.skinned!.release());
+    await page.evaluate((seconds) => window.ico3d!.skinned!.show(seconds), TIMES[1]!);
+    await expectAsInPython(reference.moments[1]!, 1);
+  });
+
+  test('a damaged file is one sentence on the page', async () => {
+    await page.route('**/body/skinned.safetensors', (route) => route.fulfill({ body: 'x'.repeat(100) }));
+    await page.reload();
+    const sentence = page.locator('#overlay-error');
+    await sentence.waitFor();
+    expect(await sentence.textContent()).toBe('body/skinned.safetensors is shorter than manifest.json says.');
+  });
+});

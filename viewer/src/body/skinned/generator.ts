@@ -1,0 +1,171 @@
+import { dyno, SplatGenerator, SplatTransformer } from '@sparkjsdev/spark';
+import * as THREE from 'three';
+import type { BakedSkinned } from './baked.ts';
+import { packSkinned, type Texels } from './packed.ts';
+import { Skeleton, TABLE_ROW, type Pose } from './skeleton.ts';
+
+const SHAPE_WORDS = 1.5; // 32-bit words of a residual shape: position and logits, six bytes
+const MILLIMETRE = '1e-3';
+
+/** A body on a skeleton as a Spark generator: a shader that moves, turns and colours its Gaussians with their joints. */
+export class SkinnedGenerator extends SplatGenerator {
+  readonly skeleton: Skeleton;
+  private readonly most: number; // Gaussians
+  private readonly uniforms: Uniforms;
+
+  constructor(baked: BakedSkinned) {
+    const texels = packSkinned(baked);
+    const uniforms = makeUniforms(baked, texels);
+    const transformer = new SplatTransformer();
+    super({
+      numSplats: baked.info.num_gaussians,
+      generator: makeGenerator(texels, baked.info.num_shapes, uniforms, transformer),
+      // Without this the program would place the body at infinity.
+      update: () => {
+        if (transformer.update(this)) this.updateVersion();
+      },
+    });
+    this.most = baked.info.num_gaussians;
+    this.uniforms = uniforms;
+    this.skeleton = new Skeleton(baked.info, baked.poses);
+  }
+
+  /** Shows a pose. */
+  pose(pose: Pose): void {
+    const { skinnedJoints, skinnedResidual } = this.uniforms;
+    this.skeleton.table(pose, skinnedJoints.value.image.data as Float32Array);
+    skinnedJoints.value.needsUpdate = true;
+    pose.residual.forEach((value, k) => skinnedResidual.value[k >> 2]!.setComponent(k & 3, value));
+    this.updateVersion();
+  }
+
+  /** Draws so many Gaussians at most: the most important ones. */
+  limit(count: number): void {
+    this.uniforms.skinnedCount.value = Math.min(count, this.most);
+    this.updateVersion();
+  }
+}
+
+interface Uniforms {
+  [name: string]: { value: unknown };
+  skinnedTexels: { value: THREE.DataArrayTexture };
+  skinnedJoints: { value: THREE.DataTexture }; // a row for each joint
+  skinnedResidual: { value: THREE.Vector4[] };
+  skinnedLight: { value: THREE.Vector3[] };
+  skinnedCount: { value: number };
+}
+
+function makeUniforms({ info, light }: BakedSkinned, { width, rows, layers, words }: Texels): Uniforms {
+  const texels = new THREE.DataArrayTexture(words, width, rows, layers);
+  texels.format = THREE.RGBAIntegerFormat;
+  texels.type = THREE.UnsignedIntType;
+  texels.internalFormat = 'RGBA32UI';
+  const joints = info.names.length;
+  const table = new Float32Array(TABLE_ROW * joints);
+  const jointTexels = new THREE.DataTexture(table, TABLE_ROW / 4, joints, THREE.RGBAFormat, THREE.FloatType);
+  for (const texture of [texels, jointTexels]) texture.needsUpdate = true;
+  return {
+    skinnedTexels: { value: texels },
+    skinnedJoints: { value: jointTexels },
+    skinnedResidual: { value: [new THREE.Vector4(), new THREE.Vector4()] },
+    skinnedLight: { value: Array.from({ length: 8 }, (_, i) => new THREE.Vector3().fromArray(light, 3 * i)) },
+    skinnedCount: { value: info.num_gaussians },
+  };
+}
+
+type Generator = NonNullable<SplatGenerator['generator']>;
+
+function makeGenerator(texels: Texels, shapes: number, uniforms: Uniforms, transformer: SplatTransformer): Generator {
+  return dyno.dynoBlock({ index: 'int' }, { gsplat: dyno.Gsplat }, ({ index }) => {
+    const node = new dyno.Dyno({
+      inTypes: { index: 'int' },
+      outTypes: { gsplat: dyno.Gsplat },
+      inputs: { index },
+      generate: ({ inputs, outputs }) => ({
+        globals: [dyno.defineGsplat, DECLARATIONS],
+        statements: statements(texels, shapes, inputs.index!, outputs.gsplat!),
+        uniforms,
+      }),
+    });
+    return { gsplat: transformer.applyGsplat(node.outputs.gsplat) };
+  });
+}
+
+const DECLARATIONS = dyno.unindent(`
+  uniform usampler2DArray skinnedTexels;
+  uniform sampler2D skinnedJoints;
+  uniform vec4 skinnedResidual[2];
+  uniform vec3 skinnedLight[8];
+  uniform int skinnedCount;
+
+  vec4 skinnedBytes(uint word) {
+    return vec4(ivec4(uvec4(word) << uvec4(24u, 16u, 8u, 0u)) >> 24);
+  }
+
+  vec2 skinnedShorts(uint word) {
+    return vec2(ivec2(uvec2(word) << uvec2(16u, 0u)) >> 16);
+  }
+
+  vec4 skinnedProduct(vec4 a, vec4 b) { // of quaternions wxyz
+    return vec4(a.x * b.x - dot(a.yzw, b.yzw), a.x * b.yzw + b.x * a.yzw + cross(a.yzw, b.yzw));
+  }
+
+  vec3 skinnedLit(vec3 n) { // spherical harmonics of degrees 1 and 2
+    return 0.4886025119029199 * (n.z * skinnedLight[1] - n.y * skinnedLight[0] - n.x * skinnedLight[2])
+      + 1.0925484305920792 * (n.x * n.y * skinnedLight[3] - n.y * n.z * skinnedLight[4] - n.x * n.z * skinnedLight[6])
+      + 0.31539156525252005 * (2.0 * n.z * n.z - n.x * n.x - n.y * n.y) * skinnedLight[5]
+      + 0.5462742152960396 * (n.x * n.x - n.y * n.y) * skinnedLight[7];
+  }
+`);
+
+/** Six signed bytes per shape, in words that lie in a row: Σ κ·position and Σ κ·logits. */
+function residual(shapes: number): string {
+  const words = Math.ceil(SHAPE_WORDS * shapes);
+  const layers = Array.from({ length: Math.ceil(words / 4) }, (_, i) => `uvec4 l${i} = texelFetch(skinnedTexels, ivec3(texel, ${3 + i}), 0);`);
+  const unpacked = Array.from({ length: words }, (_, i) => `vec4 s${i} = skinnedBytes(l${i >> 2}.${'xyzw'[i & 3]});`);
+  const byte = (at: number) => `s${at >> 2}.${'xyzw'[at & 3]}`;
+  const sum = (begin: number) =>
+    Array.from({ length: shapes }, (_, k) => {
+      const at = 6 * k + begin;
+      return `skinnedResidual[${k >> 2}].${'xyzw'[k & 3]} * vec3(${byte(at)}, ${byte(at + 1)}, ${byte(at + 2)})`;
+    }).join(' + ');
+  return `${layers.join(' ')} ${unpacked.join(' ')} vec3 moved = ${sum(0)}; vec3 tinted = ${sum(3)};`;
+}
+
+function statements({ width }: Texels, shapes: number, index: string, gsplat: string): string[] {
+  return dyno.unindentLines(`
+    ${gsplat}.flags = 0u;
+    ${gsplat}.index = ${index};
+    if (${index} < skinnedCount) {
+      ivec2 texel = ivec2(${index} % ${width}, ${index} / ${width});
+      uvec4 a = texelFetch(skinnedTexels, ivec3(texel, 0), 0);
+      uvec4 b = texelFetch(skinnedTexels, ivec3(texel, 1), 0);
+      uvec4 c = texelFetch(skinnedTexels, ivec3(texel, 2), 0);
+      uvec4 joints = (uvec4(a.w) >> uvec4(0u, 8u, 16u, 24u)) & 255u;
+      vec4 weights = vec4((uvec4(b.z) >> uvec4(0u, 8u, 16u, 24u)) & 255u) / 255.0;
+      vec4 x = vec4(0.0); vec4 y = vec4(0.0); vec4 z = vec4(0.0); vec4 turn = vec4(0.0);
+      for (int k = 0; k < 4; k++) {
+        if (weights[k] == 0.0) continue;
+        int joint = int(joints[k]);
+        x += weights[k] * texelFetch(skinnedJoints, ivec2(0, joint), 0);
+        y += weights[k] * texelFetch(skinnedJoints, ivec2(1, joint), 0);
+        z += weights[k] * texelFetch(skinnedJoints, ivec2(2, joint), 0);
+        turn += weights[k] * texelFetch(skinnedJoints, ivec2(3, joint), 0);
+      }
+      ${residual(shapes)}
+      vec2 units = unpackHalf2x16(c.w);
+      vec4 rest = vec4(uintBitsToFloat(a.xyz) + ${MILLIMETRE} * units.x * moved, 1.0);
+      vec3 normal = skinnedBytes(b.w).xyz;
+      normal = vec3(dot(x.xyz, normal), dot(y.xyz, normal), dot(z.xyz, normal));
+      normal *= inversesqrt(max(dot(normal, normal), 1e-12));
+      vec4 rotation = skinnedProduct(turn, vec4(skinnedShorts(b.x), skinnedShorts(b.y)) / 32767.0);
+      vec2 between = unpackHalf2x16(c.y);
+      vec3 logits = vec3(between.y, unpackHalf2x16(c.z)) + units.y * tinted + skinnedLit(normal);
+      ${gsplat}.flags = GSPLAT_FLAG_ACTIVE;
+      ${gsplat}.center = vec3(dot(x, rest), dot(y, rest), dot(z, rest));
+      ${gsplat}.quaternion = rotation.yzwx * inversesqrt(max(dot(rotation, rotation), 1e-12));
+      ${gsplat}.scales = exp(vec3(unpackHalf2x16(c.x), between.x));
+      ${gsplat}.rgba = vec4(1.0 / (1.0 + exp(-logits)), float(b.w >> 24u) / 255.0);
+    }
+  `);
+}

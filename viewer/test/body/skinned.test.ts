@@ -1,0 +1,111 @@
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { describe, expect, test } from 'vitest';
+import { readBakedSkinned } from '../../src/body/skinned/baked.ts';
+import { packSkinned } from '../../src/body/skinned/packed.ts';
+import { Skeleton } from '../../src/body/skinned/skeleton.ts';
+import { SKINNED } from '../../src/bundle/load.ts';
+import { bodyOf, checkManifest } from '../../src/bundle/manifest.ts';
+import { parseSafetensors, type Tensor } from '../../src/bundle/safetensors.ts';
+import { makeSkinned } from '../../support/references/skinned.ts';
+import { arrayBuffer } from '../../support/references/head.ts';
+
+const TIMES = [0, 0.013, 1, 1.237, 2, 9];
+const reference = makeSkinned({ gaussians: 300, times: TIMES });
+const read = (name: string) => readFileSync(join(reference.folder, name));
+const manifest = checkManifest(JSON.parse(read('manifest.json').toString()));
+const info = manifest.skinned!;
+const tensors = () => parseSafetensors(arrayBuffer(read(SKINNED)), SKINNED);
+const baked = readBakedSkinned(tensors(), info, SKINNED);
+
+/** The largest difference between numbers. */
+function off(found: ArrayLike<number>, expected: number[]): number {
+  return Math.max(...expected.map((value, i) => Math.abs(found[i]! - value)));
+}
+
+describe('a body on a skeleton that Python baked', () => {
+  const skeleton = new Skeleton(info, baked.poses);
+
+  test('stands at any time of the recording as in Python', () => {
+    for (const { time, rotations, root, residual } of reference.moments.filter(({ time }) => time !== null)) {
+      const pose = skeleton.empty();
+      skeleton.recorded(time! * info.fps, pose);
+      expect(off(pose.rotations, rotations)).toBeLessThan(1e-6);
+      expect(off(pose.root, root)).toBeLessThan(1e-6);
+      expect(off(pose.residual, residual)).toBeLessThan(1e-6);
+    }
+  });
+
+  test('has the coefficients that Python interpolates in a pose that was never recorded', () => {
+    const { rotations, residual } = reference.moments.at(-1)!;
+    const pose = { ...skeleton.empty(), rotations: Float64Array.from(rotations, (value) => -2 * value) }; // the same turns
+    skeleton.interpolate(pose);
+    expect(off(pose.residual, residual)).toBeLessThan(1e-5);
+    expect(Math.max(...residual.map(Math.abs))).toBeGreaterThan(0.1);
+  });
+
+  test('moves its joints as in Python', () => {
+    const table = new Float32Array(16 * info.names.length);
+    for (const { rotations, root, residual, table: expected } of reference.moments) {
+      const given = [rotations, root, residual].map((values) => Float64Array.from(values));
+      skeleton.table({ rotations: given[0]!, root: given[1]!, residual: given[2]! }, table);
+      expect(off(table, expected)).toBeLessThan(1e-6);
+    }
+  });
+
+  test('its texels hold what the file holds', () => {
+    const { words, width, rows, layers } = packSkinned(baked);
+    expect({ width, rows, layers }).toEqual({ width: 1024, rows: 1, layers: 6 }); // 96 bytes per Gaussian
+    const bytes = new Uint8Array(words.buffer);
+    const at = (layer: number, i: number) => 16 * (1024 * layer + i);
+    const i = 123;
+    expect([...new Float32Array(words.buffer, at(0, i), 3)]).toEqual([...baked.means.subarray(3 * i, 3 * i + 3)]);
+    expect([...bytes.subarray(at(0, i) + 12, at(0, i) + 16)]).toEqual([...baked.joints.subarray(4 * i, 4 * i + 4)]);
+    expect([...new Int16Array(words.buffer, at(1, i), 4)]).toEqual([...baked.quats.subarray(4 * i, 4 * i + 4)]);
+    expect(bytes[at(1, i) + 15]).toBe(baked.opacities[i]);
+    const shape = [3, 4, 5].flatMap((layer) => [...new Int8Array(words.buffer, at(layer, i), 16)]);
+    expect(shape).toEqual([...baked.shapes.subarray(48 * i, 48 * i + 48)]);
+    const halves = new Uint16Array(words.buffer, at(2, i), 8);
+    const given = new Uint16Array(read(SKINNED).buffer.slice(...rangeOf('shape_scales', 4 * i, 4)));
+    expect([...halves.subarray(6)]).toEqual([...given]);
+  });
+
+  test('is as long as it was recorded', () => expect(bodyOf(manifest)).toMatchObject({ fps: 15, frames: 31 }));
+});
+
+/** Where some bytes of a tensor are in the file's buffer. */
+function rangeOf(name: string, begin: number, size: number): [number, number] {
+  const file = read(SKINNED);
+  const length = Number(file.readBigUInt64LE(0));
+  const start = JSON.parse(file.subarray(8, 8 + length).toString())[name].data_offsets[0] as number;
+  const from = file.byteOffset + 8 + length + start + begin;
+  return [from, from + size];
+}
+
+describe('a damaged body on a skeleton is refused in one sentence', () => {
+  const spoil = (name: string, change: (tensor: Tensor) => void) => () => {
+    const spoiled = tensors();
+    change(spoiled.get(name)!);
+    readBakedSkinned(spoiled, info, SKINNED);
+  };
+  const field = (change: object) => () => checkManifest({ ...manifest, skinned: { ...info, ...change } });
+  const cases: [string, () => unknown, RegExp][] = [
+    ['not finite', spoil('means', ({ data }) => (data[4] = NaN)), /means holds numbers that are not finite/],
+    ['endless pose', spoil('roots', ({ data }) => (data[4] = Infinity)), /roots holds numbers/],
+    ['a joint that is not there', spoil('joints', ({ data }) => (data[9] = 10)), /joints names one/],
+    ['a joint that turns and is not there', spoil('moving', ({ data }) => (data[0] = 200)), /moving names one/],
+    ['a frame that is not there', spoil('known', ({ data }) => (data[0] = 31)), /known names one/],
+    ['no kernel', spoil('kernel_width', ({ data }) => (data[0] = 0)), /kernel_width/],
+    ['other length', spoil('rotations', (tensor) => tensor.shape[0]!--), /rotations is I16/],
+    ['two bodies', () => checkManifest({ ...manifest, body: { fps: 1 } }), /skinned/],
+    ['no joints', field({ names: [] }), /skinned.names/],
+    ['no tree', field({ parents: info.parents.map(() => 0) }), /skinned.parents/],
+    ['two roots', field({ parents: info.parents.map(() => -1) }), /skinned.parents/],
+    ['too many shapes', field({ num_shapes: 9 }), /num_shapes/],
+    ['too many Gaussians', field({ num_gaussians: 1e9 }), /num_gaussians/],
+    ['one frame', field({ num_frames: 1, num_known: 1 }), /num_frames/],
+    ['no rate', field({ fps: 0 }), /skinned.fps/],
+    ['no box', field({ low: [0, 0] }), /skinned.low/],
+  ];
+  test.each(cases)('%s', (_, act, sentence) => expect(act).toThrow(sentence));
+});
