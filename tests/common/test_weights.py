@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 
 from ico3d.cli import main
-from ico3d.common import weights as room
-from ico3d.common.weights import RemoteFile, Weights, cached, model_file
+from ico3d.common.catalogue import table as room
+from ico3d.common.catalogue.kinds import RemoteFile, Weights
+from ico3d.common.weights import cached, model_file
 from ico3d.errors import MissingModelError, SettingsError
 
 
