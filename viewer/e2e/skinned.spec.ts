@@ -2,9 +2,11 @@ import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import type { Playback } from '../src/motion/playback.ts';
 import { Browser } from '../support/browser/browser.ts';
-import { psnr, takePixels, worst } from '../support/browser/pictures.ts';
+import { lookAsBundled, psnr, takePixels, worst } from '../support/browser/pictures.ts';
+import { makePerson } from '../support/references/person.ts';
 import { makeSkinned, type SkinnedMoment } from '../support/references/skinned.ts';
 import { ChatServer } from '../support/servers/server.ts';
+import { servePage } from '../support/servers/static.ts';
 
 const WIDTH = 180;
 const HEIGHT = 240;
@@ -96,5 +98,48 @@ describe('a body on a skeleton alone, served by ico3d serve', () => {
     const sentence = page.locator('#overlay-error');
     await sentence.waitFor();
     expect(await sentence.textContent()).toBe('body/skinned.safetensors is shorter than manifest.json says.');
+    await page.unroute('**/body/skinned.safetensors');
+  });
+});
+
+describe('a whole person on a skeleton', () => {
+  const whole = makePerson({ body: 'skinned', gaussians: '600,3000', times: [0, 1, 2.4], pictures: `${WIDTH}x${HEIGHT}` });
+  let files: Awaited<ReturnType<typeof servePage>>;
+
+  beforeAll(async () => {
+    files = await servePage(whole.folder);
+    page = await browser.open(files.url);
+    await lookAsBundled(page, whole.folder);
+  });
+  afterAll(() => files?.close());
+
+  test.each([0, 1, 2.4].map((time, i) => [time, i] as const))('at %f s head and body are what Python makes of them', async (time, i) => {
+    await page.evaluate(async (seconds) => {
+      const { stage, skinned, head } = window.ico3d!;
+      head!.director = null;
+      await skinned!.show(seconds);
+      head!.tick(0);
+      head!.express(new Float32Array(head!.expression.length));
+      await stage.still();
+    }, time);
+    const row = await page.evaluate(() => window.ico3d!.head!.row);
+    expect(row).toBeCloseTo(time * whole.fps, 5);
+    const likeness = psnr(await takePixels(page), whole.pictures!.subarray(i * pixels, (i + 1) * pixels));
+    console.log(`whole, ${time} s: ${likeness.toFixed(1)} dB`);
+    expect(likeness).toBeGreaterThan(LIKENESS);
+  });
+
+  test('rests where its animation says, and the head goes with the body', async () => {
+    const seen = await page.evaluate(async () => {
+      const { stage, skinned, head } = window.ico3d!;
+      stage.start();
+      const steps: [number, number][] = [];
+      for (let i = 0; i < 40; i++) {
+        await new Promise((resolve) => requestAnimationFrame(resolve));
+        steps.push([skinned!.time, head!.row]);
+      }
+      return steps;
+    });
+    for (const [time, row] of seen) expect(row).toBeCloseTo(time * whole.fps, 5);
   });
 });
