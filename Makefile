@@ -58,6 +58,7 @@ bench: install ## long quality and speed runs; figures go to docs/benchmarks.md
 	$(PY) bench/step.py $(RESULTS)/capture --json $(RESULTS)/step.json
 	$(PY) bench/gpu.py --json $(RESULTS)/gpu.json --capture $(RESULTS)/capture
 	$(PY) bench/files.py src/ico3d/chat/data/demo.ico3d --json $(RESULTS)/files.json
+	$(if $(filter %.npz,$(SUBJECT)),$(PY) bench/stress.py $(SUBJECT) --json $(RESULTS)/stress.json)
 	ico3d bench chat --json $(RESULTS)/chat.json
 	cd viewer && npm run --silent bench
 

@@ -84,7 +84,7 @@ def test_a_missing_file_says_how_to_get_it():
         model_file("audio_visual_encoder.pth", "something")
     with pytest.raises(MissingModelError, match=r"needs the model file 'x\.bin': put it into"):
         model_file("x.bin", "something")
-    with pytest.raises(SettingsError, match=r"no weights 'x': choose from face-landmarker, ave"):
+    with pytest.raises(SettingsError, match=r"no weights 'x': choose from face-landmarker, pose-"):
         cached("x")
 
 

@@ -76,6 +76,7 @@ class Weights:
 
 _TORCH = "https://download.pytorch.org/models"
 _KOKORO = "https://github.com/thewh1teagle/kokoro-onnx/releases/download/model-files-v1.0"
+_MEDIAPIPE = "https://storage.googleapis.com/mediapipe-models"
 _LANGUAGES = ("English", "Spanish", "French", "Chinese", "Japanese", "Korean")
 _MB = 10**6
 
@@ -90,9 +91,33 @@ TABLE: dict[str, Weights] = {
             (
                 RemoteFile(
                     "face_landmarker.task",
-                    "https://storage.googleapis.com/mediapipe-models/face_landmarker/"
-                    "face_landmarker/float16/1/face_landmarker.task",
+                    f"{_MEDIAPIPE}/face_landmarker/face_landmarker/float16/1/face_landmarker.task",
                     "64184e229b263107bc2b804c6625db1341ff2bb731874b0bcc2fe6544e0bc9ff",
+                ),
+            ),
+        ),
+        Weights(
+            "pose-landmarker",
+            "finding a body's joints (MediaPipe, full)",
+            9_398_198,
+            "Apache-2.0",
+            (
+                RemoteFile(
+                    "pose_landmarker.task",
+                    f"{_MEDIAPIPE}/pose_landmarker/pose_landmarker_full/float16/1/"
+                    "pose_landmarker_full.task",
+                ),
+            ),
+        ),
+        Weights(
+            "hand-landmarker",
+            "finding hands' joints (MediaPipe)",
+            7_819_105,
+            "Apache-2.0",
+            (
+                RemoteFile(
+                    "hand_landmarker.task",
+                    f"{_MEDIAPIPE}/hand_landmarker/hand_landmarker/float16/1/hand_landmarker.task",
                 ),
             ),
         ),

@@ -1,0 +1,174 @@
+"""The gestures that ship with the package."""
+
+from dataclasses import replace
+
+from ico3d.motion.gestures.script import HANG, Lean, Reach, Script
+
+Key = tuple[float, Reach | None]
+
+
+def _once(
+    ready: Reach, stroke: Reach, up: float, swing: float, hold: float, down: float
+) -> tuple[Key, ...]:
+    """Up to where the stroke begins, the stroke, a hold, and down again; each so many seconds."""
+    ends = [0.0, up, up + swing, up + swing + hold, up + swing + hold + down]
+    return tuple(zip(ends, (HANG, ready, stroke, stroke, HANG), strict=True))
+
+
+def _script(
+    up: float,
+    swing: float,
+    hold: float,
+    down: float,
+    right: tuple[Reach, Reach] | None = None,
+    left: tuple[Reach, Reach] | None = None,
+    lean: Lean | None = None,
+) -> Script:
+    """A gesture with one stroke."""
+    hands = [_once(*pair, up, swing, hold, down) if pair else () for pair in (right, left)]
+    stroke = up + swing
+    leaning: tuple[tuple[float, Lean], ...] = ()
+    if lean is not None:
+        leaning = (
+            *((0.0, Lean()), (0.5 * up, Lean()), (stroke, lean)),
+            *((stroke + hold, lean), (stroke + hold + 0.8 * down, Lean())),
+        )
+    return Script(
+        up, stroke, (stroke, stroke + hold), stroke + hold + down, hands[0], hands[1], leaning
+    )
+
+
+_ELBOW = (0.5, -0.82, -0.3)
+
+_WAVE = Reach((0.30, 0.20, 0.36), (0.62, -0.78, -0.1), (0.05, 1.0, 0.06), (-0.05, 0.0, 1.0), "open")
+_WAVE_IN = replace(_WAVE, place=(0.22, 0.21, 0.37), fingers=(-0.42, 1.0, 0.06))
+_WAVE_OUT = replace(_WAVE, place=(0.38, 0.19, 0.35), fingers=(0.48, 1.0, 0.06))
+
+_AIM = Reach((0.14, -0.34, 0.40), (0.55, -0.82, -0.3), (-0.1, 0.25, 1.0), (-0.8, -0.6, 0.1))
+_POINT = Reach((-0.03, -0.10, 0.83), _ELBOW, (-0.06, 0.06, 1.0), (-0.55, -0.83, 0.0), "point")
+
+_GATHER = Reach((0.02, -0.44, 0.46), _ELBOW, (-0.15, 0.25, 1.0), (-1.0, 0.25, 0.0))
+_OPEN = Reach((0.24, -0.46, 0.52), _ELBOW, (0.38, 0.12, 1.0), (-0.42, 1.0, 0.1), "offering")
+_OFFER = Reach((0.10, -0.40, 0.60), _ELBOW, (0.12, 0.15, 1.0), (-0.35, 1.0, 0.0), "offering")
+_BEFORE_OFFER = Reach((0.00, -0.38, 0.42), _ELBOW, (-0.3, 0.35, 0.9), (-0.9, 0.3, -0.1))
+
+_COUNT = Reach((0.16, -0.10, 0.46), (0.45, -0.88, -0.1), (-0.05, 1.0, 0.18), (-0.3, -0.1, 1.0))
+_FIST = Reach(
+    (0.17, -0.24, 0.42), (0.45, -0.88, -0.1), (-0.1, 1.0, 0.3), (-0.45, -0.2, 1.0), "fist"
+)
+
+_SHRUG = Reach(
+    (0.30, -0.50, 0.40), (0.3, -0.85, -0.45), (0.75, 0.12, 0.7), (0.0, 1.0, 0.25), "open"
+)
+_BEFORE_SHRUG = Reach((0.10, -0.55, 0.40), (0.4, -0.85, -0.4), (0.2, 0.1, 1.0), (-0.9, 0.5, 0.1))
+
+_THINK = Reach(
+    *((0.03, -0.10, 0.03), (0.5, -1.0, 0.15), (-0.45, 0.9, -0.12), (-0.35, -0.25, -0.9), "chin"),
+    anchor="chin",
+    part=1.15,
+)
+
+_RAISED = Reach((0.12, -0.27, 0.45), _ELBOW, (-0.1, 0.45, 1.0), (-0.85, -0.35, 0.1))
+_BEATEN = Reach((0.14, -0.49, 0.52), _ELBOW, (-0.05, 0.05, 1.0), (-0.95, 0.15, 0.0))
+
+_HEART = Reach(
+    *((-0.08, -0.02, 0.045), (0.8, -0.6, 0.12), (-1.0, 0.32, 0.06), (0.06, 0.05, -1.0), "flat"),
+    anchor="chest",
+    part=0.85,
+)
+_BEFORE_HEART = replace(_HEART, place=(-0.02, -0.06, 0.26), fingers=(-1.0, 0.4, 0.4))
+
+_WELCOME = Reach((0.52, -0.32, 0.50), _ELBOW, (0.62, 0.18, 0.75), (-0.35, 0.75, 0.55), "open")
+_BEFORE_WELCOME = Reach((0.12, -0.36, 0.48), _ELBOW, (-0.1, 0.3, 1.0), (-0.8, 0.5, 0.0))
+
+_BIG = Reach((0.42, -0.22, 0.52), (0.7, -0.7, -0.2), (-0.05, 0.35, 1.0), (-1.0, 0.0, 0.1), "open")
+_BEFORE_BIG = replace(_BIG, place=(0.02, -0.30, 0.50), shape="loose")
+_SMALL = Reach((-0.08, -0.24, 0.50), _ELBOW, (-0.1, 0.3, 1.0), (-1.0, 0.0, 0.1), "flat")
+_BEFORE_SMALL = replace(_SMALL, place=(0.22, -0.26, 0.50), shape="loose")
+
+
+def _wave() -> Script:
+    up, half, down = 0.7, 0.24, 0.8
+    swings = (_WAVE_IN, _WAVE_OUT, _WAVE_IN, _WAVE_OUT)
+    right: list[Key] = [(0.0, HANG)]
+    right += [(up + half * i, swing) for i, swing in enumerate(swings)]
+    last = up + half * (len(swings) - 1)
+    lean = Lean(head=(-1.0, 0.0, 4.0))
+    return Script(
+        ready=up,
+        stroke=up + half,
+        hold=(up + half, last),
+        end=last + down,
+        right=(*right, (last + down, HANG)),
+        lean=((0.0, Lean()), (up, lean), (last, lean), (last + 0.8 * down, Lean())),
+    )
+
+
+def _turning(angles: tuple[tuple[float, float], ...], column: int, stroke: int) -> Script:
+    """Turns of the head: (seconds, degrees) about one axis; the stroke arrives with one of them."""
+    keys: list[tuple[float, Lean]] = []
+    for seconds, degrees in angles:
+        turn = [0.0, 0.0, 0.0]
+        turn[column] = degrees
+        keys.append((seconds, Lean(head=(turn[0], turn[1], turn[2]))))
+    at = angles[stroke][0]
+    return Script(angles[stroke - 1][0], at, (at, at), angles[-1][0], lean=tuple(keys))
+
+
+def _count(shape: str) -> Script:
+    return _script(0.55, 0.22, 0.4, 0.75, right=(_FIST, replace(_COUNT, shape=shape)))
+
+
+_NOD = ((0.0, 0.0), (0.14, -2.0), (0.38, 10.0), (0.62, 0.5), (0.84, 6.0), (1.15, 0.0))
+_SMALL_NOD = ((0.0, 0.0), (0.3, 6.0), (0.7, 0.0))
+_SHAKE = ((0.0, 0.0), (0.26, -12.0), (0.56, 12.0), (0.84, -9.0), (1.1, 5.0), (1.4, 0.0))
+_TELLING = Lean(chest=(1.5, 0.0, 0.0), head=(2.0, 0.0, 0.0))
+
+SCRIPTS = {
+    "wave": _wave(),
+    "point": _script(0.55, 0.28, 0.45, 0.85, right=(_AIM, _POINT), lean=Lean((2.0, 3.0, 0.0))),
+    "open_hands": _script(
+        *(0.55, 0.32, 0.4, 0.85), right=(_GATHER, _OPEN), left=(_GATHER, _OPEN), lean=_TELLING
+    ),
+    "open_hand": _script(
+        *(0.5, 0.32, 0.4, 0.8), right=(_BEFORE_OFFER, _OFFER), lean=Lean((1.5, 3.0, 0.0))
+    ),
+    "count_one": _count("one"),
+    "count_two": _count("two"),
+    "count_three": _count("three"),
+    "shrug": _script(
+        *(0.4, 0.3, 0.45, 0.75),
+        right=(_BEFORE_SHRUG, _SHRUG),
+        left=(_BEFORE_SHRUG, _SHRUG),
+        lean=Lean((-1.0, 0.0, 0.0), (-2.0, 0.0, 7.0), 18.0),
+    ),
+    "nod": _turning(_NOD, 0, 2),
+    "small_nod": _turning(_SMALL_NOD, 0, 1),
+    "shake": _turning(_SHAKE, 1, 1),
+    "think": _script(
+        *(0.7, 0.3, 1.0, 0.9),
+        right=(replace(_THINK, place=(0.04, -0.08, 0.16)), _THINK),
+        lean=Lean((0.0, 0.0, -1.0), (2.0, 7.0, -4.0)),
+    ),
+    "beat_right": _script(0.45, 0.2, 0.25, 0.75, right=(_RAISED, _BEATEN)),
+    "beat_left": _script(0.45, 0.2, 0.25, 0.75, left=(_RAISED, _BEATEN)),
+    "beat_both": _script(
+        *(0.48, 0.22, 0.25, 0.8), right=(_RAISED, _BEATEN), left=(_RAISED, _BEATEN), lean=_TELLING
+    ),
+    "hand_on_heart": _script(
+        *(0.6, 0.3, 0.7, 0.85),
+        right=(_BEFORE_HEART, _HEART),
+        lean=Lean((1.0, 0.0, 0.0), (5.0, 0.0, 0.0)),
+    ),
+    "welcome": _script(
+        *(0.55, 0.38, 0.5, 0.9),
+        right=(_BEFORE_WELCOME, _WELCOME),
+        left=(_BEFORE_WELCOME, _WELCOME),
+        lean=Lean((-1.5, 0.0, 0.0), (2.0, 0.0, 0.0)),
+    ),
+    "big": _script(*(0.5, 0.38, 0.4, 0.85), right=(_BEFORE_BIG, _BIG), left=(_BEFORE_BIG, _BIG)),
+    "small": _script(
+        *(0.5, 0.3, 0.4, 0.8), right=(_BEFORE_SMALL, _SMALL), left=(_BEFORE_SMALL, _SMALL)
+    ),
+}
+"""By name; those of one hand are made with the right one, and mirrored on demand."""
