@@ -34,6 +34,7 @@ VERBS: dict[str, Verb] = {
     "capture track": Verb(
         "ico3d.capture.headtrack.command", "Track", "find the head in many cameras"
     ),
+    "capture pose": Verb("ico3d.capture.posing.command", "Pose", "fit a skeleton to the person"),
     "capture resize": Verb(
         "ico3d.capture.importing.commands", "Resize", "write it with smaller pictures"
     ),

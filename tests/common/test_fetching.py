@@ -7,9 +7,9 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 
 from ico3d.cli import main
-from ico3d.common import weights as room
+from ico3d.common.catalogue import table as room
+from ico3d.common.catalogue.kinds import RemoteFile, Weights
 from ico3d.common.downloads.fetching import fetch_file, git_blob
-from ico3d.common.weights import RemoteFile, Weights
 from ico3d.errors import DownloadError
 
 pytestmark = pytest.mark.slow

@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 
 from ico3d.cli import main
-from ico3d.common import weights as room
-from ico3d.common.weights import RemoteFile, Weights, cached, model_file
+from ico3d.common.catalogue import table as room
+from ico3d.common.catalogue.kinds import RemoteFile, Weights
+from ico3d.common.weights import cached, model_file
 from ico3d.errors import MissingModelError, SettingsError
 
 
@@ -25,6 +26,12 @@ def test_every_entry_says_all_that_a_person_must_know():
         assert bool(weights.files) != bool(weights.repository)
         assert bool(weights.wanted) == bool(weights.repository)
         assert bool(weights.notice) == ("NC" in weights.licence)
+        if weights.package is not None:
+            assert len(weights.files) == 1 and weights.files[0].name.endswith(".task")
+            assert re.fullmatch(r"\d+\.\d+\.\d+", weights.package.version)
+            for model in weights.package.models:
+                assert model.name.endswith(".tflite") and model.path.endswith(".tflite")
+                assert re.fullmatch(r"[0-9a-f]{64}", model.sha256)
         for file in weights.files:
             assert file.url.startswith("https://")
             assert re.fullmatch(r"([0-9a-f]{8}|[0-9a-f]{64})?", file.sha256)
@@ -84,7 +91,7 @@ def test_a_missing_file_says_how_to_get_it():
         model_file("audio_visual_encoder.pth", "something")
     with pytest.raises(MissingModelError, match=r"needs the model file 'x\.bin': put it into"):
         model_file("x.bin", "something")
-    with pytest.raises(SettingsError, match=r"no weights 'x': choose from face-landmarker, ave"):
+    with pytest.raises(SettingsError, match=r"no weights 'x': choose from face-landmarker, pose-"):
         cached("x")
 
 

@@ -2,14 +2,16 @@ import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import type { Playback } from '../src/motion/playback.ts';
 import { Browser } from '../support/browser/browser.ts';
-import { psnr, takePixels, worst } from '../support/browser/pictures.ts';
+import { lookAsBundled, psnr, takePixels, worst } from '../support/browser/pictures.ts';
+import { makePerson } from '../support/references/person.ts';
 import { makeSkinned, type SkinnedMoment } from '../support/references/skinned.ts';
 import { ChatServer } from '../support/servers/server.ts';
+import { servePage } from '../support/servers/static.ts';
 
-const WIDTH = 180;
-const HEIGHT = 240;
-const GAUSSIANS = 5000;
-const FEW = 2000; // the most important ones
+const WIDTH = 120;
+const HEIGHT = 160;
+const GAUSSIANS = 3000;
+const FEW = 1200; // the most important ones
 const TIMES = [0, 0.31, 1.2, 2];
 const LIKENESS = 45; // dB
 const reference = makeSkinned({ gaussians: GAUSSIANS, times: TIMES, few: FEW, pictures: `${WIDTH}x${HEIGHT}` });
@@ -76,15 +78,11 @@ describe('a body on a skeleton alone, served by ico3d serve', () => {
     await expectAsInPython(unseen, TIMES.length);
   });
 
-  test('the most important Gaussians alone are a body, too', async () => {
+  test('the most important Gaussians alone are a body, too; then all of them go on with the recording', async () => {
     await strike();
     await page.evaluate((few) => window.ico3d!.skinned!.generator.limit(few), FEW);
     await expectAsInPython(unseen, TIMES.length + 1, FEW);
     await page.evaluate((all) => window.ico3d!.skinned!.generator.limit(all), GAUSSIANS);
-  });
-
-  test('goes on with the recording when the pose is let go', async () => {
-    await strike();
     await page.evaluate(() => window.ico3d!.skinned!.release());
     await page.evaluate((seconds) => window.ico3d!.skinned!.show(seconds), TIMES[1]!);
     await expectAsInPython(reference.moments[1]!, 1);
@@ -96,5 +94,48 @@ describe('a body on a skeleton alone, served by ico3d serve', () => {
     const sentence = page.locator('#overlay-error');
     await sentence.waitFor();
     expect(await sentence.textContent()).toBe('body/skinned.safetensors is shorter than manifest.json says.');
+    await page.unroute('**/body/skinned.safetensors');
+  });
+});
+
+describe('a whole person on a skeleton', () => {
+  const whole = makePerson({ body: 'skinned', gaussians: '400,2000', times: [0, 2.4], pictures: `${WIDTH}x${HEIGHT}` });
+  let files: Awaited<ReturnType<typeof servePage>>;
+
+  beforeAll(async () => {
+    files = await servePage(whole.folder);
+    page = await browser.open(files.url);
+    await lookAsBundled(page, whole.folder);
+  });
+  afterAll(() => files?.close());
+
+  test.each([0, 2.4].map((time, i) => [time, i] as const))('at %f s head and body are what Python makes of them', async (time, i) => {
+    await page.evaluate(async (seconds) => {
+      const { stage, skinned, head } = window.ico3d!;
+      head!.director = null;
+      await skinned!.show(seconds);
+      head!.tick(0);
+      head!.express(new Float32Array(head!.expression.length));
+      await stage.still();
+    }, time);
+    const row = await page.evaluate(() => window.ico3d!.head!.row);
+    expect(row).toBeCloseTo(time * whole.fps, 5);
+    const likeness = psnr(await takePixels(page), whole.pictures!.subarray(i * pixels, (i + 1) * pixels));
+    console.log(`whole, ${time} s: ${likeness.toFixed(1)} dB`);
+    expect(likeness).toBeGreaterThan(LIKENESS);
+  });
+
+  test('rests where its animation says, and the head goes with the body', async () => {
+    const seen = await page.evaluate(async () => {
+      const { stage, skinned, head } = window.ico3d!;
+      stage.start();
+      const steps: [number, number][] = [];
+      for (let i = 0; i < 40; i++) {
+        await new Promise((resolve) => requestAnimationFrame(resolve));
+        steps.push([skinned!.time, head!.row]);
+      }
+      return steps;
+    });
+    for (const [time, row] of seen) expect(row).toBeCloseTo(time * whole.fps, 5);
   });
 });

@@ -86,7 +86,7 @@ class Skinning:
 
     shapes: int = 8
     hidden: int = 32
-    dropout: float = 0.3
+    dropout: float = 0.1
     light: bool = True
 
 
@@ -131,13 +131,12 @@ class Rates:
         pose: Learning rate of a skinned body's poses, as quaternions.
         root: Learning rate of where its root is, metres.
         pose_decay: Factor to which the rates of poses and roots have decayed at the last step.
-        weights: Learning rate of the logarithms of its skinning weights; 0 keeps the template's.
         shape_means: Learning rate of its residual shapes' places, metres.
         shape_colors: Learning rate of its residual shapes' colours, logits.
         light: Learning rate of its light.
         coefficients: Learning rate of the network that tells how much of each shape a pose has.
-        skin_decay: Factor to which the rates of weights, residual shapes, their network and light
-            have decayed at the last step.
+        skin_decay: Factor to which the rates of residual shapes, their network and light have
+            decayed at the last step.
     """
 
     position: float = 1.6e-4
@@ -152,11 +151,10 @@ class Rates:
     blend: float = 1e-4
     motion: float = 1e-3
     motion_decay: float = 0.1
-    pose: float = 1.5e-3
+    pose: float = 1e-3
     root: float = 1e-3
     pose_decay: float = 0.05
-    weights: float = 0.0
-    shape_means: float = 3e-3
+    shape_means: float = 2e-4
     shape_colors: float = 5e-3
     light: float = 5e-3
     coefficients: float = 2e-3
@@ -176,7 +174,6 @@ class Rates:
             "motion": Rate(self.motion, self.motion_decay),
             "pose_rotations": Rate(self.pose, self.pose_decay),
             "pose_roots": Rate(self.root, self.pose_decay),
-            "skin_logits": Rate(self.weights, self.skin_decay),
             "shape_means": Rate(self.shape_means, self.skin_decay),
             "shape_colors": Rate(self.shape_colors, self.skin_decay),
             "light": Rate(self.light, self.skin_decay),

@@ -100,6 +100,10 @@ class Capture(ABC):
         """(P, 3) surface points of a frame: of bodies in the world, else in head space."""
         return None
 
+    def whole_body_points(self, frame: int) -> np.ndarray | None:
+        """(133, 3) annotated points of COCO-WholeBody in the world, metres; NaN where unknown."""
+        return None
+
     def body_track(self) -> BodyTrack | None:
         """How the person moved, as `ico3d capture pose` found it; None where it has not.
 

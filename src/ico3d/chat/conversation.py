@@ -208,7 +208,7 @@ class Conversation:
         await self._input.answer(question)
 
     async def _said(self, _: object, __: object, message: UserTurnStoppedMessage) -> None:
-        self._asked(message.content)
+        self._asked(message.content or "")
 
     def _asked(self, question: str) -> None:
         """What the visitor wants to be told may also be something to be shown."""

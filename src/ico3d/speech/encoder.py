@@ -11,8 +11,9 @@ import numpy as np
 import torch
 from torch import nn
 
+from ico3d.common.catalogue.table import TABLE
 from ico3d.common.downloads.fetching import sha256
-from ico3d.common.weights import TABLE, model_file, model_of
+from ico3d.common.weights import model_file, model_of
 from ico3d.errors import ModelError, SettingsError
 from ico3d.speech.blocks import sound_blocks
 from ico3d.speech.hubert import VECTORS, load_network, weight_file

@@ -7,8 +7,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ico3d.common.catalogue.table import TABLE
 from ico3d.common.expression import SPEECH_SIZE
-from ico3d.common.weights import TABLE, find_model, model_folders
+from ico3d.common.weights import find_model, model_folders
 from ico3d.errors import MissingExtraError, MissingModelError, ModelError
 from ico3d.speech.blocks import BlockStream
 from ico3d.speech.mel import RATE

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,10 @@ from PIL import Image
 from ico3d.avatar.baking import head_bundle, person_bundle
 from ico3d.avatar.baking.persona import load_persona
 from ico3d.avatar.baking.shader_head import BakeSettings
+from ico3d.avatar.baking.skinned import skinned_bundle
 from ico3d.avatar.render_bundle import avatar_gaussians, baked_gaussians, visitor_camera
+from ico3d.body.model_folder import TrainedBody
+from ico3d.body.planning.windows import Window
 from ico3d.bundle.animation import Animation, Rest
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import Loss
@@ -30,7 +34,9 @@ from support.avatars.whole_person import (
     head_recording,
     write_whole_person,
 )
+from support.bodies.skinned_model import trained_like
 from support.bundles.random_bundle import random_head
+from support.bundles.skinned_person import capsule_person
 from support.captures import open_with
 
 pytestmark = pytest.mark.slow
@@ -152,6 +158,29 @@ def test_without_a_recording_voices_say_how_the_face_moves(avatar):
     assert lids.min() == pytest.approx(person.head.eyes.rest[5], abs=1e-5)
     assert samples.importance.shape == (300, 4) and views[0].truth is None
     assert all(view.exact.std() > 0.02 for view in views)
+
+
+def test_a_body_on_a_skeleton_carries_the_head(baked, tmp_path):
+    """The baked head goes to its recorded poses, the body is the one on the skeleton."""
+    bundle, _, person, _ = baked
+    model, about = trained_like(capsule_person(300, FRAMES)), person.body.summary
+    body = TrainedBody([model], (Window(0, FRAMES - 1),), FPS, "skinned", about)
+    whole = replace(person, body=body)
+    parts = skinned_bundle.bake(body, None, person_bundle.head_at(whole)).parts
+    result = person_bundle.put_together(whole, bundle.head, parts, whole.expressions, None)
+    persona, out = load_persona(None), tmp_path / "a.ico3d"
+    animation = Animation(FPS, FRAMES, Rest(2, 5), ())
+    person_bundle.write(out, whole, result, animation, None, (persona, "Both", ""))
+    found = Bundle.open(out)
+    assert found.manifest.is_whole and found.manifest.body is None and found.skinned is not None
+    drawn = avatar_gaussians(found, 4 / FPS, np.zeros(39))
+    assert len(drawn) == 300 + bundle.head.num_gaussians
+    exact = body.gaussians(4 / FPS)
+    places = [np.sort(g.means.detach().numpy(), 0) for g in (drawn[:300], exact)]
+    np.testing.assert_allclose(*places, atol=2e-3)
+    poses = person.placement.world_from_canonical
+    head = baked_gaussians(found.head, np.zeros(39)).transform(poses[4])
+    torch.testing.assert_close(drawn.means[300:], head.means, atol=1e-5, rtol=0)
 
 
 def test_an_edited_animation_is_taken(avatar, tmp_path):

@@ -36,7 +36,7 @@ UNSEEN = {"left arm": (0, 0.4, 0.9), "left forearm": (0, -1.6, 0.3), "head": (0.
 """Rotation vectors of a pose that the motion never shows."""
 
 
-def capsule_person(count: int, seed: int = 0) -> BakedSkinned:
+def capsule_person(count: int, frames: int = FRAMES, seed: int = 0) -> BakedSkinned:
     """Gaussians in random order on capsules; the jaw never turns."""
     rng = np.random.default_rng(seed)
     starts, ends = (np.array([bone[i] for bone in BONES.values()]) for i in (1, 2))
@@ -50,13 +50,13 @@ def capsule_person(count: int, seed: int = 0) -> BakedSkinned:
     joints, weights = _carried(means, starts, ends, radii)
     colors = rng.normal(0, 1.2, (len(BONES), 3))[bone] + rng.normal(0, 0.2, (count, 3))
     size = 0.7 / np.sqrt(count)
-    held, moving, rotations = packed_rotations(from_rotvec(_motion()), 0.05)
-    known = np.arange(0, FRAMES, 2, dtype=np.int16)
+    held, moving, rotations = packed_rotations(from_rotvec(_motion(frames)), 0.05)
+    known = np.arange(0, frames, 2, dtype=np.int16)
     info = SkinnedInfo(
-        FPS, FRAMES, count, SHAPES, len(moving), len(known), NAMES, PARENTS,
+        FPS, frames, count, SHAPES, len(moving), len(known), NAMES, PARENTS,
         (-0.8, 0.0, -0.4), (0.8, 1.9, 0.6),
     )  # fmt: skip
-    phases = np.linspace(0, 2 * np.pi, FRAMES)[:, None]
+    phases = np.linspace(0, 2 * np.pi, frames)[:, None]
     return BakedSkinned(
         means=means.astype(np.float32),
         quats=packed_quats(rng.normal(size=(count, 4))),
@@ -86,8 +86,8 @@ def unseen_pose() -> Array:
     return from_rotvec(np.array([UNSEEN.get(name, (0.0, 0.0, 0.0)) for name in NAMES], float))
 
 
-def write_capsule_person(path: Path, count: int) -> Manifest:
-    baked = capsule_person(count)
+def write_capsule_person(path: Path, count: int, frames: int = FRAMES) -> Manifest:
+    baked = capsule_person(count, frames)
     camera = CameraInfo((0.6, 1.2, 4.2), (0.0, 0.95, 0.0), (0.0, 1.0, 0.0), 30.0)
     manifest = replace(
         body_manifest(random_windows()),
@@ -114,10 +114,10 @@ def _carried(
     return joints.astype(np.uint8), weights / weights.sum(1, keepdims=True)
 
 
-def _motion() -> Array:
+def _motion(frames: int) -> Array:
     """(F, J, 3) rotation vectors of somebody who waves, turns and walks on the spot."""
-    t = np.linspace(0, 2 * np.pi, FRAMES)
-    turns = np.zeros((FRAMES, len(NAMES), 3))
+    t = np.linspace(0, 2 * np.pi, frames)
+    turns = np.zeros((frames, len(NAMES), 3))
     turns[:, NAMES.index("hips"), 1] = 0.4 * np.sin(t)
     turns[:, NAMES.index("chest"), 1] = 0.3 * np.sin(2 * t)
     turns[:, NAMES.index("head"), 0] = 0.2 * np.sin(3 * t)

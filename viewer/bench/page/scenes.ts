@@ -7,48 +7,26 @@ import { BundleFiles, loadManifest } from '../../src/bundle/load.ts';
 import type { HeadFiles } from '../../src/bundle/load.ts';
 import { ExpressionTrack } from '../../src/face/track.ts';
 import { Poses } from '../../src/head/poses.ts';
-
-/** A frame that was drawn. */
-export interface Frame {
-  ms: number; // since the one before
-  window: number; // of the body, -1 in the still scene
-  uploaded: boolean; // a window into the idle slot
-}
-
-declare global {
-  interface Window {
-    scenes?: { animated(frames: number): Promise<Frame[]>; still(frames: number): Promise<Frame[]> };
-  }
-}
+import { drawFrames, type Frame } from './drawing.ts';
 
 const STEP = 0.1; // s: windows change every ten frames
 const { stage, head, body, director, conversation } = window.ico3d!;
-const gl = stage.renderer.getContext();
 const identity = await makeStill();
 let sound = 0; // s
 let uploaded = false;
 perform();
 window.scenes = { animated: (frames) => run(true, frames), still: (frames) => run(false, frames) };
 
-/** Draws one scene; a frame ends when the GPU has done all of it. */
-async function run(animated: boolean, frames: number): Promise<Frame[]> {
+/** Draws one scene. */
+function run(animated: boolean, frames: number): Promise<Frame[]> {
   for (const object of [...head!.objects, ...body!.objects]) object.visible = animated;
   identity.visible = !animated;
-  await stage.still();
-  const log: Frame[] = [];
-  for (let last = NaN; log.length < frames; ) {
-    await new Promise((resolve) => setTimeout(resolve)); // lets sorts and windows arrive
+  const change = () => {
     uploaded = false;
     if (animated) move();
     else identity.updateVersion();
-    stage.draw();
-    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
-    const now = performance.now();
-    const frame = { ms: now - last, window: animated ? body!.shown!.window : -1, uploaded };
-    if (!Number.isNaN(last)) log.push(frame);
-    last = now;
-  }
-  return log;
+  };
+  return drawFrames(stage, frames, change, () => ({ window: animated ? body!.shown!.window : -1, uploaded }));
 }
 
 /** One tick of a person who speaks and gestures through all of the recording, back and forth. */

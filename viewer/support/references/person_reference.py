@@ -1,6 +1,7 @@
-"""A whole person – the swinging body and a random head on it, on a floor – as Python draws it.
+"""A whole person – a body and a random head on it, on a floor – as Python draws it.
 
-Run: python person_reference.py OUT [--gaussians N,N] [--times S,…] [--pictures WxH]
+Run: python person_reference.py OUT [--body windows|skinned] [--gaussians N,N] [--times S,…]
+    [--pictures WxH]
 
 Writes OUT/person.ico3d, OUT/bundle/ (its files), OUT/poses.json (the head's place in each frame)
 and, if asked, OUT/pictures.u8 (T, H, W, 3) of the times and OUT/painted.u8: the same with the head
@@ -32,6 +33,7 @@ from ico3d.splat.files.raw import RawGaussians
 from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
 from support.bundles.random_bundle import random_files, random_head, random_manifest
+from support.bundles.skinned_person import write_capsule_person
 
 FPS = 15.0
 ANIMATED = Animation(FPS, BORDERS[-1] + 1, Rest(0, 12), (Action(24, 0.9), Action(40, 0.7)))
@@ -64,10 +66,13 @@ def floor() -> Gaussians:
     )
 
 
-def write_person(path: Path, on_head: int, on_body: int) -> None:
+def write_person(path: Path, kind: str, on_head: int, on_body: int) -> None:
     """The body's own head stays: some of its Gaussians lie before the other head, some behind."""
     body_path = path.with_name("body.ico3d")
-    write_body(body_path, on_body)
+    if kind == "skinned":
+        write_capsule_person(body_path, on_body, ANIMATED.num_frames)
+    else:
+        write_body(body_path, on_body)
     body, head = Bundle.open(body_path), random_head(on_head)
     info = random_manifest(head)
     assert info.head is not None
@@ -111,13 +116,14 @@ def main() -> None:
     """Does what the file's docstring says."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
+    parser.add_argument("--body", default="windows")
     parser.add_argument("--gaussians", default="1500,1500", help="on the head, on the body")
     parser.add_argument("--times", default="")
     parser.add_argument("--pictures", help="WxH")
     arguments = parser.parse_args()
     out = arguments.out
     on_head, on_body = map(int, arguments.gaussians.split(","))
-    write_person(out / "person.ico3d", on_head, on_body)
+    write_person(out / "person.ico3d", arguments.body, on_head, on_body)
     bundle = Bundle.open(out / "person.ico3d")
     for name in bundle.names:
         (out / "bundle" / name).parent.mkdir(parents=True, exist_ok=True)

@@ -83,8 +83,11 @@ class Skinned:
 
     @property
     def fixed(self) -> tuple[str, ...]:
-        """Names of the tensors that training leaves as they are."""
-        return ("skin_joints", "normals", "rig_joints")
+        """Names of the tensors that training leaves as they are.
+
+        Weights that are learnt gain nothing where the template's are good (docs/choices.md).
+        """
+        return ("skin_joints", "skin_logits", "normals", "rig_joints")
 
     def at(self, values: Mapping[str, Tensor], tau: float) -> Gaussians:
         """Activated Gaussians at τ; between two frames in a pose between theirs."""
@@ -153,8 +156,8 @@ class Skinned:
 
 
 def without_residual(pose: Pose) -> Pose:
-    """The same pose with all coefficients 0."""
-    return replace(pose, residual=None)
+    """The same pose with all coefficients 0; it does not learn to make up for them."""
+    return replace(pose, rotations=pose.rotations.detach(), root=pose.root.detach(), residual=None)
 
 
 def _between(a: Pose, b: Pose, part: float) -> Pose:

@@ -1,5 +1,6 @@
 """What training and fine-tuning of a window share: a picture's loss, and learning from it."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -134,16 +135,11 @@ class Learner:
             if name == "means":
                 rate *= self._extent
             if name in PER_FRAME:
-                self._update_frames(name, tensor, tensor.grad, rate)
-            else:
-                self.optimiser.update(name, tensor, tensor.grad, rate)
+                # A row has a gradient in one of F steps; Adam divides by the root of its mean
+                # square over all of them, and so makes steps that are √F times as large.
+                rate /= math.sqrt(len(tensor))
+            self.optimiser.update(name, tensor, tensor.grad, rate)
             tensor.grad = None
-
-    def _update_frames(self, name: str, value: Tensor, gradient: Tensor, rate: float) -> None:
-        """Updates the frames that were seen; the others' moments must not go on moving them."""
-        seen = gradient.flatten(1).any(1).nonzero()[:, 0]  # (S,)
-        for frame in seen.tolist():
-            self.optimiser.update(f"{name}.{frame}", value[frame], gradient[frame], rate)
 
     @torch.no_grad()
     def keep_mean(self, count: int) -> None:

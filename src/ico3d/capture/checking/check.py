@@ -18,6 +18,8 @@ from ico3d.errors import CaptureError
 
 SHOWN = 17
 """Frames on the contact sheet, three rows with the background."""
+FASTEST = 15.0
+"""Metres per second at which no joint of a person moves who is recorded indoors."""
 LOOKED_AT = 24
 """Frames of which pictures and masks are examined; poses and tables are examined whole."""
 
@@ -39,6 +41,7 @@ def examine(capture: Capture) -> list[Finding]:
         ("expressions", head.expressions),
         ("sound", _sound),
         ("points", head.points),
+        ("skeleton", _skeleton),
         ("provenance", _provenance),
     )
     findings = []
@@ -164,6 +167,23 @@ def _sound(capture: Capture) -> Finding:
     if level < 1e-4:
         return Finding("sound", "warn", f"{text}, but silent")
     return Finding("sound", "warn" if abs(heard - seen) > 0.25 else "ok", text)
+
+
+def _skeleton(capture: Capture) -> Finding:
+    """Whether a body track is there, whole and steady."""
+    track = capture.body_track()
+    if track is None:
+        return Finding("skeleton", "ok", "no body track; ico3d capture pose finds one")
+    count, lost = len(track.rig), int((~track.fitted).sum())
+    steps = np.linalg.norm(np.diff(track.joints(), axis=0), axis=-1) * capture.fps  # m/s
+    text = f"{count} joints in {track.num_frames} frames, {lost} of them interpolated"
+    if len(steps) and steps.max() > FASTEST:
+        frame, joint = np.unravel_index(steps.argmax(), steps.shape)
+        name = track.rig.names[int(joint)]
+        return Finding(
+            "skeleton", "warn", f"{text}; {name} moves at {steps.max():.0f} m/s in frame {frame}"
+        )
+    return Finding("skeleton", "warn" if 2 * lost > track.num_frames else "ok", text)
 
 
 def _provenance(capture: Capture) -> Finding:

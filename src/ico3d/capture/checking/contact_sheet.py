@@ -6,6 +6,8 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from ico3d.capture.capture import Capture, Sound
+from ico3d.capture.checking.skeleton import draw_skeleton
+from ico3d.rig.body_track import BodyTrack
 
 TILE = 256
 COLUMNS = 6
@@ -14,13 +16,16 @@ AXIS = 0.1
 
 
 def contact_sheet(capture: Capture, views: list[tuple[int, int]]) -> Image.Image:
-    """Draws views with landmarks, mask outline and head axes, the background, and the sound.
+    """Draws views with what is known about them, the background, and the sound.
+
+    In a view: landmarks, outlines of masks, head axes, skeleton and its surface's outline.
 
     Args:
         capture: An open capture.
         views: (camera, frame) pairs that have pictures.
     """
-    tiles = [_view(capture, camera, frame) for camera, frame in views]
+    track = capture.body_track()
+    tiles = [_view(capture, track, camera, frame) for camera, frame in views]
     plate = capture.background(0)
     if plate is not None:
         tiles.append(_labelled(_picture(plate), "background"))
@@ -37,7 +42,7 @@ def contact_sheet(capture: Capture, views: list[tuple[int, int]]) -> Image.Image
     return sheet
 
 
-def _view(capture: Capture, camera: int, frame: int) -> Image.Image:
+def _view(capture: Capture, track: BodyTrack | None, camera: int, frame: int) -> Image.Image:
     """One picture with everything known about it, as a tile."""
     image = capture.image(camera, frame)
     assert image is not None  # the caller chose views that have one
@@ -47,6 +52,8 @@ def _view(capture: Capture, camera: int, frame: int) -> Image.Image:
         if area is not None:
             drawn[_outline(area > 0.5)] = colour
     picture = _picture(drawn)
+    if track is not None:
+        picture = draw_skeleton(picture, track, capture.cameras[camera], frame)
     scale = picture.width / image.shape[1], picture.height / image.shape[0]
     draw = ImageDraw.Draw(picture)
     marks = capture.landmarks(camera, frame)

@@ -87,6 +87,14 @@ class DnaRendering(SmcCapture):
         found = row(self._all_keypoints(), self.index(frame))
         return None if found is None else found @ self.upright.T
 
+    def whole_body_points(self, frame: int) -> np.ndarray | None:
+        """(133, 3) keypoints in the world; NaN where triangulation could not find one."""
+        found = self.keypoints_3d(frame)
+        if found is None or len(found) != WHOLE_BODY:
+            return None
+        lost = (found == 0).all(-1, keepdims=True)
+        return np.where(lost, np.nan, found)
+
     def face_points(self) -> np.ndarray | None:
         """(F, 68, 3) face keypoints of COCO-WholeBody, which are in the order of Multi-PIE."""
         table = self._all_keypoints()

@@ -96,12 +96,15 @@ def agreeing(seen: Sightings, tolerance: float = AGREEING) -> np.ndarray:
     return best
 
 
-def robust(seen: Sightings, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def robust(
+    seen: Sightings, weights: np.ndarray, spread: float = SPREAD
+) -> tuple[np.ndarray, np.ndarray]:
     """Points of least robust residuals: a camera that errs about a landmark loses its say there.
 
     Args:
         seen: By cameras that agree.
         weights: (C, N) positive: how well each camera sees each point.
+        spread: Metres by which sightings usually stray.
 
     Returns:
         (N, 3) points, and the (C, N) weights they were found with (Cauchy's, times `weights`).
@@ -109,7 +112,7 @@ def robust(seen: Sightings, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray
     kept = weights
     for _ in range(ROUNDS):
         away = misses(seen, triangulate(seen, kept))
-        kept = np.maximum(weights / (1 + (away / SPREAD) ** 2), 1e-9)
+        kept = np.maximum(weights / (1 + (away / spread) ** 2), 1e-9)
     return triangulate(seen, kept), kept
 
 

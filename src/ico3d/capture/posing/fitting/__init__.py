@@ -1,0 +1,1 @@
+"""The body model brought to what was seen."""

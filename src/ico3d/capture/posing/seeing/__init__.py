@@ -1,0 +1,1 @@
+"""What pictures say about a person: points that cameras agree on, and outlines."""

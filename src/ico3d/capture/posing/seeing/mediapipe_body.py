@@ -1,0 +1,133 @@
+"""MediaPipe's body and hand models: points of a person in a part of a picture."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ico3d.errors import CaptureError, MissingExtraError
+
+PURPOSE = "fitting a skeleton"
+LEAST_CONFIDENCE = 0.3
+"""Below it MediaPipe reports nothing; wrong detections are sorted out by the other cameras."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A person in a picture.
+
+    Attributes:
+        pixels: (33, 2) pixel centres at +0.5.
+        visibility: (33,) in [0, 1].
+        relative: (33, 3) metres from between the hips, in axes of the camera (OpenCV).
+    """
+
+    pixels: np.ndarray
+    visibility: np.ndarray
+    relative: np.ndarray
+
+
+@dataclass(frozen=True)
+class Hand:
+    """A hand in a picture.
+
+    Attributes:
+        pixels: (21, 2) pixel centres at +0.5.
+        left: Whether it looks like a left hand.
+        score: How sure that is, in [0.5, 1].
+    """
+
+    pixels: np.ndarray
+    left: bool
+    score: float
+
+
+class BodyReader:
+    """Finds one person, and one hand, in pictures, each one for itself."""
+
+    def __init__(self, body_model: Path, hand_model: Path):
+        """Loads the models.
+
+        Args:
+            body_model: `pose_landmarker.task`.
+            hand_model: `hand_landmarker.task`.
+
+        Raises:
+            MissingExtraError: If MediaPipe is not installed.
+            CaptureError: If a model file cannot be used.
+        """
+        try:
+            import mediapipe
+            from mediapipe.tasks.python import BaseOptions, vision
+        except ImportError as error:
+            raise MissingExtraError("mediapipe", "face", PURPOSE) from error
+        self._mediapipe = mediapipe
+        still = vision.RunningMode.IMAGE
+        self._bodies = _opened(
+            body_model,
+            lambda: vision.PoseLandmarker.create_from_options(
+                vision.PoseLandmarkerOptions(
+                    base_options=BaseOptions(model_asset_path=str(body_model)),
+                    running_mode=still,
+                    min_pose_detection_confidence=LEAST_CONFIDENCE,
+                    min_pose_presence_confidence=LEAST_CONFIDENCE,
+                )
+            ),
+        )
+        self._hands = _opened(
+            hand_model,
+            lambda: vision.HandLandmarker.create_from_options(
+                vision.HandLandmarkerOptions(
+                    base_options=BaseOptions(model_asset_path=str(hand_model)),
+                    running_mode=still,
+                    num_hands=1,
+                    min_hand_detection_confidence=LEAST_CONFIDENCE,
+                    min_hand_presence_confidence=LEAST_CONFIDENCE,
+                )
+            ),
+        )
+
+    def close(self) -> None:
+        """Lets go of the models."""
+        self._bodies.close()
+        self._hands.close()
+
+    def body(self, picture: np.ndarray) -> Body | None:
+        """The person in a picture, uint8 RGB (H, W, 3); None where there is none."""
+        found = self._bodies.detect(self._packed(picture))
+        if not found.pose_landmarks:
+            return None
+        seen, space = found.pose_landmarks[0], found.pose_world_landmarks[0]
+        return Body(
+            _pixels(seen, picture),
+            np.array([point.visibility for point in seen]),
+            np.array([(point.x, point.y, point.z) for point in space]),
+        )
+
+    def hand(self, picture: np.ndarray) -> Hand | None:
+        """The hand in a picture, uint8 RGB (H, W, 3); None where there is none."""
+        found = self._hands.detect(self._packed(picture))
+        if not found.hand_landmarks:
+            return None
+        side = found.handedness[0][0]
+        left = side.category_name == "Left"
+        return Hand(_pixels(found.hand_landmarks[0], picture), left, float(side.score))
+
+    def _packed(self, picture: np.ndarray) -> Any:
+        form = self._mediapipe.ImageFormat.SRGB
+        return self._mediapipe.Image(image_format=form, data=np.ascontiguousarray(picture))
+
+
+def _opened(model: Path, load: Callable[[], Any]) -> Any:
+    try:
+        return load()
+    except (RuntimeError, ValueError, OSError) as error:
+        raise CaptureError(f"{model} is no usable model of MediaPipe's: {error}.") from error
+
+
+def _pixels(points: Any, picture: np.ndarray) -> np.ndarray:
+    """(N, 2) pixels of points given in parts of the picture."""
+    height, width = picture.shape[:2]
+    return np.array([(point.x * width, point.y * height) for point in points])

