@@ -155,7 +155,7 @@ def test_swing_and_twist_make_the_rotation(axis, angle, bone):
     np.testing.assert_allclose(swing[0] @ bone, whole[0] @ bone, atol=1e-9)
 
 
-@pytest.mark.parametrize("motion", ["showcase", "talk", "walk"])
+@pytest.mark.parametrize("motion", ["showcase", "talk", "walk", "sway"])
 def test_hands_and_feet_are_where_the_act_wants_them(subject, motion):
     bones = subject.skeleton
     acting = act(bones, motion, np.arange(40) / FPS, seed=2)
@@ -171,7 +171,7 @@ def test_hands_and_feet_are_where_the_act_wants_them(subject, motion):
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("motion", ["showcase", "talk"])
+@pytest.mark.parametrize("motion", ["showcase", "talk", "sway"])
 def test_who_stands_keeps_both_feet_on_the_floor(subject, motion, seed):
     for sole in _soles(subject, _joints(subject, motion, 60, seed)):
         assert np.abs(sole[..., 1]).max() < 0.005

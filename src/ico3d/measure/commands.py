@@ -234,6 +234,8 @@ class BenchBody:
     Attributes:
         capture: A recording of a whole person; by default one is made of --subject.
         subject: The person of the standard recording, an .npz file.
+        garment: What that person wears over the clothes; with a skirt the hips turn so that it
+            swings. A folder holds one standard recording.
         folder: Where the recording and the trainings lie.
         seeds: How often each method is trained.
         methods: The methods to train; skinned and hugs, which need a body track, only where they
@@ -252,6 +254,7 @@ class BenchBody:
 
     capture: tyro.conf.Positional[Path | None] = None
     subject: Path | None = None
+    garment: Literal["none", "skirt"] = "none"
     folder: Path = Path("bench-body")
     seeds: int = 1
     methods: tuple[Method, ...] = tuple(m for m in get_args(Method) if m not in SKINNED)
@@ -320,4 +323,5 @@ class BenchBody:
             raise SettingsError(
                 "ico3d bench body needs a capture, or a person to record: --subject FILE.npz."
             )
-        return record_standard(self.subject, self.folder / "capture", os.cpu_count() or 1)
+        folder, workers = self.folder / "capture", os.cpu_count() or 1
+        return record_standard(self.subject, folder, workers, self.garment)

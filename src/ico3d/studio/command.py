@@ -43,9 +43,13 @@ class Synthetic:
     which is what a head driven by speech can know."""
     light: Literal["studio", "warm"] = "studio"
     """Neutral lamps, or warm ones from the other side; they are baked into the pictures."""
-    motion: Literal["showcase", "talk", "walk"] = "talk"
+    motion: Literal["showcase", "talk", "walk", "sway"] = "talk"
     """What a whole person does: `talk` stands and gestures in turn, `walk` walks in place,
-    `showcase` is calm, gestures and moves fast, a third of the time each."""
+    `showcase` is calm, gestures and moves fast, a third of the time each; `sway` also turns the
+    hips."""
+    garment: Literal["none", "skirt"] = "none"
+    """What a whole person wears over the clothes: a `skirt` hangs, folds and swings; arms then keep
+    off it."""
     seed: int = 0
     """Decides voice, order of sentences, blinks, brows, sway, gestures and views."""
     workers: int = field(default_factory=lambda: os.cpu_count() or 1)
@@ -78,6 +82,7 @@ class Synthetic:
             self.lively,
             self.light,
             self.motion,
+            self.garment,
         )
         record(recording, self.out, self.workers)
         say(f"{self.frames} frames by {self.cameras} cameras lie in {self.out}")

@@ -13,6 +13,7 @@ DENSITY = {
     Material.EYE: 3.0,
     Material.CLOTH: 0.5,
     Material.TROUSERS: 0.5,
+    Material.SKIRT: 0.5,
 }
 """Points per area, next to skin and hair with 1: small things that move need more."""
 FACE_DENSITY = 3.0

@@ -23,6 +23,7 @@ from ico3d.errors import SettingsError
 from ico3d.studio.acting.embody import embodied
 from ico3d.studio.acting.gestures import MOTIONS
 from ico3d.studio.acting.performance import SOUND_RATE, Performance, perform
+from ico3d.studio.dress.wearing import GARMENTS, dressed
 from ico3d.studio.person.choice import load_subject
 from ico3d.studio.person.subject import Subject
 from ico3d.studio.picture.lighting import STUDIOS
@@ -54,6 +55,7 @@ class Recording:
         lively: Whether the face shows moods and glances too, which the sound does not tell.
         light: One of `STUDIOS`.
         motion: What a whole person does, one of `MOTIONS`.
+        garment: What a whole person wears over the clothes, one of `GARMENTS`; it swings.
     """
 
     subject: str
@@ -68,11 +70,17 @@ class Recording:
     lively: bool
     light: str
     motion: str
+    garment: str = "none"
 
     @property
     def whole(self) -> bool:
         """Whether the whole person is recorded."""
         return self.rig == "body"
+
+    @property
+    def arms_clear(self) -> bool:
+        """Whether arms stay away from hips and thighs, where a garment swings."""
+        return self.garment != "none"
 
 
 def record(recording: Recording, out: Path, workers: int) -> None:
@@ -94,7 +102,9 @@ def record(recording: Recording, out: Path, workers: int) -> None:
         subject, recording.text, recording.frames, recording.fps, recording.seed, recording.lively
     )
     if recording.whole:
-        acted = embodied(subject, acted, recording.motion, recording.fps, recording.seed)
+        clear = recording.arms_clear
+        acted = embodied(subject, acted, recording.motion, recording.fps, recording.seed, clear)
+        subject, acted = dressed(subject, acted, recording.garment, recording.fps)
     cameras = cameras_of(subject, recording.rig, recording.cameras, recording.size)
     views = choose_views(
         recording.frames, recording.cameras, recording.views_per_frame, recording.seed
@@ -113,13 +123,16 @@ def record(recording: Recording, out: Path, workers: int) -> None:
 
 
 def _check(recording: Recording) -> None:
-    for name, known in (("rig", RIGS), ("light", tuple(STUDIOS)), ("motion", MOTIONS)):
+    choices = {"rig": RIGS, "light": tuple(STUDIOS), "motion": MOTIONS, "garment": GARMENTS}
+    for name, known in choices.items():
         value = getattr(recording, name)
         if value not in known:
             raise SettingsError(f"there is no {name} '{value}': use {' or '.join(known)}.")
     for name in ("cameras", "frames", "fps", "views_per_frame", "size"):
         if getattr(recording, name) < 1:
             raise SettingsError(f"{name} must be at least 1, not {getattr(recording, name)}.")
+    if recording.garment != "none" and not recording.whole:
+        raise SettingsError(f"only a whole person wears a {recording.garment}: use --rig body.")
     if recording.views_per_frame > recording.cameras:
         raise SettingsError(
             f"views_per_frame ({recording.views_per_frame}) cannot exceed "

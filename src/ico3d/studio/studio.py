@@ -84,6 +84,7 @@ class Studio:
             bold=subject.skeleton is not None,
             floor=-float(subject.head_in_world[1]),
             legs=_left_leg(subject),
+            skirt=np.array(look.skirt, np.float32),
         )
         self._eyes = np.array(
             [[*eye.centre, *eye.axis, eye.iris_radius] for eye in subject.eyes], np.float32

@@ -40,14 +40,17 @@ def true_joints(folder: Path, subject: Path) -> TrueJoints:
         CaptureError: If the recording does not show a whole person.
     """
     settings = json.loads((folder / "capture.json").read_text())["settings"]
-    recording = Recording(**{field.name: settings[field.name] for field in fields(Recording)})
+    known = [field.name for field in fields(Recording) if field.name in settings]
+    recording = Recording(**{name: settings[name] for name in known})  # older ones know fewer
     person = load_subject(str(subject), recording.whole)
     if person.skeleton is None:
         raise CaptureError(f"{folder} does not show a whole person.")
     acted = perform(
         person, recording.text, recording.frames, recording.fps, recording.seed, recording.lively
     )
-    acted = embodied(person, acted, recording.motion, recording.fps, recording.seed)
+    acted = embodied(
+        person, acted, recording.motion, recording.fps, recording.seed, recording.arms_clear
+    )
     at = np.append(person.skeleton.at, np.ones((len(person.skeleton.at), 1)), 1)  # (J, 4)
     assert acted.joints is not None  # embodied
     places = np.einsum("fjab,jb->fja", acted.joints, at)[..., :3]  # (F, J, 3)

@@ -240,3 +240,12 @@ def test_the_standard_recording_is_made_once(tmp_path, monkeypatch):
     (recording,) = wanted
     assert (recording.cameras, recording.frames, recording.fps) == (20, 41, 15.0)
     assert (recording.views_per_frame, recording.size) == (20, 288)
+    assert (recording.motion, recording.garment) == ("showcase", "none")
+
+
+def test_the_standard_recording_in_a_skirt_sways(tmp_path, monkeypatch):
+    wanted = []
+    monkeypatch.setattr(methods, "record", lambda recording, *_: wanted.append(recording))
+    methods.record_standard(tmp_path / "tubes.npz", tmp_path / "c", 1)
+    methods.record_standard(tmp_path / "tubes.npz", tmp_path / "c", 1, "skirt")
+    assert wanted[1] == replace(wanted[0], motion="sway", garment="skirt")

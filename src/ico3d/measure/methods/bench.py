@@ -123,15 +123,17 @@ class Trial:
         return scores
 
 
-def record_standard(subject: Path, folder: Path, workers: int) -> Path:
+def record_standard(subject: Path, folder: Path, workers: int, garment: str = "none") -> Path:
     """Records the clip that figures are quoted for, or goes on with that.
 
-    20 cameras, 41 frames at 15 per second, 288 pixels high: calm, gestures, and fast gestures.
+    20 cameras, 41 frames at 15 per second, 288 pixels high: calm, gestures, and fast gestures; with
+    a garment, the hips turn, too.
 
     Args:
         subject: The person, an `.npz` file.
         folder: Where the capture shall lie.
         workers: Threads that draw.
+        garment: What the person wears over the clothes, or none.
 
     Returns:
         The capture's path.
@@ -149,7 +151,8 @@ def record_standard(subject: Path, folder: Path, workers: int) -> Path:
             seed=0,
             lively=True,
             light="studio",
-            motion="showcase",
+            motion="showcase" if garment == "none" else "sway",
+            garment=garment,
         )
         record(recording, folder, workers)
     return folder

@@ -12,7 +12,12 @@ from ico3d.studio.person.subject import Subject
 
 
 def embodied(
-    subject: Subject, acted: Performance, motion: str, fps: float, seed: int
+    subject: Subject,
+    acted: Performance,
+    motion: str,
+    fps: float,
+    seed: int,
+    clear: bool = False,
 ) -> Performance:
     """The performance with a body that moves; the head goes where the neck takes it.
 
@@ -22,6 +27,7 @@ def embodied(
         motion: One of `MOTIONS`.
         fps: Frames per second.
         seed: Decides what the body does.
+        clear: Whether hands stay away from hips and thighs.
 
     Raises:
         SettingsError: If the person has no skeleton.
@@ -30,6 +36,6 @@ def embodied(
     if skeleton is None:
         raise SettingsError(f"the subject {subject.name} has no joints: name an .npz file.")
     times = np.arange(len(acted.weights)) / fps
-    joints = pose(skeleton, act(skeleton, motion, times, seed))
+    joints = pose(skeleton, act(skeleton, motion, times, seed, clear))
     joints[..., :3, 3] += subject.head_in_world
     return replace(acted, joints=joints, world_from_head=joints[:, skeleton.index("head")])

@@ -1,6 +1,6 @@
-"""What a synthetic body does: stands, gestures, moves fast, walks in place."""
+"""What a synthetic body does: stands, gestures, moves fast, sways, walks in place."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from ico3d.studio.acting.limbs import Limb
 from ico3d.studio.acting.performance import wander
 from ico3d.studio.person.skeleton import Skeleton
 
-MOTIONS = ("showcase", "talk", "walk")
+MOTIONS = ("showcase", "talk", "walk", "sway")
 ARM = 0.517
 """Metres from shoulder to wrist of the person for whom lengths are written here; they are scaled
 for others."""
@@ -24,6 +24,18 @@ GESTURE = (0.3, 0.6)
 """Seconds that a hand takes from one place to the next, at least."""
 PACE = 0.8
 """Metres per second that a gesturing wrist moves at most, on average over a movement."""
+HIP_TURNS = ((np.radians(13.0), 0.45), (np.radians(26.0), FAST))
+"""How far swaying hips turn to either side, and about how many seconds from one side to the other:
+first calmly, then quickly."""
+COUNTER = 0.75
+"""Part of a turn of the hips that the chest takes back."""
+BENT_KNEES = 0.03
+"""Metres that the pelvis sinks, so that feet can stay where they are while the hips turn."""
+ASIDE = 0.05
+"""Metres that the pelvis goes aside per radian that it turns."""
+CLEAR = (-0.46, -0.28, 0.17)
+"""Who wears a skirt keeps the hands off it: below the second height, above or at the first, wrists
+go outwards by up to the third; metres from the shoulder."""
 STEPS = 1.7
 """Steps per second."""
 STEP_HEIGHT = 0.13
@@ -98,34 +110,75 @@ class Track:
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """(F, 9) rows at (F,) seconds."""
-        keys, rows = np.array(self.times), np.stack(self.rows)
-        after = np.clip(np.searchsorted(keys, times, side="right"), 1, len(keys) - 1)
-        span = np.maximum(keys[after] - keys[after - 1], 1e-9)
-        part = np.clip((times - keys[after - 1]) / span, 0, 1)[:, None]
-        part = part**3 * (10 - 15 * part + 6 * part**2)  # minimum jerk
-        return rows[after - 1] + part * (rows[after] - rows[after - 1])
+        return _minimum_jerk(np.array(self.times), np.stack(self.rows), times)
 
 
-def act(skeleton: Skeleton, motion: str, times: np.ndarray, seed: int) -> Acting:
+def _minimum_jerk(keys: np.ndarray, rows: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """(F, N) rows at (F,) seconds, from one of the rows (K, N) at (K,) seconds to the next."""
+    after = np.clip(np.searchsorted(keys, times, side="right"), 1, len(keys) - 1)
+    span = np.maximum(keys[after] - keys[after - 1], 1e-9)
+    part = np.clip((times - keys[after - 1]) / span, 0, 1)[:, None]
+    part = part**3 * (10 - 15 * part + 6 * part**2)
+    return rows[after - 1] + part * (rows[after] - rows[after - 1])
+
+
+def act(
+    skeleton: Skeleton, motion: str, times: np.ndarray, seed: int, clear: bool = False
+) -> Acting:
     """What a body does at given times.
 
     Args:
         skeleton: Whose.
         motion: One of `MOTIONS`: `showcase` stands calmly, gestures and moves fast, a third of the
-            time each; `talk` stands and gestures in turn; `walk` walks in place.
+            time each; `sway` does so too, and turns the hips, first slowly, then fast; `talk`
+            stands and gestures in turn; `walk` walks in place.
         times: (F,) seconds, ascending from 0.
         seed: Decides everything that is random.
+        clear: Whether hands stay away from hips and thighs.
     """
     random = np.random.default_rng([seed, 3])
     end = float(times[-1])
-    tracks = {"showcase": _showcase, "talk": _talk, "walk": _stand}[motion](end, random)
+    makers = {"showcase": _showcase, "sway": _showcase, "talk": _talk, "walk": _stand}
+    tracks = makers[motion](end, random)
     hands = np.stack([track.at(times) for track in tracks])  # (2, F, 9)
     hands[:, :, :3] += 0.006 * np.stack(
         [np.stack([wander(times, 0.6, random) for _ in range(3)], 1) for _ in range(2)]
     )
+    if clear:
+        hands[:, :, :3] = _cleared(hands[:, :, :3])
     hands[:, :, :3] *= _size(skeleton)
     stride = _stride(times, end if motion == "walk" else 0.0)
-    return _whole_body(skeleton, times, hands, stride, random)
+    acting = _whole_body(skeleton, times, hands, stride, random)
+    return _swaying(acting, times, end) if motion == "sway" else acting
+
+
+def _cleared(wrists: np.ndarray) -> np.ndarray:
+    """Wrists (2, F, 3) further out the lower they hang, as far from the shoulder as before."""
+    low, high, out = CLEAR
+    part = np.clip((high - wrists[..., 1]) / (high - low), 0, 1)
+    moved = wrists.copy()
+    moved[..., 0] += out * part * part * (3 - 2 * part)
+    before, after = (np.linalg.norm(w, axis=-1, keepdims=True) for w in (wrists, moved))
+    return moved * np.minimum(1.0, before / after)
+
+
+def _swaying(acting: Acting, times: np.ndarray, end: float) -> Acting:
+    """Adds hips that turn under the shoulders: calmly in the second third, fast in the last."""
+    keys, turns = [0.0, end / 3], [0.0, 0.0]
+    for angle, seconds in HIP_TURNS:
+        ways = max(1, round(end / 3 / seconds))
+        keys += [keys[-1] + end / 3 * (way + 1) / ways for way in range(ways)]
+        turns += [angle * (-1) ** (len(turns) + way) for way in range(ways)]
+    turn = _minimum_jerk(np.array(keys), np.array(turns)[:, None], times)[:, 0]  # (F,)
+    zero = np.zeros_like(turn)
+    yaw = np.stack([zero, turn, zero], 1)
+    shift = np.stack([ASIDE * turn, np.full_like(turn, -BENT_KNEES), zero], 1)
+    return replace(
+        acting,
+        shift=acting.shift + shift,
+        pelvis=acting.pelvis + yaw,
+        chest=acting.chest - COUNTER * yaw,
+    )
 
 
 def _size(skeleton: Skeleton) -> float:

@@ -69,6 +69,8 @@ class Performance:
         world_from_head: (F, 4, 4) float64.
         joints: (F, J, 4, 4) float64, of a whole person: takes what is bound to each joint from
             canonical head space at rest to the world; None for a bust.
+        cloth: (F, N, 3) float32 metres in the world, where the last N vertices of the person are:
+            cloth that swings instead of following joints; None without.
     """
 
     samples: np.ndarray
@@ -78,6 +80,7 @@ class Performance:
     eyes: np.ndarray
     world_from_head: np.ndarray
     joints: np.ndarray | None = None
+    cloth: np.ndarray | None = None
 
     def vertices(self, subject: Subject, frame: int) -> np.ndarray:
         """(V, 3) float32 the mesh of a frame, in canonical head space."""
@@ -86,7 +89,11 @@ class Performance:
             return shape
         # Into head space before blending: float32 stays exact at the face.
         inverse = np.linalg.inv(self.world_from_head[frame])
-        return subject.skeleton.skinned(shape, inverse @ self.joints[frame])
+        vertices = subject.skeleton.skinned(shape, inverse @ self.joints[frame])
+        if self.cloth is not None:
+            swinging = self.cloth[frame] @ inverse[:3, :3].T + inverse[:3, 3]
+            vertices[-len(swinging) :] = swinging
+        return vertices
 
 
 def perform(

@@ -24,6 +24,7 @@ class Material(IntEnum):
     TROUSERS = 10
     SHOE = 11
     SOCK = 12
+    SKIRT = 13
 
 
 CARDS = (Material.BROW, Material.LASH)
@@ -62,6 +63,7 @@ class Look:
         accent: (3,) albedo of the third colour of a whole person's shirt.
         trousers: (2, 3) albedo of the trousers and of their checks.
         shoe: (3,) albedo of the leather.
+        skirt: (2, 3) albedo of a skirt and of its pattern.
     """
 
     skin: tuple[float, float, float]
@@ -78,6 +80,10 @@ class Look:
         (0.30, 0.29, 0.27),
     )
     shoe: tuple[float, float, float] = (0.13, 0.06, 0.03)
+    skirt: tuple[tuple[float, float, float], tuple[float, float, float]] = (
+        (0.045, 0.17, 0.13),
+        (0.62, 0.46, 0.17),
+    )
 
 
 @dataclass(frozen=True)

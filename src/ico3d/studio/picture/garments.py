@@ -11,6 +11,8 @@ TROUSER_CHECK = 0.052
 """Metres from one line of the checks to the next."""
 CHECKS = 10
 """Lines around a leg."""
+GORES = 14
+"""Panels around a skirt, in two colours by turns."""
 
 
 @njit(cache=True, nogil=True)
@@ -93,3 +95,22 @@ def sock(x, y, z, pixel):
     """Grey ribs."""
     shade = 1.0 + 0.25 * grain(x, y * 0.2, z, 0.008, pixel)
     return Spot(0.25 * shade, 0.25 * shade, 0.27 * shade, 6.0, 0.02, 0.3, 0.1)
+
+
+@njit(cache=True, nogil=True)
+def skirt(colors, u, v, x, y, z, pixel):
+    """Gores with patches, and bands around; u goes once around from 0 to 1, v metres down."""
+    gore = _band(GORES / 2 * u, 0.5, pixel * GORES / 2 / (1.0 + 2.0 * v))
+    bands = _band(v / 0.13, 0.22, pixel / 0.13)
+    large = _patch(x + 3.0, y, z, 0.05, 0.62, pixel)
+    small = _patch(x, y + 5.0, z, 0.023, 0.60, pixel)
+    weave = 0.14 * grain(x, y, z, 0.010, pixel) + 0.10 * grain(x, y, z, 0.004, pixel)
+    shade = 1.0 + weave + 0.12 * (2.0 * noise(x / 0.08, y / 0.08, z / 0.08) - 1.0)
+    mark = gore + large - 2.0 * gore * large
+    base, pattern, accent = colors.skirt[0], colors.skirt[1], colors.accent
+    r = base[0] + (pattern[0] - base[0]) * mark
+    g = base[1] + (pattern[1] - base[1]) * mark
+    b = base[2] + (pattern[2] - base[2]) * mark
+    part = max(bands, small)
+    r, g, b = r + (accent[0] - r) * part, g + (accent[1] - g) * part, b + (accent[2] - b) * part
+    return Spot(r * shade, g * shade, b * shade, 6.0, 0.02, 0.35, 0.12)

@@ -52,6 +52,7 @@ class Colors(NamedTuple):
     bold: bool
     floor: float
     legs: np.ndarray
+    skirt: np.ndarray
 
 
 @njit(cache=True, nogil=True)

@@ -17,6 +17,7 @@ SKIN, MOUTH, EYE = int(Material.SKIN), int(Material.MOUTH), int(Material.EYE)
 TEETH, GUMS, TONGUE = int(Material.TEETH), int(Material.GUMS), int(Material.TONGUE)
 HAIR, CLOTH, BROW = int(Material.HAIR), int(Material.CLOTH), int(Material.BROW)
 TROUSERS, SHOE, SOCK = int(Material.TROUSERS), int(Material.SHOE), int(Material.SOCK)
+SKIRT = int(Material.SKIRT)
 
 
 MOUTH_DEPTH = 0.026
@@ -206,6 +207,9 @@ def _spot(scene, colors, f, a, b, c, rest, pixel):
         return garments.shoe(colors, x, y, z, pixel)
     if material == SOCK:
         return garments.sock(x, y, z, pixel)
+    if material == SKIRT:
+        u, v = _uv(scene.corner_uv, f, a, b, c)
+        return garments.skirt(colors, u, v, x, y, z, pixel)
     if material == CLOTH:
         if colors.bold:
             return garments.printed(colors, x, y, z, pixel)
@@ -262,7 +266,7 @@ def _shade_one(scene, colors, lights, f, a, b, c, camera, pixel):
             n[1] + tilt * (2.0 * noise(q[0] + 31.0, q[1], q[2]) - 1.0),
             n[2] + tilt * (2.0 * noise(q[0], q[1] + 57.0, q[2]) - 1.0),
         )
-    if material in (SKIN, CLOTH, TROUSERS, SHOE, SOCK):
+    if material in (SKIN, CLOTH, TROUSERS, SHOE, SOCK, SKIRT):
         return _lit(spot, lights, n, v, p, occlusion)
     inward = math.exp(-_painted(scene, f, a, b, c)[5] / MOUTH_DEPTH)
     r, g, bl = _lit(spot, lights, n, v, p, (0.35 + 0.65 * occlusion) * inward)
