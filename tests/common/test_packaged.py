@@ -20,7 +20,7 @@ from support.needs import needs
 from support.shared import SHARED
 from support.tiny_tflite import read_model, write_model
 
-pytestmark = [pytest.mark.slow, needs("mediapipe"), needs("pip")]
+pytestmark = [pytest.mark.slow, needs("mediapipe")]
 
 NOBODY = "http://127.0.0.1:9/tiny.task"
 LABELS = {"labels.txt": b"Left\nRight\n"}
