@@ -74,7 +74,7 @@ $(VENV)/.serve: pyproject.toml constraints.txt scripts/setup.sh | $(VENV)/.node
 $(VENV)/.develop: pyproject.toml constraints.txt scripts/setup.sh | $(VENV)/.node
 	scripts/setup.sh develop
 
-KERNELS := $(shell grep -rl --include=*.py '^@kernel' src)
+KERNELS := $(shell grep -rlE --include=*.py '^@(kernel|njit)' src)
 $(VENV)/.kernels: $(VENV)/.develop $(KERNELS)
 	OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 PYTHONPATH=tests $(PY) -m support.compile_kernels >/dev/null
 	touch $@

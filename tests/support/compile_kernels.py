@@ -17,10 +17,27 @@ import torch
 
 from ico3d.body.training.train_clip import train_window
 from ico3d.head.train_head import HeadJob, train_head
+from ico3d.studio import recording
 from support.bodies.recorded_capture import record
 from support.bodies.window_tasks import tasks
 from support.heads.tiny_capture import TinyCapture
 from support.heads.train_tiny import SETTINGS
+
+PICTURE = recording.Recording(
+    subject="anny",
+    rig="bust",
+    cameras=1,
+    frames=1,
+    fps=25.0,
+    views_per_frame=1,
+    size=64,
+    text="",
+    seed=0,
+    lively=False,
+    light="studio",
+    motion="showcase",
+)
+"""Touches the studio's kernels but those of trousers, shoes and skirts."""
 
 
 def main() -> None:
@@ -31,7 +48,7 @@ def main() -> None:
 
 
 def compile_kernels() -> None:
-    """Trains a head and the windows of a body, as briefly as touches every kernel."""
+    """Trains a head and the windows of a body and draws a person, as briefly as touches kernels."""
     numba.set_num_threads(1)
     torch.set_num_threads(1)
     with tempfile.TemporaryDirectory() as name:
@@ -45,6 +62,7 @@ def compile_kernels() -> None:
         record(folder / "clip")
         for task in tasks(folder / "clip", folder / "body", steps_per_frame=8):
             train_window(task)
+        recording.record(PICTURE, folder / "studio", 1)
 
 
 if __name__ == "__main__":
