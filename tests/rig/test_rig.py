@@ -109,11 +109,6 @@ def test_the_strongest_four_sum_to_one():
     assert Binding.strongest(np.ones((1, 2))).weights.tolist() == [[0.5, 0.5, 0, 0]]
 
 
-def test_what_hangs_on_a_joint():
-    assert ARM.below("upper") == (1, 2)
-    assert ARM.below("root") == (0, 1, 2)
-
-
 @pytest.mark.parametrize(
     ("names", "parents", "joints", "why"),
     [

@@ -57,14 +57,6 @@ class Rig:
         """Number of a joint; ValueError if there is none of that name."""
         return self.names.index(name)
 
-    def below(self, name: str) -> tuple[int, ...]:
-        """Numbers of a joint and of all that hang on it."""
-        found = {self.index(name)}
-        for joint, parent in enumerate(self.parents):
-            if parent in found:
-                found.add(joint)
-        return tuple(sorted(found))
-
     def posed(self, rotations: Array, root: Array) -> tuple[Array, Array]:
         """Where each joint is and how it is turned.
 

@@ -1,5 +1,6 @@
 import { dyno, SplatGenerator, SplatTransformer } from '@sparkjsdev/spark';
 import * as THREE from 'three';
+import { splatGenerator, type Generator } from '../splat-shader.ts';
 import { coefficientPlaces, coefficientTexels, type Capacity, type PackedWindow } from './packed.ts';
 import { coefficientsAt } from './window.ts';
 
@@ -138,22 +139,11 @@ function replace(texture: THREE.DataArrayTexture, data: Float32Array | Uint8Arra
   texture.needsUpdate = true;
 }
 
-type Generator = NonNullable<SplatGenerator['generator']>;
-
 function makeGenerator(capacity: Capacity, uniforms: Uniforms, transformer: SplatTransformer): Generator {
-  return dyno.dynoBlock({ index: 'int' }, { gsplat: dyno.Gsplat }, ({ index }) => {
-    const node = new dyno.Dyno({
-      inTypes: { index: 'int' },
-      outTypes: { gsplat: dyno.Gsplat },
-      inputs: { index },
-      generate: ({ inputs, outputs }) => ({
-        globals: [dyno.defineGsplat, DECLARATIONS],
-        statements: statements(capacity, inputs.index!, outputs.gsplat!),
-        uniforms,
-      }),
-    });
-    return { gsplat: transformer.applyGsplat(node.outputs.gsplat) };
-  });
+  return splatGenerator(
+    { declarations: DECLARATIONS, uniforms, statements: (index, gsplat) => statements(capacity, index, gsplat) },
+    transformer,
+  );
 }
 
 const DECLARATIONS = dyno.unindent(`

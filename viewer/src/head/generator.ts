@@ -1,6 +1,7 @@
 import { dyno, SplatGenerator, SplatTransformer } from '@sparkjsdev/spark';
 import * as THREE from 'three';
 import type { BakedHead } from '../bundle/baked-head.ts';
+import { splatGenerator, type Generator } from '../splat-shader.ts';
 import { coefficients } from './coefficients.ts';
 
 const WIDTH = 1024; // texels per row: one texel is one Gaussian
@@ -44,27 +45,16 @@ export class HeadGenerator extends SplatGenerator {
   }
 }
 
-type Generator = NonNullable<SplatGenerator['generator']>;
-
 function makeGenerator(head: BakedHead, values: Float32Array, transformer: SplatTransformer): Generator {
   const uniforms = {
     headRest: { value: restTexture(head) },
     headBasis: { value: basisTexture(head) },
     headCoefficients: { value: values },
   };
-  return dyno.dynoBlock({ index: 'int' }, { gsplat: dyno.Gsplat }, ({ index }) => {
-    const node = new dyno.Dyno({
-      inTypes: { index: 'int' },
-      outTypes: { gsplat: dyno.Gsplat },
-      inputs: { index },
-      generate: ({ inputs, outputs }) => ({
-        globals: [dyno.defineGsplat, declarations(head.rank)],
-        statements: statements(head.rank, inputs.index!, outputs.gsplat!),
-        uniforms,
-      }),
-    });
-    return { gsplat: transformer.applyGsplat(node.outputs.gsplat) };
-  });
+  return splatGenerator(
+    { declarations: declarations(head.rank), uniforms, statements: (index, gsplat) => statements(head.rank, index, gsplat) },
+    transformer,
+  );
 }
 
 function declarations(rank: number): string {

@@ -1,5 +1,6 @@
 import { dyno, SplatGenerator, SplatTransformer } from '@sparkjsdev/spark';
 import * as THREE from 'three';
+import { splatGenerator, type Generator } from '../../splat-shader.ts';
 import type { BakedSkinned } from './baked.ts';
 import { packSkinned, type Texels } from './packed.ts';
 import { Skeleton, TABLE_ROW, type Pose } from './skeleton.ts';
@@ -73,22 +74,11 @@ function makeUniforms({ info, light }: BakedSkinned, { width, rows, layers, word
   };
 }
 
-type Generator = NonNullable<SplatGenerator['generator']>;
-
 function makeGenerator(texels: Texels, shapes: number, uniforms: Uniforms, transformer: SplatTransformer): Generator {
-  return dyno.dynoBlock({ index: 'int' }, { gsplat: dyno.Gsplat }, ({ index }) => {
-    const node = new dyno.Dyno({
-      inTypes: { index: 'int' },
-      outTypes: { gsplat: dyno.Gsplat },
-      inputs: { index },
-      generate: ({ inputs, outputs }) => ({
-        globals: [dyno.defineGsplat, DECLARATIONS],
-        statements: statements(texels, shapes, inputs.index!, outputs.gsplat!),
-        uniforms,
-      }),
-    });
-    return { gsplat: transformer.applyGsplat(node.outputs.gsplat) };
-  });
+  return splatGenerator(
+    { declarations: DECLARATIONS, uniforms, statements: (index, gsplat) => statements(texels, shapes, index, gsplat) },
+    transformer,
+  );
 }
 
 const DECLARATIONS = dyno.unindent(`
