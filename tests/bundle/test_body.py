@@ -14,6 +14,7 @@ from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.manifest import Manifest
 from ico3d.errors import BundleError
+from support.bundles.json_values import json_values
 from support.bundles.random_body import (
     RANKS,
     body_manifest,
@@ -259,11 +260,6 @@ def test_a_wrong_field_is_named(path, value, message):
         Manifest.from_json(changed(path, value))
 
 
-json_values = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=10),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner),
-    max_leaves=6,
-)
 paths = st.sampled_from(
     [f"body.{key}" for key in VALID["body"]]
     + [f"body.windows.1.{key}" for key in VALID["body"]["windows"][1]]

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from ico3d.bundle.manifest import Manifest
 from ico3d.errors import BundleError
+from support.bundles.json_values import json_values
 from support.bundles.random_bundle import random_head, random_manifest
 
 VALID = json.loads(random_manifest(random_head(10)).to_json())
@@ -91,11 +92,6 @@ def test_an_infinite_number_is_refused():
         Manifest.from_json(data)
 
 
-json_values = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=10),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner),
-    max_leaves=6,
-)
 paths = st.sampled_from(
     [*VALID, *(f"{a}.{b}" for a in VALID if isinstance(VALID[a], dict) for b in VALID[a])]
 )

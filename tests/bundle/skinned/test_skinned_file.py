@@ -20,6 +20,7 @@ from ico3d.errors import BundleError
 from ico3d.motion.gestures.library import library
 from ico3d.motion.living import living
 from ico3d.motion.repertoire import repertoire_bytes
+from support.bundles.json_values import json_values
 from support.bundles.random_body import body_manifest, random_windows
 from support.bundles.random_bundle import thumbnail
 from support.bundles.random_skinned import random_skinned, skinned_manifest, write_random_skinned
@@ -177,11 +178,6 @@ def test_a_wrong_field_is_named(path, value, message):
         Manifest.from_json(changed(path, value))
 
 
-json_values = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=10),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner),
-    max_leaves=6,
-)
 fields = st.sampled_from([f"skinned.{key}" for key in VALID["skinned"]] + ["skinned.parents.3"])
 
 
