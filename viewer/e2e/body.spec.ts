@@ -45,6 +45,21 @@ afterAll(async () => {
   await server?.stop();
 });
 
+/** Time on the page passes by the pictures that are drawn, so that a busy machine plays slowly instead of stalling. */
+async function playByPictures(): Promise<void> {
+  await page.addInitScript(() => {
+    const LONGEST = 1000 / 30; // ms from one picture to the next
+    let [time, last] = [0, 0];
+    const request = window.requestAnimationFrame.bind(window);
+    window.requestAnimationFrame = (draw) =>
+      request((now) => {
+        time += Math.min(now - last, LONGEST);
+        last = now;
+        draw(time);
+      });
+  });
+}
+
 /** Keeps what every further picture shows, and the pictures themselves. */
 function watch(): Promise<void> {
   return page.evaluate(() => {
@@ -91,6 +106,7 @@ describe('a body alone, served by ico3d serve', () => {
   });
 
   test('plays there and back through all borders without a stall', async () => {
+    await playByPictures();
     await page.reload();
     await page.waitForFunction(() => window.ico3d !== undefined);
     await watch();
@@ -100,14 +116,14 @@ describe('a body alone, served by ico3d serve', () => {
         return windows.includes(2) && windows.lastIndexOf(2) < windows.lastIndexOf(0);
       },
       undefined,
-      { timeout: 60_000 },
+      { timeout: 120_000 },
     );
     const sights = await page.evaluate(() => window.sights!);
     expect(sights.filter(({ waiting }) => waiting)).toEqual([]);
     const changes = sights.filter(({ window }, i) => i > 0 && window !== sights[i - 1]!.window);
     expect([sights[0]!.window, ...changes.map(({ window }) => window)].slice(0, 5)).toEqual([0, 1, 2, 1, 0]);
     const steps = sights.slice(1).map(({ time, at }, i) => ({ step: Math.abs(time - sights[i]!.time), pause: at - sights[i]!.at }));
-    for (const { step } of steps) expect(step).toBeLessThan(0.26); // the longest that may pass at once
+    for (const { step } of steps) expect(step).toBeLessThan(0.07); // two ticks, where the body was held up
     const pauses = steps.map(({ pause }) => pause).sort((a, b) => a - b);
     const atChanges = changes.map((change) => steps[sights.indexOf(change) - 1]!.pause);
     console.log(`${sights.length} pictures, pauses ${ms(pauses)}, at changes of windows ${ms(atChanges)}`);
