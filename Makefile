@@ -13,8 +13,8 @@ demo: $(VENV)/.serve src/ico3d/chat/static/index.html ## talk with the packaged 
 
 test: ## everything CI runs
 	$(MAKE) --no-print-directory -j 2 install # Python's packages and the page's, side by side
-	$(MAKE) --no-print-directory -j 2 lint page $(VENV)/.kernels # none keeps time
-	$(MAKE) --no-print-directory -j 2 unit e2e-beside # browsers mostly wait for speech
+	$(MAKE) --no-print-directory $(VENV)/.kernels # before several processes ask for them
+	$(MAKE) --no-print-directory -j 4 unit e2e-beside lint page # talks mostly wait; lint and page take what they leave
 	$(MAKE) --no-print-directory e2e-alone
 
 quick: $(VENV)/.kernels src/ico3d/chat/static/index.html ## what one runs while working: checks, and the tests that take no time
@@ -30,11 +30,11 @@ viewer: src/ico3d/chat/static/index.html ## the page that servers serve
 
 lint: $(VENV)/.develop
 	ruff check . && ruff format --check .
-	pyright
+	nice pyright
 	lint-imports
 
 page: src/ico3d/chat/static/index.html
-	cd viewer && npm run --silent check && npm run --silent test
+	cd viewer && nice npm run --silent check && nice npm run --silent test
 
 unit: $(VENV)/.develop $(VENV)/.kernels src/ico3d/chat/static/index.html
 	# three files at a time on two cores: talking with an avatar is mostly waiting

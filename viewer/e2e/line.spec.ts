@@ -12,14 +12,13 @@ import { correlation, quantile } from '../support/statistics.ts';
 import { finished, lastOnset, makeVoice, openPage, SENTENCE, SILENCE, until } from '../support/browser/talk.ts';
 
 const folder = scratchFolder();
-const LONG_ENOUGH = 2000; // ms of speech before the interruption
+const LONG_ENOUGH = 2000; // ms of speech that the mouth is watched for
 const EASED = 700; // ms until the face rests after it has been silenced
 
 describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a talk with the avatar', () => {
   let server: ChatServer;
   let browser: Browser;
   let record: Record;
-  let onset: number; // of the words that interrupt
 
   beforeAll(async () => {
     server = await ChatServer.start(hasClip ? makePortrait(folder) : makeStandIn(folder, inject('shared').demo));
@@ -57,7 +56,7 @@ describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a tal
       return loudness.at(-1)!.at > stop.at + EASED + 1000;
     }, 30_000);
     const stop = record.received.find(({ type }) => type === 'stop')!;
-    onset = lastOnset(record, stop.at);
+    const onset = lastOnset(record, stop.at); // of the words that interrupt
     const silent = record.loudness.findLast(({ at, level }) => at < stop.at + 290 && level > SILENCE)!;
     console.log(`silent ${Math.round(silent.at - onset)} ms after the first sound of the second question`);
     expect(silent.at - onset).toBeLessThan(600 * slowness());
@@ -65,7 +64,7 @@ describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a tal
 
   test('the microphone says what the loudspeaker played, however busy the page was', () => {
     const during = record.microphone.filter(({ playing }) => playing !== null);
-    expect(during.length).toBeGreaterThan(LONG_ENOUGH / 40 / 2);
+    expect(during.length).toBeGreaterThan(10);
     const { utterance } = record.received.find(({ type }) => type === 'stop')!;
     const answer = during.filter(({ playing, position }) => playing === utterance && position > 0);
     // One constant, for both run in real time but for the silence of late pieces; not even late messages change it.
@@ -80,17 +79,24 @@ describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a tal
   });
 
   test('the mouth moves with the sound, and only then', async () => {
+    // The sentence is said again and again: where the answers come late, several of them are watched.
+    const since = (await readMouth(browser.page)).sights[0]!.at;
+    const { loudness } = await until(browser, (record) => spoken(record, since) > LONG_ENOUGH, 60_000);
     const { sights, pictures } = await readMouth(browser.page);
-    const sound = record.loudness.filter(({ level }) => level > SILENCE);
-    const began = sound.find(({ at }) => at > sights[0]!.at)!.at;
-    const ended = sound.findLast(({ at }) => at < onset + 1000)!.at;
-    expect(ended - began).toBeGreaterThan(LONG_ENOUGH);
+    const end = loudness.at(-1)!.at;
 
-    const watched = sights.filter(({ at }) => at < ended + EASED + 1000);
-    const together = correlation(watched.map(({ at }) => heard(record.loudness, at)), watched.map(({ speech }) => speech));
-    const changes = (when: (at: number) => boolean) => pictures.filter(({ at }) => when(at)).map(({ change }) => change);
-    const during = changes((at) => at > began + 200 && at < ended);
-    const rest = changes((at) => at < began || (at > ended + EASED && at < ended + EASED + 1000));
+    const watched = sights.filter(({ at }) => at < end);
+    const together = correlation(watched.map(({ at }) => heard(loudness, at)), watched.map(({ speech }) => speech));
+    /** What changed in the pictures before which it was heard, or not, all of the time. */
+    const changes = (audible: boolean, before: number) =>
+      pictures
+        .filter(({ at }) => {
+          const levels = loudness.filter((one) => one.at > at - before && one.at < at);
+          return at < end && levels.length > 0 && levels.every(({ level }) => level > SILENCE === audible);
+        })
+        .map(({ change }) => change);
+    const during = changes(true, 200);
+    const rest = changes(false, EASED);
     const moving = quantile(during, 0.5);
     const still = quantile(rest, 0.9);
     console.log(
@@ -103,6 +109,12 @@ describe(hasClip ? 'from a video of a person to a talk with the avatar' : 'a tal
     expect(moving).toBeGreaterThan(3 * still + 1);
   });
 });
+
+/** For how many ms the avatar was heard since a moment. */
+function spoken({ loudness }: Record, since: number): number {
+  const times = loudness.filter(({ at, level }) => at > since && level > SILENCE).map(({ at }) => at);
+  return times.slice(1).reduce((sum, at, i) => sum + Math.min(at - times[i]!, 100), 0);
+}
 
 /** How loud the avatar is within 0.2 s of a moment. */
 function heard(loudness: Loudness[], moment: number): number {
