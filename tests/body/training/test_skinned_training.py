@@ -121,6 +121,10 @@ def test_the_folder_holds_the_body(capture, tmp_path, method):
 
 
 def test_a_capture_without_a_track_is_refused(tmp_path):
-    """The sentence says what to do."""
-    with pytest.raises(CaptureError, match=r"no body track.*ico3d capture pose.*swings\+\+"):
+    """The sentence says what to do; nothing is left behind."""
+    said = r"no body track.*ico3d capture pose.*swings\+\+"
+    with pytest.raises(CaptureError, match=said):
         trainer_of(MovingCapture(tmp_path), "skinned", window=CLIP)
+    with pytest.raises(CaptureError, match=said):
+        train_body(MovingCapture(tmp_path), tmp_path / "model", job("skinned"))
+    assert not (tmp_path / "model").exists()

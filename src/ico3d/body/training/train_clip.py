@@ -14,9 +14,10 @@ from ico3d.body.planning.flow import clip_flow, dynamic_weights
 from ico3d.body.planning.plan import Plan, is_saved, make_plan, print_plan, save_plan
 from ico3d.body.planning.plan_picture import draw_plan
 from ico3d.body.planning.windows import Window
-from ico3d.body.settings import ONE_WINDOW, BodySettings, Method
+from ico3d.body.settings import ONE_WINDOW, SKINNED, BodySettings, Method
 from ico3d.body.training.finetune_window import FineTuner
 from ico3d.body.training.optimise_window import BodyTrainer
+from ico3d.body.training.prepare_skinned import tracked
 from ico3d.body.training.prepare_window import Begin, begin_window, continued_window
 from ico3d.body.training.views import BodyViews
 from ico3d.capture.capture import Capture
@@ -220,6 +221,8 @@ def train_body(
         SettingsError: If the folder holds a run with other settings.
         ModelError: If training diverges.
     """
+    if job.method in SKINNED:
+        tracked(capture)  # before a folder is made, and the clip is cut into windows
     run = RunFolder(folder, job.about(capture.path) | {"settings": asdict(job.settings)})
     if run.finished() is not None:
         return TrainedBody.load(folder)
