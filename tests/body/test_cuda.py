@@ -3,12 +3,12 @@
 import pytest
 import torch
 
-from ico3d.body.settings import settings_for
+from ico3d.body.settings import SKINNED, settings_for
 from ico3d.body.training.finetune_window import FineTuner
 from ico3d.body.training.optimise_window import BodyTrainer
 from ico3d.body.training.train_clip import BodyJob, train_body
-from support.bodies.moving_capture import MovingCapture
 from support.bodies.tiny_training import TINY
+from support.bodies.tracked_capture import TrackedCapture
 from support.settings import changed
 
 pytestmark = pytest.mark.slow
@@ -22,10 +22,10 @@ def _job(method: str, **changes) -> BodyJob:
     return BodyJob(method, 0, changed(settings_for("cpu", method), small | changes))
 
 
-@pytest.mark.parametrize("method", ["swings++", "swings", "spacetime", "freetime"])
+@pytest.mark.parametrize("method", ["swings++", "swings", "spacetime", "freetime", *SKINNED])
 def test_an_interrupted_run_goes_on_there(cuda, tmp_path, method, monkeypatch):
     """To what it would have become, in the windows and in fine-tuning them."""
-    capture = MovingCapture(tmp_path / "capture")
+    capture = TrackedCapture(tmp_path / "capture", 12.0)
     whole = train_body(capture, tmp_path / "whole", _job(method))
     for kind, death in DEATHS.items():
         step = kind.step

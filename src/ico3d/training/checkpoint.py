@@ -34,10 +34,10 @@ def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict]:
 def placed(tensors: dict[str, Tensor], place: Callable[[str], torch.device]) -> dict[str, Tensor]:
     """What a checkpoint held, each tensor where `place` says that one of its name belongs.
 
-    Whole numbers stay on the CPU: they count, and the optimiser reads them at every step.
+    Single whole numbers stay on the CPU: they count, and the optimiser reads them at every step.
     """
     return {
-        name: tensor.to(place(name)) if tensor.is_floating_point() else tensor
+        name: tensor.to(place(name)) if tensor.is_floating_point() or tensor.dim() else tensor
         for name, tensor in tensors.items()
     }
 
