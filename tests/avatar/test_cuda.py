@@ -14,9 +14,12 @@ from ico3d.avatar.camera_path import orbit, ring_around
 from ico3d.avatar.film.film import pictures
 from ico3d.avatar.moving import extent
 from ico3d.body.model_folder import TrainedBody
+from ico3d.body.training.train_clip import train_body
 from ico3d.bundle.format import Bundle
 from ico3d.cli import main
 from support.avatars.whole_person import WholeFilmed, head_recording, write_whole_person
+from support.bodies.tiny_training import job
+from support.bodies.tracked_capture import TrackedCapture
 from support.captures import open_with
 from support.pretended_cuda import drawn
 
@@ -75,8 +78,11 @@ def test_a_body_is_filmed_and_animated(cuda, folder):
         np.testing.assert_allclose(one, other, atol=1)
 
 
-def _run(*words) -> None:
-    assert main([*map(str, words), "--device", "cuda"]) == 0
+def _run_there(monkeypatch, *words) -> None:
+    """Runs a verb, which draws where CUDA is."""
+    with drawn(monkeypatch) as there:
+        assert main([*map(str, words), "--device", "cuda"]) == 0
+    assert there, words[0]
 
 
 def test_the_verbs_bake_film_and_animate_there(cuda, folder, tmp_path, monkeypatch):
@@ -89,15 +95,22 @@ def test_the_verbs_bake_film_and_animate_there(cuda, folder, tmp_path, monkeypat
     monkeypatch.setattr(body_bundle, "SHAPES", body_bundle.SHAPES[:1])
     bundle, film = tmp_path / "a.ico3d", tmp_path / "a.mp4"
     bake = ("bake", folder, "head", "body", bundle, "--rank", 4, "--force")
-    commands = {
-        "an avatar is baked": (*bake, "--strip", tmp_path / "strip.png"),
-        "an avatar is filmed": ("render", folder, film, "--size", 32, "--seconds", 0.1),
-        "a bundle is filmed": ("render", bundle, film, "--size", 32, "--seconds", 0.1),
-        "an avatar is animated": ("animate", folder, "--contact-sheet", tmp_path / "a.png"),
-        "a bundle is animated": ("animate", bundle, "--contact-sheet", tmp_path / "b.png"),
-    }
-    for what, words in commands.items():
-        with drawn(monkeypatch) as there:
-            _run(*words)
-        assert there, what
+    small = ("--size", 32, "--seconds", 0.1)
+    _run_there(monkeypatch, *bake, "--strip", tmp_path / "strip.png")
+    for avatar in (folder, bundle):
+        _run_there(monkeypatch, "render", avatar, film, *small)
+        _run_there(monkeypatch, "animate", avatar, "--contact-sheet", tmp_path / "a.png")
     assert Bundle.open(bundle).manifest.is_whole
+
+
+def test_the_verbs_do_so_for_a_body_on_a_skeleton(cuda, tmp_path, monkeypatch):
+    capture = TrackedCapture(tmp_path / "capture")
+    open_with(monkeypatch, lambda path: capture)
+    body, bundle = tmp_path / "body", tmp_path / "a.ico3d"
+    train_body(capture, body, job("skinned"))
+    _run_there(monkeypatch, "evaluate", body, "capture", "--json", tmp_path / "figures.json")
+    _run_there(monkeypatch, "bake", body, "capture", bundle)
+    for avatar in (body, bundle):
+        film = ("render", avatar, tmp_path / "a.mp4", "--size", 32, "--seconds", 0.1)
+        _run_there(monkeypatch, *film)
+    _run_there(monkeypatch, "animate", body, "--contact-sheet", tmp_path / "a.png")
