@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ico3d.common.native_messages import held_back
 from ico3d.errors import CaptureError, MissingExtraError
 
 LANDMARKS = 478
@@ -62,7 +63,8 @@ class FaceReader:
             output_facial_transformation_matrixes=True,
         )
         try:
-            self._landmarker = vision.FaceLandmarker.create_from_options(options)
+            with held_back():
+                self._landmarker = vision.FaceLandmarker.create_from_options(options)
         except (RuntimeError, ValueError, OSError) as error:
             raise CaptureError(f"{model} is no usable face landmarker model: {error}.") from error
         self.names: tuple[str, ...] = ()

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ico3d.common.native_messages import held_back
 from ico3d.errors import CaptureError, MissingExtraError
 
 PURPOSE = "fitting a skeleton"
@@ -122,7 +123,8 @@ class BodyReader:
 
 def _opened(model: Path, load: Callable[[], Any]) -> Any:
     try:
-        return load()
+        with held_back():
+            return load()
     except (RuntimeError, ValueError, OSError) as error:
         raise CaptureError(f"{model} is no usable model of MediaPipe's: {error}.") from error
 
