@@ -43,7 +43,7 @@ beforeAll(async () => {
       const { acting, head } = window.ico3d!;
       window.samples.push({ pose: acting!.pose, head: head!.generator.position.toArray() });
     }, 50);
-    const { parents, joints } = window.ico3d!.skinned!.generator.skeleton.rig();
+    const { parents, joints } = window.ico3d!.skinned!.generator.skeleton.rig;
     return { parents, joints };
   });
   rig = new Rig(bones.parents, bones.joints);

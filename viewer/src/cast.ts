@@ -87,7 +87,7 @@ async function makeActing(
 ): Promise<ActingBody | null> {
   const file = await files.gestures();
   if (!file) return null;
-  const rig = body.generator.skeleton.rig();
+  const rig = body.generator.skeleton.rig;
   const repertoire = readRepertoire(file, GESTURES, manifest.skinned!.names.length);
   const language = new BodyLanguage(rig, repertoire, Math.floor(2 ** 32 * Math.random()), heard);
   const acting = new ActingBody(body, language, rig, repertoire.figure, frame, () => stage.orbit.camera.position.toArray());

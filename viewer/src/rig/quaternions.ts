@@ -34,6 +34,18 @@ export function normalized([w, x, y, z]: Quat): Quat {
   return length > 1e-12 ? [w / length, x / length, y / length, z / length] : IDENTITY;
 }
 
+/** The index-th four of many numbers, made 1 long. */
+export function quatAt(values: ArrayLike<number>, index: number): Quat {
+  const at = 4 * index;
+  return normalized([values[at]!, values[at + 1]!, values[at + 2]!, values[at + 3]!]);
+}
+
+/** The same rotation with w ≥ 0. */
+export function upper(quat: Quat): Quat {
+  const [w, x, y, z] = quat;
+  return w < 0 ? [-w, -x, -y, -z] : quat;
+}
+
 /** Hamilton product a·b: first rotates by b, then by a. */
 export function multiply([aw, ax, ay, az]: Quat, [bw, bx, by, bz]: Quat): Quat {
   return [

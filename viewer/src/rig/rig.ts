@@ -39,8 +39,7 @@ export class Rig {
    *
    * @returns (J,3,4) rotation and, in the last column, shift
    */
-  matrices(rotations: readonly Quat[], root: Vector): Float64Array {
-    const { turned, places } = this.posed(rotations, root);
+  matrices({ turned, places }: Posed): Float64Array {
     const found = new Float64Array(12 * turned.length);
     for (const [joint, quat] of turned.entries()) {
       const matrix = toMatrix(quat);

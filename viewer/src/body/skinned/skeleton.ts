@@ -1,7 +1,7 @@
 import type { SkinnedInfo } from '../../bundle/manifest.ts';
+import { quatAt, slerp, upper, type Quat, type Vector } from '../../rig/quaternions.ts';
 import { Rig } from '../../rig/rig.ts';
 import type { RecordedPoses } from './baked.ts';
-import { multiply, normalize, slerp, toMatrix } from './quaternions.ts';
 
 /** How a body stands. */
 export interface Pose {
@@ -15,41 +15,26 @@ export const TABLE_ROW = 16;
 
 /** Forward kinematics of a rig, its recorded poses, and what any other pose has of the residual shapes. */
 export class Skeleton {
+  readonly rig: Rig;
   private readonly info: SkinnedInfo;
   private readonly poses: RecordedPoses;
   private readonly held: Float64Array; // (J,4)
   private readonly known: Float64Array; // (P,3·M) features
-  private readonly ends: Float64Array; // of an interval of the recording: (2,M,4)
-  private readonly local: Float64Array; // (J,4) w ≥ 0
-  private readonly turned: Float64Array; // (J,4) from rest space to the world
-  private readonly places: Float64Array; // (J,3)
-  private readonly matrix = new Float64Array(9);
 
   constructor(info: SkinnedInfo, poses: RecordedPoses) {
     this.info = info;
     this.poses = poses;
-    const joints = info.names.length;
+    const { joints, held, known, rotations } = poses;
+    const rest = info.parents.map((_, j): Vector => [joints[3 * j]!, joints[3 * j + 1]!, joints[3 * j + 2]!]);
+    this.rig = new Rig(info.parents, rest);
+    this.held = Float64Array.from(info.names.flatMap((_, j) => quatAt(held, j)));
     const moving = info.num_moving;
-    this.held = new Float64Array(4 * joints);
-    for (let j = 0; j < joints; j++) normalize(poses.held, 4 * j, this.held, 4 * j);
     this.known = new Float64Array(3 * moving * info.num_known);
-    const one = new Float64Array(4);
     for (let p = 0; p < info.num_known; p++) {
       for (let m = 0; m < moving; m++) {
-        normalize(poses.rotations, 4 * (poses.known[p]! * moving + m), one, 0, true);
-        this.known.set(one.subarray(1), 3 * (p * moving + m));
+        this.known.set(feature(quatAt(rotations, known[p]! * moving + m)), 3 * (p * moving + m));
       }
     }
-    this.ends = new Float64Array(8 * moving);
-    this.local = new Float64Array(4 * joints);
-    this.turned = new Float64Array(4 * joints);
-    this.places = new Float64Array(3 * joints);
-  }
-
-  /** Its bones. */
-  rig(): Rig {
-    const { joints } = this.poses;
-    return new Rig(this.info.parents, this.info.parents.map((_, j) => [joints[3 * j]!, joints[3 * j + 1]!, joints[3 * j + 2]!]));
   }
 
   /** A pose to write into: the rest pose. */
@@ -67,8 +52,10 @@ export class Skeleton {
     const first = Math.min(Math.floor(place), frames - 2);
     const part = place - first;
     out.rotations.set(this.held);
-    for (let m = 0; m < 2 * moving; m++) normalize(rotations, 4 * (first * moving + m), this.ends, 4 * m);
-    this.poses.moving.forEach((joint, m) => slerp(this.ends, 4 * m, 4 * (m + moving), part, out.rotations, 4 * joint));
+    this.poses.moving.forEach((joint, m) => {
+      const [from, to] = [quatAt(rotations, first * moving + m), quatAt(rotations, (first + 1) * moving + m)];
+      out.rotations.set(slerp(from, to, part), 4 * joint);
+    });
     mix(roots, 3, first, part, out.root);
     mix(coefficients, shapes, first, part, out.residual);
   }
@@ -77,14 +64,10 @@ export class Skeleton {
   interpolate(pose: Pose): void {
     const { num_moving: moving, num_shapes: shapes, num_known: count } = this.info;
     const { kernelWidth, coefficients, known } = this.poses;
-    const here = new Float64Array(4 * moving);
-    this.poses.moving.forEach((joint, m) => normalize(pose.rotations, 4 * joint, here, 4 * m, true));
+    const here = new Float64Array(3 * moving);
+    this.poses.moving.forEach((joint, m) => here.set(feature(quatAt(pose.rotations, joint)), 3 * m));
     const away = Float64Array.from({ length: count }, (_, p) => {
-      let sum = 0;
-      for (let i = 0; i < 3 * moving; i++) {
-        const m = Math.floor(i / 3);
-        sum += (this.known[3 * moving * p + i]! - here[4 * m + 1 + (i - 3 * m)]!) ** 2;
-      }
+      const sum = here.reduce((sum, value, i) => sum + (this.known[3 * moving * p + i]! - value) ** 2, 0);
       return sum / (2 * kernelWidth * kernelWidth);
     });
     const nearest = away.reduce((least, value) => Math.min(least, value), Infinity);
@@ -98,34 +81,21 @@ export class Skeleton {
 
   /** Writes what takes each joint's points from rest to the world: (J, TABLE_ROW). */
   table(pose: Pose, out: Float32Array): void {
-    const { local, turned, places, matrix, poses: { joints } } = this;
-    this.info.parents.forEach((parent, j) => {
-      normalize(pose.rotations, 4 * j, local, 4 * j, true); // so signs agree with the parents'
-      if (parent < 0) {
-        turned.set(local.subarray(0, 4));
-        for (let i = 0; i < 3; i++) places[i] = joints[i]! + pose.root[i]!;
-      } else {
-        multiply(turned, 4 * parent, local, 4 * j, turned, 4 * j);
-        toMatrix(turned, 4 * parent, matrix);
-        for (let i = 0; i < 3; i++) {
-          let place = places[3 * parent + i]!;
-          for (let c = 0; c < 3; c++) place += matrix[3 * i + c]! * (joints[3 * j + c]! - joints[3 * parent + c]!);
-          places[3 * j + i] = place;
-        }
-      }
-      toMatrix(turned, 4 * j, matrix);
-      const row = TABLE_ROW * j;
-      for (let i = 0; i < 3; i++) {
-        let shift = places[3 * j + i]!;
-        for (let c = 0; c < 3; c++) {
-          out[row + 4 * i + c] = matrix[3 * i + c]!;
-          shift -= matrix[3 * i + c]! * joints[3 * j + c]!;
-        }
-        out[row + 4 * i + 3] = shift;
-      }
-      out.set(turned.subarray(4 * j, 4 * j + 4), row + 12);
+    // Each with w ≥ 0, so that the signs of a joint and its parent agree.
+    const rotations = this.info.parents.map((_, j) => upper(quatAt(pose.rotations, j)));
+    const posed = this.rig.posed(rotations, [pose.root[0]!, pose.root[1]!, pose.root[2]!]);
+    const matrices = this.rig.matrices(posed);
+    posed.turned.forEach((quat, j) => {
+      out.set(matrices.subarray(12 * j, 12 * j + 12), TABLE_ROW * j);
+      out.set(quat, TABLE_ROW * j + 12);
     });
   }
+}
+
+/** What poses are compared by, of one joint. */
+function feature(quat: Quat): Vector {
+  const [, x, y, z] = upper(quat);
+  return [x, y, z];
 }
 
 /** Writes what lies between two rows. */
