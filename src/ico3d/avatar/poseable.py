@@ -75,11 +75,22 @@ class Poseable:
         """
         pose = self.footing.place(self.living.person.retarget.pose(by_role), root)
         body = self.body(*pose)
-        if self.head is None:
-            return body
-        joint, rig = self.living.person.cast.joints["head"][-1], self.living.person.rig
-        before, after = (rig.matrices(*p)[joint] for p in (self.recorded, pose))  # (4, 4) each
-        return cat([body, self.head(after @ np.linalg.inv(before), expression)])
+        return body if self.head is None else cat([body, self.head_in(*pose, expression)])
+
+    @torch.no_grad()
+    def head_in(self, rotations: Array, root: Array, expression: np.ndarray) -> Gaussians:
+        """The head alone in a pose of the rig in the world; there must be one.
+
+        Args:
+            rotations: (J, 4) wxyz of each joint about itself.
+            root: (3,) metres that the root moves from rest.
+            expression: (B,).
+        """
+        assert self.head is not None
+        person = self.living.person
+        poses = (self.recorded, (rotations, root))
+        before, after = (person.rig.matrices(*p)[person.cast.joints["head"][-1]] for p in poses)
+        return self.head(after @ np.linalg.inv(before), expression)
 
 
 def poseable_of(model: TrainedAvatar | TrainedBody | Bundle, frame: int | None) -> Poseable | None:
