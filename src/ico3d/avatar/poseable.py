@@ -119,20 +119,20 @@ def _baked(bundle: Bundle, frame: int | None) -> Poseable | None:
         return None
     frame = baked.info.num_frames // 2 if frame is None else frame
     stands = recorded_pose(baked, frame)
-    head = None
-    if bundle.head is not None and bundle.world_from_head is not None:
-        shape, placed = bundle.head, bundle.world_from_head[frame].astype(np.float64)
-
-        def head(motion: Array, expression: np.ndarray) -> Gaussians:
-            return baked_gaussians(shape, expression).transform(motion @ placed)
-
     return Poseable(
         living(baked.rig, 0),
         (stands.rotations, stands.root),
         lambda rotations, root: skinned_gaussians(baked, any_pose(baked, rotations, root)),
-        head,
+        _baked_head(bundle, frame),
         bundle.gestures,
     )
+
+
+def _baked_head(bundle: Bundle, frame: int) -> DrawHead | None:
+    if bundle.head is None or bundle.world_from_head is None:
+        return None
+    head, placed = bundle.head, bundle.world_from_head[frame].astype(np.float64)
+    return lambda moved, expression: baked_gaussians(head, expression).transform(moved @ placed)
 
 
 def _trained(
@@ -148,12 +148,15 @@ def _trained(
         pose = (torch.from_numpy(part).to(window.gaussians["means"]) for part in (rotations, root))
         return motion.posed(values, *pose)
 
-    head = None
-    if isinstance(model, TrainedAvatar):
-        trained, placed = model.head, model.placement.world_from_head(frame)
-
-        def head(motion: Array, expression: np.ndarray) -> Gaussians:
-            values = torch.from_numpy(np.asarray(trained.recorded(expression), np.float32))
-            return trained.model(values).transform(motion @ placed)
-
+    head = _trained_head(model, frame) if isinstance(model, TrainedAvatar) else None
     return Poseable(living(rig, 0), (rotations[frame], roots[frame]), posed, head)
+
+
+def _trained_head(avatar: TrainedAvatar, frame: int) -> DrawHead:
+    head, placed = avatar.head, avatar.placement.world_from_head(frame)
+
+    def drawn(moved: Array, expression: np.ndarray) -> Gaussians:
+        values = torch.from_numpy(np.asarray(head.recorded(expression), np.float32))
+        return head.model(values).transform(moved @ placed)
+
+    return drawn
