@@ -97,7 +97,7 @@ def poseable_of(model: TrainedAvatar | TrainedBody | Bundle, frame: int | None) 
     """Somebody as a model has them.
 
     Args:
-        model: Whoever can be posed.
+        model: Whoever can be posed; the face of a trained one takes expressions as recorded.
         frame: In which they stand as they shall; by default the middle of the recording.
 
     Returns:
@@ -156,7 +156,7 @@ def _trained_head(avatar: TrainedAvatar, frame: int) -> DrawHead:
     head, placed = avatar.head, avatar.placement.world_from_head(frame)
 
     def drawn(moved: Array, expression: np.ndarray) -> Gaussians:
-        values = torch.from_numpy(np.asarray(head.recorded(expression), np.float32))
+        values = torch.from_numpy(np.asarray(expression, np.float32))
         return head.model(values).transform(moved @ placed)
 
     return drawn

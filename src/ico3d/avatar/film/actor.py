@@ -1,7 +1,7 @@
 """Who can be filmed: bundles as viewers draw them, and avatars as the exact models do."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.bundle.manifest import CameraInfo
 from ico3d.capture.capture import Capture
 from ico3d.common.expression import SPEECH_SIZE
+from ico3d.head.model_folder import TrainedHead
 from ico3d.speech.runtime import open_speech
 from ico3d.splat.gaussians import Gaussians
 
@@ -142,8 +143,16 @@ def avatar_actor(avatar: TrainedAvatar, animation: Animation, capture: Capture |
         SPEECH_SIZE if driven else None,
         (lambda samples, rate: lips_of(head, samples, rate)) if driven else None,
         animation,
-        poseable=poseable_of(avatar, animation.rest.end),
+        poseable=_driven(poseable_of(avatar, animation.rest.end), head),
     )
+
+
+def _driven(person: Poseable | None, head: TrainedHead) -> Poseable | None:
+    """A trained person whose face takes what drives it, as a bundle's does."""
+    draw = person and person.head
+    if person is None or draw is None:
+        return person
+    return replace(person, head=lambda moved, driven: draw(moved, head.recorded(driven)))
 
 
 def portrait_of(view: CameraInfo, head: np.ndarray) -> CameraInfo:
