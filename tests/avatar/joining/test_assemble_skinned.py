@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import av
 import numpy as np
 import pytest
 import torch
@@ -12,6 +13,7 @@ from ico3d.avatar.joining.assemble import assemble
 from ico3d.avatar.joining.companion import HeadSource
 from ico3d.avatar.poseable import poseable_of
 from ico3d.body.companion import Pruning
+from ico3d.cli import main
 from ico3d.motion.composing.in_turn import in_turn
 from ico3d.motion.gestures.library import library
 from support.avatars.planted_person import FRAMES, planted_head
@@ -88,3 +90,19 @@ def test_the_head_nods_with_the_neck(made):
         tips.append(head.mean(0) - body.mean(0))
     assert seconds > directions[0].stroke
     assert float(tips[1][2] - tips[0][2]) > 0.005  # forwards
+
+
+def test_it_is_filmed(made, tmp_path, capsys):
+    """As long as the gesture takes; a name that nobody knows is told those that there are."""
+    _, folder, *_ = made
+    out = tmp_path / "film.mp4"
+    words = ["render", str(folder), str(out), "--gestures", "wave", "--fps", "1", "--size", "60"]
+    assert main([*words, "--path", "start"]) == 0
+    with av.open(str(out)) as film:
+        pictures = [frame.to_ndarray(format="gray").astype(float) for frame in film.decode(video=0)]
+    assert len(pictures) == 4
+    printed = " ".join(capsys.readouterr().out.split())
+    assert f"{len(pictures)} pictures at 1 per second" in printed
+    assert np.ptp(pictures[0]) > 60
+    assert main([*words[:4], "juggle", *words[5:]]) == 1
+    assert "there is no gesture 'juggle': there are wave, point" in capsys.readouterr().err
