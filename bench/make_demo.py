@@ -3,8 +3,9 @@
     python bench/make_demo.py human_face_f.npz --licences ICT-FaceKit-LICENSE.txt --work WORK
 
 Head and body are recorded in two studios whose light differs. Steps of the command line, each
-skipped when WORK holds its result already; the seed decides everything. Look at WORK/check and
-WORK/strip.png (recorded | exact | baked) before shipping it.
+skipped when WORK holds its result already; the seed decides everything. Look at WORK/check,
+WORK/strip.png (recorded | exact | baked) and WORK/gestures.mp4 before shipping it. The skeleton
+needs MediaPipe's pose and hand landmarkers: ico3d weights fetch pose-landmarker hand-landmarker.
 """
 
 import subprocess
@@ -18,6 +19,8 @@ from ico3d.bundle.format import Bundle
 from ico3d.bundle.packaged import FILE
 
 MAX_BYTES = 12 << 20
+GESTURES = ("wave", "point", "open_hands", "shrug", "count_three", "nod", "shake", "think")
+"""To look at: hands, armpits and neck in poses that nobody recorded."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,6 @@ class Demo:
         body_frames: Frames of the body at 15 per second.
         size: Height of the pictures.
         body: More options of ico3d assemble in one word, as --body="--steps 5000".
-        jobs: Windows of the body that train at once.
         seed: Of recording and training.
     """
 
@@ -44,11 +46,7 @@ class Demo:
     head_frames: int = 1600
     body_frames: int = 76
     size: int = 384
-    body: str = (
-        "--density.max-gaussians 9000 --initial.gaussians 5000 --steps-per-frame 250 "
-        "--finetune.steps 1500"
-    )
-    jobs: int = 2
+    body: str = "--density.max-gaussians 20000 --initial.gaussians 12000 --steps-per-frame 150"
     seed: int = 0
 
     def run(self) -> None:
@@ -60,12 +58,15 @@ class Demo:
         rings = ("--rig", "body", "--light", "warm", "--motion", "talk", "--cameras", 20)
         self._record(work / "body-capture", self.body_frames, *rings, "--fps", 15)
         ico3d("train head", work / "head-capture", work / "head", "--inputs", "speech", *seed)
+        if not (work / "body-capture" / "body_track.safetensors").exists():
+            ico3d("capture pose", work / "body-capture")
         parts = (work / "head", work / "body-capture", work / "avatar")
-        how = (*self.body.split(), "--jobs", self.jobs, "--check", work / "check")
+        how = ("--method", "skinned", *self.body.split(), "--check", work / "check")
         ico3d("assemble", *parts, *seed, *how)
         files = (work / "avatar", work / "head-capture", work / "body-capture", self.out)
         notices = ("--licences", *self.licences)
         ico3d("bake", *files, "--strip", work / "strip.png", *notices)
+        ico3d("render", self.out, work / "gestures.mp4", "--gestures", *GESTURES)
         size = self.out.stat().st_size
         if size > MAX_BYTES:
             sys.exit(f"{self.out} has {size / 1e6:.1f} MB, more than a package should carry.")

@@ -1,13 +1,14 @@
 """A whole person: a trained head on a trained body, as the exact models draw it."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import torch
 from scipy.spatial.transform import Rotation, Slerp
 
+from ico3d.avatar.head_joint import hung
 from ico3d.body.model_folder import TrainedBody
 from ico3d.common.files import write_atomic
 from ico3d.errors import ModelError
@@ -66,7 +67,7 @@ class TrainedAvatar:
     Attributes:
         head: Only those of its Gaussians that are drawn on the body, in the body's colours.
         body: Trained around the head.
-        placement: Where the head is.
+        placement: Where the head is; on a skeleton, where its joint carries it (`joined`).
         expressions: (F, B) what drives the head through the recorded clip.
         summary: How it was made: provenance of both captures, what was measured, settings.
     """
@@ -119,11 +120,37 @@ class TrainedAvatar:
             body = self.body.gaussians(seconds)
         return cat([body, self.head_gaussians(seconds, expression)])
 
+    @classmethod
+    def joined(
+        cls,
+        head: TrainedHead,
+        body: TrainedBody,
+        recorded: Placement,
+        expressions: np.ndarray,
+        summary: dict,
+    ) -> "TrainedAvatar":
+        """A head on a body: where it was recorded, or on its joint, where the body has one.
+
+        Args:
+            head: The head.
+            body: Trained around it.
+            recorded: Where the head was in the body's recording.
+            expressions: (F, B) of its frames.
+            summary: As in the class.
+        """
+        poses = hung(recorded.world_from_canonical, body)
+        placement = replace(recorded, world_from_canonical=poses)
+        return cls(head, body, placement, expressions, summary)
+
     def save(self, folder: Path) -> None:
         """Writes head and placement beside the body, which lies in `folder/body` already."""
         (folder / HEAD).mkdir(parents=True, exist_ok=True)
         self.head.save(folder / HEAD)
         save_placement(folder / PLACEMENT, self.placement, self.expressions)
+        self.save_summary(folder)
+
+    def save_summary(self, folder: Path) -> None:
+        """Writes the file by which the folder is known, where all else lies already."""
         write_atomic(folder / ABOUT, json.dumps({"summary": self.summary}, indent=1).encode())
 
     @classmethod
@@ -149,7 +176,7 @@ class TrainedAvatar:
                 f"{folder}: head, body and placement do not belong together: it has {frames[0]} "
                 f"head poses for {frames[1]} frames, and {sizes[0]} inputs for {sizes[1]}."
             )
-        return cls(head, body, placement, expressions, summary)
+        return cls.joined(head, body, placement, expressions, summary)
 
 
 def save_placement(file: Path, placement: Placement, expressions: np.ndarray) -> None:

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.windows import Window
+from ico3d.body.skinning.skinned import Skinned
 from ico3d.splat.density import Plan, Population
 from ico3d.splat.gaussians import Gaussians
 
@@ -19,6 +20,9 @@ PRUNE_EVERY = 100
 """Steps between two removals of what trespasses (paper, same section)."""
 MOMENTS = 5
 """Of a window, at which is looked who trespasses: its ends, its middle and between them."""
+MOST = MOMENTS // 2 + 1
+"""Of these, at which a Gaussian on a skeleton trespasses that belongs to the companion's place; a
+hand passes the face now and then, and is a hand all the same."""
 
 
 class Companion(Protocol):
@@ -60,7 +64,8 @@ class CompanionSource(Protocol):
 class Pruning:
     """Removes the Gaussians of a window that trespass at any time of it.
 
-    Where they are while they move counts, not where they are stored.
+    Where they are while they move counts, not where they are stored. On a skeleton one window is
+    the whole clip, so what trespasses for most of the time is removed, elsewhere what ever does.
     """
 
     def __init__(self, companion: Companion, window: Window):
@@ -92,10 +97,10 @@ class Pruning:
 
     @torch.no_grad()
     def trespassing(self, model: WindowModel) -> Tensor:
-        """(N,) bool: those that are where they must not be at one of the moments."""
+        """(N,) bool: those that are where they must not be, at one of the moments or at most."""
         window = self._window
-        found = torch.zeros(len(model), dtype=torch.bool, device=model.device)
+        times = torch.zeros(len(model), dtype=torch.int32, device=model.device)
         for tau in np.linspace(0, 1, MOMENTS):
             frame = window.first + tau * (window.last - window.first)
-            found |= self._companion.trespassing(model.at(float(tau)).means, frame)
-        return found
+            times += self._companion.trespassing(model.at(float(tau)).means, frame)
+        return times >= (MOST if isinstance(model.motion, Skinned) else 1)

@@ -53,13 +53,13 @@ def test_lips_follow_the_sound_and_the_body_returns_to_rest(bundles):
     actor, sound = bundle_actor(bundle), hum(2.0)
     talk = speech(actor, sound, 3)
     lips = SpeechModel(bundle.read("speech.onnx")).expressions(sound.samples, RATE)
-    np.testing.assert_allclose(talk.expressions[:, :32], lips, atol=1e-6)
+    np.testing.assert_allclose(talk.face.rows[:, :32], lips, atol=1e-6)
     assert talk.seconds == 2.0
     assert talk.times[0] == 0 and talk.times[-1] == pytest.approx(2.0, abs=1 / FPS)
     assert talk.body_times[-1] == pytest.approx(bundle.animation.rest.end / FPS)
     assert np.ptp(talk.body_times) > 0.1 and talk.body_times.max() <= (FRAMES - 1) / FPS
     at = 20 / 25  # a row of the expressions
-    expected = actor.draw(np.interp(at, talk.times, talk.body_times), talk.expressions[20])
+    expected = actor.draw(np.interp(at, talk.times, talk.body_times), talk.face.rows[20])
     drawn = talk.gaussians(at)
     torch.testing.assert_close(drawn.means, expected.means)
     torch.testing.assert_close(drawn.colors, expected.colors)
@@ -69,11 +69,11 @@ def test_the_seed_decides_blinks_and_gestures(bundles):
     actor = bundle_actor(Bundle.open(bundles / "whole.ico3d"))
     one, same, other = (speech(actor, hum(8.0), seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(one.body_times, same.body_times)
-    np.testing.assert_array_equal(one.expressions, same.expressions)
+    np.testing.assert_array_equal(one.face.rows, same.face.rows)
     assert one.body_times.tolist() != other.body_times.tolist()
-    lids = [talk.expressions[:, 37] for talk in (one, other)]
+    lids = [talk.face.rows[:, 37] for talk in (one, other)]
     assert max(lids[0]) > 0.9 and np.abs(lids[0] - lids[1]).max() > 0.5
-    np.testing.assert_array_equal(one.expressions[:, :32], other.expressions[:, :32])
+    np.testing.assert_array_equal(one.face.rows[:, :32], other.face.rows[:, :32])
 
 
 def test_a_head_alone_sways_back_and_forth(bundles):
@@ -82,7 +82,7 @@ def test_a_head_alone_sways_back_and_forth(bundles):
     talk = speech(actor, hum(5.0), 0)
     assert actor.portrait == actor.view == bundle.manifest.camera
     assert actor.seconds == pytest.approx(49 / 25) and talk.body_times[-1] == 5.0
-    face = talk.expressions[50]
+    face = talk.face.rows[50]
     there, back = actor.draw(49 / 25 - 0.4, face), actor.draw(49 / 25 + 0.4, face)
     torch.testing.assert_close(there.means, back.means)
     assert (there.means - actor.draw(0.2, face).means).abs().max() > 1e-3

@@ -26,7 +26,7 @@ class TrackedCapture(MovingCapture):
     def body_track(self) -> BodyTrack:
         rest = self.points(0)  # the arm hangs as at rest
         hulls = [np.flatnonzero(part) for part in (~self.arm, self.arm)]
-        faces = np.concatenate([_outward(rest, part) for part in hulls])
+        faces = np.concatenate([outward(rest, part) for part in hulls])
         joints = np.zeros((len(rest), 4), np.uint8)
         joints[:, 0] = self.arm
         weights = np.zeros((len(rest), 4), np.float32)
@@ -47,7 +47,7 @@ class TrackedCapture(MovingCapture):
         )
 
 
-def _outward(points: np.ndarray, part: np.ndarray) -> np.ndarray:
+def outward(points: np.ndarray, part: np.ndarray) -> np.ndarray:
     """(T, 3) triangles of the convex hull of some points, counter-clockwise seen from outside."""
     hull = ConvexHull(points[part])
     faces = part[hull.simplices]

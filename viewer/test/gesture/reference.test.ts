@@ -360,6 +360,15 @@ describe('where somebody was recorded', () => {
     expectAlike(ankles(stands), after.map((point) => placement.toRest(point)), 'toRest');
   });
 
+  test('as Python places them', () => {
+    for (const [name, { parents, joints, rig, retarget, living, footing }, { figure }] of people) {
+      const placement = new Placement(new Rig(parents, joints), figure, { rotations: rig.rotations[0]!, root: rig.roots[0]! });
+      const found = [0, 1, 2].map((i) => placement.place({ rotations: retarget.joints[3 + i]!, root: living.root[i]! }));
+      expectAlike(found.map(({ rotations }) => rotations), footing.rotations, `${name}: rotations`);
+      expectAlike(found.map(({ root }) => root), footing.root, `${name}: root`);
+    }
+  });
+
   test('a joint carries what hangs on it', () => {
     const [{ rig, pose: from, joint }, { pose: to }] = [recorded(2), recorded(-1)];
     const [turn, shift] = jointMotion(rig, joint('head'), from, { ...to, root: [0, 0.1, 0.2] });

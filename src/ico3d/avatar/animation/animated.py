@@ -13,6 +13,7 @@ from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.baked_body import body_of
 from ico3d.avatar.models import open_model
 from ico3d.avatar.moving import MovingBody, Span
+from ico3d.avatar.poseable import Poseable, poseable_of
 from ico3d.avatar.render_bundle import avatar_gaussians, body_gaussians
 from ico3d.body.model_folder import TrainedBody
 from ico3d.bundle.animation import Animation
@@ -42,6 +43,16 @@ class Person(MovingBody, Protocol):
     @property
     def has_head(self) -> bool:
         """Whether a head of its own kind is on the body."""
+        ...
+
+    @property
+    def poseable(self) -> Poseable | None:
+        """The person in poses that nobody recorded; None without a skeleton."""
+        ...
+
+    @property
+    def idle(self) -> np.ndarray:
+        """(B,) the face at rest; (0,) without a head."""
         ...
 
     def gaussians(self, seconds: float) -> Gaussians:
@@ -81,6 +92,16 @@ class TrainedPerson:
     def has_head(self) -> bool:
         """Whether this is an avatar."""
         return self.avatar is not None
+
+    @property
+    def poseable(self) -> Poseable | None:
+        """On the skeleton that a body of --method skinned has."""
+        return poseable_of(self.avatar or self.body, self.animation and self.animation.rest.end)
+
+    @property
+    def idle(self) -> np.ndarray:
+        """The face as it was recorded in the first frame."""
+        return np.zeros(0, np.float32) if self.avatar is None else self.avatar.expression(0.0)
 
     def gaussians(self, seconds: float) -> Gaussians:
         """Body and, if there is one, head in the world at a time."""
@@ -123,6 +144,17 @@ class BakedPerson:
         """Towards the visitor."""
         camera = self.bundle.manifest.camera
         return np.subtract(camera.eye, camera.target)
+
+    @property
+    def poseable(self) -> Poseable | None:
+        """On the bundle's skeleton, with its gestures."""
+        return poseable_of(self.bundle, self.animation and self.animation.rest.end)
+
+    @property
+    def idle(self) -> np.ndarray:
+        """What the manifest says."""
+        head = self.bundle.manifest.head
+        return np.array(head.idle_expression if head else (), np.float32)
 
     def window_gaussians(self, index: int, tau: float) -> Gaussians:
         """The Gaussians of a window."""

@@ -1,6 +1,7 @@
 """An animation as a picture: its key frames, and how fast the hands are."""
 
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,12 +12,14 @@ from rich.progress import track
 from ico3d.avatar.animation.animated import Person
 from ico3d.avatar.animation.keyframes import Motion
 from ico3d.avatar.animation.motion_quality import least_quality
+from ico3d.avatar.animation.strokes import filled, strokes
 from ico3d.avatar.camera_path import Ring, orbit, ring_around, ring_of
 from ico3d.avatar.moving import extent
 from ico3d.avatar.staging import NEUTRAL
 from ico3d.bundle.animation import Action, Animation
 from ico3d.common.camera import Camera
 from ico3d.common.files import write_atomic
+from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
 if TYPE_CHECKING:
@@ -27,7 +30,7 @@ SIZE = 300, 500
 MOST = 16
 """Actions of a kind that are shown; of more, the best."""
 COLUMNS = 6
-REST, ACTION, REFUSED = "tab:blue", "tab:orange", "tab:red"
+REST, ACTION, REFUSED, MADE = "tab:blue", "tab:orange", "tab:red", "tab:green"
 
 
 def draw_sheet(
@@ -41,7 +44,8 @@ def draw_sheet(
     """Draws an animation into a file.
 
     Above the speed of the hands, the rest loop and the actions marked, and how the frames look
-    where that was measured; below the person at these frames, in the order of time, from the front.
+    where that was measured; below the person at these frames, in the order of time, from the front,
+    and, on a skeleton, at the strokes of all gestures.
 
     Args:
         person: Who is animated.
@@ -56,7 +60,9 @@ def draw_sheet(
     from matplotlib.figure import Figure
 
     shown = key_frames(animation, left_out)
-    rows = -(-len(shown) // COLUMNS)
+    poseable = person.poseable
+    gestures = len(poseable.clips) if poseable else 0
+    rows = -(-(len(shown) + gestures) // COLUMNS)
     curves = 2 if animation.quality else 1
     figure = Figure(figsize=(12, 3 * curves + 3.6 * rows), layout="constrained")
     FigureCanvasAgg(figure)
@@ -70,9 +76,11 @@ def draw_sheet(
     for place in places:
         place.set(xticks=(), yticks=())  # those of hidden axes are laid out, too
         place.axis("off")
-    pairs = zip(places, shown.items(), strict=False)
-    for place, (frame, label) in track(pairs, "drawing", len(shown), transient=True):
-        place.imshow(_picture(person, frame / animation.fps, camera))
+    moments = ((name, person.gaussians(at / animation.fps)) for at, name in shown.items())
+    made = strokes(poseable, person.idle) if poseable else ()
+    drawn = track(chain(moments, made), "drawing", len(shown) + gestures, transient=True)
+    for place, (label, gaussians) in zip(places, drawn, strict=False):
+        place.imshow(_picture(gaussians, camera))
         place.set_title(label, fontsize=9, color=_colour(label), y=1.0)
     kind = "png" if path.suffix.lower() == ".png" else "jpeg"
     write_atomic(path, lambda file: figure.savefig(file, format=kind, dpi=100))
@@ -92,12 +100,16 @@ def key_frames(animation: Animation, left_out: Sequence[Action] = ()) -> dict[in
 
 def _colour(label: str) -> str:
     """Colour of a picture's title."""
+    if not label[0].isdigit():
+        return MADE
     return REFUSED if "refused" in label else ACTION if "action" in label else REST
 
 
 def front(person: Person, cameras: Sequence[Camera] | None) -> Camera:
-    """A camera before the person that sees all of it throughout the clip."""
-    points = extent(person)
+    """A camera before the person that sees all of it throughout the clip, and in all gestures."""
+    points, poseable = extent(person), person.poseable
+    if poseable:
+        points = np.concatenate([points, filled(poseable, person.idle)])
     ring = ring_of(cameras, points) if cameras else ring_around(points)
     if not cameras and person.facing is not None:
         ring = _turned(ring, person.facing)
@@ -117,8 +129,8 @@ def _turned(ring: Ring, facing: np.ndarray) -> Ring:
 
 
 @torch.no_grad()
-def _picture(person: Person, seconds: float, camera: Camera) -> np.ndarray:
-    rgb = render(person.gaussians(seconds), [camera], torch.tensor(NEUTRAL)).rgb[0]
+def _picture(gaussians: Gaussians, camera: Camera) -> np.ndarray:
+    rgb = render(gaussians, [camera], torch.tensor(NEUTRAL)).rgb[0]
     return rgb.clamp(0, 1).cpu().numpy()  # (H, W, 3)
 
 

@@ -1,7 +1,7 @@
 """Who can be filmed: bundles as viewers draw them, and avatars as the exact models do."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.baking import body_bundle, head_bundle
 from ico3d.avatar.baking.samples import lips_of
 from ico3d.avatar.moving import MOMENTS, back_and_forth, extent
+from ico3d.avatar.poseable import Poseable, poseable_of
 from ico3d.avatar.render_bundle import (
     BakedAvatar,
     backdrop_gaussians,
@@ -22,6 +23,7 @@ from ico3d.bundle.format import SPEECH, Bundle
 from ico3d.bundle.manifest import CameraInfo
 from ico3d.capture.capture import Capture
 from ico3d.common.expression import SPEECH_SIZE
+from ico3d.head.model_folder import TrainedHead
 from ico3d.speech.runtime import open_speech
 from ico3d.splat.gaussians import Gaussians
 
@@ -53,6 +55,7 @@ class Actor:
         lips: Moves the mouth; None where no sound does.
         animation: How the body moves while it talks; None where head and body are not both there.
         backdrop: What stands behind the person, in the world.
+        poseable: The person in poses that nobody recorded; None without a skeleton.
     """
 
     draw: Draw
@@ -65,6 +68,7 @@ class Actor:
     lips: Lips | None
     animation: Animation | None
     backdrop: Gaussians | None = None
+    poseable: Poseable | None = None
 
 
 def bundle_actor(bundle: Bundle) -> Actor:
@@ -95,7 +99,8 @@ def bundle_actor(bundle: Bundle) -> Actor:
     at = head.eye_offset if head else None
     stage = (manifest.camera, portrait, manifest.background)
     behind = backdrop_gaussians(bundle)
-    return Actor(draw, seconds, *stage, idle, at, lips, bundle.animation, behind)
+    poseable = poseable_of(bundle, bundle.animation and bundle.animation.rest.end)
+    return Actor(draw, seconds, *stage, idle, at, lips, bundle.animation, behind, poseable)
 
 
 def _swaying_head(bundle: Bundle) -> tuple[Draw, float]:
@@ -138,7 +143,16 @@ def avatar_actor(avatar: TrainedAvatar, animation: Animation, capture: Capture |
         SPEECH_SIZE if driven else None,
         (lambda samples, rate: lips_of(head, samples, rate)) if driven else None,
         animation,
+        poseable=_driven(poseable_of(avatar, animation.rest.end), head),
     )
+
+
+def _driven(person: Poseable | None, head: TrainedHead) -> Poseable | None:
+    """A trained person whose face takes what drives it, as a bundle's does."""
+    draw = person and person.head
+    if person is None or draw is None:
+        return person
+    return replace(person, head=lambda moved, driven: draw(moved, head.recorded(driven)))
 
 
 def portrait_of(view: CameraInfo, head: np.ndarray) -> CameraInfo:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from ico3d.avatar.film.actor import Actor
     from ico3d.avatar.moving import Moving
+    from ico3d.avatar.poseable import Poseable
     from ico3d.capture.capture import Capture, Sound
     from ico3d.common.camera import Camera
 
@@ -28,20 +29,25 @@ class Render:
 
     With --audio, lips follow the sound, the body gestures, and the film is as long as the sound.
     Without, time runs along with the camera; where the film is longer than the clip, back and
-    forth.
+    forth. Whoever has a skeleton is not bound to the clip: with --audio they gesture on the stress
+    of what they say, and --gestures names what they do.
 
     Attributes:
         model: A bundle (`demo` is the one of the package), as it was baked, or a model folder that
             ico3d assemble or ico3d train body wrote, as the exact model shows it.
         out: The video to write, NAME.mp4.
         audio: The sound to say: WAV, FLAC or MP3.
+        text: What is said in the sound, so that somebody on a skeleton shows what words mean.
+        gestures: What somebody on a skeleton does, one after the other, as long as it takes, such
+            as `wave point open_hands`; a name that does not exist is told all that do.
         capture: Orbit as the cameras of this capture stand around the person; without, level with
             a person in a world with y up. Of what ico3d assemble wrote: the body's recording.
         path: `orbit`, once around the person; `portrait`, before head and chest for the whole film;
             `start`, where visitors stand; or a JSON file with key cameras: {"cameras": [{"eye": [x,
             y, z], "target": [x, y, z], "up": [0, 1, 0], "fov_y": 40}, ...]}, metres and degrees; up
-            and fov_y can be left out. By default `portrait` with --audio, else `orbit`.
-        seconds: How long a film without --audio lasts.
+            and fov_y can be left out. By default `portrait` of whoever talks or gestures, else
+            `orbit`.
+        seconds: How long a film without --audio and --gestures lasts.
         fps: Pictures per second.
         size: Width and height in pixels, even numbers; one number for a square.
         background: Colour behind the person, as in HTML: a name or #rrggbb; by default the
@@ -53,6 +59,8 @@ class Render:
     model: tyro.conf.Positional[Path]
     out: tyro.conf.Positional[Path]
     audio: Path | None = None
+    text: str = ""
+    gestures: tuple[str, ...] = ()
     capture: Path | None = None
     path: str | None = None
     seconds: float = 8.0
@@ -83,7 +91,8 @@ class Render:
         person, actor = self._person(sound, device)
         if background is None:
             background = GREY if actor is None else actor.background
-        seconds = self.seconds if sound is None else person.seconds
+        timed = sound is not None or self.gestures
+        seconds = person.seconds if timed else self.seconds
         cameras = self._cameras(person, actor, max(1, round(seconds * self.fps)))
         backdrop = None if actor is None else actor.backdrop
         seen: Iterable = pictures(person, cameras, self.fps, background, backdrop, device)
@@ -105,6 +114,8 @@ class Render:
             raise SettingsError("--size needs an even width and height: H.264 has no others.")
         if not (self.seconds > 0 and 0 < self.fps <= 1000 and self.seconds * self.fps >= 1):
             raise SettingsError("--seconds and --fps must be above 0 and make one picture or more.")
+        if self.audio and self.gestures:
+            raise SettingsError("--gestures and --audio: who talks gestures as the words ask for.")
         if self.out.suffix != ".mp4":
             raise SettingsError(f"{self.out}: a film is written to a file NAME.mp4.")
         if self.background is None:
@@ -133,8 +144,9 @@ class Render:
         """Who is filmed, and, but for bodies of their own, how they talk and where they stand."""
         from ico3d.avatar.avatar import TrainedAvatar
         from ico3d.avatar.baking.person_bundle import animation_of
-        from ico3d.avatar.film import actor, performance
+        from ico3d.avatar.film import actor
         from ico3d.avatar.models import open_model
+        from ico3d.avatar.poseable import poseable_of
         from ico3d.body.model_folder import TrainedBody
         from ico3d.bundle.format import Bundle
         from ico3d.errors import SettingsError
@@ -145,16 +157,39 @@ class Render:
                 raise SettingsError(
                     f"{self.model} is a body alone, which does not talk: no --audio."
                 )
-            return model.to(device), None
+            model.to(device)
+            return self._gesturing(poseable_of(model, None), None) or model, None
         if isinstance(model, TrainedAvatar):
             model.to(device)
             animation = animation_of(self.model, model)
             found = actor.avatar_actor(model, animation, self._opened_capture())
         else:
             found = actor.bundle_actor(model)
-        if sound is not None:
-            return performance.speech(found, sound, self.seed), found
-        return performance.motion(found, self.seconds, self.seed), found
+        return self._gesturing(found.poseable, found) or self._acting(found, sound), found
+
+    def _gesturing(self, person: "Poseable | None", actor: "Actor | None") -> "Moving | None":
+        """Who makes the gestures that are asked for; None where none are."""
+        from ico3d.avatar.film.gesturing import gestures
+        from ico3d.errors import SettingsError
+
+        if not self.gestures:
+            return None
+        if person is None:
+            raise SettingsError(
+                f"{self.model} has no skeleton that could gesture: --gestures is for bodies of "
+                "--method skinned."
+            )
+        return gestures(person, actor, self.gestures, self.seed)
+
+    def _acting(self, actor: "Actor", sound: "Sound | None") -> "Moving":
+        """Who says something, or shows what was recorded."""
+        from ico3d.avatar.film import gesturing, performance
+
+        if sound is None:
+            return performance.motion(actor, self.seconds, self.seed)
+        if actor.poseable is None:
+            return performance.speech(actor, sound, self.seed)
+        return gesturing.speech(actor.poseable, actor, sound, self.text, self.seed)
 
     def _opened_capture(self) -> "Capture | None":
         from ico3d.capture.formats import open_capture
@@ -168,7 +203,8 @@ class Render:
         from ico3d.avatar.render_bundle import visitor_camera
         from ico3d.errors import SettingsError
 
-        path = self.path or (ORBIT if self.audio is None else PORTRAIT)
+        acts = actor is not None and (self.audio or self.gestures)
+        path = self.path or (PORTRAIT if acts else ORBIT)
         if path in (START, PORTRAIT):
             if actor is None:
                 raise SettingsError(f"--path {path}: nobody said where visitors of a body stand.")

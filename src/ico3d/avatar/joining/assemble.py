@@ -25,8 +25,8 @@ from ico3d.avatar.joining.recolour import RecolourSettings, color_difference, re
 from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.seam import largest_gap, seam_scores
 from ico3d.avatar.joining.settings import JoiningSettings
-from ico3d.avatar.joining.similarity import canonical_from_head, fit_in_words
-from ico3d.body.settings import BodySettings
+from ico3d.avatar.joining.similarity import canonical_from_head, fit_in_words, moved
+from ico3d.body.settings import BodySettings, Method
 from ico3d.body.training.train_clip import BodyJob, Runner, train_body
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.canonical import canonical_landmarks
@@ -52,6 +52,7 @@ class Assembly:
         joining: How the head is put on.
         body: How the body is trained.
         seed: All randomness follows from it.
+        method: What moves the body.
         continued: Folder of a body that was trained without the head, to go on from.
         device: Where to compute; a run may go on elsewhere.
     """
@@ -60,6 +61,7 @@ class Assembly:
     joining: JoiningSettings
     body: BodySettings
     seed: int
+    method: Method = "swings++"
     continued: Path | None = None
     device: DeviceName = "auto"
 
@@ -70,6 +72,7 @@ class Assembly:
             paths["continued"] = str(self.continued.resolve())
         return paths | {
             "seed": self.seed,
+            "method": self.method,
             "joining": asdict(self.joining),
             "settings": asdict(self.body),
         }
@@ -108,7 +111,7 @@ def assemble(
         return TrainedAvatar.load(folder)
     source = HeadSource(folder.resolve(), assembly.joining.border_points, assembly.joining.pruning)
     continued = assembly.continued and assembly.continued.resolve()
-    job = BodyJob("swings++", assembly.seed, assembly.body, source, continued, assembly.device)
+    job = BodyJob(assembly.method, assembly.seed, assembly.body, source, continued, assembly.device)
     body = train_body(capture, folder / BODY, job, runner)
     placement, expressions = load_placement(folder / PLACEMENT)
     head = TrainedHead.load(folder / HEAD)
@@ -118,10 +121,11 @@ def assemble(
         "settings": asdict(assembly.joining),
         "train_seconds": body.summary["train_seconds"],
     }
-    avatar = TrainedAvatar(head, body, placement, expressions, summary)
+    avatar = TrainedAvatar.joined(head, body, placement, expressions, summary)
     avatar.to(computing_device(assembly.device))
-    avatar = replace(avatar, summary=summary | measured(avatar, capture, say))
-    avatar.save(folder)
+    found = swaying(avatar, placement, say) | measured(avatar, capture, say)
+    avatar = replace(avatar, summary=summary | found)
+    avatar.save_summary(folder)  # its parts lie there
     run.finish(avatar.summary)
     return avatar
 
@@ -168,6 +172,22 @@ def align(capture: Capture, landmarks: np.ndarray, say: Say) -> Placement:
     matrix, rest = canonical_from_head(there, landmarks)
     say(fit_in_words(matrix, rest))
     return Placement(matrix, poses)
+
+
+def swaying(avatar: TrainedAvatar, recorded: Placement, say: Say) -> dict:
+    """How far a head on its joint is from where it was recorded, in figures for `avatar.json`."""
+    if avatar.placement.world_from_canonical is recorded.world_from_canonical:
+        return {}
+    face = moved(recorded.canonical_from_head, _landmarks(avatar.head, Path(HEAD)))  # (68, 3)
+    both = (avatar.placement.world_from_canonical, recorded.world_from_canonical)
+    hangs, was = (np.stack([moved(pose, face) for pose in poses]) for poses in both)  # (F, 68, 3)
+    away = 1e3 * np.sqrt(np.square(hangs - was).sum(-1).mean(1))  # (F,)
+    mean, most = float(np.sqrt(np.square(away).mean())), float(away.max())
+    say(
+        f"the head hangs on its joint: the face is within {mean:.1f} mm of where it was recorded, "
+        f"{most:.1f} mm in the worst frame."
+    )
+    return {"sway_mm": round(mean, 2), "sway_most_mm": round(most, 2)}
 
 
 def measured(avatar: TrainedAvatar, capture: Capture, say: Say) -> dict:

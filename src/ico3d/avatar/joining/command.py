@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from ico3d.avatar.joining.settings import JoiningSettings
-from ico3d.body.settings import PRESETS, BodySettings
+from ico3d.body.settings import PRESETS, BodySettings, Method, settings_for
 from ico3d.common.device import DeviceName
 from ico3d.common.presets import PresetName, chosen
 
@@ -23,10 +23,14 @@ class AssembleChoice:
     Attributes:
         preset: The paper's settings of the body, or those sized for two CPU cores;
             the defaults shown here are those of the preset that is chosen.
+        method: How the body is moved: SWinGS++ repeats what was recorded; skinned hangs it on the
+            skeleton of ico3d capture pose, so that the person can gesture as nobody recorded; the
+            others are what ico3d train body compares these with.
         body: A folder of ico3d train body on that capture, to go on from: a third of the steps.
     """
 
     preset: PresetName = "cpu"
+    method: Method = "swings++"
     body: Path | None = None
 
 
@@ -67,7 +71,7 @@ class Assemble(AssembleChoice):
     def defaults(cls, words: Sequence[str]) -> "Assemble":
         """The verb with the settings of the preset that words choose, or a third of its steps."""
         choice = chosen(AssembleChoice, words)
-        settings = PRESETS[choice.preset]
+        settings = settings_for(choice.preset, choice.method)
         if choice.body is not None:
             steps, per_frame = settings.steps // 3, settings.steps_per_frame // 3
             settings = replace(settings, steps=steps, steps_per_frame=per_frame, warmup_steps=0)
@@ -106,4 +110,12 @@ class Assemble(AssembleChoice):
         """What is asked for."""
         from ico3d.avatar.joining.assemble import Assembly
 
-        return Assembly(self.head, self.joining, self.settings, self.seed, self.body, self.device)
+        return Assembly(
+            self.head,
+            self.joining,
+            self.settings,
+            self.seed,
+            self.method,
+            self.body,
+            self.device,
+        )

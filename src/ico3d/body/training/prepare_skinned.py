@@ -4,7 +4,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ico3d.body.companion import Companion
+from ico3d.body.companion import MOMENTS, MOST, Companion
 from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings
@@ -37,7 +37,7 @@ def begin_skinned(
     rng: np.random.Generator,
     companion: Companion | None = None,
 ) -> Begin:
-    """Round Gaussians on the skin, as far as cameras see it at the window's centre frame.
+    """Round Gaussians on the skin, as far as cameras see it at some moment of the window.
 
     Args:
         capture: The recording, with a body track.
@@ -51,10 +51,10 @@ def begin_skinned(
     """
     track = tracked(capture)
     count = min(settings.initial.gaussians, settings.density.max_gaussians)
-    skin = _seen(sampled(track, SPARE * count, rng), track, capture, window.center)
+    skin = _seen(sampled(track, SPARE * count, rng), track, capture, window)
     skin = _dressed(skin, track, capture, window, count, settings, rng)
     if companion is not None:
-        skin = _beside(companion, skin, track, window.center, rng)
+        skin = _beside(companion, skin, track, window, rng)
     places = skin.posed(track, window.center)  # (P, 3)
     generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
     motion, shared = _motion(track, window, settings, generator)
@@ -80,27 +80,36 @@ def tracked(capture: Capture) -> BodyTrack:
     return track
 
 
-def _seen(skin: Skin, track: BodyTrack, capture: Capture, frame: int) -> Skin:
-    """The points that some training camera sees."""
-    places = skin.posed(track, frame)  # (P, 3)
-    gap = HIDING * float(np.median(spacing(places)))
+def _seen(skin: Skin, track: BodyTrack, capture: Capture, window: Window) -> Skin:
+    """The points that some training camera sees at one of the moments: arms hide what is under."""
     cameras = [capture.cameras[index] for index in train_cameras(capture)]
-    seen = np.any([visible(places, camera, gap) for camera in cameras], axis=0)  # (P,)
+    seen = np.zeros(len(skin), bool)
+    for frame in _moments(window):
+        places = skin.posed(track, frame)  # (P, 3)
+        gap = HIDING * float(np.median(spacing(places)))
+        seen |= np.any([visible(places, camera, gap) for camera in cameras], axis=0)  # (P,)
     if not seen.any():
         raise CaptureError(
-            f"{capture.path}: the body track lies outside of all pictures at frame {frame}: "
+            f"{capture.path}: the body track lies outside of all pictures: "
             "delete it and run ico3d capture pose again."
         )
     return skin[seen]
 
 
+def _moments(window: Window) -> list[int]:
+    """A few frames of a window, its ends and its centre among them."""
+    return sorted({round(frame) for frame in np.linspace(window.first, window.last, MOMENTS)})
+
+
 def _beside(
-    companion: Companion, skin: Skin, track: BodyTrack, frame: int, rng: np.random.Generator
+    companion: Companion, skin: Skin, track: BodyTrack, window: Window, rng: np.random.Generator
 ) -> Skin:
-    """The points that do not trespass at a frame, and those of the companion's border."""
+    """The points that do not trespass most of the time, and those of the companion's border."""
+    frame = window.center
     border = skin.pulled_back(companion.border(frame, rng), track, frame)
-    both = Skin.joined(skin, border)
-    return both[~trespassing(companion, both.posed(track, frame), frame)]
+    both, frames = Skin.joined(skin, border), _moments(window)
+    times = [trespassing(companion, both.posed(track, frame), frame) for frame in frames]
+    return both[np.sum(times, 0) < min(MOST, len(frames))]
 
 
 def _dressed(

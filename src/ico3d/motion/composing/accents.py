@@ -26,6 +26,10 @@ _PAUSE = 0.1
 """Seconds of silence that no stop between two vowels is."""
 _COMMA, _ASTRAY = 0.4, 0.3
 """Seconds of speech by which a comma attracts a pause, and words may be estimated amiss."""
+_WORD = 0.35
+"""Seconds of a word."""
+UNKNOWN = "(unknown)"
+"""A word that means no gesture."""
 _VOWELS = re.compile(r"[aeiouyäöüáéíóúàèùâêîôû]+")
 
 
@@ -147,6 +151,17 @@ def timed_words(text: str, levels: Array, begin: float, end: float) -> tuple[Wor
         Word(word, begin + FRAME * float(a), begin + FRAME * float(b))
         for word, a, b in zip(texts, starts, ends, strict=True)
     )
+
+
+def unknown_words(levels: Array) -> tuple[Word, ...]:
+    """Words that nobody wrote down: stretches of sound, each about as long as a word.
+
+    Args:
+        levels: Loudness of the whole utterance.
+    """
+    voiced = int((levels > levels.max(initial=_FLOOR) - SPOKEN).sum()) * FRAME
+    count = round(voiced / _WORD)
+    return timed_words(" ".join([UNKNOWN] * count), levels, 0.0, len(levels) * FRAME)
 
 
 def _at_pauses(texts: list[str], shares: Array, spoken: np.ndarray, voiced: np.ndarray) -> Array:

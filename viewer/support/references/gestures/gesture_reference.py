@@ -20,6 +20,7 @@ from ico3d.motion.composing.cues import Cue, Direction, Release, rounded_release
 from ico3d.motion.composing.gaze import Gaze, direction_to
 from ico3d.motion.composing.listening import Listener
 from ico3d.motion.composing.performer import Performer
+from ico3d.motion.footing import footing
 from ico3d.motion.gestures.library import library
 from ico3d.motion.living import Living, living
 from ico3d.motion.noise import chance, scrambled, wander
@@ -181,6 +182,12 @@ def of_interruption(rest: Living, clips: dict[str, Clip]) -> Reference:
     return {"directions": json_of(directions), "now": now, "let_go": json_of(let_go), **moved}
 
 
+def of_footing(rest: Living, joints: Array, roots: Array, moved: Array) -> Reference:
+    """Poses of the living rest where somebody was recorded who stood as nobody stands."""
+    rotations, root = footing(rest, joints[0], roots[0]).place(joints[3:], moved[:3])
+    return {"rotations": rotations, "root": root}
+
+
 def of_person(out: Path, name: str, rig: Rig, gestures: tuple[str, ...] | None) -> Reference:
     """A person's file, and what the person does."""
     random = np.random.default_rng(SEED)
@@ -201,6 +208,7 @@ def of_person(out: Path, name: str, rig: Rig, gestures: tuple[str, ...] | None) 
         "retarget": {"pose": np.concatenate([poses, still[:3]]), "joints": joints},
         "rig": {"rotations": joints[:3], "roots": roots, "matrices": None},
         "random": of_performance(rest, clips, random_directions(clips, random)),
+        "footing": of_footing(rest, joints, roots, moved),
     }
     found["rig"]["matrices"] = rig.matrices(joints[:3], roots)[..., :3, :]  # (3, J, 3, 4)
     if gestures is None:

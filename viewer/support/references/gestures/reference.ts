@@ -28,6 +28,7 @@ export interface PersonReference {
   retarget: { pose: Quat[][]; joints: Quat[][] };
   rig: { rotations: Quat[][]; roots: Vector[]; matrices: number[][][][] }; // (3,J,3,4)
   random: Performance;
+  footing: { rotations: Quat[][]; root: Vector[] }; // the last poses of `retarget` where the first of `rig` stood
   composed?: Performance;
   interrupted?: Moved & { directions: Direction[]; now: number; let_go: Direction[] };
 }
