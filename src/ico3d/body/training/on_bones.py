@@ -18,7 +18,7 @@ EVERY = 150
 """Steps from one look at who hangs where to the next."""
 POINTS = 20_000
 """On the template."""
-OFF = 0.015
+OFF = 0.01
 """Metres from the skin at rest below which a Gaussian belongs where it hangs."""
 NEARER = 0.75
 """Part of that distance within which another limb's skin must come."""
