@@ -24,7 +24,7 @@ class TrackedCapture(MovingCapture):
         self.error = error
 
     def body_track(self) -> BodyTrack:
-        rest = self.points(0)  # the arm hangs as at rest
+        rest = self._rest
         hulls = [np.flatnonzero(part) for part in (~self.arm, self.arm)]
         faces = np.concatenate([outward(rest, part) for part in hulls])
         joints = np.zeros((len(rest), 4), np.uint8)

@@ -45,8 +45,8 @@ class Render:
         path: `orbit`, once around the person; `portrait`, before head and chest for the whole film;
             `start`, where visitors stand; or a JSON file with key cameras: {"cameras": [{"eye": [x,
             y, z], "target": [x, y, z], "up": [0, 1, 0], "fov_y": 40}, ...]}, metres and degrees; up
-            and fov_y can be left out. By default `portrait` of whoever talks or gestures, else
-            `orbit`.
+            and fov_y can be left out. By default `portrait` with --audio, `start` with
+            --gestures, of bodies of their own and without both `orbit`.
         seconds: How long a film without --audio and --gestures lasts.
         fps: Pictures per second.
         size: Width and height in pixels, even numbers; one number for a square.
@@ -203,8 +203,8 @@ class Render:
         from ico3d.avatar.render_bundle import visitor_camera
         from ico3d.errors import SettingsError
 
-        acts = actor is not None and (self.audio or self.gestures)
-        path = self.path or (PORTRAIT if acts else ORBIT)
+        acted = PORTRAIT if self.audio else START if self.gestures and actor else ORBIT
+        path = self.path or acted
         if path in (START, PORTRAIT):
             if actor is None:
                 raise SettingsError(f"--path {path}: nobody said where visitors of a body stand.")

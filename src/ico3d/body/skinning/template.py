@@ -3,10 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from scipy.spatial import KDTree
+from torch import Tensor
 
 from ico3d.rig.binding import Binding
 from ico3d.rig.body_track import BodyTrack
+
+LEAST_WEIGHT = 1e-3
+"""Of a joint, before the logarithm: what does not carry a Gaussian may learn to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,3 +89,8 @@ def sampled(track: BodyTrack, count: int, rng: np.random.Generator) -> Skin:
     dense = track.binding.dense(len(track.rig))[track.faces[chosen]]  # (P, 3, J)
     binding = Binding.strongest(np.einsum("pc,pcj->pj", parts, dense))
     return Skin(points, normals, binding)
+
+
+def hung_logits(binding: Binding) -> Tensor:
+    """(P, 4) logarithms of weights, whose softmax is what they were."""
+    return torch.from_numpy(binding.weights).float().clamp_min(LEAST_WEIGHT).log()

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 
-import torch
 from torch import Tensor
 
 from ico3d.body.companion import Companion
@@ -11,9 +10,9 @@ from ico3d.body.motion.encoder import space_smoothness, time_change, time_smooth
 from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings, Method
-from ico3d.body.skinning.sizes import bone_lengths, largest_log_scales
 from ico3d.body.skinning.skinned import Skinned, without_residual
 from ico3d.body.training.density import density_control
+from ico3d.body.training.on_bones import OnBones
 from ico3d.body.training.picture_step import Learner, WindowTrainee
 from ico3d.body.training.views import BodyViews
 from ico3d.capture.pictures import View
@@ -37,10 +36,10 @@ class BodyTrainer(WindowTrainee):
     ):
         """Gets ready for the first step; arguments as for `Learner`."""
         fixed: tuple[str, ...] = ()
-        self._bones: Tensor | None = None
+        self._bones: OnBones | None = None
         if isinstance(model.motion, Skinned):
             fixed = model.motion.fixed
-            self._bones = bone_lengths(model.motion.parents, model.shared["rig_joints"])
+            self._bones = OnBones(model, pictures.body_track())
         for name, tensor in {**model.gaussians, **model.shared}.items():
             tensor.requires_grad_(name not in fixed)
         super().__init__(Learner(model, window, pictures, settings, extent, seed, companion))
@@ -64,9 +63,12 @@ class BodyTrainer(WindowTrainee):
         self._strategy.observe(rendering.info.first(len(gaussians)), index)
         progress = index / self._steps
         learner.update(progress)
-        self._keep_within_bones()
+        if self._bones is not None:
+            self._bones.limit_sizes(self.model)
         rate = self._settings.rates.by_parameter()["means"].at(progress)
         self._strategy.adapt(learner.population, index, rate)
+        if self._bones is not None:
+            self._bones.rehang(self.model, index)
         learner.prune(index, self._steps)
         return {
             "loss": loss.item(),
@@ -83,15 +85,6 @@ class BodyTrainer(WindowTrainee):
         pose = motion.pose_at(values, tau)
         dropped = self._learner.random(index, 4).random() < self._settings.skinning.dropout
         return motion.drawn(values, without_residual(pose) if dropped else pose)
-
-    @torch.no_grad()
-    def _keep_within_bones(self) -> None:
-        """Gaussians on a skeleton stay shorter than what carries them."""
-        if self._bones is None:
-            return
-        values = self.model.gaussians
-        most = largest_log_scales(self._bones, values["skin_joints"], values["skin_logits"])
-        values["log_scales"].clamp_(max=most)
 
     def tensors(self) -> dict[str, Tensor]:
         """Parameters, moments, and what density control has gathered."""

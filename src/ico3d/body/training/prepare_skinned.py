@@ -11,7 +11,7 @@ from ico3d.body.settings import BodySettings
 from ico3d.body.skinning.coefficients import initial_network
 from ico3d.body.skinning.light import LIGHTS
 from ico3d.body.skinning.skinned import NETWORK, Skinned
-from ico3d.body.skinning.template import Skin, sampled
+from ico3d.body.skinning.template import Skin, hung_logits, sampled
 from ico3d.body.training.begin import Begin, round_gaussians, trespassing
 from ico3d.body.training.standing_off import standing_off
 from ico3d.body.training.surface_points import initial_points
@@ -26,8 +26,6 @@ SPARE = 3
 """Times as many points as are wanted are drawn: those that nobody sees are left out."""
 SURFACE = 10_000
 """Points of the recorded surface among which what stands off the skin is sought."""
-LEAST_WEIGHT = 1e-3
-"""Of a joint, before the logarithm: what does not carry a Gaussian may learn to."""
 
 
 def begin_skinned(
@@ -158,10 +156,9 @@ def _motion(
 def _hung(skin: Skin, motion: Skinned) -> dict[str, Tensor]:
     """What the motion hangs on the Gaussians; no residual yet."""
     binding = skin.binding
-    logits = torch.from_numpy(binding.weights).float().clamp_min(LEAST_WEIGHT).log()  # (P, 4)
     tensors = {
         "skin_joints": torch.from_numpy(binding.joints.astype(np.int32)),
-        "skin_logits": logits,
+        "skin_logits": hung_logits(binding),
     }
     if motion.light:
         tensors["normals"] = torch.from_numpy(skin.normals).float()

@@ -10,6 +10,7 @@ from torch import Tensor
 from ico3d.capture.capture import Capture
 from ico3d.capture.pictures import LayerCache, Layers, View, train_cameras
 from ico3d.errors import CaptureError
+from ico3d.rig.body_track import BodyTrack
 
 MARGIN = 8
 """Pixels around the person that are kept: what lies outside of the mask must learn to be empty."""
@@ -68,6 +69,10 @@ class BodyViews:
         ]
         if not self.views:
             raise CaptureError(f"{capture.path} has no picture of the person to train on.")
+
+    def body_track(self) -> BodyTrack | None:
+        """How the person moved, where the recording knows it."""
+        return self._capture.body_track()
 
     def example(self, view: View, color: np.ndarray, device: torch.device) -> Example:
         """What a view asks for, before a colour (3,)."""
