@@ -24,6 +24,8 @@ from ico3d.splat.initial import spacing
 
 SPARE = 3
 """Times as many points as are wanted are drawn: those that nobody sees are left out."""
+LOOKS = 5
+"""Frames at which it is looked which points of the skin cameras see."""
 SURFACE = 10_000
 """Points of the recorded surface among which what stands off the skin is sought."""
 LEAST_WEIGHT = 1e-3
@@ -37,7 +39,7 @@ def begin_skinned(
     rng: np.random.Generator,
     companion: Companion | None = None,
 ) -> Begin:
-    """Round Gaussians on the skin, as far as cameras see it at the window's centre frame.
+    """Round Gaussians on the skin, as far as cameras see it at some of the window's frames.
 
     Args:
         capture: The recording, with a body track.
@@ -51,7 +53,7 @@ def begin_skinned(
     """
     track = tracked(capture)
     count = min(settings.initial.gaussians, settings.density.max_gaussians)
-    skin = _seen(sampled(track, SPARE * count, rng), track, capture, window.center)
+    skin = _seen(sampled(track, SPARE * count, rng), track, capture, window)
     skin = _dressed(skin, track, capture, window, count, settings, rng)
     if companion is not None:
         skin = _beside(companion, skin, track, window.center, rng)
@@ -80,15 +82,17 @@ def tracked(capture: Capture) -> BodyTrack:
     return track
 
 
-def _seen(skin: Skin, track: BodyTrack, capture: Capture, frame: int) -> Skin:
-    """The points that some training camera sees."""
-    places = skin.posed(track, frame)  # (P, 3)
-    gap = HIDING * float(np.median(spacing(places)))
+def _seen(skin: Skin, track: BodyTrack, capture: Capture, window: Window) -> Skin:
+    """The points that some training camera sees at some time: arms hide what they hang before."""
     cameras = [capture.cameras[index] for index in train_cameras(capture)]
-    seen = np.any([visible(places, camera, gap) for camera in cameras], axis=0)  # (P,)
+    seen = np.zeros(len(skin), bool)
+    for frame in np.unique(np.linspace(window.first, window.last, LOOKS).round().astype(int)):
+        places = skin.posed(track, int(frame))  # (P, 3)
+        gap = HIDING * float(np.median(spacing(places)))
+        seen |= np.any([visible(places, camera, gap) for camera in cameras], axis=0)
     if not seen.any():
         raise CaptureError(
-            f"{capture.path}: the body track lies outside of all pictures at frame {frame}: "
+            f"{capture.path}: the body track lies outside of all pictures: "
             "delete it and run ico3d capture pose again."
         )
     return skin[seen]
