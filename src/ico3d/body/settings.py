@@ -100,12 +100,15 @@ class Loss:
         smoothness: Weight of the second differences of the encoder's planes. Not in the paper.
         stillness: Weight of how far the encoder's planes along time are from 1, where nothing
             moves. Not in the paper.
+        joints: Weight of the squares of the metres that a skinned body's joints are moved at rest,
+            so that those that hardly turn stay where they were tracked.
     """
 
     ssim: float = 0.2
     mask: float = 0.1
     smoothness: float = 0.0
     stillness: float = 0.0
+    joints: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -130,7 +133,9 @@ class Rates:
             last step.
         pose: Learning rate of a skinned body's poses, as quaternions.
         root: Learning rate of where its root is, metres.
-        pose_decay: Factor to which the rates of poses and roots have decayed at the last step.
+        joints: Learning rate of where its joints are at rest, metres.
+        pose_decay: Factor to which the rates of poses, roots and joints have decayed at the last
+            step.
         shape_means: Learning rate of its residual shapes' places, metres.
         shape_colors: Learning rate of its residual shapes' colours, logits.
         light: Learning rate of its light.
@@ -153,6 +158,7 @@ class Rates:
     motion_decay: float = 0.1
     pose: float = 1e-3
     root: float = 1e-3
+    joints: float = 5e-4
     pose_decay: float = 0.05
     shape_means: float = 2e-4
     shape_colors: float = 5e-3
@@ -174,6 +180,7 @@ class Rates:
             "motion": Rate(self.motion, self.motion_decay),
             "pose_rotations": Rate(self.pose, self.pose_decay),
             "pose_roots": Rate(self.root, self.pose_decay),
+            "rig_joints": Rate(self.joints, self.pose_decay),
             "shape_means": Rate(self.shape_means, self.skin_decay),
             "shape_colors": Rate(self.shape_colors, self.skin_decay),
             "light": Rate(self.light, self.skin_decay),

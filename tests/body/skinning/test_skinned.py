@@ -173,6 +173,16 @@ def test_a_trained_pose_far_from_others_has_its_own_coefficients():
     torch.testing.assert_close(found, mixed[8], atol=0.05, rtol=0)
 
 
+def test_a_pose_unlike_all_trained_ones_has_a_mean_of_several():
+    """Not what the nearest has: between two clusters of poses it is near the mean of both."""
+    turns = torch.tensor([0.0, 0.01, 1.0, 1.01])
+    known = torch.stack([turns.cos(), turns.sin(), 0 * turns, 0 * turns], 1)[:, None]  # (4, 1, 4)
+    place = torch.tensor(0.4)
+    pose = torch.stack([place.cos(), place.sin(), 0 * place, 0 * place])[None]
+    mixed = torch.tensor([[0.0], [0.0], [1.0], [1.0]])
+    assert 0.2 < float(interpolated(known, mixed, pose)) < 0.5
+
+
 def test_any_pose_can_be_drawn():
     """A trained one as it was trained, but for the coefficients; any other one finite."""
     values = arm_tensors(BARE)

@@ -66,18 +66,30 @@ def test_what_stands_off_the_skin_is_found(tmp_path):
 
 
 def test_poses_learn_from_pictures(capture):
-    """The shoulder finds its place, and what never trains is as it was."""
+    """The shoulder finds its angles."""
     trainer = trainer_of(capture, "skinned", window=CLIP, **{"rates.pose": 3e-2})
     assert shoulder_spread(capture, trainer) > 11
-    before = {n: trainer.model.shared[n].clone() for n in ("rig_joints", "pose_rotations")}
     for index in range(360):
         trainer.step(index)
     assert shoulder_spread(capture, trainer) < 5
-    assert torch.equal(before["rig_joints"], trainer.model.shared["rig_joints"])
     assert 250 < len(trainer.model) <= 400
     assert trainer.model.gaussians["skin_joints"].dtype == torch.int32
     for name in trainer.model.motion.per_gaussian:
         assert len(trainer.model.gaussians[name]) == len(trainer.model)
+
+
+def test_joints_learn_from_pictures(tmp_path):
+    """A shoulder that was tracked 6 cm too high finds its place; a weight can hold it."""
+    capture = TrackedCapture(tmp_path, misplaced=0.06)
+    off = {}
+    for weight in (0.0, 1e4):
+        changes = {"rates.joints": 2e-3, "rates.pose": 1e-6, "rates.root": 1e-6}
+        changes |= {"skinning.shapes": 0, "loss.joints": weight}
+        trainer = trainer_of(capture, "skinned", window=CLIP, **changes)
+        for index in range(200):
+            trainer.step(index)
+        off[weight] = abs(trainer.model.shared["rig_joints"][1, 1].item() - 0.2)
+    assert off[0.0] < 0.03 and off[1e4] > 0.05
 
 
 def test_copies_hang_on_the_joints_of_what_they_come_from(capture):

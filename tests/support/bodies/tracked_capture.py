@@ -17,11 +17,12 @@ class TrackedCapture(MovingCapture):
 
     Attributes:
         error: Degrees by which the track's shoulder is wrong, now this way, now the other.
+        misplaced: Metres by which it lies too high at rest.
     """
 
-    def __init__(self, path: Path, error: float = 0.0):
+    def __init__(self, path: Path, error: float = 0.0, misplaced: float = 0.0):
         super().__init__(path)
-        self.error = error
+        self.error, self.misplaced = error, misplaced
 
     def body_track(self) -> BodyTrack:
         rest = self._rest
@@ -34,8 +35,9 @@ class TrackedCapture(MovingCapture):
         turns = np.zeros((FRAMES, 2, 3))
         wrong = np.radians(self.error) * (-1.0) ** np.arange(FRAMES)
         turns[:, 1, 2] = [self.angle(f) + wrong[f] for f in range(FRAMES)]
+        places = np.array([[0.0, 0, 0], [0.14, 0.2 + self.misplaced, 0]])
         return BodyTrack(
-            Rig(("trunk", "shoulder"), (-1, 0), np.array([[0.0, 0, 0], [0.14, 0.2, 0]])),
+            Rig(("trunk", "shoulder"), (-1, 0), places),
             self.fps,
             from_rotvec(turns).astype(np.float32),
             np.zeros((FRAMES, 3), np.float32),

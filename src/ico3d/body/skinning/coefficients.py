@@ -11,6 +11,9 @@ LAYERS = ("weight0", "bias0", "weight1", "bias1")
 """Tensors of the network: (3·J, H), (H,), (H, K), (K,)."""
 NEAREST = 2.0
 """Width of the kernel, in distances from a pose to the nearest trained one, their median."""
+FARTHER = 0.5
+"""Of the distance to the nearest trained pose, by which the kernel is wider: a pose unlike all of
+them has a mean of several, not the cast shadows of the nearest one alone."""
 
 
 def features(rotations: Tensor) -> Tensor:
@@ -62,5 +65,6 @@ def interpolated(known: Tensor, coefficients: Tensor, rotations: Tensor) -> Tens
     between = torch.cdist(places, places)  # (F, F)
     between.fill_diagonal_(math.inf)
     width = NEAREST * between.amin(1).median() if len(known) > 1 else place.new_ones(())
-    away = (places - place).square().sum(1) / (2 * width.clamp_min(1e-6).square())  # (F,)
-    return torch.softmax(-away, 0) @ coefficients
+    away = (places - place).square().sum(1)  # (F,)
+    square = width.clamp_min(1e-6).square() + FARTHER**2 * away.min()
+    return torch.softmax(-away / (2 * square), 0) @ coefficients

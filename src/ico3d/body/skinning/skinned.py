@@ -87,7 +87,7 @@ class Skinned:
 
         Weights that are learnt gain nothing where the template's are good (docs/choices.md).
         """
-        return ("skin_joints", "skin_logits", "normals", "rig_joints")
+        return ("skin_joints", "skin_logits", "normals")
 
     def at(self, values: Mapping[str, Tensor], tau: float) -> Gaussians:
         """Activated Gaussians at τ; between two frames in a pose between theirs."""

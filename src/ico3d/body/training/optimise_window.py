@@ -44,6 +44,8 @@ class BodyTrainer(WindowTrainee):
             tensor.requires_grad_(name not in fixed)
         super().__init__(Learner(model, window, pictures, settings, extent, seed, companion))
         self._settings = settings
+        # Copied, because training changes it in place.
+        self._joints = model.shared["rig_joints"].detach().clone() if fixed else None  # (J, 3)
         self._steps = settings.steps_of(len(window))
         self._strategy = density_control(method, settings, self._steps, seed, extent)
         deforms = isinstance(model.motion, Deformation)
@@ -100,7 +102,7 @@ class BodyTrainer(WindowTrainee):
         self._strategy.restore(gathered)
 
     def _penalties(self) -> Tensor:
-        """What density control and the planes' regularisers add to the loss."""
+        """What density control and the regularisers of planes and joints add to the loss."""
         weights, model = self._settings.loss, self.model
         total = self._strategy.penalty(self._learner.population)
         planes = {n.removeprefix(GRID): p for n, p in model.shared.items() if n.startswith(GRID)}
@@ -110,4 +112,7 @@ class BodyTrainer(WindowTrainee):
             )
         if weights.stillness and planes:
             total = total + weights.stillness * time_change(planes)
+        if weights.joints and self._joints is not None:
+            moved = model.shared["rig_joints"] - self._joints  # (J, 3)
+            total = total + weights.joints * moved.square().sum()
         return total

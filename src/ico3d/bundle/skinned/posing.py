@@ -10,6 +10,8 @@ from ico3d.rig.quaternions import Array, multiply, normalized, slerp
 _FIRST = 0.4886025119029199
 _SECOND = (1.0925484305920792, 0.31539156525252005, 0.5462742152960396)
 """Of real spherical harmonics of degrees 1 and 2."""
+FARTHER = 0.5
+"""Of the distance to the nearest known pose, by which the kernel is wider."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +79,11 @@ def any_pose(baked: BakedSkinned, rotations: Array, root: Array) -> SkinnedPose:
         root: (3,) metres that the root moves from rest.
     """
     rotations = normalized(np.asarray(rotations, np.float64))
-    # Joints that never turned are as far from this pose in all known ones.
-    known = _features(baked.rotations[baked.known] / QUAT_UNIT)  # (P, 3·M)
-    here = _features(rotations[baked.moving])  # (3·M,)
-    away = np.square(known - here).sum(1) / (2 * float(baked.kernel_width[0]) ** 2)  # (P,)
-    parts = np.exp(away.min() - away)  # (P,)
+    known = np.repeat(baked.held[None] / QUAT_UNIT, len(baked.known), 0)  # (P, J, 4)
+    known[:, baked.moving] = baked.rotations[baked.known] / QUAT_UNIT
+    away = np.square(_features(known) - _features(rotations)).sum(1)  # (P,)
+    square = float(baked.kernel_width[0]) ** 2 + FARTHER**2 * away.min()
+    parts = np.exp((away.min() - away) / (2 * square))  # (P,)
     residual = (parts / parts.sum()) @ baked.coefficients[baked.known]  # (K,)
     return SkinnedPose(rotations, np.asarray(root, np.float64), residual)
 

@@ -13,6 +13,9 @@ export interface Pose {
 /** Numbers of a joint in a table: the rows of the matrix (R | t), the quaternion wxyz. */
 export const TABLE_ROW = 16;
 
+/** Of the distance to the nearest known pose, by which the kernel of any other pose is wider. */
+const FARTHER = 0.5;
+
 /** Forward kinematics of a rig, its recorded poses, and what any other pose has of the residual shapes. */
 export class Skeleton {
   readonly rig: Rig;
@@ -66,17 +69,28 @@ export class Skeleton {
     const { kernelWidth, coefficients, known } = this.poses;
     const here = new Float64Array(3 * moving);
     this.poses.moving.forEach((joint, m) => here.set(feature(quatAt(pose.rotations, joint)), 3 * m));
-    const away = Float64Array.from({ length: count }, (_, p) => {
-      const sum = here.reduce((sum, value, i) => sum + (this.known[3 * moving * p + i]! - value) ** 2, 0);
-      return sum / (2 * kernelWidth * kernelWidth);
-    });
+    const away = Float64Array.from({ length: count }, (_, p) =>
+      here.reduce((sum, value, i) => sum + (this.known[3 * moving * p + i]! - value) ** 2, 0),
+    );
     const nearest = away.reduce((least, value) => Math.min(least, value), Infinity);
-    const parts = away.map((value) => Math.exp(nearest - value));
+    const square = kernelWidth ** 2 + FARTHER ** 2 * (nearest + this.awayFromHeld(pose));
+    const parts = away.map((value) => Math.exp((nearest - value) / (2 * square)));
     const total = parts.reduce((sum, value) => sum + value, 0);
     pose.residual.fill(0);
     parts.forEach((part, p) => {
       for (let k = 0; k < shapes; k++) pose.residual[k]! += (part / total) * coefficients[known[p]! * shapes + k]!;
     });
+  }
+
+  /** The square of how far the joints that the recording never turns are from how they are held. */
+  private awayFromHeld({ rotations }: Pose): number {
+    let sum = 0;
+    for (const j of this.info.names.keys()) {
+      if (this.poses.moving.includes(j)) continue;
+      const [held, here] = [this.held, rotations].map((all) => feature(quatAt(all, j)));
+      for (const i of here!.keys()) sum += (held![i]! - here![i]!) ** 2;
+    }
+    return sum;
   }
 
   /** Writes what takes each joint's points from rest to the world: (J, TABLE_ROW). */
