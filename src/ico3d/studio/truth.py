@@ -23,10 +23,14 @@ class TrueJoints:
     Attributes:
         names: J names, MakeHuman's.
         places: (F, J, 3) metres in the world.
+        turns: (F, J, 3, 3) from rest to the world, of what the joints carry.
+        rest: (J, 3) metres, where the person stands at rest.
     """
 
     names: tuple[str, ...]
     places: np.ndarray
+    turns: np.ndarray
+    rest: np.ndarray
 
 
 def true_joints(folder: Path, subject: Path) -> TrueJoints:
@@ -54,4 +58,5 @@ def true_joints(folder: Path, subject: Path) -> TrueJoints:
     at = np.append(person.skeleton.at, np.ones((len(person.skeleton.at), 1)), 1)  # (J, 4)
     assert acted.joints is not None  # embodied
     places = np.einsum("fjab,jb->fja", acted.joints, at)[..., :3]  # (F, J, 3)
-    return TrueJoints(person.skeleton.names, places)
+    rest = person.skeleton.at + person.head_in_world
+    return TrueJoints(person.skeleton.names, places, acted.joints[..., :3, :3], rest)

@@ -38,7 +38,7 @@ def _acted():
     template = load_template()
     kinematics = Kinematics(template, anatomy_of(template))
     turns = np.tile(np.diag([-1.0, 1.0, -1.0]), (FRAMES, 1, 1))
-    body = Body.at_rest(template, 0, turns, np.full((FRAMES, 3), [0.1, -0.9, 0.2]))
+    body = Body.at_rest(template, np.zeros(0), turns, np.full((FRAMES, 3), [0.1, -0.9, 0.2]))
     body.shape[:] = np.random.default_rng(4).normal(0, 0.7, len(body.shape))
     for joint, bend in (("upperarm01.L", 0.9), ("lowerarm01.L", 0.6), ("lowerleg01.R", 0.7)):
         body.angles[:, template.names.index(joint), 0] = bend * np.linspace(0.2, 1, FRAMES)

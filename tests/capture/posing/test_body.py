@@ -20,7 +20,7 @@ def posed_body():
     """Kinematics, and a body in a pose and shape like no other."""
     template, random = load_template(), np.random.default_rng(3)
     turns = to_matrix(from_rotvec(np.array([[0.3, 1.2, -0.2]])))
-    body = Body.at_rest(template, 0, turns, np.array([[0.1, 0.2, 0.3]]))
+    body = Body.at_rest(template, np.zeros(0), turns, np.array([[0.1, 0.2, 0.3]]))
     body.angles = random.normal(0, 0.4, body.angles.shape)
     body.shape = random.normal(size=body.shape.shape)
     body.offsets = random.normal(0, 0.01, body.offsets.shape)
@@ -72,6 +72,8 @@ def test_points_follow_shape_and_their_own_offsets_as_finite_differences(posed_b
         body.shape[shape] -= STEP
         np.testing.assert_allclose(change[..., shape], (there - marks) / STEP, atol=1e-5)
     body.offsets[:, 1] += STEP
-    there = term.marks(body, posed)
+    moved = (term.marks(body, posed) - marks) / STEP  # (P, 3)
     body.offsets[:, 1] -= STEP
-    np.testing.assert_allclose(term.own(posed)[..., 1], (there - marks) / STEP, atol=1e-5)
+    rows = term.rows(body, posed, 0)
+    said = term.own(posed, rows).reshape(len(rows.ways), len(marks), 3)[..., 1].sum(1)
+    np.testing.assert_allclose(said, (rows.ways * moved[rows.numbers]).sum(1), atol=1e-5)

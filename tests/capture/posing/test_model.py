@@ -65,7 +65,7 @@ def test_points_of_detectors_and_annotators_are_landmarks_and_named_once():
 )
 def test_positive_bends_are_those_of_knees_elbows_and_fingers(template, joint, seen, way):
     kinematics = Kinematics(template, anatomy_of(template))
-    body = Body.at_rest(template, 0, np.eye(3)[None], np.zeros((1, 3)))
+    body = Body.at_rest(template, np.zeros(0), np.eye(3)[None], np.zeros((1, 3)))
     number = template.landmarks.index(seen)
     carrier = template.carriers[number]
 

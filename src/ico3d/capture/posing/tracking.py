@@ -14,6 +14,7 @@ from ico3d.capture.posing.fitting.gauss_newton import Plan, Solver
 from ico3d.capture.posing.fitting.rows import LandmarkTerm
 from ico3d.capture.posing.fitting.surface import Surface, vertex_normals
 from ico3d.capture.posing.model.anatomy import anatomy_of
+from ico3d.capture.posing.model.detector import mediapipe_detector
 from ico3d.capture.posing.model.landmarks import LANDMARKS
 from ico3d.capture.posing.model.template import Template, load_template
 from ico3d.capture.posing.seeing.evidence import INSTEAD, TORSO, Evidence, annotated, detected
@@ -23,8 +24,12 @@ from ico3d.rig.body_track import BodyTrack
 from ico3d.rig.quaternions import continuous, from_matrix, from_rotvec, slerp
 from ico3d.rig.rig import Rig
 
-PLANS = (Plan(25, 6, outlines=False), Plan(40, 0, outlines=True))
+PLANS = (Plan(25, 6, outlines=False), Plan(20, 0, outlines=True))
 """Points alone first; then outlines, too."""
+
+
+ANNOTATORS_OFFSET = 0.3
+"""Part of `Landmark.sigma` by which annotated points may lie beside: they are about joints."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,14 +97,13 @@ def fit(
         done: Called after each step.
     """
     frames = np.flatnonzero(evidence.fitted)
+    template, spread = _seen(template, evidence.detected)
     kinematics = Kinematics(template, anatomy_of(template))
     landmarks = LandmarkTerm(kinematics, evidence.points[frames], evidence.roots[frames])
     surface = Surface(kinematics, evidence.outlines, frames, seed=0)
     turns, roots = placed(template, evidence.points[frames])
-    body = Body.at_rest(template, surface.count, turns, roots)
-    body.offsets += evidence.offsets
-    usual = (evidence.offsets, evidence.sigmas)
-    solver = Solver(kinematics, landmarks, surface, usual, frames, capture.fps)
+    body = Body.at_rest(template, surface.usual, turns, roots)
+    solver = Solver(kinematics, landmarks, surface, spread, frames, capture.fps)
     for plan in PLANS:
         solver.run(body, plan, done)
     track = _track(capture, kinematics, surface, body, frames, evidence.source)
@@ -111,6 +115,15 @@ def fit(
         off[frame] = np.median(away[known])
         outside[frame] = surface.beyond(body, posed, int(frame))
     return Fitted(track, off, outside)
+
+
+def _seen(template: Template, detected: bool) -> tuple[Template, np.ndarray]:
+    """The template with landmarks as they are seen, and metres (P, 3) that they may be beside."""
+    if detected:
+        detector = mediapipe_detector(template.num_shapes)
+        return detector.seen(template), detector.spread
+    sigmas = np.array([landmark.sigma for landmark in LANDMARKS.values()])
+    return template, np.repeat(ANNOTATORS_OFFSET * sigmas[:, None], 3, 1)
 
 
 def placed(template: Template, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

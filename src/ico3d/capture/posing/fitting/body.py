@@ -17,7 +17,7 @@ class Body:
     Attributes:
         shape: (K,) coefficients of the template.
         offsets: (P, 3) metres by which landmarks are elsewhere than on the template, at rest.
-        off_skin: (S,) metres by which points of the surface stand off the template.
+        off_skin: (M,) metres by which clothes and hair stand off the template, at nodes.
         angles: (F, J, 3) radians of the joints about bend, side and twist.
         root_turns: (F, 3, 3) that come after the root's own angles; they stay.
         roots: (F, 3) metres that the root moves.
@@ -32,14 +32,14 @@ class Body:
 
     @staticmethod
     def at_rest(
-        template: Template, surface: int, root_turns: np.ndarray, roots: np.ndarray
+        template: Template, off_skin: np.ndarray, root_turns: np.ndarray, roots: np.ndarray
     ) -> "Body":
         """The mean shape at rest, turned and placed."""
         joints, marks = len(template.names), len(template.landmarks)
         return Body(
             np.zeros(template.num_shapes),
             np.zeros((marks, 3)),
-            np.zeros(surface),
+            off_skin.copy(),
             np.zeros((len(roots), joints, 3)),
             root_turns,
             roots.copy(),

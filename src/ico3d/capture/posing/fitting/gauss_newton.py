@@ -9,11 +9,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csc_matrix, csr_matrix, diags
-from scipy.sparse.linalg import splu
 
 from ico3d.capture.posing.fitting.body import Body, Kinematics, Posed
-from ico3d.capture.posing.fitting.rows import LandmarkTerm, Term
+from ico3d.capture.posing.fitting.rows import LandmarkTerm, Rows, Term
 from ico3d.capture.posing.fitting.surface import Surface
 from ico3d.rig.quaternions import from_matrix, from_rotvec, slerp, to_matrix, to_rotvec
 
@@ -50,7 +48,7 @@ class Solver:
         kinematics: Kinematics,
         landmarks: LandmarkTerm,
         surface: Surface,
-        usual: tuple[np.ndarray, np.ndarray],
+        spread: np.ndarray,
         frames: np.ndarray,
         fps: float,
     ):
@@ -60,13 +58,13 @@ class Solver:
             kinematics: Of the template.
             landmarks: Evidence by points.
             surface: Evidence by outlines.
-            usual: Offsets of landmarks (P, 3) that are usual, and (P,) metres that others differ.
+            spread: (P, 3) metres that landmarks usually lie elsewhere than on the template.
             frames: (F,) numbers in the recording of the frames that are fitted.
             fps: The recording's frames per second.
         """
         self._kinematics, self._anatomy = kinematics, kinematics.anatomy
         self._landmarks, self._surface = landmarks, surface
-        self._usual_offsets = usual
+        self._spread = spread
         middle = np.flatnonzero(frames[2:] - frames[:-2] == 2) + 1
         self._between = np.isin(np.arange(len(frames)), middle)  # (F,) has both neighbours
         tenths = (10 / fps) ** 2
@@ -83,38 +81,36 @@ class Solver:
         terms: list[Term] = [self._landmarks, *([self._surface] if plan.outlines else [])]
         for step in range(plan.steps):
             damping = FIRST_DAMPING * DAMPED**step
-            shared = _Shared(body, self._usual_offsets, self._surface.information)
+            shared = _Shared(self._kinematics, body, self._spread, self._surface)
             for frame in range(len(body.roots)):
-                self._pose(body, frame, terms, damping)
+                posed = self._kinematics.posed(body, frame)
+                seen = [_Seen.of(term, body, posed, frame) for term in terms]
+                normal = self._pose(body, frame, seen, damping)
                 if step >= plan.shape_from:
-                    shared.add(self._kinematics, body, frame, terms)
+                    shared.add(posed, seen, normal)
             if step >= plan.shape_from:
                 shared.solve(body)
             done()
 
-    def _pose(self, body: Body, frame: int, terms: Sequence[Term], damping: float) -> None:
-        """One step of a frame's angles and root."""
-        posed = self._kinematics.posed(body, frame)
-        count = body.angles[frame].size
-        normal, pull = np.zeros((count + 3, count + 3)), np.zeros(count + 3)
-        for term in terms:
-            rows = term.rows(body, posed, frame)
-            system = posed.changes(
-                rows.points, rows.ways, term.carried[rows.numbers]
-            )  # (N, 3 J + 3)
-            weighted = (system * rows.weights[:, None]).astype(np.float32)
-            normal += weighted.T @ system.astype(np.float32)
-            pull += weighted.T @ rows.missing
-        strength, aim = self._prior(body, frame)
-        pull += strength * (aim - np.append(body.angles[frame], body.roots[frame]))
+    def _pose(self, body: Body, frame: int, seen: Sequence["_Seen"], damping: float) -> np.ndarray:
+        """One step of a frame's angles and root.
+
+        Returns:
+            (3 J + 3, 3 J + 3) normal matrix without the neighbours in time: of what the pose
+            resists where all frames turn alike.
+        """
+        normal = np.sum([one.turning.T @ one.weighted for one in seen], 0, dtype=float)
+        pull = np.sum([one.weighted.T @ one.missing for one in seen], 0)
+        (strength, aim), (calm, middle) = self._prior(body, frame), self._neighbours(body, frame)
+        now = np.append(body.angles[frame], body.roots[frame])
         slow = np.append(1 / self._anatomy.spread.ravel() ** 2, [1.0] * 3)
-        number = np.arange(count + 3)
+        number = np.arange(len(now))
         normal[number, number] += strength + damping * (slow + normal[number, number])
-        step = np.linalg.solve(normal, pull)
-        turn = step[:count].reshape(-1, 3)
-        size = np.linalg.norm(turn, axis=-1, keepdims=True)
-        body.angles[frame] += turn * np.minimum(1, LARGEST_STEP / np.maximum(size, 1e-9))
-        body.roots[frame] += step[count:]
+        pull += strength * (aim - now) + calm * (middle - now)
+        step = turn(body, frame, np.linalg.solve(normal + np.diag(calm), pull))
+        for one in seen:
+            one.missing -= one.turning @ step
+        return normal
 
     def _prior(self, body: Body, frame: int) -> tuple[np.ndarray, np.ndarray]:
         """1 / variance (3 J + 3,) of angles and root before anything is seen, and their means."""
@@ -125,18 +121,57 @@ class Solver:
         beyond = np.where(stop != bend, 1 / LIMIT**2, 0.0)
         strength[:, 0] += beyond
         pull[:, 0] += beyond * stop
-        root_strength, root_aim = np.full(3, 1e-6), body.roots[frame]
-        if self._between[frame]:
-            around = 0.5 * (body.angles[frame - 1] + body.angles[frame + 1])
-            around[0] = _root_angles(body, frame)
-            calm = _calm(angles - around, self._pace[:, None])
-            strength, pull = strength + calm, pull + calm * around
-            root_aim = 0.5 * (body.roots[frame - 1] + body.roots[frame + 1])
-            root_strength = _calm(body.roots[frame] - root_aim, self._root_pace)
-        return (
-            np.append(strength, root_strength),
-            np.append(pull / strength, root_aim),
-        )
+        return np.append(strength, [1e-6] * 3), np.append(pull / strength, body.roots[frame])
+
+    def _neighbours(self, body: Body, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        """The same that the frames before and after say; 0 where one of them is missing."""
+        if not self._between[frame]:
+            nothing = np.zeros(body.angles[frame].size + 3)
+            return nothing, nothing
+        around = 0.5 * (body.angles[frame - 1] + body.angles[frame + 1])
+        around[0] = _root_angles(body, frame)
+        middle = 0.5 * (body.roots[frame - 1] + body.roots[frame + 1])
+        calm = _calm(body.angles[frame] - around, self._pace[:, None])
+        root = _calm(body.roots[frame] - middle, self._root_pace)
+        return np.append(calm, root), np.append(around, middle)
+
+
+def turn(body: Body, frame: int, step: np.ndarray) -> np.ndarray:
+    """Turns and moves a frame's body by (3 J + 3,), by no more than `LARGEST_STEP`; by what."""
+    angles = step[:-3].reshape(-1, 3)
+    size = np.linalg.norm(angles, axis=-1, keepdims=True)
+    angles = angles * np.minimum(1, LARGEST_STEP / np.maximum(size, 1e-9))
+    body.angles[frame] += angles
+    body.roots[frame] += step[-3:]
+    return np.append(angles, step[-3:])
+
+
+@dataclass(eq=False)
+class _Seen:
+    """What a term says about a frame.
+
+    Attributes:
+        term: The term.
+        rows: Its equations.
+        turning: (N, 3 J + 3) float32: how points go along their ways, by angles and root.
+        weighted: The same times the rows' weights.
+        missing: (N,) metres that are missed.
+    """
+
+    term: Term
+    rows: Rows
+    turning: np.ndarray
+    weighted: np.ndarray
+    missing: np.ndarray
+
+    @staticmethod
+    def of(term: Term, body: Body, posed: Posed, frame: int) -> "_Seen":
+        """Asks a term."""
+        rows = term.rows(body, posed, frame)
+        turning = posed.changes(rows.points, rows.ways, term.carried[rows.numbers])
+        turning = turning.astype(np.float32)
+        weighted = turning * rows.weights[:, None].astype(np.float32)
+        return _Seen(term, rows, turning, weighted, rows.missing.copy())
 
 
 def _calm(off: np.ndarray, pace: np.ndarray | float) -> np.ndarray:
@@ -155,76 +190,66 @@ def _root_angles(body: Body, frame: int) -> np.ndarray:
 
 
 class _Shared:
-    """Normal equations of what all frames share: shape, offsets of landmarks, stand-off."""
+    """Normal equations of what all frames share: shape, offsets of landmarks, stand-off.
 
-    def __init__(self, body: Body, usual: tuple[np.ndarray, np.ndarray], information: csr_matrix):
+    Poses give way to it as far as they like (Schur's complement): shoulders that grow broad move
+    arms along.
+    """
+
+    def __init__(self, kinematics: Kinematics, body: Body, spread: np.ndarray, surface: Surface):
         """Begins with priors.
 
         Detectors err alike in neighbouring frames, so that frames are not as many witnesses:
         priors count as often as the root of their number.
         """
-        self._say = len(body.roots) ** 0.5
-        self._shapes, self._information = len(body.shape), information
-        offsets = body.offsets.size
-        self._small = np.diag(
-            self._say * np.append(np.ones(self._shapes), np.repeat(1 / usual[1] ** 2, 3))
-        )
-        off = np.append(body.shape, body.offsets - usual[0])
-        self._pull = -np.diag(self._small) * off
-        self._own = np.zeros(len(body.off_skin))
-        self._own_pull = -self._say * (information @ body.off_skin)
-        self._mixed = np.zeros((self._shapes, len(body.off_skin)))
-        self._offsets = np.zeros((self._shapes, offsets))
+        self._kinematics = kinematics
+        shapes, marks, nodes = len(body.shape), body.offsets.size, len(body.off_skin)
+        self._shapes, self._marks = shapes, marks
+        self._own = {
+            LandmarkTerm: shapes + np.arange(marks),
+            Surface: shapes + marks + np.arange(nodes),
+        }
+        information = np.zeros((shapes + marks + nodes,) * 2)
+        known = np.append(np.ones(shapes), 1 / spread.ravel() ** 2)
+        information[: len(known), : len(known)] = np.diag(known)
+        information[len(known) :, len(known) :] = surface.information
+        off = np.concatenate([body.shape, body.offsets.ravel(), body.off_skin - surface.usual])
+        self._normal = len(body.roots) ** 0.5 * information
+        self._pull = -self._normal @ off
+        self._following: list[np.ndarray] = []
 
-    def add(self, kinematics: Kinematics, body: Body, frame: int, terms: Sequence[Term]) -> None:
-        """Adds what a frame says."""
-        posed: Posed = kinematics.posed(body, frame)
-        moved = kinematics.reshaped(posed)
-        shapes = self._shapes
-        for term in terms:
-            rows = term.rows(body, posed, frame)
-            if not len(rows.numbers):
+    def add(self, posed: Posed, seen: Sequence[_Seen], normal: np.ndarray) -> None:
+        """Adds what a frame says.
+
+        Args:
+            posed: The body in it.
+            seen: By each term.
+            normal: (3 J + 3, 3 J + 3) of its pose.
+        """
+        moved = self._kinematics.reshaped(posed)
+        mixed = np.zeros((len(normal), len(self._pull)))
+        for one in seen:
+            if not len(one.missing):
                 continue
-            way = rows.ways[:, None]  # (N, 1, 3)
-            change = (way @ term.reshaped(posed, moved)[rows.numbers])[:, 0]  # (N, K)
-            own = (way @ term.own(posed)[rows.numbers])[:, 0]  # (N, U)
-            weighted = change * rows.weights[:, None]
-            self._small[:shapes, :shapes] += weighted.T @ change
-            self._pull[:shapes] += weighted.T @ rows.missing
-            size = own.shape[1] * (int(rows.numbers.max()) + 1)
-            for u in range(own.shape[1]):
-                column = rows.numbers * own.shape[1] + u
-                mixed = np.stack(
-                    [np.bincount(column, w * own[:, u], size) for w in weighted.T]
-                )  # (K, ≤)
-                said = np.bincount(column, rows.weights * own[:, u] * rows.missing, size)
-                if own.shape[1] == 1:
-                    self._mixed[:, :size] += mixed
-                    self._own_pull[:size] += said
-                    self._own[:size] += np.bincount(column, rows.weights * own[:, u] ** 2, size)
-                    continue
-                self._offsets[:, :size] += mixed
-                self._pull[shapes : shapes + size] += said
-                for v in range(own.shape[1]):
-                    other = shapes + rows.numbers * own.shape[1] + v
-                    np.add.at(
-                        self._small,
-                        (shapes + column, other),
-                        rows.weights * own[:, u] * own[:, v],
-                    )
+            rows, term = one.rows, one.term
+            reshaped = term.reshaped(posed, moved)[rows.numbers]  # (N, 3, K)
+            change = (rows.ways[:, None] @ reshaped)[:, 0]  # (N, K)
+            system = np.concatenate([change, term.own(posed, rows)], 1).astype(np.float32)
+            weighted = system * rows.weights[:, None].astype(np.float32)
+            unknown = np.append(np.arange(self._shapes), self._own[type(term)])
+            self._normal[np.ix_(unknown, unknown)] += weighted.T @ system
+            self._pull[unknown] += weighted.T @ one.missing
+            mixed[:, unknown] += one.turning.T @ weighted
+        following = np.linalg.solve(normal, mixed)
+        self._normal -= mixed.T @ following
+        self._following.append(following.astype(np.float32))
 
     def solve(self, body: Body) -> None:
-        """One step of what is shared; the surface's stand-off is eliminated first."""
-        shapes = self._shapes
-        small = self._small.copy()
-        small[:shapes, shapes:] += self._offsets
-        small[shapes:, :shapes] += self._offsets.T
-        surface = splu(csc_matrix(self._say * self._information + diags(self._own)))
-        solved = surface.solve(self._mixed.T.copy())  # (S, K)
-        small[:shapes, :shapes] -= self._mixed @ solved
-        pull = self._pull.copy()
-        pull[:shapes] -= solved.T @ self._own_pull
-        step = np.linalg.solve(small, pull)
-        body.shape += step[:shapes]
-        body.offsets += step[shapes:].reshape(-1, 3)
-        body.off_skin += surface.solve(self._own_pull - self._mixed.T @ step[:shapes])
+        """One step of what is shared; poses follow."""
+        step = np.linalg.solve(self._normal, self._pull)
+        shape, offsets, off_skin = np.split(step, [self._shapes, self._shapes + self._marks])
+        body.shape += shape
+        body.offsets += offsets.reshape(-1, 3)
+        body.off_skin += off_skin
+        for frame, following in enumerate(self._following):
+            turn(body, frame, -(following @ step))

@@ -47,8 +47,8 @@ class Term(Protocol):
         """
         ...
 
-    def own(self, posed: Posed) -> np.ndarray:
-        """(P, 3, U) metres that its points move by one of each of their own U unknowns."""
+    def own(self, posed: Posed, rows: Rows) -> np.ndarray:
+        """(N, U) metres that points of rows go along their ways by one of the term's U unknowns."""
         ...
 
 
@@ -98,6 +98,9 @@ class LandmarkTerm:
         turned = np.einsum("pab,kpb->pak", posed.turns[self._carriers], local)
         return turned + moved[:, self._carriers].transpose(1, 2, 0)
 
-    def own(self, posed: Posed) -> np.ndarray:
-        """Three offsets each."""
-        return posed.turns[self._carriers]
+    def own(self, posed: Posed, rows: Rows) -> np.ndarray:
+        """By three offsets of each landmark."""
+        turned = np.einsum("na,nab->nb", rows.ways, posed.turns[self._carriers[rows.numbers]])
+        moves = np.zeros((len(rows.numbers), len(self._carriers), 3))
+        moves[np.arange(len(rows.numbers)), rows.numbers] = turned
+        return moves.reshape(len(rows.numbers), 3 * len(self._carriers))

@@ -1,30 +1,35 @@
 """The template's surface against the masks: clothes and hair stand off it, by always the same."""
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix, identity
 from scipy.spatial import KDTree
 
 from ico3d.capture.posing.fitting.body import Body, Kinematics, Posed, mixed
 from ico3d.capture.posing.fitting.rows import Rows
 from ico3d.capture.posing.model.template import Template
 from ico3d.capture.posing.seeing.outlines import Outlines
+from ico3d.common.camera import Camera
 
 COARSE, FINE = 0.03, 0.012
 """Metres between the looked-at points of the surface: anywhere, and on hands."""
 CAMERAS_AT_ONCE = 6
 """Cameras whose outlines a step looks at."""
+AHEAD = 0.03
+"""Metres off the rim where nothing else of the body may be seen: else there is no outline."""
 RIM = 0.3
 """Cosine between normal and line of sight below which a point may lie on the outline."""
 STRAY, CUT_OFF = 0.010, 0.04
 """Metres: an outline is met as well as that, and one that is farther off is another's."""
-STAND_OFF, SKIN = 0.015, 0.0015
-"""Metres that clothes and hair usually stand off the template, and skin of hands."""
-SMOOTH = 0.003
-"""Metres by which neighbours usually differ in it."""
-NEIGHBOURS = 6
+CLOTHES, HAIR, SKIN = (0.012, 0.015), (0.0, 0.015), (0.0, 0.0015)
+"""Metres that clothes, hair, and skin of hands usually stand off the template, and their spread."""
+SMOOTH = 0.012
+"""Metres by which neighbouring nodes usually differ in it."""
+APART, NEIGHBOURS = 0.08, 6
+"""Metres between nodes that know what stands off, and how many neighbours each has."""
+MIXED = 4
+"""Nodes between which a point's stand-off lies."""
 SAY = 0.06
 """Part of what a point of the rim says that counts: its neighbours say the same."""
-HAND = ("wrist", "metacarpal", "finger")
+HAND, HEAD = ("wrist", "metacarpal", "finger"), ("neck", "head")
 
 
 class Surface:
@@ -54,29 +59,37 @@ class Surface:
         self._basis = self._points[1:].transpose(1, 2, 0).copy()  # (S, 3, K)
         self._normals = vertex_normals(rest, template.faces)[chosen]
         self._weights = binding.dense(len(template.names))[chosen].astype(float)  # (S, J)
-        self._tree = KDTree(rest[chosen])
         self.carried = self._weights @ kinematics.below.astype(float)  # (S, J)
-        usual = np.where(in_hand[chosen], SKIN, STAND_OFF)
-        self.information = self._smoothness(rest[chosen], usual)
+        nodes = chosen[_thinned(rest[chosen], APART)]
+        self._tree = KDTree(rest[nodes])
+        self._nodes = self._between(rest[chosen])  # (S, M)
+        self.usual, spread = self._clothed([template.names[j] for j in strongest[nodes]])
+        self.information = self._smoothness(rest[nodes], spread)
 
-    @property
-    def count(self) -> int:
-        """S."""
-        return len(self._chosen)
+    def _between(self, points: np.ndarray) -> np.ndarray:
+        """(N, M) parts that nodes have in points (N, 3) of the mean shape."""
+        away, near = self._tree.query(points, MIXED)
+        parts = 1 / np.maximum(away, 0.01) ** 2  # (N, 4)
+        weights = np.zeros((len(points), self._tree.n))
+        np.put_along_axis(weights, np.asarray(near), parts / parts.sum(1, keepdims=True), 1)
+        return weights
 
-    def _smoothness(self, rest: np.ndarray, usual: np.ndarray) -> csr_matrix:
-        """(S, S) inverse covariance of what stands off: little, and much as its neighbours."""
-        near = np.asarray(self._tree.query(rest, NEIGHBOURS + 1)[1])[:, 1:]  # (S, 6)
-        rows = np.repeat(np.arange(len(rest)), NEIGHBOURS)
-        edges = np.arange(len(rows))
-        ones = np.ones(len(rows))
-        differ = coo_matrix(
-            (np.append(ones, -ones), (np.append(edges, edges), np.append(rows, near.ravel()))),
-            (len(rows), len(rest)),
-        )
-        return csr_matrix(
-            differ.T @ differ / SMOOTH**2 + identity(len(rest)).multiply(1 / usual[:, None] ** 2)
-        )
+    @staticmethod
+    def _clothed(carriers: list[str]) -> np.ndarray:
+        """(2, M) metres that nodes usually stand off and their spread, by the joints' names."""
+        kinds = [
+            SKIN if name.startswith(HAND) else HAIR if name.startswith(HEAD) else CLOTHES
+            for name in carriers
+        ]
+        return np.array(kinds).T
+
+    def _smoothness(self, nodes: np.ndarray, spread: np.ndarray) -> np.ndarray:
+        """(M, M) inverse covariance of what stands off: little, and much as its neighbours."""
+        near = np.asarray(self._tree.query(nodes, NEIGHBOURS + 1)[1])[:, 1:]  # (M, 6)
+        rows, edges = np.repeat(np.arange(len(nodes)), NEIGHBOURS), np.arange(near.size)
+        differ = np.zeros((len(edges), len(nodes)))
+        differ[edges, rows], differ[edges, near.ravel()] = 1, -1
+        return differ.T @ differ / SMOOTH**2 / 2 + np.diag(1 / spread**2)
 
     def rows(self, body: Body, posed: Posed, frame: int) -> Rows:
         """An equation for each point that is beyond a mask, or on the rim in a camera."""
@@ -106,6 +119,7 @@ class Surface:
         sight = points - lens.camera_to_world[:3, 3]
         sight /= np.linalg.norm(sight, axis=1, keepdims=True)
         rim = np.abs((sight * normals).sum(1)) < RIM
+        rim[rim] = _outermost(lens, pixels, points[rim] + AHEAD * normals[rim])
         with np.errstate(invalid="ignore"):
             used = np.isfinite(metres) & (depths > 0.05) & (rim | (metres < 0))
         off = np.where(used, metres, 0.0) / STRAY
@@ -133,7 +147,8 @@ class Surface:
 
     def skinned(self, body: Body, posed: Posed) -> tuple[np.ndarray, np.ndarray]:
         """(S, 3) points and normals in the world."""
-        rest = mixed(self._points, body.shape) + body.off_skin[:, None] * self._normals
+        rest = mixed(self._points, body.shape)
+        rest += (self._nodes @ body.off_skin)[:, None] * self._normals
         moves = posed.places - np.einsum("jab,jb->ja", posed.turns, posed.joints)  # (J, 3)
         turns = self._turns(posed)
         points = (turns @ rest[..., None])[..., 0] + self._weights @ moves
@@ -150,15 +165,22 @@ class Surface:
         moves = moved.transpose(1, 2, 0) - back  # (J, 3, K)
         return basis + (self._weights @ moves.reshape(len(moves), -1)).reshape(basis.shape)
 
-    def own(self, posed: Posed) -> np.ndarray:
-        """(S, 3, 1): one stand-off each, along the normal."""
-        return np.einsum("sab,sb->sa", self._turns(posed), self._normals)[..., None]
+    def own(self, posed: Posed, rows: Rows) -> np.ndarray:
+        """By the nodes' stand-off, along the points' normals."""
+        normals = (self._turns(posed) @ self._normals[..., None])[..., 0]
+        along = (rows.ways * normals[rows.numbers]).sum(1)
+        return along[:, None] * self._nodes[rows.numbers]
 
     def whole(self, off_skin: np.ndarray) -> np.ndarray:
-        """(V,) metres that all of the template's vertices stand off, from the chosen points'."""
-        away, near = self._tree.query(self._template.vertices[0], 4)
-        weights = 1 / np.maximum(away, 1e-3) ** 2  # (V, 4)
-        return (weights * off_skin[near]).sum(1) / weights.sum(1)
+        """(V,) metres that all of the template's vertices stand off, from the nodes'."""
+        return self._between(self._template.vertices[0]) @ off_skin
+
+
+def _outermost(lens: Camera, pixels: np.ndarray, ahead: np.ndarray) -> np.ndarray:
+    """(N,) whether a camera sees nothing of the body around places (N, 3) ahead of its rim."""
+    there, depths = lens.project(ahead)
+    away = np.asarray(KDTree(pixels).query(there)[0])
+    return away * depths / lens.intrinsics[0, 0] > 0.5 * AHEAD
 
 
 def _thinned(points: np.ndarray, apart: float) -> np.ndarray:

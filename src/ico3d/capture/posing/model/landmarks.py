@@ -12,28 +12,16 @@ class Landmark:
         bone: The bone at whose end it is; empty where vertices tell.
         end: `head` or `tail` of that bone.
         vertices: Numbers of vertices of the base mesh; it is at their mean.
-        detected: (3,) metres at rest by which MediaPipe usually sees it elsewhere.
-        sigma: Metres by which it may lie elsewhere still, always by the same way.
+        sigma: Metres by which a person's may lie elsewhere, always by the same way.
     """
 
     carrier: str
     bone: str = ""
     end: str = "head"
     vertices: tuple[int, ...] = ()
-    detected: tuple[float, float, float] = (0.0, 0.0, 0.0)
     sigma: float = 0.02
 
 
-DETECTED = {
-    "shoulder": (0.0, 0.027, -0.009),
-    "elbow": (-0.011, 0.011, 0.003),
-    "wrist": (-0.007, 0.0, 0.009),
-    "hip": (0.0, -0.007, 0.018),
-    "knee": (-0.012, -0.011, -0.012),
-    "ankle": (0.0, 0.025, 0.0),
-}
-"""Metres by which MediaPipe's joints lie beside the rig's, of the left side at rest: measured on a
-synthetic woman in twelve cameras, the mean of both sides."""
 FINGERS = ("thumb", "index", "middle", "ring", "little")
 
 
@@ -55,32 +43,18 @@ def _side(
     """The points of one side of the body; numbers are vertices of the base mesh."""
     head = "head"
 
-    def at(name: str) -> tuple[float, float, float]:
-        x, y, z = DETECTED[name]
-        return (x if side == "L" else -x, y, z)
-
     return {
         f"eye.{side}": Landmark(head, f"eye.{side}", sigma=0.012),
         f"eye_inner.{side}": Landmark(head, vertices=(inner,), sigma=0.01),
         f"eye_outer.{side}": Landmark(head, vertices=(outer,), sigma=0.01),
         f"ear.{side}": Landmark(head, vertices=(ear,), sigma=0.03),
         f"mouth.{side}": Landmark(head, vertices=(mouth,), sigma=0.012),
-        f"shoulder.{side}": Landmark(
-            f"shoulder01.{side}", f"upperarm01.{side}", detected=at("shoulder"), sigma=0.015
-        ),
-        f"elbow.{side}": Landmark(
-            f"upperarm02.{side}", f"lowerarm01.{side}", detected=at("elbow"), sigma=0.012
-        ),
-        f"wrist.{side}": Landmark(
-            f"lowerarm02.{side}", f"wrist.{side}", detected=at("wrist"), sigma=0.01
-        ),
-        f"hip.{side}": Landmark("root", f"upperleg01.{side}", detected=at("hip"), sigma=0.025),
-        f"knee.{side}": Landmark(
-            f"upperleg02.{side}", f"lowerleg01.{side}", detected=at("knee"), sigma=0.015
-        ),
-        f"ankle.{side}": Landmark(
-            f"lowerleg02.{side}", f"foot.{side}", detected=at("ankle"), sigma=0.012
-        ),
+        f"shoulder.{side}": Landmark(f"shoulder01.{side}", f"upperarm01.{side}", sigma=0.015),
+        f"elbow.{side}": Landmark(f"upperarm02.{side}", f"lowerarm01.{side}", sigma=0.012),
+        f"wrist.{side}": Landmark(f"lowerarm02.{side}", f"wrist.{side}", sigma=0.01),
+        f"hip.{side}": Landmark("root", f"upperleg01.{side}", sigma=0.025),
+        f"knee.{side}": Landmark(f"upperleg02.{side}", f"lowerleg01.{side}", sigma=0.015),
+        f"ankle.{side}": Landmark(f"lowerleg02.{side}", f"foot.{side}", sigma=0.012),
         f"heel.{side}": Landmark(f"foot.{side}", vertices=(heel,), sigma=0.02),
         f"toe.{side}": Landmark(f"foot.{side}", f"toe1-2.{side}", "tail", sigma=0.02),
         f"little_toe.{side}": Landmark(f"foot.{side}", f"toe5-3.{side}", "tail", sigma=0.02),

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ico3d.capture.capture import Capture
-from ico3d.capture.posing.model.landmarks import LANDMARKS
 from ico3d.capture.posing.model.naming import COCO_WHOLE_BODY
 from ico3d.capture.posing.seeing.agreement import (
     CORE,
@@ -27,8 +26,6 @@ BODY_STRAY, HAND_STRAY = 0.012, 0.006
 """Metres by which triangulated points usually err."""
 ANNOTATED_STRAY = 0.006
 """Metres by which annotated points usually err."""
-ANNOTATORS_OFFSET = 0.3
-"""Part of a detector's constant offset that annotated points may have: they are about joints."""
 DEPTH_STRAY = 0.08
 """Metres by which one camera errs about depths."""
 IN_HANDS = np.isin(np.arange(len(NAMES)), np.concatenate(HANDS))
@@ -51,18 +48,6 @@ class Evidence:
     outlines: Outlines
     source: str
     detected: bool
-
-    @property
-    def offsets(self) -> np.ndarray:
-        """(P, 3) metres by which the points usually lie beside the template's landmarks."""
-        usual = np.array([landmark.detected for landmark in LANDMARKS.values()])
-        return usual * float(self.detected)
-
-    @property
-    def sigmas(self) -> np.ndarray:
-        """(P,) metres by which they lie elsewhere still, always by the same way."""
-        usual = np.array([landmark.sigma for landmark in LANDMARKS.values()])
-        return usual if self.detected else ANNOTATORS_OFFSET * usual
 
     @property
     def fitted(self) -> np.ndarray:
