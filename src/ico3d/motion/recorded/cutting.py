@@ -1,0 +1,208 @@
+"""Finds gestures in a recording: spans of frames, with names."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ico3d.motion.recorded.cut import REST, Cut
+from ico3d.motion.recorded.head_cuts import head_cuts
+from ico3d.motion.recorded.naming import name_of
+from ico3d.motion.recorded.recording import Recording
+from ico3d.motion.recorded.turning_points import runs, swings, turning_points, volleys
+from ico3d.motion.roles import SIDES
+from ico3d.rig.quaternions import Array
+
+AWAY, BACK = 0.22, 0.08
+"""Arm lengths from where a hand rests from which it gestures, and at which it is back."""
+LEAST, GAP = 0.3, 0.2
+"""Seconds that a gesture lasts at least, and that two of them are apart."""
+CALM = 0.2
+"""Arm lengths a second below which a hand is calm."""
+HANGS = -0.55
+"""Arm lengths above the shoulder below which a wrist may rest."""
+LEAST_REST = 0.5
+"""Seconds that somebody rests at least."""
+SLOWER = 1.8
+"""How many times slower than before and after a hand is where a stroke arrives."""
+HELD = 2.0
+"""How many times faster than where it is slowest a hand may be that is held."""
+PREPARED, SOON = 0.22, 0.8
+"""Seconds: the hand that stops for less than the first, and is elsewhere within the second, was
+brought to where the stroke begins."""
+TAKES_PART = 0.35
+"""How far a hand goes in a gesture that is its own, next to the other one, at least."""
+SWING = 0.15
+"""Arm lengths that the tip of a waving hand goes to a side, at least."""
+SWINGS = 3
+"""How often a waving hand goes from side to side, at least."""
+AFTERWARDS = 0.35
+"""Seconds after a wave in which a stop is its end."""
+UPRIGHT, SHOULDER = 0.3, -0.25
+"""How much a waving hand points up, and arm lengths that it is above the shoulder, at least."""
+ALIKE = 4
+"""Cuts of one name that are kept, at most: those that go farthest."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Watched:
+    """What is told of the hands before anything is cut.
+
+    Attributes:
+        recording: Whose.
+        rest: First and last frame of the longest rest; None where nobody rests.
+        away: (2, F) arm lengths of the left and the right hand from where they rest.
+        speed: (2, F) arm lengths a second.
+    """
+
+    recording: Recording
+    rest: tuple[int, int] | None
+    away: Array
+    speed: Array
+
+    @property
+    def resting(self) -> int:
+        """A frame of rest; where there is none, that with the hands the nearest to hanging."""
+        if self.rest is not None:
+            return sum(self.rest) // 2
+        return int(self.away.max(0).argmin())
+
+
+def find_cuts(recording: Recording) -> list[Cut]:
+    """What somebody did, by rule, in the order of time.
+
+    Gestures of the hands last from when they leave their rest until they are back; there each place
+    at which they slow down is a stroke of its own, and a hand that goes from side to side waves.
+    Names follow from what hands do where the stroke arrives; nods and shakes are the head's.
+    """
+    seen = _watched(recording)
+    found = [cut for span in _spans(seen) for cut in _of_span(seen, *span)]
+    found += head_cuts(recording)
+    kept = [cut for cut in found if _rank(seen, cut, found) < ALIKE]
+    if seen.rest is not None:
+        first, last = seen.rest
+        kept.append(Cut(REST, first, first, last, last))
+    return sorted(kept, key=lambda cut: (cut.first, cut.last, cut.name))
+
+
+def _watched(recording: Recording) -> _Watched:
+    hands = [recording.hands[side] for side in SIDES]
+    speed = np.stack([recording.speed(side) for side in SIDES])  # (2, F)
+    low = np.all([hand.place[:, 1] < HANGS for hand in hands], axis=0)
+    calm = (speed < CALM).all(0) & low  # (F,)
+    long = [run for run in runs(calm) if run[1] - run[0] + 1 >= recording.frames(LEAST_REST)]
+    rest = max(long, key=lambda run: run[1] - run[0], default=None)
+    away: list[Array] = []
+    for side, hand in zip(SIDES, hands, strict=True):
+        at_rest = recording.hanging[side].knuckles[0]
+        if calm.any():
+            at_rest = np.median(hand.knuckles[calm], axis=0)
+        away.append(np.linalg.norm(hand.knuckles - at_rest, axis=-1))
+    return _Watched(recording, rest, np.stack(away), speed)
+
+
+def _spans(seen: _Watched) -> list[tuple[int, int]]:
+    """First and last frame of what hands do between one rest and the next."""
+    frames = seen.recording.frames
+    active = (seen.away > AWAY).any(0)  # (F,)
+    for first, last in runs(~active):
+        if last - first + 1 < frames(GAP) and first > 0 and last < len(active) - 1:
+            active[first : last + 1] = True
+    whole = [run for run in runs(active) if run[1] - run[0] + 1 >= frames(LEAST)]
+    away = seen.away.max(0)
+    found: list[tuple[int, int]] = []
+    for first, last in whole:
+        while first > 0 and away[first] > BACK and away[first - 1] < away[first]:
+            first -= 1
+        while last < len(away) - 1 and away[last] > BACK and away[last + 1] < away[last]:
+            last += 1
+        found.append((first, last))
+    return found
+
+
+def _of_span(seen: _Watched, first: int, last: int) -> list[Cut]:
+    """The gestures of a span, each from where the one before is let go."""
+    waves = [wave for side in SIDES for wave in _waves(seen, side, first, last)]
+    after = seen.recording.frames(AFTERWARDS)
+    strokes = [
+        stop
+        for stop in _stops(seen, first, last)
+        if not any(stop.stroke <= wave.last + after and stop.last >= wave.first for wave in waves)
+    ]
+    found: list[Cut] = []
+    for cut in sorted(waves + strokes, key=lambda cut: cut.stroke):
+        begin = found[-1].release if found else first
+        hands = cut.hands or _taking_part(seen, max(begin, cut.first), cut.stroke)
+        name = cut.name or name_of(seen.recording, hands, cut.stroke, seen.resting)
+        found.append(Cut(name, begin, cut.stroke, cut.release, cut.release, hands))
+    return [*found[:-1], *(replace(cut, last=last) for cut in found[-1:])]
+
+
+def _stops(seen: _Watched, first: int, last: int) -> list[Cut]:
+    """Where the hands slow down: strokes without a name, each from where the one before ends."""
+    away = (seen.away > AWAY).any(0)
+    speed = np.where(seen.away > BACK, seen.speed, 0).max(0)  # (F,) of what gestures
+    part = np.log(speed[first : last + 1] + 0.1 * CALM)
+    turns = turning_points(part, np.log(SLOWER))
+    lows = [first + i for i, j in zip(turns, _others(turns), strict=True) if part[i] < part[j]]
+    found: list[Cut] = []
+    for low in lows:
+        if not away[low] or low in (first, last):
+            continue
+        still = speed <= max(CALM, HELD * speed[low])
+        begin, end = next(run for run in runs(still) if run[0] <= low <= run[1])
+        begin, end = max(begin, first), min(end, last)
+        before = found[-1].last if found else first
+        if not found or begin > before:
+            found.append(Cut("", before, begin, end, end))
+    return found[1:] if _prepares(found, seen.recording.fps) else found
+
+
+def _prepares(stops: list[Cut], fps: float) -> bool:
+    """Whether the first stop only brings the hands to where the stroke begins."""
+    if len(stops) < 2:
+        return False
+    stop, after = stops[:2]
+    return stop.last - stop.stroke < PREPARED * fps and after.stroke - stop.last <= SOON * fps
+
+
+def _others(turns: list[int]) -> list[int]:
+    """For each turning point one beside it."""
+    return [turns[i - 1] if i else turns[1] for i in range(len(turns))]
+
+
+def _taking_part(seen: _Watched, first: int, stroke: int) -> tuple[str, ...]:
+    """The hands that are away from rest and go about as far; of none, the one farther away."""
+    hands = [seen.recording.hands[side].knuckles[first : stroke + 1] for side in SIDES]
+    gone = [np.ptp(knuckles, axis=0).max() for knuckles in hands]
+    found = [
+        side
+        for side, away, far in zip(SIDES, seen.away[:, stroke], gone, strict=True)
+        if away > AWAY and far > TAKES_PART * max(gone)
+    ]
+    return tuple(found) or (SIDES[int(seen.away[:, stroke].argmax())],)
+
+
+def _waves(seen: _Watched, side: str, first: int, last: int) -> list[Cut]:
+    """Where a hand that points up goes from side to side; from its first turn to its last."""
+    recording, hand = seen.recording, seen.recording.hands[side]
+    up = (hand.fingers[:, 1] > UPRIGHT) & (hand.place[:, 1] > SHOULDER)
+    found: list[Cut] = []
+    for begin, end in runs(up[first : last + 1]):
+        begin, end = first + begin, first + end
+        whole = swings(hand.tip[begin : end + 1, 0], SWING)
+        for volley in volleys(whole, recording):
+            if len(volley) < SWINGS:
+                continue
+            turns = [begin + swing.end for swing in volley]
+            back = turns[::2][-1]  # on the side of the stroke again
+            found.append(Cut("wave", begin + volley[0].begin, turns[0], back, turns[-1], (side,)))
+    return found
+
+
+def _rank(seen: _Watched, cut: Cut, found: list[Cut]) -> int:
+    """How many cuts of the same name go farther."""
+
+    def size(one: Cut) -> float:
+        return float(seen.away[:, one.stroke].max())
+
+    return sum(size(one) > size(cut) for one in found if one.name == cut.name)
