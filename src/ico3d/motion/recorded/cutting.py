@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ico3d.motion.recorded.cut import REST, Cut
+from ico3d.motion.recorded.cut import REST, Cut, Hands
 from ico3d.motion.recorded.head_cuts import head_cuts
 from ico3d.motion.recorded.naming import name_of
 from ico3d.motion.recorded.recording import Recording
 from ico3d.motion.recorded.turning_points import runs, swings, turning_points, volleys
-from ico3d.motion.roles import SIDES
+from ico3d.motion.roles import SIDES, Side
 from ico3d.rig.quaternions import Array
 
 AWAY, BACK = 0.22, 0.08
@@ -80,7 +80,7 @@ def find_cuts(recording: Recording) -> list[Cut]:
     kept = [cut for cut in found if _rank(seen, cut, found) < ALIKE]
     if seen.rest is not None:
         first, last = seen.rest
-        kept.append(Cut(REST, first, first, last, last))
+        kept.append(Cut(REST, "both", first, first, last, last))
     return sorted(kept, key=lambda cut: (cut.first, cut.last, cut.name))
 
 
@@ -103,7 +103,7 @@ def _watched(recording: Recording) -> _Watched:
 def _spans(seen: _Watched) -> list[tuple[int, int]]:
     """First and last frame of what hands do between one rest and the next."""
     frames = seen.recording.frames
-    active = (seen.away > AWAY).any(0)  # (F,)
+    active = np.any(seen.away > AWAY, axis=0)  # (F,)
     for first, last in runs(~active):
         if last - first + 1 < frames(GAP) and first > 0 and last < len(active) - 1:
             active[first : last + 1] = True
@@ -131,38 +131,45 @@ def _of_span(seen: _Watched, first: int, last: int) -> list[Cut]:
     found: list[Cut] = []
     for cut in sorted(waves + strokes, key=lambda cut: cut.stroke):
         begin = found[-1].release if found else first
-        hands = cut.hands or _taking_part(seen, max(begin, cut.first), cut.stroke)
-        name = cut.name or name_of(seen.recording, hands, cut.stroke, seen.resting)
-        found.append(Cut(name, begin, cut.stroke, cut.release, cut.release, hands))
+        found.append(replace(cut, first=begin, last=cut.release))
     return [*found[:-1], *(replace(cut, last=last) for cut in found[-1:])]
 
 
 def _stops(seen: _Watched, first: int, last: int) -> list[Cut]:
-    """Where the hands slow down: strokes without a name, each from where the one before ends."""
-    away = (seen.away > AWAY).any(0)
+    """Strokes: where the hands slow down, each from where the one before ends."""
+    away = np.any(seen.away > AWAY, axis=0)  # (F,)
     speed = np.where(seen.away > BACK, seen.speed, 0).max(0)  # (F,) of what gestures
     part = np.log(speed[first : last + 1] + 0.1 * CALM)
     turns = turning_points(part, np.log(SLOWER))
     lows = [first + i for i, j in zip(turns, _others(turns), strict=True) if part[i] < part[j]]
-    found: list[Cut] = []
+    found: list[tuple[int, int]] = []
     for low in lows:
         if not away[low] or low in (first, last):
             continue
         still = speed <= max(CALM, HELD * speed[low])
         begin, end = next(run for run in runs(still) if run[0] <= low <= run[1])
         begin, end = max(begin, first), min(end, last)
-        before = found[-1].last if found else first
-        if not found or begin > before:
-            found.append(Cut("", before, begin, end, end))
-    return found[1:] if _prepares(found, seen.recording.fps) else found
+        if not found or begin > found[-1][1]:
+            found.append((begin, end))
+    before = [first, *(end for _, end in found)]
+    cuts = [_stroke(seen, a, *stop) for a, stop in zip(before, found, strict=False)]
+    return cuts[1:] if _prepares(found, seen.recording.fps) else cuts
 
 
-def _prepares(stops: list[Cut], fps: float) -> bool:
+def _stroke(seen: _Watched, first: int, stroke: int, release: int) -> Cut:
+    """A stroke that begins where the hands were before."""
+    sides = _taking_part(seen, first, stroke)
+    name = name_of(seen.recording, sides, stroke, seen.resting)
+    hands: Hands = "both" if len(sides) == 2 else sides[0]
+    return Cut(name, hands, first, stroke, release, release)
+
+
+def _prepares(stops: list[tuple[int, int]], fps: float) -> bool:
     """Whether the first stop only brings the hands to where the stroke begins."""
     if len(stops) < 2:
         return False
-    stop, after = stops[:2]
-    return stop.last - stop.stroke < PREPARED * fps and after.stroke - stop.last <= SOON * fps
+    (begin, end), (after, _) = stops[:2]
+    return end - begin < PREPARED * fps and after - end <= SOON * fps
 
 
 def _others(turns: list[int]) -> list[int]:
@@ -170,11 +177,11 @@ def _others(turns: list[int]) -> list[int]:
     return [turns[i - 1] if i else turns[1] for i in range(len(turns))]
 
 
-def _taking_part(seen: _Watched, first: int, stroke: int) -> tuple[str, ...]:
+def _taking_part(seen: _Watched, first: int, stroke: int) -> tuple[Side, ...]:
     """The hands that are away from rest and go about as far; of none, the one farther away."""
     hands = [seen.recording.hands[side].knuckles[first : stroke + 1] for side in SIDES]
     gone = [np.ptp(knuckles, axis=0).max() for knuckles in hands]
-    found = [
+    found: list[Side] = [
         side
         for side, away, far in zip(SIDES, seen.away[:, stroke], gone, strict=True)
         if away > AWAY and far > TAKES_PART * max(gone)
@@ -182,7 +189,7 @@ def _taking_part(seen: _Watched, first: int, stroke: int) -> tuple[str, ...]:
     return tuple(found) or (SIDES[int(seen.away[:, stroke].argmax())],)
 
 
-def _waves(seen: _Watched, side: str, first: int, last: int) -> list[Cut]:
+def _waves(seen: _Watched, side: Side, first: int, last: int) -> list[Cut]:
     """Where a hand that points up goes from side to side; from its first turn to its last."""
     recording, hand = seen.recording, seen.recording.hands[side]
     up = (hand.fingers[:, 1] > UPRIGHT) & (hand.place[:, 1] > SHOULDER)
@@ -195,7 +202,7 @@ def _waves(seen: _Watched, side: str, first: int, last: int) -> list[Cut]:
                 continue
             turns = [begin + swing.end for swing in volley]
             back = turns[::2][-1]  # on the side of the stroke again
-            found.append(Cut("wave", begin + volley[0].begin, turns[0], back, turns[-1], (side,)))
+            found.append(Cut("wave", side, begin + volley[0].begin, turns[0], back, turns[-1]))
     return found
 
 

@@ -35,7 +35,7 @@ def head_cuts(recording: Recording) -> list[Cut]:
 def _cut(name: str, volley: list[Swing]) -> Cut:
     """The stroke arrives with the first swing; a head does not hold."""
     stroke = volley[0].end
-    return Cut(name, volley[0].begin, stroke, stroke, volley[-1].end)
+    return Cut(name, "none", volley[0].begin, stroke, stroke, volley[-1].end)
 
 
 def _down_and_up(volley: list[Swing]) -> list[list[Swing]]:

@@ -11,7 +11,7 @@ NEAR_CHIN, NEAR_HEART = 0.3, 0.3
 STRAIGHT, BENT = 50.0, 85.0
 """Degrees that a straight finger is bent at most, and a bent one at least."""
 POINTED, STRETCHED = 0.75, 0.92
-"""Arm lengths from shoulder to wrist of somebody who points with the index, or with an open hand."""
+"""Arm lengths from shoulder to wrist of who points with the index alone, or with the hand."""
 NOT_DOWN = -0.5
 """Arm lengths that a pointing wrist is above the shoulder at least."""
 ABOVE = 0.45
@@ -53,7 +53,7 @@ def name_of(recording: Recording, hands: tuple[str, ...], frame: int, rest: int)
 
 def _of_one(hand: Hand, i: int) -> str | None:
     """The name of what one hand does; None for a beat."""
-    out, up, ahead = hand.place[i]
+    _, up, ahead = hand.place[i]
     if hand.to_chin[i] < NEAR_CHIN:
         return "think"
     if hand.to_heart[i] < NEAR_HEART and hand.palm[i, 2] < -FACING:

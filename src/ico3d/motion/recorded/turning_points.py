@@ -8,8 +8,6 @@ import numpy as np
 from ico3d.motion.recorded.recording import Recording
 from ico3d.rig.quaternions import Array
 
-CORE = 0.25
-"""Part of a change that comes before its middle half and after it: there it may be slow."""
 STILL = 0.15
 """Part of the fastest step down to which a change has begun or goes on."""
 QUICK = (0.06, 0.45)
@@ -61,23 +59,24 @@ class Swing:
 
 
 def swings(values: Array, least: float) -> list[Swing]:
-    """Changes of values (F,) by `least` or more, without the time that they stay."""
-    turns = turning_points(values, least)
-    return [_swing(values, *pair) for pair in pairwise(turns)]
+    """Changes of values (F,) by `least` or more, around the fastest step between two turns.
+
+    What drifts before and after does not belong to them.
+    """
+    found = [_swing(values, *pair) for pair in pairwise(turning_points(values, least))]
+    return [swing for swing in found if abs(swing.change) >= least]
 
 
 def _swing(values: Array, first: int, last: int) -> Swing:
-    change = float(values[last] - values[first])
-    part = (values[first : last + 1] - values[first]) / change  # 0 to 1
-    begin = int(np.flatnonzero(part <= CORE)[-1])
-    end = begin + int(np.flatnonzero(part[begin:] >= 1 - CORE)[0])
-    steps = np.diff(part)
-    still = STILL * steps[begin:end].max()
+    steps = np.diff(values[first : last + 1]) * np.sign(values[last] - values[first])
+    begin = end = int(np.argmax(steps))
+    still = STILL * steps[begin]
     while begin > 0 and steps[begin - 1] > still:
         begin -= 1
     while end < len(steps) and steps[end] > still:
         end += 1
-    return Swing(first + begin, first + end, change)
+    begin, end = first + begin, first + end
+    return Swing(begin, end, float(values[end] - values[begin]))
 
 
 def volleys(found: list[Swing], recording: Recording) -> list[list[Swing]]:
