@@ -224,4 +224,4 @@ def test_gestures_belong_to_the_rig(tmp_path):
 
 
 def test_a_rig_without_roles_has_no_gestures():
-    assert gesture_files(BAKED.rig) == {}
+    assert gesture_files(BAKED) == {}

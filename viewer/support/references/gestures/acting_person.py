@@ -81,7 +81,7 @@ def main() -> None:
         speech=about.speech,
     )
     animation = Animation(fps, FRAMES, Rest(0, 2), (Action(4, 0.9),))
-    files = random_files(head) | gesture_files(body.rig)
+    files = random_files(head) | gesture_files(body)
     files |= {SKINNED: body.to_bytes(), POSES: poses_to_bytes(poses)}
     files |= {ANIMATION: animation.to_bytes(), "thumbnail.png": thumbnail()}
     write_bundle(Path(sys.argv[1]) / "person.ico3d", manifest, files)
