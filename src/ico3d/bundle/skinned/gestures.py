@@ -11,7 +11,7 @@ from ico3d.motion.living import living
 from ico3d.motion.recorded.cut import Cut, from_toml, to_toml
 from ico3d.motion.recorded.cutting import find_cuts
 from ico3d.motion.recorded.making import recorded_clips
-from ico3d.motion.recorded.recording import recording_of
+from ico3d.motion.recorded.recording import Recording, recording_of
 from ico3d.motion.repertoire import clips_for, cuts_text, preferring, repertoire_bytes
 
 GESTURES = "body/gestures.safetensors"
@@ -28,16 +28,22 @@ def gesture_files(baked: BakedSkinned, cuts: Sequence[Cut] | None = None) -> dic
     Returns:
         The file by its name; none where the rig lacks roles.
     """
-    try:
-        somebody = living(baked.rig, 0)
-    except SettingsError:
+    recording = recording_in(baked)
+    if recording is None:
         return {}
-    info = baked.info
-    recording = recording_of(baked.rig, info.fps, recorded_rotations(baked))
+    somebody, info = living(baked.rig, 0), baked.info
     cuts = find_cuts(recording) if cuts is None else cuts
     clips = preferring(recorded_clips(recording, cuts), library(somebody.person))
     text = to_toml(cuts, info.fps, info.num_frames)
     return {GESTURES: repertoire_bytes(somebody, clips, text)}
+
+
+def recording_in(baked: BakedSkinned) -> Recording | None:
+    """How a body moved in its recording; None where its rig lacks the roles of a person."""
+    try:
+        return recording_of(baked.rig, baked.info.fps, recorded_rotations(baked))
+    except SettingsError:
+        return None
 
 
 def gestures_from(data: bytes, baked: BakedSkinned) -> tuple[dict[str, Clip], tuple[Cut, ...]]:

@@ -16,7 +16,7 @@ AWAY, BACK = 0.22, 0.08
 """Arm lengths from where a hand rests from which it gestures, and at which it is back."""
 LEAST, GAP = 0.3, 0.2
 """Seconds that a gesture lasts at least, and that two of them are apart."""
-CALM = 0.2
+CALM = 0.3
 """Arm lengths a second below which a hand is calm."""
 HANGS = -0.55
 """Arm lengths above the shoulder below which a wrist may rest."""

@@ -10,11 +10,21 @@ from ico3d.motion.person import Person, person_of
 from ico3d.motion.retarget import DOWN, PALM
 from ico3d.motion.roles import INDEX, SIDES
 from ico3d.motion.turning import dot
-from ico3d.rig.quaternions import Array, conjugate, continuous, multiply, rotate, to_rotvec
+from ico3d.rig.quaternions import (
+    Array,
+    conjugate,
+    continuous,
+    multiply,
+    normalized,
+    rotate,
+    to_rotvec,
+)
 from ico3d.rig.rig import Rig
 
 SMOOTH = 0.1
 """Seconds over which a speed is averaged."""
+STEADY = 0.1
+"""Seconds before and after a frame that tell how somebody stood in it."""
 FOUR = ("index", "middle", "ring", "little")
 
 
@@ -113,7 +123,25 @@ def recording_of(rig: Rig, fps: float, rotations: np.ndarray) -> Recording:
     """
     person = person_of(rig)
     poses = person.retarget.by_role(np.asarray(rotations, np.float64))
-    return Recording(person, fps, continuous(poses))
+    return Recording(person, fps, steadied(continuous(poses), fps))
+
+
+def steadied(poses: Array, fps: float) -> Array:
+    """Rotations (F, ..., 4) without the jitter of poses that were found frame by frame.
+
+    A parabola through the frames around each one (Savitzky and Golay) keeps the height of quick
+    strokes.
+    """
+    half = min(max(1, round(STEADY * fps)), (len(poses) - 1) // 2)
+    if half < 2:  # a parabola goes through three frames
+        return poses
+    around = np.arange(-half, half + 1)
+    weights = np.linalg.pinv(np.vander(around, 3, increasing=True))[0]  # (2 half + 1,)
+    before = 2 * poses[:1] - poses[half:0:-1]
+    after = 2 * poses[-1:] - poses[-2 : -half - 2 : -1]
+    padded = np.concatenate([before, poses, after])  # (F + 2 half, ..., 4)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, len(around), axis=0)
+    return normalized(windows @ weights)
 
 
 def speeds(places: Array, fps: float) -> Array:

@@ -1,0 +1,36 @@
+"""What a body on a skeleton did in its recording, and the file that says so."""
+
+from pathlib import Path
+
+from ico3d.body.model_folder import TrainedBody
+from ico3d.body.skinning.skinned import Skinned
+from ico3d.errors import SettingsError
+from ico3d.motion.recorded.cut import CUTS, Cut, from_toml
+from ico3d.motion.recorded.recording import Recording, recording_of
+from ico3d.rig.quaternions import normalized
+from ico3d.rig.rig import Rig
+
+
+def recording_of_body(body: TrainedBody) -> Recording | None:
+    """How a body moved, in its trained poses; None without a skeleton that has a person's roles."""
+    model = body.models[0]
+    if not isinstance(model.motion, Skinned):
+        return None
+    shared = {name: value.detach().cpu().double().numpy() for name, value in model.shared.items()}
+    rig = Rig(model.motion.names, model.motion.parents, shared["rig_joints"])
+    try:
+        return recording_of(rig, body.fps, normalized(shared["pose_rotations"]))
+    except SettingsError:
+        return None
+
+
+def read_cuts(folder: Path, body: TrainedBody) -> tuple[Cut, ...] | None:
+    """The `clips.toml` of a model's folder; None where nobody put one there.
+
+    Raises:
+        SettingsError: If it makes no sense, or is of another body.
+    """
+    file = folder / CUTS
+    if not file.is_file():
+        return None
+    return from_toml(file.read_bytes(), str(file), body.fps, body.windows[-1].last + 1)
