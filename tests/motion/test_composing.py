@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 
 from ico3d.motion.clip import Clip
 from ico3d.motion.composing.accents import FRAME, Word
-from ico3d.motion.composing.composer import Composer, limbs
+from ico3d.motion.composing.composer import Composer
 from ico3d.motion.composing.cues import SETTLE, Cue, Direction, Release, clip_time, weight
 from ico3d.motion.composing.gaze import CHEST_YAW, HEAD_SPEED, HEAD_YAW, Gaze, direction_to
 from ico3d.motion.composing.performer import Performer
+from ico3d.motion.composing.takes import limbs
 from ico3d.motion.gestures.library import library
 from ico3d.motion.living import Living, living
 from ico3d.motion.roles import INDEX, SIDES

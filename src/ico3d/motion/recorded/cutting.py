@@ -12,7 +12,7 @@ from ico3d.motion.recorded.turning_points import runs, swings, turning_points, v
 from ico3d.motion.roles import SIDES, Side
 from ico3d.rig.quaternions import Array
 
-AWAY, BACK = 0.22, 0.08
+AWAY, BACK = 0.22, 0.04
 """Arm lengths from where a hand rests from which it gestures, and at which it is back."""
 LEAST, GAP = 0.3, 0.2
 """Seconds that a gesture lasts at least, and that two of them are apart."""
@@ -24,8 +24,13 @@ LEAST_REST = 0.5
 """Seconds that somebody rests at least."""
 SLOWER = 1.8
 """How many times slower than before and after a hand is where a stroke arrives."""
-HELD = 2.0
+HELD = 1.7
 """How many times faster than where it is slowest a hand may be that is held."""
+ARRIVED = 0.1
+"""Part of its fastest to which a hand has slowed down where the stroke arrives."""
+JITTER = 2.0, (0.1, 0.3)
+"""How many times faster than a resting hand, whose pose jitters, and between which arm lengths a
+second, a hand may be that is held."""
 PREPARED, SOON = 0.22, 0.8
 """Seconds: the hand that stops for less than the first, and is elsewhere within the second, was
 brought to where the stroke begins."""
@@ -52,12 +57,14 @@ class _Watched:
         rest: First and last frame of the longest rest; None where nobody rests.
         away: (2, F) arm lengths of the left and the right hand from where they rest.
         speed: (2, F) arm lengths a second.
+        jitter: Arm lengths a second up to which a hand that is held seems to move.
     """
 
     recording: Recording
     rest: tuple[int, int] | None
     away: Array
     speed: Array
+    jitter: float
 
     @property
     def resting(self) -> int:
@@ -97,7 +104,9 @@ def _watched(recording: Recording) -> _Watched:
         if calm.any():
             at_rest = np.median(hand.knuckles[calm], axis=0)
         away.append(np.linalg.norm(hand.knuckles - at_rest, axis=-1))
-    return _Watched(recording, rest, np.stack(away), speed)
+    times, (least, most) = JITTER
+    jitter = times * float(np.median(speed[:, calm])) if calm.any() else most
+    return _Watched(recording, rest, np.stack(away), speed, min(max(jitter, least), most))
 
 
 def _spans(seen: _Watched) -> list[tuple[int, int]]:
@@ -144,12 +153,12 @@ def _stops(seen: _Watched, first: int, last: int) -> list[Cut]:
     lows = [first + i for i, j in zip(turns, _others(turns), strict=True) if part[i] < part[j]]
     found: list[tuple[int, int]] = []
     for low in lows:
-        if not away[low] or low in (first, last):
-            continue
-        still = speed <= max(CALM, HELD * speed[low])
-        begin, end = next(run for run in runs(still) if run[0] <= low <= run[1])
-        begin, end = max(begin, first), min(end, last)
-        if not found or begin > found[-1][1]:
+        before = found[-1][1] if found else first
+        if away[low] and before < low < last:
+            still = max(seen.jitter, HELD * speed[low])
+            arrived = max(still, ARRIVED * speed[before:low].max())
+            begin = low - _run(speed[before + 1 : low + 1][::-1] <= arrived) + 1
+            end = low + _run(speed[low : last + 1] <= still) - 1
             found.append((begin, end))
     before = [first, *(end for _, end in found)]
     cuts = [_stroke(seen, a, *stop) for a, stop in zip(before, found, strict=False)]
@@ -170,6 +179,11 @@ def _prepares(stops: list[tuple[int, int]], fps: float) -> bool:
         return False
     (begin, end), (after, _) = stops[:2]
     return end - begin < PREPARED * fps and after - end <= SOON * fps
+
+
+def _run(there: np.ndarray) -> int:
+    """How many are True before the first that is not."""
+    return int(np.argmin(np.append(there, False)))
 
 
 def _others(turns: list[int]) -> list[int]:

@@ -24,8 +24,6 @@ from ico3d.rig.quaternions import (
     to_rotvec,
 )
 
-TOLERANCE = 1.0
-"""Degrees that a recorded clip's curves may be off, at most."""
 STROKE = 0.3
 """Seconds before a stroke arrives at which it begins."""
 HOLD = 0.4
@@ -94,7 +92,7 @@ class _Take:
             times = np.delete(times, -2)
         own = self._within(times - lead, frames, before, hold)  # (T, R, 4)
         poses = self._brought(times, own, lead, marks.end - tail)
-        return clip_of(name, marks, times, poses, self._roles(frames), TOLERANCE)
+        return clip_of(name, marks, times, poses, self._roles(frames))
 
     def _seconds(self, frames: int) -> float:
         return frames / self.recording.fps
