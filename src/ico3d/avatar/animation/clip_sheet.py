@@ -68,6 +68,6 @@ def mark(axes: "Axes", clips: Named) -> None:
 
 
 def _title(name: str, cut: Cut, frame: int) -> str:
-    said = {cut.last: "ends", cut.release: "released", cut.stroke: "stroke"}
+    said = {cut.release: "released", cut.last: "ends", cut.stroke: "stroke"}
     said[cut.first] = f"{name} ({cut.hands})" if cut.hands in ("left", "right") else name
     return f"{frame}: {said[frame]}" if frame in said else str(frame)

@@ -55,7 +55,8 @@ def gestures_from(data: bytes, baked: BakedSkinned) -> tuple[dict[str, Clip], tu
     info = baked.info
     try:
         clips, text = clips_for(data, baked.rig), cuts_text(data)
-        cuts = from_toml(text.encode(), "its cuts", info.fps, info.num_frames) if text else ()
+        about = "the list of clips", info.fps, info.num_frames
+        cuts = from_toml(text.encode(), *about) if text else ()
     except SettingsError as error:
         raise BundleError(f"{GESTURES}: {error}") from error
     return clips, cuts
