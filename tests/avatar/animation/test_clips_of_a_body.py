@@ -55,7 +55,10 @@ def test_clips_are_shown_renamed_and_baked(body, tmp_path, capsys):
     assert main(["animate", str(body), "--contact-sheet", str(sheet)]) == 0
     assert [row[0] for row in rows(capsys.readouterr().out)] == ["rest", "take_a_bow"]
     with Image.open(sheet) as picture:
-        assert picture.size == (1200, 1180)  # a row for each clip below the key frames
+        assert picture.size == (
+            1200,
+            2620,
+        )  # five rows of key frames and strokes, one for each clip
     out, again = tmp_path / "a.ico3d", tmp_path / "again.toml"
     assert main(["bake", str(body), str(out), "--device", "cpu", "--force"]) == 0
     bundle = Bundle.open(out)

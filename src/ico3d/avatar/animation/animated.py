@@ -9,12 +9,12 @@ import numpy as np
 import torch
 
 from ico3d.avatar.animation.keyframes import read_animation
-from ico3d.avatar.animation.recorded import read_cuts, recording_of_body
 from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.baked_body import body_of
 from ico3d.avatar.models import open_model
 from ico3d.avatar.moving import MovingBody, Span
 from ico3d.avatar.poseable import Poseable, poseable_of
+from ico3d.avatar.recorded import read_cuts, recording_of_body
 from ico3d.avatar.render_bundle import avatar_gaussians, body_gaussians
 from ico3d.body.model_folder import TrainedBody
 from ico3d.bundle.animation import Animation
@@ -113,7 +113,8 @@ class TrainedPerson:
     @property
     def poseable(self) -> Poseable | None:
         """On the skeleton that a body of --method skinned has."""
-        return poseable_of(self.avatar or self.body, self.animation and self.animation.rest.end)
+        frame = self.animation and self.animation.rest.end
+        return poseable_of(self.avatar or self.body, frame, self.cuts)
 
     @property
     def idle(self) -> np.ndarray:

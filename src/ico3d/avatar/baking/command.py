@@ -135,8 +135,8 @@ class Bake:
         head_bundle.write(self._out, name, result, samples, head, capture, persona, notices)
 
     def _bake_body(self, body: "TrainedBody", report: Report) -> None:
-        from ico3d.avatar.animation.recorded import read_cuts
         from ico3d.avatar.baking import body_bundle
+        from ico3d.avatar.recorded import read_cuts
 
         if self.rank is not None:
             self._refuse("--rank is for heads: what a body keeps is chosen window by window.")
@@ -150,9 +150,9 @@ class Bake:
         body_bundle.write(self._out, persona, parts, body, capture, notices)
 
     def _bake_whole(self, avatar: "TrainedAvatar", report: Report) -> None:
-        from ico3d.avatar.animation.recorded import read_cuts
         from ico3d.avatar.baking import head_bundle, head_cost, person_bundle
         from ico3d.avatar.baking.persona import load_persona
+        from ico3d.avatar.recorded import read_cuts
 
         self._check_rank()
         persona, notices = load_persona(self.persona), self._notices()

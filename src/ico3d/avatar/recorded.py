@@ -2,24 +2,20 @@
 
 from pathlib import Path
 
+from ico3d.avatar.head_joint import rig_of, trained_poses
 from ico3d.body.model_folder import TrainedBody
-from ico3d.body.skinning.skinned import Skinned
 from ico3d.errors import SettingsError
 from ico3d.motion.recorded.cut import CUTS, Cut, from_toml
 from ico3d.motion.recorded.recording import Recording, recording_of
-from ico3d.rig.quaternions import normalized
-from ico3d.rig.rig import Rig
 
 
 def recording_of_body(body: TrainedBody) -> Recording | None:
     """How a body moved, in its trained poses; None without a skeleton that has a person's roles."""
-    model = body.models[0]
-    if not isinstance(model.motion, Skinned):
+    rig = rig_of(body)
+    if rig is None:
         return None
-    shared = {name: value.detach().cpu().double().numpy() for name, value in model.shared.items()}
-    rig = Rig(model.motion.names, model.motion.parents, shared["rig_joints"])
     try:
-        return recording_of(rig, body.fps, normalized(shared["pose_rotations"]))
+        return recording_of(rig, body.fps, trained_poses(body)[0])
     except SettingsError:
         return None
 
