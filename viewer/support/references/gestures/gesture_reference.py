@@ -234,11 +234,11 @@ def recorded(rest: Living, gestures: dict[str, Clip]) -> dict[str, Clip]:
 
 
 def of_gaze(random: np.random.Generator) -> Reference:
-    """Somebody who looks here and there."""
+    """Somebody who looks at a visitor who is here and there, also behind."""
     gaze = Gaze()
     eyes = np.array([0.0, 1.6, 0.1])
-    visitors = random.normal(np.array([0.0, 1.6, 1.5]), 1.0, (12, 3))
-    times = np.cumsum(random.uniform(0, 1.2, 12))
+    visitors = random.normal(np.array([0.0, 1.6, 0.5]), (1.5, 0.5, 1.0), (24, 3))
+    times = np.cumsum(random.uniform(0, 1.2, 24))
     turns: list[Array] = []
     for visitor, time in zip(visitors, times, strict=True):
         gaze.look(*direction_to(eyes, visitor))
