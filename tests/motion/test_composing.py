@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 
 from ico3d.motion.clip import Clip
 from ico3d.motion.composing.accents import FRAME, Word
-from ico3d.motion.composing.composer import Composer, limbs
+from ico3d.motion.composing.composer import Composer
 from ico3d.motion.composing.cues import SETTLE, Cue, Direction, Release, clip_time, weight
 from ico3d.motion.composing.gaze import CHEST_YAW, HEAD_SPEED, HEAD_YAW, Gaze, direction_to
 from ico3d.motion.composing.performer import Performer
+from ico3d.motion.composing.takes import limbs
 from ico3d.motion.gestures.library import library
 from ico3d.motion.living import Living, living
 from ico3d.motion.roles import INDEX, SIDES
@@ -214,7 +215,19 @@ def test_the_head_turns_first_then_the_chest_within_limits():
     assert np.degrees(chest[-1]) == pytest.approx(24.0, abs=0.2) and chest.max() <= CHEST_YAW + 0.02
     assert np.degrees(head[-1]) == pytest.approx(50.0, abs=0.5) and head.max() <= HEAD_YAW + 0.02
     assert np.abs(np.diff(head)).max() / 0.02 <= HEAD_SPEED * 1.01
-    assert np.degrees(2 * twist_angle(turns[-1, 1], down)) == pytest.approx(7.5, abs=1.0)
+    assert np.degrees(2 * twist_angle(turns[-1, 1], down)) == pytest.approx(10.0, abs=1.0)
+
+
+def test_who_goes_behind_is_looked_after_on_the_side_where_they_went():
+    gaze, up = Gaze(), np.array([0.0, 1.0, 0.0])
+    turns: list[float] = []
+    for second, degrees in enumerate((100.0, 170.0, -170.0, -125.0, -100.0)):
+        gaze.look(math.radians(degrees), 0.0)
+        turns.append(float(twist_angle(gaze.at(4.0 * (second + 1))[1], up)))
+    assert np.sign(turns).tolist() == [1, 1, 1, 1, -1]
+    start = Gaze()
+    start.look(math.radians(-150.0), 0.0)
+    assert twist_angle(start.at(2.0)[1], up) < 0
 
 
 def test_a_visitor_is_to_the_left_or_below():

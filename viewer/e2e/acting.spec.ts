@@ -1,7 +1,7 @@
 import { join } from 'node:path';
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { rotate, subtract, type Vector } from '../src/rig/quaternions.ts';
+import { add, rotate, subtract, type Vector } from '../src/rig/quaternions.ts';
 import type { RigPose } from '../src/gesture/placement.ts';
 import { Rig } from '../src/rig/rig.ts';
 import type { Browser } from '../support/browser/browser.ts';
@@ -61,6 +61,20 @@ async function places(name: string): Promise<Vector[]> {
   return samples.map(({ pose }) => rig.posed(pose.rotations, pose.root).places[names.indexOf(name)]!);
 }
 
+/** Radians to the person's left that a joint is turned about the vertical at each sample so far. */
+async function yaws(name: string): Promise<number[]> {
+  const samples = await page.evaluate(() => window.samples);
+  return samples.map(({ pose }) => {
+    const [x, , z] = rotate(rig.posed(pose.rotations, pose.root).turned[names.indexOf(name)]!, [0, 0, 1]);
+    return Math.atan2(x, z) - YAW;
+  });
+}
+
+/** Metres in the world, at the height of the eyes, in some direction of the person. */
+function visitorAt(yaw: number): Vector {
+  return add(PLACE, [2.5 * Math.sin(yaw), 1.6, 2.5 * Math.cos(yaw)]);
+}
+
 describe('a whole person on a skeleton in a conversation', () => {
   test('stands where it was recorded, breathes, and its feet stay', async () => {
     await until(browser, finished(0), 60_000); // the greeting
@@ -77,7 +91,7 @@ describe('a whole person on a skeleton in a conversation', () => {
     expect(Math.max(...heads.map(([x]) => x)) - Math.min(...heads.map(([x]) => x))).toBeGreaterThan(1e-4);
   });
 
-  test('waves when it is asked to, with its head on its neck', async () => {
+  test('waves as it was recorded when it is asked to, with its head on its neck', async () => {
     await page.evaluate(() => (window.samples.length = 0));
     await page.fill('#text', 'Can you wave at me and tell me about yourself?');
     await page.keyboard.press('Enter');
@@ -85,7 +99,7 @@ describe('a whole person on a skeleton in a conversation', () => {
     const cues = received.filter(({ type }) => type === 'cues').flatMap((message) => message.cues as { name: string }[]);
     expect(cues.map(({ name }) => name)).toContain('wave');
     expect(received.filter(({ type }) => type === 'timeline')).toEqual([]);
-    const [wrists, shoulders] = [await places('right_wrist'), await places('right_shoulder')];
+    const [wrists, shoulders] = [await places('left_wrist'), await places('left_shoulder')]; // the package waves with the right hand
     expect(Math.max(...wrists.map(([, y], i) => y - shoulders[i]![1]))).toBeGreaterThan(0); // a hand above the shoulder
     expect(Math.min(...wrists.map(([, y], i) => y - shoulders[i]![1]))).toBeLessThan(-0.3); // and down
     const samples = await page.evaluate(() => window.samples);
@@ -97,5 +111,29 @@ describe('a whole person on a skeleton in a conversation', () => {
     });
     for (const place of held) place.forEach((value, axis) => expect(value).toBeCloseTo(held[0]![axis]!, 5));
     console.log(`${cues.length} cues: ${cues.map(({ name }) => name)}`);
+  });
+
+  test('turns to a visitor who goes to the side, the head before the chest, over feet that stay', async () => {
+    const feet = (await places('left_ankle')).at(-1)!;
+    for (const aside of [1, -0.9]) {
+      await page.evaluate(
+        ([eye, target]) => {
+          window.samples.length = 0;
+          window.ico3d!.stage.orbit.look({ eye: [...eye!], target: [...target!], up: [0, 1, 0], fov_y: 30 });
+        },
+        [visitorAt(YAW + aside), add(PLACE, [0, 1.2, 0])],
+      );
+      await expect.poll(async () => Math.abs((await yaws('head')).at(-1)! - aside), { timeout: 20_000 }).toBeLessThan(0.08);
+      await page.waitForTimeout(1500);
+      const [head, chest] = [await yaws('head'), await yaws('spine3')];
+      expect(Math.abs(head.at(-1)! - aside)).toBeLessThan(0.12); // it wanders by some degrees
+      const wanted = Math.sign(aside) * 0.4 * (Math.abs(aside) - Math.PI / 12);
+      expect(Math.abs(chest.at(-1)! - wanted)).toBeLessThan(0.08);
+      const half = (angles: number[]) => angles.findIndex((angle) => (angle - angles[0]!) / (angles.at(-1)! - angles[0]!) > 0.5);
+      expect(half(head)).toBeLessThanOrEqual(half(chest));
+      expect(half(head)).toBeGreaterThan(0); // it takes its time
+    }
+    const stay = (await places('left_ankle')).at(-1)!;
+    stay.forEach((value, axis) => expect(value).toBeCloseTo(feet[axis]!, 3));
   });
 });

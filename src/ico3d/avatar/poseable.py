@@ -1,7 +1,7 @@
 """People on a skeleton, trained or baked, in poses that nobody recorded."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +21,11 @@ from ico3d.motion.composing.performer import Performer
 from ico3d.motion.footing import Footing, footing
 from ico3d.motion.gestures.library import library
 from ico3d.motion.living import Living, living
+from ico3d.motion.recorded.cut import Cut
+from ico3d.motion.recorded.cutting import find_cuts
+from ico3d.motion.recorded.making import recorded_clips
+from ico3d.motion.recorded.recording import recording_of
+from ico3d.motion.repertoire import preferring
 from ico3d.rig.quaternions import Array
 from ico3d.rig.rig import Rig
 from ico3d.splat.gaussians import Gaussians, cat
@@ -42,6 +47,7 @@ class Poseable:
         body: Draws the body.
         head: Draws the head; None where there is a body alone.
         known: Their gestures; None makes those of the package.
+        made: What they made in their recording, which comes before gestures of the package.
     """
 
     living: Living
@@ -49,11 +55,14 @@ class Poseable:
     body: DrawBody
     head: DrawHead | None
     known: dict[str, Clip] | None = None
+    made: dict[str, Clip] = field(default_factory=dict)
 
     @cached_property
     def clips(self) -> dict[str, Clip]:
         """Their gestures by name."""
-        return library(self.living.person) if self.known is None else self.known
+        if self.known is not None:
+            return self.known
+        return preferring(self.made, library(self.living.person))
 
     @cached_property
     def footing(self) -> Footing:
@@ -93,12 +102,18 @@ class Poseable:
         return self.head(after @ np.linalg.inv(before), expression)
 
 
-def poseable_of(model: TrainedAvatar | TrainedBody | Bundle, frame: int | None) -> Poseable | None:
+def poseable_of(
+    model: TrainedAvatar | TrainedBody | Bundle,
+    frame: int | None,
+    cuts: Sequence[Cut] | None = None,
+) -> Poseable | None:
     """Somebody as a model has them.
 
     Args:
         model: Whoever can be posed; the face of a trained one takes expressions as recorded.
         frame: In which they stand as they shall; by default the middle of the recording.
+        cuts: Gestures in the recording of a trained model; None finds them by rule. A bundle has
+            its own.
 
     Returns:
         None where the body has no skeleton, or one without the joints that gestures need.
@@ -108,7 +123,7 @@ def poseable_of(model: TrainedAvatar | TrainedBody | Bundle, frame: int | None) 
             return _baked(model, frame)
         body = model.body if isinstance(model, TrainedAvatar) else model
         rig = rig_of(body)
-        return None if rig is None else _trained(model, body, rig, frame)
+        return None if rig is None else _trained(model, body, rig, frame, cuts)
     except SettingsError:  # a rig without the roles of a person
         return None
 
@@ -136,7 +151,11 @@ def _baked_head(bundle: Bundle, frame: int) -> DrawHead | None:
 
 
 def _trained(
-    model: TrainedAvatar | TrainedBody, body: TrainedBody, rig: Rig, frame: int | None
+    model: TrainedAvatar | TrainedBody,
+    body: TrainedBody,
+    rig: Rig,
+    frame: int | None,
+    cuts: Sequence[Cut] | None,
 ) -> Poseable:
     window = body.models[0]
     motion, values = window.motion, {**window.gaussians, **window.shared}
@@ -149,7 +168,10 @@ def _trained(
         return motion.posed(values, *pose)
 
     head = _trained_head(model, frame) if isinstance(model, TrainedAvatar) else None
-    return Poseable(living(rig, 0), (rotations[frame], roots[frame]), posed, head)
+    recording = recording_of(rig, body.fps, rotations)
+    made = recorded_clips(recording, find_cuts(recording) if cuts is None else cuts)
+    stands = rotations[frame], roots[frame]
+    return Poseable(living(rig, 0), stands, posed, head, made=made)
 
 
 def _trained_head(avatar: TrainedAvatar, frame: int) -> DrawHead:

@@ -22,6 +22,7 @@ from ico3d.bundle.skinned.gestures import GESTURES, gestures_from
 from ico3d.bundle.skinned.info import SKINNED
 from ico3d.errors import BundleError
 from ico3d.motion.clip import Clip
+from ico3d.motion.recorded.cut import Cut
 
 SPEECH = "speech.onnx"
 THUMBNAIL = "thumbnail.png"
@@ -37,7 +38,8 @@ class Bundle:
         world_from_head: (F, 4, 4) float32 head poses at `manifest.head.fps`: one per frame of the
             body, or, without a body, to be played back and forth; None without a head.
         skinned: The body on a skeleton, None where there is none.
-        gestures: What that body can do besides what was recorded; None where it cannot.
+        gestures: What that body can do while it talks; None where it only repeats its recording.
+        cuts: Which frames of its recording are gestures; none where nobody says.
         animation: How a whole person moves; None where there is a head or a body only.
     """
 
@@ -46,6 +48,7 @@ class Bundle:
     world_from_head: np.ndarray | None
     skinned: BakedSkinned | None
     gestures: dict[str, Clip] | None
+    cuts: tuple[Cut, ...]
     animation: Animation | None
 
     def __init__(self, archive: Archive):
@@ -130,10 +133,11 @@ class Bundle:
         for index in range(len(self.manifest.body.windows) if self.manifest.body else 0):
             self.window(index)  # not kept: together they may be large
         self.skinned = self.gestures = self.animation = None
+        self.cuts = ()
         if self.manifest.skinned is not None:
             self.skinned = BakedSkinned.from_bytes(self.read(SKINNED), self.manifest.skinned)
             if GESTURES in self.manifest.files:
-                self.gestures = gestures_from(self.read(GESTURES), self.skinned.rig)
+                self.gestures, self.cuts = gestures_from(self.read(GESTURES), self.skinned)
         if self.manifest.is_whole and self.manifest.any_body is not None:
             self.animation = Animation.from_bytes(self.read(ANIMATION))
             self.animation.check_body(self.manifest.any_body)

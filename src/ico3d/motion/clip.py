@@ -2,6 +2,7 @@
 
 import base64
 import json
+import re
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, cast
@@ -14,11 +15,22 @@ from safetensors.numpy import load, save
 from ico3d.common.typed import parse_json
 from ico3d.errors import SettingsError
 from ico3d.motion.curves import TOLERANCE, Curve, packed, reduced, unpacked
-from ico3d.motion.roles import INDEX, ROLES, mirrored_role
+from ico3d.motion.roles import INDEX, ROLES, SIDES, mirrored_role
 from ico3d.motion.turning import mirrored
 from ico3d.rig.quaternions import Array, continuous
 
 VERSION = 1
+
+
+def meaning(name: str) -> str:
+    """What a clip means: its name without the number that tells several alike apart."""
+    return re.sub(r"_\d+$", "", name)
+
+
+def other_hand(meant: str) -> str:
+    """The meaning of the same gesture made with the other hand: `beat_left` of `beat_right`."""
+    gesture, _, side = meant.rpartition("_")
+    return f"{gesture}_{SIDES[1 - SIDES.index(side)]}" if side in SIDES else meant
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,15 @@
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Literal
 
 import numpy as np
 
 from ico3d.errors import SettingsError
 from ico3d.rig.rig import Rig
 
-SIDES = ("left", "right")
+Side = Literal["left", "right"]
+SIDES: tuple[Side, Side] = ("left", "right")
 FINGERS = ("thumb", "index", "middle", "ring", "little")
 PHALANGES = (1, 2, 3)
 TORSO = ("hips", "spine", "chest", "neck", "head")

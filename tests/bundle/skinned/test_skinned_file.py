@@ -12,18 +12,21 @@ from safetensors.numpy import save
 from ico3d.bundle.format import Bundle, write_bundle
 from ico3d.bundle.manifest import VERSION, Manifest
 from ico3d.bundle.skinned.baked import BakedSkinned
-from ico3d.bundle.skinned.gestures import GESTURES, gesture_files
+from ico3d.bundle.skinned.gestures import GESTURES, gesture_files, gestures_from
 from ico3d.bundle.skinned.info import SKINNED
 from ico3d.bundle.skinned.packing import packed_quats
 from ico3d.bundle.skinned.posing import any_pose, posed, recorded_pose
 from ico3d.errors import BundleError
 from ico3d.motion.gestures.library import library
+from ico3d.motion.gestures.scripts import SCRIPTS
 from ico3d.motion.living import living
+from ico3d.motion.person import person_of
 from ico3d.motion.repertoire import repertoire_bytes
 from support.bundles.json_values import json_values
 from support.bundles.random_body import body_manifest, random_windows
 from support.bundles.random_bundle import thumbnail
 from support.bundles.random_skinned import random_skinned, skinned_manifest, write_random_skinned
+from support.recorded import body_of, made_still
 from support.rigs import rig_of
 
 RELAXED = settings(
@@ -224,4 +227,26 @@ def test_gestures_belong_to_the_rig(tmp_path):
 
 
 def test_a_rig_without_roles_has_no_gestures():
-    assert gesture_files(BAKED.rig) == {}
+    assert gesture_files(BAKED) == {}
+
+
+def test_what_was_recorded_travels_with_its_cuts(tmp_path):
+    rig = rig_of("SMPL-X", 0.0)
+    person = person_of(rig)
+    wave = library(person, ("wave",))["wave"].mirrored()
+    rotations = made_still(person, wave, 15.0)
+    baked = body_of(rig, 15.0, rotations, np.zeros((len(rotations), 3)), 30)
+    files = {SKINNED: baked.to_bytes(), "thumbnail.png": thumbnail(), **gesture_files(baked)}
+    write_bundle(tmp_path / "a.ico3d", skinned_manifest(baked), files)
+    bundle = Bundle.open(tmp_path / "a.ico3d")
+    assert bundle.gestures is not None and set(bundle.gestures) == set(SCRIPTS)
+    assert "left_wrist" in bundle.gestures["wave"].curves  # the package waves with the right hand
+    found = {cut.name: cut for cut in bundle.cuts}
+    assert set(found) == {"rest", "wave"} and found["wave"].hands == "left"
+    bow = [replace(found["wave"], name="bow")]
+    named = gestures_from(gesture_files(baked, bow)[GESTURES], baked)
+    assert set(named[0]) == {*SCRIPTS, "bow"} and named[1] == tuple(bow)
+    assert "right_wrist" in named[0]["wave"].curves
+    longer = replace(baked, info=replace(baked.info, num_frames=99))
+    with pytest.raises(BundleError, match="the list of clips is of a recording of"):
+        gestures_from(files[GESTURES], longer)

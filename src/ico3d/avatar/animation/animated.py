@@ -14,10 +14,14 @@ from ico3d.avatar.baked_body import body_of
 from ico3d.avatar.models import open_model
 from ico3d.avatar.moving import MovingBody, Span
 from ico3d.avatar.poseable import Poseable, poseable_of
+from ico3d.avatar.recorded import read_cuts, recording_of_body
 from ico3d.avatar.render_bundle import avatar_gaussians, body_gaussians
 from ico3d.body.model_folder import TrainedBody
 from ico3d.bundle.animation import Animation
 from ico3d.bundle.format import Bundle
+from ico3d.bundle.skinned.gestures import recording_in
+from ico3d.motion.recorded.cut import Cut
+from ico3d.motion.recorded.recording import Recording
 from ico3d.splat.device import CPU
 from ico3d.splat.gaussians import Gaussians
 
@@ -28,6 +32,16 @@ class Person(MovingBody, Protocol):
     @property
     def animation(self) -> Animation | None:
         """What lies beside it, or in the bundle; None where key frames are to be found."""
+        ...
+
+    @property
+    def recording(self) -> Recording | None:
+        """How it moved; None of bodies without a skeleton of a person."""
+        ...
+
+    @property
+    def cuts(self) -> tuple[Cut, ...] | None:
+        """What it did there: beside it, or in the bundle; None where that is to be found."""
         ...
 
     @property
@@ -72,16 +86,19 @@ class TrainedPerson:
         body: What moves.
         avatar: What is seen; None for a body alone.
         animation: What lies in the model's folder as `animation.json`; None where nothing does.
+        cuts: What lies there as `clips.toml`; None where nothing does.
     """
 
     body: TrainedBody
     avatar: TrainedAvatar | None
     animation: Animation | None
+    cuts: tuple[Cut, ...] | None
 
     def __post_init__(self):
         """Takes over what the body says of itself."""
         self.fps, self.windows, self.summary = self.body.fps, self.body.windows, self.body.summary
         self.seconds, self.window_gaussians = self.body.seconds, self.body.window_gaussians
+        self.recording = recording_of_body(self.body)
 
     @property
     def facing(self) -> np.ndarray | None:
@@ -96,7 +113,8 @@ class TrainedPerson:
     @property
     def poseable(self) -> Poseable | None:
         """On the skeleton that a body of --method skinned has."""
-        return poseable_of(self.avatar or self.body, self.animation and self.animation.rest.end)
+        frame = self.animation and self.animation.rest.end
+        return poseable_of(self.avatar or self.body, frame, self.cuts)
 
     @property
     def idle(self) -> np.ndarray:
@@ -138,6 +156,9 @@ class BakedPerson:
         self.windows: Sequence[Span] = self.body.windows
         self.seconds = self.windows[-1].last / self.fps
         self.animation = self.bundle.animation
+        skinned = self.bundle.skinned
+        self.recording = None if skinned is None else recording_in(skinned)
+        self.cuts: tuple[Cut, ...] | None = self.bundle.cuts
 
     @property
     def facing(self) -> np.ndarray:
@@ -188,11 +209,14 @@ def open_person(path: Path, device: torch.device) -> Person:
         ModelError: If it is none of them, or holds a damaged model.
         BundleError: If the bundle is damaged or has no body, or if there is an animation that makes
             no sense, or is for another body.
+        SettingsError: If there are cuts that make no sense, or are of another body.
     """
     model = open_model(path, TrainedAvatar, TrainedBody, Bundle)
     if isinstance(model, Bundle):
         return BakedPerson(model, device)
     model.to(device)
     if isinstance(model, TrainedAvatar):
-        return TrainedPerson(model.body, model, read_animation(path, model.body))
-    return TrainedPerson(model, None, read_animation(path, model))
+        body, avatar = model.body, model
+    else:
+        body, avatar = model, None
+    return TrainedPerson(body, avatar, read_animation(path, body), read_cuts(path, body))

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ico3d.avatar.animation.animated import Person
+    from ico3d.avatar.animation.clip_sheet import Named
     from ico3d.avatar.animation.keyframes import Motion
     from ico3d.bundle.animation import Action, Animation
     from ico3d.capture.capture import Capture
@@ -28,6 +29,10 @@ class Animate:
     are visited more often; the ends of the rest loop; the speeds), looked at with --contact-sheet,
     and goes into the bundle.
 
+    A body on a skeleton also has clips: what the person did in the recording, cut and named by
+    rule. --clips writes them as text: names and frames can be corrected there, and clips deleted or
+    added; the file counts for this verb and for ico3d bake.
+
     With --capture, every frame is compared with the recording, part by part of the body. Gestures
     that cannot be reached without frames that fall far below the clip's own quality are refused,
     here and by ico3d bake.
@@ -35,8 +40,9 @@ class Animate:
     Attributes:
         model: A folder of ico3d train body or ico3d assemble, or a bundle.
         out: The file to write, usually MODEL/animation.json.
-        contact_sheet: Draw it here, NAME.jpg or NAME.png: the rest loop's ends and the actions
-            from the front, and how fast the hands are.
+        clips: The file to write with the clips of a body on a skeleton, usually MODEL/clips.toml.
+        contact_sheet: Draw it here, NAME.jpg or NAME.png: the rest loop's ends, the actions and
+            the clips from the front, and how fast the hands are.
         capture: The body's recording: measure how the motion looks. A body is also drawn from the
             side of its first camera; without, as someone stands before it in a world with y up.
             Avatars and bundles know their front.
@@ -45,6 +51,7 @@ class Animate:
 
     model: tyro.conf.Positional[Path]
     out: Path | None = None
+    clips: Path | None = None
     contact_sheet: Path | None = None
     capture: Path | None = None
     device: DeviceName = "auto"
@@ -57,7 +64,8 @@ class Animate:
             BundleError: If there is no body, its animation makes no sense, or nowhere does its rest
                 look as good as its clip.
             CaptureError: If the capture is that of another body.
-            SettingsError: If the contact sheet would be no picture.
+            SettingsError: If the contact sheet would be no picture, the body has no skeleton for
+                clips, or those that it has make no sense.
         """
         from rich.console import Console
         from rich.progress import track
@@ -91,10 +99,34 @@ class Animate:
             left_out = refused(candidates, animation)
             console.print(in_words(animation, len(left_out)))
         console.print(table(animation, motion, left_out))
+        clips = self._clips(person)
+        if clips:
+            console.print(clip_table(clips, animation.fps))
         if self.out:
             write_atomic(self.out, animation.to_bytes())
         if self.contact_sheet:
-            self._draw(person, animation, motion, left_out, capture)
+            self._draw(person, animation, motion, left_out, capture, clips)
+
+    def _clips(self, person: "Person") -> "Named":
+        """What the person did, by names; written where that is asked for."""
+        from ico3d.common.files import write_atomic
+        from ico3d.errors import SettingsError
+        from ico3d.motion.recorded.cut import named, to_toml
+        from ico3d.motion.recorded.cutting import find_cuts
+
+        recording = person.recording
+        if recording is None:
+            if self.clips:
+                raise SettingsError(
+                    f"{self.model} has no skeleton of a person: clips are cut from a body that was "
+                    "trained with --method skinned."
+                )
+            return []
+        cuts = find_cuts(recording) if person.cuts is None else person.cuts
+        if self.clips:
+            text = to_toml(cuts, recording.fps, recording.num_frames)
+            write_atomic(self.clips, text.encode())
+        return named(cuts)
 
     def _draw(
         self,
@@ -103,12 +135,13 @@ class Animate:
         motion: "Motion",
         left_out: "Sequence[Action]",
         capture: "Capture | None",
+        clips: "Named",
     ) -> None:
         from ico3d.avatar.animation.sheet import draw_sheet
 
         assert self.contact_sheet is not None
         cameras = capture.cameras if capture else None
-        draw_sheet(person, animation, motion, left_out, cameras, self.contact_sheet)
+        draw_sheet(person, animation, motion, left_out, cameras, self.contact_sheet, clips)
 
 
 def _with_quality(
@@ -156,4 +189,20 @@ def table(animation: "Animation", motion: "Motion", left_out: "Sequence[Action]"
         time = f"{frame / animation.fps:.2f}"
         picture = [f"{animation.quality[frame]:.1f}"] if animation.quality else []
         shown.add_row(str(frame), time, what, score, f"{speed:.3f}", f"{away:.3f}", *picture)
+    return shown
+
+
+def clip_table(clips: "Named", fps: float):
+    """Recorded clips as a table for the terminal.
+
+    Args:
+        clips: By names.
+        fps: Frames per second.
+    """
+    from rich.table import Table
+
+    shown = Table("clip", "hands", "first", "stroke", "release", "last", "time s")
+    for name, cut in clips:
+        frames = map(str, (cut.first, cut.stroke, cut.release, cut.last))
+        shown.add_row(name, cut.hands, *frames, f"{cut.stroke / fps:.2f}")
     return shown

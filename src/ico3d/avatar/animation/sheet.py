@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from rich.progress import track
 
+from ico3d.avatar.animation import clip_sheet
 from ico3d.avatar.animation.animated import Person
 from ico3d.avatar.animation.keyframes import Motion
 from ico3d.avatar.animation.motion_quality import least_quality
@@ -40,12 +41,13 @@ def draw_sheet(
     left_out: Sequence[Action],
     cameras: Sequence[Camera] | None,
     path: Path,
+    clips: clip_sheet.Named = (),
 ) -> None:
     """Draws an animation into a file.
 
     Above the speed of the hands, the rest loop and the actions marked, and how the frames look
     where that was measured; below the person at these frames, in the order of time, from the front,
-    and, on a skeleton, at the strokes of all gestures.
+    and, on a skeleton, at the strokes of all gestures; then each recorded clip in a row.
 
     Args:
         person: Who is animated.
@@ -55,6 +57,7 @@ def draw_sheet(
         cameras: Those of the recording, whose first one stands in front; None for the person's own
             front, or in a world with y up.
         path: NAME.jpg or NAME.png.
+        clips: What the person did, by names.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -64,11 +67,13 @@ def draw_sheet(
     gestures = len(poseable.clips) if poseable else 0
     rows = -(-(len(shown) + gestures) // COLUMNS)
     curves = 2 if animation.quality else 1
-    figure = Figure(figsize=(12, 3 * curves + 3.6 * rows), layout="constrained")
+    heights = [3 * curves, 3.6 * rows, *([clip_sheet.height(clips)] if clips else [])]
+    figure = Figure(figsize=(12, sum(heights)), layout="constrained")
     FigureCanvasAgg(figure)
-    above, below = figure.subfigures(2, 1, height_ratios=(3 * curves, 3.6 * rows))  # type: ignore
+    above, below, *lowest = figure.subfigures(len(heights), 1, height_ratios=heights)  # type: ignore
     charts = above.subplots(curves, 1, squeeze=False).ravel()
     _speed(charts[0], animation, motion)
+    clip_sheet.mark(charts[0], clips)
     if animation.quality:
         _quality(charts[1], animation)
     places = below.subplots(rows, COLUMNS, squeeze=False).ravel()
@@ -82,6 +87,10 @@ def draw_sheet(
     for place, (label, gaussians) in zip(places, drawn, strict=False):
         place.imshow(_picture(gaussians, camera))
         place.set_title(label, fontsize=9, color=_colour(label), y=1.0)
+    for place in lowest:
+        clip_sheet.draw_clips(
+            place, clips, lambda at: _picture(person.gaussians(at / animation.fps), camera)
+        )
     kind = "png" if path.suffix.lower() == ".png" else "jpeg"
     write_atomic(path, lambda file: figure.savefig(file, format=kind, dpi=100))
 

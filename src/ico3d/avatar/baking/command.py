@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ico3d.bundle.manifest import Persona
     from ico3d.capture.capture import Capture
     from ico3d.head.model_folder import TrainedHead
+    from ico3d.motion.recorded.cut import Cut
 
 Report = Callable[[str], None]
 """Tells people how it goes."""
@@ -135,12 +136,13 @@ class Bake:
 
     def _bake_body(self, body: "TrainedBody", report: Report) -> None:
         from ico3d.avatar.baking import body_bundle
+        from ico3d.avatar.recorded import read_cuts
 
         if self.rank is not None:
             self._refuse("--rank is for heads: what a body keeps is chosen window by window.")
         persona, notices = self._body_persona(), self._notices()
         capture = self._capture(0)
-        parts, check = _baked(body, capture, None, report)
+        parts, check = _baked(body, capture, None, read_cuts(self.model, body), report)
         if self.strip:
             _save_picture(body_bundle.strip(body, parts.baked, capture), self.strip)
         if not self.force:
@@ -150,6 +152,7 @@ class Bake:
     def _bake_whole(self, avatar: "TrainedAvatar", report: Report) -> None:
         from ico3d.avatar.baking import head_bundle, head_cost, person_bundle
         from ico3d.avatar.baking.persona import load_persona
+        from ico3d.avatar.recorded import read_cuts
 
         self._check_rank()
         persona, notices = load_persona(self.persona), self._notices()
@@ -158,7 +161,8 @@ class Bake:
         samples, views = person_bundle.head_samples(avatar, head_capture, persona)
         head = head_bundle.bake(avatar.head, views, samples, self.rank, report)
         head_at = person_bundle.head_at(avatar)
-        body, check = _baked(avatar.body, body_capture, head_at, report)
+        cuts = read_cuts(self.model, avatar.body)
+        body, check = _baked(avatar.body, body_capture, head_at, cuts, report)
         parts = (head.head, body, samples.expressions)
         result = person_bundle.put_together(avatar, *parts, body_capture)
         report(f"the whole person: {head_cost.in_words(result.loss)}.")
@@ -222,7 +226,11 @@ def _played(animation: "Animation", report: Report) -> "Animation":
 
 
 def _baked(
-    body: "TrainedBody", capture: "Capture | None", head: "HeadAt | None", report: Report
+    body: "TrainedBody",
+    capture: "Capture | None",
+    head: "HeadAt | None",
+    cuts: "tuple[Cut, ...] | None",
+    report: Report,
 ) -> "tuple[BodyParts, Callable[[], None]]":
     """The baked body, and what refuses it where it costs too much."""
     from functools import partial
@@ -231,7 +239,7 @@ def _baked(
     from ico3d.avatar.baking.skinned import skinned_bundle
 
     if skinned_bundle.is_skinned(body):
-        result = skinned_bundle.bake(body, capture, head)
+        result = skinned_bundle.bake(body, capture, head, cuts)
         report(f"the body: {result}.")
         return result.parts, partial(skinned_bundle.check, result)
     windows = body_bundle.bake(body, capture, head)

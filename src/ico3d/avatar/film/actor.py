@@ -1,6 +1,6 @@
 """Who can be filmed: bundles as viewers draw them, and avatars as the exact models do."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from ico3d.bundle.manifest import CameraInfo
 from ico3d.capture.capture import Capture
 from ico3d.common.expression import SPEECH_SIZE
 from ico3d.head.model_folder import TrainedHead
+from ico3d.motion.recorded.cut import Cut
 from ico3d.speech.runtime import open_speech
 from ico3d.splat.gaussians import Gaussians
 
@@ -117,13 +118,19 @@ def _swaying_head(bundle: Bundle) -> tuple[Draw, float]:
     return draw, seconds
 
 
-def avatar_actor(avatar: TrainedAvatar, animation: Animation, capture: Capture | None) -> Actor:
+def avatar_actor(
+    avatar: TrainedAvatar,
+    animation: Animation,
+    capture: Capture | None,
+    cuts: Sequence[Cut] | None = None,
+) -> Actor:
     """The exact person that `ico3d assemble` made.
 
     Args:
         avatar: Who is filmed, on the device where it is drawn.
         animation: How the body moves while it talks.
         capture: The body's recording, which says which way is up; without one, y is.
+        cuts: Gestures in that recording; None finds them by rule.
     """
     points = extent(avatar)
     low, high = points.min(0), points.max(0)
@@ -143,7 +150,7 @@ def avatar_actor(avatar: TrainedAvatar, animation: Animation, capture: Capture |
         SPEECH_SIZE if driven else None,
         (lambda samples, rate: lips_of(head, samples, rate)) if driven else None,
         animation,
-        poseable=_driven(poseable_of(avatar, animation.rest.end), head),
+        poseable=_driven(poseable_of(avatar, animation.rest.end, cuts), head),
     )
 
 

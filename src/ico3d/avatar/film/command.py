@@ -147,6 +147,7 @@ class Render:
         from ico3d.avatar.film import actor
         from ico3d.avatar.models import open_model
         from ico3d.avatar.poseable import poseable_of
+        from ico3d.avatar.recorded import read_cuts
         from ico3d.body.model_folder import TrainedBody
         from ico3d.bundle.format import Bundle
         from ico3d.errors import SettingsError
@@ -158,11 +159,13 @@ class Render:
                     f"{self.model} is a body alone, which does not talk: no --audio."
                 )
             model.to(device)
-            return self._gesturing(poseable_of(model, None), None) or model, None
+            cuts = read_cuts(self.model, model)
+            return self._gesturing(poseable_of(model, None, cuts), None) or model, None
         if isinstance(model, TrainedAvatar):
             model.to(device)
             animation = animation_of(self.model, model)
-            found = actor.avatar_actor(model, animation, self._opened_capture())
+            cuts = read_cuts(self.model, model.body)
+            found = actor.avatar_actor(model, animation, self._opened_capture(), cuts)
         else:
             found = actor.bundle_actor(model)
         return self._gesturing(found.poseable, found) or self._acting(found, sound), found

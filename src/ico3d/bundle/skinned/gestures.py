@@ -1,32 +1,62 @@
 """The gestures of a body on a skeleton, and its figure, as a file of the bundle."""
 
+from collections.abc import Sequence
+
+from ico3d.bundle.skinned.baked import BakedSkinned
+from ico3d.bundle.skinned.posing import recorded_rotations
 from ico3d.errors import BundleError, SettingsError
 from ico3d.motion.clip import Clip
 from ico3d.motion.gestures.library import library
 from ico3d.motion.living import living
-from ico3d.motion.repertoire import clips_for, repertoire_bytes
-from ico3d.rig.rig import Rig
+from ico3d.motion.recorded.cut import Cut, from_toml, to_toml
+from ico3d.motion.recorded.cutting import find_cuts
+from ico3d.motion.recorded.making import recorded_clips
+from ico3d.motion.recorded.recording import Recording, recording_of
+from ico3d.motion.repertoire import clips_for, cuts_text, preferring, repertoire_bytes
 
 GESTURES = "body/gestures.safetensors"
 """The file; a body whose rig lacks roles has none, and repeats what was recorded."""
 
 
-def gesture_files(rig: Rig) -> dict[str, bytes]:
-    """The file for a rig, whose joints are as the bundle holds them; none where it lacks roles."""
-    try:
-        somebody = living(rig, 0)
-    except SettingsError:
+def gesture_files(baked: BakedSkinned, cuts: Sequence[Cut] | None = None) -> dict[str, bytes]:
+    """The file of a body: what it did in its recording, and gestures of the package besides.
+
+    Args:
+        baked: The body, as the bundle holds it.
+        cuts: Gestures in the recording; None finds them by rule.
+
+    Returns:
+        The file by its name; none where the rig lacks roles.
+    """
+    recording = recording_in(baked)
+    if recording is None:
         return {}
-    return {GESTURES: repertoire_bytes(somebody, library(somebody.person))}
+    somebody, info = living(baked.rig, 0), baked.info
+    cuts = find_cuts(recording) if cuts is None else cuts
+    clips = preferring(recorded_clips(recording, cuts), library(somebody.person))
+    text = to_toml(cuts, info.fps, info.num_frames)
+    return {GESTURES: repertoire_bytes(somebody, clips, text)}
 
 
-def gestures_from(data: bytes, rig: Rig) -> dict[str, Clip]:
-    """The gestures in a file, by name.
+def recording_in(baked: BakedSkinned) -> Recording | None:
+    """How a body moved in its recording; None where its rig lacks the roles of a person."""
+    try:
+        return recording_of(baked.rig, baked.info.fps, recorded_rotations(baked))
+    except SettingsError:
+        return None
+
+
+def gestures_from(data: bytes, baked: BakedSkinned) -> tuple[dict[str, Clip], tuple[Cut, ...]]:
+    """The gestures in a file by name, and which frames of the recording some of them are.
 
     Raises:
-        BundleError: If the file is damaged, or not of this rig.
+        BundleError: If the file is damaged, or not of this body.
     """
+    info = baked.info
     try:
-        return clips_for(data, rig)
+        clips, text = clips_for(data, baked.rig), cuts_text(data)
+        about = "the list of clips", info.fps, info.num_frames
+        cuts = from_toml(text.encode(), *about) if text else ()
     except SettingsError as error:
         raise BundleError(f"{GESTURES}: {error}") from error
+    return clips, cuts

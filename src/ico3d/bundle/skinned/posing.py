@@ -67,6 +67,14 @@ def recorded_pose(baked: BakedSkinned, frame: float) -> SkinnedPose:
     )
 
 
+def recorded_rotations(baked: BakedSkinned) -> Array:
+    """(F, J, 4) of all joints about themselves, in all recorded frames."""
+    shape = (baked.info.num_frames, *baked.held.shape)
+    rotations = np.broadcast_to(normalized(baked.held / QUAT_UNIT), shape).copy()
+    rotations[:, baked.moving] = normalized(baked.rotations / QUAT_UNIT)
+    return rotations
+
+
 def any_pose(baked: BakedSkinned, rotations: Array, root: Array) -> SkinnedPose:
     """A pose that need not have been recorded.
 

@@ -10,6 +10,7 @@ from ico3d.motion.clip import Clip
 from ico3d.motion.composing.composer import Composer
 from ico3d.motion.composing.cues import Cue, Direction, Release
 from ico3d.motion.composing.lexicon import requested
+from ico3d.motion.composing.takes import Takes
 from ico3d.motion.noise import scrambled
 
 LEAD = 0.8
@@ -43,7 +44,7 @@ class Cueing:
     @property
     def names(self) -> list[str]:
         """Gestures that can be asked for."""
-        return list(self._clips) if self._moving else []
+        return Takes(self._clips).meanings if self._moving else []
 
     def request(self, name: str) -> None:
         """A gesture to make next, in what is spoken now or in the utterance that follows."""
@@ -52,7 +53,7 @@ class Cueing:
 
     def asked(self, question: str) -> None:
         """What a visitor says: who asks for a gesture gets it with the answer."""
-        name = requested(question)
+        name = requested(question, self.names)
         if name is not None and name in self.names:
             self.request(name)
 

@@ -6,7 +6,7 @@ and stays for a moment; a gesture is held until the phrase ends or the next one 
 
 import numpy as np
 
-from ico3d.motion.clip import Clip
+from ico3d.motion.clip import Clip, meaning
 from ico3d.motion.composing.accents import FRAME, SPOKEN, Accent, Word, accents
 from ico3d.motion.composing.cues import (
     BLEND_IN,
@@ -19,6 +19,7 @@ from ico3d.motion.composing.cues import (
     rounded_release,
 )
 from ico3d.motion.composing.lexicon import meanings, stressed
+from ico3d.motion.composing.takes import Takes, limbs
 from ico3d.motion.noise import chance
 from ico3d.rig.quaternions import Array
 
@@ -52,12 +53,6 @@ BEATS = (
 """Chances of what goes with an accent that means nothing by itself; mirrored, the other hand."""
 
 
-def limbs(clip: Clip) -> frozenset[str]:
-    """What a gesture moves: `left`, `right` (arms), `head`."""
-    sides = {role.partition("_")[0] for role in clip.curves if role.endswith("_wrist")}
-    return frozenset(sides or {"head"})
-
-
 class Composer:
     """The gestures of one utterance."""
 
@@ -65,11 +60,12 @@ class Composer:
         """Nothing is said yet.
 
         Args:
-            clips: By name; at least those of `BEATS`.
+            clips: By name; at least those of `BEATS`, with either hand.
             seed: Decides all that is by chance.
             start: Seconds before which no gesture begins.
         """
         self._clips, self._seed = clips, seed
+        self._takes = Takes(clips)
         self._limbs = {name: limbs(clip) for name, clip in clips.items()}
         self._words: tuple[Word, ...] = ()
         self._levels: Array = np.zeros(0)
@@ -100,10 +96,13 @@ class Composer:
     def request(self, name: str) -> None:
         """A gesture to make next.
 
+        Args:
+            name: What it means.
+
         Raises:
-            KeyError: If there is none of that name.
+            KeyError: If there is none that means it.
         """
-        self._clips[name]
+        self._takes.one(name, False, 0.0)
         self._wanted.append(name)
 
     def directions(self, until: float) -> list[Direction]:
@@ -135,16 +134,18 @@ class Composer:
     def _make_wanted(self, until: float, stresses: tuple[Accent, ...]) -> None:
         """What was asked for comes first: its stroke on the next accent, where one is near."""
         while self._wanted:
-            clip = self._clips[self._wanted[0]]
-            begin = max(self._handed, self._free(self._wanted[0]))
+            draw = chance(self._seed, len(self._cues), 4)
+            name, mirror = self._takes.one(self._wanted[0], False, draw)
+            clip, used = self._clips[name], self._used(name, mirror)
+            begin = max(self._handed, self._free(used))
             if begin >= until:
                 return
-            name = self._wanted.pop(0)
-            busy = any(self._over.get(limb, begin) > begin for limb in self._limbs[name])
+            self._wanted.pop(0)
+            busy = any(self._over.get(limb, begin) > begin for limb in used)
             skip = clip.marks.stroke - self._taking_up(clip) if busy else 0.0
             soonest = begin + clip.marks.stroke - skip
             near = [a.time for a in stresses if soonest <= a.time <= soonest + NEAR]
-            self._cue(name, False, begin, near[0] if near else soonest, skip)
+            self._cue(name, mirror, begin, near[0] if near else soonest, skip)
 
     def _decide(
         self, index: int, stresses: tuple[Accent, ...], meant: dict[int, str], until: float
@@ -170,15 +171,18 @@ class Composer:
     ) -> tuple[str | None, bool]:
         """The gesture of an accent and whether it is mirrored; None for none."""
         accent = stresses[index]
+        draw = chance(self._seed, accent.word, 3)
         name = meant.get(accent.word)
-        if name in self._clips and self._may_mean(name, accent.time):
-            return name, False
+        if name is not None and name in self._takes:
+            take = self._takes.one(name, False, draw)
+            if self._may_mean(name, self._used(*take), accent.time):
+                return take
         if not self._may_beat(index, stresses, meant):
             return None, False
-        return _beat(chance(self._seed, accent.word, 1))
+        return self._takes.one(*_beat(chance(self._seed, accent.word, 1)), draw)
 
-    def _may_mean(self, name: str, time: float) -> bool:
-        last = max((self._struck.get(limb, -np.inf) for limb in self._limbs[name]), default=-np.inf)
+    def _may_mean(self, name: str, used: frozenset[str], time: float) -> bool:
+        last = max((self._struck.get(limb, -np.inf) for limb in used), default=-np.inf)
         return time - last >= MEANT and time - self._shown.get(name, -np.inf) >= AGAIN
 
     def _may_beat(self, index: int, stresses: tuple[Accent, ...], meant: dict[int, str]) -> bool:
@@ -196,7 +200,7 @@ class Composer:
             if away > NEAR + MEANT:
                 break
             name = meant.get(later.word)
-            if name in self._clips and "head" not in self._limbs[name]:
+            if name is not None and name in self._takes and self._takes.of_hands(name):
                 return False
             if away <= NEAR and later.strength > accent.strength + STRONGER:
                 return False
@@ -235,10 +239,9 @@ class Composer:
         used = self._limbs[name]
         return frozenset(other.get(limb, limb) for limb in used) if mirror else used
 
-    def _free(self, name: str) -> float:
-        """Seconds from which a gesture may take its limbs without cutting a stroke off."""
-        limbs_used = self._limbs[name]
-        return max((self._struck.get(limb, -np.inf) + SETTLE for limb in limbs_used), default=0.0)
+    def _free(self, used: frozenset[str]) -> float:
+        """Seconds from which a gesture may take limbs without cutting a stroke off."""
+        return max((self._struck.get(limb, -np.inf) + SETTLE for limb in used), default=0.0)
 
     def _cue(self, name: str, mirror: bool, begin: float, stroke: float, skip: float = 0.0) -> None:
         cue = Cue(len(self._cues), name, mirror, begin, stroke, skip)
@@ -252,7 +255,7 @@ class Composer:
         for limb in used:
             self._struck[limb] = stroke
             self._over[limb] = float("inf")
-        self._shown[name] = stroke
+        self._shown[meaning(name)] = stroke
 
     def _earliest(self, cue: Cue) -> float:
         return rounded_release(self._clips[cue.name], cue, cue.stroke)
@@ -272,7 +275,7 @@ class Composer:
         if not hold:
             return self._earliest(cue)
         around = rounded_release(clip, cue, cue.stroke + ROUNDS * hold)
-        if around > cue.stroke + ROUNDS * hold + 1e-6 or cue.name == "wave":
+        if around > cue.stroke + ROUNDS * hold + 1e-6 or meaning(cue.name) == "wave":
             return max(around, self._handed)
         wanted = min(self._phrase_end(cue.stroke + hold), cue.stroke + hold + LONGEST_HOLD)
         return max(rounded_release(clip, cue, wanted), self._handed)

@@ -20,8 +20,8 @@ HEAD_SPEED, CHEST_SPEED = math.radians(140.0), math.radians(45.0)
 """Radians a second, at most."""
 HEAD_STIFF, CHEST_STIFF = 7.0, 3.0
 """1/s: how soon they follow (critically damped)."""
-PITCH_PART = 0.75
-"""Part of the height of the visitor's eyes that the head follows; the eyes do the rest."""
+BEHIND = math.radians(120.0)
+"""From which angle on a visitor is behind, who is looked after on the side where they went."""
 
 
 @dataclass
@@ -59,7 +59,11 @@ class Gaze:
             yaw: Radians to the person's left from straight ahead.
             pitch: Radians downwards.
         """
-        self._yaw, self._pitch = yaw, pitch
+        if abs(yaw) <= BEHIND:
+            self._yaw = yaw
+        else:
+            self._yaw = math.copysign(BEHIND, self._yaw or yaw)
+        self._pitch = pitch
 
     def at(self, time: float) -> Array:
         """(3, 4) turns of chest, neck and head at a time, not before the last one asked for."""
@@ -77,7 +81,7 @@ class Gaze:
         self._chest.step(wanted)
         rest = self._yaw - self._chest.angle
         self._head.step(min(max(rest, -HEAD_YAW), HEAD_YAW))
-        self._nod.step(min(max(PITCH_PART * self._pitch, -HEAD_PITCH), HEAD_PITCH))
+        self._nod.step(min(max(self._pitch, -HEAD_PITCH), HEAD_PITCH))
 
 
 def direction_to(eyes: Array, visitor: Array) -> tuple[float, float]:

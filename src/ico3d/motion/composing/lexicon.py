@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -16,6 +17,7 @@ class Lexicon:
     """What `motion/data/lexicon.json` holds.
 
     Attributes:
+        gestures: Those that it knows.
         words: The gesture of a word.
         phrases: Gestures of several words, as tuples of them; the longest first.
         light: Words that bear no stress of their own.
@@ -24,6 +26,7 @@ class Lexicon:
         refusing: What makes them none.
     """
 
+    gestures: frozenset[str]
     words: dict[str, str]
     phrases: tuple[tuple[tuple[str, ...], str], ...]
     light: frozenset[str]
@@ -43,6 +46,7 @@ def lexicon() -> Lexicon:
         phrases += [(tuple(plain(text)), gesture) for text in entry.get("phrases", [])]
     requests = [(text, gesture) for gesture, texts in content["requests"].items() for text in texts]
     return Lexicon(
+        frozenset(content["gestures"]) | frozenset(content["requests"]),
         words,
         tuple(sorted(phrases, key=lambda found: -len(found[0]))),
         frozenset(content["light"]),
@@ -76,20 +80,24 @@ def stressed(word: Word) -> bool:
     return not set(plain(word.text)) <= lexicon().light
 
 
-def requested(text: str) -> str | None:
+def requested(text: str, names: Iterable[str] = ()) -> str | None:
     """The gesture that a visitor asks for: "can you wave at me?" is a wave.
 
     Args:
         text: What the visitor says.
+        names: Gestures that somebody can make; those that the lexicon does not know are asked for
+            by their name.
 
     Returns:
         Its name; None where none is asked for.
     """
     known = lexicon()
+    others = [name for name in names if name not in known.gestures]
+    own = [(name.replace("_", " "), name) for name in others]
     said = f" {' '.join(plain(text))} "
     if any(f" {word} " in said for word in known.refusing):
         return None
-    for phrase, gesture in known.requests:
+    for phrase, gesture in (*known.requests, *own):
         at = said.find(f" {phrase} ")
         if at == 0 or (at > 0 and any(f" {ask} " in said[: at + 1] for ask in known.asking)):
             return gesture

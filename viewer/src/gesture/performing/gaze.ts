@@ -12,7 +12,7 @@ const HEAD_SPEED = 140 * RADIANS; // a second, at most
 const CHEST_SPEED = 45 * RADIANS;
 const HEAD_STIFF = 7; // 1/s
 const CHEST_STIFF = 3;
-const PITCH_PART = 0.75; // of the height of the visitor's eyes that the head follows
+const BEHIND = 120 * RADIANS; // from here on the visitor is behind: she stays turned to the side where they went
 
 /** An angle that follows a target, critically damped, no faster than a limit. */
 class Hinge {
@@ -45,7 +45,7 @@ export class Gaze {
 
   /** The visitor is so many radians to the person's left, and downwards. */
   look(yaw: number, pitch: number): void {
-    this.yaw = yaw;
+    this.yaw = Math.abs(yaw) <= BEHIND ? yaw : BEHIND * Math.sign(this.yaw || yaw);
     this.pitch = pitch;
   }
 
@@ -60,7 +60,7 @@ export class Gaze {
     const beyond = Math.max(Math.abs(this.yaw) - CHEST_FROM, 0) * CHEST_PART;
     this.chest.step(Math.sign(this.yaw) * Math.min(beyond, CHEST_YAW));
     this.head.step(clamp(this.yaw - this.chest.angle, HEAD_YAW));
-    this.nod.step(clamp(PITCH_PART * this.pitch, HEAD_PITCH));
+    this.nod.step(clamp(this.pitch, HEAD_PITCH));
   }
 }
 

@@ -1,4 +1,4 @@
-"""A whole person on a skeleton that gestures, recorded away from the origin and turned aside.
+"""A whole person on a skeleton, recorded waving, away from the origin and turned aside.
 
 Run: python acting_person.py OUT
 
@@ -18,13 +18,15 @@ from ico3d.bundle.head import POSES, poses_to_bytes
 from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.gestures import gesture_files
 from ico3d.bundle.skinned.info import SKINNED
-from ico3d.bundle.skinned.packing import packed_quats
-from ico3d.rig.quaternions import to_matrix
+from ico3d.motion.gestures.library import library
+from ico3d.motion.person import person_of
+from ico3d.rig.quaternions import multiply, to_matrix
 from support.bundles.random_bundle import random_files, random_head, random_manifest, thumbnail
-from support.bundles.random_skinned import random_skinned, skinned_manifest
+from support.bundles.random_skinned import skinned_manifest
+from support.recorded import body_of, made_still
 from support.rigs import rig_of
 
-FRAMES, GAUSSIANS = 6, 900
+GAUSSIANS, FPS = 900, 15.0
 YAW = 0.5
 """Radians by which the person was turned to its left when recorded."""
 PLACE = np.array([0.4, 0.0, -0.3])
@@ -33,55 +35,34 @@ PERSONA = Path(__file__).parents[1] / "persona.json"
 
 
 def recorded_body() -> BakedSkinned:
-    """Somebody who stands still."""
-    rig, random = rig_of("SMPL-X", 0.0), np.random.default_rng(2)
-    drawn = random_skinned(GAUSSIANS, frames=FRAMES)
-    count = len(rig)
-    joints = rig.joints.astype(np.float32)
-    bone = random.integers(0, count, GAUSSIANS)
+    """Somebody who stands still, then waves with the left hand."""
+    rig = rig_of("SMPL-X", 0.0)
+    person = person_of(rig)
+    (wave,) = library(person, ("wave",)).values()
+    rotations = made_still(person, wave.mirrored(), FPS)  # (F, J, 4)
     turned = np.array([np.cos(YAW / 2), 0, np.sin(YAW / 2), 0])
-    held = np.tile([1.0, 0, 0, 0], (count, 1))
-    held[0] = turned
-    pivot = to_matrix(turned) @ joints[0] + PLACE
-    info = replace(
-        drawn.info,
-        names=rig.names,
-        parents=rig.parents,
-        num_moving=1,
-        low=(-1.0, -0.1, -1.5),
-        high=(1.5, 2.0, 1.0),
-    )
-    return replace(
-        drawn,
-        info=info,
-        means=(joints[bone] + random.normal(0, 0.03, (GAUSSIANS, 3))).astype(np.float32),
-        joints=np.tile(bone[:, None], (1, 4)).astype(np.uint8),
-        shape_scales=drawn.shape_scales * np.float16(0.01),
-        rig_joints=joints,
-        held=packed_quats(held),
-        moving=np.array([0], np.uint8),
-        rotations=np.tile(packed_quats(turned[None]), (FRAMES, 1, 1)),
-        roots=np.tile(pivot - joints[0], (FRAMES, 1)).astype(np.float32),
-    )
+    rotations[:, 0] = multiply(turned, rotations[:, 0])
+    root = to_matrix(turned) @ rig.joints[0] + PLACE - rig.joints[0]
+    return body_of(rig, FPS, rotations, np.tile(root, (len(rotations), 1)), GAUSSIANS)
 
 
 def main() -> None:
     """Does what the file's docstring says."""
     body, head = recorded_body(), random_head(300)
-    fps, about = body.info.fps, random_manifest(head)
+    frames, about = body.info.num_frames, random_manifest(head)
     assert about.head is not None
-    poses = np.tile(np.eye(4, dtype=np.float32), (FRAMES, 1, 1))  # (F, 4, 4)
+    poses = np.tile(np.eye(4, dtype=np.float32), (frames, 1, 1))  # (F, 4, 4)
     turn = to_matrix(np.array([np.cos(YAW / 2), 0, np.sin(YAW / 2), 0]))
     poses[:, :3, :3] = turn
     poses[:, :3, 3] = turn @ [0, 1.6, 0.05] + PLACE
     manifest = replace(
         skinned_manifest(body),
         persona=load_persona(PERSONA),
-        head=replace(about.head, fps=fps, num_poses=FRAMES),
+        head=replace(about.head, fps=FPS, num_poses=frames),
         speech=about.speech,
     )
-    animation = Animation(fps, FRAMES, Rest(0, 2), (Action(4, 0.9),))
-    files = random_files(head) | gesture_files(body.rig)
+    animation = Animation(FPS, frames, Rest(0, 2), (Action(24, 0.9),))
+    files = random_files(head) | gesture_files(body)
     files |= {SKINNED: body.to_bytes(), POSES: poses_to_bytes(poses)}
     files |= {ANIMATION: animation.to_bytes(), "thumbnail.png": thumbnail()}
     write_bundle(Path(sys.argv[1]) / "person.ico3d", manifest, files)

@@ -24,12 +24,16 @@ from ico3d.motion.footing import footing
 from ico3d.motion.gestures.library import library
 from ico3d.motion.living import Living, living
 from ico3d.motion.noise import chance, scrambled, wander
-from ico3d.motion.repertoire import repertoire_bytes
+from ico3d.motion.recorded.cutting import find_cuts
+from ico3d.motion.recorded.making import recorded_clips
+from ico3d.motion.recorded.recording import recording_of
+from ico3d.motion.repertoire import preferring, repertoire_bytes
 from ico3d.motion.roles import ROLES
 from ico3d.motion.turning import aligned, arc, power, twist_angle, unit
 from ico3d.rig import quaternions
 from ico3d.rig.quaternions import Array, normalized
 from ico3d.rig.rig import Rig
+from support.recorded import performed
 from support.rigs import rig_of
 from support.spoken import speech
 
@@ -193,6 +197,8 @@ def of_person(out: Path, name: str, rig: Rig, gestures: tuple[str, ...] | None) 
     random = np.random.default_rng(SEED)
     rest = living(rig, SEED)
     made = library(rest.person, gestures) if gestures else library(rest.person)
+    if gestures:
+        made = preferring(recorded(rest, made), made)
     content = repertoire_bytes(rest, made)
     (out / f"{name}.safetensors").write_bytes(content)
     clips = from_bytes(content)
@@ -217,12 +223,22 @@ def of_person(out: Path, name: str, rig: Rig, gestures: tuple[str, ...] | None) 
     return found
 
 
+def recorded(rest: Living, gestures: dict[str, Clip]) -> dict[str, Clip]:
+    """What is found in a recording of some gestures that were made with the left hand."""
+    some = {name: gestures[name] for name in ("wave", "small_nod", "beat_right")}
+    rotations, _ = performed(rest, some, 20.0, mirror=True)
+    recording = recording_of(rest.person.rig, 20.0, rotations)
+    clips = recorded_clips(recording, find_cuts(recording))
+    assert {"wave", "beat_left"} <= set(clips)
+    return clips
+
+
 def of_gaze(random: np.random.Generator) -> Reference:
-    """Somebody who looks here and there."""
+    """Somebody who looks at a visitor who is here and there, also behind."""
     gaze = Gaze()
     eyes = np.array([0.0, 1.6, 0.1])
-    visitors = random.normal(np.array([0.0, 1.6, 1.5]), 1.0, (12, 3))
-    times = np.cumsum(random.uniform(0, 1.2, 12))
+    visitors = random.normal(np.array([0.0, 1.6, 0.5]), (1.5, 0.5, 1.0), (24, 3))
+    times = np.cumsum(random.uniform(0, 1.2, 24))
     turns: list[Array] = []
     for visitor, time in zip(visitors, times, strict=True):
         gaze.look(*direction_to(eyes, visitor))

@@ -1,5 +1,6 @@
 """From a trained body on a skeleton to the parts of a bundle that browsers play."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -22,6 +23,7 @@ from ico3d.bundle.skinned.gestures import gesture_files
 from ico3d.bundle.skinned.info import SKINNED
 from ico3d.capture.capture import Capture
 from ico3d.errors import BundleError
+from ico3d.motion.recorded.cut import Cut
 
 PROBES = 24
 """Pictures by which the importance of Gaussians is told."""
@@ -35,16 +37,18 @@ class SkinnedResult:
         baked: The baked body.
         data: The content of its file.
         loss: Means over pictures.
+        cuts: Gestures in its recording; None finds them by rule.
     """
 
     baked: BakedSkinned
     data: bytes
     loss: Loss
+    cuts: Sequence[Cut] | None = None
 
     @property
     def parts(self) -> BodyParts:
         """What a bundle holds of it."""
-        files = {SKINNED: self.data, **gesture_files(self.baked.rig)}
+        files = {SKINNED: self.data, **gesture_files(self.baked, self.cuts)}
         return BodyParts(SkinnedBody(self.baked), files, self.baked.info, self.loss)
 
     def __str__(self) -> str:
@@ -64,7 +68,10 @@ def is_skinned(body: TrainedBody) -> bool:
 
 
 def bake(
-    body: TrainedBody, capture: Capture | None, head: body_cost.HeadAt | None = None
+    body: TrainedBody,
+    capture: Capture | None,
+    head: body_cost.HeadAt | None = None,
+    cuts: Sequence[Cut] | None = None,
 ) -> SkinnedResult:
     """Bakes a body on a skeleton.
 
@@ -72,6 +79,7 @@ def bake(
         body: The exact body, of one window.
         capture: Its recording, to measure with; None to measure against the exact body only.
         head: The exact head on it, which is in the recorded pictures.
+        cuts: Gestures in the recording; None finds them by rule.
     """
     exact = partial(body.window_gaussians, 0)
     with torch.no_grad():
@@ -86,7 +94,8 @@ def bake(
     recorded = recorded_views(capture, span) if capture else []
     pair = body_cost.window_pair(body, 0, partial(SkinnedBody(baked).window_gaussians, 0), head)
     probes = body_cost.probe_views(ring, span)
-    return SkinnedResult(baked, baked.to_bytes(), body_cost.measure(*pair, recorded, probes))
+    loss = body_cost.measure(*pair, recorded, probes)
+    return SkinnedResult(baked, baked.to_bytes(), loss, cuts)
 
 
 def check(result: SkinnedResult) -> None:
