@@ -1,1 +1,1 @@
-"""The deployable avatar: its file, the checks of that file, and the reference evaluator."""
+"""The deployable avatar: its file format, checks, reference evaluator and planner of motion."""

@@ -1,7 +1,8 @@
-"""`animation.json`: where a body rests, and at which frames its motion may turn around.
+"""`animation.json`: the frames at which a body rests, and at which its motion may turn around.
 
-Both are frames of the recorded clip (paper, section "Procedural Body Animation"): the rest loop
-plays start … end back and forth, and whoever speaks goes from action to action.
+All frames are those of the recorded clip (paper, section "Procedural Body Animation"). At rest the
+frames start … end are played back and forth; during speech the body moves from one action to
+another.
 """
 
 import json
@@ -18,15 +19,15 @@ VERSION = 1
 MAX_BYTES = 1 << 20
 MAX_FRAMES = 1_000_000
 FASTEST = 4.0
-"""Captured seconds per second that `max_speed` may be."""
+"""Highest value of `max_speed`, captured seconds per second."""
 
 MOST_NAMED = 8
-"""Actions that can be asked for by name."""
+"""Number of actions that have names and can be asked for."""
 
 
 @dataclass(frozen=True)
 class Rest:
-    """The loop of somebody who waits: frames start … end, both inside, back and forth.
+    """The resting loop: frames start … end, both included, played back and forth.
 
     Attributes:
         start: First frame of the loop.
@@ -39,11 +40,11 @@ class Rest:
 
 @dataclass(frozen=True)
 class Action:
-    """A frame at which the hands stand still for a moment, away from where they rest.
+    """A frame at which the hands stand still for a moment, away from their resting place.
 
     Attributes:
-        frame: Motion may turn around here, or be held.
-        score: How well it serves, 0 to 1: those with higher scores are visited more often.
+        frame: Frame at which motion may pause or turn around.
+        score: Suitability, 0 to 1; actions with higher scores are visited more often.
     """
 
     frame: int
@@ -52,18 +53,18 @@ class Action:
 
 @dataclass(frozen=True)
 class Animation:
-    """How a body moves when nobody recorded what it shall do.
+    """How a body moves procedurally, by replaying parts of the recorded clip.
 
     Attributes:
         fps: Frames per second of the body; frame i is at i / fps seconds of body time.
-        num_frames: Of the body.
-        rest: The loop of somebody who waits.
-        actions: Key frames of gestures.
-        min_speed: Captured seconds per second that motion lasts at least, but for easing.
-        max_speed: Captured seconds per second at most.
-        quality: PSNR in dB of the worst part of the body in each frame, as far as somebody
-            measured it; empty where nobody did.
-        version: Of the file.
+        num_frames: Number of frames of the body.
+        rest: The resting loop.
+        actions: Frames at which motion may pause or turn around.
+        min_speed: Lowest speed of motion, captured seconds per second, except while easing.
+        max_speed: Highest speed of motion, captured seconds per second.
+        quality: PSNR in dB of the worst part of the body in each frame; empty if it was not
+            measured.
+        version: Version of the file format.
     """
 
     fps: float
@@ -101,7 +102,7 @@ class Animation:
         _require(known, "quality", f"have {self.num_frames} entries, or none")
 
     def to_bytes(self) -> bytes:
-        """The content of `animation.json`, the same bytes for the same animation."""
+        """The content of `animation.json`; equal animations give equal bytes."""
         values = plain(self)
         names = [name for name in _ORDER if name != "quality" or self.quality]
         lines = [f" {json.dumps(name)}: {json.dumps(values[name])}" for name in names]
@@ -109,10 +110,10 @@ class Animation:
 
     @staticmethod
     def from_bytes(data: bytes) -> "Animation":
-        """Reads and checks an animation.
+        """Reads and checks the content of `animation.json`.
 
         Raises:
-            BundleError: In one sentence, if it is none or makes no sense.
+            BundleError: If the content is malformed or contradicts itself.
         """
         _require(len(data) <= MAX_BYTES, "it", f"have at most {MAX_BYTES} bytes")
         values = parse_json(data, ANIMATION, BundleError)
@@ -121,10 +122,10 @@ class Animation:
         return fill(Animation, values, ANIMATION, Rules(BundleError))
 
     def check_body(self, body: BodyInfo | SkinnedInfo) -> None:
-        """Checks that this is the animation of a body.
+        """Checks that this animation belongs to a body.
 
         Raises:
-            BundleError: If the frames are others.
+            BundleError: If the number or the rate of the frames differ.
         """
         _require(self.fps == body.fps, "fps", f"be the body's, {body.fps:g}")
         frames = body.num_frames
@@ -132,14 +133,14 @@ class Animation:
 
     @property
     def gestures(self) -> dict[str, float]:
-        """Seconds of body time of the best actions by name: `gesture-1` is the very best."""
+        """Body time in seconds of the best actions, by name; `gesture-1` has the highest score."""
         ranked = sorted(self.actions, key=lambda action: (-action.score, action.frame))
         best = enumerate(ranked[:MOST_NAMED], 1)
         return {f"gesture-{rank}": action.frame / self.fps for rank, action in best}
 
     @property
     def seconds(self) -> float:
-        """Body time of the last frame."""
+        """Body time of the last frame, seconds."""
         return (self.num_frames - 1) / self.fps
 
 

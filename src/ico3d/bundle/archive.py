@@ -1,4 +1,4 @@
-"""A folder or an uncompressed zip as a set of named files, read without trusting any of it."""
+"""Reads a folder or an uncompressed zip as named files, on the assumption that it is hostile."""
 
 import contextlib
 import os
@@ -22,24 +22,24 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 class Archive(ABC):
-    """Named files with their sizes; names are checked before anything is read."""
+    """Named files and their sizes in bytes; names are checked before anything is read."""
 
     sizes: Mapping[str, int]
 
     @abstractmethod
     def read(self, name: str) -> bytes:
-        """The content of one of `sizes`.
+        """The content of the file `name`, a key of `sizes`.
 
         Raises:
-            BundleError: If it cannot be read, or has not the size it had.
+            BundleError: If the file cannot be read, or its size has changed.
         """
 
 
 def open_archive(path: Path) -> Archive:
-    """Lists a bundle's files.
+    """Lists the files of a bundle.
 
     Raises:
-        BundleError: If there is nothing, or a name, link or entry is refused.
+        BundleError: If the path does not exist, or a name, link or zip entry is refused.
     """
     if path.is_dir():
         return _Folder(path)
@@ -49,7 +49,7 @@ def open_archive(path: Path) -> Archive:
 
 
 def write_zip(path: Path, files: Mapping[str, bytes]) -> None:
-    """Writes a stored zip in one step; the same files give the same bytes."""
+    """Writes a zip without compression, atomically; equal files give equal bytes."""
     sizes = {name: len(data) for name, data in files.items()}
     _check_names(list(sizes), path)
     _check_sizes(sizes, path)

@@ -1,8 +1,8 @@
-"""The splats behind a person (`background.spz` or `.ply`): what a reader checks of them.
+"""Checks the Gaussians of a background (`background.spz` or `.ply`) in a bundle.
 
-They are decoded by the browser only. Here the header must promise no more Gaussians than a bundle
-may hold, and the file must be as large as its header says (SPZ, which is packed: not impossibly
-small).
+Only browsers decode this file. Here the header must not claim more Gaussians than a bundle may
+hold, and the file must be as large as the header claims; SPZ, which is compressed, must not be
+impossibly small.
 """
 
 import re
@@ -13,13 +13,13 @@ from ico3d.bundle import limits
 from ico3d.errors import BundleError
 
 BACKGROUNDS = ("background.spz", "background.ply")
-"""The names that it may have; a bundle holds one at most."""
+"""Possible names of the background; a bundle holds at most one of them."""
 _SPZ_HEADER = struct.Struct("<4sIIBBBB")
 _SPZ_VERSIONS, _MAX_DEGREE = (2, 3, 4), 3
 _LEAST_SPZ_BYTES = 19
 """Unpacked bytes of a Gaussian without harmonics."""
 _MAX_RATIO, _FREE_BYTES = 8, 1 << 18
-"""As in `ico3d.splat.files`: unpacked bytes per byte of file, and those that any file may have."""
+"""As in `ico3d.splat.files`: largest ratio of unpacked to packed bytes; bytes always allowed."""
 _MAX_PLY_HEADER = 1 << 16
 _WIDTHS = {
     **dict.fromkeys(("char", "int8", "uchar", "uint8"), 1),
@@ -30,10 +30,11 @@ _WIDTHS = {
 
 
 def check_background(data: bytes, name: str) -> None:
-    """Checks a file of `BACKGROUNDS`.
+    """Checks the content of a file named as in `BACKGROUNDS`.
 
     Raises:
-        BundleError: If it is too large, or its header is none or promises what is not there.
+        BundleError: If the file is too large, or its header is malformed or claims more than the
+            file holds.
     """
     if len(data) > limits.MAX_BACKGROUND_BYTES:
         raise BundleError(f"{name}: is larger than {limits.MAX_BACKGROUND_BYTES} bytes.")

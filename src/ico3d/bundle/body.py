@@ -9,28 +9,28 @@ from ico3d.bundle.tensors import Spec, decode_tensors, encode_tensors
 from ico3d.errors import BundleError
 
 QUAT_UNIT = 32767
-"""What stands for 1 in `quats`."""
+"""Integer that represents 1 in `BakedWindow.quats`."""
 _MAX_LENGTH = 1e4
 """Metres; anything farther is no person, and overflows when it is squared in a shader."""
 LEAST_SCALE = 1e-6
-"""Metres; nothing is drawn smaller."""
+"""Smallest standard deviation that is drawn, metres."""
 
 
 @dataclass(frozen=True)
 class BakedWindow:
-    """N Gaussians in the world; those of a cluster move, turn and grow in a few shared ways.
+    """N Gaussians in the world, in C clusters; each cluster moves by a few coefficients over time.
 
     Attributes:
         means: (N, 3) float32 metres.
         quats: (N, 4) int16 wxyz in units of 1/32767, of any length up to 1.
         scales: (N, 3) float16 standard deviations in metres.
         rgba: (N, 4) uint8 display colour and opacity.
-        clusters: (N,) uint8, which of the C clusters.
-        position_basis: (P, N, 3) int16.
-        rotation_basis: (R, N, 4) int16.
-        scale_basis: (L, N, 3) int16.
-        coefficients: (S, C, P + R + L) float32: metres, quaternion values and metres per unit of
-            the bases, at S times evenly spread over the window.
+        clusters: (N,) uint8, index of each Gaussian's cluster.
+        position_basis: (P, N, 3) int16 basis vectors of positions.
+        rotation_basis: (R, N, 4) int16 basis vectors of quaternions.
+        scale_basis: (L, N, 3) int16 basis vectors of scales.
+        coefficients: (S, C, P + R + L) float32 factors of the bases at S times, evenly spread over
+            the window; one unit of a basis is worth that many metres, quaternion values or metres.
     """
 
     means: np.ndarray
@@ -45,24 +45,24 @@ class BakedWindow:
 
     @property
     def num_gaussians(self) -> int:
-        """N."""
+        """N, the number of Gaussians."""
         return self.means.shape[0]
 
     @property
     def num_clusters(self) -> int:
-        """C."""
+        """C, the number of clusters."""
         return self.coefficients.shape[1]
 
     @property
     def ranks(self) -> tuple[int, int, int]:
-        """P, R, L."""
+        """P, R, L, the numbers of basis vectors of positions, rotations and scales."""
         return len(self.position_basis), len(self.rotation_basis), len(self.scale_basis)
 
     def to_bytes(self, name: str) -> bytes:
         """The content of the file `name`.
 
         Raises:
-            BundleError: If shapes or dtypes disagree, or a value is out of range.
+            BundleError: If shapes or dtypes do not fit one another, or a value is out of range.
         """
         tensors = {f.name: getattr(self, f.name) for f in fields(self)}
         samples = len(self.coefficients)
@@ -73,10 +73,10 @@ class BakedWindow:
 
     @staticmethod
     def from_bytes(data: bytes, body: BodyInfo, window: WindowInfo) -> "BakedWindow":
-        """Reads a window; the counts must be those of the manifest.
+        """Reads a window and checks it against the manifest's counts.
 
         Raises:
-            BundleError: If anything does not fit.
+            BundleError: If the file is malformed or does not fit the manifest.
         """
         samples = body.num_samples(window)
         spec = _window_spec(window.num_gaussians, window.num_clusters, window.ranks, samples)
@@ -85,10 +85,10 @@ class BakedWindow:
         return baked
 
     def coefficients_at(self, tau: float) -> np.ndarray:
-        """(C, P + R + L) float32 at τ in [0, 1]: Catmull–Rom between the sampled times.
+        """(C, P + R + L) float32 at τ in [0, 1] of the window: Catmull–Rom between the samples.
 
-        Beyond either end the samples go on as the parabola through the last three, so that the
-        curve is quadratic there too.
+        Before the first and after the last sample, the parabola through the three nearest samples
+        is used, which makes the curve quadratic there.
         """
         rows = _continued(self.coefficients)  # (S + 2, C, P + R + L)
         place = min(max(tau, 0.0), 1.0) * (len(rows) - 3)
@@ -97,7 +97,7 @@ class BakedWindow:
         return np.tensordot(weights, rows[index : index + 4], 1)
 
     def at(self, tau: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What moves, at τ in [0, 1].
+        """The moving parts of the Gaussians at τ in [0, 1] of the window.
 
         Returns:
             means (N, 3) in metres, quats (N, 4) wxyz normalised, scales (N, 3) in metres; float32.

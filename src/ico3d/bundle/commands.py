@@ -12,21 +12,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Info:
-    """Checks a bundle and says what is in it.
+    """Checks a bundle and prints what it holds.
 
     Attributes:
-        bundle: The avatar: NAME.ico3d or its folder; `demo` is the one of the package.
-        json: Also write it to this file.
+        bundle: The avatar: NAME.ico3d or its folder; `demo` is the avatar of the package.
+        json: Also write the printed figures to this file.
     """
 
     bundle: tyro.conf.Positional[Path]
     json: Path | None = None
 
     def run(self) -> None:
-        """Prints the figures, writes what was asked for.
+        """Prints the figures and writes the file.
 
         Raises:
-            BundleError: If there is no bundle, or it fails a check.
+            BundleError: If the bundle does not exist or fails a check.
         """
         import json
 
@@ -46,16 +46,16 @@ class Info:
 
 
 def figures(bundle: "Bundle", path: Path) -> dict[str, Any]:
-    """What a bundle holds, as JSON can say it.
+    """Facts about a bundle, JSON-serialisable.
 
     Args:
         bundle: The opened bundle.
-        path: Where it lies.
+        path: Path of the bundle.
 
     Returns:
-        `bytes` on disk; `head_gaussians`, null without a head; `body_windows`, how many, 0 without
-        a body or on a skeleton; `body_gaussians` of each window, or of the body on a skeleton;
-        `provenance`; and further facts.
+        Among others: `bytes` on disk; `head_gaussians`, null without a head; `body_windows`, the
+        number of windows, 0 without a body or with one on a skeleton; `body_gaussians` of each
+        window, or of the body on a skeleton; `provenance`.
     """
     from ico3d.common.typed import plain
 

@@ -1,4 +1,4 @@
-"""The reference evaluator of the baked head; shaders are tested against it."""
+"""The reference evaluator of the baked head, against which shaders are tested."""
 
 import numpy as np
 
@@ -8,11 +8,11 @@ LEAKY_SLOPE = 0.02
 
 
 def coefficients(head: BakedHead, expression: np.ndarray) -> np.ndarray:
-    """c(e) = LeakyReLU(e·w1 + b1)·w2 + b2.
+    """Factors of the basis: c(e) = LeakyReLU(e·w1 + b1)·w2 + b2.
 
     Args:
         head: The baked head.
-        expression: (B,) or (T, B).
+        expression: (B,) or (T, B) expressions e.
 
     Returns:
         (K,) or (T, K) float32.
@@ -23,13 +23,13 @@ def coefficients(head: BakedHead, expression: np.ndarray) -> np.ndarray:
 
 
 def logits(head: BakedHead, expression: np.ndarray) -> np.ndarray:
-    """Ȳ + scale · Σ_k c_k(e) · basis[k] of one expression (B,) → (N, 4) float32."""
+    """Logits (N, 4) float32 for an expression (B,): Ȳ + scale · Σ_k c_k(e) · basis[k]."""
     blend = np.tensordot(coefficients(head, expression), head.basis.astype(np.float32), 1)  # (N, 4)
     return head.mean_logits.astype(np.float32) + head.basis_scale[:, None] * blend
 
 
 def attributes(head: BakedHead, expression: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What is drawn for one expression (B,).
+    """Colours and opacities of the Gaussians for an expression (B,).
 
     Returns:
         rgb (N, 3) and opacity (N,), float32 in [0, 1].

@@ -30,17 +30,17 @@ LICENSES = "LICENSES.txt"
 
 
 class Bundle:
-    """An avatar that has passed every check of docs/bundle.md.
+    """An opened bundle that has passed every check of docs/bundle.md.
 
     Attributes:
-        manifest: What the bundle says of itself.
-        head: The baked head, None where there is only a body.
-        world_from_head: (F, 4, 4) float32 head poses at `manifest.head.fps`: one per frame of the
-            body, or, without a body, to be played back and forth; None without a head.
-        skinned: The body on a skeleton, None where there is none.
-        gestures: What that body can do while it talks; None where it only repeats its recording.
-        cuts: Which frames of its recording are gestures; none where nobody says.
-        animation: How a whole person moves; None where there is a head or a body only.
+        manifest: The manifest.
+        head: The baked head, or None for a body alone.
+        world_from_head: (F, 4, 4) float32 head poses at `manifest.head.fps`: on a body one for each
+            frame of the body; without a body to be played back and forth; None without a head.
+        skinned: The body on a skeleton, or None.
+        gestures: Gestures of the body on a skeleton besides the recorded motion, by name, or None.
+        cuts: Frames of the recording that are gestures; empty where nobody says which.
+        animation: Procedural motion of a whole person; None for a head or a body alone.
     """
 
     manifest: Manifest
@@ -55,7 +55,7 @@ class Bundle:
         """Reads and checks every file; use `Bundle.open`.
 
         Raises:
-            BundleError: In one sentence that names the file.
+            BundleError: If a check fails; the sentence names the file.
         """
         self._archive = archive
         if MANIFEST not in archive.sizes:
@@ -69,28 +69,28 @@ class Bundle:
 
     @staticmethod
     def open(path: Path | str) -> "Bundle":
-        """Opens a folder or an uncompressed zip and checks all of it; `demo` is the packaged one.
+        """Opens a folder or an uncompressed zip and runs all checks; `demo` is the packaged bundle.
 
         Raises:
-            BundleError: If there is none, or it is damaged, unsafe or of another version.
+            BundleError: If the bundle is missing, damaged, unsafe or of an unknown version.
         """
         return Bundle(open_archive(bundle_path(path)))
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names that `read` knows, the manifest first."""
+        """Names of all files, the manifest first."""
         return (MANIFEST, *self.manifest.files)
 
     @property
     def background(self) -> str | None:
-        """Name of the file with the splats behind the person; None where there are none."""
+        """Name of the file with the background's Gaussians, or None."""
         return next((name for name in BACKGROUNDS if name in self.manifest.files), None)
 
     def read(self, name: str) -> bytes:
-        """The content of one file, verified again against its hash at each reading.
+        """The content of a file; its hash is checked again at each call.
 
         Raises:
-            BundleError: If the bundle has no such file, or it has changed since it was opened.
+            BundleError: If the bundle has no such file, or the file has changed since opening.
         """
         if name == MANIFEST:
             return self._manifest_bytes
@@ -103,20 +103,20 @@ class Bundle:
         return data
 
     def require_head(self) -> tuple[BakedHead, np.ndarray]:
-        """The head and its poses.
+        """The head and its poses (F, 4, 4).
 
         Raises:
-            BundleError: If there is only a body.
+            BundleError: If the bundle has no head.
         """
         if self.head is None or self.world_from_head is None:
             raise BundleError(f"the bundle of '{self.manifest.name}' has a body only, no head.")
         return self.head, self.world_from_head
 
     def window(self, index: int) -> BakedWindow:
-        """A window of the body.
+        """The window `index` of the body.
 
         Raises:
-            BundleError: If there is none, or its file has changed since it was opened.
+            BundleError: If there is no such window, or its file has changed since opening.
         """
         body = self.manifest.body
         if body is None or not 0 <= index < len(body.windows):
@@ -151,12 +151,12 @@ class Bundle:
 
 
 def write_bundle(path: Path | str, manifest: Manifest, files: Mapping[str, bytes]) -> Manifest:
-    """Writes a bundle as one stored zip, in one step; the same parts give the same bytes.
+    """Writes a bundle as one uncompressed zip, atomically; equal parts give equal bytes.
 
     Args:
         path: The file, usually NAME.ico3d.
-        manifest: Its `files` are filled in here.
-        files: Content by name, without the manifest.
+        manifest: The manifest; the field `files` is filled in here.
+        files: Contents by name, without the manifest.
 
     Returns:
         The manifest as written.
@@ -176,10 +176,13 @@ def write_bundle(path: Path | str, manifest: Manifest, files: Mapping[str, bytes
 
 
 def read_background(path: Path) -> dict[str, bytes]:
-    """A file of splats as the part of a bundle that it becomes: its name there, and its content.
+    """Reads a file of Gaussians for use as a bundle's background.
+
+    Returns:
+        One entry: the name in the bundle, and the content.
 
     Raises:
-        BundleError: If it cannot be read, or bundles hold no such file.
+        BundleError: If the file cannot be read, or is neither SPZ nor PLY, or fails a check.
     """
     name = f"background{path.suffix.lower()}"
     if name not in BACKGROUNDS:
@@ -193,10 +196,14 @@ def read_background(path: Path) -> dict[str, bytes]:
 
 
 def add_files(path: Path, more: Mapping[str, bytes]) -> None:
-    """Puts further files into a bundle.
+    """Adds files to an existing bundle, or replaces files there.
+
+    Args:
+        path: The bundle.
+        more: Contents by name.
 
     Raises:
-        BundleError: If they do not belong into it.
+        BundleError: If the bundle is damaged, or a file has no place in it.
     """
     bundle = Bundle.open(path)
     files = {name: bundle.read(name) for name in bundle.manifest.files}

@@ -17,19 +17,19 @@ _MAX_LENGTH = 1e4
 
 @dataclass(frozen=True)
 class BakedHead:
-    """N Gaussians in canonical head space whose look is a low-rank function of the expression.
+    """N Gaussians in canonical head space; colour and opacity are low-rank in the expression.
 
     Attributes:
         means: (N, 3) float32 metres.
         quats: (N, 4) float16 wxyz, normalised.
-        scales: (N, 3) float16, logarithms of metres.
-        mean_logits: (N, 4) float16 logits of r, g, b, opacity.
-        basis: (K, N, 4) int8.
-        basis_scale: (N,) float32.
-        w1: (B, H) float32.
-        b1: (H,) float32.
-        w2: (H, K) float32.
-        b2: (K,) float32.
+        scales: (N, 3) float16, natural logarithms of standard deviations in metres.
+        mean_logits: (N, 4) float16 mean logits Ȳ of r, g, b and opacity.
+        basis: (K, N, 4) int8 basis vectors of the logits.
+        basis_scale: (N,) float32 logits per unit of `basis`.
+        w1: (B, H) float32, first layer of the coefficient network.
+        b1: (H,) float32, first layer's bias.
+        w2: (H, K) float32, second layer.
+        b2: (K,) float32, second layer's bias.
     """
 
     means: np.ndarray
@@ -45,29 +45,29 @@ class BakedHead:
 
     @property
     def num_gaussians(self) -> int:
-        """N."""
+        """N, the number of Gaussians."""
         return self.means.shape[0]
 
     @property
     def rank(self) -> int:
-        """K."""
+        """K, the number of basis vectors."""
         return self.basis.shape[0]
 
     @property
     def hidden(self) -> int:
-        """H."""
+        """H, the width of the coefficient network."""
         return self.b1.shape[0]
 
     @property
     def expression_size(self) -> int:
-        """B."""
+        """B, the number of values of an expression."""
         return self.w1.shape[0]
 
     def to_bytes(self) -> bytes:
         """The content of `head.safetensors`.
 
         Raises:
-            BundleError: If shapes or dtypes disagree, or a value is out of range.
+            BundleError: If shapes or dtypes do not fit one another, or a value is out of range.
         """
         tensors = {f.name: getattr(self, f.name) for f in fields(self)}
         spec = _head_spec(self.num_gaussians, self.rank, self.hidden, self.expression_size)
@@ -77,10 +77,10 @@ class BakedHead:
 
     @staticmethod
     def from_bytes(data: bytes, info: HeadInfo) -> "BakedHead":
-        """Reads `head.safetensors`; the counts must be those of the manifest.
+        """Reads `head.safetensors` and checks it against the manifest's counts.
 
         Raises:
-            BundleError: If anything does not fit.
+            BundleError: If the file is malformed or does not fit the manifest.
         """
         spec = _head_spec(info.num_gaussians, info.rank, info.hidden, info.expression_size)
         head = BakedHead(**decode_tensors(data, spec, HEAD))
@@ -92,7 +92,7 @@ def poses_to_bytes(world_from_head: np.ndarray) -> bytes:
     """The content of `head_poses.safetensors` from (F, 4, 4) rigid transforms.
 
     Raises:
-        BundleError: If one is not rigid.
+        BundleError: If a transform is not rigid.
     """
     spec = _poses_spec(len(world_from_head))
     poses = np.asarray(world_from_head, np.float32)
@@ -101,10 +101,10 @@ def poses_to_bytes(world_from_head: np.ndarray) -> bytes:
 
 
 def poses_from_bytes(data: bytes, num_poses: int) -> np.ndarray:
-    """Reads `head_poses.safetensors` → (F, 4, 4) float32.
+    """Reads `head_poses.safetensors` as (F, 4, 4) float32.
 
     Raises:
-        BundleError: If it does not fit, or a pose is not rigid.
+        BundleError: If the file is malformed or a pose is not rigid.
     """
     poses = decode_tensors(data, _poses_spec(num_poses), POSES)["world_from_head"]
     _check_rigid(poses)

@@ -1,4 +1,4 @@
-"""What a bundle may hold at most, so that a hostile one cannot exhaust memory."""
+"""Upper limits for bundles, so that a hostile bundle cannot exhaust memory."""
 
 MAX_FILES = 256
 MAX_FILE_BYTES = 256 << 20
@@ -18,6 +18,6 @@ MAX_SAMPLES_PER_FRAME = 8
 MAX_BACKGROUND_BYTES = 64 << 20
 MAX_SHAPES = 8
 MAX_POSED_FRAMES = 30_000
-"""Of a body on a skeleton: numbers of frames are kept in 16 bits."""
+"""Frames of a body on a skeleton, whose numbers are stored in 16 bits."""
 MAX_KNOWN_POSES = 256
-"""A page compares every pose with each of them."""
+"""Stored poses with which a page compares every pose."""

@@ -13,14 +13,14 @@ from ico3d.errors import BundleError
 FORMAT = "ico3d-bundle"
 VERSION = 3
 SINCE = {"body": 2, "skinned": 3}
-"""Fields by the version that brought them: older manifests are read as if they were null."""
+"""Version in which a field appeared; in older manifests that field is read as null."""
 OLDEST = 1
 MANIFEST = "manifest.json"
 
 
 @dataclass(frozen=True)
 class FileEntry:
-    """One file: its SHA-256 in lower-case hexadecimal digits and its size in bytes."""
+    """A file: SHA-256 in lower-case hexadecimal digits, and size in bytes."""
 
     sha256: str
     size: int
@@ -28,20 +28,20 @@ class FileEntry:
 
 @dataclass(frozen=True)
 class HeadInfo:
-    """The counts that the tensors must agree with.
+    """The counts that the head's tensors must agree with.
 
     Attributes:
-        num_gaussians: N.
-        rank: K, the number of basis vectors.
-        hidden: H, the width of the coefficient network.
-        inputs: `speech` or `blendshapes`.
-        expression_size: B.
-        eye_offset: Where the seven eye and brow values (`capture.EYE_NAMES`) start in the
-            expression; null where it has none.
-        expression_names: One name each for blendshapes; empty for speech.
-        fps: Rate of head poses; on a body, that of the body.
-        num_poses: F, the number of head poses; on a body, one per frame of it.
-        idle_expression: (B,) the neutral face in silence with open eyes.
+        num_gaussians: N, number of Gaussians.
+        rank: K, number of basis vectors.
+        hidden: H, width of the coefficient network.
+        inputs: What drives the head: `speech` or `blendshapes`.
+        expression_size: B, number of values of an expression.
+        eye_offset: Index of the first of the seven eye and brow values
+            (`ico3d.common.expression.EYE_NAMES`) in an expression; null for a head without them.
+        expression_names: Names of the B blendshapes; empty for speech.
+        fps: Head poses per second; on a body the body's frame rate.
+        num_poses: F, number of head poses; on a body one for each frame of the body.
+        idle_expression: (B,) expression of the neutral face in silence with open eyes.
     """
 
     num_gaussians: int
@@ -58,15 +58,15 @@ class HeadInfo:
 
 @dataclass(frozen=True)
 class WindowInfo:
-    """A span of the body's time with Gaussians of its own.
+    """A window: a span of the body's frames that has its own Gaussians.
 
     Attributes:
-        first: Number of its first frame, which is the last one of the window before.
-        last: Number of its last frame.
-        num_gaussians: N.
-        num_clusters: C, groups of Gaussians that move in ways of their own.
-        ranks: P, R, L: the numbers of basis vectors of positions, rotations and scales.
-        file: `body/0000.safetensors` and so on.
+        first: First frame; it is also the last frame of the previous window.
+        last: Last frame.
+        num_gaussians: N, number of Gaussians.
+        num_clusters: C, number of groups of Gaussians with coefficients of their own.
+        ranks: P, R, L: numbers of basis vectors of positions, rotations and scales.
+        file: Name of the window's file: `body/0000.safetensors` and so on.
     """
 
     first: int
@@ -79,14 +79,14 @@ class WindowInfo:
 
 @dataclass(frozen=True)
 class BodyInfo:
-    """The counts that the windows' tensors must agree with.
+    """A body of windows: the counts that the windows' tensors must agree with.
 
     Attributes:
         fps: Frames per second; frame i is at i / fps seconds.
         samples_per_frame: Sampled times per frame: S = samples_per_frame · (last − first) + 1.
-        low: Least coordinates that its Gaussians' centres reach, metres.
-        high: Greatest coordinates.
-        windows: In the order of time, without gaps.
+        low: Lower corner of the box that the Gaussians' centres stay in, metres.
+        high: Upper corner of that box, metres.
+        windows: Windows in order of time, without gaps.
     """
 
     fps: float
@@ -96,12 +96,12 @@ class BodyInfo:
     windows: tuple[WindowInfo, ...]
 
     def num_samples(self, window: WindowInfo) -> int:
-        """S of a window."""
+        """S, the number of sampled times of a window."""
         return self.samples_per_frame * (window.last - window.first) + 1
 
     @property
     def num_frames(self) -> int:
-        """F of the whole clip."""
+        """F, the number of frames of the whole clip."""
         return self.windows[-1].last + 1
 
 
@@ -112,13 +112,13 @@ def window_file(index: int) -> str:
 
 @dataclass(frozen=True)
 class SpeechInfo:
-    """How sound becomes expressions.
+    """How sound is turned into expressions.
 
     Attributes:
         encoder: Name of the speech encoder.
-        sha256: Hash of the encoder's weights.
+        sha256: SHA-256 of the encoder's weights.
         fps: Expression rows per second (25).
-        input: `mel` (windows (T, 80, 16)) or `features` (T, D).
+        input: Input of `speech.onnx`: `mel` (windows (T, 80, 16)) or `features` (T, D).
     """
 
     encoder: str
@@ -129,7 +129,7 @@ class SpeechInfo:
 
 @dataclass(frozen=True)
 class CameraInfo:
-    """Where the visitor starts: world space, metres, `fov_y` in degrees."""
+    """The visitor's first view: world space in metres, vertical field of view in degrees."""
 
     eye: tuple[float, float, float]
     target: tuple[float, float, float]
@@ -139,14 +139,14 @@ class CameraInfo:
 
 @dataclass(frozen=True)
 class Loss:
-    """What baking costs on held-out pictures, dB of PSNR; null where not measured.
+    """Quality lost by baking, on held-out pictures: PSNR in dB; null where not measured.
 
-    Of whole pictures for heads, on the person for bodies and whole persons.
+    For heads it is measured on whole pictures, for bodies and whole persons on the person.
 
     Attributes:
-        psnr_exact: The exact model against ground truth.
-        psnr_baked: The baked one against ground truth.
-        psnr_baked_vs_exact: The baked one against the exact model's render.
+        psnr_exact: The trained model against the recording.
+        psnr_baked: The baked model against the recording.
+        psnr_baked_vs_exact: The baked model against pictures of the trained model.
     """
 
     psnr_exact: float | None
@@ -156,7 +156,7 @@ class Loss:
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where the avatar comes from: kind of subject, sources, consent, licence."""
+    """Origin of the avatar: kind of subject, sources, consent, licence."""
 
     kind: str
     sources: tuple[str, ...]
@@ -166,9 +166,9 @@ class Provenance:
 
 @dataclass(frozen=True)
 class Manifest:
-    """`manifest.json` of a head, a body, or both; `files` is filled in when it is written.
+    """`manifest.json` of a head, a body, or both; `write_bundle` fills in `files`.
 
-    A body is either one of windows (`body`) or one on a skeleton (`skinned`).
+    A body is either one of windows (`body`) or one on a skeleton (`skinned`), never both.
     """
 
     name: str
@@ -187,16 +187,16 @@ class Manifest:
 
     @property
     def is_whole(self) -> bool:
-        """Whether it is of a whole person: a head on a body."""
+        """Whether the avatar is a whole person: a head on a body."""
         return self.head is not None and self.any_body is not None
 
     @property
     def any_body(self) -> BodyInfo | SkinnedInfo | None:
-        """The body of either kind."""
+        """The body of either kind, or None."""
         return self.body or self.skinned
 
     def to_json(self) -> bytes:
-        """UTF-8 JSON, the same bytes for the same manifest."""
+        """The manifest as UTF-8 JSON; equal manifests give equal bytes."""
         value = {**plain(self), "persona": without_defaults(self.persona)}
         return (json.dumps(value, indent=1, ensure_ascii=False) + "\n").encode()
 
@@ -205,7 +205,7 @@ class Manifest:
         """Parses and checks `manifest.json`.
 
         Raises:
-            BundleError: If it is no manifest of this version, or contradicts itself.
+            BundleError: If the data are no manifest of a known version, or contradict themselves.
         """
         if len(data) > limits.MAX_MANIFEST_BYTES:
             raise BundleError(f"{MANIFEST}: is larger than {limits.MAX_MANIFEST_BYTES} bytes.")
@@ -232,10 +232,10 @@ def _check_version(value: Any) -> None:
 
 
 def check_manifest(manifest: Manifest) -> None:
-    """Checks ranges and that the parts agree.
+    """Checks that values are within their ranges and fit one another.
 
     Raises:
-        BundleError: Naming the first field that is wrong.
+        BundleError: At the first invalid field, which the sentence names.
     """
     head, body = manifest.head, manifest.any_body
     _require(head is not None or body is not None, "head", "be there where no body is")

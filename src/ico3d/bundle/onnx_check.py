@@ -1,7 +1,7 @@
-"""A look into `speech.onnx` before a runtime loads it: standard operators, weights inside.
+"""Checks `speech.onnx` before a runtime loads it: standard operators, weights inside.
 
-Reads protobuf's wire format directly, so that a server needs no onnx package. Field numbers are
-those of onnx.proto (ModelProto, GraphProto, NodeProto, AttributeProto, TensorProto).
+The check reads protobuf's wire format directly, so that a server needs no onnx package. Field
+numbers are those of onnx.proto (ModelProto, GraphProto, NodeProto, AttributeProto, TensorProto).
 """
 
 from collections.abc import Iterator
@@ -34,7 +34,10 @@ OPERATORS = {
     "Tanh",
     "Unsqueeze",
 }
-"""What feed-forward graphs such as those of `speech.export` need; no loops, no random numbers."""
+"""Allowed operators: those of feed-forward graphs such as `speech.export` writes.
+
+There are no loops and no random numbers among them.
+"""
 
 Value = int | memoryview
 
@@ -43,13 +46,14 @@ def check_onnx(data: bytes, name: str, input_name: str, output_name: str) -> Non
     """Checks that a model is self-contained and has the expected input and output.
 
     Args:
-        data: The model.
-        name: The file, for messages.
-        input_name: Name of the graph's only input.
-        output_name: Name of the graph's only output.
+        data: Content of the file.
+        name: Name of the file, for errors.
+        input_name: Expected name of the graph's only input.
+        output_name: Expected name of the graph's only output.
 
     Raises:
-        BundleError: If it is no ONNX model, uses other operators, or refers to other files.
+        BundleError: If the data are no ONNX model, the model uses operators that are not allowed,
+            or it refers to other files.
     """
     try:
         graphs: list[memoryview] = []

@@ -1,4 +1,4 @@
-"""The avatar that comes in the package."""
+"""The avatar that is part of the Python package."""
 
 from pathlib import Path
 
@@ -6,15 +6,15 @@ import ico3d
 from ico3d.errors import BundleError
 
 NAME = "demo"
-"""How it is called wherever a bundle is taken."""
+"""Name of the packaged avatar, accepted wherever the path of a bundle is."""
 FILE = Path(ico3d.__file__).parent / "chat" / "data" / "demo.ico3d"
 
 
 def bundle_path(named: Path | str) -> Path:
-    """Where a bundle lies that somebody named: `demo` is the packaged one, all else a path.
+    """Path of a bundle; `demo` stands for the packaged avatar.
 
     Raises:
-        BundleError: If the packaged one is asked for and the package came without it.
+        BundleError: If `demo` is asked for and this installation of the package lacks it.
     """
     if str(named) != NAME:
         return Path(named)

@@ -1,4 +1,4 @@
-"""Who an avatar is: part of its bundle, or a file of its own (docs/conversation.md)."""
+"""Who an avatar is: name, knowledge and manner, from a bundle or a file (docs/conversation.md)."""
 
 import re
 import tomllib
@@ -20,15 +20,16 @@ class Persona:
     """Who the avatar is, what it knows and how it talks.
 
     Attributes:
-        name: How it calls itself.
-        greeting: First words of the avatar.
-        notes: What it knows: "question | question => answer", or a fact as a plain sentence, which
-            only language models can use.
-        manner: How it behaves and talks, in a sentence or two.
-        languages: Codes such as `en` or `pt-BR` of the languages it answers in, its own one first;
-            empty for any.
-        voice: Name of its voice for each provider of voices, such as {"espeak-ng": "en+f2"}.
-        forbidden: Topics it declines to talk about, each "word | other word".
+        name: Name by which the avatar introduces itself.
+        greeting: The avatar's first words.
+        notes: What the avatar knows. A note is "question | question => answer", or a fact as a
+            plain sentence, which only language models can use.
+        manner: How the avatar behaves and talks, in a sentence or two.
+        languages: Codes such as `en` or `pt-BR` of the languages in which the avatar answers, its
+            own language first; empty for any language.
+        voice: Name of the avatar's voice for each provider of voices, such as {"espeak-ng":
+            "en+f2"}.
+        forbidden: Topics about which the avatar declines to talk, each "word | other word".
     """
 
     name: str
@@ -41,17 +42,25 @@ class Persona:
 
 
 REQUIRED = ("name", "greeting", "notes")
-"""Entries that a bundle must have; the others came later and are written where they say more."""
+"""Entries that a bundle must have.
+
+The other entries are newer; they are written only where they differ from their default.
+"""
 
 
 def without_defaults(persona: Persona) -> dict[str, Any]:
-    """A persona as a bundle holds it: readable for programs that know the required ones only."""
+    """A persona as a bundle stores it, readable for older programs that know only `REQUIRED`."""
     values, empty = plain(persona), plain(Persona(""))
     return {key: v for key, v in values.items() if key in REQUIRED or v != empty[key]}
 
 
 def with_defaults(value: Any, required: tuple[str, ...] = REQUIRED) -> Any:
-    """Parsed JSON or TOML of a persona with the entries it may lack."""
+    """Adds defaults for missing entries to parsed JSON or TOML of a persona.
+
+    Args:
+        value: The parsed data.
+        required: Entries for which there is no default.
+    """
     if not isinstance(value, dict):
         return value
     known = plain(Persona(""))
@@ -60,10 +69,10 @@ def with_defaults(value: Any, required: tuple[str, ...] = REQUIRED) -> Any:
 
 
 def read_persona(path: Path) -> Persona:
-    """Reads a persona's own file: TOML, or JSON if its name ends so; only `name` must be there.
+    """Reads a persona's file, TOML or (by its suffix) JSON, in which only `name` is required.
 
     Raises:
-        BundleError: In one sentence, if it cannot be read or an entry makes no sense.
+        BundleError: If the file cannot be read or an entry is invalid.
     """
     try:
         with path.open("rb") as file:
@@ -86,14 +95,14 @@ def read_persona(path: Path) -> Persona:
 
 
 def check_persona(persona: Persona, where: str) -> None:
-    """Checks lengths and forms.
+    """Checks lengths and forms of all entries.
 
     Args:
-        persona: Of a bundle or a file.
-        where: What an error names as the place.
+        persona: The persona of a bundle or a file.
+        where: Name of the bundle or file, for errors.
 
     Raises:
-        BundleError: Naming the first entry that makes no sense.
+        BundleError: At the first invalid entry, which the sentence names.
     """
     for entry in ("name", "greeting", "manner"):
         short = len(getattr(persona, entry)) <= MOST_LETTERS

@@ -1,9 +1,9 @@
-"""Procedural body animation: captured frames in a new order, as long as a speech.
+"""Procedural body animation: replays captured frames in a new order, as long as a speech lasts.
 
-Follows the paper's section "Procedural Body Animation": motion goes along the captured frames,
-forwards or backwards, from one action's key frame to another picked at random, and ends at the
-end of the rest loop together with the speech. The path is a list of points (audio time, body
-time), straight between them.
+As in the paper's section "Procedural Body Animation", motion runs along the captured frames,
+forwards or backwards, from one action's key frame to another, randomly chosen one, and ends at the
+end of the rest loop together with the speech. The path is a list of points (audio time, body time)
+with straight lines between them.
 """
 
 import math
@@ -15,33 +15,33 @@ import numpy as np
 from ico3d.bundle.animation import Animation
 
 Point = tuple[float, float]
-"""Seconds of the speech, seconds of body time."""
+"""A point of the path: seconds of the speech, seconds of body time."""
 EASE = 0.2
-"""Seconds in which motion starts from standing still, or ends."""
+"""Seconds in which motion accelerates from standing still, or slows down to it."""
 RAMP = 4
-"""Straight pieces that stand for one such acceleration."""
+"""Number of straight pieces that approximate one such acceleration."""
 STEP = 0.25
-"""Seconds between points of steady motion, so that a path can be handed out piece by piece."""
+"""Seconds between points of steady motion; small, so that a path can be sent piece by piece."""
 SHORTEST = 0.25
-"""Seconds of body time between two actions, at least: nearer ones look like trembling."""
+"""Least body time in seconds between two visited actions; shorter motion looks like trembling."""
 PAUSE = 0.6
-"""Seconds that a pose is held at a key frame, at most; half of the poses are not."""
+"""Longest time in seconds for which a pose is held at a key frame; half of them are not held."""
 LINGER = 1.0
-"""Seconds that an action is held for want of time to reach another, at most."""
+"""Longest time in seconds for which an action is held if too little time is left for another."""
 AGAIN = 0.25
-"""How likely it is to go straight back to where one came from, relative to elsewhere."""
+"""Probability of returning to the previous action, relative to that of any other action."""
 SAME = 1e-6
-"""Seconds of body time that are no distance."""
+"""Differences of body time up to this, in seconds, count as none."""
 
 
 @dataclass(frozen=True)
 class Start:
-    """Where a body is when its plan begins.
+    """State of a body at the beginning of a plan.
 
     Attributes:
-        body_time: Seconds.
-        velocity: Body seconds per second, negative when it plays backwards; 0 if it stands still,
-            or may start in either direction.
+        body_time: Body time in seconds.
+        velocity: Body seconds per second, negative while playing backwards; 0 for a body that
+            stands still, which may start in either direction.
     """
 
     body_time: float
@@ -57,18 +57,20 @@ def plan(
 ) -> list[Point]:
     """The motion during a speech of known length.
 
-    It begins at (0, start.body_time) and ends at the last frame of the rest loop when the speech
-    ends; if that cannot be reached so soon, as soon as it can. A moving body first goes on to the
-    next key frame in its direction, for motion turns around at key frames and at the ends of the
-    rest loop only. Speeds are within the animation's limits, but for `EASE` seconds around
-    standing still.
+    The motion begins at (0, start.body_time) and ends with the speech at the last frame of the rest
+    loop; if that is too far away, it ends as soon as possible. Motion turns around only at key
+    frames and at the ends of the rest loop, so a moving body first continues to the next key frame
+    in its direction. Speeds stay within the animation's limits except while easing.
 
     Args:
-        animation: The key frames.
-        start: Where the body is.
-        seconds: How long the speech lasts.
-        random: Decides which actions are visited, how fast, and how long poses are held.
-        gestures: False keeps the body at rest: it goes there and is held while the face talks.
+        animation: Key frames, rest loop and limits of speed.
+        start: State of the body at the beginning.
+        seconds: Duration of the speech.
+        random: Source of all random choices: actions, speeds, and how long poses are held.
+        gestures: If False, the body goes to rest and stays there while the face talks.
+
+    Returns:
+        The path, from the first point to the last.
     """
     planner = Planner(animation, start, random, gestures=gestures)
     planner.end(seconds)
@@ -76,11 +78,11 @@ def plan(
 
 
 class Planner:
-    """The motion during a speech that is still growing; what was handed out stays as it was.
+    """Plans the motion during a speech that is still growing; points once returned never change.
 
     At every moment the body could be back at rest when the sound known so far has ended, or
-    `overrun` seconds later. Decisions are made as late as possible: a motion begins when points
-    beyond its beginning are asked for.
+    `overrun` seconds later. Decisions are made as late as possible: a motion is chosen only when
+    points after its beginning are asked for.
     """
 
     def __init__(
@@ -92,16 +94,16 @@ class Planner:
         gestures: bool = True,
         overrun: float = 0.0,
     ):
-        """A plan of which nothing is known yet but its first point.
+        """Starts a plan that has only its first point.
 
         Args:
-            animation: The key frames.
-            start: Where the body is.
-            random: Decides everything that is random.
-            at: Seconds of the speech at which it is there.
-            gestures: False keeps the body at rest.
-            overrun: Seconds that motion may last beyond the known sound of a speech that has not
-                ended; then more gestures fit into sound that comes in small pieces.
+            animation: Key frames, rest loop and limits of speed.
+            start: State of the body at the beginning.
+            random: Source of all random choices.
+            at: Seconds of the speech at which the plan begins.
+            gestures: If False, the body stays at rest.
+            overrun: Seconds by which motion may exceed the known sound while the speech has not
+                ended; a larger value allows more gestures when sound arrives in small pieces.
         """
         self._animation, self._random, self._overrun = animation, random, overrun
         fps = animation.fps
@@ -118,29 +120,30 @@ class Planner:
         self._decided: deque[Point] = deque([(at, self._place)])  # and not yet handed out
 
     def know(self, seconds: float) -> None:
-        """The speech lasts so long at least."""
+        """Tells that the speech lasts at least `seconds`."""
         self._known = max(self._known, seconds)
 
     def end(self, seconds: float) -> None:
-        """The speech lasts just so long."""
+        """Tells that the speech lasts exactly `seconds`."""
         self._known = self._end = seconds
 
     def visit(self, place: float) -> None:
-        """The action at these seconds of body time comes next, as soon as there is time for it."""
+        """Asks for the action at body time `place` in seconds, as soon as there is time for it."""
         if place in self._actions:
             self._wanted = place
 
     @property
     def is_over(self) -> bool:
-        """Whether the last point has been handed out."""
+        """Whether the last point of the path has been returned."""
         return not self._decided and self._has_arrived()
 
     def points(self, until: float = math.inf) -> list[Point]:
-        """The points that follow those handed out before.
+        """The points that follow those returned before.
 
         Args:
-            until: Seconds of the speech of the last one. It is cut to the known sound unless the
-                speech has ended: then there is always a way on to the end, if it is later.
+            until: Seconds of the speech up to which to return points, limited to the known sound
+                while the speech has not ended; afterwards the path always leads to the end of the
+                speech.
         """
         if self._end is None:
             until = min(until, self._known)
@@ -268,33 +271,33 @@ class Planner:
 
 
 def ease_seconds(way: float, speed: float, eased: int) -> float:
-    """How long each acceleration takes: less where the way is too short for `EASE`."""
+    """Duration in seconds of each acceleration: `EASE`, or less for a short way."""
     return min(EASE, 2 * way / (eased * speed))
 
 
 def travel(way: float, speed: float, eased: int = 2) -> float:
-    """Seconds of a motion over some body seconds.
+    """Duration in seconds of a motion.
 
     Args:
-        way: Body seconds.
-        speed: In the middle.
-        eased: How many of its two ends stand still.
+        way: Distance in body seconds.
+        speed: Speed in the middle, body seconds per second.
+        eased: Number of the motion's ends at which the body stands still.
     """
     return way / speed + eased * ease_seconds(way, speed, eased) / 2
 
 
 def speed_for(way: float, seconds: float) -> float:
-    """The speed in the middle of a motion that lasts so long: the inverse of `travel`."""
+    """Speed in the middle of a motion that takes `seconds`; the inverse of `travel`."""
     return way / (seconds - EASE) if seconds >= 2 * EASE else 2 * way / seconds
 
 
 def leg(way: float, speed: float, moving: bool) -> list[Point]:
-    """A motion from 0 to `way`: points (seconds, body seconds) after its beginning.
+    """A motion from 0 to `way`, as points (seconds, body seconds) relative to its beginning.
 
     Args:
-        way: Body seconds, above 0.
-        speed: In the middle.
-        moving: Whether it begins at this speed instead of standing still.
+        way: Distance in body seconds, above 0.
+        speed: Speed in the middle, body seconds per second.
+        moving: Whether the motion begins at full speed instead of from standing still.
     """
     ease = ease_seconds(way, speed, 1 if moving else 2)
     ramp = [(ease * i / RAMP, speed * ease * (i / RAMP) ** 2 / 2) for i in range(1, RAMP + 1)]

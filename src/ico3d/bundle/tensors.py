@@ -1,4 +1,4 @@
-"""Safetensors with exact expectations: each tensor's dtype, shape and finiteness."""
+"""Safetensors with exact expectations of each tensor's dtype, shape and finiteness."""
 
 import struct
 from collections.abc import Mapping
@@ -20,14 +20,14 @@ _DTYPES = {
 _MAX_HEADER_BYTES = 1 << 16
 
 Spec = Mapping[str, tuple[str, tuple[int, ...]]]
-"""Name → (safetensors dtype, shape) of every tensor that a file must hold."""
+"""For each tensor that a file must hold, by name: safetensors dtype and shape."""
 
 
 def encode_tensors(tensors: Mapping[str, np.ndarray], spec: Spec, name: str) -> bytes:
-    """Serialises tensors that fit `spec`; the same tensors give the same bytes.
+    """Serialises tensors according to `spec`; equal tensors give equal bytes.
 
     Raises:
-        BundleError: If one has another dtype or shape, or is not finite.
+        BundleError: If a tensor has another dtype or shape, or is not finite.
     """
     for key, (dtype, shape) in spec.items():
         array = tensors[key]
@@ -40,15 +40,15 @@ def encode_tensors(tensors: Mapping[str, np.ndarray], spec: Spec, name: str) -> 
 
 
 def decode_tensors(data: bytes, spec: Spec, name: str) -> dict[str, np.ndarray]:
-    """Reads tensors as read-only views of `data`.
+    """Decodes tensors as read-only views of `data`.
 
     Args:
-        data: A whole safetensors file.
-        spec: What it must hold, no more and no less.
-        name: The file, for messages.
+        data: Content of a safetensors file.
+        spec: The tensors that the file must hold, no more and no less.
+        name: Name of the file, for errors.
 
     Raises:
-        BundleError: If header, dtypes, shapes or values are anything else.
+        BundleError: If the header is malformed, or dtypes, shapes or values do not comply.
     """
     header, start = _header(data, name)
     if set(header) != set(spec):

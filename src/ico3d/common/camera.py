@@ -46,13 +46,14 @@ class Camera:
         return inverse
 
     def moved(self, world_from_local: np.ndarray) -> "Camera":
-        """The same camera seen from a local frame that lies in the world at `world_from_local`.
+        """The same camera, given in a local frame instead of the world.
 
         Args:
-            world_from_local: (4, 4) rigid transform.
+            world_from_local: (4, 4) rigid transform from the local frame to the world, metres.
 
         Returns:
-            A camera whose `world_to_camera` takes local points: W2C · world_from_local.
+            A camera whose `world_to_camera` is W2C · world_from_local, so that the camera projects
+            points of the local frame.
         """
         return Camera(
             self.width,
@@ -63,18 +64,18 @@ class Camera:
         )
 
     def resized(self, width: int, height: int) -> "Camera":
-        """The same camera with another resolution (intrinsics scale along)."""
+        """The same camera at another resolution in pixels; the intrinsics are scaled to match."""
         scale = np.diag([width / self.width, height / self.height, 1.0])
         return Camera(width, height, scale @ self.intrinsics, self.world_to_camera, self.name)
 
     def cropped(self, left: int, top: int, width: int, height: int) -> "Camera":
-        """The camera that takes a part of the picture only.
+        """The camera whose picture is a rectangle of this camera's picture.
 
         Args:
-            left: Columns cut off, or added where negative.
-            top: Rows cut off, or added.
-            width: Columns of the part.
-            height: Rows of the part.
+            left: Pixel columns cut off on the left; a negative number adds columns there.
+            top: Pixel rows cut off at the top; a negative number adds rows there.
+            width: Pixel columns of the rectangle.
+            height: Pixel rows of the rectangle.
         """
         intrinsics = self.intrinsics.copy()
         intrinsics[:2, 2] -= (left, top)
@@ -84,10 +85,11 @@ class Camera:
         """Projects world points.
 
         Args:
-            points: (..., 3) metres.
+            points: (..., 3) points in the world, metres.
 
         Returns:
-            pixels (..., 2) with pixel centres at +0.5, and depths (...,) along z in metres.
+            Pixel coordinates (..., 2), where pixel centres lie at +0.5, and depths (...,) along the
+            camera's z axis in metres.
         """
         points = np.asarray(points, np.float64)
         local = points @ self.world_to_camera[:3, :3].T + self.world_to_camera[:3, 3]  # (..., 3)
@@ -96,7 +98,7 @@ class Camera:
 
 
 def look_at(eye: ArrayLike, target: ArrayLike, up: ArrayLike = (0.0, 1.0, 0.0)) -> np.ndarray:
-    """World-to-camera (4, 4) of a camera at `eye` that looks at `target` (OpenCV axes)."""
+    """World-to-camera matrix (4, 4) of a camera at `eye` looking at `target`, in OpenCV axes."""
     eye, target = np.asarray(eye, float), np.asarray(target, float)
     forward = (target - eye) / np.linalg.norm(target - eye)
     right = np.cross(forward, np.asarray(up, float))

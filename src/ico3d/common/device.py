@@ -1,6 +1,6 @@
-"""What users may say about where to compute."""
+"""The names by which users choose the device to compute on."""
 
 from typing import Literal
 
 DeviceName = Literal["auto", "cpu", "cuda"]
-"""`auto` takes CUDA where it works and the CPU otherwise (`ico3d.splat.device`)."""
+"""`auto` takes CUDA where CUDA works, else the CPU (`ico3d.splat.device` decides)."""

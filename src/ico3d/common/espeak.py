@@ -1,6 +1,7 @@
-"""Speech from espeak-ng, with the time of every phoneme: truth for training, a voice offline.
+"""Speech synthesis with espeak-ng, which also tells the time of every phoneme.
 
-The library (GPL-3) comes with the package `espeakng-loader` and is loaded when first used.
+Training uses the phonemes as ground truth; without a network, espeak-ng can serve as a voice. The
+library (GPL-3) comes with the package `espeakng-loader` and is loaded at first use.
 """
 
 # pyright: reportMissingTypeStubs=false
@@ -64,8 +65,9 @@ class Phoneme:
     """One speech sound; it lasts until the next one begins.
 
     Attributes:
-        time: When the articulation begins, in seconds; for stops, when the mouth closes.
-        symbol: IPA with stress and length marks; the empty string is a pause.
+        time: When the articulation begins, in seconds from the start of the sound; for stop
+            consonants, when the mouth closes.
+        symbol: IPA with stress and length marks; the empty string stands for a pause.
     """
 
     time: float
@@ -123,18 +125,18 @@ def synthesize(
 ) -> Speech:
     """Speaks a text; the same arguments give the same samples.
 
-    Safe to call from any thread; one call at a time does the work.
+    Any thread may call this function; a lock lets one call at a time through.
 
     Args:
         text: What to say, in the language of the voice.
         voice: Language and, after `+`, a variant: `en-us`, `de+f3`, `fr+klatt2`.
         rate: Words per minute, 80 to 450.
-        pitch: 0 to 100.
+        pitch: Pitch of the voice, 0 to 100.
         pitch_range: How far the pitch moves: 0 (monotone) to 100.
 
     Raises:
         MissingExtraError: If espeakng-loader is not installed.
-        SettingsError: If there is no such voice.
+        SettingsError: If espeak-ng has no such voice.
     """
     blocks: list[np.ndarray] = []
     marks: list[tuple[int, str]] = []

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 SPEECH_SIZE = 32
-"""How many adapted speech features come first."""
+"""Number of speech values at the start of the expression vector."""
 
 EYE_NAMES = (
     "browDownLeft",
@@ -16,35 +16,38 @@ EYE_NAMES = (
     "eyeBlinkLeft",
     "eyeBlinkRight",
 )
-"""The seven eye and brow values that complete the expression vector (ARKit names, 0 to 1)."""
+"""ARKit names of the seven eye and brow values, 0 to 1, at the end of the expression vector."""
 
 LIDS = [i for i, name in enumerate(EYE_NAMES) if "Blink" in name]
-"""Which of them are the eyelids."""
+"""Indices of the eyelids in `EYE_NAMES`."""
 
 
 @dataclass(frozen=True)
 class EyeRange:
     """How far the eyes and brows of one person were seen to move.
 
-    A head knows nothing of what lies beyond: a brow that moved by a hundredth while it was
-    recorded turns the whole face to rags when it is raised by half.
+    A head model is undefined outside of the values it was trained with: where a brow moved by 0.01
+    in the recording, raising it by 0.5 tears the whole face apart.
 
     Attributes:
-        rest: (7,) values of `EYE_NAMES` at rest.
-        most: (7,) the highest; at least those at rest.
+        rest: (7,) values of eyes and brows at rest, in the order of `EYE_NAMES`.
+        most: (7,) highest values seen, none below `rest`.
     """
 
     rest: tuple[float, ...] = (0.0,) * len(EYE_NAMES)
     most: tuple[float, ...] = (1.0,) * len(EYE_NAMES)
 
     def values(self, shares: np.ndarray) -> np.ndarray:
-        """Values (..., 7) of shares of the way from rest (0) to the most that was seen (1)."""
+        """Values (..., 7) of shares (..., 7) of the way from rest (0) to the highest seen (1)."""
         rest, most = np.array(self.rest, np.float32), np.array(self.most, np.float32)  # (7,), (7,)
         return rest + np.asarray(shares, np.float32) * (most - rest)
 
 
 def eye_range(recorded: np.ndarray) -> EyeRange:
-    """What a recording (T, 7) tells: brows rest at their usual place, lids as open as they get."""
+    """The range of eyes and brows in a recording (T, 7).
+
+    Brows rest at their median; lids rest at the 10th percentile of closure, nearly fully open.
+    """
     rest = np.median(recorded, axis=0)  # (7,)
     rest[LIDS] = np.percentile(recorded[:, LIDS], 10, axis=0)
     most = np.maximum(recorded.max(axis=0), rest)
@@ -54,13 +57,13 @@ def eye_range(recorded: np.ndarray) -> EyeRange:
 def expression_rows(
     idle: np.ndarray, lips: np.ndarray, eyes: np.ndarray, eye_offset: int | None
 ) -> np.ndarray:
-    """Whole expressions of a face whose mouth and eyes move.
+    """Expression vectors of a face from separate values for mouth and eyes.
 
     Args:
-        idle: (B,) the resting face.
-        lips: (n, C) what the mouth does; C = 0 for a mouth at rest.
-        eyes: (n, 7) what eyes and brows do.
-        eye_offset: Where their values start; None where the face has none.
+        idle: (B,) expression of the resting face.
+        lips: (n, C) values of the mouth, put at the start of each row; C = 0 for a mouth at rest.
+        eyes: (n, 7) values of eyes and brows.
+        eye_offset: Column at which the values of the eyes start; None for a face without them.
 
     Returns:
         (n, B) float32.

@@ -11,11 +11,11 @@ _TEMPORARY = re.compile(r"\..+\.[0-9a-f]{16}(\.[^.]+)?")
 
 
 def write_atomic(path: Path | str, write: Callable[[Path], None] | bytes) -> None:
-    """Writes a file by way of a temporary one: write, fsync, rename.
+    """Writes a file under a temporary name, flushes it to disk and renames it.
 
     Args:
-        path: Where the file shall lie; its folder is made.
-        write: The bytes, or a function that writes to the path it is given.
+        path: The file to write; its folder is made where missing.
+        write: The contents, or a function that writes them to the temporary path it is given.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -35,7 +35,7 @@ def write_atomic(path: Path | str, write: Callable[[Path], None] | bytes) -> Non
 
 
 def remove_unfinished(folder: Path) -> None:
-    """Removes what writers that were killed left in a folder; nobody may be writing to it now."""
+    """Removes what killed writers left in a folder; call only while nobody writes there."""
     for path in folder.iterdir():
         if _TEMPORARY.fullmatch(path.name):
             path.unlink()

@@ -1,4 +1,4 @@
-"""What libraries written in C++ print to the standard error, past Python."""
+"""Hides messages that C++ libraries print to the standard error stream, bypassing Python."""
 
 import os
 import sys
@@ -11,10 +11,10 @@ STANDARD_ERROR = 2
 
 @contextmanager
 def held_back() -> Generator[None]:
-    """Keeps such messages from the user; they are printed only if what runs within fails.
+    """Hides what libraries print to the standard error stream, unless the `with` block raises.
 
-    Everything that the process writes to the standard error meanwhile is held back, that of other
-    threads as well: for short steps, such as opening a model.
+    If the block raises, everything held back is printed. The stream of the whole process is
+    redirected, other threads included, so use it only around short steps such as opening a model.
     """
     if sys.stderr is not None:
         sys.stderr.flush()

@@ -1,6 +1,6 @@
-"""Presets of settings, and how words of the command line choose one of them.
+"""Presets of settings, and how the command line selects one.
 
-Settings modules need no torch: `--help` shows their defaults, and has to be quick.
+Modules with settings must not import torch: `--help` shows their defaults and should be fast.
 """
 
 from collections.abc import Sequence
@@ -15,10 +15,13 @@ Choice = TypeVar("Choice")
 
 
 def chosen(kind: type[Choice], words: Sequence[str]) -> Choice:
-    """What words say about the options that decide the defaults of all others.
+    """Parses the options that decide the defaults of all other options, such as the preset.
 
     Args:
-        kind: A dataclass with these options alone.
-        words: All words behind a verb; other options among them are passed over.
+        kind: A dataclass that has only these options.
+        words: All arguments that follow the verb; options that `kind` does not have are ignored.
+
+    Returns:
+        An instance of `kind`.
     """
     return tyro.cli(kind, args=list(words), add_help=False, return_unknown_args=True)[0]

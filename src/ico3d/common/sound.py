@@ -1,7 +1,7 @@
-"""What a sound says of itself, judged before it is decoded or resampled.
+"""Checks what the header of a sound file claims, before the sound is decoded or resampled.
 
-A header of 44 bytes may claim any rate and any length: two kilobytes at 1 Hz are half an hour of
-sound, and 100 MB of samples. Every entrance of sound asks `fault` first.
+A header of 44 bytes can claim any rate and length: a file of two kilobytes at 1 Hz claims half an
+hour, which takes 100 MB once resampled. Code that accepts sound from outside calls `fault` first.
 """
 
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
@@ -18,19 +18,19 @@ MOST_BYTES = 2 << 30  # of decoded samples
 RECORDING = 2 * 3600.0  # s of a recording that someone made on purpose
 REQUEST = 600.0  # s of a sound that another machine sends, or of one that it is asked for
 WAV_ERRORS = (wave.Error, EOFError, RuntimeError)
-"""What `wave` raises for damaged files: the last where one part claims more than another holds."""
+"""What `wave` raises for damaged files; RuntimeError where a chunk claims more than its parent."""
 _WAV = struct.Struct("<4s4x4s4s4xHHI6xH")  # up to the width of a sample, of a plain WAV file
 
 
 @dataclass(frozen=True)
 class Claim:
-    """What a header says.
+    """What the header of a sound file claims.
 
     Attributes:
         rate: Samples per second.
-        channels: How many.
+        channels: Number of channels.
         frames: Samples of each channel.
-        width: Bytes of a decoded sample.
+        width: Bytes of one decoded sample of one channel.
     """
 
     rate: int
@@ -40,11 +40,11 @@ class Claim:
 
 
 def fault(claim: Claim, longest: float = RECORDING) -> str:
-    """Why a sound is not taken, as a clause without its subject; empty if it is.
+    """Why a sound is refused, as a clause without a subject ("claims …"); empty if it is accepted.
 
     Args:
-        claim: What it says of itself.
-        longest: Seconds that it may last.
+        claim: What the sound's header says.
+        longest: Longest duration that is accepted, in seconds.
     """
     if not LOWEST_RATE <= claim.rate <= HIGHEST_RATE:
         return f"claims {claim.rate} samples per second, not {LOWEST_RATE} to {HIGHEST_RATE}"
@@ -58,10 +58,11 @@ def fault(claim: Claim, longest: float = RECORDING) -> str:
 
 
 def file_claim(path: Path) -> Claim:
-    """What the header of a file says, of any kind that libsndfile reads; needs soundfile.
+    """The claim of a sound file, in any format that libsndfile (package soundfile) reads.
 
     Raises:
-        OSError, RuntimeError: If it cannot be read as sound.
+        OSError: If the file cannot be opened.
+        RuntimeError: If the file cannot be read as sound.
     """
     import soundfile
 
@@ -70,11 +71,13 @@ def file_claim(path: Path) -> Claim:
 
 
 def open_claim(sound: wave.Wave_read, size: int) -> Claim:
-    """What an opened WAV file says; one written while it was made claims more than there is.
+    """The claim of an opened WAV file, its length limited by the size of the file.
+
+    The header of a WAV file that was streamed while being recorded claims more than the file holds.
 
     Args:
-        sound: The file.
-        size: Its bytes.
+        sound: The opened file.
+        size: Size of the file in bytes.
     """
     width, channels = sound.getsampwidth(), sound.getnchannels()
     frames = min(sound.getnframes(), size // (width * channels))
@@ -82,7 +85,7 @@ def open_claim(sound: wave.Wave_read, size: int) -> Claim:
 
 
 def wav_claim(head: bytes) -> Claim | None:
-    """What the first 44 bytes of a plain WAV file say, its length aside; None for other bytes."""
+    """The claim of a plain WAV header of 44 bytes, without the length; None for other bytes."""
     if len(head) < _WAV.size:
         return None
     riff, wave, form, _, channels, rate, bits = _WAV.unpack_from(head)

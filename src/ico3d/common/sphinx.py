@@ -1,8 +1,7 @@
-"""pocketsphinx in a process of its own.
+"""Runs pocketsphinx, a speech recogniser, in a process of its own.
 
-Its decoder holds the interpreter's lock while it works. In a thread it would delay all that a
-server does meanwhile: in the first moments of a sentence, with 0.7 s of sound to catch up on, by
-some 0.2 s.
+pocketsphinx holds Python's interpreter lock while it decodes. In a thread of the server, decoding
+the first 0.7 s of a sentence would block everything else for about 0.2 s.
 """
 
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false
@@ -21,18 +20,18 @@ _RATE = 16_000  # Hz
 
 
 class DecoderLostError(Exception):
-    """The process has ended; the next sound starts another."""
+    """The decoder's process has ended; the next call starts a new one."""
 
 
 class SphinxProcess:
-    """A decoder of one's own (about 120 MB; its first words take 0.5 s longer)."""
+    """A decoder in its own process, which takes about 120 MB and 0.5 s to start."""
 
     def __init__(self):
-        """No process yet: the first call starts it."""
+        """Starts no process yet; the first call does."""
         self._process: asyncio.subprocess.Process | None = None
 
     async def start(self) -> None:
-        """Starts the process, unless it runs."""
+        """Starts the process unless it is running."""
         if self._process is None:
             self._process = await asyncio.create_subprocess_exec(
                 *(sys.executable, "-m", __name__),
@@ -41,7 +40,10 @@ class SphinxProcess:
             )
 
     async def decode(self, pcm: bytes) -> str:
-        """The words so far, with more sound: PCM16 mono 16 kHz.
+        """Decodes more sound; returns the words recognised so far.
+
+        Args:
+            pcm: PCM, 16 bits, mono, 16 kHz.
 
         Raises:
             DecoderLostError: If the process has ended.
@@ -49,7 +51,7 @@ class SphinxProcess:
         return await self._ask(len(pcm), pcm)
 
     async def finish(self) -> str:
-        """The words of all the sound since the last call.
+        """Ends the utterance; returns the words of all sound since the last call of `finish`.
 
         Raises:
             DecoderLostError: If the process has ended.
@@ -85,7 +87,7 @@ class SphinxProcess:
 
 
 def serve(asked: BinaryIO, told: BinaryIO) -> None:
-    """Decodes what comes in until it ends."""
+    """Main loop of the decoder's process: reads sound from `asked`, writes words to `told`."""
     from pocketsphinx import Decoder
 
     # without the flat second pass the last words come 5 times sooner and no worse

@@ -1,13 +1,13 @@
-"""Choosing a few of many."""
+"""Choosing a few evenly spread items of many."""
 
 import numpy as np
 
 
 def spread(count: int, most: int) -> list[int]:
-    """Indices of at most so many of `count` things, evenly spread, the first and last among them.
+    """Evenly spread indices into `count` items, at most `most`, the first and last among them.
 
     Args:
-        count: How many there are.
-        most: At least 2, or 1 for the first alone.
+        count: Number of items.
+        most: Highest number of indices; 1 gives the first alone.
     """
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int)).tolist()

@@ -1,4 +1,4 @@
-"""Parsed JSON and TOML as dataclasses: one walk along their type hints, as strict as it is told."""
+"""Converts parsed JSON or TOML to dataclasses along their type hints; strictness is a parameter."""
 
 import json
 import math
@@ -15,13 +15,13 @@ NAMES = {int: "a whole number", float: "a number", str: "a text", bool: "true or
 
 @dataclass(frozen=True)
 class Kind:
-    """An annotation taken apart.
+    """A type annotation, split into its parts.
 
     Attributes:
-        bare: The type in `Annotated[type, marks…]`.
-        marks: Its marks, such as limits.
-        origin: `list` of a `list[int]`.
-        arguments: `int` of it.
+        bare: The annotation without its marks: `type` of `Annotated[type, marks…]`.
+        marks: The marks of the annotation, such as limits.
+        origin: The generic type, such as `list` of `list[int]`.
+        arguments: The arguments of the generic type, such as `int` of `list[int]`.
     """
 
     bare: Any
@@ -31,7 +31,7 @@ class Kind:
 
     @property
     def optional(self) -> Any:
-        """`T` of a `T | None`; None for every other annotation."""
+        """`T` where the annotation is `T | None`, else None."""
         if self.origin not in (types.UnionType, typing.Union):
             return None
         return next(one for one in self.arguments if one is not type(None))
@@ -39,7 +39,7 @@ class Kind:
 
 @cache  # every field of every message asks
 def kind_of(annotation: Any) -> Kind:
-    """What an annotation says."""
+    """Splits a type annotation into its parts."""
     bare, marks = annotation, ()
     if typing.get_origin(annotation) is Annotated:
         bare, marks = annotation.__origin__, annotation.__metadata__
@@ -48,7 +48,7 @@ def kind_of(annotation: Any) -> Kind:
 
 @cache
 def field_types(kind: type) -> dict[str, Any]:
-    """Annotations of a dataclass's fields in order."""
+    """Type annotations of a dataclass's fields by name, in the order of definition."""
     hints = typing.get_type_hints(kind, include_extras=True)
     return {field.name: hints[field.name] for field in fields(kind)}
 
@@ -64,76 +64,78 @@ def required(kind: type) -> tuple[str, ...]:
 
 
 class Rules:
-    """How strict a walk is, and in which words it refuses what does not fit.
+    """How strict the conversion is, and how its error messages are worded.
 
-    A place is whatever `field` and `entry` make of the place given to `fill`: here a text.
+    A place says where a value stands in the parsed data. In this class a place is a text;
+    subclasses may use another type, which `field` and `entry` then extend.
     """
 
     defaults = False
-    """Whether fields that have a default may be left out."""
+    """Whether fields that have a default may be missing."""
     null = True
-    """Whether null stands for the None of a `T | None`."""
+    """Whether null is accepted where the type is `T | None`."""
     finite = True
-    """Whether numbers must be finite; marks may say more."""
+    """Whether every number must be finite; marks of an annotation may restrict it further."""
 
     def __init__(self, error: Callable[[str], Exception]):
-        """Rules of a walk that raises `error`, made of one sentence."""
+        """Sets the constructor of the error to raise; its argument is one sentence."""
         self.error = error
 
     def field(self, where: Any, name: str, kind: Kind) -> Any:
-        """The place of a dataclass's field."""
+        """The place of a field, given the place of its dataclass."""
         return f"{where}.{name}"
 
     def entry(self, where: Any, key: int | str) -> Any:
-        """The place of an entry of a list or a dictionary."""
+        """The place of an entry, given the place of its list or dictionary."""
         return f"{where}[{key}]" if isinstance(key, int) else f"{where}[{key[:80]!r}]"
 
     def unknown(self, where: Any, name: str, kind: type) -> str:
-        """Refuses a name that no field of a dataclass has."""
+        """The sentence for a key that is no field of the dataclass."""
         return f"{where} has the unknown key {name[:40]!r}."
 
     def missing(self, where: Any, name: str) -> str:
-        """Refuses a dataclass without one of its fields."""
+        """The sentence for a missing field."""
         return f"{where} lacks '{name}'."
 
     def count(self, where: Any, wanted: int, given: int) -> str:
-        """Refuses a list of another length."""
+        """The sentence for a list of the wrong length."""
         return f"{where} must have {wanted} entries, not {given}."
 
     def wrong(self, where: Any, kind: Kind, value: Any) -> str:
-        """Refuses a value of another type."""
+        """The sentence for a value of the wrong type."""
         return f"{where} must be {wanted(kind)}, not {describe(value)}."
 
     def infinite(self, where: Any) -> str:
-        """Refuses a number that is none."""
+        """The sentence for NaN or an infinite number."""
         return f"{where} must be a finite number."
 
     def own(self, kind: Kind, value: Any, where: Any) -> Any:
-        """What the rules make of a kind that the walk does not know, else `NotImplemented`."""
+        """Converts a value of a type that only these rules know; else returns `NotImplemented`."""
         return NotImplemented
 
     def check(self, value: Any, mark: Any, where: Any) -> None:
-        """Checks a value against one mark of its annotation; raises `error` where it breaks it."""
+        """Checks a value against one mark of its annotation; raises `error` where it fails."""
 
 
 def fill(kind: type[T], value: Any, where: Any, rules: Rules) -> T:
-    """A dataclass of parsed JSON or TOML.
+    """Builds a dataclass from parsed JSON or TOML.
 
     Args:
-        kind: Its fields are numbers, texts, truth values, literals, dataclasses, lists, tuples or
-            dictionaries of those, any of them or None, or what the rules know besides.
-        value: What a parser gave.
-        where: Its place, for sentences.
+        kind: The dataclass. Its fields are numbers, texts, truth values, literals, dataclasses,
+            lists, tuples or dictionaries of these, any of these or None, or types that `rules.own`
+            converts.
+        value: The parsed data.
+        where: Place of the data, named in errors.
         rules: How strict to be.
 
     Raises:
-        Exception: `rules.error`, at the first thing that does not fit.
+        Exception: `rules.error`, at the first value that does not fit.
     """
     return kind(**fill_fields(kind, value, where, rules))
 
 
 def fill_fields(kind: type, value: Any, where: Any, rules: Rules) -> dict[str, Any]:
-    """The fields of a dataclass by name, those left out excepted; else as `fill`."""
+    """The converted fields of a dataclass by name, missing ones left out; else as for `fill`."""
     if not isinstance(value, dict):
         raise rules.error(rules.wrong(where, kind_of(kind), value))
     values = cast(dict[str, Any], value)
@@ -152,7 +154,7 @@ def fill_fields(kind: type, value: Any, where: Any, rules: Rules) -> dict[str, A
 
 
 def parsed(annotation: Any, value: Any, where: Any, rules: Rules) -> Any:
-    """One value by its annotation; else as `fill`."""
+    """Converts one value according to its annotation; other arguments and errors as for `fill`."""
     kind = kind_of(annotation)
     result = rules.own(kind, value, where)
     if result is NotImplemented:
@@ -223,14 +225,14 @@ def _scalar(kind: Kind, value: Any, where: Any, rules: Rules) -> Any:
 
 
 def wanted(kind: Kind) -> str:
-    """The type that a value must have, for people."""
+    """The expected type of a value, in words for users."""
     if kind.origin in (list, tuple):
         return "a list"
     return NAMES.get(kind.bare, "an object")
 
 
 def describe(value: Any) -> str:
-    """A value of another type, for people; short, for it may be hostile."""
+    """A value of the wrong type, in words for users; short, as it may come from an attacker."""
     if isinstance(value, dict):
         return "an object"
     if isinstance(value, list):
@@ -239,7 +241,7 @@ def describe(value: Any) -> str:
 
 
 def plain(value: Any) -> Any:
-    """The inverse of `fill`: dataclasses and tuples as what JSON has."""
+    """The inverse of `fill`: dataclasses become dictionaries, tuples become lists."""
     if is_dataclass(value) and not isinstance(value, type):
         return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, dict):
@@ -252,8 +254,13 @@ def plain(value: Any) -> Any:
 def parse_json(data: bytes, name: str, error: Callable[[str], Exception]) -> Any:
     """Parses strict JSON: UTF-8, no NaN or Infinity, no repeated key.
 
+    Args:
+        data: The text.
+        name: What the text is, at the start of error sentences.
+        error: Makes the exception to raise from one sentence.
+
     Raises:
-        Exception: `error`, made of one sentence that begins with `name`, if it is anything else.
+        Exception: `error`, if the data is not strict JSON.
     """
     try:
         return json.loads(
@@ -274,5 +281,5 @@ def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def refuse_constant(name: str) -> Any:
-    """NaN and Infinity are no JSON, whatever Python thinks."""
+    """Raises ValueError for NaN and Infinity, which Python's parser accepts but JSON forbids."""
     raise ValueError(f"{name} is no JSON number")

@@ -1,4 +1,4 @@
-"""Which mouth shape a speech sound has: IPA symbols to the fifteen Oculus visemes."""
+"""Maps phonemes in IPA to mouth shapes: the fifteen Oculus visemes."""
 
 VISEMES = (
     "sil",
@@ -17,7 +17,7 @@ VISEMES = (
     "oh",
     "ou",
 )
-"""Oculus viseme names; silence is the first."""
+"""Names of the Oculus visemes; the first one is silence."""
 
 _SOUNDS = {
     "PP": "pbmɓʙɸβ",
@@ -39,16 +39,16 @@ _VISEME_OF = {sound: viseme for viseme, sounds in _SOUNDS.items() for sound in s
 
 
 def visemes(symbol: str) -> tuple[str, ...]:
-    """The mouth shapes of one phoneme, in the order in which they are passed through.
+    """The mouth shapes of one phoneme, in the order in which the mouth takes them.
 
-    Stress, length and other marks are ignored; a diphthong or affricate has two shapes
-    (aɪ: aa, ih; tʃ: DD, CH).
+    Stress, length and other marks are ignored. A diphthong or affricate has two shapes: aɪ gives
+    aa, ih; tʃ gives DD, CH.
 
     Args:
-        symbol: IPA; the empty string is a pause.
+        symbol: IPA; the empty string stands for a pause.
 
     Returns:
-        Names from `VISEMES`, at least one; unknown symbols count as silence.
+        At least one name of `VISEMES`; an unknown symbol gives silence.
     """
     found: list[str] = []
     for sound in symbol:

@@ -1,6 +1,6 @@
-"""Where weights lie that ico3d can use and does not ship.
+"""Finds pretrained weights on this machine.
 
-Nothing is downloaded unless the user says `ico3d weights fetch NAME`.
+Nothing is downloaded here; only the command `ico3d weights fetch NAME` does that.
 """
 
 import os
@@ -12,10 +12,10 @@ from ico3d.errors import MissingModelError, SettingsError
 
 
 def weights_named(name: str) -> Weights:
-    """An entry of the table.
+    """The entry of `TABLE` with this name.
 
     Raises:
-        SettingsError: If there is none of this name.
+        SettingsError: If the table has no such entry.
     """
     if name not in TABLE:
         raise SettingsError(f"there are no weights '{name}': choose from {', '.join(TABLE)}.")
@@ -23,29 +23,30 @@ def weights_named(name: str) -> Weights:
 
 
 def model_folders() -> list[Path]:
-    """Where weights are looked for: `$ICO3D_MODELS`, then the user's cache, where fetched ones go.
+    """Folders that are searched for weights: `$ICO3D_MODELS` if set, then the user's cache.
 
-    The last one, `~/.cache/ico3d/models`, is the one to write to.
+    Downloads are written to the last one, `~/.cache/ico3d/models`.
     """
     folders = [Path(p) for p in (os.environ.get("ICO3D_MODELS"),) if p]
     return [*folders, Path.home() / ".cache" / "ico3d" / "models"]
 
 
 def find_model(name: str) -> Path | None:
-    """A file or folder by its name in the folders of weights; None where it lies in neither."""
+    """Path of a file or folder of this name in `model_folders()`; None where there is none."""
     places = (folder / name for folder in model_folders())
     return next((place for place in places if place.exists()), None)
 
 
 def cached(name: str) -> Path | None:
-    """Where weights of the table lie on this machine; nothing is downloaded.
+    """Path of installed weights; downloads nothing.
 
     Args:
         name: A key of `TABLE`.
 
     Returns:
-        The file; for several files or a repository their folder (a copy named like the
-        repository's last part in a folder of weights counts); None where they are not there.
+        The file where the weights are one file, otherwise the folder of the files or of the
+        repository; a copy of a repository in `model_folders()` counts if it has the last part of
+        the repository's name. None where the weights are not installed.
 
     Raises:
         SettingsError: If the table has no such weights.
@@ -60,14 +61,14 @@ def cached(name: str) -> Path | None:
 
 
 def model_file(name: str, purpose: str) -> Path:
-    """Finds a model file in the folders of weights.
+    """Path of a model file in `model_folders()`.
 
     Args:
-        name: The file.
-        purpose: What needs it, for the error.
+        name: Name of the file.
+        purpose: The part of ico3d that needs the file, named in the error.
 
     Raises:
-        MissingModelError: If it lies in none of them; the sentence says how to get it.
+        MissingModelError: If no folder has the file; the sentence says how to get it.
     """
     found = find_model(name)
     if found is not None:
@@ -76,10 +77,10 @@ def model_file(name: str, purpose: str) -> Path:
 
 
 def model_of(name: str) -> Path:
-    """Where weights of the table lie.
+    """Path of installed weights, as `cached` returns it.
 
     Raises:
-        MissingModelError: If they are not on this machine; the sentence says how to get them.
+        MissingModelError: If the weights are not installed; the sentence says how to get them.
     """
     found = cached(name)
     if found is None:
@@ -92,7 +93,7 @@ def model_of(name: str) -> Path:
 
 
 def how_to_get(file: str) -> str:
-    """The end of a sentence that says where a missing file comes from."""
+    """The end of an error sentence: how to get a missing model file."""
     place = (
         f"put it into {model_folders()[-1]} or name its folder in the environment variable "
         "ICO3D_MODELS."

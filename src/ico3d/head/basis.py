@@ -1,7 +1,7 @@
-"""The latent basis of the Gaussians: blending by an expression, and learning it.
+"""The latent basis of the Gaussians: blending by an expression, and the training step.
 
-One image gives the basis a gradient of rank one, e ⊗ g. It is 40 to 60 times the size of g and
-never stored: `update_basis` takes e and g apart.
+A picture gives the basis a gradient of rank one, e ⊗ g. The full gradient is 40 to 60 times as
+large as g and is never stored: `update_basis` takes e and g separately.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ from ico3d.training.optimiser import Optimiser, adam_reference, bias_corrections
 
 
 def blend(basis: Tensor, weights: Tensor) -> Tensor:
-    """Blends the rows of the basis (paper, the equation of f_i; the bias f_0 is the last row).
+    """Blends the rows of the basis (paper, the equation of f_i); the bias f_0 is the last row.
 
     Args:
         basis: (R, N, w).
@@ -67,21 +67,21 @@ def update_basis(
     rate: float,
     weight_decay: float = 0.0,
 ) -> None:
-    """One step on the basis with the gradient weights ⊗ gradient, in place.
+    """One step on the basis, in place, with the gradient weights ⊗ gradient.
 
-    Rows of weight 0 are left alone, moments included, and each row counts its own steps (lazy
-    Adam, as usual for sparse gradients): most blendshapes rest in most frames.
+    Rows of weight 0 keep their values and moments, and each row counts its own steps (lazy Adam, as
+    usual for sparse gradients), because most blendshapes are 0 in most frames.
 
     Args:
         optimiser: Holds the moments under the name "basis".
         basis: (R, N, w).
         weights: (R,) the expression with 1 appended.
-        gradient: (N, w) of the blended features.
+        gradient: (N, w) gradient of the loss by the blended features.
         rate: Learning rate.
-        weight_decay: Factor of each row but the bias added to its gradient (L2).
+        weight_decay: Factor by which each row except the bias is added to its gradient (L2).
 
     Raises:
-        NotFiniteError: If a gradient holds NaN or infinity; nothing is changed then.
+        NotFiniteError: If the gradient holds NaN or infinity; then nothing is changed.
     """
     basis, weights, gradient = basis.detach(), weights.detach(), gradient.detach()
     check_gradient("basis", gradient)

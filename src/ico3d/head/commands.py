@@ -14,7 +14,7 @@ from ico3d.head.settings import PRESETS, HeadSettings
 
 @dataclass(frozen=True, kw_only=True)
 class HeadChoice:
-    """What the defaults of all other settings follow from.
+    """The options that decide the defaults of all others.
 
     Attributes:
         preset: The paper's settings, or those sized for two CPU cores;
@@ -26,19 +26,19 @@ class HeadChoice:
 
 @dataclass(frozen=True)
 class TrainHead(HeadChoice):
-    """Trains HeadGaS++ on a capture. The same command goes on where it was interrupted.
+    """Trains HeadGaS++ on a capture. The same command continues an interrupted training.
 
     Attributes:
         capture: A capture folder with head poses.
         out: The model folder to write.
         inputs: What drives the head: its own speech, or the capture's blendshapes.
-        variant: The paper's model, or what it is compared with: colours and opacity blended
-            directly, the expression fed to the MLP instead of blended, no expression at all.
+        variant: The paper's model, or one to compare with: colours and opacity blended directly,
+            the expression given to the MLP instead of blended, or no expression at all.
         encoder: Speech encoder for speech-driven heads: builtin, ave (SyncTalk's) or hubert.
-        seed: All randomness follows from it.
-        device: Where to compute: by default with CUDA where that works, else on the CPU.
-        watch: Shows the training in the browser while it lasts.
-        watch_port: Port of that page, on this machine only; the next free one where it is taken.
+        seed: Seed of all random numbers.
+        device: Where to compute: by default CUDA where that works, else the CPU.
+        watch: Show the training in the browser while it lasts.
+        watch_port: Port of that page, on this machine only; if it is taken, the next free one.
         settings: How the head is trained.
     """
 
@@ -55,12 +55,12 @@ class TrainHead(HeadChoice):
 
     @classmethod
     def defaults(cls, words: Sequence[str]) -> "TrainHead":
-        """The verb with the settings of the preset that words choose."""
+        """The verb with the settings of the preset that `words` of the command line choose."""
         preset = chosen(HeadChoice, words).preset
         return cls(tyro.MISSING, tyro.MISSING, settings=PRESETS[preset])
 
     def run(self) -> None:
-        """Trains, or goes on training; writes the model folder."""
+        """Starts or continues the training; writes the model folder."""
         from rich.console import Console
 
         from ico3d.capture.formats import open_capture

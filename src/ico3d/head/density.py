@@ -1,4 +1,4 @@
-"""Density control of a head: what splat plans, carried out on model and moments."""
+"""Density control of a head: applies the plans of `splat.density` to model and moments."""
 
 import math
 from collections.abc import Callable
@@ -22,14 +22,14 @@ from ico3d.training.optimiser import Optimiser
 
 CLONE_BELOW = 0.01
 PRUNE_ABOVE = 0.1
-"""Sizes relative to the box of what begins, as 3DGS has them relative to the scene."""
+"""Both sizes are relative to the box of the initial points; in 3DGS, to the scene's extent."""
 
 
 def bound_scales(model: HeadModel) -> None:
-    """Keeps every Gaussian as small as density control leaves them, in place.
+    """Limits the size of every Gaussian, in place, as density control would.
 
-    Density control ends before training does: a Gaussian that nothing else helps would then grow
-    into a beam, which shows from where no camera stood.
+    Density control ends before training does. Afterwards an unconstrained Gaussian could grow into
+    a long beam that is visible from directions without a camera.
     """
     largest = PRUNE_ABOVE * model.shape.box_size
     model.log_scales.data.clamp_(max=math.log(largest))
@@ -37,11 +37,11 @@ def bound_scales(model: HeadModel) -> None:
 
 @dataclass(frozen=True)
 class Sampled:
-    """The greatest over some frames of what each Gaussian does there.
+    """Maxima over some frames, for each Gaussian.
 
     Attributes:
-        opacities: (N,) predicted.
-        contributions: (N,) pixels.
+        opacities: (N,) largest predicted opacity.
+        contributions: (N,) largest contribution to a picture: blending weights summed over pixels.
     """
 
     opacities: Tensor
@@ -49,15 +49,15 @@ class Sampled:
 
 
 class HeadDensity:
-    """Clones, splits and prunes; clones and parts copy F and f_0."""
+    """Clones, splits and prunes; clones and parts copy the basis (F and f_0)."""
 
     def __init__(self, settings: Density, seed: int):
-        """Gathers nothing yet."""
+        """Sets thresholds and seed; the statistics are empty."""
         self._settings, self._seed = settings, seed
         self._stats = DensityStats.zeros(0)
 
     def observe(self, info: RenderInfo, step: int) -> None:
-        """Gathers screen gradients after `backward`."""
+        """Gathers screen-space gradients; call after `backward`."""
         if step >= self._settings.until:
             return
         if len(self._stats.views) != info.radii.shape[1]:
@@ -71,13 +71,14 @@ class HeadDensity:
         sample: Callable[[int], Sampled],
         step: int,
     ) -> None:
-        """Densifies and prunes if it is time.
+        """Densifies and prunes on schedule.
 
         Args:
-            model: Changed in place.
-            optimiser: Its moments follow; those of new Gaussians begin at 0.
-            sample: Looks at the head in some frames, chosen for a step.
-            step: Number of the step just done.
+            model: The head, changed in place.
+            optimiser: Holds the moments, which are changed like the model; new Gaussians start with
+                0.
+            sample: Returns maxima over some frames, which depend on the step's number.
+            step: Number of the step that was just done.
 
         Raises:
             ModelError: If no Gaussian is left.
@@ -108,11 +109,11 @@ class HeadDensity:
         self._stats = DensityStats.zeros(len(model), model.means.device)
 
     def tensors(self) -> dict[str, Tensor]:
-        """Gradients, and how many views gave them, since the last step of density control."""
+        """Gradients, and the number of views that gave them, since the last densification."""
         return {"gradient_sum": self._stats.gradient_sum, "views": self._stats.views}
 
     def restore(self, tensors: dict[str, Tensor]) -> None:
-        """Takes back what `tensors` gave."""
+        """Restores the statistics that `tensors` returned."""
         self._stats = DensityStats(tensors["gradient_sum"], tensors["views"])
 
 

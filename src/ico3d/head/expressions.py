@@ -1,4 +1,4 @@
-"""From a capture to the expression of each of its frames."""
+"""The expression of each frame of a capture."""
 
 import logging
 from functools import cache
@@ -16,30 +16,30 @@ from ico3d.speech.encoder import FrozenEncoder
 from ico3d.speech.network import SpeechAdaptor, feature_windows
 
 FEATURE_RATE = 25.0
-"""Rows of speech features per second; everything else is resampled to it by time."""
+"""Rows of speech features per second; other rates are resampled by time."""
 
 log = logging.getLogger(__name__)
 
 
 class ExpressionTrack(Protocol):
-    """The expressions of one capture.
+    """The expressions of all frames of one capture.
 
     Attributes:
-        size: B.
+        size: B, the number of values of an expression.
     """
 
     size: int
 
     def at(self, frame: int) -> Tensor:
-        """The expression (B,) of a frame; carries gradients where something is trained."""
+        """The expression (B,) of a frame; carries gradients if parts of the track are trained."""
         ...
 
 
 class BlendshapeTrack:
-    """Expressions that the capture itself gives, by name."""
+    """Expressions made of blendshape weights that the capture contains."""
 
     def __init__(self, capture: Capture, names: tuple[str, ...]):
-        """Collects the named blendshapes of all frames.
+        """Reads the named blendshapes of all frames.
 
         Raises:
             CaptureError: If the capture has no blendshapes, or lacks one of the names.
@@ -64,7 +64,7 @@ class BlendshapeTrack:
         """The blendshape weights (B,) of a frame.
 
         Raises:
-            CaptureError: If the frame has none, or one is not finite.
+            CaptureError: If the frame has no weights, or one is not finite.
         """
         values = self._capture.blendshapes(frame)
         if values is None or not np.isfinite(values).all():
@@ -76,7 +76,7 @@ class BlendshapeTrack:
 
 
 class SpeechTrack:
-    """32 adapted speech features and 7 eye values, B = 39.
+    """Expressions of 32 adapted speech features and 7 eye values, B = 39.
 
     Attributes:
         eyes: (F, 7) the eye values of all frames.
@@ -91,14 +91,14 @@ class SpeechTrack:
         adaptor: SpeechAdaptor,
         needs_eyes: bool = True,
     ):
-        """Binds what drives a head through a capture.
+        """Combines sound features, adaptor and eye values of one capture.
 
         Args:
-            capture: Gives eye values and frame rate.
-            features: (T, D) speech features, 25 rows/s.
-            adaptor: Turns them into speech values.
-            needs_eyes: Whether missing eye values are worth a warning: the eyes of a head that
-                was trained without any do not move.
+            capture: Provides eye values and frame rate.
+            features: (T, D) speech features, 25 rows per second.
+            adaptor: Network from speech features to speech values.
+            needs_eyes: Whether to warn if eye values are missing; a head that was trained without
+                eye values does not need them.
         """
         self._adaptor = adaptor
         self._fps = capture.fps
@@ -106,7 +106,7 @@ class SpeechTrack:
         self._features = torch.from_numpy(features)
 
     def at(self, frame: int) -> Tensor:
-        """The expression (39,) of a frame, interpolated between rows of features by time."""
+        """The expression (39,) of a frame, interpolated in time between rows of features."""
         position = min(frame / self._fps * FEATURE_RATE, len(self._features) - 1.0)
         lower = int(position)
         part = position - lower
@@ -117,7 +117,10 @@ class SpeechTrack:
 
 
 def eye_track(capture: Capture, needed: bool = True) -> Tensor:
-    """The seven eye values (F, 7) of all frames; 0, with a warning if needed, where none are."""
+    """The seven eye values (F, 7) of all frames.
+
+    Missing values are 0; if `needed`, a warning is logged.
+    """
     rows = [capture.eyes(frame) for frame in range(capture.num_frames)]
     lacking = [frame for frame, row in enumerate(rows) if row is None or not np.isfinite(row).all()]
     if lacking and needed:
@@ -140,7 +143,7 @@ def _say_eyes_are_missing(path: Path, lacking: int, frames: int, first: int) -> 
 
 
 def speech_features(capture: Capture, encoder: FrozenEncoder, device: torch.device) -> np.ndarray:
-    """The features (T, D) of a capture's sound, 25 rows/s, computed on a device.
+    """Features (T, D) of a capture's sound, 25 rows per second, computed on `device`.
 
     Raises:
         CaptureError: If the capture has no sound.

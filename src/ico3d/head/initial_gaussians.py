@@ -1,4 +1,4 @@
-"""The Gaussians a head starts with."""
+"""The initial Gaussians of a head."""
 
 import logging
 from collections.abc import Sequence
@@ -18,17 +18,17 @@ from ico3d.head.views import view_of
 from ico3d.splat.initial import in_pictures, resampled, spacing
 
 FRAMES = 8
-"""Spread over the training frames: some camera must see a surface point there."""
+"""Number of training frames in which some camera must see a surface point."""
 MOMENTS = 4
-"""Spread over the training frames: where the masks are compared with the surface points."""
+"""Number of training frames in which masks are compared with the surface points."""
 NEAREST = 16
-"""Frames about such a moment among which each camera's mask is looked for."""
+"""Number of neighbouring frames in which each camera's mask is looked for."""
 REACH = 3.0
-"""Spacings around a surface point that it accounts for."""
+"""Distance, in spacings of the surface points, within which a point covers the surface."""
 LEAST_POINTS = 4
-"""Of a surface: a point's spacing is that to the three nearest."""
+"""Smallest number of surface points: a point's spacing is measured to its three nearest."""
 LEAST_REACH = 0.01
-"""Metres: how far a surface may lie off the masks' edges, however dense it is."""
+"""Smallest distance in metres within which a point covers the surface, however dense the points."""
 
 log = logging.getLogger(__name__)
 
@@ -40,13 +40,20 @@ def initial_head(
     expression_size: int,
     rng: np.random.Generator,
 ) -> HeadModel:
-    """A head on the capture's surface points, round Gaussians as wide as their spacing.
+    """A head with round Gaussians on the capture's surface points, as wide as the points' spacing.
 
-    What the masks show of the person beyond these points (a face model ends at the neck) begins on
-    the visual hull, with as large a part of the Gaussians as it has of the person's pixels.
+    Surface points may miss parts of the person (a face model ends at the neck). Where the masks
+    show such parts, Gaussians start on the visual hull; their share equals that of those pixels.
+
+    Args:
+        capture: The recording.
+        settings: The number of Gaussians and the size of the network.
+        variant: The model's variant.
+        expression_size: B, the number of values of an expression.
+        rng: Source of all random choices.
 
     Raises:
-        CaptureError: If the capture has no surface points or one is not finite.
+        CaptureError: If the capture has no surface points, or one is not finite.
     """
     surface = capture.points()
     if surface is None or len(surface) < LEAST_POINTS or not np.isfinite(surface).all():

@@ -1,8 +1,9 @@
 """Numba kernels of the latent basis: blending, its gradients and a rank-one Adam step.
 
-All take the basis as (R, S): R rows, one per expression value and one for the bias, and S = N·w
-numbers, w per Gaussian. Work is cut into blocks of S that stay in the first-level cache while the
-rows pass by, and inner loops run over slices: indexing `basis[row, i]` there is four times slower.
+All kernels take the basis as (R, S): R rows, one for each expression value and one for the bias,
+and S = N·w numbers, w for each Gaussian. Work is cut into blocks of S that stay in the first-level
+cache during the loop over the rows. Inner loops run over slices, because indexing `basis[row, i]`
+there is four times slower.
 """
 
 import numpy as np
@@ -15,7 +16,7 @@ BLOCK = 2048
 
 @njit(parallel=True, fastmath=True, cache=True)
 def blend_rows(basis, weights, rows, out):
-    """Writes Σ weights[r]·basis[r] over the listed rows to out (S,)."""
+    """Writes Σ weights[r]·basis[r], summed over `rows`, to out (S,)."""
     for block in prange((out.size + BLOCK - 1) // BLOCK):
         target = out[block * BLOCK : (block + 1) * BLOCK]
         target[:] = 0
@@ -28,7 +29,7 @@ def blend_rows(basis, weights, rows, out):
 
 @njit(parallel=True, fastmath=True, cache=True)
 def row_products(basis, gradient, out):
-    """Writes basis · gradient to out (R,): the gradient of the row weights."""
+    """Writes basis · gradient to out (R,), which is the gradient of the row weights."""
     for r in prange(basis.shape[0]):
         source = basis[r]
         total = np.float32(0)
@@ -39,7 +40,7 @@ def row_products(basis, gradient, out):
 
 @njit(parallel=True, fastmath=True, cache=True)
 def adam_rank_one(basis, first, second, weights, gradient, rows, steps, roots, pulls):
-    """Adam with the gradient weights ⊗ gradient, which is never stored; in place.
+    """One Adam step, in place, with the gradient weights ⊗ gradient, which is never stored.
 
     Args:
         basis: (R, S).
@@ -47,10 +48,10 @@ def adam_rank_one(basis, first, second, weights, gradient, rows, steps, roots, p
         second: (R, S) second moments.
         weights: (R,) row weights.
         gradient: (S,) gradient of the blended features.
-        rows: Rows to update.
+        rows: Indices of the rows to update.
         steps: (R,) learning rate times the correction of the first moment.
-        roots: (R,) correction of the second moment's root.
-        pulls: (R,) factor of each row added to its gradient (L2).
+        roots: (R,) correction of the root of the second moment.
+        pulls: (R,) weight decay: factor by which each row is added to its gradient (L2).
     """
     beta1, beta2, epsilon = np.float32(BETA1), np.float32(BETA2), np.float32(EPSILON)
     rest1, rest2 = np.float32(1.0 - BETA1), np.float32(1.0 - BETA2)

@@ -17,18 +17,18 @@ log = logging.getLogger(__name__)
 
 
 class HeadLoss:
-    """λ_1·L1 + λ_s·(1 − SSIM) + λ_p·VGG, and a term on alpha where masks exist.
+    """λ_1·L1 + λ_s·(1 − SSIM) + λ_p·VGG, plus a term on alpha where the capture has masks.
 
     Attributes:
-        settings: The settings, with the perceptual term off where VGG's weights are missing.
+        settings: The settings; the perceptual term is off if VGG's weights are not installed.
     """
 
     def __init__(self, settings: HeadSettings, device: torch.device):
-        """Looks for VGG weights when the perceptual term is wanted; warns when there are none.
+        """Loads VGG's weights if the perceptual term is wanted; logs a warning if there are none.
 
         Args:
-            settings: The weights; that of the perceptual term counts as 0 without VGG's.
-            device: Where the pictures will be.
+            settings: Weights of the terms.
+            device: Device of the pictures.
         """
         self._perceptual: Callable[[Tensor, Tensor], Tensor] | None = None
         if settings.loss.perceptual and settings.steps > settings.loss.perceptual_from:
@@ -38,10 +38,11 @@ class HeadLoss:
         self.settings = settings
 
     def go_on(self, perceptual_weight: float) -> None:
-        """Goes on as an interrupted run began, with the perceptual term or without it.
+        """Sets the perceptual weight of a resumed run to the one that the run began with.
 
         Raises:
-            ModelError: If the run had it, and VGG's weights are not there any more.
+            ModelError: If the run used the perceptual term and VGG's weights are no longer
+                installed.
         """
         if perceptual_weight and not self.settings.loss.perceptual:
             raise ModelError(
@@ -56,9 +57,9 @@ class HeadLoss:
         """The loss of one picture.
 
         Args:
-            rendering: The picture of one camera.
-            target: (H, W, 3) in [0, 1].
-            picture: The recorded picture and masks that the target was made of.
+            rendering: The rendered picture of one camera.
+            target: (H, W, 3) picture to match, in [0, 1].
+            picture: The recorded picture and masks from which the target was made.
             step: Number of the optimisation step.
 
         Returns:

@@ -19,22 +19,24 @@ Variant = Literal["full", "no-mlp", "no-blending", "static"]
 INITIAL_OPACITY = 0.1
 
 GAUSSIAN_AXES = {"means": 0, "quats": 0, "log_scales": 0, "basis": 1}
-"""The parameters that exist per Gaussian, and the axis along which they do."""
+"""The parameters that exist per Gaussian, with the axis along which the Gaussians lie."""
 
 
 @dataclass(frozen=True)
 class HeadShape:
-    """What decides the sizes of a head model's parameters; training takes them from its settings.
+    """Everything that decides the sizes of a head model's parameters.
 
     Attributes:
-        expression_size: B, values that drive the head.
+        expression_size: B, number of values of an expression.
         variant: `full` is the paper's model; `no-mlp` blends colours and opacity directly;
-            `no-blending` gives the expression to the MLP instead of blending; `static` ignores it.
-        features: f, width of the latent basis.
-        hidden: Width of the MLP.
+            `no-blending` gives the expression to the MLP instead of blending; `static` ignores the
+            expression.
+        features: f, width of the latent basis per Gaussian.
+        hidden: Width of the MLP's hidden layers.
         frequencies: L, octaves of the position encoding.
-        box_center: Middle of the head box in metres; positions are encoded relative to it.
-        box_size: Half the longest edge of that box in metres.
+        box_center: Centre of the head's bounding box in metres; encoded positions are relative to
+            it.
+        box_size: Half of the box's longest edge in metres.
     """
 
     expression_size: int
@@ -48,27 +50,27 @@ class HeadShape:
 
     @property
     def blends(self) -> bool:
-        """Whether the expression weighs rows of the basis."""
+        """Whether the variant blends rows of the basis by the expression."""
         return self.variant in ("full", "no-mlp")
 
     @property
     def has_mlp(self) -> bool:
-        """Whether an MLP turns features into colour and opacity."""
+        """Whether the variant has an MLP from features to colour and opacity."""
         return self.variant in ("full", "no-blending")
 
     @property
     def rows(self) -> int:
-        """R: rows of the basis, the bias f_0 included."""
+        """R, number of rows of the basis, the bias f_0 included."""
         return (self.expression_size if self.blends else 0) + 1
 
     @property
     def width(self) -> int:
-        """w: numbers per row and Gaussian; without an MLP they are the logits themselves."""
+        """w, numbers per row and Gaussian; without an MLP these are the four logits."""
         return self.features if self.has_mlp else 4
 
     @property
     def mlp_inputs(self) -> int:
-        """Width of what enters the MLP."""
+        """Width of the MLP's input."""
         direct = 0 if self.blends else self.expression_size
         return self.width + direct + 3 + 6 * self.frequencies
 
@@ -76,19 +78,19 @@ class HeadShape:
 class HeadModel(nn.Module):
     """N Gaussians in canonical head space, driven by an expression.
 
-    Geometry is static; colour (SH degree 0) and opacity are those of φ(f, γ(μ)) with
-    f = Fᵀe + f_0 per Gaussian.
+    Geometry is static. Colour (SH degree 0) and opacity are φ(f, γ(μ)): the MLP φ reads the blended
+    features f = Fᵀe + f_0 and the encoded position γ(μ) of each Gaussian.
 
     Attributes:
         shape: Sizes and variant.
         means: (N, 3) metres.
         quats: (N, 4) wxyz, not normalised.
         log_scales: (N, 3) log of metres.
-        basis: (R, N, w) latent basis, last row the bias.
+        basis: (R, N, w) latent basis F; the last row is the bias f_0.
     """
 
     def __init__(self, shape: HeadShape, num_gaussians: int):
-        """Makes a model with zero basis and identity rotations; set the geometry afterwards."""
+        """Creates a zero basis and identity rotations; the caller sets the geometry."""
         super().__init__()
         self.shape = shape
         count = num_gaussians
@@ -111,11 +113,11 @@ class HeadModel(nn.Module):
 
     @property
     def device(self) -> torch.device:
-        """Where its tensors lie."""
+        """The device of the parameters."""
         return self.means.device
 
     def resize(self, num_gaussians: int) -> None:
-        """Makes room for another number of Gaussians; their values are to be set afterwards."""
+        """Changes the number of Gaussians; the caller sets all values afterwards."""
         for name, axis in GAUSSIAN_AXES.items():
             old = getattr(self, name)
             size = list(old.shape)
@@ -123,11 +125,10 @@ class HeadModel(nn.Module):
             setattr(self, name, nn.Parameter(old.new_empty(size), old.requires_grad))
 
     def forward(self, expression: Tensor) -> Gaussians:
-        """The head with this expression.
+        """The Gaussians for an expression.
 
         Args:
-            expression: (B,), on any device, as in all methods: sound and captures give it on
-                the CPU.
+            expression: (B,), on any device; sounds and captures give expressions on the CPU.
 
         Returns:
             Gaussians in canonical head space.
@@ -135,37 +136,37 @@ class HeadModel(nn.Module):
         return self.gaussians(self.logits(expression))
 
     def logits(self, expression: Tensor) -> Tensor:
-        """(N, 4) logits of red, green, blue and opacity for an expression (B,)."""
+        """(N, 4) logits of red, green, blue and opacity for an expression (B,) on any device."""
         return self.decode(self.blended(expression), expression)
 
     def blended(self, expression: Tensor) -> Tensor:
-        """(N, w) features f_i of an expression (B,)."""
+        """(N, w) blended features f for an expression (B,)."""
         return blend(self.basis, self.row_weights(expression))
 
     def row_weights(self, expression: Tensor) -> Tensor:
-        """(R,) weights of the basis rows: the expression (B,) with 1 for the bias."""
+        """(R,) weights of the basis rows: the expression (B,), then 1 for the bias."""
         one = torch.ones(1, dtype=self.basis.dtype, device=self.device)
         return torch.cat([expression.to(self.device), one]) if self.shape.blends else one
 
     def decode(self, features: Tensor, expression: Tensor) -> Tensor:
-        """φ: features (N, w) of an expression (B,) to logits (N, 4)."""
+        """The MLP φ: features (N, w) and expression (B,) to logits (N, 4)."""
         if not self.shape.has_mlp:
             return features
         return self.branches(self.hidden(features, expression))
 
     def branches(self, hidden: Tensor) -> Tensor:
-        """φ's last layer: (N, hidden) to logits (N, 4)."""
+        """The last layer of φ: activations (N, hidden) to logits (N, 4)."""
         return torch.cat([self.color_branch(hidden), self.opacity_branch(hidden)], 1)  # (N, 4)
 
     def hidden(self, features: Tensor, expression: Tensor) -> Tensor:
-        """What φ's last layer takes in (N, hidden); arguments as for `decode`."""
+        """Input (N, hidden) of the last layer of φ; arguments as for `decode`."""
         parts = [features, self.encoded_positions()]
         if not self.shape.blends:
             parts.append(expression.to(self.device).expand(len(self), -1))  # (N, B)
         return nn.functional.leaky_relu(self.trunk(torch.cat(parts, 1)), 0.01)  # (N, hidden)
 
     def encoded_positions(self) -> Tensor:
-        """γ(μ): (N, 3 + 6·L), positions relative to the head box with their sines and cosines."""
+        """γ(μ), (N, 3 + 6·L): positions relative to the head's box, their sines and cosines."""
         center = self.means.new_tensor(self.shape.box_center)
         positions = (self.means - center) / self.shape.box_size  # (N, 3), about −1 … 1
         octaves = math.pi * 2.0 ** torch.arange(self.shape.frequencies).to(positions)  # (L,)
@@ -173,7 +174,7 @@ class HeadModel(nn.Module):
         return torch.cat([positions, angles.sin(), angles.cos()], 1)
 
     def gaussians(self, logits: Tensor) -> Gaussians:
-        """Renderable Gaussians with these logits (N, 4)."""
+        """Renderable Gaussians with the given logits (N, 4)."""
         values = torch.sigmoid(logits)
         return Gaussians(
             means=self.means,
@@ -184,12 +185,12 @@ class HeadModel(nn.Module):
         )
 
     def save(self, path: Path) -> None:
-        """Writes parameters and shape to one safetensors file."""
+        """Writes shape and parameters to one safetensors file."""
         save_tensors(path, dict(self.state_dict()), {"shape": asdict(self.shape)})
 
     @classmethod
     def load(cls, path: Path) -> "HeadModel":
-        """Reads what `save` wrote.
+        """Reads a file that `save` wrote.
 
         Raises:
             ModelError: If the file is missing, damaged, or does not hold a head model.

@@ -1,4 +1,4 @@
-"""A trained head with everything needed to drive it: what a model folder holds."""
+"""A trained head with everything needed to drive it, as a model folder stores it."""
 
 import json
 from dataclasses import asdict, dataclass, field
@@ -20,27 +20,27 @@ from ico3d.speech.network import SpeechAdaptor
 from ico3d.training.checkpoint import load_tensors, save_tensors
 
 ABOUT = "head.json"
-"""The file by which a folder is known to hold a head."""
+"""Name of the file that marks a folder as one of a head."""
 SILENCE = 2
-"""Seconds, in the middle of which a voice has been silent for long."""
+"""Seconds of silent sound, long enough that the middle is free of effects of the ends."""
 Inputs = Literal["speech", "blendshapes"]
 
 
 @dataclass
 class TrainedHead:
-    """A head model and how captures turn into its expressions.
+    """A head model, and how captures are turned into its expressions.
 
     Attributes:
         model: The Gaussians.
         inputs: What drives the head: `speech` or `blendshapes`.
-        blendshape_names: B names for `blendshapes`, else empty.
-        encoder: Name of the speech encoder for `speech`, else empty.
-        encoder_sha256: Of its weights: an adaptor fits no other.
-        adaptor: The trained speech adaptor for `speech`, else None.
-        summary: How it was made: provenance of the capture, seconds of training, settings.
-        landmarks: (68, 3) Multi-PIE landmarks in canonical head space, metres; None where the
-            capture has none. They tell where the head belongs on a body.
-        eyes: How far eyes and brows move in what it was trained with; for `speech`.
+        blendshape_names: The B names where `inputs` is `blendshapes`, else empty.
+        encoder: Name of the speech encoder where `inputs` is `speech`, else empty.
+        encoder_sha256: SHA-256 of the encoder's weights; the adaptor works with no other encoder.
+        adaptor: The trained speech adaptor where `inputs` is `speech`, else None.
+        summary: How the head was made: provenance of the capture, seconds of training, settings.
+        landmarks: (68, 3) Multi-PIE landmarks in canonical head space, metres, by which the head is
+            placed on a body; None where the capture has none.
+        eyes: How far eyes and brows moved in the recording; used where `inputs` is `speech`.
     """
 
     model: HeadModel
@@ -54,7 +54,7 @@ class TrainedHead:
     eyes: EyeRange = field(default_factory=EyeRange)
 
     def to(self, device: torch.device) -> "TrainedHead":
-        """Moves the Gaussians, and gives itself back; the adaptor stays on the CPU."""
+        """Moves the Gaussians to a device and returns this head; the adaptor stays on the CPU."""
         self.model.to(device)
         return self
 
@@ -62,9 +62,9 @@ class TrainedHead:
         """The expressions that drive this head through a capture.
 
         Raises:
-            CaptureError: If the capture lacks the sound or the blendshapes this head needs.
-            ModelError: If the speech encoder is not the one it was trained with, or its recording
-                now has other head poses than it was trained with.
+            CaptureError: If the capture lacks the sound or the blendshapes that the head needs.
+            ModelError: If the installed speech encoder is not the one of the training, or the
+                capture is the training's recording but its head poses have changed.
         """
         trained_on = self.summary.get("recording", {})
         same = trained_on.get("path") == str(capture.path.resolve())
@@ -85,7 +85,7 @@ class TrainedHead:
         return SpeechTrack(capture, features, self.adaptor, needs_eyes=any(self.eyes.most))
 
     def neutral(self) -> np.ndarray:
-        """(B,) float32: silence, with open eyes and brows at rest."""
+        """The resting expression (B,) float32: silence, open eyes, brows at rest."""
         if self.adaptor is None:
             return np.zeros(self.model.shape.expression_size, np.float32)
         silence = np.zeros(16_000 * SILENCE, np.float32)
@@ -96,10 +96,10 @@ class TrainedHead:
         return np.concatenate([rows[len(rows) // 2].numpy(), np.array(self.eyes.rest, np.float32)])
 
     def recorded(self, driven: np.ndarray) -> np.ndarray:
-        """Expressions (..., B) as they were recorded, from those that drive an avatar.
+        """Converts expressions (..., B) of an avatar to those of the recording.
 
-        What drives an avatar (and a bundle) says how far its eyes and brows move: 0 is at rest, 1
-        as far as this person was seen to move them.
+        An avatar and a bundle give eye values relative to this person: 0 is at rest, 1 as far as
+        the person was seen to move. The head itself takes the values of the recording.
         """
         if self.adaptor is None:
             return driven
@@ -125,10 +125,10 @@ class TrainedHead:
 
     @classmethod
     def load(cls, folder: Path | str) -> "TrainedHead":
-        """Reads what `save` wrote.
+        """Reads a folder that `save` wrote.
 
         Raises:
-            ModelError: If the folder holds no trained head, or a damaged one.
+            ModelError: If the folder holds no trained head, or a file is damaged.
         """
         folder = Path(folder)
         try:

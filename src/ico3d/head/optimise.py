@@ -26,28 +26,28 @@ CPU = torch.device("cpu")
 GEOMETRY = ("means", "quats", "log_scales")
 
 LEAST_TOLD = 0.5
-"""Share of the pictures that must tell the person from what is behind, if any does."""
+"""If any picture has a mask or a plate, at least this share of the pictures must have one."""
 FEW_FRAMES = 100
-"""Training frames that `rates.basis_weight_decay` is meant for."""
+"""Number of training frames for which `rates.basis_weight_decay` is meant."""
 SAMPLES = 16
-"""Views that density control looks at."""
+"""Number of views that density control samples."""
 
 ATTENTION_FACTOR = 5
 ATTENTION_WEIGHT_DECAY = 1e-4
 
 
 class HeadTrainer:
-    """A `Trainee`: the head, its optimiser, and the pictures it learns from.
+    """The `Trainee` of a head: model, optimiser, and the pictures to learn from.
 
-    Every random choice of a step follows from the seed and the step's number.
+    All random choices of a step depend on the seed and the step's number alone.
 
     Attributes:
         model: The head.
-        track: What drives it.
-        adaptor: Turns speech features into speech values; None for heads driven otherwise.
-        pictures: Where pictures are read.
-        views: What it learns from, frame by frame.
-        poses: Tells the head space from others of the recording.
+        track: The expressions of the capture's frames.
+        adaptor: Network from speech features to speech values; None for heads without speech.
+        pictures: Reads the recorded pictures.
+        views: The views to learn from, frame by frame.
+        poses: Hash of the capture's head poses, which identifies the canonical head space.
     """
 
     def __init__(
@@ -62,8 +62,8 @@ class HeadTrainer:
         """Finds the recorded views of the training frames.
 
         Raises:
-            CaptureError: If there is no picture to train on, or too few have a mask.
-            SettingsError: If the model shall be compiled and there is no compiler.
+            CaptureError: If there is no picture to train on, or too few pictures have a mask.
+            SettingsError: If the model is to be compiled and there is no compiler.
         """
         self.model, self.track, self.adaptor = model, track, adaptor
         self._settings, self._seed = settings, seed
@@ -84,11 +84,11 @@ class HeadTrainer:
 
     @property
     def settings(self) -> HeadSettings:
-        """How it is really trained: without weights of VGG there is no perceptual term."""
+        """The settings in effect: the perceptual weight is 0 if VGG's weights are not installed."""
         return self._loss.settings
 
     def step(self, index: int) -> Mapping[str, float]:
-        """Renders one picture and learns from the difference."""
+        """Renders one picture and updates the parameters; returns the loss and other numbers."""
         view = self._view(index)
         picture = self.pictures.picture(view, self.model.device)
         background, target = self._staged(view, picture, index)
@@ -106,7 +106,7 @@ class HeadTrainer:
         return {"loss": float(loss.detach()), "psnr": psnr, "gaussians": len(self.model)}
 
     def tensors(self) -> dict[str, Tensor]:
-        """Parameters, moments, and what density control has gathered."""
+        """Parameters, moments, and the statistics of density control."""
         named = {f"model.{name}": value for name, value in self.model.state_dict().items()}
         if self.adaptor is not None:
             state = self.adaptor.state_dict()
@@ -115,19 +115,19 @@ class HeadTrainer:
         return named | {f"density.{name}": t for name, t in self._density.tensors().items()}
 
     def place(self, name: str) -> torch.device:
-        """With the head, but for the adaptor, which sees two rows of sound at a time: CPU."""
+        """The device of the tensor `name`: that of the head, but the CPU for the small adaptor."""
         about_adaptor = name.startswith(("adaptor.", "moments.adaptor."))
         return CPU if about_adaptor else self.model.device
 
     def state(self) -> dict:
-        """The weight of the perceptual term, and the space; randomness follows from the step."""
+        """The weight of the perceptual term and the hash of the head poses."""
         return {"perceptual_weight": self.settings.loss.perceptual, "space": self._space()}
 
     def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
-        """Takes back what `tensors` and `state` gave.
+        """Restores what `tensors` and `state` returned.
 
         Raises:
-            SettingsError: If it was begun in another space: weights would not fit their places.
+            SettingsError: If the head poses have changed: the Gaussians would lie in another space.
         """
         if state.get("space") != self._space():
             raise SettingsError(

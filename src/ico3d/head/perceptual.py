@@ -10,10 +10,10 @@ from ico3d.common.weights import model_file
 from ico3d.errors import ModelError
 
 WEIGHTS = "vgg16.safetensors"
-"""The convolutions of ImageNet VGG-16 under torchvision's names (`features.0.weight` …)."""
+"""File of the convolutions of ImageNet VGG-16, with torchvision's names (`features.0.weight` …)."""
 
 CHANNELS = (64, 64, 0, 128, 128, 0, 256, 256, 256)
-"""Output channels of the convolutions up to relu3_3; 0 is a 2×2 max pooling."""
+"""Output channels of the layers up to relu3_3; 0 stands for a 2×2 max pooling."""
 
 MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 """Mean and standard deviation of ImageNet's colours, with which VGG was trained."""
@@ -30,7 +30,7 @@ class PerceptualLoss(nn.Module):
 
         Raises:
             MissingModelError: If they are not installed.
-            ModelError: If the file holds something else.
+            ModelError: If the file does not hold these weights.
         """
         super().__init__()
         path = model_file(WEIGHTS, "the perceptual loss")
@@ -43,7 +43,7 @@ class PerceptualLoss(nn.Module):
         self.requires_grad_(False)
 
     def forward(self, image: Tensor, target: Tensor) -> Tensor:
-        """The distance of two pictures (H, W, 3) in [0, 1]: a scalar."""
+        """The distance (a scalar) of two pictures (H, W, 3) in [0, 1]."""
         pair = torch.stack([image, target])  # (2, H, W, 3)
         values = (pair - pair.new_tensor(MEAN)) / pair.new_tensor(DEVIATION)
         values = values.permute(0, 3, 1, 2)  # (2, 3, H, W)

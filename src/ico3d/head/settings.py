@@ -1,4 +1,4 @@
-"""Settings of head training: the paper's, and those sized for two CPU cores."""
+"""Settings of head training: those of the paper, and a preset for two CPU cores."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -9,12 +9,12 @@ from ico3d.training.rate import Rate
 
 @dataclass(frozen=True)
 class Network:
-    """Size of the model: a latent basis per Gaussian, and the MLP that reads what it blends to.
+    """Size of the model: each Gaussian's latent basis, and the MLP that reads blended features.
 
     Attributes:
         features: Width f of the latent basis, numbers per Gaussian and expression value.
         hidden: Width of the MLP's hidden layers.
-        frequencies: Octaves L of the encoding of a Gaussian's position, which the MLP reads, too.
+        frequencies: Octaves L of the position encoding, a further input of the MLP.
     """
 
     features: int = 32
@@ -33,7 +33,7 @@ class Loss:
             installed.
         perceptual_from: First step with the perceptual term.
         torso: Weight, 0 to 1, of pixels that show the person but not the head, where the capture
-            tells them apart: a torso that moves by itself shall not teach the head.
+            tells them apart. Low values keep a torso that moves by itself from disturbing the head.
         alpha: Weight of the L1 difference of rendered alpha and mask, where the capture has masks.
             Not in the paper.
     """
@@ -61,14 +61,14 @@ class Rates:
         logit: Learning rate of the basis of variants without an MLP, whose basis holds the logits
             of colours and opacity themselves; takes the place of --rates.basis.
         basis_decay: Factor to which the basis' rate has decayed at the last step.
-        basis_weight_decay: Weight decay of the basis' rows, the bias excepted: what the expression
-            need not change, it shall not. Meant for 100 training frames; the fourth power of
-            100 / frames multiplies it, since many frames are not learned by heart (measured:
+        basis_weight_decay: Weight decay of the basis' rows except the bias: suppresses changes that
+            the expression does not call for. Meant for 100 training frames and multiplied by the
+            fourth power of 100 / frames, since more frames overfit less (measured:
             docs/choices.md). Not in the paper.
         mlp: Learning rate of the MLP.
         mlp_decay: Factor to which the MLP's rate has decayed at the last step.
-        adaptor: Learning rate of the speech adaptor; its attention learns five times as fast, as in
-            SyncTalk.
+        adaptor: Learning rate of the speech adaptor; that of its attention is five times as high,
+            as in SyncTalk.
     """
 
     position: float = 1.6e-4
@@ -101,8 +101,8 @@ class Initial:
     """The Gaussians that training begins with.
 
     Attributes:
-        gaussians: How many, on the capture's surface points and on what these leave out of the
-            person.
+        gaussians: Number of Gaussians, on the capture's surface points and on parts of the person
+            that those points miss.
     """
 
     gaussians: int = 2_500
@@ -119,12 +119,13 @@ class Density:
         every: Steps between two rounds of multiplying and dying.
         gradient: Mean screen-space gradient (normalised device units) above which a Gaussian
             multiplies: a small one is cloned, a large one split.
-        absgrad: Sum screen-space gradients over a picture's pixels without their signs; four times
-            the threshold is usual then.
+        absgrad: Sum absolute values of screen-space gradients over a picture's pixels; usual
+            together with four times the threshold.
         min_opacity: Gaussians whose predicted opacity, 0 to 1, is below this in all sampled frames
             die.
-        min_contribution: Gaussians that give every sampled picture less than this die: the sum of
-            their blending weights, as a factor of the median over all Gaussians. Not in the paper.
+        min_contribution: Gaussians die if their contribution to every sampled picture is below
+            this: the sum of their blending weights, as a factor of the median over all Gaussians.
+            Not in the paper.
     """
 
     max_gaussians: int = 100_000
@@ -139,7 +140,7 @@ class Density:
 
 @dataclass(frozen=True)
 class HeadSettings:
-    """How a head is trained; defaults are the paper's, with Adam instead of SGD.
+    """How a head is trained; defaults are the paper's, but with Adam instead of SGD.
 
     Attributes:
         steps: Optimisation steps, one picture each.
@@ -147,7 +148,7 @@ class HeadSettings:
         checkpoint_every: Steps from one checkpoint to the next.
         cache_gib: Memory for recorded pictures, GiB; what does not fit is read again at each use.
         mixed_precision: Multiply the MLP's matrices in bfloat16; on CUDA only.
-        compile: Let torch.compile make the MLP's code, which takes half a minute first.
+        compile: Compile the MLP with torch.compile, which takes half a minute at the start.
         network: Size of the model.
         loss: Weights of the terms of the loss.
         rates: Learning rates, and the factors to which they decay.

@@ -1,4 +1,4 @@
-"""From a capture to a model folder: sets up, trains, saves."""
+"""Trains a head on a capture and writes the model folder."""
 
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass
@@ -29,14 +29,14 @@ from ico3d.training.watch import LivePage
 
 @dataclass(frozen=True)
 class HeadJob:
-    """What to train.
+    """A head training: the options of `ico3d train head`.
 
     Attributes:
-        inputs: What drives the head.
-        variant: The model.
-        encoder: Name of the speech encoder, for speech.
-        seed: All randomness follows from it.
-        settings: How to train.
+        inputs: What drives the head: `speech` or `blendshapes`.
+        variant: The model's variant.
+        encoder: Name of the speech encoder where `inputs` is `speech`.
+        seed: Seed of all random numbers.
+        settings: How the head is trained.
     """
 
     inputs: Inputs
@@ -53,23 +53,24 @@ def train_head(
     watch_port: int | None = None,
     device: DeviceName = "auto",
 ) -> TrainedHead:
-    """Trains a head, or goes on with an interrupted run of the same settings.
+    """Trains a head, or continues an interrupted run of the same settings.
 
     Args:
-        capture: Where pictures, poses and expressions come from.
-        folder: Model folder; also holds metrics and checkpoints.
+        capture: The recording, with pictures, head poses and expressions.
+        folder: The model folder, which also holds metrics and checkpoints.
         job: Inputs, variant, seed and settings.
-        watch_port: Where a page shows the training while it lasts; None for nowhere.
-        device: Where to compute; a run may go on elsewhere.
+        watch_port: Port of a live page that shows the training; None for no page.
+        device: Where to compute; a resumed run may use another device.
 
     Returns:
-        The trained head, as the folder now holds it.
+        The trained head, as the folder stores it.
 
     Raises:
-        CaptureError: If the capture lacks something that is needed.
-        SettingsError: If the folder holds a run with other settings, or CUDA does not work.
+        CaptureError: If the capture lacks something that the training needs.
+        SettingsError: If the folder holds a run with other settings, or CUDA is asked for and does
+            not work.
         ModelError: If training diverges.
-        MissingExtraError: If it is to be watched and viser is not installed.
+        MissingExtraError: If a live page is wanted and viser is not installed.
     """
     run = RunFolder(folder, {"capture": str(capture.path.resolve()), **asdict(job)})
     if run.finished() is not None:

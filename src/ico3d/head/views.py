@@ -18,19 +18,20 @@ from ico3d.errors import CaptureError
 log = logging.getLogger(__name__)
 
 COMPARED = 16
-"""Head poses that tell one head space from another."""
+"""Number of head poses that are hashed to identify a head space."""
 GREY = 0.5
-"""Behind a person who is cut out to be measured or shown."""
+"""Background of a person who is cut out to be measured or shown."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """What a view shows.
+    """What a recorded view shows.
 
     Attributes:
         image: (H, W, 3) in [0, 1].
-        mask: (H, W) in [0, 1], the person, or None.
-        torso: (H, W) in [0, 1], the person but the head; None where nobody tells them apart.
+        mask: (H, W) in [0, 1], 1 on the person; None where the capture has none.
+        torso: (H, W) in [0, 1], 1 on the person except the head; None where the capture does not
+            tell them apart.
     """
 
     image: Tensor
@@ -41,16 +42,17 @@ class Picture:
 def staged(
     picture: Picture, plate: Tensor | None, color: Tensor | None = None
 ) -> tuple[Tensor, Tensor]:
-    """The background to render over, and the recorded picture over that background.
+    """The background to render over, and the recorded picture on the same background.
 
     Args:
-        picture: What was recorded.
-        plate: (H, W, 3) what the camera sees without the person, where that is known.
-        color: (3,) what a person is cut out over where it is not; grey by default.
+        picture: The recorded picture and its mask.
+        plate: (H, W, 3) what the camera sees without the person; None if unknown.
+        color: (3,) background for a person who is cut out because there is no plate; grey by
+            default.
 
     Returns:
-        The plate and the picture as it is; without a plate, the colour, and the person over it as
-        the mask cuts it out; without a mask either, black and the picture as it is.
+        With a plate: the plate and the unchanged picture. With a mask only: `color`, and the person
+        blended over `color`. With neither: black and the unchanged picture.
     """
     image = picture.image
     if plate is not None:
@@ -63,7 +65,7 @@ def staged(
 
 
 def head_pose(capture: Capture, frame: int) -> np.ndarray:
-    """W_i (4, 4).
+    """The head pose W_i (4, 4) of a frame, canonical head space to world.
 
     Raises:
         CaptureError: If the frame has no finite head pose.
@@ -78,7 +80,7 @@ def head_pose(capture: Capture, frame: int) -> np.ndarray:
 
 
 def poses_digest(capture: Capture) -> str:
-    """Tells head spaces of a recording apart: a hash of some of its head poses."""
+    """A hash of some head poses; identifies the canonical head space of a recording."""
     digest = hashlib.sha256()
     for frame in spread(capture.num_frames, COMPARED):
         pose = capture.world_from_head(frame)
@@ -87,32 +89,32 @@ def poses_digest(capture: Capture) -> str:
 
 
 def view_of(capture: Capture, camera: int, frame: int) -> View:
-    """The view of a frame by a camera, whether it was recorded or not."""
+    """The view of a frame by a camera, recorded or not."""
     moved = capture.cameras[camera].moved(head_pose(capture, frame))
     return View(camera, frame, moved)
 
 
 class PictureCache:
-    """Pictures of a capture, kept as bytes within a budget, else read again at each use."""
+    """Pictures of a capture, kept in memory as bytes up to a limit, otherwise read at each use."""
 
     def __init__(self, capture: Capture, budget_gib: float):
-        """Keeps up to `budget_gib` GiB."""
+        """Sets the limit of memory in GiB."""
         self._capture = capture
         self._backgrounds: dict[int, Tensor | None] = {}
         self._cache = LayerCache(self._read, budget_gib)
 
     def views(self, frames: Sequence[int], least: float = 0.0) -> list[View]:
-        """All views of these frames that were recorded, frame by frame.
+        """All recorded views of some frames, frame by frame.
 
-        Where a mask or a clean background tells the person from what is behind in some of them, the
-        others are left out: they would show what is behind as a part of the person.
+        If some of the views have a mask or a clean background, all views without one are left out,
+        because training would take their background for a part of the person.
 
         Args:
-            frames: Whose views.
-            least: Share of the recorded views that must not be left out.
+            frames: Numbers of the frames.
+            least: Share of the recorded views that must remain.
 
         Raises:
-            CaptureError: If too many would be left out.
+            CaptureError: If fewer views remain.
         """
         told, untold = [], []
         for frame in frames:
@@ -134,14 +136,14 @@ class PictureCache:
         return told or untold
 
     def background(self, view: View, device: torch.device) -> Tensor | None:
-        """(H, W, 3) what the view's camera sees without the person, where that is known."""
+        """(H, W, 3) what the view's camera sees without the person; None if unknown."""
         index, plate = view.camera_index, self._plate(view.camera_index)
         if plate is not None and plate.device != device:  # every step wants it there
             plate = self._backgrounds[index] = plate.to(device)
         return plate
 
     def picture(self, view: View, device: torch.device) -> Picture:
-        """What a recorded view shows."""
+        """The picture and masks of a recorded view, on `device`."""
         layers = self._cache.layers(view.camera_index, view.frame)
         if layers is None:
             raise CaptureError(

@@ -1,4 +1,4 @@
-"""A head in training, as `training.watch` shows it."""
+"""A head in training as the live page of `training.watch` shows it."""
 
 from collections.abc import Mapping, Sequence
 
@@ -18,21 +18,21 @@ from ico3d.training.watch import Slider
 
 MOST_SLIDERS = 12
 SAMPLES = 100
-"""Frames that decide which inputs get a slider, and how far it goes."""
+"""Number of frames that decide which inputs get a slider, and the slider's range."""
 STILL = 1e-3
-"""Inputs whose standard deviation is less get none."""
+"""Inputs with a smaller standard deviation over those frames get no slider."""
 
 
 class WatchedHead:
-    """A `Watchable`: the frames a head learns from, each as the first of its pictures shows it.
+    """The `Watchable` of a head; a frame is shown as its first recorded picture shows it.
 
-    Sliders are the named inputs that move most in the recording: blendshapes, or the eye values
-    of a head driven by speech, whose sound features mean nothing by themselves. All other inputs
-    are those of the frame.
+    Sliders are the named inputs that vary most in the recording: blendshapes, or, for a head driven
+    by speech, the eye values, since sound features have no meaning for people. All other inputs
+    keep the frame's values.
     """
 
     def __init__(self, trainer: HeadTrainer):
-        """Looks at the expressions of some frames."""
+        """Chooses the sliders from the expressions of some frames."""
         self._trainer = trainer
         first: dict[int, View] = {}
         for view in trainer.views:
@@ -43,17 +43,17 @@ class WatchedHead:
         self.sliders: Sequence[Slider] = self._found_sliders()
 
     def camera(self, frame: int) -> Camera:
-        """Who recorded a frame, in canonical head space."""
+        """The camera that recorded a frame, in canonical head space."""
         return self._views[frame].camera
 
     def values(self, frame: int) -> Mapping[str, float]:
-        """What the named inputs are in a frame."""
+        """The values of the sliders' inputs in a frame."""
         expression = self._expression(frame)
         return {name: float(expression[index]) for name, index in self._inputs.items()}
 
     @torch.no_grad()
     def gaussians(self, frame: int, values: Mapping[str, float]) -> Gaussians:
-        """The head in canonical space with the expression of a frame, but these inputs."""
+        """The head in canonical space with a frame's expression, but with these `values`."""
         expression = self._expression(frame).clone()
         for name, value in values.items():
             expression[self._inputs[name]] = value
@@ -61,7 +61,7 @@ class WatchedHead:
 
     @torch.no_grad()
     def pictures(self, frame: int) -> tuple[Tensor, Tensor]:
-        """(H, W, 3) each, on the CPU: recorded and rendered."""
+        """The recorded picture of a frame and its rendering, (H, W, 3) each, on the CPU."""
         view, device = self._views[frame], self._trainer.model.device
         plate = self._trainer.pictures.background(view, device)
         behind, recorded = staged(self._trainer.pictures.picture(view, device), plate)

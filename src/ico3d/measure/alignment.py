@@ -1,4 +1,4 @@
-"""When a person says which sound in a recording: forced alignment by pocketsphinx."""
+"""Forced alignment by pocketsphinx: the time of each speech sound in a recording."""
 
 import re
 from pathlib import Path
@@ -18,14 +18,14 @@ _STEP = 100  # of the aligner's times per second
 
 
 def transcripts(folder: Path) -> dict[Path, str]:
-    """The recordings of a folder and what is said in them.
+    """The recordings of a folder, and the words that are spoken in each.
 
     Args:
         folder: WAV files (mono, 16 kHz, PCM16) and a README.md with a table whose first column
             names a file and which has a column `words`.
 
     Raises:
-        SettingsError: If there is no such table, or none of its files.
+        SettingsError: If there is no such table, or a file of the table is missing.
     """
     try:
         lines = (folder / "README.md").read_text("utf-8").splitlines()
@@ -43,18 +43,18 @@ def transcripts(folder: Path) -> dict[Path, str]:
 
 
 def aligned(samples: np.ndarray, words: str) -> tuple[list[Phoneme], float]:
-    """Finds the sounds of known words.
+    """Finds the times of the sounds of known words.
 
     Args:
         samples: (S,) int16 at 16 kHz.
-        words: What is said, in English.
+        words: The spoken words, in English.
 
     Returns:
-        The phonemes in the order of time, and when the last one ends, seconds.
+        The phonemes in order of time, and the end of the last one in seconds.
 
     Raises:
         MissingExtraError: If pocketsphinx is not installed.
-        SettingsError: If the words cannot be found in the sound.
+        SettingsError: If the words cannot be aligned with the sound.
     """
     try:
         from pocketsphinx import Decoder

@@ -1,4 +1,4 @@
-"""Measuring a trained body: pictures by the cameras that trained nothing, at all moments."""
+"""Measures a trained body with the cameras that were not used for training, in all frames."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -26,29 +26,29 @@ from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
 QUALITY = ("psnr", "psnr_mask", "psnr_moving", "ssim", "lpips")
-"""Metrics of a picture; of several pictures, their mean over those that allow them."""
+"""Metrics of a picture; for several pictures, the mean over those that have a value."""
 
 
 class Drawn(Protocol):
-    """A body, or a whole person."""
+    """A model of a body, or of a whole person, that can be drawn."""
 
     def gaussians(self, seconds: float) -> Gaussians:
-        """Activated Gaussians in the world at a time."""
+        """Activated Gaussians in the world at a time in seconds."""
         ...
 
 
 class BodyRenderer:
-    """Renders somebody at the frames of a capture."""
+    """Renders a body or a whole person as a capture's cameras would see it."""
 
     def __init__(self, drawn: Drawn, capture: Capture, device: torch.device):
-        """Binds them, who are on a device, to the capture's clock and clean plates."""
+        """Takes a model on `device`, and the capture with clock, cameras and clean plates."""
         self._drawn, self._capture, self.device = drawn, capture, device
         self._plate = lru_cache(1)(self._read_plate)
         self.watch = Stopwatch(device)
 
     @torch.no_grad()
     def picture(self, camera: int, frame: int) -> np.ndarray:
-        """(H, W, 3) the body over the clean plate, else over black; clipped to [0, 1]."""
+        """(H, W, 3) the body over the clean plate, or over black without one; limited to [0, 1]."""
         behind = self._plate(camera)
         seen = self._capture.cameras[camera]
         with self.watch.picture():
@@ -63,14 +63,14 @@ class BodyRenderer:
 
 @dataclass(frozen=True)
 class Truth:
-    """What was recorded, as far as a body can know it.
+    """A recorded picture, prepared for comparison with a rendered body.
 
     Attributes:
-        picture: (H, W, 3) in [0, 1]; where no clean plate is known the person cut out by the
-            mask, before black.
-        mask: (H, W) the person, or None where nobody made a mask.
-        moving: (H, W) bool, `moving_pixels`.
-        whole: Whether all of the picture can be expected of a body: there is a plate or a mask.
+        picture: (H, W, 3) in [0, 1]; without a clean plate, the person cut out by the mask on
+            black.
+        mask: (H, W) in [0, 1], 1 on the person, or None.
+        moving: (H, W) bool, the pixels of `moving_pixels`.
+        whole: Whether the whole picture can be compared, because there is a plate or a mask.
     """
 
     picture: np.ndarray
@@ -80,16 +80,16 @@ class Truth:
 
 
 class BodyTruth:
-    """The recorded pictures of a capture; remembers a few, since each is looked at three times."""
+    """The recorded pictures of a capture; the last few are cached, as each is read three times."""
 
     def __init__(self, capture: Capture):
-        """Reads nothing yet."""
+        """Takes the capture; nothing is read yet."""
         self._capture = capture
         self._image = lru_cache(3)(capture.image)
         self._has_plate = lru_cache(1)(lambda camera: capture.background(camera) is not None)
 
     def at(self, camera: int, frame: int) -> Truth | None:
-        """The truth of one view, or None where it was not recorded."""
+        """The recorded picture of a camera in a frame, or None if it was not recorded."""
         picture = self._image(camera, frame)
         if picture is None:
             return None
@@ -111,31 +111,31 @@ def evaluate_body(
     images: Path | None = None,
     drawn: Drawn | None = None,
 ) -> dict:
-    """All metrics that a body has (docs/architecture.md), those of pictures as means over them.
+    """All metrics of a body (docs/architecture.md, "Metrics"), as means over pictures.
 
-    The body is rendered over the capture's clean plates; where it has none, over black, and
-    compared with the person cut out by the mask. `psnr_moving` is PSNR on the person's moving
-    pixels: those that differ by more than 25/255 from the frame before or after, and what lies
-    within 3 pixels of them.
+    The body is rendered over the capture's clean plates. Without plates it is rendered over black
+    and compared with the person cut out by the mask. `psnr_moving` is the PSNR on moving pixels of
+    the person, which differ by more than 25/255 from the frame before or after or lie within 3
+    pixels of such a pixel.
 
     Args:
-        body: The trained body; it is drawn where it is.
-        capture: Where truth comes from.
-        cameras: Those to measure with; by default the capture's test cameras.
-        frames: Those to measure; by default all that the body shows.
-        spans: Frames to report on one by one; by default the body's windows. A frame in two of
-            them counts for the earlier, which shows it.
-        images: Folder for pictures, or None.
-        drawn: Who is in the pictures: the whole person of an avatar, whose `body` this is; by
-            default the body alone. `flicker` and `num_gaussians` are the body's anyway.
+        body: The trained body; it is drawn on its own device.
+        capture: The recording to compare with.
+        cameras: Indices of the cameras to measure with; by default the capture's test cameras.
+        frames: Frames to measure; by default all that the body covers.
+        spans: Spans of frames to report separately; by default the body's windows. A frame in two
+            spans counts for the earlier one, which shows it.
+        images: Folder for pictures, or None for no pictures.
+        drawn: Model that is drawn: the whole person of an avatar whose body is `body`; by default
+            the body alone. `flicker` and `num_gaussians` are always those of the body.
 
     Returns:
-        Metric keys to values, None where this capture does not allow the metric; `per_window`,
-        `per_camera` and `per_frame`: lists of the same for parts of the pictures. `flicker` is
-        the mean of `per_border` (`border_flicker`), None where there is one window.
+        Values by metric, None where the capture does not allow the metric; `per_window`,
+        `per_camera` and `per_frame`: lists of the same for parts of the pictures. `flicker` is the
+        mean of `per_border` (see `border_flicker`), None for a single window.
 
     Raises:
-        CaptureError: If there is no picture to measure with.
+        CaptureError: If there is no picture to compare with.
     """
     cameras = _test_cameras(capture) if cameras is None else cameras
     frames = _shown(body, capture) if frames is None else frames
@@ -169,7 +169,7 @@ def evaluate_body(
 
 
 PictureScores = dict[str, float | None]
-"""Metric keys to the values of one picture."""
+"""Values of one picture by metric."""
 
 
 def _test_cameras(capture: Capture) -> tuple[int, ...]:
@@ -217,7 +217,7 @@ def picture_scores(
     Args:
         predicted: (H, W, 3) in [0, 1].
         truth: The recorded picture.
-        device: Where LPIPS is computed.
+        device: Device for LPIPS.
     """
     scores = Scores({name: [] for name in QUALITY})
     if truth.whole:

@@ -22,16 +22,16 @@ class Evaluate:
     """Measures a trained head, body, whole person or static scene against a capture.
 
     Attributes:
-        model: A model folder that ico3d train head, train body, train static or assemble wrote.
-        capture: The capture with the truth; its sound or blendshapes drive the head.
+        model: Model folder written by ico3d train head, train body, train static or assemble.
+        capture: The recording to compare with; its sound or blendshapes drive the head.
         json: File for the metrics.
         images: Folder for pictures: {pred,gt,mask}/CAMERA/%06d.png.
-        frames: The capture's test frames (of a single moment: its test cameras), or all of them
-            (for a capture that trained nothing); of bodies and whole persons: all frames by the
-            test cameras, or by all cameras.
-        plots: Of bodies: folder for PSNR over frames and by camera, as pictures.
-        untuned: Of bodies: measure the windows as they were before temporal fine-tuning.
-        device: Where to compute: by default with CUDA where that works, else on the CPU.
+        frames: `test`: the capture's test frames (of a single frame its test cameras), or all (for
+            a capture that was not used for training). For bodies and whole persons `test` means all
+            frames by the test cameras, and `all` all frames by all cameras.
+        plots: For bodies: folder for plots of PSNR over frames and by camera.
+        untuned: For bodies: measure the windows as they were before temporal fine-tuning.
+        device: Where to compute: by default CUDA where that works, else the CPU.
     """
 
     model: tyro.conf.Positional[Path]
@@ -44,7 +44,7 @@ class Evaluate:
     device: DeviceName = "auto"
 
     def run(self) -> None:
-        """Prints the metrics, writes what was asked for."""
+        """Prints the metrics and writes the files that were asked for."""
         import json
 
         from rich.console import Console
@@ -105,7 +105,7 @@ class Evaluate:
 
 
 SCENES = ((5_000, 256), (20_000, 256), (50_000, 512), (100_000, 1024), (200_000, 1024))
-"""Gaussians and picture sizes that `ico3d bench raster` goes through."""
+"""Numbers of Gaussians and picture sizes of the scenes of `ico3d bench raster`."""
 
 
 @dataclass(frozen=True)
@@ -113,12 +113,13 @@ class BenchRaster:
     """Times the CPU rasteriser against another program on the same projected Gaussians.
 
     Attributes:
-        against: The opponent's Python script; it is run, so name only one that you trust.
+        against: Python script of the other program; it is executed, so name only one that you
+            trust.
         json: File for the figures.
-        n: Gaussians of one scene, in the place of five from 5,000 to 200,000.
-        size: That scene's image width and height in pixels, a multiple of 16.
-        runs: Turns; medians are reported.
-        threads: Threads of either program.
+        n: Number of Gaussians of a single scene; by default there are five, from 5,000 to 200,000.
+        size: Image width and height of the single scene in pixels, a multiple of 16.
+        runs: Number of repetitions; medians are reported.
+        threads: Threads of each program.
     """
 
     against: Path
@@ -129,7 +130,7 @@ class BenchRaster:
     threads: int = 2
 
     def run(self) -> None:
-        """Prints the table, writes the figures."""
+        """Prints the table and writes the file."""
         import json
         import os
 
@@ -172,12 +173,12 @@ class BenchRaster:
 class BenchExpression:
     """Measures the mouth: speed, streaming, silence, and lips against recordings of people.
 
-    For the avatar's speech model and every encoder whose weights are here.
+    The avatar's speech model and every installed encoder are measured.
 
     Attributes:
-        speech: Folder with WAV files and a README.md whose table has their names and words.
-        bundle: An avatar driven by speech, `demo` for that of the package.
-        random: Encoders to time with random weights where theirs are not here.
+        speech: Folder with WAV files and a README.md whose table lists names and words.
+        bundle: An avatar driven by speech; `demo` is the avatar of the package.
+        random: Encoders to time with random weights if their own are not installed.
         json: File for the figures.
     """
 
@@ -187,7 +188,7 @@ class BenchExpression:
     json: Path | None = None
 
     def run(self) -> None:
-        """Prints the table, writes the figures."""
+        """Prints the table and writes the file."""
         import json
 
         from rich.console import Console
@@ -225,31 +226,31 @@ class BenchExpression:
 
 @dataclass(frozen=True)
 class BenchBody:
-    """Trains SWinGS++ and what it is compared with on one recording, and measures all of them.
+    """Trains SWinGS++ and methods to compare with on one recording, and measures all of them.
 
-    As many Gaussians and steps for each: a method that takes the clip as one window has those of
-    all windows; on a skeleton it has as many Gaussians as one window. All begin on the visual hull,
-    or on the skin. The same command goes on where it was interrupted.
+    All methods have equal numbers of Gaussians and steps: one that takes the clip as a single
+    window has those of all windows together; one on a skeleton has as many Gaussians as one window.
+    All start on the visual hull, or on the skin. The same command continues an interrupted run.
 
     Attributes:
         capture: A recording of a whole person; by default one is made of --subject.
         subject: The person of the standard recording, an .npz file.
-        garment: What that person wears over the clothes; with a skirt the hips turn so that it
-            swings. A folder holds one standard recording.
-        folder: Where the recording and the trainings lie.
-        seeds: How often each method is trained.
-        methods: The methods to train; skinned and hugs, which need a body track, only where they
-            are named.
-        frames: Only so many of the first frames; all by default.
-        unseen: Measure the frames that --frames leaves out, too: a body on a skeleton in the poses
-            of the body track, others as they were in the last trained frame.
-        finetune: Fine-tune SWinGS++ in the end, and measure before and after; the table shows it
-            as it was before.
-        device: Where to compute: by default with CUDA where that works, else on the CPU.
-        jobs: Trainings at a time; they share the cores.
+        garment: What that person wears over the clothes; with a skirt the hips turn, so that the
+            skirt swings. A folder holds only one standard recording.
+        folder: Folder for the recording and the trainings.
+        seeds: Number of trainings of each method, each with another seed.
+        methods: Methods to train; skinned and hugs, which need a body track, only if they are
+            named.
+        frames: Use only this many of the first frames; by default all.
+        unseen: Also measure the frames that --frames leaves out: a body on a skeleton takes the
+            poses of the body track, others stay as they were in the last trained frame.
+        finetune: Fine-tune SWinGS++ at the end and measure before and after; the table shows the
+            state before.
+        device: Where to compute: by default CUDA where that works, else the CPU.
+        jobs: Number of trainings at a time, which share the cores.
         json: File for the figures.
-        settings: How SWinGS++ is trained; the other methods alike, except where their own papers
-            differ. What is set here holds for all of them.
+        settings: How SWinGS++ is trained. The other methods are trained in the same way, except
+            where their papers differ; options given here apply to all methods.
     """
 
     capture: tyro.conf.Positional[Path | None] = None
@@ -269,10 +270,10 @@ class BenchBody:
     )
 
     def run(self) -> None:
-        """Prints the table and margins, writes the figures.
+        """Prints the table and margins, and writes the file.
 
         Raises:
-            SettingsError: If there is neither a recording nor a person to record.
+            SettingsError: If neither a recording nor a person to record is given.
         """
         import json
 

@@ -1,4 +1,4 @@
-"""How fast, how true and how still the mouth is, for every speech encoder that is here."""
+"""Measures speed, accuracy and stillness of the mouth for every installed speech encoder."""
 
 import time
 import warnings
@@ -27,17 +27,17 @@ from ico3d.speech.training.corpus import utterance
 from ico3d.speech.training.targets import ARTICULATION, articulation_track
 
 SLICE, STEP = RATE * 160 // 1000, RATE * 600 // 1000
-"""Samples that arrive at a time: short slices, and what the server takes of a voice at once."""
+"""Samples per piece: in short slices, and as the server takes a voice."""
 SPOKEN, SECONDS = 40, 3.0
-"""Synthetic utterances that the reading of lips is fitted on, and how long each is."""
+"""Number of synthetic utterances that the lip reading is fitted on, and their length in seconds."""
 FORGOTTEN = 0.3
-"""Seconds after the end of speech from which the mouth must rest."""
+"""Seconds after the end of speech from which on the mouth must rest."""
 TIMED = 2.0
-"""Seconds of processor time after which speed is known: the median of as many rounds."""
+"""Seconds of processor time for measuring speed; the result is the median of its rounds."""
 
 _DAMPING = 1e-2
 Hears = Callable[[np.ndarray, int], np.ndarray]
-"""Samples (S,) and their rate to rows (T, C) at 25 per second."""
+"""Function from samples (S,) and their rate to rows (T, C) at 25 per second."""
 
 
 @dataclass(frozen=True)
@@ -57,12 +57,12 @@ class Recording:
 
 @dataclass(frozen=True)
 class Subject:
-    """A speech model that is measured.
+    """A speech model to measure.
 
     Attributes:
-        model: As a server runs it; encoders without an avatar have a random adaptor.
-        hears: What lips are read from: features, or an avatar's expressions. None for random
-            weights: they can only be timed.
+        model: The model as a server runs it; an encoder without an avatar has a random adaptor.
+        hears: What the lip reading is fitted on: an encoder's features, or an avatar's expressions.
+            None for random weights, which can only be timed.
     """
 
     model: SpeechModel
@@ -70,11 +70,11 @@ class Subject:
 
 
 def read_recordings(folder: Path) -> list[Recording]:
-    """The recordings of a folder (see `transcripts`), aligned.
+    """Reads and aligns the recordings of a folder (see `transcripts`).
 
     Raises:
         MissingExtraError: If pocketsphinx or soundfile is not installed.
-        SettingsError: If they cannot be read or aligned.
+        SettingsError: If a recording cannot be read or aligned.
     """
     import soundfile
 
@@ -94,11 +94,11 @@ def read_recordings(folder: Path) -> list[Recording]:
 
 
 def subjects(avatar: Bundle, untrained: tuple[str, ...]) -> dict[str, Callable[[], Subject]]:
-    """Makers of everything that can be measured here.
+    """Functions that load each speech model that can be measured on this machine, by name.
 
     Args:
         avatar: A bundle whose head is driven by speech.
-        untrained: Encoders that are timed with random weights where theirs are not here.
+        untrained: Encoders to time with random weights if their own are not installed.
     """
     made: dict[str, Callable[[], Subject]] = {
         "avatar": lambda: _avatar(avatar),
@@ -136,7 +136,7 @@ def random_ave() -> FrozenEncoder:
 
 
 def random_hubert() -> FrozenEncoder:
-    """HuBERT large (315 million weights) with random ones.
+    """HuBERT large (315 million weights) with random weights.
 
     Raises:
         MissingExtraError: If transformers is not installed.
@@ -162,16 +162,16 @@ def random_hubert() -> FrozenEncoder:
 
 
 def measure(subject: Subject, recordings: list[Recording]) -> dict:
-    """The figures of one subject.
+    """The figures of one speech model.
 
     Returns:
-        `real_time_factor`: seconds of sound per second of processor time, in the server's steps.
-        `real_time_factor_slices`: the same for slices of 160 ms.
-        `streaming_difference`: greatest difference of those slices from the whole.
-        `silence_opening`: how far the mouth is from rest (distance of expressions, in medians of
-        that in speech) in digital silence, at -60 dB of white noise, and from 0.3 s after speech.
-        `lip_correlation` and `lip_lag_ms` by file: a linear reading of the lips' opening, fitted
-        on synthetic voices, against forced alignment; None for random weights.
+        `real_time_factor`: seconds of sound per second of processor time, in the server's steps;
+        `real_time_factor_slices`: the same for slices of 160 ms; `streaming_difference`: largest
+        difference between slices and the whole sound; `silence_opening`: distance of the mouth from
+        rest (distance of expressions, divided by its median during speech) in digital silence, in
+        white noise of -60 dB, and from 0.3 s after speech; `lip_correlation` and `lip_lag_ms` by
+        file: a linear reading of the lips' opening, fitted on synthetic voices, against forced
+        alignment; None for random weights.
     """
     _, stepped = _timed(subject.model, recordings, STEP)
     streams, sliced = _timed(subject.model, recordings, SLICE)
@@ -237,7 +237,7 @@ def _after(model: SpeechModel, samples: np.ndarray) -> np.ndarray:
 
 
 def reading(hears: Hears) -> Callable[[np.ndarray], np.ndarray]:
-    """A linear reading of the lips' opening, (T, C) to (T,), fitted on synthetic voices.
+    """Fits a linear reading of the lips' opening, (T, C) to (T,), on synthetic voices.
 
     Raises:
         MissingExtraError: If espeak-ng or soxr is not installed.
@@ -261,7 +261,11 @@ def reading(hears: Hears) -> Callable[[np.ndarray], np.ndarray]:
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # as in a server
 def bench(folder: Path, avatar: Bundle, untrained: tuple[str, ...]) -> dict[str, dict]:
-    """Measures everything that is here on the recordings of a folder, under a progress bar."""
+    """Measures all speech models on the recordings of a folder, with a progress bar.
+
+    Returns:
+        The figures of `measure` by name of the model.
+    """
     from rich.progress import track
 
     recordings = read_recordings(folder)

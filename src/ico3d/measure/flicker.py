@@ -1,4 +1,4 @@
-"""How much a body jumps where one window hands over to the next."""
+"""Measures how much a body jumps at the border of two windows."""
 
 from collections.abc import Sequence
 
@@ -16,20 +16,20 @@ NOVEL_CAMERAS = 20
 
 
 def novel_cameras(recorded: Sequence[Camera], count: int = NOVEL_CAMERAS) -> list[Camera]:
-    """The same cameras between the recorded ones at every call."""
+    """Cameras between the recorded ones; the same at every call."""
     return [novel_camera(recorded, np.random.default_rng([count, k])) for k in range(count)]
 
 
 @torch.no_grad()
 def border_flicker(body: TrainedBody, cameras: Sequence[Camera]) -> list[float]:
-    """How different the two windows of each border show the frame that they share.
+    """Difference between the two windows at each border, in the frame that both of them show.
 
     Args:
-        body: The trained body.
-        cameras: Who looks on (`novel_cameras`).
+        body: The trained body, with W windows.
+        cameras: Cameras that look at the body (see `novel_cameras`).
 
     Returns:
-        One value per border, the mean over cameras of `masked_difference`.
+        W − 1 values of `masked_difference`, means over the cameras.
     """
     borders = range(len(body.windows) - 1)
     return [
@@ -44,16 +44,16 @@ def border_flicker(body: TrainedBody, cameras: Sequence[Camera]) -> list[float]:
 def masked_difference(
     first: np.ndarray, second: np.ndarray, first_alpha: np.ndarray, second_alpha: np.ndarray
 ) -> float:
-    """L1 per pixel of the person: Σ |a − b| / (3·Σ m), where m is the larger alpha.
+    """L1 difference per pixel of the person: Σ |a − b| / (3·Σ m), m being the larger alpha.
 
-    What lies outside of both silhouettes does not differ, and needs no mask. Two that differ by
-    a constant colour alone have that as their difference.
+    Pixels outside of both silhouettes do not differ and need no mask. Two pictures that differ by a
+    constant colour on the person have that constant as their difference.
 
     Args:
-        first: (H, W, 3), before black.
-        second: (H, W, 3) the other picture.
-        first_alpha: (H, W).
-        second_alpha: (H, W).
+        first: (H, W, 3) picture on black.
+        second: (H, W, 3) the other picture on black.
+        first_alpha: (H, W) alpha of the first picture.
+        second_alpha: (H, W) alpha of the second picture.
     """
     area = np.maximum(first_alpha, second_alpha).sum(dtype=np.float64)
     error = np.abs(first - second).sum(dtype=np.float64)

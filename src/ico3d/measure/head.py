@@ -1,4 +1,4 @@
-"""Measuring a trained head on frames of a capture."""
+"""Measures a trained head on frames of a capture."""
 
 import logging
 from collections.abc import Iterator, Sequence
@@ -25,9 +25,9 @@ from ico3d.measure.stopwatch import Stopwatch
 from ico3d.splat.render import render
 
 FACING = np.array([0.0, 0.0, 1.0])
-"""Where the face looks in canonical head space."""
+"""Viewing direction of the face in canonical head space."""
 SHOWS_MOUTH = float(np.cos(np.radians(75.0)))
-"""Cameras further round the head show no mouth to speak of."""
+"""Least cosine of the angle to the face at which a camera sees the mouth well enough."""
 
 log = logging.getLogger(__name__)
 
@@ -36,14 +36,14 @@ class HeadRenderer:
     """Renders a trained head as a capture's cameras would see it."""
 
     def __init__(self, head: TrainedHead, capture: Capture):
-        """Binds the head to the capture that drives it."""
+        """Takes the head and the capture that drives it."""
         self._head = head
         self._track: ExpressionTrack = head.track(capture)
         self.watch = Stopwatch(head.model.device)
 
     @torch.no_grad()
     def picture(self, view: View, behind: Tensor) -> np.ndarray:
-        """(H, W, 3) the head over a picture (H, W, 3) or a colour (3,), clipped to [0, 1]."""
+        """(H, W, 3) the head over a picture (H, W, 3) or a colour (3,), limited to [0, 1]."""
         expression = self._track.at(view.frame)
         with self.watch.picture():
             rendering = render(
@@ -55,23 +55,23 @@ class HeadRenderer:
 def evaluate_head(
     head: TrainedHead, capture: Capture, frames: Sequence[int], images: Path | None
 ) -> dict[str, float | str | None]:
-    """All metrics of a head.
+    """All metrics of a head (docs/architecture.md, "Metrics").
 
     Where a capture has no clean background, the person is cut out by the mask, and both pictures
-    stand over the same grey.
+    are shown on the same grey.
 
     Args:
-        head: The trained head; it is drawn where its model is.
-        capture: Where truth comes from; it may be another one than the head was trained on.
+        head: The trained head; it is drawn on its model's device.
+        capture: The recording to compare with; may differ from that of the training.
         frames: Consecutive frames to measure.
-        images: Folder for pictures, or None.
+        images: Folder for pictures, or None for no pictures.
 
     Returns:
-        Metric keys to values, None where this capture does not allow the metric; a warning says
+        Values by metric; None where the capture does not allow the metric, with a warning that says
         why.
 
     Raises:
-        CaptureError: If the capture lacks what drives the head, or has no picture in the frames.
+        CaptureError: If the capture lacks what drives the head, or has no picture in these frames.
     """
     renderer = HeadRenderer(head, capture)
     result: dict[str, float | str | None]
@@ -135,13 +135,13 @@ def _say_why(result: dict[str, float | str | None], capture: Capture) -> None:
 
 
 def squareness(camera: Camera) -> float:
-    """Cosine of the angle between where the face looks and a camera in canonical head space."""
+    """Cosine of the angle between the face's and a camera's direction, in canonical head space."""
     center = camera.camera_to_world[:3, 3]
     return float(center @ FACING / np.linalg.norm(center))
 
 
 def most_frontal_camera(capture: Capture, frames: Sequence[int]) -> int:
-    """The camera that faces the head most squarely, averaged over some of the frames."""
+    """Index of the camera that faces the head most directly, on average over some of the frames."""
     some = [frames[place] for place in spread(len(frames), 16)]
 
     def average(camera: int) -> float:

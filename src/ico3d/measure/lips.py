@@ -1,4 +1,4 @@
-"""Do the lips move as they should, and when: opening of the mouth over time."""
+"""Metrics of lip movement: correlation and delay of the mouth's opening over time."""
 
 import logging
 
@@ -9,22 +9,22 @@ from ico3d.errors import MissingExtraError, MissingModelError
 UPPER_INNER_LIP = (61, 62, 63)
 LOWER_INNER_LIP = (67, 66, 65)
 LONGEST_LAG = 0.4
-"""Seconds within which the correlation's peak is looked for."""
+"""Largest delay in seconds at which the correlation's peak is searched."""
 
 log = logging.getLogger(__name__)
 
 
 def lip_gap(landmarks: np.ndarray) -> float:
-    """Opening between the inner lips in pixels, from the 68 landmarks (68, 2)."""
+    """Distance of the inner lips in pixels, from the 68 landmarks (68, 2)."""
     between = landmarks[list(UPPER_INNER_LIP)] - landmarks[list(LOWER_INNER_LIP)]  # (3, 2)
     return float(np.linalg.norm(between, axis=1).mean())
 
 
 def lip_correlation(gaps: np.ndarray, truth: np.ndarray) -> float | None:
-    """Pearson correlation of two series (T,) at lag 0; frames with NaN in either are left out.
+    """Pearson correlation of two series (T,) without a shift; frames with NaN are left out.
 
     Returns:
-        The correlation, or None where fewer than 8 frames are left or a series is constant.
+        The correlation; None if fewer than 8 frames are left or a series is constant.
     """
     both = np.isfinite(gaps) & np.isfinite(truth)
     a, b = gaps[both], truth[both]
@@ -34,13 +34,13 @@ def lip_correlation(gaps: np.ndarray, truth: np.ndarray) -> float | None:
 
 
 def lip_lag_ms(gaps: np.ndarray, truth: np.ndarray, fps: float) -> float | None:
-    """How late `gaps` (T,) is against `truth` (T,), in milliseconds.
+    """Delay of the series `gaps` (T,) behind `truth` (T,), in milliseconds.
 
-    Correlations at whole-frame shifts; a parabola through the highest and its neighbours gives
-    the fraction.
+    Correlations are computed at shifts of whole frames; a parabola through the highest and its
+    neighbours gives fractions of a frame.
 
     Returns:
-        The lag, positive where `gaps` is late, or None where correlations do not exist.
+        The delay, positive if `gaps` is late; None if there is no correlation.
     """
     reach = min(round(LONGEST_LAG * fps), len(gaps) // 2)
     values = [_shifted_correlation(gaps, truth, shift) for shift in range(-reach, reach + 1)]
@@ -63,14 +63,14 @@ def _shifted_correlation(gaps: np.ndarray, truth: np.ndarray, shift: int) -> flo
 
 
 class LandmarkReader:
-    """The 68 landmarks that MediaPipe sees in a picture."""
+    """Finds the 68 landmarks of a face in a picture with MediaPipe."""
 
     def __init__(self):
         """Loads MediaPipe and its model.
 
         Raises:
             MissingExtraError: If MediaPipe is not installed.
-            MissingModelError: If the model file is not there.
+            MissingModelError: If the model file is not installed.
         """
         from ico3d.capture.face.mediapipe_face import FaceReader
         from ico3d.common.weights import model_file
@@ -85,15 +85,15 @@ class LandmarkReader:
         self._reader.__exit__(*details)
 
     def read(self, picture: np.ndarray, mask: np.ndarray | None = None) -> np.ndarray | None:
-        """The landmarks of the face in a picture.
+        """The landmarks of a face in a picture.
 
         Args:
             picture: (H, W, 3) in [0, 1].
-            mask: (H, W) the person, in whose parts a face is looked for that is small in the
-                picture; None looks at the whole picture only.
+            mask: (H, W) the person; a face that is small in the picture is searched in parts of the
+                person. None searches the whole picture only.
 
         Returns:
-            (68, 2) pixels, or None where no face is seen.
+            (68, 2) pixels, or None if no face is found.
         """
         from ico3d.capture.face.landmarks import MULTI_PIE
         from ico3d.capture.headtrack.crops import search
@@ -110,7 +110,7 @@ class LandmarkReader:
 
 
 def landmark_reader() -> LandmarkReader | None:
-    """A reader, or None, with a warning, where MediaPipe or its model is missing."""
+    """A reader; None, with a warning, if MediaPipe or its model is missing."""
     try:
         return LandmarkReader()
     except (MissingExtraError, MissingModelError) as error:

@@ -1,4 +1,4 @@
-"""LPIPS with VGG-16 (Zhang et al. 2018), where its weights are at hand."""
+"""LPIPS with VGG-16 (Zhang et al. 2018), if its weights are installed."""
 
 import logging
 from collections.abc import Callable
@@ -15,27 +15,30 @@ from ico3d.head.perceptual import DEVIATION, MEAN, WEIGHTS, vgg_layers
 from ico3d.splat.device import CPU
 
 LINEAR = "lpips_vgg.safetensors"
-"""The learnt weights of channels, (1, C, 1, 1) each, under the names of version 0.1 of the authors'
-package: `lin0.model.1.weight` … `lin4.model.1.weight`."""
+"""File of the learnt channel weights, (1, C, 1, 1) each.
+
+Names are those of version 0.1 of the authors' package: `lin0.model.1.weight` …
+`lin4.model.1.weight`.
+"""
 
 CHANNELS = (64, 64, 0, 128, 128, 0, 256, 256, 256, 0, 512, 512, 512, 0, 512, 512, 512)
-"""All convolutions of VGG-16; 0 is a max pooling."""
+"""Output channels of VGG-16's convolutions; 0 stands for a max pooling."""
 
 TAPS = (3, 8, 15, 22, 29)
-"""Layers that are compared: relu1_2, relu2_2, relu3_3, relu4_3, relu5_3."""
+"""Layers whose outputs are compared: relu1_2, relu2_2, relu3_3, relu4_3, relu5_3."""
 
 log = logging.getLogger(__name__)
 
 
 class Lpips(nn.Module):
-    """Distance of two pictures in the features of VGG-16, each channel weighted as learnt."""
+    """Distance of two pictures in VGG-16's features, with a learnt weight for each channel."""
 
     def __init__(self):
         """Loads the weights.
 
         Raises:
             MissingModelError: If a file is not installed.
-            ModelError: If a file holds something else.
+            ModelError: If a file does not hold these weights.
         """
         super().__init__()
         paths = [model_file(name, "LPIPS") for name in (WEIGHTS, LINEAR)]
@@ -79,12 +82,12 @@ def _installed(device: torch.device) -> Callable[[Tensor, Tensor], float] | None
 
 
 def lpips(predicted: np.ndarray, truth: np.ndarray, device: torch.device = CPU) -> float | None:
-    """LPIPS of two pictures, or None where its weights are not installed.
+    """LPIPS of two pictures; None if the weights are not installed.
 
     Args:
         predicted: (H, W, 3) in [0, 1].
         truth: (H, W, 3) in [0, 1].
-        device: Where to compute.
+        device: Device to compute on.
     """
     measure = _installed(device)
     if measure is None:

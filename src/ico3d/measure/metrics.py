@@ -1,4 +1,4 @@
-"""Picture metrics, each with one meaning everywhere (docs/architecture.md, "Metrics")."""
+"""Picture metrics, each defined once (docs/architecture.md, "Metrics")."""
 
 from collections.abc import Sequence
 
@@ -7,27 +7,30 @@ import numpy as np
 from ico3d.common.psnr import psnr
 
 MOUTH = slice(48, 68)
-"""The mouth among the 68 landmarks."""
+"""Indices of the mouth among the 68 landmarks."""
 
 MOTION = 25 / 255
-"""Change of a colour channel from frame to frame above which a pixel moves."""
+"""Change of a colour channel between two frames above which a pixel counts as moving."""
 SPREAD = 3
-"""Pixels around a moving one that count as moving too."""
+"""Distance in pixels from a moving pixel within which others count as moving, too."""
 FEWEST_MOVING = 50
-"""Moving pixels of the person below which a picture tells nothing about motion: a lone pixel
-spreads over 49."""
+"""Least number of moving pixels of the person for which `psnr_moving` is defined.
+
+A single moving pixel already makes 49 pixels count as moving.
+"""
 
 
 def moving_pixels(picture: np.ndarray, neighbours: Sequence[np.ndarray]) -> np.ndarray:
-    """Where something moves: what differs from the frame before or after, and what is near it.
+    """Pixels that differ from the frame before or after, and those near them.
 
     Args:
-        picture: (H, W, 3) in [0, 1], as recorded.
-        neighbours: The frames before and after by the same camera, as far as there are any.
+        picture: (H, W, 3) recorded picture in [0, 1].
+        neighbours: (H, W, 3) pictures of the same camera in the frames before and after, if
+            recorded.
 
     Returns:
-        (H, W) bool: some channel differs from some neighbour by more than `MOTION` within `SPREAD`
-        pixels along rows and columns.
+        (H, W) bool: within `SPREAD` pixels along rows and columns, some channel differs from some
+        neighbour by more than `MOTION`.
     """
     from scipy.ndimage import maximum_filter
 
@@ -43,24 +46,24 @@ def psnr_moving(predicted: np.ndarray, truth: np.ndarray, weight: np.ndarray) ->
     Args:
         predicted: (H, W, 3) in [0, 1].
         truth: (H, W, 3) in [0, 1].
-        weight: (H, W) the mask where pixels move (`moving_pixels`), else 0.
+        weight: (H, W) the mask of the person on pixels of `moving_pixels`, else 0.
 
     Returns:
-        dB, or None where `weight` adds up to fewer than `FEWEST_MOVING` pixels.
+        dB, or None if `weight` adds up to fewer than `FEWEST_MOVING` pixels.
     """
     return None if weight.sum() < FEWEST_MOVING else psnr(predicted, truth, weight)
 
 
 def mouth_box(landmarks: np.ndarray, height: int, width: int) -> tuple[slice, slice] | None:
-    """Rows and columns of the box of landmarks 48–67, grown by half about its middle.
+    """The box around the mouth's landmarks, enlarged by half about its centre.
 
     Args:
         landmarks: (68, 2) pixels.
-        height: Image height.
-        width: Image width.
+        height: Image height in pixels.
+        width: Image width in pixels.
 
     Returns:
-        Row and column slices within the image, or None where the box lies outside of it.
+        Slices of rows and columns within the image, or None if the box lies outside of it.
     """
     mouth = landmarks[MOUTH]
     low, high = mouth.min(0), mouth.max(0)
@@ -73,12 +76,12 @@ def mouth_box(landmarks: np.ndarray, height: int, width: int) -> tuple[slice, sl
 
 
 def psnr_mouth(predicted: np.ndarray, truth: np.ndarray, landmarks: np.ndarray) -> float | None:
-    """PSNR within `mouth_box`, or None where that lies outside of the picture."""
+    """PSNR in dB within `mouth_box`, or None if that box lies outside of the picture."""
     box = mouth_box(landmarks, *truth.shape[:2])
     return None if box is None else psnr(predicted[box], truth[box])
 
 
 def lmd(predicted: np.ndarray, truth: np.ndarray) -> float:
-    """Landmark distance of two sets (68, 2): mouth only, each less its own mean, in pixels."""
+    """Mean distance in pixels of the mouth's landmarks in two sets (68, 2), each centred first."""
     a, b = predicted[MOUTH], truth[MOUTH]
     return float(np.linalg.norm((a - a.mean(0)) - (b - b.mean(0)), axis=1).mean())

@@ -1,4 +1,4 @@
-"""Times the CPU rasteriser against another one on the same projected Gaussians."""
+"""Compares the speed of the CPU rasteriser with another program, on equal projected Gaussians."""
 
 import ctypes
 import importlib.util
@@ -17,16 +17,16 @@ from ico3d.errors import SettingsError
 
 @dataclass(frozen=True)
 class Scene:
-    """Projected Gaussians; all float32.
+    """N projected Gaussians; all arrays are float32.
 
     Attributes:
         means2d: (N, 2) pixels.
-        conics: (N, 3).
-        colors: (N, 3).
+        conics: (N, 3) entries xx, xy, yy of the inverse 2D covariances.
+        colors: (N, 3) in [0, 1].
         opacities: (N,).
-        depths: (N,).
-        extents: (N, 2) pixels.
-        size: Image width and height.
+        depths: (N,) along the camera's z.
+        extents: (N, 2) half sizes of bounding boxes in pixels.
+        size: Image width and height in pixels.
     """
 
     means2d: np.ndarray
@@ -42,14 +42,14 @@ class Ours:
     """ico3d's kernels: binning, forward, backward."""
 
     def __init__(self, scene: Scene):
-        """Compiles the kernels by a first run."""
+        """Compiles the kernels by running them once."""
         self.scene = scene
         self.bin()
         self.forward()
         self.backward()
 
     def bin(self) -> None:
-        """Finds each tile's splats."""
+        """Sorts the splats into tiles."""
         from ico3d.splat.cpu.tiles import bin_splats
 
         s = self.scene
@@ -58,7 +58,7 @@ class Ours:
         )
 
     def forward(self) -> None:
-        """Draws."""
+        """Draws the picture."""
         from ico3d.splat.cpu.forward import draw, splat_records
 
         s = self.scene
@@ -66,7 +66,7 @@ class Ours:
         self.image, self.light = draw(self.records, self.tiles)
 
     def backward(self) -> None:
-        """Gradients of ½·Σ image²; afterwards colour 3, opacity, mean 2, conic 3."""
+        """Computes gradients of ½·Σ image², by colour (3), opacity, mean (2), conic (3)."""
         from ico3d.splat.cpu.backward import draw_backward
 
         no_light = np.zeros_like(self.light)
@@ -77,10 +77,10 @@ class Ours:
 
 
 class Theirs:
-    """The opponent's library behind its C interface."""
+    """The other program's library, behind its C interface."""
 
     def __init__(self, library: ctypes.CDLL, scene: Scene):
-        """Runs once, so that everything it needs is there."""
+        """Runs everything once as a warm-up."""
         library.bin_c.restype = ctypes.c_int64
         self.library, self.scene = library, scene
         count, size = len(scene.depths), scene.size
@@ -93,7 +93,7 @@ class Theirs:
         self.backward()
 
     def forward(self) -> None:
-        """Bins and draws."""
+        """Sorts the splats into tiles and draws the picture."""
         s, at = self.scene, _pointer
         self.library.free_c(self.entries)
         self.pairs = self.library.bin_c(
@@ -106,7 +106,7 @@ class Theirs:
         )
 
     def backward(self) -> None:
-        """Gradients of ½·Σ image²."""
+        """Computes gradients of ½·Σ image²."""
         s, at = self.scene, _pointer
         no_light = np.zeros_like(self.light)
         self.library.bwd_c(
@@ -121,10 +121,10 @@ def _pointer(array: np.ndarray) -> ctypes.c_void_p:
 
 
 def load_opponent(path: Path) -> ModuleType:
-    """Runs the benchmark script that the user names; it offers `scene()` and `build()`.
+    """Executes the other program's benchmark script, which must define `scene()` and `build()`.
 
     Raises:
-        SettingsError: If the file is not there or offers something else.
+        SettingsError: If the file is missing or does not define both.
     """
     spec = importlib.util.spec_from_file_location("raster_opponent", path)
     if not path.is_file() or spec is None or spec.loader is None:
@@ -144,19 +144,21 @@ def _timed(step: Callable[[], None]) -> float:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Both rasterisers on one scene.
+    """Times and differences of the two rasterisers on one scene; times are medians.
 
     Attributes:
         gaussians: Number of Gaussians in the scene.
         size: Image width and height in pixels.
-        pairs: Splats times tiles that ours draws: what its cost should be proportional to.
-        ours_binning_ms: Medians, as are those below.
-        ours_forward_ms: Drawing alone.
-        ours_backward_ms: Gradients.
-        theirs_forward_ms: Binning and drawing.
-        theirs_backward_ms: Gradients.
-        image_difference: Largest difference of the pictures.
-        gradient_difference: Of the gradients, relative to the largest of each parameter.
+        pairs: Number of pairs of a splat and a tile that ico3d draws, to which cost should be
+            proportional.
+        ours_binning_ms: ico3d: sorting splats into tiles, milliseconds.
+        ours_forward_ms: ico3d: drawing alone, milliseconds.
+        ours_backward_ms: ico3d: gradients, milliseconds.
+        theirs_forward_ms: Other program: binning and drawing, milliseconds.
+        theirs_backward_ms: Other program: gradients, milliseconds.
+        image_difference: Largest difference between the pictures.
+        gradient_difference: Largest difference between gradients, relative to the largest gradient
+            of each parameter.
     """
 
     gaussians: int
@@ -172,27 +174,27 @@ class Comparison:
 
     @property
     def name(self) -> str:
-        """Such as 20k_256."""
+        """Name of the scene, such as 20k_256."""
         return f"{self.gaussians / 1000:g}k_{self.size}"
 
     @property
     def forward_ratio(self) -> float:
-        """Binning and drawing, ours / theirs."""
+        """Time of binning and drawing, ours / theirs."""
         return (self.ours_binning_ms + self.ours_forward_ms) / self.theirs_forward_ms
 
     @property
     def backward_ratio(self) -> float:
-        """Gradients, ours / theirs."""
+        """Time of gradients, ours / theirs."""
         return self.ours_backward_ms / self.theirs_backward_ms
 
     @property
     def ours_total_ms(self) -> float:
-        """Binning, drawing and gradients."""
+        """Milliseconds of ico3d's binning, drawing and gradients."""
         return self.ours_binning_ms + self.ours_forward_ms + self.ours_backward_ms
 
     @property
     def theirs_total_ms(self) -> float:
-        """Milliseconds of the opponent's picture and gradients."""
+        """Milliseconds of the other program's picture and gradients."""
         return self.theirs_forward_ms + self.theirs_backward_ms
 
     @property
@@ -201,7 +203,7 @@ class Comparison:
         return self.ours_total_ms / self.theirs_total_ms
 
     def figures(self) -> dict[str, Any]:
-        """Everything as JSON holds it."""
+        """All values, JSON-serialisable."""
         ratios = {
             "forward_ratio": self.forward_ratio,
             "backward_ratio": self.backward_ratio,
@@ -211,19 +213,19 @@ class Comparison:
 
 
 def compare(path: Path, count: int, size: int, runs: int) -> Comparison:
-    """Times both, turn by turn, so that what disturbs the machine disturbs both.
+    """Times both programs in turns, so that disturbances of the machine affect both.
 
     Args:
-        path: The opponent's script.
-        count: Gaussians.
-        size: Image width and height, a multiple of 16.
-        runs: Turns.
+        path: The other program's script.
+        count: Number of Gaussians.
+        size: Image width and height in pixels, a multiple of 16.
+        runs: Number of turns.
 
     Returns:
         Median times and differences.
 
     Raises:
-        SettingsError: If the opponent cannot be used or built, or the size does not fit it.
+        SettingsError: If the other program cannot be used or built, or the size does not suit it.
     """
     if size % 16:
         raise SettingsError(f"--size must be a multiple of 16 for the opponent, got {size}.")

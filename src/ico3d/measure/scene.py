@@ -1,4 +1,4 @@
-"""Measuring a static scene: the floor that every model of somebody who moves must beat."""
+"""Measures a static scene: the lower bound that every model of a moving person must exceed."""
 
 from pathlib import Path
 from typing import Literal
@@ -21,22 +21,22 @@ from ico3d.splat.render import render
 def evaluate_scene(
     trained: TrainedScene, capture: Capture, which: Literal["test", "all"], images: Path | None
 ) -> dict[str, float | str | None]:
-    """Picture metrics, with the meaning they have for heads.
+    """Picture metrics of a static scene, defined as for heads.
 
-    A person is rendered over the capture's clean plates. `psnr_background` looks at what is not the
-    person; without plates a background has nothing else to be measured by.
+    A person is rendered over the capture's clean plates. `psnr_background` is the PSNR outside of
+    the person; for a background without plates it is the only metric.
 
     Args:
-        trained: The scene; it is drawn where it is.
-        capture: Where truth comes from; it may be another one than the scene was trained on.
-        which: The test views of a capture (`SceneViews.test`), or all views.
-        images: Folder for pictures, or None.
+        trained: The scene; it is drawn on its own device.
+        capture: The recording to compare with; may differ from that of the training.
+        which: `test` for the test views of the capture (`SceneViews.test`), `all` for all views.
+        images: Folder for pictures, or None for no pictures.
 
     Returns:
-        Metric keys to values, None where this capture does not allow the metric.
+        Values by metric; None where the capture does not allow the metric.
 
     Raises:
-        CaptureError: If no picture is to be measured.
+        CaptureError: If there is no picture to compare with.
     """
     views = SceneViews(capture, trained.only, trained.frames, cache_gib=0)
     chosen = views.test if which == "test" else views.train + views.test
@@ -72,13 +72,13 @@ class SceneRenderer:
     """Renders a scene as a capture's cameras would see it."""
 
     def __init__(self, trained: TrainedScene, views: SceneViews):
-        """Binds the scene to the capture whose plates a person stands before."""
+        """Takes the scene, and the views of a capture, whose plates are shown behind a person."""
         self._trained, self._views = trained, views
         self.watch = Stopwatch(trained.scene.device)
 
     @torch.no_grad()
     def picture(self, view: View) -> np.ndarray:
-        """(H, W, 3), clipped to [0, 1]."""
+        """(H, W, 3) the rendered view, limited to [0, 1]."""
         behind = self._views.plate(view) if self._trained.only == "person" else None
         if behind is not None:
             behind = behind.to(self._trained.scene.device)
@@ -87,7 +87,10 @@ class SceneRenderer:
         return rendering.rgb[0].clamp(0, 1).cpu().numpy()
 
     def shows_all(self, view: View, person: np.ndarray | None) -> bool:
-        """Whether the whole picture is known: a person needs a plate, a background nobody."""
+        """Whether the scene accounts for the whole picture.
+
+        A person does so only over a clean plate, a background only in a picture without a person.
+        """
         if self._trained.only == "person":
             return self._views.plate(view) is not None
         return self._trained.only == "all" or person is None

@@ -1,4 +1,4 @@
-"""What every evaluation does with a picture: scores it, and writes it where others can."""
+"""Collects scores of pictures, and writes pictures so that other programs can score them."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +14,7 @@ from ico3d.splat.losses import ssim
 
 @dataclass
 class Scores:
-    """Values of one metric over pictures; None counts for nothing."""
+    """Values of metrics over several pictures; None values are left out."""
 
     values: dict[str, list[float]] = field(default_factory=dict)
 
@@ -25,7 +25,7 @@ class Scores:
             self.values[name].append(value)
 
     def means(self) -> dict[str, float | None]:
-        """Mean of each metric, None where no picture had a value."""
+        """Mean of each metric, None if no picture had a value."""
         return {name: float(np.mean(v)) if v else None for name, v in self.values.items()}
 
 
@@ -33,7 +33,7 @@ def add_picture(scores: Scores, predicted: np.ndarray, truth: np.ndarray) -> Non
     """Adds `psnr` and `ssim` of one whole picture.
 
     Args:
-        scores: Where to.
+        scores: Receives the values.
         predicted: (H, W, 3) in [0, 1].
         truth: (H, W, 3) in [0, 1].
     """
@@ -44,7 +44,7 @@ def add_picture(scores: Scores, predicted: np.ndarray, truth: np.ndarray) -> Non
 def write_pictures(
     folder: Path, view: View, predicted: np.ndarray, truth: np.ndarray, mask: np.ndarray | None
 ) -> None:
-    """Writes `FOLDER/{pred,gt,mask}/CAMERA/%06d.png`."""
+    """Writes a view's pictures as `FOLDER/{pred,gt,mask}/CAMERA/%06d.png`."""
     for part, picture in {"pred": predicted, "gt": truth, "mask": mask}.items():
         if picture is None:
             continue

@@ -1,4 +1,4 @@
-"""How long pictures take, and where."""
+"""Measures how long pictures take to compute."""
 
 import time
 from collections.abc import Iterator
@@ -11,16 +11,16 @@ from ico3d.splat.device import device_name
 
 
 class Stopwatch:
-    """Times pictures that a device computes."""
+    """Times the computation of pictures on a device."""
 
     def __init__(self, device: torch.device):
-        """Has timed nothing yet."""
+        """Takes the device; nothing is timed yet."""
         self._device = device
         self._seconds: list[float] = []
 
     @contextmanager
     def picture(self) -> Iterator[None]:
-        """Times what happens inside, until CUDA has really done it."""
+        """Times the `with` block, including all work that CUDA still has to finish."""
         begin = time.perf_counter()
         yield
         if self._device.type == "cuda":
@@ -28,6 +28,6 @@ class Stopwatch:
         self._seconds.append(time.perf_counter() - begin)
 
     def figures(self) -> dict[str, float | str]:
-        """`ms_per_frame`, the median, and the `device` that it was measured on."""
+        """`ms_per_frame`, the median in milliseconds, and the name of the `device`."""
         milliseconds = float(np.median(self._seconds) * 1000)
         return {"ms_per_frame": milliseconds, "device": device_name(self._device)}

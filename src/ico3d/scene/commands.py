@@ -14,12 +14,12 @@ from ico3d.scene.settings import PRESETS, SceneSettings, StrategyName, settings_
 
 @dataclass(frozen=True, kw_only=True)
 class SceneChoice:
-    """What the defaults of all other settings follow from.
+    """The options that decide the defaults of all others.
 
     Attributes:
         preset: The settings of 3DGS, or those sized for two CPU cores;
             the defaults shown here are those of the preset that is chosen.
-        strategy: How Gaussians multiply: 3DGS's own way, or as a Markov chain.
+        strategy: How Gaussians multiply: as in 3DGS, or as a Markov chain.
     """
 
     preset: PresetName = "cpu"
@@ -30,17 +30,18 @@ class SceneChoice:
 class TrainStatic(SceneChoice):
     """Trains a static scene (3D Gaussian splatting): a background, or a person who stands still.
 
-    The same command goes on where it was interrupted.
+    The same command continues an interrupted training.
 
     Attributes:
         capture: A capture folder.
         out: The model folder to write.
-        only: The whole picture; the person cut out, which takes masks; or everything but the
-            person.
-        frames: All frames together, or the number of the one moment to show.
-        seed: All randomness follows from it.
-        device: Where to compute: by default with CUDA where that works, else on the CPU.
-        export: A file for other tools: .ply (lossless) or .spz (small; for scenes of avatars).
+        only: Which part of the pictures to train: all of it; the person alone, which needs masks;
+            or the background alone.
+        frames: All frames together, or the number of a single frame.
+        seed: Seed of all random numbers.
+        device: Where to compute: by default CUDA where that works, else the CPU.
+        export: Also write a file for other programs: .ply (lossless) or .spz (small; for scenes of
+            avatars).
         settings: How the scene is trained.
     """
 
@@ -61,7 +62,7 @@ class TrainStatic(SceneChoice):
         return cls(tyro.MISSING, tyro.MISSING, settings=settings)
 
     def run(self) -> None:
-        """Trains, or goes on training; writes the model folder and what is exported."""
+        """Starts or continues the training; writes the model folder and the exported file."""
         from rich.console import Console
 
         from ico3d.capture.formats import open_capture

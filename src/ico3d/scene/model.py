@@ -1,4 +1,4 @@
-"""A static scene: Gaussians whose colours depend on where they are seen from."""
+"""A static scene: Gaussians whose colours depend on the direction of view."""
 
 import math
 
@@ -15,19 +15,19 @@ NAMES = ("means", "quats", "log_scales", "opacity_logits", "f_dc", "f_rest")
 
 
 class StaticScene:
-    """N Gaussians as training stores them, in the layout of 3DGS files.
+    """N Gaussians with the trained parameters, in the layout of 3DGS files.
 
     Attributes:
         parameters: `means` (N, 3) metres, `quats` (N, 4) wxyz not normalised, `log_scales` (N, 3),
-            `opacity_logits` (N,), `f_dc` (N, 1, 3) and `f_rest` (N, (degree + 1)² − 1, 3)
-            coefficients of the harmonics. Density control replaces the tensors.
+            `opacity_logits` (N,), `f_dc` (N, 1, 3) and `f_rest` (N, (degree + 1)² − 1, 3),
+            coefficients of the spherical harmonics. Density control replaces these tensors.
     """
 
     def __init__(self, parameters: dict[str, Tensor]):
-        """Takes parameters of these names.
+        """Takes all parameters by name.
 
         Raises:
-            ValueError: If names or shapes do not fit one another.
+            ValueError: If a name is missing or unknown, or shapes do not fit one another.
         """
         if set(parameters) != set(NAMES):
             raise ValueError(f"a scene has {', '.join(NAMES)}, not {', '.join(parameters)}")
@@ -46,12 +46,12 @@ class StaticScene:
 
     @property
     def degree(self) -> int:
-        """The degree of the harmonics."""
+        """The degree of the spherical harmonics."""
         return harmonics.degree_of(1 + self.parameters["f_rest"].shape[1])
 
     @property
     def device(self) -> torch.device:
-        """Where its parameters lie."""
+        """The device of the parameters."""
         return self.parameters["means"].device
 
     def to(self, device: torch.device) -> None:
@@ -59,10 +59,11 @@ class StaticScene:
         self.parameters = {name: value.to(device) for name, value in self.parameters.items()}
 
     def raw(self) -> RawGaussians:
-        """The parameters as files hold them, bit by bit.
+        """The parameters as files store them, without loss.
 
-        Scenes have y up, files y down: turned by half about x, they stand upright in other tools,
-        and an SPZ holds the scene's own coordinates.
+        In a scene y points up, in PLY files down. The Gaussians are therefore turned by 180° about
+        x, so that other programs show them upright; SPZ files, which turn once more, hold the
+        scene's own coordinates.
         """
         arrays = {name: value.detach().cpu().numpy() for name, value in self.parameters.items()}
         return RawGaussians(
@@ -75,7 +76,7 @@ class StaticScene:
         ).half_turn()
 
     def gaussians(self, degree: int | None = None) -> Gaussians:
-        """Renderable Gaussians, with harmonics up to this degree or all of them."""
+        """Renderable Gaussians with harmonics up to `degree`, by default all."""
         values = self.parameters
         used = self.degree if degree is None else min(degree, self.degree)
         rest = values["f_rest"][:, : (used + 1) ** 2 - 1]  # (N, K − 1, 3)
@@ -91,14 +92,14 @@ class StaticScene:
 def scene_on_points(
     points: np.ndarray, colors: np.ndarray, degree: int, opacity: float, scale: float
 ) -> StaticScene:
-    """Round Gaussians on points.
+    """A scene of round Gaussians at the given points.
 
     Args:
         points: (N, 3) metres.
         colors: (N, 3) in [0, 1].
-        degree: Of the harmonics; those above 0 begin at 0.
-        opacity: Opacity that all Gaussians begin with.
-        scale: Size relative to the distance of neighbours.
+        degree: Degree of the spherical harmonics; coefficients above degree 0 start at 0.
+        opacity: Initial opacity of all Gaussians, 0 to 1.
+        scale: Size of a Gaussian as a factor of its distance to its neighbours.
     """
     count = len(points)
     sizes = torch.from_numpy(np.log(spacing(points) * scale)).float()

@@ -1,4 +1,4 @@
-"""A trained scene: what a model folder holds."""
+"""A trained static scene, as a model folder stores it."""
 
 import json
 from dataclasses import dataclass
@@ -13,19 +13,19 @@ from ico3d.scene.views import Frames, Only, Space
 from ico3d.training.checkpoint import load_tensors, save_tensors
 
 ABOUT = "scene.json"
-"""The file by which a folder is known to hold a scene."""
+"""Name of the file that marks a folder as one of a scene."""
 
 
 @dataclass
 class TrainedScene:
-    """A static scene and what it shows.
+    """A static scene, and what was trained.
 
     Attributes:
         scene: The Gaussians.
-        only: What of the pictures it was trained on.
-        frames: The frames that it was trained on.
-        space: Where it lies: the capture's world, or canonical head space.
-        summary: How it was made: provenance of the capture, seconds of training, settings.
+        only: The trained part of the pictures: all, the person, or the background.
+        frames: The frames of the training: all, or the number of one.
+        space: The space of the Gaussians: the capture's world, or canonical head space.
+        summary: How the scene was made: provenance of the capture, seconds of training, settings.
     """
 
     scene: StaticScene
@@ -35,7 +35,7 @@ class TrainedScene:
     summary: dict
 
     def to(self, device: torch.device) -> "TrainedScene":
-        """Moves the scene, and gives itself back."""
+        """Moves the scene to a device and returns the same object."""
         self.scene.to(device)
         return self
 
@@ -52,10 +52,10 @@ class TrainedScene:
 
     @classmethod
     def load(cls, folder: Path | str) -> "TrainedScene":
-        """Reads what `save` wrote, onto the CPU.
+        """Reads a folder that `save` wrote, onto the CPU.
 
         Raises:
-            ModelError: If the folder holds no scene, or a damaged one.
+            ModelError: If the folder holds no scene, or a file is damaged.
         """
         folder = Path(folder)
         try:

@@ -27,13 +27,13 @@ from ico3d.training.optimiser import Optimiser
 
 CLONE_BELOW = 0.01
 PRUNE_ABOVE = 0.1
-"""Sizes relative to the scene's extent, as in 3DGS."""
+"""`CLONE_BELOW` and `PRUNE_ABOVE`: sizes relative to the scene's extent, as in 3DGS."""
 
 
 class SceneTrainer:
-    """A `Trainee`: the scene, its optimiser, density control and the pictures.
+    """The `Trainee` of a scene: Gaussians, optimiser, density control and pictures.
 
-    Every random choice of a step follows from the seed and the step's number.
+    All random choices of a step depend on the seed and the step's number alone.
     """
 
     def __init__(
@@ -44,7 +44,15 @@ class SceneTrainer:
         settings: SceneSettings,
         seed: int,
     ):
-        """Gets ready for the first step."""
+        """Prepares the first step.
+
+        Args:
+            start: The initial Gaussians and the scene's extent.
+            views: The pictures to learn from.
+            strategy: Name of the density control.
+            settings: How to train.
+            seed: Seed of all random numbers.
+        """
         self.scene = start.scene
         self._views, self._settings, self._seed = views, settings, seed
         self._extent = start.extent
@@ -60,7 +68,7 @@ class SceneTrainer:
         return Population(self.scene.parameters, self._optimiser.moments)
 
     def step(self, index: int) -> Mapping[str, float]:
-        """Renders one picture and learns from the difference."""
+        """Renders one picture and updates the parameters; returns the loss and other numbers."""
         view = self._view(index)
         example = self._example(view, index)
         degree = index // self._settings.sh_every
@@ -83,22 +91,22 @@ class SceneTrainer:
         }
 
     def tensors(self) -> dict[str, Tensor]:
-        """Parameters, moments, and what density control has gathered."""
+        """Parameters, moments, and the statistics of density control."""
         named = {f"scene.{name}": value for name, value in self.scene.parameters.items()}
         named |= {f"moments.{name}": value for name, value in self._optimiser.moments.items()}
         return named | {f"density.{name}": t for name, t in self._strategy.tensors().items()}
 
     def place(self, name: str) -> torch.device:
-        """Every tensor of a checkpoint belongs on the scene's device."""
+        """The device of the tensor `name`: always that of the scene."""
         del name
         return self.scene.device
 
     def state(self) -> dict:
-        """Nothing beside the tensors: randomness follows from the step's number."""
+        """An empty dictionary: `tensors` holds everything that steps change."""
         return {}
 
     def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
-        """Takes back what `tensors` gave."""
+        """Restores what `tensors` returned."""
         del state
         parts: dict[str, dict[str, Tensor]] = {"scene": {}, "moments": {}, "density": {}}
         for name, tensor in tensors.items():
@@ -143,7 +151,7 @@ class SceneTrainer:
 def density_control(
     name: StrategyName, settings: SceneSettings, seed: int, extent: float
 ) -> Strategy:
-    """The strategy of that name, with thresholds for a scene of this extent in metres."""
+    """The named strategy, with thresholds for a scene of `extent` metres."""
     density, mcmc = settings.density, settings.mcmc
     schedule = Schedule(density.begin, density.until, density.every)
     if name == "mcmc":

@@ -1,4 +1,4 @@
-"""Settings of static scenes: those of 3DGS, and those sized for two CPU cores."""
+"""Settings of static scenes: those of 3DGS, and presets for two CPU cores."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -10,7 +10,7 @@ StrategyName = Literal["default", "mcmc"]
 """How Gaussians multiply: as in 3DGS, or as a Markov chain (Kheradmand et al. 2024)."""
 
 REST_FACTOR = 1 / 20
-"""Harmonics above degree 0 learn slower by this, as in 3DGS."""
+"""Learning rate of harmonics above degree 0, as a factor of that of degree 0 (as in 3DGS)."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Rates:
     Attributes:
         position: Learning rate of the Gaussians' centres, relative to the scene's extent.
         position_decay: Factor to which the rate of the centres has decayed at the last step.
-        color: Learning rate of the constant spherical harmonic; the others learn at a twentieth of
-            it.
+        color: Learning rate of the constant spherical harmonic; that of the higher degrees is a
+            twentieth of this.
         opacity: Learning rate of the opacities' logits.
         scale: Learning rate of the logarithms of the Gaussians' sizes.
         rotation: Learning rate of the Gaussians' rotations (quaternions).
@@ -65,7 +65,7 @@ class Initial:
     """The Gaussians that training begins with.
 
     Attributes:
-        gaussians: How many.
+        gaussians: Number of Gaussians.
         opacity: Opacity of each, 0 to 1.
         scale: Size of each, as a factor of its distance to its neighbours.
     """
@@ -86,12 +86,12 @@ class Density:
         every: Steps between two rounds of multiplying and dying.
         gradient: Strategy default: mean screen-space gradient (normalised device units) above which
             a Gaussian multiplies: a small one is cloned, a large one split.
-        absgrad: Strategy default: sum screen-space gradients over a picture's pixels without their
-            signs; four times the threshold is usual then.
+        absgrad: Strategy default: sum absolute values of screen-space gradients over a picture's
+            pixels; usual together with four times the threshold.
         reset_every: Strategy default: steps from one reset of all opacities to the next; 0 for no
             resets.
-        min_opacity: Gaussians whose opacity, 0 to 1, is below this die (strategy default) or move
-            to where a living one is (strategy mcmc).
+        min_opacity: Gaussians whose opacity, 0 to 1, is below this are removed (strategy default)
+            or moved to the place of an opaque one (strategy mcmc).
     """
 
     max_gaussians: int = 1_000_000
@@ -109,11 +109,11 @@ class Mcmc:
     """The strategy mcmc (Kheradmand et al. 2024); without effect on the strategy default.
 
     Attributes:
-        noise: Strength λ_noise of the noise on the centres, as a factor of their learning rate and
-            of their Gaussian's covariance.
-        opacity: Weight λ_o of the mean opacity in the loss: what is not needed fades.
-        scale: Weight λ_Σ of the mean size, relative to the scene's extent, in the loss: what is not
-            needed shrinks.
+        noise: Strength λ_noise of the noise on the centres, which is also scaled by their learning
+            rate and their Gaussian's covariance.
+        opacity: Weight λ_o of the mean opacity in the loss, which makes superfluous Gaussians fade.
+        scale: Weight λ_Σ of the mean size, relative to the scene's extent, in the loss, which makes
+            superfluous Gaussians shrink.
     """
 
     noise: float = 5e5
@@ -127,16 +127,16 @@ class SceneSettings:
 
     Attributes:
         steps: Optimisation steps, one picture each.
-        sh_degree: Degree of the spherical harmonics, 0 to 3: how colours depend on where one looks
-            from.
-        sh_every: Steps after which the next degree begins to learn.
+        sh_degree: Degree of the spherical harmonics, 0 to 3, by which colours depend on the
+            direction of view.
+        sh_every: Steps between two increases of the degree that is trained, which starts at 0.
         checkpoint_every: Steps from one checkpoint to the next.
         cache_gib: Memory for recorded pictures, GiB; what does not fit is read again at each use.
         loss: Weights of the terms of the loss.
         rates: Learning rates, and the factors to which they decay.
         initial: The Gaussians that training begins with.
         density: When Gaussians multiply and die (3DGS, Kerbl et al. 2023, section 5).
-        mcmc: For --strategy mcmc alone (Kheradmand et al. 2024).
+        mcmc: Settings of the strategy mcmc alone (Kheradmand et al. 2024).
     """
 
     steps: int = 30_000
@@ -177,7 +177,7 @@ _MCMC: dict[PresetName, tuple[int, float]] = {"paper": (25_000, 0.1), "cpu": (2_
 
 
 def settings_for(preset: PresetName, strategy: StrategyName) -> SceneSettings:
-    """The settings of a preset for a strategy: mcmc begins otherwise, and adapts for longer."""
+    """The settings of a preset; mcmc changes initial opacity and scale and adapts for longer."""
     settings = PRESETS[preset]
     if strategy == "default":
         return settings

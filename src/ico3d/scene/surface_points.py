@@ -1,4 +1,4 @@
-"""Where the Gaussians of a scene begin: on known surfaces, else where its pictures say."""
+"""Initial positions of a scene's Gaussians: known surfaces, else estimates from the pictures."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,23 +17,23 @@ from ico3d.scene.views import SceneViews
 from ico3d.splat.initial import in_pictures, resampled
 
 SAMPLED_VIEWS = 24
-"""Views that are looked at: more tell nothing new."""
+"""Number of views that are examined; further ones add no information."""
 HULL_VOXELS = 50
-"""Voxels of the visual hull, across half of what the pictures hold."""
+"""Voxels of the visual hull along half the width of the space that the pictures show."""
 DEPTHS = 0.5, 6.0
-"""How far away a background may be, in distances of the cameras from what they look at."""
+"""Nearest and farthest background, as factors of the cameras' distance from their subject."""
 CAMERA_MARGIN = 1.1
-"""3DGS's factor from the spread of the cameras to the extent of the scene."""
+"""Factor of 3DGS between the spread of the cameras and the extent of the scene."""
 
 
 @dataclass(frozen=True)
 class Start:
-    """What the training of a scene begins with.
+    """The initial state of a scene's training.
 
     Attributes:
-        scene: The Gaussians.
-        extent: Size of the scene in metres, which rates and thresholds refer to: half the edge of
-            a person's box, else the spread of the cameras.
+        scene: The initial Gaussians.
+        extent: Size of the scene in metres, to which rates and thresholds are relative: half the
+            edge of a person's bounding box, else the spread of the cameras.
     """
 
     scene: StaticScene
@@ -45,10 +45,11 @@ def initial_scene(
 ) -> Start:
     """Gaussians on the person's surface, throughout the background, or both.
 
-    The person's surface is the capture's; without one, the volume that all masks agree on.
+    The person's surface comes from the capture's surface points or, without any, from the volume
+    that all masks agree on.
 
     Raises:
-        CaptureError: If there is nothing to start from.
+        CaptureError: If the capture has neither surface points nor other means to place Gaussians.
     """
     some = [views.train[place] for place in spread(len(views.train), SAMPLED_VIEWS)]
     initial = settings.initial

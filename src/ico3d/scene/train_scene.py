@@ -1,4 +1,4 @@
-"""From a capture to a model folder: sets up, trains, saves."""
+"""Trains a static scene on a capture and writes the model folder."""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -19,14 +19,14 @@ from ico3d.training.run import RunFolder
 
 @dataclass(frozen=True)
 class SceneJob:
-    """What to train.
+    """A scene training: the options of `ico3d train static`.
 
     Attributes:
-        only: The whole picture, the person cut out, or everything else.
+        only: The part of the pictures to train: all, the person, or the background.
         frames: All frames, or the number of one.
-        strategy: Density control.
-        seed: All randomness follows from it.
-        settings: How to train.
+        strategy: Name of the density control.
+        seed: Seed of all random numbers.
+        settings: How the scene is trained.
     """
 
     only: Only
@@ -39,20 +39,21 @@ class SceneJob:
 def train_scene(
     capture: Capture, folder: Path, job: SceneJob, device: DeviceName = "auto"
 ) -> TrainedScene:
-    """Trains a static scene, or goes on with an interrupted run of the same settings.
+    """Trains a static scene, or continues an interrupted run of the same settings.
 
     Args:
-        capture: Where the pictures come from.
-        folder: Model folder; also holds metrics and checkpoints.
+        capture: The recording.
+        folder: The model folder, which also holds metrics and checkpoints.
         job: Which part of the pictures, which frames, seed and settings.
-        device: Where to compute; a run may go on elsewhere.
+        device: Where to compute; a resumed run may use another device.
 
     Returns:
-        The trained scene, as the folder now holds it.
+        The trained scene, as the folder stores it.
 
     Raises:
-        CaptureError: If the capture lacks something that is needed.
-        SettingsError: If the folder holds a run with other settings, or CUDA does not work.
+        CaptureError: If the capture lacks something that the training needs.
+        SettingsError: If the folder holds a run with other settings, or CUDA is asked for and does
+            not work.
         ModelError: If training diverges.
     """
     run = RunFolder(folder, {"capture": str(capture.path.resolve()), **asdict(job)})

@@ -1,4 +1,4 @@
-"""Which pictures a static scene is trained on and measured with, and what they ask of it."""
+"""The pictures on which a static scene is trained and measured."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,18 +18,20 @@ Frames = int | Literal["all"]
 Space = Literal["world", "head"]
 
 TEST_EVERY = 8
-"""Of the pictures of one moment every 8th, from the first on, is a test picture; fewer all train.
-The usual rule for static scenes (LLFF's)."""
+"""Of a single frame's pictures every 8th, starting with the first, is a test picture.
+
+This is the usual rule for static scenes (LLFF's). With fewer pictures all are training pictures.
+"""
 
 
 @dataclass(frozen=True)
 class Example:
-    """A recorded picture as a scene learns from it.
+    """A recorded picture, prepared for training a scene.
 
     Attributes:
-        target: (H, W, 3) what the rendering should be.
-        behind: What to render over: (3,) a colour, or None for black.
-        weight: (H, W) in [0, 1], how much a pixel counts; None where all do.
+        target: (H, W, 3) picture that the rendering should match.
+        behind: (3,) colour to render over; None for black.
+        weight: (H, W) weight of each pixel in [0, 1]; None where all count fully.
     """
 
     target: Tensor
@@ -37,34 +39,34 @@ class Example:
     weight: Tensor | None
 
     def to(self, device: torch.device) -> "Example":
-        """This example on another device."""
+        """The same example on another device."""
         parts = (self.target, self.behind, self.weight)
         return Example(*(None if part is None else part.to(device) for part in parts))  # type: ignore[arg-type]
 
 
 class SceneViews:
-    """The pictures of a capture that show a static scene.
+    """The pictures of a capture for a static scene.
 
-    A person whose head poses are known is trained in canonical head space, so that the head's own
-    movement does not blur it; everything else in the world. A background comes from clean plates
-    where the capture has them, else from what the masks leave.
+    The scene of a person with known head poses lies in canonical head space, so that movements of
+    the head do not blur it; every other scene lies in the world. A background is taken from clean
+    plates where the capture has them, else from what lies outside the masks.
 
     Attributes:
-        path: Where the capture lies.
+        path: Folder of the capture.
         only: Which part of the pictures counts: the person, the background, or all.
-        space: Where the scene lies.
-        train: Views to learn from.
-        test: Views to measure with: the capture's test frames, or of a single moment every 8th.
+        space: The space of the scene: `world` or `head`.
+        train: Views for training.
+        test: Views for measuring: the capture's test frames, or every 8th view of a single frame.
     """
 
     def __init__(self, capture: Capture, only: Only, frames: Frames, cache_gib: float):
         """Finds the recorded views.
 
         Args:
-            capture: Where pictures come from.
-            only: The whole picture, the person cut out, or everything else.
+            capture: The recording.
+            only: The part of the pictures to train: all, the person, or the background.
             frames: All frames, or the number of one.
-            cache_gib: Memory for pictures.
+            cache_gib: Memory for pictures, GiB.
 
         Raises:
             CaptureError: If there are no pictures, a mask is missing, or there is no such frame.
@@ -91,7 +93,7 @@ class SceneViews:
         """Picture (H, W, 3) and mask (H, W) of a view, on the CPU.
 
         Raises:
-            CaptureError: If there is no such picture.
+            CaptureError: If the view was not recorded.
         """
         found = self._cache.layers(view.camera_index, view.frame)
         if found is None:
@@ -101,7 +103,7 @@ class SceneViews:
         return image, mask
 
     def plate(self, view: View) -> Tensor | None:
-        """(H, W, 3) what the view's camera sees without the person, where that is known."""
+        """(H, W, 3) what the view's camera sees without the person; None if unknown."""
         index = view.camera_index
         if index not in self._known_plates:
             found = self._capture.background(index)
@@ -109,11 +111,11 @@ class SceneViews:
         return self._known_plates[index]
 
     def example(self, view: View, color: np.ndarray) -> Example:
-        """The picture of a view, as the scene learns from it.
+        """The picture of a view, prepared for training or measuring.
 
         Args:
             view: One of `train` or `test`.
-            color: (3,) what a person that is cut out stands before.
+            color: (3,) background behind a person who is cut out.
 
         Raises:
             CaptureError: If the person is wanted and this view has no mask.

@@ -1,8 +1,8 @@
-"""Windows of sound for HuBERT, whose attention would otherwise see the whole recording (numpy).
+"""Cuts sound into windows for HuBERT, whose attention would otherwise span everything (numpy).
 
-What HuBERT says about a moment depends on all the sound that it is given. So that training, whole
-files and streams agree, it is always given the same: windows of 1.2 s, of which the rows between
-0.8 s of past and 0.2 s of future are taken.
+HuBERT's output at one moment depends on all the sound that it is given. Training, whole files and
+streams agree because all of them use windows of 1.2 s, of which only the rows between 0.8 s of past
+and 0.2 s of future are used.
 """
 
 import numpy as np
@@ -10,13 +10,13 @@ import numpy as np
 from ico3d.speech.mel import RATE, resampled, resampling_stream
 
 PAST, ROWS, FUTURE = 20, 5, 5
-"""25-fps rows of a window: context, those that are taken, look-ahead."""
+"""Rows of a window, at 25 per second: past context, rows that are used, future context."""
 
 ROW = RATE // 25
-"""Samples of a row; HuBERT gives two vectors for it."""
+"""Samples per row; HuBERT gives two vectors per row."""
 
 TAIL = 80
-"""Samples that its last convolution sees beyond the last row."""
+"""Samples behind the last row that HuBERT's last convolution reads."""
 
 SIZE = (PAST + ROWS + FUTURE) * ROW + TAIL
 """Samples of a window."""
@@ -26,13 +26,13 @@ _QUIETEST = 1e-3
 
 
 class BlockStream:
-    """Turns pieces of sound into windows as soon as their look-ahead is there.
+    """Turns pieces of sound into windows, each as soon as its future context has arrived.
 
-    Window b stands for rows [5·b, 5·b + 5); row i belongs to time i/25 s.
+    Window b provides rows 5·b to 5·b + 4; row i belongs to time i/25 s.
     """
 
     def __init__(self, rate: int):
-        """Starts one sound; a rate other than 16 kHz needs the package soxr."""
+        """Starts one sound of `rate` samples per second; other than 16 kHz needs package soxr."""
         self._resample = resampling_stream(rate)
         self._sound = np.zeros(0, np.float32)  # from sample `_begin` on
         self._begin = 0
@@ -41,16 +41,16 @@ class BlockStream:
 
     @property
     def num_rows(self) -> int:
-        """Rows of the sound so far, which are those of the whole when it has ended."""
+        """Number of rows of the sound so far; after `finish`, of the whole sound."""
         return self.num_samples // ROW + 1
 
     def push(self, samples: np.ndarray) -> np.ndarray:
-        """Takes the next samples (S,) in [-1, 1]; returns the windows (n, SIZE) now complete."""
+        """Adds samples (S,) in [-1, 1]; returns the windows (n, SIZE) that are now complete."""
         self._take(self._resample(samples, False))
         return self._windows((self.num_samples - TAIL - FUTURE * ROW) // (ROWS * ROW))
 
     def finish(self) -> np.ndarray:
-        """Ends the sound; returns the windows (n, SIZE) that remain, silence after it."""
+        """Ends the sound, pads with silence and returns the remaining windows (n, SIZE)."""
         self._take(self._resample(np.zeros(0, np.float32), True))
         return self._windows(-(-self.num_rows // ROWS))
 
@@ -79,7 +79,12 @@ class BlockStream:
 
 
 def sound_blocks(samples: np.ndarray, rate: int) -> tuple[np.ndarray, int]:
-    """The windows (n, SIZE) of a whole sound, and how many rows it has."""
+    """The windows (n, SIZE) of a whole sound, and the number of rows of the sound.
+
+    Args:
+        samples: (S,) in [-1, 1].
+        rate: Samples per second; rates other than 16 kHz need the package soxr.
+    """
     stream = BlockStream(RATE)
     windows = [stream.push(resampled(samples, rate)), stream.finish()]
     return np.concatenate(windows), stream.num_rows

@@ -1,4 +1,4 @@
-"""The verbs of this room."""
+"""The verbs `ico3d train speech` and `ico3d weights onnx`."""
 
 import json
 from dataclasses import asdict, dataclass, field
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 class TrainSpeech:
     """Trains the built-in speech encoder on espeak-ng voices and measures it on held-out ones.
 
-    The same command goes on with an interrupted training. It needs no recordings.
+    The training data are synthesised, so no recordings are needed. The same command continues an
+    interrupted training.
 
     Attributes:
-        out: Folder for encoder.safetensors, encoder.json (how it was made, how good it is) and
+        out: Folder for encoder.safetensors, encoder.json (settings and measured quality) and
             metrics.jsonl.
-        test_batches: Batches of held-out voices, languages and words that the encoder is measured
-            on.
+        test_batches: Number of batches of held-out voices, languages and words for the measurement.
         settings: How the encoder is trained.
     """
 
@@ -35,7 +35,7 @@ class TrainSpeech:
     )
 
     def run(self) -> None:
-        """Trains, measures, writes."""
+        """Trains, measures, and writes the folder."""
         from rich import print as show
 
         from ico3d.speech.training.train_encoder import EncoderTraining, evaluate, save_encoder
@@ -109,18 +109,18 @@ class TrainSpeech:
 
 @dataclass(frozen=True)
 class ExportEncoder:
-    """Makes a speech encoder usable where avatars are served, which needs no torch.
+    """Exports a speech encoder to ONNX for servers of avatars, which have no torch.
 
-    Baking a head does so, too. A server elsewhere needs a copy of the file.
+    Baking a head exports its encoder, too. A server on another machine needs a copy of the file.
 
     Attributes:
-        name: ave or hubert; its weights must be here (ico3d weights fetch).
+        name: ave or hubert; the weights must be installed (ico3d weights fetch).
     """
 
     name: tyro.conf.Positional[Literal["ave", "hubert"]]
 
     def run(self) -> None:
-        """Writes the ONNX file, says where it is."""
+        """Writes the ONNX file and prints its path."""
         from rich.console import Console
 
         from ico3d.speech.encoder import load_encoder

@@ -1,4 +1,4 @@
-"""Frozen speech encoders: the built-in one and SyncTalk's, by name (torch)."""
+"""Pretrained speech encoders by name, with frozen weights: built-in, SyncTalk's, HuBERT (torch)."""
 
 import hashlib
 import warnings
@@ -31,15 +31,17 @@ _BATCH = {"mel": 256, "sound": 8}  # windows at once
 
 @dataclass(frozen=True)
 class FrozenEncoder:
-    """An encoder whose weights stay as they are.
+    """A speech encoder whose weights are not trained any further.
 
     Attributes:
         name: `builtin`, `ave` or `hubert`.
-        size: D, the number of features per row.
-        sha256: Of the file that holds the weights.
-        network: (b, 1, 80, 16) mel windows to (b, D), or (b, SIZE) windows of sound to (b, 5, D).
-        input: What it looks at: `mel` or `sound` (see `blocks`).
-        vectors: How many vectors, one after the other, the D features of a row are.
+        size: D, number of features per row.
+        sha256: SHA-256 of the file of weights.
+        network: Maps mel windows (b, 1, 80, 16) to (b, D), or windows of sound (b, SIZE) to (b, 5,
+            D).
+        input: What the network reads: `mel` windows, or windows of the `sound` itself (see
+            `blocks`).
+        vectors: Number of vectors that are concatenated to the D features of a row.
     """
 
     name: str
@@ -51,7 +53,7 @@ class FrozenEncoder:
 
     @torch.no_grad()
     def features(self, samples: np.ndarray, rate: int, device: torch.device = CPU) -> np.ndarray:
-        """Features of a whole sound.
+        """Computes the features of a whole sound.
 
         Args:
             samples: (S,) in [-1, 1].
@@ -77,17 +79,17 @@ class FrozenEncoder:
 
 
 def load_encoder(name: str = "builtin") -> FrozenEncoder:
-    """Loads an encoder by its name.
+    """Loads a speech encoder by name.
 
     Args:
-        name: `builtin` (comes with the package), `ave` (SyncTalk's) or `hubert`; the last two are
-            looked for by `ico3d.common.weights`.
+        name: `builtin` (part of ico3d), `ave` (SyncTalk's) or `hubert`; weights of the last two are
+            searched for by `ico3d.common.weights`.
 
     Raises:
-        SettingsError: If there is no such encoder.
-        MissingModelError: If its weights are not there.
+        SettingsError: If no encoder has this name.
+        MissingModelError: If the weights are not installed.
         MissingExtraError: If HuBERT is wanted and transformers is not installed.
-        ModelError: If they are another encoder's.
+        ModelError: If the file holds the weights of another network.
     """
     if name == "builtin":
         return load_builtin(BUILTIN_FILE)
@@ -101,7 +103,7 @@ def load_encoder(name: str = "builtin") -> FrozenEncoder:
 
 
 def load_builtin(path: Path) -> FrozenEncoder:
-    """Loads a built-in encoder that `ico3d train speech` wrote."""
+    """Loads a built-in encoder from a file that `ico3d train speech` wrote."""
     from safetensors.torch import load
 
     data = _read(path)
@@ -110,7 +112,7 @@ def load_builtin(path: Path) -> FrozenEncoder:
 
 
 def load_ave(path: Path) -> FrozenEncoder:
-    """Loads SyncTalk's encoder from its published file; its licence is told as a warning."""
+    """Loads SyncTalk's encoder from its published file; logs its licence as a warning."""
     warnings.warn(TABLE["ave"].notice, stacklevel=2)
     data = _read(path)
     try:
@@ -123,7 +125,10 @@ def load_ave(path: Path) -> FrozenEncoder:
 
 
 def load_hubert(folder: Path) -> FrozenEncoder:
-    """Loads HuBERT from a folder as transformers writes it; a second call is quick."""
+    """Loads HuBERT from a folder in the layout of transformers.
+
+    The last encoder that was loaded is cached, so that a second call is fast.
+    """
     path = weight_file(folder)
     return _hubert(path, path.stat().st_mtime_ns)
 

@@ -1,4 +1,4 @@
-"""Speech networks as ONNX graphs, for servers that have no torch."""
+"""Exports speech networks to ONNX, for servers without torch."""
 
 from pathlib import Path
 
@@ -36,15 +36,16 @@ _ROWS = "rows"
 
 
 def export_speech(adaptor: SpeechAdaptor, encoder: FrozenEncoder) -> bytes:
-    """The bundle's `speech.onnx` (docs/bundle.md).
+    """The contents of a bundle's `speech.onnx` (docs/bundle.md).
 
     Args:
-        adaptor: The subject's adaptor.
-        encoder: What its features come from. The built-in one goes into the graph; any other is
-            the user's, so the graph takes its features.
+        adaptor: The adaptor of this person's head.
+        encoder: The encoder whose features the adaptor takes. The built-in encoder becomes part of
+            the graph. Other encoders stay files of their own, which users install; the graph then
+            takes their features as its input.
 
     Returns:
-        A model from `mel` (T, 80, 16) or `features` (T, D) to `expression` (T, 32).
+        An ONNX model from `mel` (T, 80, 16) or `features` (T, D) to `expression` (T, 32).
     """
     graph = _Graph()
     if encoder.name == "builtin":
@@ -55,7 +56,7 @@ def export_speech(adaptor: SpeechAdaptor, encoder: FrozenEncoder) -> bytes:
 
 
 def export_encoder(encoder: FrozenEncoder) -> bytes:
-    """An encoder alone: from `mel` (T, 80, 16) or `sound` (1, SIZE) to `features` (T, D)."""
+    """An ONNX model of an encoder: `mel` (T, 80, 16) or `sound` (1, SIZE) to `features` (T, D)."""
     if isinstance(encoder.network, Hubert):
         return export_hubert(encoder.network)
     graph = _Graph()
@@ -64,10 +65,10 @@ def export_encoder(encoder: FrozenEncoder) -> bytes:
 
 
 def make_servable(encoder: FrozenEncoder) -> Path:
-    """Writes an encoder where servers of this machine find it (`served_encoder`), unless it is.
+    """Exports an encoder to where `served_encoder` finds the file, unless it exists.
 
     Returns:
-        The file; other machines need a copy of it in their folder of weights.
+        Path of the file; servers on other machines need a copy in their folder of weights.
     """
     name = served_name(encoder.name, encoder.sha256)
     found = find_model(name)

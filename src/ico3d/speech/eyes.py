@@ -1,7 +1,7 @@
-"""How an avatar blinks and moves its brows: random, but as people do (numpy).
+"""Random but natural blinks and brow movements of an avatar (numpy).
 
-The figures of a blink are the one source for the whole house: the page, which blinks at rest and
-in speech, gets them as generated TypeScript (`ico3d.chat.generating.shared`).
+The timing of blinks is defined here for both the server and the page: the page, which blinks at
+rest and in speech, gets the numbers as generated TypeScript (`ico3d.chat.generating.shared`).
 """
 
 import numpy as np
@@ -9,23 +9,23 @@ import numpy as np
 from ico3d.common.expression import EYE_NAMES, LIDS
 
 PAUSE_MEDIAN, PAUSE_SPREAD = 3.4, 0.35
-"""Seconds from one blink to the next, and the deviation of their logarithm: 17 blinks a minute.
+"""Median of the seconds between blinks, and the standard deviation of their logarithm.
 
-That is the mean rate of people at rest, whose rates are log-normal (Bentivoglio et al. 1997,
-Movement Disorders 12:1028).
+The median gives 17 blinks a minute, the mean rate of people at rest, whose rates are log-normally
+distributed (Bentivoglio et al. 1997, Movement Disorders 12:1028).
 """
 SHORTEST_PAUSE, LONGEST_PAUSE = 2.0, 6.0
-"""Seconds at which pauses are cut off: nobody stares or flutters."""
+"""Limits of the seconds between blinks, which prevent staring and fluttering."""
 CLOSING = 0.07
-"""Seconds in which lids close: 66 ms in spontaneous blinks.
+"""Seconds in which lids close; in spontaneous blinks 66 ms.
 
-Voluntary ones last 77.6 ms, 17.6% longer ("Kinematic comparison of spontaneously generated blinks
-and voluntary blinks in normal adult subjects").
+Voluntary blinks close in 77.6 ms, 17.6% more ("Kinematic comparison of spontaneously generated
+blinks and voluntary blinks in normal adult subjects").
 """
 CLOSED = 0.03
-"""Seconds for which lids stay closed; about 10 ms in people.
+"""Seconds for which lids stay closed; in people about 10 ms.
 
-At 25 rows a second a shorter time would let some blinks fall between two rows.
+With a shorter time, at 25 rows per second, some blinks would fall between two rows.
 """
 OPENING = 0.1
 """Seconds in which lids open.
@@ -42,19 +42,19 @@ _FROWNS = [EYE_NAMES.index(f"browDown{side}") for side in ("Left", "Right")]
 
 
 class EyeBehaviour:
-    """Blinks at natural, random intervals and slow small brow motion.
+    """Blinks at random intervals, and slow small movements of the brows.
 
-    The same seed gives the same behaviour; it is a function of time, whatever the frame rate.
+    The values are a function of seed and time, independent of the frame rate.
     """
 
     def __init__(self, seed: int):
-        """Draws the brows' phases; blinks are drawn as far as times are asked for."""
+        """Seeds the random numbers; blinks are drawn later, as far as times are asked for."""
         self._random = np.random.default_rng(seed)
         self._phases = self._random.uniform(0, 2 * np.pi, (2, len(_BROW_PERIODS)))
         self._blinks = np.zeros(0)  # (n,) s, when lids begin to close
 
     def values(self, times: np.ndarray) -> np.ndarray:
-        """The seven values of `EYE_NAMES` at any times.
+        """The seven values of `EYE_NAMES` at the given times, in any order.
 
         Args:
             times: (T,) seconds, ≥ 0.
@@ -71,7 +71,7 @@ class EyeBehaviour:
         return values
 
     def blink_times(self, end: float) -> np.ndarray:
-        """(n,) seconds at which lids begin to close, until at least `end`."""
+        """(n,) seconds at which lids begin to close, at least up to time `end`."""
         while len(self._blinks) == 0 or self._blinks[-1] <= end:
             pauses = PAUSE_MEDIAN * np.exp(PAUSE_SPREAD * self._random.standard_normal(_BLOCK))
             pauses = np.clip(pauses, SHORTEST_PAUSE, LONGEST_PAUSE)

@@ -12,18 +12,18 @@ from ico3d.errors import MissingExtraError, ModelError
 from ico3d.speech.blocks import PAST, ROWS, SIZE
 
 VECTORS = 2
-"""HuBERT's 50 vectors per second make two per row, one after the other, as in SyncTalk."""
+"""HuBERT gives 50 vectors per second; two are concatenated to a row, as in SyncTalk."""
 
 WEIGHTS = ("model.safetensors", "pytorch_model.bin")
-"""What holds them in a folder of transformers, the better one first."""
+"""Files of weights in a folder of transformers, the preferred one first."""
 
 
 class Hubert(nn.Module):
-    """Windows of sound (b, SIZE) to the features (b, 5, 2·H) of their inner rows.
+    """Maps windows of sound (b, SIZE) to the features (b, 5, 2·H) of their inner rows.
 
     Attributes:
-        size: 2·H, H being the model's hidden size.
-        model: HuBERT.
+        size: 2·H, where H is HuBERT's hidden size.
+        model: The `transformers.HubertModel`.
     """
 
     def __init__(self, model: nn.Module):
@@ -33,17 +33,17 @@ class Hubert(nn.Module):
         self.model = model
 
     def forward(self, sound: torch.Tensor) -> torch.Tensor:
-        """(b, SIZE) to (b, 5, 2·H)."""
+        """Windows (b, SIZE) to features (b, 5, 2·H)."""
         vectors = self.model(sound).last_hidden_state  # (b, 60, H)
         return vectors.unflatten(1, (-1, VECTORS)).flatten(2)[:, PAST : PAST + ROWS]
 
 
 def load_network(folder: Path) -> Hubert:
-    """Loads a folder as transformers writes it: `config.json` and weights.
+    """Loads HuBERT from a folder of transformers: `config.json` and weights.
 
     Raises:
         MissingExtraError: If transformers is not installed.
-        ModelError: If the folder does not hold HuBERT.
+        ModelError: If the folder holds no HuBERT model.
     """
     try:
         from transformers import HubertModel
@@ -66,10 +66,10 @@ def load_network(folder: Path) -> Hubert:
 
 
 def weight_file(folder: Path) -> Path:
-    """The file that holds the weights.
+    """Path of the file of weights in a folder of transformers.
 
     Raises:
-        ModelError: If the folder has none.
+        ModelError: If the folder has no such file.
     """
     found = next((folder / name for name in WEIGHTS if (folder / name).is_file()), None)
     if found is None:
@@ -78,7 +78,7 @@ def weight_file(folder: Path) -> Path:
 
 
 def export_hubert(network: Hubert) -> bytes:
-    """An ONNX model from `sound` (1, SIZE) to `features` (5, 2·H)."""
+    """An ONNX model of HuBERT, from `sound` (1, SIZE) to `features` (5, 2·H)."""
     file = io.BytesIO()
     with warnings.catch_warnings():
         # The newer exporter needs a further package and takes 15 times as long for the same graph.

@@ -26,13 +26,13 @@ _REFERENCE, _MIN_DB, _LIMIT = 20.0, 100.0, 4.0
 
 
 def mel_spectrogram(samples: np.ndarray) -> np.ndarray:
-    """Normalised log-mel rows of a whole sound.
+    """Normalised log-mel spectrum of a whole sound.
 
     Args:
         samples: (S,) in [-1, 1] at 16 kHz, S > 400.
 
     Returns:
-        (1 + S // 200, 80) float32 in [-4, 4]; row m is centred on sample 200·m, the sound being
+        (1 + S // 200, 80) float32 in [-4, 4]; row m is centred on sample 200·m. The sound is
         mirrored at both ends.
     """
     padded = np.pad(pre_emphasis(samples), FFT // 2, mode="reflect")  # (S + 800,)
@@ -40,16 +40,16 @@ def mel_spectrogram(samples: np.ndarray) -> np.ndarray:
 
 
 def pre_emphasis(samples: np.ndarray, previous: float = 0.0) -> np.ndarray:
-    """y_n = x_n − 0.97·x_{n−1}, with `previous` before the first sample."""
+    """y_n = x_n − 0.97·x_{n−1}, where `previous` precedes the first sample."""
     samples = np.asarray(samples, np.float64)
     return samples - _PRE_EMPHASIS * np.concatenate([[previous], samples[:-1]])
 
 
 def mel_rows(emphasised: np.ndarray) -> np.ndarray:
-    """Mel rows of all complete spectra in a stretch of pre-emphasised sound.
+    """Mel rows of all complete spectra in a piece of pre-emphasised sound.
 
     Args:
-        emphasised: (S,) samples; row m covers samples 200·m … 200·m + 800.
+        emphasised: (S,) samples; row m covers samples 200·m to 200·m + 799.
 
     Returns:
         (1 + (S − 800) // 200, 80) float32.
@@ -62,7 +62,7 @@ def mel_rows(emphasised: np.ndarray) -> np.ndarray:
 
 
 def window_count(num_rows: int) -> int:
-    """How many encoder windows a sound of `num_rows` mel rows has (without the repeated ones)."""
+    """Number of encoder windows in `num_rows` mel rows, without the repeated ones at the ends."""
     return (num_rows - WINDOW) * 5 // 16 + 2  # 5/16 windows per mel row: 25 fps / 80 rows per s
 
 
@@ -74,12 +74,12 @@ def window_start(index: _Index) -> _Index:
 def mel_windows(samples: np.ndarray, rate: int) -> np.ndarray:
     """Encoder inputs of a whole sound, one per 25-fps frame.
 
-    Row i belongs to time i/25 s and sees 0.2 s of mel rows centred on the frame that begins then:
-    window i − 2. Rows before the first and after the last window repeat them (twice each).
+    Row i belongs to time i/25 s and covers 0.2 s of mel rows around that time, which is window i −
+    2. The first and the last window are repeated twice each.
 
     Args:
         samples: (S,) in [-1, 1]; a sound shorter than one window is followed by silence.
-        rate: Samples per second; other than 16 kHz needs the package soxr.
+        rate: Samples per second; rates other than 16 kHz need the package soxr.
 
     Returns:
         (T, 80, 16) float32, T ≥ ⌊25·seconds⌋ + 1.
@@ -95,10 +95,10 @@ def mel_windows(samples: np.ndarray, rate: int) -> np.ndarray:
 
 
 def resampled(samples: np.ndarray, rate: int) -> np.ndarray:
-    """The sound at 16 kHz, float32.
+    """Resamples a sound (S,) from `rate` samples per second to 16 kHz, float32.
 
     Raises:
-        MissingExtraError: If the rate is another one and soxr is not installed.
+        MissingExtraError: If `rate` is not 16 kHz and soxr is not installed.
     """
     samples = np.asarray(samples, np.float32)
     if rate == RATE:
@@ -107,14 +107,14 @@ def resampled(samples: np.ndarray, rate: int) -> np.ndarray:
 
 
 def resampling_stream(rate: int) -> Callable[[np.ndarray, bool], np.ndarray]:
-    """Brings pieces of one sound to 16 kHz.
+    """A function that resamples consecutive pieces of one sound to 16 kHz.
 
     Returns:
-        A function of the next samples (S,) and of whether they are the last; what it returns may
-        lag behind until then.
+        A function that takes the next samples (S,) and whether they are the last ones; until the
+        last call its output may lag behind.
 
     Raises:
-        MissingExtraError: If the rate is another one and soxr is not installed.
+        MissingExtraError: If `rate` is not 16 kHz and soxr is not installed.
     """
     if rate == RATE:
         return lambda samples, last: np.asarray(samples, np.float32)
@@ -123,7 +123,7 @@ def resampling_stream(rate: int) -> Callable[[np.ndarray, bool], np.ndarray]:
 
 
 def soxr() -> ModuleType:
-    """The resampling package."""
+    """Imports the resampling package soxr."""
     try:
         import soxr
     except ImportError:

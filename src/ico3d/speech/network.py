@@ -17,10 +17,10 @@ _SLOPE = 0.02  # of the leaky ReLUs
 
 
 class ConvBlock(nn.Module):
-    """Convolution, batch normalisation, the input added if residual, ReLU.
+    """Convolution, batch normalisation, addition of the input if residual, then ReLU.
 
     Attributes:
-        conv_block: The convolution and, unless it is folded into it, the normalisation.
+        conv_block: The convolution, followed by the batch normalisation unless both were merged.
         residual: Whether the input is added.
     """
 
@@ -35,7 +35,7 @@ class ConvBlock(nn.Module):
         residual: bool = False,
         normalise: bool = True,
     ):
-        """Takes the arguments of `nn.Conv2d`, then whether it is residual and normalised."""
+        """Takes arguments of `nn.Conv2d`, then whether the block is residual and normalised."""
         super().__init__()
         conv = nn.Conv2d(inputs, outputs, kernel, stride, padding, dilation)
         layers = [conv, nn.BatchNorm2d(outputs)] if normalise else [conv]
@@ -43,12 +43,12 @@ class ConvBlock(nn.Module):
         self.residual = residual
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
-        """(b, inputs, h, w) to (b, outputs, h', w')."""
+        """Maps (b, inputs, h, w) to (b, outputs, h', w')."""
         y = self.conv_block(x)
         return torch.relu(y + x if self.residual else y)
 
     def folded(self) -> tuple[torch.Tensor, torch.Tensor]:
-        """Weight and bias of the one convolution that does what the block does before its ReLU."""
+        """Weight and bias of one convolution that equals the block without its final ReLU."""
         conv = self.conv_block[0]
         assert isinstance(conv, nn.Conv2d) and conv.bias is not None
         if len(self.conv_block) == 1:
@@ -62,12 +62,12 @@ class ConvBlock(nn.Module):
 
 
 class AudioEncoder(nn.Sequential):
-    """SyncTalk's audio-visual encoder (AVE): (b, 1, 80, 16) mel windows to (b, 512), ≥ 0."""
+    """SyncTalk's audio-visual encoder (AVE): mel windows (b, 1, 80, 16) to (b, 512), at least 0."""
 
     size = AVE_SIZE
 
     def __init__(self):
-        """Builds the layers with random weights; keys are those of the published file."""
+        """Builds the layers with random weights; parameters are named as in the published file."""
         super().__init__(
             ConvBlock(1, 32, 3, 1, 1),
             ConvBlock(32, 32, 3, 1, 1, residual=True),
@@ -85,25 +85,25 @@ class AudioEncoder(nn.Sequential):
         )
 
     def forward(self, input: torch.Tensor) -> torch.Tensor:
-        """(b, 1, 80, 16) to (b, 512)."""
+        """Maps mel windows (b, 1, 80, 16) to features (b, 512)."""
         return super().forward(input).flatten(1)  # (b, 512)
 
 
 class BuiltinEncoder(nn.Module):
-    """The encoder that comes with the package: (b, 1, 80, 16) mel windows to (b, 64).
+    """The encoder that is part of ico3d: mel windows (b, 1, 80, 16) to features (b, 64).
 
-    No layer pads or strides in time, so that it also runs over a whole sound at once:
-    (b, 1, 80, T) to (b, 64, T − 15), each column what its window gives.
+    No layer pads or strides in time, so the encoder can also process a whole sound at once: `dense`
+    maps (b, 1, 80, T) to (b, 64, T − 15), where each column equals the features of its window.
 
     Attributes:
-        blocks: Convolutions, 80 × 16 to 1 × 1.
-        project: To the features, which have mean 0 and deviation 1 on the training sounds.
+        blocks: Convolutions that reduce 80 × 16 to 1 × 1.
+        project: Linear layer to the features, which have mean 0 and deviation 1 on training sounds.
     """
 
     size = BUILTIN_SIZE
 
     def __init__(self, normalise: bool = False):
-        """Builds it with random weights; only training needs batch normalisation."""
+        """Builds the layers with random weights; batch normalisation is for training only."""
         super().__init__()
         self.blocks = nn.Sequential(
             ConvBlock(1, 32, (5, 3), (2, 1), (2, 0), normalise=normalise),  # 40 × 14
@@ -116,19 +116,19 @@ class BuiltinEncoder(nn.Module):
         self.project = nn.Conv2d(128, BUILTIN_SIZE, 1)
 
     def dense(self, mel: torch.Tensor) -> torch.Tensor:
-        """(b, 1, 80, T) mel rows to (b, 64, T − 15): one column per first row of a window."""
+        """Mel rows (b, 1, 80, T) to features (b, 64, T − 15), one column per window."""
         return self.project(self.blocks(mel)).squeeze(2)  # (b, 64, T − 15)
 
     def forward(self, mel: torch.Tensor) -> torch.Tensor:
-        """(b, 1, 80, 16) to (b, 64)."""
+        """Maps mel windows (b, 1, 80, 16) to features (b, 64)."""
         return self.dense(mel).squeeze(2)  # (b, 64)
 
 
 class Adaptor(nn.Sequential):
-    """Per-subject network from encoder features (…, D) to (…, 32), trained with the head."""
+    """Network from encoder features (…, D) to (…, 32), trained with each person's head."""
 
     def __init__(self, size: int):
-        """Takes the encoder's feature size D."""
+        """Takes D, the encoder's number of features per row."""
         super().__init__(
             nn.Linear(size, 256),
             nn.LeakyReLU(_SLOPE),
@@ -139,14 +139,14 @@ class Adaptor(nn.Sequential):
 
 
 class SequenceAdaptor(nn.Sequential):
-    """The per-subject network for encoders with several vectors per row (HuBERT: 2), as SyncTalk's.
+    """Like `Adaptor`, for encoders with several vectors per row (HuBERT: 2), as in SyncTalk.
 
     Attributes:
-        vectors: How many.
+        vectors: Number of vectors per row.
     """
 
     def __init__(self, size: int, vectors: int):
-        """Takes the encoder's feature size D, all vectors of a row together, and their number."""
+        """Takes D, the features per row, and the number of vectors that D is made of."""
         super().__init__(
             nn.Conv1d(size // vectors, 32, 3, stride=2, padding=1),
             nn.LeakyReLU(_SLOPE),
@@ -164,21 +164,21 @@ class SequenceAdaptor(nn.Sequential):
         self.vectors = vectors
 
     def forward(self, input: torch.Tensor) -> torch.Tensor:
-        """Rows (…, D), one vector after the other, to (…, 32)."""
+        """Rows (…, D), in which the vectors are concatenated, to (…, 32)."""
         rows = input.reshape(-1, self.vectors, input.shape[-1] // self.vectors)  # (n, v, D / v)
         return super().forward(rows.transpose(1, 2)).unflatten(0, input.shape[:-1])
 
 
 class AudioAttNet(nn.Module):
-    """Smooths over time: a learnt weighted mean of the eight rows around each.
+    """Smooths features over time: a learnt weighted mean of eight neighbouring rows.
 
     Attributes:
-        convolutions: 32 → 16 → 8 → 4 → 2 → 1 channels over the window's rows.
-        scores: One score per row; their softmax are the weights.
+        convolutions: 32 → 16 → 8 → 4 → 2 → 1 channels, along the rows.
+        scores: One score per row; the softmax of the scores gives the weights.
     """
 
     def __init__(self):
-        """Builds it with random weights."""
+        """Builds the layers with random weights."""
         super().__init__()
         channels = (SPEECH_SIZE, 16, 8, 4, 2, 1)
         layers: list[nn.Module] = []
@@ -188,51 +188,52 @@ class AudioAttNet(nn.Module):
         self.scores = nn.Linear(ATTENTION_WINDOW, ATTENTION_WINDOW)
 
     def forward(self, windows: torch.Tensor) -> torch.Tensor:
-        """(b, 8, 32) to (b, 32)."""
+        """Maps windows of rows (b, 8, 32) to rows (b, 32)."""
         scores = self.convolutions(windows.transpose(1, 2)).squeeze(1)  # (b, 8)
         weights = torch.softmax(self.scores(scores), dim=1)  # (b, 8)
         return (weights[:, :, None] * windows).sum(1)  # (b, 32)
 
 
 class SpeechAdaptor(nn.Module):
-    """What is learnt per subject: adaptor and attention; D features to 32 expression values.
+    """The speech part of a person's head: D encoder features to 32 expression values.
 
-    Train it jointly with the head; row i of features and expressions is at i/25 s.
+    The network is an adaptor followed by an attention and is trained together with the head. Row i
+    of features and expressions belongs to time i/25 s.
 
     Attributes:
-        size: D.
-        vectors: Vectors of a row, of D / vectors values each.
+        size: D, features per row.
+        vectors: Number of vectors per row, with D / vectors values each.
         adaptor: Applied to each row.
         attention: Applied to rows [i − 4, i + 4) of the adapted features.
     """
 
     def __init__(self, size: int, vectors: int = 1):
-        """Takes the encoder's feature size D, and how many vectors a row has."""
+        """Takes D, the features per row, and the number of vectors that D is made of."""
         super().__init__()
         self.size, self.vectors = size, vectors
         self.adaptor = Adaptor(size) if vectors == 1 else SequenceAdaptor(size, vectors)
         self.attention = AudioAttNet()
 
     def forward(self, windows: torch.Tensor) -> torch.Tensor:
-        """Feature windows (b, 8, D), rows [i − 4, i + 4), to expressions (b, 32)."""
+        """Windows (b, 8, D) of feature rows i − 4 to i + 3 to expression values (b, 32)."""
         return self.attention(self.adaptor(windows))
 
     def track(self, features: torch.Tensor) -> torch.Tensor:
-        """Features of a whole sound (T, D) to its expressions (T, 32)."""
+        """Features of a whole sound (T, D) to expression values (T, 32)."""
         adapted = self.adaptor(_padded(features))  # (T + 7, 32)
         windows = adapted.unfold(0, ATTENTION_WINDOW, 1).transpose(1, 2)  # (T, 8, 32)
         return self.attention(windows)
 
 
 def feature_windows(features: torch.Tensor, rows: torch.Tensor) -> torch.Tensor:
-    """The windows that `SpeechAdaptor` takes.
+    """Cuts the windows that `SpeechAdaptor` takes out of a sound's features.
 
     Args:
-        features: (T, D) of a whole sound.
-        rows: (b,) row numbers in 0 … T − 1.
+        features: (T, D) features of a whole sound.
+        rows: (b,) row numbers i, 0 to T − 1.
 
     Returns:
-        (b, 8, D): rows [i − 4, i + 4), zeros outside the sound.
+        (b, 8, D): rows i − 4 to i + 3; rows outside the sound are 0.
     """
     offsets = torch.arange(ATTENTION_WINDOW, device=rows.device)  # (8,)
     return _padded(features)[rows[:, None] + offsets]

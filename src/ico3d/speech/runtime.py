@@ -1,4 +1,4 @@
-"""Sound to expression values where an avatar is served: numpy and onnxruntime, no torch."""
+"""From sound to expression values on a server: numpy and onnxruntime, no torch."""
 
 import warnings
 from collections.abc import Callable
@@ -22,10 +22,10 @@ BEFORE, AFTER = 4, 3  # rows that the attention sees around each: [i − 4, i + 
 
 
 class RowStream(Protocol):
-    """A sound that arrives in pieces, as rows that a network takes."""
+    """Turns pieces of a sound into rows of a network's input."""
 
     def push(self, samples: np.ndarray) -> np.ndarray:
-        """Takes the next samples (S,) in [-1, 1]; returns the rows that are now known."""
+        """Adds samples (S,) in [-1, 1]; returns the rows that are now complete."""
         ...
 
     def finish(self) -> np.ndarray:
@@ -34,19 +34,20 @@ class RowStream(Protocol):
 
 
 class SpeechModel:
-    """The `speech.onnx` of a bundle (docs/bundle.md), with the encoder that it needs."""
+    """The `speech.onnx` of a bundle (docs/bundle.md), together with its encoder."""
 
     def __init__(self, model: bytes | Path | str, encoder: bytes | Path | str | None = None):
-        """Opens a model.
+        """Opens the model and, where needed, the encoder.
 
         Args:
-            model: `speech.onnx` or its bytes.
-            encoder: Encoder from mel windows or sound to features (`export_encoder` writes it),
-                needed where the model's input is `features`.
+            model: Path or contents of `speech.onnx`.
+            encoder: Path or contents of an encoder that `export_encoder` wrote, from mel windows or
+                sound to features; needed if the model's input is `features`.
 
         Raises:
             MissingExtraError: If onnxruntime is not installed.
-            ModelError: If a file is no such model, or the encoder is missing or does not fit.
+            ModelError: If a file cannot be used, or the encoder is missing or has another feature
+                size.
         """
         self._model = _session(model, "speech.onnx")
         self._input = self._model.get_inputs()[0].name
@@ -69,7 +70,7 @@ class SpeechModel:
         self.silent_expression = self.run(silent)[BEFORE]  # (32,)
 
     def expressions(self, samples: np.ndarray, rate: int) -> np.ndarray:
-        """Expression values of a whole sound, with silence around it.
+        """Expression values of a whole sound; silence is assumed before and after.
 
         Args:
             samples: (S,) in [-1, 1].
@@ -82,11 +83,11 @@ class SpeechModel:
         return np.concatenate([stream.push(samples), stream.finish()])
 
     def stream(self, rate: int) -> RowStream:
-        """Turns a new sound into the rows that `run` takes."""
+        """A stream that turns a new sound of `rate` samples per second into rows for `run`."""
         return WindowStream(rate) if self._encoder is None else self._encoder.stream(rate)
 
     def run(self, rows: np.ndarray) -> np.ndarray:
-        """Mel windows (T, 80, 16) or features (T, D) to expressions (T, 32)."""
+        """Mel windows (T, 80, 16) or features (T, D) to expression values (T, 32)."""
         return self._model.run(None, {self._input: rows})[0]
 
     def _silence(self) -> np.ndarray:
@@ -157,17 +158,17 @@ class _BlockFeatures:
 class StreamingExpressions:
     """Expression values of a sound that arrives in pieces.
 
-    The rows are those of `SpeechModel.expressions` on the whole sound. Row i comes as soon as the
-    sound is there that it depends on: until about (i/25 + 0.26) s for encoders of mel windows,
-    (i/25 + 0.53) s for those that look at the sound itself. Where the sound is silent (see
-    `silence`), rows are those of silence: the mouth at rest.
+    The rows equal those of `SpeechModel.expressions` for the whole sound. Row i is returned as soon
+    as the sound that it depends on has arrived: up to about (i/25 + 0.26) s with encoders of mel
+    windows, (i/25 + 0.53) s with encoders of the sound itself. Where the sound is silent (see
+    `silence`), rows are those of a closed mouth.
     """
 
     def __init__(self, model: SpeechModel, rate: int):
         """Starts one sound.
 
         Args:
-            model: What turns it into expressions.
+            model: The speech model of the avatar.
             rate: Samples per second of the pieces.
         """
         self._model = model
@@ -177,7 +178,7 @@ class StreamingExpressions:
         self._next = 0  # the row that is returned next
 
     def push(self, samples: np.ndarray) -> np.ndarray:
-        """Takes the next samples (S,); returns the rows (n, 32) that are now known."""
+        """Adds samples (S,); returns the rows (n, 32) that are now known."""
         self._gate.push(samples)
         return self._advance(self._stream.push(samples))
 
@@ -205,16 +206,16 @@ class StreamingExpressions:
 
 
 def open_speech(model: bytes, encoder: str, sha256: str, takes: str) -> SpeechModel:
-    """Opens a bundle's speech model with the encoder that it needs from this machine.
+    """Opens a bundle's speech model, with an encoder installed on this machine where needed.
 
     Args:
-        model: `speech.onnx`.
-        encoder: The encoder's name.
-        sha256: Of the encoder's weights.
-        takes: What the model takes: `mel`, the encoder being inside, or `features`.
+        model: Contents of `speech.onnx`.
+        encoder: Name of the encoder.
+        sha256: SHA-256 of the encoder's weights.
+        takes: Input of the model: `mel` if the encoder is part of the model, else `features`.
 
     Raises:
-        MissingModelError: If the encoder is not in the bundle and not on this machine.
+        MissingModelError: If the encoder is neither part of the model nor installed.
         ModelError: If a model cannot be used.
     """
     if takes == "mel":
@@ -226,10 +227,10 @@ def open_speech(model: bytes, encoder: str, sha256: str, takes: str) -> SpeechMo
 
 
 def served_encoder(name: str, sha256: str) -> Path:
-    """The exported encoder that has these weights.
+    """Path of the exported encoder with these weights.
 
     Raises:
-        MissingModelError: If it is not here; the sentence says how to make it.
+        MissingModelError: If the file is not on this machine; the sentence says how to make it.
     """
     file = served_name(name, sha256)
     found = find_model(file)
@@ -243,7 +244,7 @@ def served_encoder(name: str, sha256: str) -> Path:
 
 
 def served_name(name: str, sha256: str) -> str:
-    """What the file of an exported encoder is called."""
+    """File name of an exported encoder."""
     return f"{name}-{sha256[:12]}.onnx"
 
 

@@ -1,8 +1,8 @@
-"""Silence closes the mouth: how far each row of expressions counts (numpy).
+"""Closes the mouth in silence: a factor for each row of expression values (numpy).
 
-Encoders answer to the faintest hiss (a spectrum is a matter of shape, HuBERT even normalises its
-input), and the adaptor of a head makes some half-open mouth of it. So what a sound says fades out
-where there is next to no sound.
+Encoders react to the faintest hiss, because a spectrum is normalised and HuBERT even normalises its
+input. The adaptor of a head would turn that into a half-open mouth. Expression values are therefore
+faded out where there is next to no sound.
 """
 
 import numpy as np
@@ -10,14 +10,14 @@ import numpy as np
 from ico3d.speech.mel import FPS
 
 SILENT, HEARD = -60.0, -50.0
-"""Levels (dB of the root mean square, 0 for ±1) up to which nothing and from which all counts."""
+"""Levels in dB (RMS, 0 for ±1) up to which the factor is 0, and from which on the factor is 1."""
 
 _REACH = 2
 """Rows to either side whose sound counts: 0.2 s in all, longer than the silence of a t or p."""
 
 
 class SilenceGate:
-    """Factors 0 to 1, one per row, of a sound that arrives in pieces."""
+    """Factors 0 to 1, one per row at 25 rows per second, for a sound that arrives in pieces."""
 
     def __init__(self, rate: int):
         """Starts one sound of `rate` samples per second."""
@@ -27,7 +27,7 @@ class SilenceGate:
         self._first = -_REACH  # the row of its first entry
 
     def push(self, samples: np.ndarray) -> None:
-        """Takes the next samples (S,) in [-1, 1]."""
+        """Adds samples (S,) in [-1, 1]."""
         squares = np.asarray(samples, np.float64) ** 2
         self._pending = np.concatenate([self._pending, squares])
         while len(self._pending) >= (size := self._size(self._first + len(self._energy))):
@@ -35,14 +35,14 @@ class SilenceGate:
             self._pending = self._pending[size:]
 
     def finish(self) -> None:
-        """Ends the sound: silence follows."""
+        """Ends the sound; silence follows."""
         self._energy = np.append(self._energy, self._pending.sum())
         self._pending = self._pending[:0]
 
     def gains(self, first: int, count: int) -> np.ndarray:
-        """Factors (count,) of the rows from `first` on; forgets the sound before them.
+        """Factors (count,) of `count` rows from row `first` on; earlier sound is forgotten.
 
-        The sound must be there until two rows after the last of them, or be finished.
+        The sound must have arrived up to two rows behind the last of these rows, or have ended.
         """
         window = 2 * _REACH + 1
         energy = self._energy[first - _REACH - self._first :]

@@ -1,4 +1,4 @@
-"""Mel windows of a sound that arrives in pieces; the same as `mel_windows` of the whole."""
+"""Mel windows of a sound that arrives in pieces, equal to `mel_windows` of the whole sound."""
 
 import numpy as np
 
@@ -19,13 +19,13 @@ _PAD = FFT // 2  # mirrored samples at both ends
 
 
 class WindowStream:
-    """Turns pieces of sound into encoder windows as soon as their last sample is there."""
+    """Turns pieces of sound into encoder windows, each as soon as its last sample has arrived."""
 
     def __init__(self, rate: int):
         """Starts one sound.
 
         Args:
-            rate: Samples per second of the pieces; other than 16 kHz needs the package soxr.
+            rate: Samples per second of the pieces; rates other than 16 kHz need the package soxr.
         """
         self._resample = resampling_stream(rate)
         self._sound = np.zeros(0)  # (S,) pre-emphasised, padded, from the next mel row on
@@ -36,12 +36,12 @@ class WindowStream:
         self._next = 0  # the encoder window that comes next
 
     def push(self, samples: np.ndarray) -> np.ndarray:
-        """Takes the next samples (S,) in [-1, 1]; returns the windows (n, 80, 16) now complete."""
+        """Adds samples (S,) in [-1, 1]; returns the windows (n, 80, 16) that are now complete."""
         self._take(self._resample(samples, False))
         return self._windows(self._complete())
 
     def finish(self) -> np.ndarray:
-        """Ends the sound; returns the windows (n, 80, 16) that remain."""
+        """Ends the sound; returns the remaining windows (n, 80, 16)."""
         self._take(self._resample(np.zeros(0, np.float32), True))
         missing = (WINDOW - 1) * HOP - self._num_samples
         if missing > 0:

@@ -12,9 +12,9 @@ class Convert:
     """Converts a file of 3D Gaussians: reads PLY, compressed PLY, SPZ, .splat; writes PLY or SPZ.
 
     Attributes:
-        source: The file to read; what it is, is told by its contents.
+        source: The file to read; its format is recognised by its contents.
         target: The file to write: .ply (lossless) or .spz (about a fifth of the size).
-        sh_degree: Drop the spherical harmonics above this degree.
+        sh_degree: Drop the spherical harmonics above this degree; by default all are kept.
     """
 
     source: tyro.conf.Positional[Path]
@@ -22,7 +22,7 @@ class Convert:
     sh_degree: Literal[0, 1, 2, 3] | None = None
 
     def run(self) -> None:
-        """Converts, and prints what was read and written."""
+        """Converts the file and prints what was read and written."""
         from ico3d.splat.files.formats import read_file, write_gaussians
 
         read = read_file(self.source)

@@ -3,8 +3,10 @@
 from math import exp
 
 GSPLAT = (1, 5, 3), (1, 6)
-"""The first version of gsplat that draws by these numbers, and the first that does not any more:
-1.6 bounds alpha by 0.99 and the low-pass's share of opacity from below."""
+"""The first version of gsplat that follows these numbers, and the first one that no longer does.
+
+gsplat 1.6 limits alpha to 0.99 and bounds the low-pass's factor on opacity from below.
+"""
 
 BLUR = 0.3
 """Low-pass added to both diagonal entries of the 2D covariance, pixels squared."""
@@ -35,7 +37,7 @@ SSIM_C1, SSIM_C2 = 0.01**2, 0.03**2
 
 
 def ssim_window() -> list[float]:
-    """SSIM's 11 Gaussian weights, which add up to 1."""
+    """The 11 weights of SSIM's Gaussian window; their sum is 1."""
     offsets = range(-SSIM_RADIUS, SSIM_RADIUS + 1)
     weights = [exp(-(i**2) / (2 * SSIM_SIGMA**2)) for i in offsets]
     return [weight / sum(weights) for weight in weights]

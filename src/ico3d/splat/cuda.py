@@ -1,4 +1,4 @@
-"""The CUDA side of `splat.render`: gsplat under the same contract."""
+"""The CUDA backend of `splat.render`, by gsplat."""
 
 # pyright: reportMissingImports=false, reportUnknownMemberType=false
 # pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
@@ -72,22 +72,23 @@ def draw_gaussians(
     antialiased: bool,
     absgrad: bool,
 ) -> Drawing:
-    """Draws on black.
+    """Draws Gaussians on black, on a CUDA device.
 
     Args:
         gaussians: Float32, on a CUDA device.
-        colors: (C, N, 3).
-        cameras: C of one size; their intrinsics count.
+        colors: (C, N, 3) colours of the Gaussians as each camera sees them.
+        cameras: C cameras with one picture size; only size and intrinsics are used, not their
+            poses.
         poses: (C, 4, 4) float64, world to camera.
-        antialiased: Whether opacity makes up for the low-pass.
-        absgrad: Whether screen gradients are summed without signs.
+        antialiased: Whether a splat's opacity is reduced where the low-pass filter enlarges it.
+        absgrad: Whether screen-space gradients are also summed over pixels as absolute values.
 
     Returns:
         The drawing.
 
     Raises:
         MissingExtraError: If gsplat is not installed.
-        SettingsError: If it cannot be used.
+        SettingsError: If gsplat is installed but cannot be used.
     """
     width, height = cameras[0].width, cameras[0].height
     if len(gaussians) == 0 or width * height == 0:

@@ -1,4 +1,4 @@
-"""Where to compute: the one place that decides, by trying."""
+"""Chooses the device to compute on, for all verbs; CUDA is used only after a successful trial."""
 
 # pyright: reportUnknownMemberType=false
 # (torch leaves some of its functions untyped)
@@ -21,7 +21,7 @@ TRIED = ((30.0, 1.0), (0.06, 0.9))
 """Standard deviations in pixels, and opacities, of splats that are drawn to try CUDA: alpha is at
 its upper bound in the middle of the first, the low-pass takes nearly all of the second."""
 SIZE = 17
-"""Pixels of a side of these pictures; there is one in the middle."""
+"""Side of the trial pictures in pixels; odd, so that one pixel lies in the centre."""
 TOLERANCE = 1e-4
 
 
@@ -29,8 +29,8 @@ def computing_device(wanted: DeviceName = "auto") -> torch.device:
     """The device to compute on.
 
     Args:
-        wanted: `auto` takes CUDA where a render and its gradients come out right there; where
-            there is a CUDA device on which they do not, it says why, once, and takes the CPU.
+        wanted: `auto` takes CUDA if a trial rendering and its gradients are right there. If a CUDA
+            device exists but fails the trial, the reason is printed once and the CPU is taken.
 
     Raises:
         SettingsError: If `cuda` is wanted and does not work.
@@ -48,18 +48,21 @@ def computing_device(wanted: DeviceName = "auto") -> torch.device:
 
 
 def decided(wanted: DeviceName) -> DeviceName:
-    """What becomes of a wish on this machine, for its other processes; errors as above."""
+    """`cpu` or `cuda`: the device that `computing_device` chooses, by name, for other processes.
+
+    Raises what `computing_device` raises.
+    """
     return "cuda" if computing_device(wanted).type == "cuda" else "cpu"
 
 
 def device_name(device: torch.device) -> str:
-    """For people and files: `cpu`, or `cuda` with the name of the GPU."""
+    """The device in words: `cpu`, or `cuda` with the name of the GPU."""
     return "cpu" if device.type == "cpu" else f"cuda ({torch.cuda.get_device_name(device)})"
 
 
 @cache
 def cuda_fault() -> str | None:
-    """Why CUDA cannot be computed with, as the end of a sentence; None where it can."""
+    """Why CUDA cannot be used, as the end of a sentence; None if it can."""
     if not torch.cuda.is_available():
         return "torch finds no CUDA device."
     try:

@@ -39,7 +39,7 @@ class Gaussians:
         return self.means.shape[0]
 
     def map(self, change: Callable[[Tensor], Tensor]) -> "Gaussians":
-        """The Gaussians with `change` applied to every tensor."""
+        """Gaussians with `change` applied to every tensor."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         present = {name: change(value) for name, value in values.items() if value is not None}
         return Gaussians(**present)
@@ -49,7 +49,7 @@ class Gaussians:
         return self.map(lambda tensor: tensor.to(device))
 
     def detach(self) -> "Gaussians":
-        """The same Gaussians without gradient."""
+        """The same Gaussians, detached from autograd."""
         return self.map(Tensor.detach)
 
     def __getitem__(self, index: Tensor | slice) -> "Gaussians":
@@ -57,7 +57,7 @@ class Gaussians:
         return self.map(lambda tensor: tensor[index])
 
     def drawable(self) -> Tensor:
-        """(N,) bool: all parameters are finite and the quaternion is not 0."""
+        """(N,) bool: whether all parameters are finite and the quaternion is not 0."""
         values = [getattr(self, field.name) for field in fields(self)]
         present = [value for value in values if value is not None]
         turns = self.quats.any(1)  # (N,)
@@ -67,7 +67,7 @@ class Gaussians:
         return torch.stack([*finite, self.opacities.isfinite(), turns]).all(0)
 
     def where(self, chosen: Tensor, others: "Gaussians") -> "Gaussians":
-        """These where `chosen` (N,) says so, elsewhere those of `others`, of the same kind."""
+        """These Gaussians where `chosen` (N,) is true, else `others`, with the same fields."""
         values = {}
         for field in fields(self):
             a, b = getattr(self, field.name), getattr(others, field.name)
@@ -77,17 +77,17 @@ class Gaussians:
         return Gaussians(**values)
 
     def transform(self, a_from_b: Tensor | np.ndarray) -> "Gaussians":
-        """Moves Gaussians given in space b to space a.
+        """Moves Gaussians from space b to space a.
 
         Args:
-            a_from_b: (4, 4) similarity: rotation, uniform scale, translation. A tensor may carry
-                gradient, which reaches means and scales.
+            a_from_b: (4, 4) similarity: rotation, uniform scale, translation. A tensor may require
+                gradients, which then flow through means and scales.
 
         Returns:
-            Moved Gaussians: means, rotations, scales and harmonics; the rest is shared.
+            Gaussians with moved means, rotations, scales and harmonics; other tensors are shared.
 
         Raises:
-            ValueError: If the matrix is not a similarity or mirrors.
+            ValueError: If the matrix is no similarity, or contains a reflection.
         """
         matrix = torch.as_tensor(a_from_b).to(self.means)
         scale, rotation = _split_similarity(matrix)
@@ -121,10 +121,10 @@ def _split_similarity(matrix: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def cat(parts: Sequence[Gaussians]) -> Gaussians:
-    """Several sets of Gaussians as one.
+    """Concatenates several sets of Gaussians.
 
     Raises:
-        ValueError: If some have colours and others harmonics, or harmonics of other degrees.
+        ValueError: If some sets have colours and others harmonics, or harmonics differ in degree.
     """
     values = {}
     for field in fields(Gaussians):

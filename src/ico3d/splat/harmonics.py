@@ -14,10 +14,10 @@ MAX_DEGREE = 3
 
 
 def degree_of(coefficients: int) -> int:
-    """The degree that has (degree + 1)² coefficients.
+    """The degree of spherical harmonics that has (degree + 1)² = `coefficients` coefficients.
 
     Raises:
-        ValueError: If there is none, or it is above 3.
+        ValueError: If no degree has this number, or the degree is above 3.
     """
     for degree in range(MAX_DEGREE + 1):
         if (degree + 1) ** 2 == coefficients:
@@ -54,17 +54,17 @@ def basis(directions: Tensor, degree: int) -> Tensor:
 
 
 def to_colors(sh: Tensor, directions: Tensor) -> Tensor:
-    """Colours (..., N, 3) of coefficients (N, K, 3) seen along (..., N, 3), at least 0."""
+    """Colours (..., N, 3), at least 0, of coefficients (N, K, 3) seen along (..., N, 3)."""
     degree = degree_of(sh.shape[-2])
     weights = basis(torch.nn.functional.normalize(directions, dim=-1), degree)  # (..., N, K)
     return (torch.einsum("...nk,nkc->...nc", weights, sh) + 0.5).clamp_min(0)
 
 
 def rotate(sh: Tensor, rotation: Tensor) -> Tensor:
-    """Coefficients (N, K, 3) of the same colours on an object turned by `rotation` (3, 3).
+    """Coefficients (N, K, 3) for objects that were turned by `rotation` (3, 3).
 
-    The matrix that does it is solved for on fixed directions: exact, as rotation maps harmonics
-    of one degree to one another.
+    The matrix of each degree is solved for on fixed directions; the result is exact, because a
+    rotation maps harmonics of one degree to harmonics of the same degree.
     """
     degree = degree_of(sh.shape[-2])
     points = torch.randn(64, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(0))

@@ -1,4 +1,4 @@
-"""Round Gaussians on surface points: where every training starts."""
+"""Initial Gaussians from surface points: their number and their spacing."""
 
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false, reportMissingTypeStubs=false
@@ -14,7 +14,7 @@ from ico3d.common.camera import Camera
 
 
 def resampled(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
-    """`count` of the points (P, 3); where there are fewer, further ones between neighbours."""
+    """`count` points drawn from (P, 3); if P is smaller, further ones between neighbours."""
     if len(points) >= count:
         return points[np.sort(rng.choice(len(points), count, replace=False))]
     _, neighbours = KDTree(points).query(points, k=4)  # (P, 4), itself first
@@ -26,7 +26,10 @@ def resampled(points: np.ndarray, count: int, rng: np.random.Generator) -> np.nd
 
 
 def spacing(points: np.ndarray) -> np.ndarray:
-    """Root mean square distance (N,) to the three nearest neighbours, within sane bounds."""
+    """Root mean square distance (N,) to the three nearest neighbours.
+
+    Values are limited to a tenth of the median and ten times the median.
+    """
     distances, _ = KDTree(points).query(points, k=4)
     distance = np.sqrt((distances[:, 1:] ** 2).mean(1))
     typical = float(np.median(distance))
@@ -34,7 +37,7 @@ def spacing(points: np.ndarray) -> np.ndarray:
 
 
 def in_pictures(points: np.ndarray, cameras: Sequence[Camera]) -> np.ndarray:
-    """(C, P) bool: whether a camera's picture holds a point (P, 3)."""
+    """(C, P) bool: whether each point (P, 3) lies within each camera's picture."""
     inside = np.zeros((len(cameras), len(points)), bool)
     for row, camera in zip(inside, cameras, strict=True):
         pixels, depths = camera.project(points)  # (P, 2), (P,)

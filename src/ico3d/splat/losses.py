@@ -1,4 +1,4 @@
-"""Image losses: L1 and SSIM (paper eq. 2 and 5, with 1 − SSIM)."""
+"""Image losses: L1 and SSIM (paper eq. 2 and 5, in which SSIM enters as 1 − SSIM)."""
 
 # pyright: reportIncompatibleMethodOverride=false, reportUnknownMemberType=false
 # pyright: reportUnknownVariableType=false
@@ -23,8 +23,8 @@ def l1(rgb: Tensor, target: Tensor) -> Tensor:
 def ssim(rgb: Tensor, target: Tensor) -> Tensor:
     """Mean structural similarity, differentiable in `rgb` only.
 
-    11×11 Gaussian window of σ = 1.5 pixels; outside of the picture both images count as 0, as is
-    usual in 3DGS. For evaluation by other definitions see the metrics.
+    The window is an 11×11 Gaussian with σ = 1.5 pixels. Outside of the picture both images count as
+    0, as is usual in 3DGS. For evaluation by other definitions see `ico3d.measure.metrics`.
 
     Args:
         rgb: (..., H, W, 3) in [0, 1].
@@ -46,17 +46,17 @@ def ssim(rgb: Tensor, target: Tensor) -> Tensor:
 
 
 def photometric(rgb: Tensor, target: Tensor, ssim_weight: float = 0.2) -> Tensor:
-    """(1 − λ)·L1 + λ·(1 − SSIM), λ = `ssim_weight`; arguments as for `ssim`."""
+    """(1 − λ)·L1 + λ·(1 − SSIM) with λ = `ssim_weight`; other arguments as for `ssim`."""
     return (1 - ssim_weight) * l1(rgb, target) + ssim_weight * (1 - ssim(rgb, target))
 
 
 def tensor_psnr(rgb: Tensor, target: Tensor, weight: Tensor | None = None) -> float:
-    """PSNR in dB of tensors where they are, for progress bars; files are measured by `psnr`.
+    """PSNR in dB of tensors on their own device, for progress bars; reports use `psnr`.
 
     Args:
         rgb: (H, W, 3) in [0, 1].
         target: (H, W, 3) in [0, 1].
-        weight: (H, W) in [0, 1]: which pixels count, and how much; all by default.
+        weight: (H, W) weight of each pixel in [0, 1]; all pixels count fully by default.
     """
     squares = (rgb.detach() - target).square().mean(-1)  # (H, W)
     if weight is None:

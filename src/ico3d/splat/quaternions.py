@@ -21,8 +21,8 @@ def to_matrix(quats: Tensor) -> Tensor:
 def from_matrix(matrix: Tensor) -> Tensor:
     """Quaternion (4,) of one rotation matrix (3, 3).
 
-    It is the eigenvector of the largest eigenvalue of a symmetric 4×4 matrix, which has no
-    special cases (Bar-Itzhack).
+    The quaternion is the eigenvector of the largest eigenvalue of a symmetric 4×4 matrix, a method
+    without special cases (Bar-Itzhack).
     """
     m = matrix
     trace = m.diagonal().sum()
@@ -35,7 +35,7 @@ def from_matrix(matrix: Tensor) -> Tensor:
 
 
 def multiply(a: Tensor, b: Tensor) -> Tensor:
-    """Hamilton product a·b of (..., 4) quaternions: first rotates by b, then by a."""
+    """Hamilton product a·b of quaternions (..., 4): rotates first by b, then by a."""
     aw, ax, ay, az = a.unbind(-1)
     bw, bx, by, bz = b.unbind(-1)
     parts = [

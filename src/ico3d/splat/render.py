@@ -1,11 +1,13 @@
-"""Rendering Gaussians: one contract, a CPU (numba) and a CUDA (gsplat) backend.
+"""Renders Gaussians with one of two backends, CPU (numba) or CUDA (gsplat).
 
-The convention: pixel centres at +0.5. A splat's 2D covariance Σ is blurred to Σ + 0.3·I, and its
-opacity multiplied by √(det Σ / det(Σ + 0.3·I)), so that small splats keep their light (the
-anti-aliasing of Mip-Splatting; gsplat's "antialiased"; scenes that other tools trained without it
-can be drawn without it). A splat ends where its alpha is under
-1/255; alpha is at most 0.999; a pixel is finished at transmittance 10⁻⁴; nothing nearer than 0.01 m
-is drawn. The projection's Jacobian is taken at most 0.3 half images outside of the picture.
+Both backends follow one convention. Pixel centres lie at +0.5. A splat's 2D covariance Σ is blurred
+to Σ + 0.3·I, and the opacity is multiplied by √(det Σ / det(Σ + 0.3·I)), so that small splats keep
+their light (the anti-aliasing of Mip-Splatting; "antialiased" in gsplat). Scenes that other tools
+trained without that factor can be drawn without the factor.
+
+A splat ends where its alpha is below 1/255; alpha is at most 0.999; a pixel is finished when its
+transmittance falls to 10⁻⁴; Gaussians nearer than 0.01 m are not drawn. The projection's Jacobian
+is evaluated at most 0.3 half images outside of the picture.
 """
 
 # pyright: reportUnknownMemberType=false
@@ -34,26 +36,27 @@ def render(
 ) -> Rendering:
     """Renders Gaussians, differentiably in all of their parameters and in the cameras' poses.
 
-    The backend follows the tensors' device: CPU runs numba kernels, CUDA runs gsplat. Computation
-    is float32 whatever the tensors' precision.
+    The device of the tensors selects the backend: numba kernels on the CPU, gsplat on CUDA. All
+    computation is in float32, whatever the precision of the tensors.
 
     Args:
         gaussians: N ≥ 0 Gaussians in world space.
-        cameras: C ≥ 1 cameras of one size.
-        background: What lies behind: None for black, (3,), (H, W, 3) or (C, H, W, 3).
-        world_to_camera: (C, 4, 4) rigid, in the place of the cameras' own; may carry gradient.
-        antialiased: Whether opacity makes up for the low-pass.
-        absgrad: Whether `info.screen_gradients()` sums over pixels without signs.
+        cameras: C ≥ 1 cameras with one picture size.
+        background: Colour behind the Gaussians: None for black, (3,), (H, W, 3) or (C, H, W, 3).
+        world_to_camera: (C, 4, 4) rigid transforms that replace the cameras' own; may require
+            gradients.
+        antialiased: Whether a splat's opacity is reduced where the blur enlarges the splat.
+        absgrad: Whether `info.screen_gradients()` sums absolute values over pixels.
 
     Returns:
-        Pictures (C, H, W, 3), alpha, depth, and what density control needs. Gaussians behind a
-        camera, and those with a parameter that is not finite, are not drawn and get no gradient;
-        without Gaussians the background is left.
+        Pictures (C, H, W, 3), alpha, depth, and the data for density control. Gaussians behind a
+        camera, and those with a parameter that is not finite, are not drawn and get no gradient.
+        Without Gaussians the picture is the background.
 
     Raises:
-        ValueError: If cameras differ in size, there is none, or a shape does not fit.
+        ValueError: If there is no camera, the cameras differ in size, or a shape does not fit.
         MissingExtraError: If the tensors are on a CUDA device and gsplat is not installed.
-        SettingsError: If gsplat is there and cannot be used.
+        SettingsError: If gsplat is installed but cannot be used.
     """
     _check(gaussians, cameras, background)
     poses = _poses(cameras, world_to_camera)

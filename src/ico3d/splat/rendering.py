@@ -1,4 +1,4 @@
-"""What a render gives."""
+"""The results of `render`."""
 
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
 # (torch leaves some of its functions untyped)
@@ -13,15 +13,16 @@ from torch import Tensor
 
 @dataclass
 class RenderInfo:
-    """What density control needs of a render.
+    """Data of a rendering that density control needs.
 
     Attributes:
-        radii: (C, N) int32 pixels from a splat's centre to its farthest end; 0 where unseen.
-        means2d: (C, N, 2) pixels; holds its gradient after `backward`.
+        radii: (C, N) int32 distance in pixels from a splat's centre to its farthest end; 0 if
+            unseen.
+        means2d: (C, N, 2) splat centres in pixels; the tensor holds its gradient after `backward`.
         width: Image width in pixels.
         height: Image height in pixels.
-        absolute: Gives (C, N, 2) after `backward`: the gradient of means2d summed over pixels
-            without signs, where that was asked for.
+        absolute: Where asked for: a function that returns, after `backward`, the gradient (C, N, 2)
+            of means2d summed over pixels as absolute values.
     """
 
     radii: Tensor
@@ -36,18 +37,18 @@ class RenderInfo:
         return self.radii > 0
 
     def first(self, count: int) -> "RenderInfo":
-        """What is known of the first Gaussians of the render, where others came after them."""
+        """The data of the first `count` Gaussians, for renderings that contain further ones."""
         return replace(self, radii=self.radii[:, :count])
 
     def screen_gradients(self) -> Tensor:
-        """(C, N) length of the loss's gradient by the splat's centre.
+        """(C, N) length of the gradient of the loss by the splat's centre on the screen.
 
-        Normalised as 3DGS does it: by device coordinates, in which the image is 2 wide and high.
-        With absolute gradients, what pulls a splat to all sides at once does not cancel out
-        (AbsGS).
+        The unit is that of 3DGS: normalised device coordinates, in which the image is 2 wide and 2
+        high. Where absolute gradients were asked for, pulls in opposite directions do not cancel
+        out (AbsGS).
 
         Raises:
-            RuntimeError: If `backward` has not run, or the means need no gradient.
+            RuntimeError: If `backward` has not run, or the means do not require gradients.
         """
         if self.means2d.grad is None:
             raise RuntimeError("screen gradients exist only after backward of a render")
@@ -59,13 +60,14 @@ class RenderInfo:
 
 @dataclass
 class Drawing:
-    """Gaussians on black.
+    """Pictures of Gaussians on black, as a backend returns them.
 
     Attributes:
         rgb: (C, H, W, 3).
         alpha: (C, H, W).
-        draw_depth: Gives (C, H, W), depth weighted by what each splat contributes.
-        info: Where and how large the splats are, for density control.
+        draw_depth: Function that returns (C, H, W) depths in metres, weighted by the splats'
+            contributions.
+        info: Position and size of the splats, for density control.
     """
 
     rgb: Tensor
@@ -79,9 +81,9 @@ class Rendering:
     """Images of C cameras.
 
     Attributes:
-        rgb: (C, H, W, 3), over the background.
-        alpha: (C, H, W): how much of the background is hidden.
-        drawing: The picture on black, and what was needed for it.
+        rgb: (C, H, W, 3) picture over the background.
+        alpha: (C, H, W) share of the background that is hidden.
+        drawing: The picture on black, as the backend returned it.
     """
 
     rgb: Tensor
@@ -90,13 +92,13 @@ class Rendering:
 
     @property
     def info(self) -> RenderInfo:
-        """Where and how large the splats are, with their gradients: density control needs both."""
+        """Position and size of the splats, and their gradients, for density control."""
         return self.drawing.info
 
     @cached_property
     def depth(self) -> Tensor:
-        """(C, H, W) expected depth in metres along z, 0 where nothing is.
+        """(C, H, W) expected depth in metres along z; 0 where no Gaussian is.
 
-        Drawn when first asked for: few who render need it.
+        The depth is drawn at the first access, since few callers need it.
         """
         return self.drawing.draw_depth() / self.alpha.clamp_min(1e-10)

@@ -12,10 +12,10 @@ from ico3d.errors import MissingExtraError
 
 @dataclass(frozen=True)
 class Synthetic:
-    """Records a synthetic person who talks, with exact truth for everything.
+    """Records a synthetic person who talks, with exact ground truth for everything.
 
-    The person speaks with espeak-ng's voice; lips, lids, brows and the sway of the body follow.
-    The same settings write the same files.
+    The person speaks with a voice of espeak-ng; lips, lids, brows and the sway of the body follow
+    the speech. The same settings write the same files.
     """
 
     out: Annotated[Path, tyro.conf.Positional]
@@ -23,40 +23,41 @@ class Synthetic:
     subject: str = "anny"
     """`anny` (the open body model, pip install 'ico3d[synthetic]') or an .npz subject file."""
     rig: Literal["head", "bust", "body"] = "head"
-    """Camera rig. Frontal arcs: `head` fills the picture with it, `bust` shows the shoulders; rings
-    all around the whole person: `body`."""
+    """Arrangement of the cameras: a frontal arc that shows the head (`head`) or head and
+    shoulders (`bust`), or rings all around the whole person (`body`)."""
     cameras: int = 6
-    """How many cameras; the first stands in front."""
+    """Number of cameras; the first stands in front."""
     frames: int = 1100
-    """How many frames; of a head, the last 1/11 are the test frames."""
+    """Number of frames; for a head, the last 1/11 are test frames."""
     fps: float = 25.0
     """Frames per second."""
     views_per_frame: int | None = None
-    """How many cameras take each frame; by default one for heads (many expressions seen once teach
-    a head more than few seen often) and all for bodies."""
+    """Number of cameras that record each frame; by default one for heads (many expressions seen
+    once teach a head more than few seen often) and all for bodies."""
     size: int = 256
-    """Height of the pictures in pixels; those of heads are as wide, those of bodies narrower."""
+    """Height of the pictures in pixels. Pictures of heads are square, those of bodies narrower."""
     text: str = ""
-    """What is said, repeated as long as needed; by default varied English sentences."""
+    """Text to say, repeated as long as needed; by default varied English sentences."""
     lively: bool = True
-    """Also show moods and glances; without, the face does nothing but speak, blink and raise brows,
-    which is what a head driven by speech can know."""
+    """Also show moods and glances. Without this the face only speaks, blinks and raises brows,
+    which is all that a head driven by speech can know."""
     light: Literal["studio", "warm"] = "studio"
-    """Neutral lamps, or warm ones from the other side; they are baked into the pictures."""
+    """Neutral lamps (`studio`), or warm lamps from the other side (`warm`); the light becomes
+    part of the recorded colours."""
     motion: Literal["showcase", "talk", "walk", "sway"] = "talk"
-    """What a whole person does: `talk` stands and gestures in turn, `walk` walks in place,
-    `showcase` is calm, gestures and moves fast, a third of the time each; `sway` also turns the
-    hips."""
+    """What a whole person does: `talk` stands and gestures in turn; `walk` walks in place;
+    `showcase` stands calmly, gestures and moves fast, a third of the time each; `sway` does the
+    same and turns the hips."""
     garment: Literal["none", "skirt"] = "none"
-    """What a whole person wears over the clothes: a `skirt` hangs, folds and swings; arms then keep
-    off it."""
+    """What a whole person wears over the clothes: a `skirt` hangs, folds and swings, and the
+    arms keep off it."""
     seed: int = 0
-    """Decides voice, order of sentences, blinks, brows, sway, gestures and views."""
+    """Seed of voice, order of sentences, blinks, brows, sway, gestures and choice of cameras."""
     workers: int = field(default_factory=lambda: os.cpu_count() or 1)
-    """Threads that draw."""
+    """Number of threads that draw pictures."""
 
     def run(self) -> None:
-        """Records and says where the capture lies."""
+        """Records, and prints where the capture lies."""
         from rich import print as say
 
         try:

@@ -1,4 +1,4 @@
-"""Points on the surface of a synthetic person, where Gaussians may start."""
+"""Surface points of a synthetic person, from which Gaussians may start."""
 
 from dataclasses import dataclass
 
@@ -15,34 +15,34 @@ DENSITY = {
     Material.TROUSERS: 0.5,
     Material.SKIRT: 0.5,
 }
-"""Points per area, next to skin and hair with 1: small things that move need more."""
+"""Points per area relative to skin and hair: small moving parts need more."""
 FACE_DENSITY = 3.0
 
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """Places on a mesh that go where it goes.
+    """P points that stick to a mesh.
 
     Attributes:
-        corners: (P, 3) int vertices of the triangle of each.
-        parts: (P, 3) float64 barycentric weights of these.
+        corners: (P, 3) int vertices of the triangle that holds each point.
+        parts: (P, 3) float64 barycentric weights of the vertices.
     """
 
     corners: np.ndarray
     parts: np.ndarray
 
     def on(self, vertices: np.ndarray) -> np.ndarray:
-        """(P, 3) float32 where they lie on vertices (V, 3)."""
+        """(P, 3) float32 positions of the points on a mesh with vertices (V, 3)."""
         return np.einsum("pk,pkc->pc", self.parts, vertices[self.corners]).astype(np.float32)
 
 
 def surface_points(subject: Subject, count: int, seed: int) -> SurfacePoints:
-    """Samples the neutral surface by area, with more points in face and mouth.
+    """Samples points on the neutral surface by area, more densely in face and mouth.
 
     Args:
         subject: The person.
-        count: How many points.
-        seed: Decides where.
+        count: Number of points.
+        seed: Seed of the random positions.
     """
     random = np.random.default_rng([seed, 2])
     solid = ~np.isin(subject.materials, CARDS)

@@ -1,4 +1,4 @@
-"""A z-buffer rasteriser: which triangle, and where on it, each sample of a picture sees."""
+"""A z-buffer rasteriser: finds the triangle, and the place on it, that each sample sees."""
 
 import numpy as np
 from numba import njit
@@ -6,7 +6,7 @@ from numba import njit
 from ico3d.common.camera import Camera
 
 EMPTY = -1
-"""Triangle number of a sample that sees nothing."""
+"""Triangle index of a sample that sees nothing."""
 
 
 def to_screen(vertices: np.ndarray, camera: Camera, supersampling: int) -> np.ndarray:
@@ -14,12 +14,12 @@ def to_screen(vertices: np.ndarray, camera: Camera, supersampling: int) -> np.nd
 
     Args:
         vertices: (V, 3) in the camera's world, metres.
-        camera: Its image has `supersampling`² samples per pixel.
+        camera: The camera; its image has `supersampling`² samples per pixel.
         supersampling: Samples along each side of a pixel.
 
     Returns:
-        (V, 3) float32: x and y in samples (centres at +0.5) and nearness 1/z, 0 where a vertex
-        is behind the camera.
+        (V, 3) float32: x and y in samples (centres at +0.5) and nearness 1/z, in 1/metres; nearness
+        is 0 for vertices behind the camera.
     """
     pixels, depth = camera.project(vertices)
     nearness = np.where(depth > 1e-3, 1.0 / np.maximum(depth, 1e-3), 0.0)
@@ -28,16 +28,18 @@ def to_screen(vertices: np.ndarray, camera: Camera, supersampling: int) -> np.nd
 
 @njit(cache=True, nogil=True)
 def rasterise(screen, faces, nearest, triangle, barycentric):
-    """Draws triangles into buffers, keeping the nearest one at each sample.
+    """Draws triangles into buffers; each sample keeps the nearest one.
 
-    Triangles with a vertex at nearness ≤ 0 are left out. Both sides are drawn.
+    Triangles with a vertex of nearness ≤ 0 are skipped. Both sides of a triangle are drawn.
 
     Args:
-        screen: (V, 3) float32 of `to_screen`, or any x, y and a nearness that is linear in them.
+        screen: (V, 3) float32 from `to_screen`, or other x, y with a nearness that is linear in
+            them.
         faces: (F, 3) int32.
-        nearest: (H, W) float32 nearness so far; changed.
-        triangle: (H, W) int32, `EMPTY` where nothing is seen; changed.
-        barycentric: (H, W, 2) float32 screen-space weights of the second and third corner; changed.
+        nearest: (H, W) float32 nearness of what was drawn so far; changed in place.
+        triangle: (H, W) int32 triangle indices, `EMPTY` where nothing is seen; changed in place.
+        barycentric: (H, W, 2) float32 screen-space weights of the second and third corner; changed
+            in place.
     """
     height, width = nearest.shape
     for f in range(faces.shape[0]):
@@ -103,7 +105,11 @@ def vertex_normals(vertices, faces):
 
 
 def empty_buffers(height: int, width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nearness (H, W) float32, triangle (H, W) int32 and barycentric (H, W, 2) float32 buffers."""
+    """Empty buffers for `rasterise`.
+
+    Returns:
+        Nearness (H, W) float32, triangle (H, W) int32 and barycentric (H, W, 2) float32.
+    """
     return (
         np.zeros((height, width), np.float32),
         np.full((height, width), EMPTY, np.int32),

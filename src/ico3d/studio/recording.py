@@ -1,6 +1,6 @@
-"""Records a synthetic person: writes the folder that `reader` reads.
+"""Records a synthetic person into a folder that `ico3d.capture.synthetic` reads.
 
-Layout: `docs/captures/synthetic.md`, "Synthetic captures".
+The layout is described in `docs/captures/synthetic.md`, "Synthetic captures".
 """
 
 import io
@@ -33,29 +33,29 @@ from ico3d.studio.studio import Studio, backdrop
 
 POINTS = 6000
 BODY_POINTS = 4000
-"""Surface points that are written for each frame of a whole person."""
+"""Number of surface points that are written for each frame of a whole person."""
 UNFINISHED = "unfinished.json"
-"""Settings of a recording that has not come to its end."""
+"""File that keeps the settings of an unfinished recording."""
 
 
 @dataclass(frozen=True)
 class Recording:
-    """What to record.
+    """Settings of a synthetic recording.
 
     Attributes:
         subject: `anny` or an `.npz` file.
-        rig: Name of the camera rig: `head`, `bust` or `body`.
-        cameras: How many cameras.
-        frames: How many frames.
+        rig: Camera rig: `head`, `bust` or `body`.
+        cameras: Number of cameras.
+        frames: Number of frames.
         fps: Frames per second.
-        views_per_frame: How many cameras take a picture of each frame.
-        size: Height of the pictures; those of heads are as wide.
-        text: What is said; empty for sentences of our own.
-        seed: Decides everything that is random.
-        lively: Whether the face shows moods and glances too, which the sound does not tell.
-        light: One of `STUDIOS`.
+        views_per_frame: Number of cameras that record each frame.
+        size: Height of the pictures in pixels; pictures of heads are square.
+        text: What is said; if empty, the built-in sentences.
+        seed: Seed of all random choices.
+        lively: Whether to add expressions and glances that cannot be inferred from the sound.
+        light: Lights, one of `STUDIOS`.
         motion: What a whole person does, one of `MOTIONS`.
-        garment: What a whole person wears over the clothes, one of `GARMENTS`; it swings.
+        garment: Swinging garment that a whole person wears over the clothes, one of `GARMENTS`.
     """
 
     subject: str
@@ -79,20 +79,20 @@ class Recording:
 
     @property
     def arms_clear(self) -> bool:
-        """Whether arms stay away from hips and thighs, where a garment swings."""
+        """Whether hands keep away from hips and thighs, because the person wears a skirt."""
         return self.garment != "none"
 
 
 def record(recording: Recording, out: Path, workers: int) -> None:
-    """Records a person; a call with unchanged arguments goes on where an earlier one was cut off.
+    """Records a person; a call with the same arguments continues an interrupted recording.
 
     Args:
-        recording: What to record.
-        out: Folder to write; holds nothing yet, or what a cut-off call left.
-        workers: Threads that draw pictures.
+        recording: Settings of the recording.
+        out: Folder to write; must be empty, or left by an interrupted call.
+        workers: Number of threads that draw pictures.
 
     Raises:
-        SettingsError: If the settings make no sense or the folder is not empty.
+        SettingsError: If the settings contradict each other, or the folder is not empty.
         CaptureError: If the subject cannot be read.
         MissingExtraError: If an optional package is missing.
     """
@@ -152,10 +152,10 @@ def _begin(recording: Recording, out: Path) -> None:
 
 
 def choose_views(frames: int, cameras: int, per_frame: int, seed: int) -> np.ndarray:
-    """Which cameras take each frame, each as often as the others, in random order.
+    """Chooses at random which cameras record each frame, all cameras equally often.
 
     Returns:
-        (frames, cameras) uint8, `per_frame` ones in each row.
+        (frames, cameras) uint8 with `per_frame` ones in each row.
     """
     random = np.random.default_rng([seed, 1])
     views = np.zeros((frames, cameras), np.uint8)

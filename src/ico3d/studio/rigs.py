@@ -1,4 +1,4 @@
-"""Where cameras stand: an arc in front of a head, or rings all around a body."""
+"""Arrangements of cameras: an arc in front of a head, or rings all around a body."""
 
 from dataclasses import dataclass
 
@@ -8,17 +8,18 @@ from ico3d.common.camera import Camera, look_at
 from ico3d.studio.person.subject import Subject
 
 DISTANCE = 1.35
-"""Metres from the cameras to the head."""
+"""Distance of the cameras from the head, metres."""
 WIDEST_AZIMUTH = 60.0
 
 
 @dataclass(frozen=True)
 class Framing:
-    """What the pictures of a rig show.
+    """What the pictures of a camera rig show.
 
     Attributes:
-        height: Metres from their top to their bottom, at the head.
-        aim: What they look at: metres from the canonical origin at rest, upwards.
+        height: Height of the visible field at the head, metres.
+        aim: Height of the point that cameras look at, metres relative to the canonical origin at
+            rest.
     """
 
     height: float
@@ -26,15 +27,15 @@ class Framing:
 
 
 ARCS = {"head": Framing(0.31, -0.02), "bust": Framing(0.46, -0.045)}
-"""Head: three quarters of the picture are head. Bust: half, with the shoulders."""
+"""The head fills three quarters of a `head` picture and half of a `bust` picture."""
 
 BODY = Framing(2.36, 1.05)
-"""A person from the floor to above raised hands; the aim is a height above the floor."""
+"""A person from the floor to above raised hands; `aim` is a height above the floor here."""
 BODY_DISTANCE = 2.8
 ASPECT = 0.62
-"""Width of a picture of a body by its height."""
+"""Width of a picture of a body divided by its height."""
 RINGS = (-7.0, 5.0, 17.0)
-"""Elevations of the rings of cameras, degrees."""
+"""Elevation angles of the rings of cameras around a body, degrees."""
 RIGS = (*ARCS, "body")
 
 
@@ -42,10 +43,10 @@ def cameras_of(subject: Subject, rig: str, count: int, size: int) -> tuple[Camer
     """The cameras of a rig.
 
     Args:
-        subject: Its rest pose places the arcs.
+        subject: The person; the rest pose decides where an arc is placed.
         rig: One of `RIGS`.
-        count: How many cameras.
-        size: Height of the pictures in pixels; those of a head are as wide.
+        count: Number of cameras.
+        size: Height of the pictures in pixels; pictures of heads are square.
     """
     if rig == "body":
         return camera_rings(count, size)
@@ -53,7 +54,12 @@ def cameras_of(subject: Subject, rig: str, count: int, size: int) -> tuple[Camer
 
 
 def camera_rings(count: int, height: int) -> tuple[Camera, ...]:
-    """Cameras all around a body, azimuths evenly spaced; neighbours stand on different rings."""
+    """Cameras all around a body at evenly spaced azimuths; neighbours are on different rings.
+
+    Args:
+        count: Number of cameras.
+        height: Height of the pictures in pixels.
+    """
     width = 2 * round(ASPECT * height / 2)
     focal = height * BODY_DISTANCE / BODY.height
     intrinsics = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
@@ -68,13 +74,13 @@ def camera_rings(count: int, height: int) -> tuple[Camera, ...]:
 
 
 def camera_arc(subject: Subject, rig: str, count: int, size: int) -> tuple[Camera, ...]:
-    """Cameras on a frontal arc around the head; the first looks straight at the face.
+    """Cameras on a frontal arc around the head; the first one looks straight at the face.
 
     Args:
-        subject: Its rest pose places the rig.
+        subject: The person; the rest pose decides where the arc is placed.
         rig: One of `ARCS`.
-        count: How many cameras.
-        size: Width and height of the pictures.
+        count: Number of cameras.
+        size: Width and height of the pictures in pixels.
     """
     framing = ARCS[rig]
     target = subject.head_in_world + np.array([0.0, framing.aim, 0.0])

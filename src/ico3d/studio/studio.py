@@ -1,4 +1,4 @@
-"""The studio: backdrop, and pictures of a person."""
+"""The studio: draws a person before a backdrop."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ SUPERSAMPLING = 3
 
 
 def backdrop(camera: Camera, lamps: Lamps) -> np.ndarray:
-    """(H, W, 3) float32: a mottled grey cloth far behind the person, as the camera sees it."""
+    """(H, W, 3) float32 picture of a mottled grey cloth far behind the person."""
     columns, rows = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     pixels = np.stack([columns, rows, np.ones_like(rows)], axis=-1)  # (H, W, 3)
     rays = pixels @ np.linalg.inv(camera.intrinsics).T @ camera.world_to_camera[:3, :3]
@@ -42,12 +42,12 @@ def _cloth_backdrop(rays, tint):
 
 @dataclass(frozen=True)
 class Figure:
-    """A person in one frame, as every camera sees them.
+    """A person in one frame, ready to be drawn by any camera.
 
     Attributes:
-        scene: What is drawn, in canonical head space.
-        lights: The studio's lamps, in canonical head space.
-        world_from_head: (4, 4).
+        scene: The posed person in canonical head space.
+        lights: The studio's lights in canonical head space.
+        world_from_head: (4, 4) pose of the head.
     """
 
     scene: Scene
@@ -56,10 +56,10 @@ class Figure:
 
 
 class Studio:
-    """Takes pictures of one person."""
+    """Draws pictures of one person."""
 
     def __init__(self, subject: Subject, lamps: Lamps):
-        """Paints the person, which takes about a second."""
+        """Computes the person's painted values, which takes about a second."""
         self.subject = subject
         self._lamps = lamps
         cards = np.isin(subject.materials, CARDS)
@@ -91,11 +91,11 @@ class Studio:
         )
 
     def figure(self, vertices: np.ndarray, world_from_head: np.ndarray) -> Figure:
-        """A person in one frame.
+        """Prepares a person for the pictures of one frame.
 
         Args:
-            vertices: (V, 3) float32 posed, canonical head space.
-            world_from_head: (4, 4) pose of the head; the whole mesh is brought there.
+            vertices: (V, 3) float32 posed vertices, canonical head space, metres.
+            world_from_head: (4, 4) pose of the head, which moves the whole mesh to the world.
         """
         covered = BUST if self.subject.skeleton is None else WHOLE
         lights = lights_on(vertices, self._solid, world_from_head, self._lamps, covered)
@@ -105,8 +105,8 @@ class Studio:
         """Draws one picture.
 
         Returns:
-            rgb (H, W, 3) float32 display values premultiplied by alpha, and alpha (H, W) float32,
-            the part of each pixel that the person covers.
+            rgb (H, W, 3) float32, display values premultiplied by alpha, and alpha (H, W) float32,
+            the share of each pixel that the person covers.
         """
         scene, lights = figure.scene, figure.lights
         local = camera.moved(figure.world_from_head)

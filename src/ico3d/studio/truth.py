@@ -1,6 +1,6 @@
-"""Where the joints of a synthetic person were: for measuring, never for training.
+"""True positions of a synthetic person's joints: for measuring, never for training.
 
-Nothing of it lies in a recording; it is acted again from the recording's settings.
+Recordings do not contain these positions; they are recomputed from the recording's settings.
 """
 
 import json
@@ -18,13 +18,13 @@ from ico3d.studio.recording import Recording
 
 @dataclass(frozen=True)
 class TrueJoints:
-    """Joints of a synthetic person through F frames.
+    """Positions of J joints of a synthetic person in F frames.
 
     Attributes:
-        names: J names, MakeHuman's.
-        places: (F, J, 3) metres in the world.
-        turns: (F, J, 3, 3) from rest to the world, of what the joints carry.
-        rest: (J, 3) metres, where the person stands at rest.
+        names: Names of the joints in MakeHuman's default rig.
+        places: (F, J, 3) positions in the world, metres.
+        turns: (F, J, 3, 3) rotations from rest to the world, of what the joints carry.
+        rest: (J, 3) positions at rest, metres.
     """
 
     names: tuple[str, ...]
@@ -34,11 +34,11 @@ class TrueJoints:
 
 
 def true_joints(folder: Path, subject: Path) -> TrueJoints:
-    """The joints of the whole person whom a folder shows.
+    """The joints of the whole person in a synthetic recording.
 
     Args:
-        folder: What `ico3d capture synthetic --rig body` wrote.
-        subject: The file of the person; the recording knows its name only.
+        folder: Folder that `ico3d capture synthetic --rig body` wrote.
+        subject: The person's file, of which the recording stores only the name.
 
     Raises:
         CaptureError: If the recording does not show a whole person.

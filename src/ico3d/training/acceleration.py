@@ -1,4 +1,4 @@
-"""Faster arithmetic for the networks of a model: bfloat16 on CUDA, and torch.compile."""
+"""Faster arithmetic for a model's networks: bfloat16 on CUDA, and torch.compile."""
 
 import os
 import shutil
@@ -14,23 +14,24 @@ from ico3d.errors import SettingsError
 def accelerated(
     network: Callable[..., Tensor], device: torch.device, mixed_precision: bool, compiled: bool
 ) -> Callable[..., Tensor]:
-    """A copy of a network that computes what the network does, faster.
+    """A function that computes the same as a network, but faster.
 
-    Only the network is touched: kernels and losses stay in float32, and so do the parameters,
-    their gradients and what the network gives. bfloat16 has the range of float32, so that no loss
-    needs scaling.
+    Only the network runs faster: rendering and losses stay in float32, as do the parameters, their
+    gradients and the network's outputs. bfloat16 has the range of float32, so losses need no
+    scaling.
 
     Args:
-        network: From tensors to a tensor; the first axis of any may change from call to call.
-        device: Where it runs.
-        mixed_precision: Whether its matrix products run in bfloat16. On the CPU nothing changes.
-        compiled: Whether torch.compile makes its code: at the first call, half a minute.
+        network: A function of tensors that returns a tensor; sizes of first axes may change between
+            calls.
+        device: The device that the network runs on.
+        mixed_precision: Whether matrix products run in bfloat16; without effect on the CPU.
+        compiled: Whether to use torch.compile, which takes half a minute at the first call.
 
     Returns:
-        The network itself where nothing is to change.
+        The fast function; the network itself if neither option has an effect.
 
     Raises:
-        SettingsError: If it shall be compiled and there is no compiler.
+        SettingsError: If `compiled` is set and there is no C++ compiler.
     """
     mixed = mixed_precision and device.type == "cuda"
     if compiled:

@@ -1,4 +1,4 @@
-"""Checkpoints: one safetensors file with tensors and a JSON state, written atomically."""
+"""Checkpoints: tensors and a JSON state in one safetensors file, written atomically."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -15,16 +15,16 @@ from ico3d.errors import ModelError
 
 
 def save_tensors(path: Path, tensors: dict[str, Tensor], state: dict) -> None:
-    """Writes tensors and a JSON-serialisable state into one file: all of it or nothing."""
+    """Writes tensors and a JSON-serialisable state into one file, atomically."""
     contiguous = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
     write_atomic(path, save(contiguous, metadata={"state": json.dumps(state)}))
 
 
 def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict]:
-    """Reads what `save_tensors` wrote, onto the CPU.
+    """Reads the tensors, onto the CPU, and the state that `save_tensors` wrote.
 
     Raises:
-        ModelError: If the file is missing, damaged, or was written by something else.
+        ModelError: If the file is missing, damaged, or no checkpoint.
     """
     with _opened(path) as file:
         state = json.loads((file.metadata() or {})["state"])
@@ -32,9 +32,9 @@ def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict]:
 
 
 def placed(tensors: dict[str, Tensor], place: Callable[[str], torch.device]) -> dict[str, Tensor]:
-    """What a checkpoint held, each tensor where `place` says that one of its name belongs.
+    """Moves each tensor of a checkpoint to the device that `place` returns for its name.
 
-    Single whole numbers stay on the CPU: they count, and the optimiser reads them at every step.
+    Scalar integers stay on the CPU: they count steps, and the optimiser reads them at every step.
     """
     return {
         name: tensor.to(place(name)) if tensor.is_floating_point() or tensor.dim() else tensor
@@ -43,7 +43,7 @@ def placed(tensors: dict[str, Tensor], place: Callable[[str], torch.device]) -> 
 
 
 def load_state(path: Path) -> dict:
-    """Only the state, without reading the tensors; arguments and errors as for `load_tensors`."""
+    """Reads only the state of a checkpoint, not its tensors; errors as for `load_tensors`."""
     with _opened(path) as file:
         return json.loads((file.metadata() or {})["state"])
 

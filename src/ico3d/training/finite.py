@@ -1,4 +1,4 @@
-"""Finding NaN and infinity early: before an update, naming the parameter."""
+"""Detects NaN and infinity before an update, and names the parameter."""
 
 import math
 from collections.abc import Mapping
@@ -13,16 +13,16 @@ class NotFiniteError(ModelError):
     """Optimisation has met NaN or infinity.
 
     Attributes:
-        what: The tensor that holds one, in words.
+        what: The tensor that holds NaN or infinity, in words.
     """
 
     def __init__(self, what: str):
-        """Names the tensor; the loop adds step and checkpoint."""
+        """Names the tensor; the training loop adds step and checkpoint."""
         super().__init__(f"{what} is not finite.")
         self.what = what
 
     def at(self, step: int, saved: int) -> ModelError:
-        """The sentence for the user of a run whose latest checkpoint is of step `saved`."""
+        """The error for the user; the run's latest checkpoint was written after step `saved`."""
         return ModelError(
             f"{self.what} is not finite at step {step}: look for damaged frames with ico3d "
             f"capture check and run the same command again (it goes on from step {saved}), "
@@ -31,20 +31,20 @@ class NotFiniteError(ModelError):
 
 
 def check_gradient(name: str, gradient: Tensor) -> None:
-    """Looks for NaN and infinity before a parameter takes them over.
+    """Refuses a parameter's gradient that holds NaN or infinity; call before the update.
 
     Raises:
-        NotFiniteError: If the gradient holds one.
+        NotFiniteError: If the gradient holds NaN or infinity.
     """
     if not _is_finite(gradient):
         raise NotFiniteError(f"the gradient of '{name}'")
 
 
 def check_finite(tensors: Mapping[str, Tensor]) -> None:
-    """Looks for NaN and infinity.
+    """Refuses named tensors that hold NaN or infinity.
 
     Raises:
-        NotFiniteError: Naming the first tensor that holds one.
+        NotFiniteError: At the first tensor that holds NaN or infinity.
     """
     for name, tensor in tensors.items():
         if tensor.is_floating_point() and not _is_finite(tensor):

@@ -1,4 +1,4 @@
-"""Where the numbers of a run go: metrics.jsonl, TensorBoard and the progress bar."""
+"""Writes the numbers of a training run: metrics.jsonl, TensorBoard and the progress bar."""
 
 import json
 import logging
@@ -12,17 +12,17 @@ from ico3d.common.files import write_atomic
 
 METRICS = "metrics.jsonl"
 TAIL = 4096
-"""Bytes at the end of a metrics file that surely hold a whole entry."""
+"""Bytes at the end of a metrics file that are certain to contain a complete entry."""
 
 
 class MetricsLog:
-    """Appends to `metrics.jsonl` and TensorBoard.
+    """Appends numbers to `metrics.jsonl` and to TensorBoard's files.
 
-    A resumed run first drops what an interrupted one wrote after its last checkpoint.
+    A resumed run first removes entries that the interrupted run wrote after its last checkpoint.
     """
 
     def __init__(self, folder: Path, first_step: int):
-        """Opens both below `folder`; entries from `first_step` on are dropped."""
+        """Opens the files in `folder` and removes entries from `first_step` on."""
         logging.getLogger("tensorboard").setLevel(logging.ERROR)
         from torch.utils.tensorboard import SummaryWriter
 
@@ -33,14 +33,14 @@ class MetricsLog:
         self._board = SummaryWriter(str(folder / "tensorboard"), purge_step=first_step)
 
     def write(self, step: int, values: Mapping[str, float]) -> None:
-        """Records the values of one step."""
+        """Appends the values of one step."""
         self._file.write(json.dumps({"step": step, **values}) + "\n")
         self._file.flush()
         for name, value in values.items():
             self._board.add_scalar(name, value, step)
 
     def close(self) -> None:
-        """Closes both."""
+        """Closes the files."""
         self._file.close()
         self._board.close()
 
@@ -54,7 +54,7 @@ def _entries_before(path: Path, step: int) -> list[str]:
 
 
 def latest_entry(folder: Path) -> dict | None:
-    """The last entry in a run's metrics.jsonl, which somebody may be writing to; None without."""
+    """The last entry of a run's metrics.jsonl, or None; a training may be writing to the file."""
     try:
         with (folder / METRICS).open("rb") as file:
             file.seek(max(file.seek(0, os.SEEK_END) - TAIL, 0))
@@ -65,12 +65,12 @@ def latest_entry(folder: Path) -> dict | None:
 
 
 def readable(numbers: Mapping[str, float]) -> str:
-    """The numbers in the order the trainee gave them."""
+    """The numbers as a short text, in the order in which the trainee returned them."""
     return "  ".join(f"{name} {value:.4g}" for name, value in numbers.items())
 
 
 def progress_bar() -> Progress:
-    """A bar with steps, time left and a field `numbers` for what matters."""
+    """A progress bar with steps, remaining time and a text field `numbers`."""
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),

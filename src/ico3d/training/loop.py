@@ -1,4 +1,4 @@
-"""The loop every optimisation runs in: resume, step, log, check, save."""
+"""The loop of every training: resume, step, log, check, save."""
 
 import math
 import time
@@ -17,50 +17,50 @@ from ico3d.training.run import RunFolder, checkpoint_state
 
 
 class Trainee(Protocol):
-    """What the loop optimises.
+    """A model with its optimiser, as the training loop sees them.
 
-    All randomness of a step must follow from the seed and the step's number, so that a resumed
-    run repeats the uninterrupted one.
+    All randomness of a step must depend on the seed and the step's number alone, so that a resumed
+    run repeats an uninterrupted one.
     """
 
     def place(self, name: str) -> torch.device:
-        """Where one of its tensors belongs: with the parameter that it is, or is about."""
+        """The device of the tensor `name` of `tensors`; moments lie with their parameter."""
         ...
 
     def step(self, index: int) -> Mapping[str, float | Tensor]:
-        """Does optimisation step `index`; returns its numbers, `loss` among them."""
+        """Does optimisation step `index`; returns numbers to log, among them `loss`."""
         ...
 
     def tensors(self) -> dict[str, Tensor]:
-        """Everything that steps change: parameters and optimiser moments, by name."""
+        """All tensors that steps change, by name: parameters and the optimiser's moments."""
         ...
 
     def state(self) -> dict:
-        """What else steps change, JSON-serialisable."""
+        """Everything else that steps change, JSON-serialisable."""
         ...
 
     def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
-        """Takes back what `tensors` and `state` gave; each tensor is at its place."""
+        """Restores what `tensors` and `state` returned; each tensor is on the device of `place`."""
         ...
 
 
 class Watch(Protocol):
-    """Somebody who looks on."""
+    """An observer of a training, such as a live page."""
 
     def after_step(self, done: int, values: Mapping[str, float | Tensor]) -> None:
-        """Told when `done` steps are done, on the training thread, with the numbers of the last."""
+        """Called on the training thread when `done` steps are done; `values` are the last's."""
         ...
 
 
 @dataclass(frozen=True)
 class LoopSettings:
-    """How many steps a loop makes, and how often it writes something.
+    """Number of steps of a training loop, and how often the loop logs and saves.
 
     Attributes:
         steps: Optimisation steps.
         log_every: Steps between entries in metrics.jsonl.
         checkpoint_every: Steps between checkpoints.
-        label: What the progress bar says.
+        label: Text beside the progress bar.
     """
 
     steps: int
@@ -72,20 +72,20 @@ class LoopSettings:
 def run_loop(
     trainee: Trainee, run: RunFolder, settings: LoopSettings, watch: Watch | None = None
 ) -> float:
-    """Runs all steps that are left; the caller marks the run finished.
+    """Runs all remaining steps; the caller marks the run as finished.
 
     Args:
         trainee: The model with its optimiser.
-        run: Where its checkpoint and metrics lie.
-        settings: How many steps, and how often something is written.
-        watch: Told after each step; its time does not count.
+        run: The folder of the run's checkpoint and metrics.
+        settings: Number of steps, and how often to log and save.
+        watch: Observer that is called after each step; the time it takes is not counted.
 
     Returns:
-        Seconds spent in steps, those before interruptions included.
+        Seconds spent in steps, including those before interruptions.
 
     Raises:
-        ModelError: If the loss, a gradient or a parameter is not finite any more; it is named,
-            and the latest checkpoint stays as it was.
+        ModelError: If the loss, a gradient or a parameter is no longer finite; the sentence names
+            the tensor, and the latest checkpoint is kept.
     """
     first, seconds = _resume(trainee, run)
     log = MetricsLog(run.path, first)
@@ -137,6 +137,6 @@ def _resume(trainee: Trainee, run: RunFolder) -> tuple[int, float]:
 
 
 def saved_steps(folder: Path) -> int:
-    """Steps that a run has behind it at its latest checkpoint; somebody may be running it."""
+    """Number of steps in a run's latest checkpoint; safe while the run is going on."""
     state = checkpoint_state(folder)
     return 0 if state is None else state["step"]

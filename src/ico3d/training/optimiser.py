@@ -1,8 +1,8 @@
-"""Adam and SGD over named tensors, with moments that can be saved, split and pruned.
+"""Adam and SGD over named tensors, whose moments can be saved, split and pruned.
 
-`torch.optim` keys its state by parameter objects and saves it as a pickle; density control needs
-to cut moments along the Gaussians, checkpoints need tensors by name, and on the CPU a step over
-large tensors must be one pass through memory.
+`torch.optim` keys its state by parameter objects and saves pickles. Here density control has to cut
+moments along the Gaussians, checkpoints need names, and on the CPU an update of large tensors has
+to be a single pass through memory.
 """
 
 import math
@@ -17,39 +17,39 @@ from ico3d.training.finite import check_gradient
 BETA1 = 0.9
 BETA2 = 0.999
 EPSILON = 1e-15
-"""As in 3D Gaussian splatting: gradients of positions are far below Adam's usual 1e-8."""
+"""Adam's ε as in 3D Gaussian splatting: gradients of positions are far below the usual 1e-8."""
 BLOCK = 4096
-"""Numbers that a thread updates at a time."""
+"""Numbers that a thread updates as one block."""
 
 
 class Optimiser:
     """Adam, or plain SGD, over tensors named by the caller.
 
     Attributes:
-        kind: "adam" or "sgd".
-        moments: name.first and name.second → tensors shaped like the parameter; name.steps → how
-            often the parameter was updated.
+        kind: `adam` or `sgd`.
+        moments: By name: NAME.first and NAME.second are shaped like the parameter NAME; NAME.steps
+            counts the parameter's updates.
     """
 
     def __init__(self, kind: str = "adam"):
-        """Starts without moments: they are made at a parameter's first update."""
+        """Starts without moments; a parameter's first update creates them."""
         self.kind = kind
         self.moments: dict[str, Tensor] = {}
 
     def update(
         self, name: str, value: Tensor, gradient: Tensor, rate: float, weight_decay: float = 0.0
     ) -> None:
-        """Updates `value` in place.
+        """Updates `value` in place by one step.
 
         Args:
-            name: Key of its moments.
+            name: Name of the parameter in `moments`.
             value: The parameter, any shape, contiguous.
             gradient: Shaped as the parameter.
             rate: Learning rate.
-            weight_decay: Factor of the parameter added to its gradient (L2).
+            weight_decay: Factor by which the parameter is added to its gradient (L2).
 
         Raises:
-            NotFiniteError: If the gradient holds NaN or infinity; nothing is changed then.
+            NotFiniteError: If the gradient holds NaN or infinity; then nothing is changed.
         """
         value, gradient = value.detach(), gradient.detach()
         check_gradient(name, gradient)
@@ -79,7 +79,7 @@ class Optimiser:
 
 
 def bias_corrections(steps: int) -> tuple[np.float32, np.float32]:
-    """The factors of Adam's first moment and of the root of its second after `steps` updates."""
+    """Corrections of Adam's first moment and of the root of its second after `steps` updates."""
     first = 1.0 / (1.0 - BETA1**steps)
     second = 1.0 / math.sqrt(1.0 - BETA2**steps)
     return np.float32(first), np.float32(second)
@@ -93,7 +93,7 @@ def adam_reference(
     rate: float,
     corrections: tuple,
 ) -> None:
-    """One Adam step in plain torch, in place; `adam_kernel` does the same in one pass."""
+    """One Adam step in plain torch, in place; `adam_kernel` does the same in a single pass."""
     first.lerp_(gradient, 1.0 - BETA1)
     second.mul_(BETA2).addcmul_(gradient, gradient, value=1.0 - BETA2)
     denominator = second.sqrt().mul_(float(corrections[1])).add_(EPSILON)
@@ -104,8 +104,8 @@ def adam_reference(
 def adam_kernel(value, first, second, gradient, rate, first_correction, second_correction):
     """One Adam step over flat float32 arrays, in place.
 
-    Threads share blocks, which end where they end whatever the number of threads: the numbers at
-    the end of a loop are computed one by one, and rounded otherwise than eight at a time.
+    Work is cut into blocks whose ends do not depend on the number of threads: the last numbers of a
+    loop are computed singly and round differently from those computed eight at a time.
     """
     beta1, beta2, epsilon = np.float32(BETA1), np.float32(BETA2), np.float32(EPSILON)
     rest1, rest2 = np.float32(1.0 - BETA1), np.float32(1.0 - BETA2)

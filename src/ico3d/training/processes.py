@@ -1,17 +1,18 @@
-"""Processes that begin with everything imported."""
+"""Starts worker processes that have already imported what they need."""
 
 import multiprocessing
 from multiprocessing.context import ForkServerContext
 
 
 def fork_server(module: str) -> ForkServerContext:
-    """Starts processes as copies of one that has imported what they need and has done nothing.
+    """A multiprocessing context whose processes are forked from one clean, prepared process.
 
-    Importing takes seconds, a copy does not; and such a copy has neither the threads nor the CUDA
-    context of the process that asks for it, which a plain fork would not survive.
+    The prepared process has imported `module` and done nothing else. Forking avoids seconds of
+    imports, and the copy has neither the threads nor the CUDA context of the calling process, which
+    a plain fork would not survive.
 
     Args:
-        module: What the processes need. The first call decides for all.
+        module: The module that the processes need; only the first call in a process has an effect.
     """
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload([module, "torch.utils.tensorboard"])

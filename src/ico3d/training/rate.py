@@ -1,4 +1,4 @@
-"""Learning rates; settings name them, so this needs no torch."""
+"""Learning rates; this module imports no torch, because settings use it."""
 
 from dataclasses import dataclass
 
@@ -9,12 +9,12 @@ class Rate:
 
     Attributes:
         initial: The rate at step 0.
-        decay: The factor it has reached at the last step.
+        decay: The rate at the last step, as a factor of `initial`.
     """
 
     initial: float
     decay: float = 1.0
 
     def at(self, progress: float) -> float:
-        """The rate when `progress` (0 to 1) of the steps are done."""
+        """The rate when a share `progress` (0 to 1) of the steps is done."""
         return self.initial * self.decay**progress

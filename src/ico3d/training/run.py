@@ -1,4 +1,4 @@
-"""The folder of one optimisation: settings, checkpoint, metrics."""
+"""The folder of one training run: settings, checkpoint, metrics."""
 
 import json
 from collections.abc import Mapping
@@ -12,19 +12,19 @@ from ico3d.training.checkpoint import load_state, load_tensors, save_tensors
 
 CHECKPOINT = "checkpoint.safetensors"
 NESTED = "settings"
-"""What the command line sets lies under this name; older runs have it among the rest."""
+"""Key under which the options of the command line are stored; older runs store them unnested."""
 
 
 class RunFolder:
-    """What lies on disk of one training run.
+    """The files of one training run.
 
     Attributes:
-        path: The folder; made when missing.
-        settings: What the run was started with; a resumed run must have the same.
+        path: The folder; created if missing.
+        settings: The settings that the run was started with; a resumed run must have the same.
     """
 
     def __init__(self, path: Path, settings: Mapping):
-        """Opens the folder for these settings; what killed runs left half done is removed.
+        """Opens the folder for a run with these settings; removes unfinished files of killed runs.
 
         Raises:
             SettingsError: If the folder holds a run with other settings.
@@ -61,7 +61,7 @@ class RunFolder:
         return self.path / CHECKPOINT
 
     def checkpoint(self) -> tuple[dict[str, Tensor], dict] | None:
-        """The latest checkpoint, or None before the first."""
+        """Tensors and state of the latest checkpoint, or None before the first."""
         file = self._checkpoint_file
         return load_tensors(file) if file.exists() else None
 
@@ -70,20 +70,20 @@ class RunFolder:
         save_tensors(self._checkpoint_file, tensors, state)
 
     def finish(self, summary: dict) -> None:
-        """Marks the run as finished and drops its checkpoint."""
+        """Marks the run as finished, with a summary, and deletes its checkpoint."""
         write_atomic(self.path / "finished.json", json.dumps(summary, indent=1).encode())
         self._checkpoint_file.unlink(missing_ok=True)
 
     def finished(self) -> dict | None:
-        """The summary of a finished run, None while it is not."""
+        """The summary of a finished run, or None."""
         file = self.path / "finished.json"
         return json.loads(file.read_text()) if file.exists() else None
 
 
 def checkpoint_state(folder: Path) -> dict | None:
-    """The state in a run's latest checkpoint, None before the first.
+    """The state of a run's latest checkpoint, or None before the first.
 
-    Leaves the folder as it is, which opening the run would not: somebody may be writing to it.
+    Unlike opening a `RunFolder`, this changes nothing in the folder, so the run may be going on.
     """
     try:
         return load_state(folder / CHECKPOINT)

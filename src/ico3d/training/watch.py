@@ -1,6 +1,6 @@
-"""Looking on while something trains: a page in the browser, served by viser.
+"""A live page that shows a training in the browser, served by viser.
 
-viser answers the browser on threads of its own. They only set flags here; everything that touches
+viser answers the browser on its own threads. Those threads only set flags; everything that touches
 the model happens in `after_step`, on the training thread.
 """
 
@@ -25,26 +25,29 @@ HOST = "127.0.0.1"
 PERIOD = 1.0
 """Seconds between two updates of the page."""
 ANSWER = 0.1
-"""Seconds between two pictures after somebody has moved something."""
+"""Shortest time in seconds between two pictures while a visitor moves something."""
 
 RADIUS = 10.0
-"""What the page shows is as large, in units of its scene: viser keeps covariances as 16-bit floats,
-which a Gaussian of half a millimetre, in metres, falls out of."""
+"""Size at which the page shows the scene, in viser's units.
+
+viser stores covariances as 16-bit floats, which cannot represent a Gaussian of half a millimetre in
+metres.
+"""
 LARGEST = 200.0
-"""Longest standard deviation in those units, for the same reason."""
+"""Longest standard deviation in viser's units, also because of 16-bit covariances."""
 
 UP_SAMPLES = 50
-"""Cameras that decide which way is up."""
+"""Number of cameras from which the upward direction is estimated."""
 
 
 @dataclass(frozen=True)
 class Slider:
-    """A number that whoever looks on can change.
+    """A number that visitors of the page can change.
 
     Attributes:
-        name: Shown beside it.
-        low: Its least value.
-        high: Its greatest.
+        name: Label of the slider.
+        low: Smallest value.
+        high: Largest value.
     """
 
     name: str
@@ -53,38 +56,38 @@ class Slider:
 
 
 class Watchable(Protocol):
-    """What the page shows: Gaussians in training, frame by frame of their recording.
+    """A model in training as the page needs it: Gaussians for each frame of the recording.
 
     Attributes:
-        frames: How many frames there are to choose from.
-        sliders: Inputs besides the frame that a visitor can change.
+        frames: Number of frames to choose from.
+        sliders: Inputs of the model, besides the frame, that visitors can change.
     """
 
     frames: int
     sliders: Sequence[Slider]
 
     def camera(self, frame: int) -> Camera:
-        """Who recorded a frame, in the space of the Gaussians."""
+        """A camera that recorded the frame, in the space of the Gaussians."""
         ...
 
     def values(self, frame: int) -> Mapping[str, float]:
-        """What the sliders stand at in a frame."""
+        """The values of the sliders in a frame of the recording."""
         ...
 
     def gaussians(self, frame: int, values: Mapping[str, float]) -> Gaussians:
-        """The Gaussians in a frame, but with these values."""
+        """The Gaussians of a frame, with the sliders at `values`."""
         ...
 
     def pictures(self, frame: int) -> tuple[Tensor, Tensor]:
-        """(H, W, 3) each: what was recorded, and the same rendered."""
+        """The recorded picture of a frame and its rendering, (H, W, 3) each."""
         ...
 
 
 class LivePage:
-    """A `Watch` that shows its subject in the browser until it is closed."""
+    """An observer of a training that shows the model in the browser during a `with` block."""
 
     def __init__(self, subject: Watchable, port: int):
-        """Serves at this port of this machine only, or the next free one.
+        """Serves on this port of 127.0.0.1, or on the next free one.
 
         Raises:
             MissingExtraError: If viser is not installed.
@@ -117,7 +120,7 @@ class LivePage:
         self.server.stop()
 
     def after_step(self, done: int, values: Mapping[str, float | Tensor]) -> None:
-        """Updates the page if it is time and somebody looks; stays here while paused."""
+        """Updates the page if an update is due and somebody is connected; waits while paused."""
         self._update_if_due(done, values)
         while not self._running.is_set():
             time.sleep(ANSWER)

@@ -1,1 +1,1 @@
-"""The table of weights."""
+"""The table of pretrained weights that ico3d can use but does not ship."""

@@ -1,19 +1,20 @@
-"""What can be said of weights: their files, their repository, their package."""
+"""Data classes for entries of the table of weights: files, packages and repositories."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class RemoteFile:
-    """One file of some weights.
+    """One file that a set of weights consists of, and where it is downloaded from.
 
     Attributes:
-        name: How it is called here.
-        url: Where it is downloaded from.
-        sha256: Of what is downloaded, in hexadecimal; its first digits where no more is known
-            (PyTorch puts eight of them into its file names); empty where nothing is known.
-        git_blob: Its id in the git repository it comes from, instead.
-        keep: Prefix of the tensors that are kept where a PyTorch file becomes safetensors.
+        name: The file's name on this machine.
+        url: Address of the download.
+        sha256: SHA-256 of the download in hexadecimal, or its first digits where only those are
+            known (PyTorch puts eight of them into file names); empty where the checksum is unknown.
+        git_blob: Id of the file in the git repository it comes from; where given, checked instead
+            of `sha256`.
+        keep: Where a PyTorch file is converted to safetensors: prefix of the tensors that are kept.
     """
 
     name: str
@@ -25,14 +26,15 @@ class RemoteFile:
 
 @dataclass(frozen=True)
 class PackagedModel:
-    """A TensorFlow Lite model inside a Python package, for a bundle of MediaPipe's Tasks API.
+    """A TensorFlow Lite model that lies in a Python package and goes into a MediaPipe bundle.
 
     Attributes:
-        name: How it is called in the bundle.
-        path: Where it lies in the package.
-        sha256: In hexadecimal.
-        mean: Of what the model takes: it is given (value − mean) / deviation of values in 0..255.
-        deviation: See `mean`.
+        name: The model's name in the bundle.
+        path: The model's path in the package.
+        sha256: SHA-256 of the model in hexadecimal.
+        mean: Number subtracted from pixel values (0 to 255) before the model reads them: the
+            model's input is (value − mean) / deviation.
+        deviation: Number by which pixel values are divided after `mean` was subtracted.
     """
 
     name: str
@@ -44,13 +46,13 @@ class PackagedModel:
 
 @dataclass(frozen=True)
 class ModelPackage:
-    """A Python package with models that a bundle of MediaPipe's Tasks API can be made of.
+    """A Python package with models from which a bundle for MediaPipe's Tasks API can be made.
 
     Attributes:
-        package: By its name in a package index.
-        version: The one that holds these models.
-        size: Bytes to download.
-        models: In the order of the bundle.
+        package: The package's name in the package index.
+        version: The package's version that holds these models.
+        size: Size of the download in bytes.
+        models: The models, in the order in which they stand in the bundle.
     """
 
     package: str
@@ -61,18 +63,21 @@ class ModelPackage:
 
 @dataclass(frozen=True)
 class Weights:
-    """Weights under one name: some files, or a repository of the Hugging Face hub.
+    """A named set of pretrained weights: single files, or a repository of the Hugging Face hub.
 
     Attributes:
-        name: What the user calls them.
-        purpose: What needs them.
-        size: Bytes to download, to about two digits.
-        licence: By its usual name.
-        files: To download one by one; the first one stands for all.
-        package: What the file is made of where its own address cannot be reached.
-        repository: `owner/name` on the hub, instead of files.
-        wanted: Which of the repository's files, as patterns; the first one must be there.
-        notice: What the licence forbids, one sentence; who fetches them is asked to agree.
+        name: The name by which users ask for the weights.
+        purpose: The part of ico3d that needs the weights.
+        size: Size of the download in bytes, to about two digits.
+        licence: The licence's usual name.
+        files: Files that are downloaded one by one; the address of the first is shown as their
+            source.
+        package: Python package from which the file can be made where its address cannot be reached.
+        repository: `owner/name` on the Hugging Face hub, for weights without `files`.
+        wanted: Patterns of the repository's files to download; a file that matches the first
+            pattern must exist.
+        notice: One sentence on what the licence forbids; users must agree before the download.
+            Empty where no consent is needed.
     """
 
     name: str
@@ -87,15 +92,15 @@ class Weights:
 
     @property
     def source(self) -> str:
-        """Where they come from, for people."""
+        """Where the weights come from, as a text for users."""
         return f"huggingface.co/{self.repository}" if self.repository else self.files[0].url
 
     @property
     def checked_by(self) -> str:
-        """How a download is checked, for people.
+        """How a download is checked, as a text for users.
 
-        By the hub's own client, by a checksum, or, where none is known, by its length and by how
-        files of its kind begin.
+        The hub's client checks its own downloads. A file is checked by its checksum or, where no
+        checksum is known, by its length and its first bytes.
         """
         if self.repository:
             return "hub"

@@ -1,6 +1,6 @@
 """The weights that ico3d can use and does not ship, where they come from, and their licences.
 
-The facts are in `TABLE` and nowhere else.
+`TABLE` is the only place that holds these facts.
 """
 
 from ico3d.common.catalogue.kinds import ModelPackage, PackagedModel, RemoteFile, Weights

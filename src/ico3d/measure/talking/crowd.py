@@ -1,4 +1,4 @@
-"""`ico3d bench sessions`: many visitors at once, each with a tone that only he may hear."""
+"""`ico3d bench sessions`: many visitors at once, each with a tone that only they may hear."""
 
 import asyncio
 from dataclasses import dataclass
@@ -29,9 +29,9 @@ class Visit:
     """What one visitor heard.
 
     Attributes:
-        tones: Loudest tone of each piece of speech, Hz, in multiples of APART.
-        ahead: Milliseconds by which each piece was there before it was played, but for the first
-            of an utterance.
+        tones: Loudest tone of each piece of speech, Hz, in multiples of `APART`.
+        ahead: Milliseconds by which each piece arrived before it was to be played, except the first
+            piece of an utterance.
     """
 
     tones: list[float]
@@ -41,13 +41,16 @@ class Visit:
 def measure(
     bundle: Path, visitors: int, microphones: int = 0, script: Script = SCRIPT
 ) -> list[Visit]:
-    """Has all visitors ask within WITHIN seconds, twice.
+    """Has all visitors ask within `WITHIN` seconds, twice.
 
     Args:
-        bundle: The avatar.
-        visitors: How many visitors talk at once.
-        microphones: Of how many the microphone is open.
-        script: What the voices say.
+        bundle: The avatar to serve.
+        visitors: Number of visitors who talk at once.
+        microphones: Number of visitors with an open microphone.
+        script: What the services of the server do.
+
+    Returns:
+        What each visitor heard.
 
     Raises:
         SettingsError: If there are no visitors, more than there are tones, or more microphones.
@@ -61,7 +64,7 @@ def measure(
 
 
 async def visit(url: str, visitors: int, microphones: int) -> list[Visit]:
-    """Lets visitors of the avatar at a URL ask, some of them with an open microphone."""
+    """Has visitors ask the avatar at a URL; `microphones` of them have an open microphone."""
     opened = [await open_page(url, microphone=n < microphones) for n in range(visitors)]
     pages = [page for page, _ in opened]
     for utterance in (1, 2):
@@ -82,18 +85,18 @@ async def _ask(page: SimulatedPage, utterance: int, delay: float) -> None:
 
 
 def tones(page: SimulatedPage) -> list[float]:
-    """The loudest tone of each piece of speech that is long enough to tell, Hz."""
+    """The loudest tone in Hz of each piece of speech that is long enough to tell."""
     return [tone_of(m.pcm) for m in page.messages(Speech) if len(m.pcm) >= SPEECH_RATE // 10]
 
 
 def tone_of(pcm: np.ndarray) -> float:
-    """The loudest multiple of APART in (S,) int16 at 24 kHz, Hz."""
+    """The loudest multiple of `APART` in samples (S,) int16 at 24 kHz, Hz."""
     heights = np.abs(np.fft.rfft(pcm * np.hanning(len(pcm)), n=SPEECH_RATE))  # one per Hz
     return float(APART * round(int(heights.argmax()) / APART))
 
 
 def ahead(page: SimulatedPage) -> list[float]:
-    """Milliseconds by which pieces came before they were played; not of those that begin."""
+    """Milliseconds by which pieces of speech arrived early, except first pieces of utterances."""
     started: dict[int, float] = {}
     found = []
     for at, message in page.log:
@@ -108,7 +111,7 @@ def ahead(page: SimulatedPage) -> list[float]:
 
 
 def figures(visits: list[Visit]) -> dict[str, Any]:
-    """How many heard one tone that nobody else heard, and how early speech was there."""
+    """How many visitors heard exactly one tone, their own, and how early speech arrived."""
     heard = [set(visit.tones) for visit in visits]
     own = [len(tones) == 1 and sum(bool(tones & other) for other in heard) == 1 for tones in heard]
     early = [value for visit in visits for value in visit.ahead]
@@ -121,7 +124,7 @@ def figures(visits: list[Visit]) -> dict[str, Any]:
 
 
 def table(figures: dict[str, Any]) -> Table:
-    """The figures as a table for the terminal."""
+    """The figures of `figures` as a table for the terminal."""
     shown = Table("visitors at once", str(figures["visitors"]))
     shown.add_row("heard their own tone only", str(figures["heard_their_own_tone_only"]))
     shown.add_row("pieces of speech", str(figures["pieces"]))

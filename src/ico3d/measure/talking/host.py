@@ -1,4 +1,4 @@
-"""What a virtual machine's host takes of its processor time, for others."""
+"""Measures the processor time that a virtual machine's host withholds (steal time)."""
 
 import os
 import time
@@ -13,16 +13,16 @@ COLUMN = 8  # of the line of all cores: ticks in which one of them was to run an
 
 @dataclass
 class Stolen:
-    """Time that was taken.
+    """Steal time of a virtual machine.
 
     Attributes:
-        cores: How many cores the host kept from running, on average; None where it is not known.
+        cores: Mean number of cores that the host kept from running; None if unknown.
     """
 
     cores: float | None = None
 
     def sentence(self) -> str:
-        """The share of stolen time as a sentence."""
+        """The steal time as a sentence for users."""
         if self.cores is None:
             return "Whether the machine was this process' own is not known."
         return f"The host kept {self.cores:.2f} of {os.cpu_count()} cores from running meanwhile."
@@ -30,10 +30,10 @@ class Stolen:
 
 @contextmanager
 def watched() -> Iterator[Stolen]:
-    """Measures what is taken while something runs: times are longer for it.
+    """Measures steal time during the `with` block, by which other measured times are longer.
 
     Yields:
-        Is filled in at the end.
+        The result, which is filled in at the end of the block.
     """
     found, since, before = Stolen(), time.monotonic(), stolen_seconds()
     yield found
@@ -43,7 +43,7 @@ def watched() -> Iterator[Stolen]:
 
 
 def stolen_seconds() -> float | None:
-    """Seconds taken since the machine started, of all cores together; None where not known."""
+    """Steal time in seconds since the machine started, over all cores; None if unknown."""
     try:
         ticks = int(STAT.read_text().split("\n", 1)[0].split()[COLUMN])
         return ticks / os.sysconf("SC_CLK_TCK")

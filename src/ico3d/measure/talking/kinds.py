@@ -1,6 +1,6 @@
-"""What `ico3d bench chat` tries."""
+"""The kinds of trials of `ico3d bench chat`."""
 
 from typing import Literal
 
 Kind = Literal["questions", "interruptions", "assent", "share"]
-"""Questions that are answered, answers that are broken off, "uh-huh", the server's own time."""
+"""Answered questions, interrupted answers, "uh-huh" during answers, the server's own share."""

@@ -1,4 +1,4 @@
-"""A page without a picture: talks with a server as the viewer does, and plays by the clock."""
+"""A page without a picture: talks with a server like the viewer, and plays in real time."""
 
 import asyncio
 import contextlib
@@ -35,10 +35,10 @@ M = TypeVar("M", bound=ServerMessage)
 
 
 class Player:
-    """When each sample would be heard."""
+    """Computes when each sample of an utterance would be heard."""
 
     def __init__(self):
-        """Nothing plays."""
+        """Starts in silence."""
         self.utterance = -1
         self.started = 0.0  # monotonic s of sample 0
         self.received = 0.0  # s of sound
@@ -46,7 +46,7 @@ class Player:
         self._paused: float | None = None  # position at which it waits
 
     def take(self, message: ServerMessage, now: float) -> None:
-        """Follows what arrives."""
+        """Updates the state by a message that arrived at time `now` in seconds."""
         if isinstance(message, Speech):
             if message.utterance != self.utterance:
                 self.utterance, self.started = message.utterance, now + SCHEDULING
@@ -62,18 +62,18 @@ class Player:
                 self.started, self._paused = now - self._paused, None
 
     def position(self, now: float) -> float:
-        """Seconds of the utterance heard."""
+        """Seconds of the current utterance that have been heard."""
         if self._paused is not None:
             return self._paused
         return float(np.clip(now - self.started, 0, self.received))
 
     def playing(self, now: float) -> int | None:
-        """The utterance that sounds; None in silence."""
+        """Number of the utterance that is being heard, or None."""
         sounds = self.started <= now < self.started + self.received
         return self.utterance if sounds and not self._ended and self._paused is None else None
 
     def clock(self, now: float) -> Clock | None:
-        """What the page reports now; the last report is that of the end."""
+        """The report of playback that a page would send now; None after the end was reported."""
         if self._ended:
             return None
         position = self.position(now)
@@ -82,10 +82,10 @@ class Player:
 
 
 class SimulatedPage:
-    """One connection. Everything that arrives is kept with its time in `log`."""
+    """One connection; everything that arrives is kept in `log` with its time."""
 
     def __init__(self, socket: ClientConnection, microphone: bool):
-        """Use `open_page`."""
+        """Takes an open socket; call `open_page` instead."""
         self._socket = socket
         self.log: list[tuple[float, ServerMessage]] = []
         self.player = Player()
@@ -101,17 +101,21 @@ class SimulatedPage:
         await self._socket.send(encode(message))
 
     async def send_frame(self, frame: str | bytes) -> None:
-        """Sends anything."""
+        """Sends a raw frame, valid or not."""
         await self._socket.send(frame)
 
     def say(self, pcm: np.ndarray) -> float:
-        """Speaks (S,) int16 at 16 kHz into the microphone; returns when its last sample is said."""
+        """Speaks (S,) int16 at 16 kHz into the microphone in real time.
+
+        Returns:
+            Time of the last sample, seconds.
+        """
         start = max(self._sample, self._sample + len(self._sound))
         self._sound = np.concatenate([self._sound, pcm])
         return self._opened + (start + len(pcm)) / protocol.MICROPHONE_RATE
 
     def messages(self, kind: type[M], since: int = 0) -> list[M]:
-        """What arrived of one kind, from log entry `since` on."""
+        """Messages of one kind that have arrived, from log entry `since` on."""
         return [message for _, message in self.log[since:] if isinstance(message, kind)]
 
     async def wait(
@@ -121,10 +125,13 @@ class SimulatedPage:
         timeout: float = 20.0,
         where: Callable[[M], bool] = lambda _: True,
     ) -> tuple[float, M]:
-        """The first message of a kind from log entry `since` on, with its time.
+        """Waits for the first message of a kind that `where` accepts, from log entry `since` on.
+
+        Returns:
+            The time of its arrival in seconds, and the message.
 
         Raises:
-            TimeoutError: If none comes.
+            TimeoutError: If no such message arrives within `timeout` seconds.
         """
         async with asyncio.timeout(timeout):
             seen = since
@@ -148,14 +155,14 @@ class SimulatedPage:
         return bool(ends) and self._position() >= ends[0] / protocol.SPEECH_RATE
 
     def recorded(self, pcm: np.ndarray, end: float) -> Audio:
-        """What the microphone sends: (CHUNK,) int16 whose last sample was recorded at `end`."""
+        """A message of the microphone: (CHUNK,) int16, the last sample recorded at time `end`."""
         playing = self.player.playing(end)
         position = 0.0 if playing is None else self.player.position(end)
         return Audio(self._sample, pcm, playing, position)
 
     @property
     def state(self) -> str:
-        """What the avatar does."""
+        """The avatar's current state, as the server last reported it."""
         states = (m.state for _, m in reversed(self.log) if isinstance(m, State))
         return next(states, "idle")
 
@@ -171,7 +178,7 @@ class SimulatedPage:
         return self._socket.close_code, self._socket.close_reason or ""
 
     async def closed(self) -> int | None:
-        """Waits until the server closes; returns its code."""
+        """Waits until the server closes the connection; returns the close code."""
         await self._socket.wait_closed()
         return self._socket.close_code
 
@@ -208,13 +215,16 @@ class SimulatedPage:
 async def open_page(
     url: str, session: str | None = None, last_index: int = -1, microphone: bool = True
 ) -> tuple[SimulatedPage, Welcome]:
-    """Connects and says hello.
+    """Connects to a server and opens a session.
 
     Args:
         url: Address of the server, `http://…`.
-        session: The session to resume.
-        last_index: Its last speech message.
-        microphone: Open the microphone at once.
+        session: Id of the session to resume, or None for a new one.
+        last_index: Index of the last speech message received in that session.
+        microphone: Whether to open the microphone at once.
+
+    Returns:
+        The page, and the server's welcome.
     """
     address = url.replace("http", "ws", 1).rstrip("/") + "/ws"
     socket = await connect(address, max_size=protocol.MAX_BINARY_FRAME)

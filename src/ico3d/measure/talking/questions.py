@@ -1,4 +1,4 @@
-"""What is said to an avatar that is measured: recordings of people, or synthetic voices."""
+"""What is said to an avatar under test: recordings of people, or synthetic voices."""
 
 import wave
 from dataclasses import dataclass
@@ -24,12 +24,12 @@ SLOW = 150  # words per minute
 
 @dataclass(frozen=True)
 class Sayings:
-    """Sounds to say, (S,) int16 at 16 kHz each, without silence around them.
+    """Sounds to say, (S,) int16 at 16 kHz each, trimmed of silence.
 
     Attributes:
-        questions: To be answered.
-        objections: Said over an answer that is to end.
-        assent: "Uh-huh": said over an answer that is to go on.
+        questions: Questions that the avatar is to answer.
+        objections: Sentences said over an answer that has to stop.
+        assent: "Uh-huh", said over an answer that has to go on.
     """
 
     questions: list[np.ndarray]
@@ -38,10 +38,10 @@ class Sayings:
 
 
 def sayings(folder: Path | None) -> Sayings:
-    """Recordings of a folder ask and interrupt; synthetic voices where there is none.
+    """Recordings of a folder as questions and objections; without a folder, synthetic voices.
 
     Raises:
-        CaptureError: If a recording cannot be used, or the folder has none.
+        CaptureError: If a recording cannot be used, or the folder has no recordings.
     """
     assent = [spoken(text, voice) for text in ASSENT for voice in VOICES]
     if folder is None:
@@ -56,10 +56,10 @@ def sayings(folder: Path | None) -> Sayings:
 
 
 def read_recording(path: Path) -> np.ndarray:
-    """A recorded question, (S,) int16.
+    """Reads a recorded question, (S,) int16.
 
     Raises:
-        CaptureError: If it is no PCM16 mono WAV of 16 kHz with something in it.
+        CaptureError: If the file is no PCM16 mono WAV of 16 kHz, or contains only silence.
     """
     try:
         with wave.open(str(path)) as file:
@@ -77,7 +77,7 @@ def read_recording(path: Path) -> np.ndarray:
 
 
 def audible(samples: np.ndarray) -> np.ndarray:
-    """(S,) without what is quiet before and after: it begins and ends where speech does."""
+    """Samples (S,) without the quiet parts before and after speech."""
     padded = np.pad(samples.astype(np.float32), (0, -len(samples) % MOMENT))
     level = np.sqrt((padded.reshape(-1, MOMENT) ** 2).mean(axis=1))  # RMS by moment
     loud = np.nonzero(level > QUIET * level.max())[0]
@@ -85,9 +85,9 @@ def audible(samples: np.ndarray) -> np.ndarray:
 
 
 def broken_off(samples: np.ndarray) -> np.ndarray:
-    """(S,) up to the end of its loudest moment after the first half second.
+    """Samples (S,) up to the end of the loudest moment after the first half second.
 
-    Where a voice fades, and a room with it, its end is a matter of opinion; here it is not.
+    Where a voice fades into the room's echo, its end is ambiguous; here it is not.
     """
     begin = MICROPHONE_RATE // 2 // MOMENT
     whole = samples[: len(samples) // MOMENT * MOMENT].astype(np.float32)
@@ -96,7 +96,7 @@ def broken_off(samples: np.ndarray) -> np.ndarray:
 
 
 def spoken(text: str, voice: str) -> np.ndarray:
-    """A text in a synthetic voice, (S,) int16."""
+    """A text, spoken by a synthetic voice, (S,) int16 at 16 kHz."""
     import soxr
 
     speech = synthesize(text, voice, rate=SLOW)

@@ -1,7 +1,7 @@
-"""Services with set delays: whatever time a conversation takes besides is the server's own.
+"""Services with set delays, so that all other time of a conversation is the server's own.
 
-They understand, think and speak nothing. For timing and load tests of the server, also on machines
-where the real services are slow or absent.
+They recognise, think and speak nothing. They serve timing and load tests of the server, also on
+machines where the real services are slow or missing.
 """
 
 import asyncio
@@ -37,17 +37,17 @@ SLOWEST = 10.0  # s that pipecat waits for words or for sound
 
 @dataclass(frozen=True)
 class Script:
-    """What the three do.
+    """What recogniser, language model and voice do.
 
     Attributes:
-        recognition: Seconds from the noticed end of speech to the transcript.
-        language: Seconds from a question to the first word of its answer.
-        voice: Seconds from a clause to its first sound.
-        heard: What every question is taken for.
-        answer: What is said to it.
-        seconds: How long the sound of a clause is.
-        pitch: Its tone, Hz.
-        apart: Hz by which the tone of each further session is higher.
+        recognition: Seconds from the detected end of speech to the transcript.
+        language: Seconds from a question to the first word of the answer.
+        voice: Seconds from a clause to the first sound.
+        heard: Transcript of every question.
+        answer: Answer to every question.
+        seconds: Duration of each clause's sound in seconds.
+        pitch: Frequency of the voice's tone, Hz.
+        apart: Hz by which the tone rises from one session to the next.
     """
 
     recognition: float = 0.1
@@ -60,11 +60,11 @@ class Script:
     apart: float = 0.0
 
     def delay(self) -> float:
-        """Seconds that all of them take, one after the other."""
+        """Sum of the three delays in seconds."""
         return self.recognition + self.language + self.voice
 
     def services(self) -> Chosen:
-        """The three, as a conversation takes them."""
+        """The three services, as a conversation takes them."""
         pitches = itertools.count(self.pitch, self.apart)
 
         def voice(script: Script, _: Context) -> FrameProcessor:
@@ -75,16 +75,16 @@ class Script:
 
 
 class Recognition(STTService):
-    """Hears the same words in everything."""
+    """A recogniser that returns the same words for every sound."""
 
     def __init__(self, script: Script):
-        """A recogniser for one session."""
+        """Creates the recogniser of one session."""
         settings = STTSettings(model="scripted", language=None)
         super().__init__(ttfs_p99_latency=SLOWEST, settings=settings)
         self._script = script
 
     async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame | None, None]:
-        """Nothing: words come after the end of speech."""
+        """Yields nothing: the transcript comes after the end of speech."""
         yield None
 
     async def _handle_vad_user_stopped_speaking(self, frame: VADUserStoppedSpeakingFrame):
@@ -98,15 +98,15 @@ class Recognition(STTService):
 
 
 class Language(LLMService):
-    """Gives every question the same answer, word by word."""
+    """A language model that gives the same answer to every question, word by word."""
 
     def __init__(self, script: Script):
-        """A model for one session."""
+        """Creates the language model of one session."""
         super().__init__(settings=LLMSettings(model="scripted"))
         self._script = script
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
-        """Answers contexts, passes everything else."""
+        """Answers frames with a context and passes all other frames on."""
         await super().process_frame(frame, direction)
         if not isinstance(frame, LLMContextFrame):
             await self.push_frame(frame, direction)
@@ -119,10 +119,10 @@ class Language(LLMService):
 
 
 class Voice(TTSService):
-    """Hums one tone."""
+    """A voice that hums one tone."""
 
     def __init__(self, script: Script):
-        """A voice for one session."""
+        """Creates the voice of one session."""
         super().__init__(
             push_start_frame=True,
             push_stop_frames=True,
@@ -133,18 +133,18 @@ class Voice(TTSService):
         self._script = script
 
     async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame | None, None]:
-        """Yields a clause's sound in one frame."""
+        """Yields the sound of a clause in one frame."""
         await asyncio.sleep(self._script.voice)
         sound = tone(self._script.pitch, self._script.seconds)
         yield TTSAudioRawFrame(sound.tobytes(), SPEECH_RATE, 1, context_id=context_id)
 
 
 def tone(pitch: float, seconds: float) -> np.ndarray:
-    """(S,) int16 at 24 kHz."""
+    """A tone of `pitch` Hz, (S,) int16 at 24 kHz."""
     times = np.arange(int(seconds * SPEECH_RATE)) / SPEECH_RATE
     return (8000 * np.sin(2 * np.pi * pitch * times)).astype(np.int16)
 
 
 def made(kind: Callable[[Script], FrameProcessor], script: Script, _: Context) -> FrameProcessor:
-    """One of the three for one session."""
+    """Creates one of the three services for one session."""
     return kind(script)

@@ -1,4 +1,7 @@
-"""Servers to be measured, each a process of its own; `python -m` this runs one with a script."""
+"""Starts servers to be measured, each in its own process.
+
+`python -m ico3d.measure.talking.serving` runs a server with a script.
+"""
 
 import dataclasses
 import json
@@ -18,10 +21,10 @@ STARTING = 30  # s that a server may take
 
 @contextmanager
 def serving(bundle: Path, settings: Path | None = None) -> Iterator[str]:
-    """Runs `ico3d serve` on a free port; yields its URL.
+    """Runs `ico3d serve` on a free port during the `with` block; yields the URL.
 
     Raises:
-        BundleError: If it does not start.
+        BundleError: If the server does not start.
     """
     command = ["-m", "ico3d.cli", "serve", str(bundle), "--port", "0"]
     with _running([*command, *(["--settings", str(settings)] if settings else [])]) as url:
@@ -30,15 +33,15 @@ def serving(bundle: Path, settings: Path | None = None) -> Iterator[str]:
 
 @contextmanager
 def serving_script(bundle: Path, script: Script, settings: ChatSettings) -> Iterator[str]:
-    """Runs a server whose services have set delays; yields its URL.
+    """Runs a server whose services have set delays during the `with` block; yields the URL.
 
     Args:
-        bundle: The avatar.
+        bundle: The avatar to serve.
         script: What the services do.
-        settings: Its turns, and how many sessions it takes.
+        settings: Settings of turns and of the number of sessions.
 
     Raises:
-        BundleError: If it does not start.
+        BundleError: If the server does not start.
     """
     told = [json.dumps(dataclasses.asdict(options)) for options in (script, settings.turns)]
     with _running(["-m", __name__, str(bundle), *told, str(settings.max_sessions)]) as url:
@@ -79,7 +82,7 @@ def _wait_until_ready(url: str) -> None:
 
 
 def main(bundle: str, script: str, turns: str, sessions: str) -> None:
-    """Serves with services of set delays until it is ended."""
+    """Serves with scripted services until the process is ended; arguments are JSON or numbers."""
     from ico3d.bundle.format import Bundle
     from ico3d.chat.observing.operator_log import set_up_log
     from ico3d.chat.serving import server

@@ -1,4 +1,4 @@
-"""Talks with a served avatar by the clock: questions, interruptions, and "uh-huh"."""
+"""Single trials with a served avatar in real time: questions, interruptions, and "uh-huh"."""
 
 import asyncio
 import time
@@ -35,13 +35,14 @@ LOOK = 0.01  # s between two looks; times are those at which messages came
 
 @dataclass(frozen=True)
 class Question:
-    """One question and the start of its answer, milliseconds.
+    """A question and the start of the answer; times in milliseconds.
 
     Attributes:
-        voice_to_voice: From the question's last audible sample to the answer's first sample as
-            a page plays it.
-        arrival: The same until the first sample was there.
-        parts: What the server says of the same turn.
+        voice_to_voice: From the question's last audible sample to the answer's first sample, as a
+            page plays it.
+        arrival: From the question's last audible sample to the arrival of the answer's first
+            sample.
+        parts: Parts of the time, as the server reports them for the same turn.
         is_disturbed: Whether the machine's host took processor time meanwhile.
     """
 
@@ -53,12 +54,12 @@ class Question:
 
 @dataclass(frozen=True)
 class Interruption:
-    """Somebody spoke over an answer; milliseconds from the first audible sample.
+    """A visitor spoke over an answer; times in milliseconds from the first audible sample.
 
     Attributes:
         duck: Until the answer was at least 20 dB quieter.
-        stop: Until it was stopped.
-        after: Messages of the stopped answer that came later.
+        stop: Until the answer was stopped.
+        after: Number of messages of the stopped answer that arrived later.
     """
 
     duck: float
@@ -68,12 +69,12 @@ class Interruption:
 
 @dataclass(frozen=True)
 class Assent:
-    """Somebody said "uh-huh" while an answer was heard.
+    """A visitor said "uh-huh" during an answer.
 
     Attributes:
         resumed: Whether the answer went on to its end.
-        silence: Milliseconds for which it had fallen silent.
-        lossless: Whether each sample of it was heard, once and in order.
+        silence: Milliseconds for which the answer was silent.
+        lossless: Whether each sample of the answer was heard exactly once and in order.
     """
 
     resumed: bool
@@ -83,7 +84,7 @@ class Assent:
 
 @asynccontextmanager
 async def visit(url: str):
-    """A page whose greeting is over."""
+    """A connected page after the greeting, closed at the end of the `with` block."""
     page, _ = await open_page(url)
     await page.wait(Speech)
     await peace(page)
@@ -92,7 +93,7 @@ async def visit(url: str):
 
 
 async def peace(page: SimulatedPage) -> None:
-    """Cuts an answer short and waits until nobody says anything."""
+    """Interrupts any answer and waits until nobody speaks."""
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
         since = len(page.log)
@@ -125,7 +126,7 @@ async def ask(page: SimulatedPage, sound: np.ndarray) -> Question | None:
 
 
 async def interrupt(page: SimulatedPage, sound: np.ndarray, after: float) -> Interruption:
-    """Speaks over an answer that has been heard for `after` seconds."""
+    """Speaks over an answer after `after` seconds of it have been heard."""
     utterance = await answer_heard(page, LONG, after)
     since = len(page.log)
     onset = page.say(sound) - len(sound) / MICROPHONE_RATE
@@ -146,7 +147,7 @@ async def interrupt(page: SimulatedPage, sound: np.ndarray, after: float) -> Int
 
 
 async def assent(page: SimulatedPage, sound: np.ndarray, after: float, whole: np.ndarray) -> Assent:
-    """Says "uh-huh" while an answer is heard, whose sound would be `whole` (S,)."""
+    """Says "uh-huh" after `after` seconds of an answer, whose full sound is `whole` (S,) int16."""
     utterance = await answer_heard(page, SHORT, after)
     since = len(page.log)
     page.say(sound)
@@ -165,7 +166,7 @@ async def assent(page: SimulatedPage, sound: np.ndarray, after: float, whole: np
 
 
 async def whole_answer(page: SimulatedPage) -> np.ndarray:
-    """The sound of the short answer that nobody disturbs, (S,) int16 at 24 kHz."""
+    """The undisturbed sound of the short answer, (S,) int16 at 24 kHz."""
     utterance = await answer_heard(page, SHORT, 0.1)
     await until(lambda: page.has_heard(utterance), 3 * PATIENCE)
     await peace(page)
@@ -173,7 +174,7 @@ async def whole_answer(page: SimulatedPage) -> np.ndarray:
 
 
 async def answer_heard(page: SimulatedPage, text: str, seconds: float) -> int:
-    """Asks for something and listens for a while; the utterance that is being heard."""
+    """Asks by text and listens for `seconds`; returns the number of the utterance being heard."""
     since = len(page.log)
     await page.send(Text(text))
     _, first = await page.wait(Speech, since)
@@ -182,7 +183,7 @@ async def answer_heard(page: SimulatedPage, text: str, seconds: float) -> int:
 
 
 async def until(condition: Callable[[], bool], seconds: float) -> bool:
-    """Waits for a condition; whether it became true in time."""
+    """Waits up to `seconds` for a condition; returns whether it became true."""
     end = time.monotonic() + seconds
     while not condition() and time.monotonic() < end:
         await asyncio.sleep(LOOK)
@@ -190,7 +191,7 @@ async def until(condition: Callable[[], bool], seconds: float) -> bool:
 
 
 def first_speech(page: SimulatedPage, since: int) -> dict[int, float]:
-    """When each utterance began to arrive."""
+    """Time at which each utterance began to arrive, from log entry `since` on."""
     firsts: dict[int, float] = {}
     for at, message in page.log[since:]:
         if isinstance(message, Speech):
@@ -201,13 +202,13 @@ def first_speech(page: SimulatedPage, since: int) -> dict[int, float]:
 def of_utterance(
     page: SimulatedPage, utterance: int, since: int
 ) -> list[tuple[float, ServerMessage]]:
-    """What came for an utterance, with its times."""
+    """Messages of an utterance with their times of arrival, from log entry `since` on."""
     log = page.log[since:]
     return [(at, m) for at, m in log if getattr(m, "utterance", None) == utterance]
 
 
 def sound_of(page: SimulatedPage, utterance: int) -> np.ndarray:
-    """The samples of an utterance as its messages place them, (S,); silence where none came."""
+    """Samples (S,) of an utterance, placed as its messages say; silence in gaps."""
     pieces = [m for m in page.messages(Speech) if m.utterance == utterance]
     sound = np.zeros(sum(len(m.pcm) for m in pieces), np.int16)
     for piece in pieces:
@@ -217,6 +218,6 @@ def sound_of(page: SimulatedPage, utterance: int) -> np.ndarray:
 
 
 def turns_told(page: SimulatedPage, since: int) -> list[tuple[float, Metrics]]:
-    """What the server said of the times of turns, and when."""
+    """The server's reports on the timing of turns, with their times of arrival."""
     told = [(at, m) for at, m in page.log[since:] if isinstance(m, Metrics)]
     return [(at, metrics) for at, metrics in told if metrics.name == "turn"]

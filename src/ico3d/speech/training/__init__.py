@@ -1,1 +1,1 @@
-"""How the built-in speech encoder is trained, on synthetic voices."""
+"""Training of the built-in speech encoder on synthetic voices."""

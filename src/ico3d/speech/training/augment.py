@@ -1,4 +1,4 @@
-"""Makes synthetic speech vary as recordings do: voice, microphone, room, noise (numpy)."""
+"""Varies synthetic speech as recordings vary: voice, microphone, room, noise (numpy)."""
 
 import functools
 
@@ -10,12 +10,12 @@ _COLOURS = 5
 
 
 def recorded(sound: np.ndarray, other: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """One utterance as some microphone in some room might record it.
+    """An utterance as it might sound when recorded by some microphone in some room.
 
     Args:
-        sound: (S,) speech at 16 kHz; keeps its timing.
-        other: (S',) somebody else's speech, for the background.
-        random: Decides everything.
+        sound: (S,) speech at 16 kHz; the timing is kept.
+        other: (S',) speech of somebody else at 16 kHz, for the background.
+        random: Source of all random choices.
 
     Returns:
         (S,) float32 within [-1, 1].

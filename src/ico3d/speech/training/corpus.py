@@ -1,4 +1,4 @@
-"""Endless labelled speech: espeak-ng voices of many languages read random words."""
+"""Unlimited labelled speech: espeak-ng voices of many languages read random words."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -38,12 +38,14 @@ mel row int(3.2·i − 6.4), on average 6.8 before 3.2·i."""
 
 @dataclass(frozen=True)
 class Batch:
-    """Labelled utterances of equal length.
+    """Labelled utterances of equal length. M is the number of mel rows.
 
     Attributes:
-        mel: (b, 80, M) float32 mel rows.
-        visemes: (b, M − 15) int64, at the time that each window stands for.
-        articulation: (b, M − 15, 5) float32.
+        mel: (b, 80, M) float32 mel spectra.
+        visemes: (b, M − 15) int64 viseme index of each window, at the time that the window
+            describes.
+        articulation: (b, M − 15, 5) float32 lip articulation of each window
+            (`targets.ARTICULATION`).
     """
 
     mel: np.ndarray
@@ -52,13 +54,13 @@ class Batch:
 
 
 def make_batch(random: np.random.Generator, size: int, seconds: float, held_out: bool) -> Batch:
-    """Draws utterances.
+    """Synthesises a batch of random utterances.
 
     Args:
-        random: Decides everything.
-        size: b.
-        seconds: Length of each.
-        held_out: Whether to draw from the voices, languages and words kept for evaluation.
+        random: Source of all random choices.
+        size: b, number of utterances.
+        seconds: Length of each utterance in seconds.
+        held_out: Whether to use the voices, languages and words reserved for evaluation.
 
     Raises:
         MissingExtraError: If espeak-ng or soxr is not installed.
@@ -78,7 +80,7 @@ def make_batch(random: np.random.Generator, size: int, seconds: float, held_out:
 def utterance(
     random: np.random.Generator, seconds: float, held_out: bool
 ) -> tuple[np.ndarray, tuple[Phoneme, ...]]:
-    """Clean speech at 16 kHz of a given length, with its phonemes."""
+    """Clean random speech (S,) at 16 kHz of the given length in seconds, and its phonemes."""
     languages = HELD_OUT_LANGUAGES if held_out else LANGUAGES
     variants = HELD_OUT_VARIANTS if held_out else VARIANTS
     speech = synthesize(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class EncoderSettings:
-    """How the built-in encoder is trained; the encoder in the package has these settings.
+    """How the built-in encoder is trained; the defaults made the encoder that is part of ico3d.
 
     Attributes:
         steps: Optimisation steps.
@@ -13,9 +13,9 @@ class EncoderSettings:
         seconds: Length of an utterance, s.
         learning_rate: Highest learning rate of AdamW, which warms up over 5 % of the steps and then
             falls to 0.
-        articulation_weight: Weight of the squared error of articulation against the cross-entropy
-            of visemes.
-        seed: Decides voices, texts, recordings and first weights.
+        articulation_weight: Weight of the squared error of articulation; the cross-entropy of
+            visemes has weight 1.
+        seed: Seed of voices, texts, simulated recordings and initial weights.
     """
 
     steps: int = 600

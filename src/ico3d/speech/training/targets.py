@@ -1,4 +1,4 @@
-"""What the built-in encoder learns to hear: mouth shapes and lip articulation over time."""
+"""Training targets of the built-in encoder: mouth shapes and lip articulation over time."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ from ico3d.common.espeak import Phoneme
 from ico3d.common.visemes import VISEMES, visemes
 
 ARTICULATION = ("opening", "spread", "rounding", "closure", "labiodental")
-"""Continuous values, 0 to 1: lips apart, corners apart, lips forward, p b m, f v."""
+"""Lip values, 0 to 1: lips apart, corners apart, lips forward, closed (p b m), on teeth (f v)."""
 
 _STEP = 0.005  # s, the grid on which sounds are laid out
 _SPREAD = np.array([0.030, 0.040, 0.045, 0.015, 0.018])  # s, how far each value blends in time
@@ -34,11 +34,12 @@ _SHAPES = {
 
 
 def viseme_track(phonemes: Sequence[Phoneme], end: float, times: np.ndarray) -> np.ndarray:
-    """Which viseme is made at given times.
+    """Index of the viseme at each of the given times.
 
     Args:
-        phonemes: In the order of time.
-        end: When the last one ends, seconds; silence before the first and from then on.
+        phonemes: Phonemes in order of time.
+        end: Time in seconds at which the last phoneme ends; before the first phoneme and after this
+            time there is silence.
         times: (T,) seconds.
 
     Returns:
@@ -49,14 +50,14 @@ def viseme_track(phonemes: Sequence[Phoneme], end: float, times: np.ndarray) -> 
 
 
 def articulation_track(phonemes: Sequence[Phoneme], end: float, times: np.ndarray) -> np.ndarray:
-    """How open, spread, rounded and closed the lips are at given times.
+    """How open, spread, rounded and closed the lips are at the given times.
 
-    Each sound asks for its values; neighbours blend under symmetric windows, so that nothing
-    comes early or late.
+    Each phoneme has target values. Neighbouring phonemes blend under symmetric windows, so that
+    movements are neither early nor late.
 
     Args:
-        phonemes: In the order of time.
-        end: When the last one ends, seconds.
+        phonemes: Phonemes in order of time.
+        end: Time in seconds at which the last phoneme ends.
         times: (T,) seconds.
 
     Returns:

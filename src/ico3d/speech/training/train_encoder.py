@@ -27,25 +27,28 @@ _STATISTICS_BATCHES = 8
 
 
 class Readout(nn.Module):
-    """Linear reading of visemes and articulation from features; it judges, avatars lack it."""
+    """Linear layers from features to visemes and articulation; only for training and evaluation."""
 
     def __init__(self):
-        """Builds it with random weights."""
+        """Builds the layers with random weights."""
         super().__init__()
         self.visemes = nn.Linear(BUILTIN_SIZE, len(VISEMES) * len(_SHIFTS))
         self.articulation = nn.Linear(BUILTIN_SIZE, len(ARTICULATION))
 
     def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Features (…, D) to viseme logits (…, 3, 15), before, at and after, and values (…, 5)."""
+        """Features (…, D) to viseme logits (…, 3, 15) and articulation values (…, 5).
+
+        The three rows of logits are for times before, at and after the features' time.
+        """
         logits = self.visemes(features).unflatten(-1, (len(_SHIFTS), len(VISEMES)))
         return logits, self.articulation(features)
 
 
 class EncoderTraining:
-    """One optimisation: network, readout, optimiser and how far it is."""
+    """A training run: network, readout, optimiser and progress."""
 
     def __init__(self, settings: EncoderSettings, checkpoint: Path):
-        """Starts with random weights, or where the checkpoint is.
+        """Starts with random weights, or continues from the checkpoint if it exists.
 
         Raises:
             SettingsError: If the checkpoint was made with other settings.
@@ -64,7 +67,7 @@ class EncoderTraining:
             self._resume()
 
     def run(self) -> Iterator[dict[str, float]]:
-        """Trains to the end; yields the numbers of every step."""
+        """Trains to the last step; yields the numbers of every step."""
         with ThreadPoolExecutor(1) as pool:  # the next batch is made while this one trains
             following = pool.submit(self._batch, self.step)
             while self.step < self.settings.steps:
@@ -123,7 +126,11 @@ class EncoderTraining:
         self.step = state["step"]
 
     def finished(self) -> tuple[BuiltinEncoder, Readout]:
-        """The encoder without batch normalisation, features of mean 0 and deviation 1."""
+        """Encoder and readout for use after training.
+
+        Batch normalisation is merged into the convolutions, and features are scaled to mean 0 and
+        deviation 1.
+        """
         plain = BuiltinEncoder()
         state = {}
         for index, block in enumerate(self.network.blocks):
@@ -176,11 +183,12 @@ def _standardise(network: BuiltinEncoder, readout: Readout, batches: list[Batch]
 
 
 def evaluate(network: BuiltinEncoder, readout: Readout, batches: list[Batch]) -> dict:
-    """How well features tell what is said, on voices, languages and words never trained on.
+    """Measures what features tell about speech, on held-out voices, languages and words.
 
     Returns:
-        `viseme_accuracy` (share of windows), `viseme_recall` (by viseme), and by articulation
-        value its `correlation` with the truth and `lag_ms`, positive when late.
+        `viseme_accuracy`: share of windows; `viseme_recall`: by viseme; and, for each articulation
+        value, its `correlation` with the truth and `lag_ms`, which is positive if the value is
+        late.
     """
     mel = torch.from_numpy(np.concatenate([batch.mel for batch in batches]))[:, None]
     truth = np.concatenate([batch.visemes for batch in batches])  # (b, T)
@@ -216,7 +224,7 @@ def _lag_ms(found: np.ndarray, wanted: np.ndarray, reach: int = 8) -> float:
 
 
 def save_encoder(folder: Path, network: BuiltinEncoder, readout: Readout, card: dict) -> None:
-    """Writes `encoder.safetensors` (half precision) and `encoder.json`, its card."""
+    """Writes `encoder.safetensors` (half precision) and `encoder.json` (the contents of `card`)."""
     from safetensors.torch import save
 
     state = dict(network.state_dict())
@@ -228,10 +236,10 @@ def save_encoder(folder: Path, network: BuiltinEncoder, readout: Readout, card: 
 
 
 def load_readout(path: Path) -> Readout:
-    """The readout that lies in an encoder's file.
+    """Loads the readout from an encoder's file.
 
     Raises:
-        ModelError: If the file has none.
+        ModelError: If the file has no readout.
     """
     from safetensors.torch import load_file
 

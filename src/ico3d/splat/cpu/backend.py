@@ -1,4 +1,4 @@
-"""The CPU side of `splat.render`."""
+"""The CPU backend of `splat.render`."""
 
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false
@@ -23,15 +23,16 @@ def draw_gaussians(
     antialiased: bool,
     absgrad: bool,
 ) -> Drawing:
-    """Draws on black.
+    """Draws Gaussians on black, on the CPU.
 
     Args:
         gaussians: Float32, on the CPU.
-        colors: (C, N, 3).
-        cameras: C of one size; their intrinsics count.
+        colors: (C, N, 3) colours of the Gaussians as each camera sees them.
+        cameras: C cameras with one picture size; only size and intrinsics are used, not their
+            poses.
         poses: (C, 4, 4) float64, world to camera.
-        antialiased: Whether opacity makes up for the low-pass.
-        absgrad: Whether screen gradients are summed without signs.
+        antialiased: Whether a splat's opacity is reduced where the low-pass filter enlarges it.
+        absgrad: Whether screen-space gradients are also summed over pixels as absolute values.
 
     Returns:
         The drawing.

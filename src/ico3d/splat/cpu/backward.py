@@ -1,4 +1,4 @@
-"""Gradients of the compositing: tiles once more, front to back."""
+"""Gradients of the compositing; visits the tiles a second time, splats front to back."""
 
 # pyright: reportMissingParameterType=false, reportUnknownParameterType=false
 # pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
@@ -28,9 +28,9 @@ from ico3d.splat.cpu.forward import (
 from ico3d.splat.cpu.tiles import BLOCK, TILE_WIDTH, Tiles, tiles_across
 
 GRADIENTS = 9
-"""Per splat: mean (2), conic (3), opacity, colour (3)."""
+"""Gradients per splat: mean (2), conic (3), opacity, colour (3)."""
 ABSOLUTE = 2
-"""And where asked for: the mean's (2) once more, summed over pixels without their signs."""
+"""Further gradients on request: the mean's two, summed over pixels as absolute values."""
 
 
 @kernel()
@@ -173,13 +173,13 @@ def draw_backward(
     """Gradients of `draw`.
 
     Args:
-        records: (N, 9), as drawn.
-        tiles: The tiles that `draw` drew.
+        records: (N, 9) array that was given to `draw`.
+        tiles: The tiles that were given to `draw`.
         image: (H, W, 3) that `draw` returned.
-        light: (H, W) that `draw` returned.
+        light: (H, W) transmittance that `draw` returned.
         g_image: (H, W, 3) gradient with respect to the image.
         g_light: (H, W) gradient with respect to the transmittance.
-        absolute: Whether to sum the mean's gradient without signs, too.
+        absolute: Whether the mean's gradient is also summed over pixels as absolute values.
 
     Returns:
         (N, 9) float32: mean (2), conic (3), opacity, colour (3); with `absolute` (N, 11).

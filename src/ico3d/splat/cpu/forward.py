@@ -1,4 +1,4 @@
-"""Splats to pixels: alpha compositing, tile by tile, front to back."""
+"""Draws splats into pixels: alpha compositing, tile by tile, splats front to back."""
 
 # pyright: reportMissingParameterType=false, reportUnknownParameterType=false
 # pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
@@ -16,26 +16,29 @@ from ico3d.splat.cpu.tiles import BLOCK, TILE_HEIGHT, TILE_WIDTH, VECTOR, Tiles,
 
 PIXELS = TILE_WIDTH * TILE_HEIGHT
 PLANE = BLOCK * PIXELS + 3 * VECTOR
-"""A block's state is several planes of numbers, tile after tile. Planes at a multiple of 4096
-bytes from one another would pass for the same memory in the processor's store buffer."""
+"""Numbers from one plane of a block's state to the next; the state consists of several planes.
+
+The padding keeps planes from lying a multiple of 4096 bytes apart, where the processor's store
+buffer would mistake one plane for another.
+"""
 
 CHECK = 32
-"""After so many splats a tile looks whether all of its pixels are finished."""
+"""Number of splats after which a tile checks whether all of its pixels are finished."""
 
 MIN_ALPHA = np.float32(convention.MIN_ALPHA)
 MAX_ALPHA = np.float32(convention.MAX_ALPHA)
 MIN_TRANSMITTANCE = np.float32(convention.MIN_TRANSMITTANCE)
 ZERO, HALF, ONE = np.float32(0), np.float32(0.5), np.float32(1)
 FARTHEST = np.float32(8)
-"""Exponents end here: exp(−8) is under the least alpha, so every splat has ended before."""
+"""Largest exponent that is evaluated: exp(−8) is below MIN_ALPHA, so a splat has ended there."""
 
 E1, E2, E3, E4, E5, E6 = (np.float32((-1 / 16) ** k / factorial(k)) for k in range(1, 7))
-"""The Taylor series of exp(−x/16)."""
+"""Coefficients of the Taylor series of exp(−x/16) after the constant 1."""
 
 
 @kernel()
 def falloff(exponent):
-    """exp(−exponent) as the 16th power of a polynomial: unlike a call, it vectorises."""
+    """exp(−exponent) as the 16th power of a polynomial, which vectorises, unlike a call of exp."""
     x = min(exponent, FARTHEST)
     power = ONE + x * (E1 + x * (E2 + x * (E3 + x * (E4 + x * (E5 + x * E6)))))
     power *= power
@@ -46,7 +49,7 @@ def falloff(exponent):
 
 @kernel()
 def pixel_positions(state, plane):
-    """Writes pixel centres, relative to the first of their tile, into two planes of a state."""
+    """Writes pixel centres, relative to the tile's first pixel, into two planes of a state."""
     for p in range(BLOCK * PIXELS):
         state[plane * PLANE + p] = np.float32(p % TILE_WIDTH)
         state[(plane + 1) * PLANE + p] = np.float32(p % PIXELS // TILE_WIDTH)
@@ -54,7 +57,7 @@ def pixel_positions(state, plane):
 
 @kernel()
 def finished(state):
-    """Whether no pixel of the tile whose state begins here lets light through any more."""
+    """Whether every pixel of the tile at the start of `state` has used up its transmittance."""
     most = -ONE
     for p in range(PIXELS):
         most = max(most, state[p])
@@ -87,14 +90,14 @@ def _blend(state, count, splat, left, top):
 
 @kernel()
 def window(image, block, across):
-    """The part of an image (H, W, ...) that a block shows."""
+    """The part of an image (H, W, ...) that a block of tiles covers."""
     left, top = block * BLOCK % across * TILE_WIDTH, block * BLOCK // across * TILE_HEIGHT
     return image[top : top + TILE_HEIGHT, left : left + BLOCK * TILE_WIDTH]
 
 
 @kernel()
 def first_center(tile, across):
-    """Centre of a tile's first pixel."""
+    """Pixel coordinates of the centre of a tile's first pixel."""
     left, top = tile % across * TILE_WIDTH, tile // across * TILE_HEIGHT
     return np.float32(left) + HALF, np.float32(top) + HALF
 
@@ -164,7 +167,13 @@ def _pack(means2d, conics, alphas, colors, records):
 def splat_records(
     means2d: np.ndarray, conics: np.ndarray, alphas: np.ndarray, colors: np.ndarray
 ) -> np.ndarray:
-    """What a tile reads of each splat, side by side in memory.
+    """Packs what a tile reads of each splat side by side in memory.
+
+    Args:
+        means2d: (N, 2) pixels.
+        conics: (N, 3) entries xx, xy, yy of the inverse 2D covariances.
+        alphas: (N,) opacities.
+        colors: (N, 3).
 
     Returns:
         (N, 9) float32: mean (2), ½ conic xx, conic xy, ½ conic yy, opacity, colour (3).
@@ -175,14 +184,14 @@ def splat_records(
 
 
 def draw(records: np.ndarray, tiles: Tiles) -> tuple[np.ndarray, np.ndarray]:
-    """Draws splats.
+    """Draws splats on black.
 
     Args:
-        records: (N, 9) of `splat_records`.
-        tiles: Which of these splats each tile shows.
+        records: (N, 9) from `splat_records`.
+        tiles: Which of the N splats each tile shows.
 
     Returns:
-        Image (H, W, 3) float32 on black, and the transmittance (H, W) that is left.
+        Image (H, W, 3) float32, and the transmittance (H, W) left behind all splats.
     """
     image = np.empty((tiles.height, tiles.width, 3), np.float32)
     light = np.empty((tiles.height, tiles.width), np.float32)

@@ -1,4 +1,4 @@
-"""One Gaussian seen by one camera: the 2D covariance and what it is made of."""
+"""Kernels that project one Gaussian into one camera: the 2D covariance and its factors."""
 
 # pyright: reportMissingParameterType=false, reportUnknownParameterType=false
 # pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
@@ -11,7 +11,7 @@ from ico3d.splat.convention import FRUSTUM_MARGIN
 from ico3d.splat.cpu.compile import kernel
 
 CAMERA_SIZE = 16
-"""Numbers that describe a camera: fx, fy, cx, cy, rotation (9, by rows), translation (3)."""
+"""Numbers that describe a camera: fx, fy, cx, cy, rotation (9, row by row), translation (3)."""
 
 
 @kernel()
@@ -28,7 +28,7 @@ def rotation(w, x, y, z):
 
 @kernel()
 def camera_space(camera, mean):
-    """A point in camera axes."""
+    """A world point in the camera's axes."""
     x = camera[4] * mean[0] + camera[5] * mean[1] + camera[6] * mean[2] + camera[13]
     y = camera[7] * mean[0] + camera[8] * mean[1] + camera[9] * mean[2] + camera[14]
     z = camera[10] * mean[0] + camera[11] * mean[1] + camera[12] * mean[2] + camera[15]
@@ -37,14 +37,14 @@ def camera_space(camera, mean):
 
 @kernel()
 def clamped_slope(slope, focal, center, size):
-    """x/z or y/z held within the widened image, where the linearised projection stays sane."""
+    """The slope x/z, limited to a margin around the image, beyond which the linearisation fails."""
     margin = FRUSTUM_MARGIN * 0.5 * size / focal
     return min(max(slope, -center / focal - margin), (size - center) / focal + margin)
 
 
 @kernel()
 def jacobian(camera, x, y, z, width, height):
-    """The four entries of the projection's Jacobian that are not zero: 00, 02, 11, 12."""
+    """The four non-zero entries of the projection's Jacobian: 00, 02, 11, 12."""
     slope_x = clamped_slope(x / z, camera[0], camera[2], width)
     slope_y = clamped_slope(y / z, camera[1], camera[3], height)
     return camera[0] / z, -camera[0] * slope_x / z, camera[1] / z, -camera[1] * slope_y / z
@@ -52,7 +52,7 @@ def jacobian(camera, x, y, z, width, height):
 
 @kernel()
 def pixel_from_world(camera, j00, j02, j11, j12):
-    """Jacobian times camera rotation: two rows of three."""
+    """The projection's Jacobian times the camera's rotation: two rows of three numbers."""
     return (
         (
             j00 * camera[4] + j02 * camera[10],
@@ -75,7 +75,7 @@ def dot(a, b):
 
 @kernel()
 def row_times_scaled(row, turn, scale):
-    """A row times R·S: one row of the 2D covariance's square root."""
+    """A row times R·S: one row of the square root of the 2D covariance."""
     return (
         (row[0] * turn[0][0] + row[1] * turn[1][0] + row[2] * turn[2][0]) * scale[0],
         (row[0] * turn[0][1] + row[1] * turn[1][1] + row[2] * turn[2][1]) * scale[1],
@@ -85,7 +85,7 @@ def row_times_scaled(row, turn, scale):
 
 @kernel()
 def determinant(p, q):
-    """Det of [p; q]·[p; q]ᵀ as |p × q|², free of cancellation."""
+    """Determinant of [p; q]·[p; q]ᵀ, computed as |p × q|² to avoid cancellation."""
     x = p[1] * q[2] - p[2] * q[1]
     y = p[2] * q[0] - p[0] * q[2]
     z = p[0] * q[1] - p[1] * q[0]

@@ -23,7 +23,7 @@ from ico3d.splat.cpu.geometry import (
 )
 
 FARTHEST = 1e6
-"""No splat reaches farther, pixels: tiles are counted with whole numbers."""
+"""Largest extent of a splat in pixels; tile counts must fit into integers."""
 
 
 @kernel()
@@ -103,20 +103,20 @@ def project(
     """Projects N Gaussians into C cameras.
 
     Args:
-        cameras: (C, 16) float64, in the order of `geometry.CAMERA_SIZE`.
-        means: (N, 3) float32, as are the rest.
-        quats: (N, 4).
-        scales: (N, 3).
-        opacities: (N,).
+        cameras: (C, 16) float64, laid out as described at `geometry.CAMERA_SIZE`.
+        means: (N, 3) float32 centres in the world, metres.
+        quats: (N, 4) float32 rotations wxyz.
+        scales: (N, 3) float32 standard deviations, metres.
+        opacities: (N,) float32.
         width: Image width in pixels, the same for all cameras.
         height: Image height in pixels.
-        antialiased: Whether opacity makes up for the low-pass.
+        antialiased: Whether a splat's opacity is reduced where the low-pass filter enlarges it.
 
     Returns:
-        means2d (C, N, 2) pixels; conics (C, N, 3), the entries xx, xy, yy of the inverse of the
-        blurred 2D covariance; opacities (C, N) after the low-pass; depths (C, N) along z;
-        extents (C, N, 2), half sizes in pixels of the box outside of which a splat ends. Extent
-        and opacity are 0 for what a camera does not see.
+        means2d (C, N, 2) in pixels; conics (C, N, 3), the entries xx, xy, yy of the inverse of the
+        blurred 2D covariance; opacities (C, N) after the low-pass filter; depths (C, N) along z in
+        metres; extents (C, N, 2), half sizes in pixels of the box outside of which a splat ends.
+        Extent and opacity are 0 for Gaussians that a camera does not see.
     """
     shape = (len(cameras), len(means))
     means2d = np.empty((*shape, 2), np.float32)

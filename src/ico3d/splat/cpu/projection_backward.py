@@ -1,4 +1,4 @@
-"""Gradients of the projection, through the low-pass compensation too."""
+"""Gradients of the projection, including the effect of the low-pass filter on opacity."""
 
 # pyright: reportMissingParameterType=false, reportUnknownParameterType=false
 # pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
@@ -24,9 +24,9 @@ from ico3d.splat.cpu.geometry import (
 )
 
 GRADIENTS = 11
-"""Per Gaussian: mean (3), quaternion (4), scale (3), opacity."""
+"""Gradients per Gaussian: mean (3), quaternion (4), scale (3), opacity."""
 POSE = 12
-"""Numbers of a camera's pose."""
+"""Gradients per camera: rotation (9, row by row), translation (3)."""
 
 
 @kernel()
@@ -229,20 +229,20 @@ def project_backward(
     """Gradients of `project`, summed over the cameras.
 
     Args:
-        cameras: As given to `project`, as are those up to `antialiased`.
-        means: (N, 3).
-        quats: (N, 4).
-        scales: (N, 3).
-        opacities: (N,).
-        width: Pixels.
-        height: Pixels.
-        antialiased: Whether opacity makes up for the low-pass.
-        alphas: (C, N) opacities left that `project` returned; 0 takes no part.
-        gradients: (C, N, 7) with respect to means2d (2), conics (3), opacity left, depth.
+        cameras: (C, 16) float64, as given to `project`.
+        means: (N, 3) as given to `project`.
+        quats: (N, 4) as given to `project`.
+        scales: (N, 3) as given to `project`.
+        opacities: (N,) as given to `project`.
+        width: Image width in pixels.
+        height: Image height in pixels.
+        antialiased: As given to `project`.
+        alphas: (C, N) opacities that `project` returned; Gaussians with 0 are skipped.
+        gradients: (C, N, 7) gradients of the loss by means2d (2), conics (3), opacity, depth.
 
     Returns:
-        (N, 11) float32, gradients of mean (3), quaternion (4), scale (3), opacity; and (C, 12)
-        float64, those of the cameras' rotation (9, by rows) and translation (3).
+        (N, 11) float32 gradients of mean (3), quaternion (4), scale (3), opacity; and (C, 12)
+        float64 gradients of each camera's rotation (9, row by row) and translation (3).
     """
     outs = np.empty((len(means), GRADIENTS), np.float32)
     # sums of fixed parts, so that they do not depend on the number of threads

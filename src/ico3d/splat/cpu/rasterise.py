@@ -1,4 +1,4 @@
-"""The kernels as differentiable torch functions."""
+"""Torch autograd functions around the numba kernels."""
 
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false, reportUnknownParameterType=false
@@ -22,11 +22,11 @@ from ico3d.splat.cpu.tiles import Tiles, bin_splats
 
 
 def camera_numbers(cameras: Sequence[Camera], poses: Tensor) -> Tensor:
-    """(C, 16) float64 that the kernels read.
+    """Packs cameras into the (C, 16) float64 that the kernels read.
 
     Args:
-        cameras: C cameras, of which the intrinsics count.
-        poses: (C, 4, 4) float64, world to camera.
+        cameras: C cameras, of which only the intrinsics are used.
+        poses: (C, 4, 4) float64, world to camera; gradients reach them.
     """
     k = torch.from_numpy(np.stack([camera.intrinsics for camera in cameras]))  # (C, 3, 3)
     lens = torch.stack([k[:, 0, 0], k[:, 1, 1], k[:, 0, 2], k[:, 1, 2]], -1)  # (C, 4)
@@ -38,7 +38,7 @@ def _array(tensor: Tensor) -> np.ndarray:
 
 
 class Project(torch.autograd.Function):
-    """Differentiable `cpu.projection.project`; the extents carry no gradient."""
+    """Autograd function for `cpu.projection.project`; extents carry no gradient."""
 
     @staticmethod
     def forward(
@@ -52,7 +52,7 @@ class Project(torch.autograd.Function):
         height: int,
         antialiased: bool,
     ) -> tuple[Tensor, ...]:
-        """Returns means2d, conics, opacities left, depths, extents as `project` does."""
+        """Returns means2d, conics, opacities, depths and extents, as `project` does."""
         arrays = [_array(t) for t in (cameras, means, quats, scales, opacities)]
         results = project(*arrays, width=width, height=height, antialiased=antialiased)
         ctx.problem = (arrays, width, height, antialiased, results[2])
@@ -84,7 +84,7 @@ class Project(torch.autograd.Function):
 
 
 class Draw(torch.autograd.Function):
-    """Differentiable compositing of C cameras' splats."""
+    """Autograd function that composites the splats of C cameras."""
 
     @staticmethod
     def forward(
@@ -96,16 +96,17 @@ class Draw(torch.autograd.Function):
         tiles: Sequence[Tiles],
         absolute: Tensor | None,
     ) -> tuple[Tensor, Tensor]:
-        """Draws.
+        """Draws the splats of every camera.
 
         Args:
-            ctx: Autograd's.
-            means2d: (C, N, 2).
-            conics: (C, N, 3).
-            alphas: (C, N) opacities after the low-pass.
+            ctx: Autograd's context.
+            means2d: (C, N, 2) pixels.
+            conics: (C, N, 3) entries xx, xy, yy of the inverse 2D covariances.
+            alphas: (C, N) opacities after the low-pass filter.
             colors: (C, N, 3).
-            tiles: Tiles of the pictures, one object per camera.
-            absolute: (C, N, 2) that takes the means' gradients summed without signs, or None.
+            tiles: One `Tiles` for each camera.
+            absolute: (C, N, 2) buffer to which `backward` writes the gradients of means2d, summed
+                over pixels as absolute values; None where they are not wanted.
 
         Returns:
             Images (C, H, W, 3) on black and transmittances (C, H, W).
@@ -120,7 +121,7 @@ class Draw(torch.autograd.Function):
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, g_images: Tensor, g_lights: Tensor) -> tuple[Tensor | None, ...]:
-        """Gradients of means2d, conics, alphas, colors."""
+        """Gradients of means2d, conics, alphas and colors."""
         wanted = ctx.absolute is not None
         views = zip(*ctx.problem, _array(g_images), _array(g_lights), strict=True)
         gradients = torch.from_numpy(
@@ -146,6 +147,6 @@ def bin_views(
     width: int,
     height: int,
 ) -> list[Tiles]:
-    """One `Tiles` per camera from the results of `Project`."""
+    """Sorts splats into tiles: one `Tiles` per camera; the arguments are what `Project` returns."""
     views = zip(*map(_array, (means2d, conics, alphas, depths, extents)), strict=True)
     return [bin_splats(*view, width=width, height=height) for view in views]

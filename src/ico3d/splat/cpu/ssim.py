@@ -1,4 +1,4 @@
-"""SSIM and its gradient, fused: separable blurs over rows of interleaved RGB."""
+"""SSIM and its gradient in one kernel: separable blurs over rows of interleaved RGB."""
 
 # pyright: reportMissingParameterType=false, reportUnknownParameterType=false
 # pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
@@ -150,8 +150,8 @@ def ssim_with_gradient(x: np.ndarray, y: np.ndarray) -> tuple[float, np.ndarray]
     """Mean SSIM of two pictures and its gradient.
 
     Args:
-        x: (H, W, 3) float32.
-        y: (H, W, 3) float32.
+        x: (H, W, 3) float32 in [0, 1].
+        y: (H, W, 3) float32 in [0, 1].
 
     Returns:
         Mean SSIM, and its gradient (H, W, 3) with respect to x.

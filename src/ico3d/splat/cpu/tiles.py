@@ -1,4 +1,4 @@
-"""Which splats touch which tile, front to back."""
+"""Finds out which splats touch which tile of a picture, and sorts them front to back."""
 
 # pyright: reportMissingParameterType=false, reportUnknownParameterType=false
 # pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
@@ -15,39 +15,42 @@ from ico3d.splat.convention import MIN_ALPHA
 from ico3d.splat.cpu.compile import PARTS, kernel
 
 TILE_WIDTH, TILE_HEIGHT = 8, 64
-"""Pixels. Narrow tiles waste fewer pixels beside a splat, tall ones mean fewer pairs."""
+"""Size of a tile in pixels: narrow tiles waste few pixels beside a splat, tall ones save pairs."""
 
 BLOCK = 2
-"""Neighbouring tiles in a row that are drawn one after the other: together they fill whole cache
-lines of a picture. Every row has whole blocks; the last tile may lie outside."""
+"""Number of neighbouring tiles that are drawn one after the other, as a block.
+
+The tiles of a block together fill whole cache lines of a picture. Every row consists of whole
+blocks; the last tile may lie outside of the picture.
+"""
 
 VECTOR = 16
-"""Pixels that are drawn together: two rows of a tile, one or two vector registers."""
+"""Number of pixels that are drawn together: two rows of a tile, one or two vector registers."""
 
 SLACK = 0.01
-"""Pixels by which a splat's outline is widened, so that rounding cuts nothing off."""
+"""Pixels by which a splat's outline is widened, so that rounding errors cut nothing off."""
 
 DIGIT = 11
-"""Bits sorted per pass."""
+"""Bits that one pass of the radix sort takes."""
 
 
 @dataclass
 class Tiles:
-    """Splats by tile.
+    """The splats that each tile of a picture shows.
 
-    A *pair* is one splat in one tile. Pairs are numbered splat by splat, so that all pairs of a
-    splat are neighbours: its gradient is summed in one fixed order whatever thread made the parts.
+    A *pair* is one splat in one tile. All pairs of a splat have consecutive numbers, so that the
+    splat's gradient is always summed in the same order, whichever thread computed the parts.
 
     Attributes:
         width: Image width in pixels.
         height: Image height in pixels.
-        first_pair: (N,) int32, where a splat's pairs begin.
-        end_pair: (N,) int32, where they end.
-        spans: (P, 2) int32, first and end pixel of the rows within the tile that the splat of a
-            pair touches, widened to whole vectors.
-        splats: (P,) int32, the splat of a pair.
-        first_entry: (tiles + 1,) int32, where a tile's entries of `pairs` begin.
-        pairs: (P,) int32, pairs by tile, front to back.
+        first_pair: (N,) int32, number of a splat's first pair.
+        end_pair: (N,) int32, number behind a splat's last pair.
+        spans: (P, 2) int32, first and end pixel of the tile's rows that the pair's splat touches,
+            widened to whole vectors.
+        splats: (P,) int32, the splat of each pair.
+        first_entry: (tiles + 1,) int32, index into `pairs` at which a tile's entries begin.
+        pairs: (P,) int32, numbers of the pairs, tile by tile, front to back.
     """
 
     width: int
@@ -61,7 +64,7 @@ class Tiles:
 
 
 def tiles_across(width: int) -> int:
-    """Tiles in a row."""
+    """Number of tiles in a row of a picture that is `width` pixels wide."""
     return -(-width // (TILE_WIDTH * BLOCK)) * BLOCK
 
 
@@ -239,14 +242,14 @@ def bin_splats(
     width: int,
     height: int,
 ) -> Tiles:
-    """Finds each tile's splats, ordered front to back.
+    """Finds each tile's splats and sorts them front to back.
 
     Args:
         means2d: (N, 2) float32 pixels.
-        conics: (N, 3) float32.
-        alphas: (N,) float32; 0 takes no part.
-        depths: (N,) float32; those that take part are not negative.
-        extents: (N, 2) float32 half sizes of the splats' boxes in pixels.
+        conics: (N, 3) float32, entries xx, xy, yy of the inverse 2D covariances.
+        alphas: (N,) float32 opacities; splats with 0 are skipped.
+        depths: (N,) float32 metres; not negative where `alphas` is above 0.
+        extents: (N, 2) float32 half sizes of the splats' bounding boxes in pixels.
         width: Image width in pixels.
         height: Image height in pixels.
 

@@ -1,7 +1,7 @@
-"""Density control: where Gaussians are needed, more of them; where they are not, none.
+"""Density control: adds Gaussians where the pictures need more, removes those that add nothing.
 
-`growth` plans as 3DGS does, `strategy` has the interface to train with, `plan` carries everything
-that exists per Gaussian along, `relocation` the formula of the Markov chain.
+`growth` plans changes as 3DGS does; `strategy` is the interface for training loops; `plan` applies
+a change to everything stored per Gaussian; `relocation` holds a formula of 3DGS-MCMC.
 """
 
 from ico3d.splat.density.growth import (

@@ -1,4 +1,4 @@
-"""Adaptive density control of 3D Gaussian Splatting: which Gaussians clone, split and die."""
+"""The rules of 3D Gaussian Splatting by which Gaussians are cloned, split and removed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,24 +14,26 @@ from ico3d.splat.render import render
 from ico3d.splat.rendering import RenderInfo
 
 SPLIT_PARTS = 2
-"""A Gaussian that is too large becomes this many."""
+"""Number of Gaussians that a split one is replaced by."""
 
 
 @dataclass(frozen=True)
 class DensitySettings:
-    """When Gaussians multiply and die.
+    """Thresholds by which Gaussians multiply and are removed.
 
     Attributes:
-        max_gaussians: Never more than this many; the strongest gradients win.
+        max_gaussians: Upper limit on the number of Gaussians; those with the strongest gradients
+            multiply first.
         gradient_threshold: Mean screen gradient (normalised device units) above which a Gaussian
             multiplies.
-        clone_below: Gaussians whose largest scale is up to this are cloned, larger ones split,
-            metres. 3DGS: 1 % of the scene's extent.
-        prune_opacity: Those whose opacity falls below this die.
-        prune_scale: Those whose largest scale exceeds this die, metres. 3DGS: 10 % of the
-            scene's extent.
-        prune_contribution: Those that give pictures less than this times the median die.
-        growth: Part of the Gaussians that multiplies at once at most, those of strongest gradient.
+        clone_below: Of the Gaussians that multiply, those whose largest scale is at most this
+            (metres) are cloned and the others split. 3DGS: 1 % of the scene's extent.
+        prune_opacity: Gaussians with an opacity below this are removed.
+        prune_scale: Gaussians whose largest scale exceeds this (metres) are removed. 3DGS: 10 % of
+            the scene's extent.
+        prune_contribution: Gaussians are removed whose contribution to pictures is below this, as a
+            factor of the median contribution.
+        growth: Largest share of the Gaussians that multiplies at once.
     """
 
     max_gaussians: int = 50_000
@@ -45,11 +47,12 @@ class DensitySettings:
 
 @dataclass
 class DensityStats:
-    """Screen gradients gathered between two densifications.
+    """Screen-space gradients, gathered between two changes of the set of Gaussians.
 
     Attributes:
-        gradient_sum: (N,) sum over the views that saw a Gaussian.
-        views: (N,) number of those views.
+        gradient_sum: (N,) sum of a Gaussian's gradient lengths over the views that saw the
+            Gaussian.
+        views: (N,) number of views that saw the Gaussian.
     """
 
     gradient_sum: Tensor
@@ -57,14 +60,14 @@ class DensityStats:
 
     @staticmethod
     def zeros(count: int, device: torch.device | str = "cpu") -> "DensityStats":
-        """Statistics of `count` Gaussians, nothing gathered."""
+        """Empty statistics for `count` Gaussians."""
         return DensityStats(torch.zeros(count, device=device), torch.zeros(count, device=device))
 
     def add(self, info: RenderInfo) -> None:
-        """Gathers from a render after `backward`.
+        """Adds the gradients of one rendering; call after `backward`.
 
-        With a loss that averages over C cameras the gradients are C times too small; they are
-        scaled back, so that the threshold means the same for any number of cameras.
+        A loss that averages over C cameras makes gradients C times smaller. They are multiplied by
+        C here, so that the threshold means the same for any number of cameras.
 
         Raises:
             RuntimeError: If `backward` has not run.
@@ -75,14 +78,15 @@ class DensityStats:
         self.views += visible.sum(0)
 
     def mean_gradient(self) -> Tensor:
-        """(N,) mean over the views that saw a Gaussian; 0 where none did."""
+        """(N,) mean gradient length over the views that saw the Gaussian; 0 without views."""
         return self.gradient_sum / self.views.clamp_min(1)
 
 
 def contributions(gaussians: Gaussians, cameras: Sequence[Camera]) -> Tensor:
-    """What each Gaussian gives pictures: (C, N) the sum over pixels of its blending weight.
+    """Contribution of each Gaussian to each picture: (C, N) blending weights, summed over pixels.
 
-    What lies behind others, or between pixels, gives next to nothing however opaque it is.
+    Gaussians that are hidden by others, or too small for a pixel, contribute next to nothing, even
+    if opaque.
     """
     gaussians = gaussians.detach()
     one = gaussians.means.new_zeros(len(gaussians), 3).requires_grad_()
@@ -102,22 +106,22 @@ def densify_plan(
     settings: DensitySettings,
     contribution: Tensor | None = None,
 ) -> Plan:
-    """Decides what multiplies and what dies (3DGS section 5).
+    """Decides which Gaussians multiply and which are removed (3DGS section 5).
 
-    Pruned are the faint, the hidden and those that would still be too large after their split;
-    only the others multiply. Where the cap leaves no room for all of them, those of the strongest
-    gradient go first; where even those that stay are too many, the faintest die.
+    Removed are Gaussians that are faint, hidden, or too large even after a split; only the others
+    multiply. If the limit leaves no room for all, those with the strongest gradients multiply. If
+    even the remaining Gaussians exceed the limit, the faintest are removed.
 
     Args:
-        stats: What was gathered since the last plan.
+        stats: Gradients gathered since the last plan.
         scales: (N, 3) activated, metres.
-        opacities: (N,) that decide who is faint. A model that predicts opacities gives the
-            greatest over sampled frames.
-        settings: Thresholds and the cap.
-        contribution: (N,) pixels, the greatest over sampled pictures; None keeps the hidden.
+        opacities: (N,) opacities by which faint Gaussians are found. Models that predict opacities
+            pass the maximum over sampled frames.
+        settings: Thresholds and the limit on the number of Gaussians.
+        contribution: (N,) maximum of `contributions` over sampled pictures; None skips this test.
 
     Returns:
-        The plan; the same for the same arguments.
+        The plan; equal arguments give equal plans.
     """
     size = scales.detach().amax(-1)  # (N,)
     gradient = stats.mean_gradient()
@@ -146,10 +150,10 @@ def _strongest(chosen: Tensor, strength: Tensor, count: int) -> Tensor:
 
 
 def under_cap(alive: Tensor, opacities: Tensor, cap: int) -> Tensor:
-    """Mask (N,) of those alive, without the faintest where they are more than the cap."""
+    """Mask (N,) of `alive`, without the faintest Gaussians if more than `cap` are alive."""
     return _strongest(alive, opacities, cap) if int(alive.sum()) > cap else alive
 
 
 def reset_opacity_logits(logits: Tensor, ceiling: float = 0.01) -> Tensor:
-    """Stored opacity logits (N,), none above that of `ceiling` (3DGS's opacity reset)."""
+    """Limits opacity logits (N,) to the logit of `ceiling` (the opacity reset of 3DGS)."""
     return logits.detach().clamp_max(log(ceiling / (1 - ceiling)))

@@ -1,4 +1,4 @@
-"""What becomes of Gaussians, and everything per Gaussian that has to follow."""
+"""Plans for a change of the set of Gaussians, applied to everything stored per Gaussian."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,17 +9,17 @@ from torch import Tensor
 from ico3d.splat import quaternions
 
 SPLIT_SHRINK = 1.6
-"""A Gaussian that is split becomes parts smaller by this factor."""
+"""Factor by which the parts of a split Gaussian are smaller than the original."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What becomes of N Gaussians; the new order is: kept, clones, parts of the split.
+    """A change of a set of N Gaussians to M: the kept ones, then clones, then parts of split ones.
 
     Attributes:
-        keep: (K,) indices of those that stay as they are.
-        clone_from: (A,) indices of which there is one more.
-        split_from: (2·B,) indices of the split, each twice: they do not stay.
+        keep: (K,) indices of Gaussians that stay as they are.
+        clone_from: (A,) indices of Gaussians of which a copy is added.
+        split_from: (2·B,) indices of split Gaussians, each twice; the originals are not kept.
     """
 
     keep: Tensor
@@ -32,26 +32,26 @@ class Plan:
 
     @property
     def sources(self) -> Tensor:
-        """(M,) the old index of each new Gaussian."""
+        """(M,) index of the old Gaussian from which each new Gaussian comes."""
         return torch.cat([self.keep, self.clone_from, self.split_from])
 
 
 def apply_plan(values: Tensor, plan: Plan, axis: int = 0) -> Tensor:
-    """Carries per-Gaussian values over: clones and parts copy their source's.
+    """Applies a plan to values stored per Gaussian; clones and parts copy the original's values.
 
     Args:
-        values: N long along `axis`.
+        values: Tensor of size N along `axis`.
         plan: The plan.
-        axis: Along which the Gaussians lie.
+        axis: The axis of the Gaussians.
 
     Returns:
-        M long along `axis`, without gradient.
+        Tensor of size M along `axis`, without gradient.
     """
     return values.detach().index_select(axis, plan.sources.to(values.device))
 
 
 def apply_plan_to_state(state: Tensor, plan: Plan, axis: int = 0) -> Tensor:
-    """Carries an optimiser's running values over; those of clones and parts begin at 0."""
+    """Applies a plan to an optimiser's running values; clones and parts start with 0."""
     new = apply_plan(state, plan, axis)
     new.narrow(axis, len(plan.keep), len(plan) - len(plan.keep)).zero_()
     return new
@@ -60,14 +60,14 @@ def apply_plan_to_state(state: Tensor, plan: Plan, axis: int = 0) -> Tensor:
 def apply_plan_to_geometry(
     means: Tensor, quats: Tensor, scales: Tensor, plan: Plan, generator: torch.Generator
 ) -> tuple[Tensor, Tensor]:
-    """Carries means and activated scales over; parts of the split are drawn from their source.
+    """Applies a plan to means and scales; parts of a split are sampled from the original Gaussian.
 
     Args:
-        means: (N, 3).
-        quats: (N, 4), need not be normalised.
+        means: (N, 3) metres.
+        quats: (N, 4) wxyz; need not be normalised.
         scales: (N, 3) activated, metres.
         plan: The plan.
-        generator: On the CPU; decides where the parts lie.
+        generator: Random generator on the CPU, for the positions of the parts.
 
     Returns:
         Means (M, 3) and scales (M, 3), without gradient.
@@ -84,16 +84,16 @@ def apply_plan_to_geometry(
 
 @dataclass
 class Population:
-    """The Gaussians of a model as density control sees them; both mappings change in place.
+    """Everything that density control changes of a model; both mappings are changed in place.
 
     Attributes:
-        parameters: What exists per Gaussian, as it is stored: `means` (N, 3), `quats` (N, 4) and
-            `log_scales` (N, 3), for strategies also `opacity_logits` (N,), and whatever else a
-            model hangs on its Gaussians (HeadGaS++: the basis F).
-        moments: An optimiser's running values; what belongs to NAME is called NAME.first and
-            NAME.second (`training.optimiser.Optimiser.moments`), and NAME.mean where a mean is
-            kept of a model that nothing is added to any more.
-        axes: Where the Gaussians of a parameter lie along another axis than the first.
+        parameters: Parameters per Gaussian in the form that is trained: `means` (N, 3), `quats` (N,
+            4) and `log_scales` (N, 3), for strategies also `opacity_logits` (N,), and any others of
+            the model (HeadGaS++: the basis F).
+        moments: Running values of the optimiser. Those of parameter NAME are NAME.first and
+            NAME.second (`training.optimiser.Optimiser.moments`), and NAME.mean where the training
+            keeps a running mean of the parameter.
+        axes: For parameters whose Gaussians do not lie along axis 0: their axis, by name.
     """
 
     parameters: dict[str, Tensor]
@@ -115,11 +115,12 @@ class Population:
         return self.parameters["opacity_logits"].sigmoid()
 
     def carry_out(self, plan: Plan, generator: torch.Generator) -> None:
-        """Applies a plan to parameters and moments.
+        """Applies a plan to all parameters and moments.
 
         Args:
-            plan: Which Gaussians are kept, copied or split.
-            generator: On the CPU; decides where the parts of split ones lie.
+            plan: Which Gaussians are kept, cloned or split.
+            generator: Random generator on the CPU, for the positions of the parts of split
+                Gaussians.
         """
         old = self.parameters
         means, scales = apply_plan_to_geometry(
@@ -134,17 +135,17 @@ class Population:
                 self.moments[moment] = apply_plan_to_state(state, plan, self.axis(name))
 
     def replace(self, name: str, value: Tensor) -> None:
-        """Puts a value in the place of a parameter, which learns as the old one did."""
+        """Replaces a parameter's value; the new tensor requires gradients if the old one did."""
         learns = self.parameters[name].requires_grad
         self.parameters[name] = value.detach().requires_grad_(learns)
 
     def forget(self, name: str, index: Tensor | slice = slice(None)) -> None:
-        """Sets the moments of some Gaussians' parameter to 0; the Gaussians lie along axis 0."""
+        """Sets a parameter's moments to 0 for some Gaussians, which must lie along axis 0."""
         for moment in self._moments_of(name):
             self.moments[moment][index] = 0
 
     def axis(self, name: str) -> int:
-        """Along which a parameter's Gaussians lie."""
+        """The axis of a parameter along which the Gaussians lie."""
         return self.axes.get(name, 0)
 
     def _moments_of(self, name: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""What N copies in one place must be to look like the one Gaussian they come from.
+"""Opacity and scale with which N copies at one place look like the one original Gaussian.
 
 Kheradmand et al., "3D Gaussian Splatting as Markov Chain Monte Carlo", 2024, section 4.2 and eq. 9.
 """
@@ -14,26 +14,25 @@ import torch
 from torch import Tensor
 
 MAX_COPIES = 51
-"""More of one Gaussian are corrected as if they were this many, as in the paper's code."""
+"""A larger number of copies is corrected as if there were this many, as in the paper's code."""
 
 LARGEST_OPACITY = 1 - 1e-6
 """An opaque Gaussian's copies would be opaque too."""
 
 
 def relocated(opacities: Tensor, scales: Tensor, copies: Tensor) -> tuple[Tensor, Tensor]:
-    """Opacities and scales with which copies of a Gaussian together look like it.
+    """Opacities and scales with which copies of a Gaussian together look like the original.
 
-    The opacity o' is exact in the middle: (1 − o')^N = 1 − o. The scale is multiplied so that the
-    light along a line through the middle stays: with g = o'·exp(−x²/2s'²),
-    ∫ 1 − (1 − g)^N dx = o·s·√2π.
+    The opacity o' is exact in the centre: (1 − o')^N = 1 − o. The scale s' preserves the light
+    along a line through the centre: with g = o'·exp(−x²/2s'²), ∫ 1 − (1 − g)^N dx = o·s·√2π.
 
     Args:
-        opacities: (M,) of Gaussians that are copied, in [0, 1].
-        scales: (M, 3) activated.
-        copies: (M,) int, N: how many there are afterwards, itself among them; at least 1.
+        opacities: (M,) opacities of the originals, in [0, 1].
+        scales: (M, 3) activated scales of the originals, metres.
+        copies: (M,) int, N: number of copies, the original included; at least 1.
 
     Returns:
-        Opacities (M,) and scales (M, 3) of each of the copies.
+        Opacities (M,) and scales (M, 3) for every copy.
     """
     opacities = opacities.detach().clamp(0, LARGEST_OPACITY)
     copies = copies.clamp(1, MAX_COPIES)

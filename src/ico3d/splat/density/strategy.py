@@ -1,9 +1,11 @@
-"""How the number of Gaussians follows the training: one interface, two strategies.
+"""Strategies that change the number of Gaussians during training: one interface, two of them.
 
-`DefaultStrategy` is 3DGS (clone, split, prune, opacity reset), `McmcStrategy` is Kheradmand et al.,
-"3D Gaussian Splatting as Markov Chain Monte Carlo", 2024. Both work on any device. gsplat has both
-as well, but bound to torch.optim, to the process's random state (a resumed run would not repeat the
-uninterrupted one) and, the default, without a cap; so of gsplat the relocation kernel is used.
+`DefaultStrategy` is 3DGS (clone, split, prune, opacity reset). `McmcStrategy` is Kheradmand et al.,
+"3D Gaussian Splatting as Markov Chain Monte Carlo", 2024. Both work on any device.
+
+gsplat has both strategies, too, but they are bound to torch.optim and to the global random state,
+with which a resumed run would not repeat an uninterrupted one, and gsplat's default strategy has no
+upper limit. Only gsplat's relocation kernel is used.
 """
 
 import math
@@ -27,16 +29,16 @@ from ico3d.splat.density.relocation import relocated
 from ico3d.splat.rendering import RenderInfo
 
 NOISE_SHARPNESS = 100.0
-"""Noise fades as σ(100·(0.005 − o)): it shakes the almost transparent."""
+"""Slope of the sigmoid σ(100·(0.005 − opacity)): only nearly transparent Gaussians are shaken."""
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """When the set of Gaussians changes.
+    """The steps at which the set of Gaussians changes.
 
     Attributes:
-        begin: First step at which it may.
-        until: First step at which it may no longer.
+        begin: First step at which the set may change.
+        until: First step at which the set may no longer change.
         every: Steps between two changes.
     """
 
@@ -45,22 +47,22 @@ class Schedule:
     every: int = 100
 
     def due(self, step: int) -> bool:
-        """Whether it changes after this step."""
+        """Whether the set changes after this step."""
         return self.begin <= step < self.until and step % self.every == 0
 
 
 @dataclass(frozen=True)
 class McmcSettings:
-    """Numbers of the Markov chain; lengths are relative to the scene's extent.
+    """Settings of the Markov chain; lengths are relative to the scene's extent.
 
     Attributes:
-        max_gaussians: Never more than this many.
-        min_opacity: Those whose opacity is not above this are relocated.
-        growth: Factor by which the Gaussians multiply at each change, up to the cap.
-        noise_rate: λ_noise of the paper: shakes means by this times their learning rate times their
-            covariance.
-        opacity_weight: λ_o, of the mean opacity in the loss.
-        scale_weight: λ_Σ, of the mean scale in the loss.
+        max_gaussians: Upper limit on the number of Gaussians.
+        min_opacity: Gaussians whose opacity is not above this are relocated.
+        growth: Factor by which the number of Gaussians grows at each change, up to the limit.
+        noise_rate: λ_noise of the paper: noise on the means is scaled by this factor, by their
+            learning rate and by the Gaussian's covariance.
+        opacity_weight: λ_o, weight of the mean opacity in the loss.
+        scale_weight: λ_Σ, weight of the mean scale in the loss.
     """
 
     max_gaussians: int = 1_000_000
@@ -72,30 +74,30 @@ class McmcSettings:
 
 
 class Strategy(ABC):
-    """Density control during one training.
+    """Changes the set of Gaussians during one training.
 
-    The order within a step: render, loss + `penalty`, backward, `observe`, optimiser, `adapt`.
-    All randomness follows from the seed and the step's number.
+    Order within a step: render, add `penalty` to the loss, backward, `observe`, update by the
+    optimiser, `adapt`. All randomness depends on the seed and the step's number alone.
     """
 
     def __init__(self, schedule: Schedule, max_gaussians: int, seed: int):
-        """Plans by a schedule and for a cap."""
+        """Sets the steps of changes, the upper limit of Gaussians and the seed."""
         self.schedule, self.max_gaussians, self._seed = schedule, max_gaussians, seed
 
     def penalty(self, population: Population) -> Tensor:
-        """What the strategy adds to the loss: a scalar, 0 by default."""
+        """A scalar that is added to the loss; 0 unless a subclass defines one."""
         return population.parameters["means"].new_zeros(())
 
     def observe(self, info: RenderInfo, step: int) -> None:
-        """Gathers what the next change needs, after `backward`; nothing by default."""
+        """Gathers statistics for the next change; call after `backward`. By default a no-op."""
         del info, step
 
     def adapt(self, population: Population, step: int, rate: float) -> None:
-        """Changes the set of Gaussians if it is time, and whenever it is above the cap.
+        """Changes the set of Gaussians if the schedule says so or the limit is exceeded.
 
         Args:
-            population: Changed in place; afterwards it is not above `max_gaussians`.
-            step: Number of the step just done.
+            population: Changed in place; afterwards it has at most `max_gaussians`.
+            step: Number of the step that was just done.
             rate: Learning rate of the means in that step, relative to the scene's extent.
 
         Raises:
@@ -116,11 +118,11 @@ class Strategy(ABC):
         """Carries out a change after a step."""
 
     def tensors(self) -> dict[str, Tensor]:
-        """What has been gathered, for checkpoints."""
+        """The statistics gathered so far, for checkpoints."""
         return {}
 
     def restore(self, tensors: dict[str, Tensor]) -> None:
-        """Takes back what `tensors` gave."""
+        """Restores the statistics that `tensors` returned."""
         del tensors
 
     def _generator(self, step: int, purpose: int) -> torch.Generator:
@@ -129,19 +131,19 @@ class Strategy(ABC):
 
 
 class DefaultStrategy(Strategy):
-    """3DGS: those with strong screen gradients clone or split, the faint and the huge die.
+    """3DGS: Gaussians with strong screen-space gradients multiply; faint and huge ones are removed.
 
-    As in 3DGS the huge die only after the first opacity reset: what a scene begins with may be
-    sparse, and far away everything is large.
+    As in 3DGS, huge Gaussians are removed only after the first opacity reset, because sparse
+    initial points and distant surfaces need large Gaussians.
     """
 
     def __init__(self, schedule: Schedule, settings: DensitySettings, seed: int, reset_every: int):
-        """Gathers nothing yet.
+        """Sets schedule and thresholds; the statistics are empty.
 
         Args:
             schedule: When to densify.
-            settings: Thresholds and the cap.
-            seed: Decides where the parts of split Gaussians lie.
+            settings: Thresholds and the upper limit on the number of Gaussians.
+            seed: Seed for the positions of the parts of split Gaussians.
             reset_every: Steps between two opacity resets while densifying; 0 for none.
         """
         super().__init__(schedule, settings.max_gaussians, seed)
@@ -149,7 +151,7 @@ class DefaultStrategy(Strategy):
         self._stats = DensityStats.zeros(0)
 
     def observe(self, info: RenderInfo, step: int) -> None:
-        """Gathers screen gradients."""
+        """Gathers screen-space gradients; call after `backward`."""
         if step >= self.schedule.until:
             return
         if len(self._stats.views) != info.radii.shape[1]:
@@ -157,7 +159,7 @@ class DefaultStrategy(Strategy):
         self._stats.add(info)
 
     def adapt(self, population: Population, step: int, rate: float) -> None:
-        """Densifies and prunes if it is time, then resets opacities if it is time for that."""
+        """Densifies and prunes on schedule, then resets opacities when a reset is due."""
         super().adapt(population, step, rate)
         resets = self._reset_every and 0 < step < self.schedule.until
         if resets and step % self._reset_every == 0:
@@ -177,31 +179,36 @@ class DefaultStrategy(Strategy):
         self._stats = DensityStats.zeros(len(population), population.scales.device)
 
     def tensors(self) -> dict[str, Tensor]:
-        """Screen gradients gathered so far."""
+        """Screen-space gradients gathered so far."""
         return {"gradient_sum": self._stats.gradient_sum, "views": self._stats.views}
 
     def restore(self, tensors: dict[str, Tensor]) -> None:
-        """Takes back what `tensors` gave."""
+        """Restores the gradients that `tensors` returned."""
         self._stats = DensityStats(tensors["gradient_sum"], tensors["views"])
 
 
 class McmcStrategy(Strategy):
-    """Gaussians as samples: the dead move to the living, the set grows, all but the sure shake."""
+    """Gaussians as samples of a Markov chain, after Kheradmand et al. 2024.
+
+    Faint Gaussians are moved to the places of opaque ones, the set grows, and noise shakes all
+    Gaussians that are not clearly opaque.
+    """
 
     def __init__(self, schedule: Schedule, settings: McmcSettings, seed: int, extent: float):
-        """Starts a chain.
+        """Sets schedule, settings and the scene's size.
 
         Args:
             schedule: When to relocate and to grow.
-            settings: Its numbers and the cap.
-            seed: Decides who is copied, and the noise.
-            extent: Size of the scene in metres: noise and penalty shall not depend on the unit.
+            settings: Settings of the chain and the upper limit on the number of Gaussians.
+            seed: Seed for the choice of copied Gaussians and for the noise.
+            extent: Size of the scene in metres, which makes noise and penalty independent of the
+                unit.
         """
         super().__init__(schedule, settings.max_gaussians, seed)
         self._settings, self._extent = settings, extent
 
     def penalty(self, population: Population) -> Tensor:
-        """λ_o·mean(o) + λ_Σ·mean(s): what is not needed fades and shrinks."""
+        """λ_o·mean(opacity) + λ_Σ·mean(scale)/extent: superfluous Gaussians fade and shrink."""
         settings = self._settings
         scales = population.scales.mean() / self._extent
         return (
@@ -209,7 +216,7 @@ class McmcStrategy(Strategy):
         )
 
     def adapt(self, population: Population, step: int, rate: float) -> None:
-        """Relocates and grows if it is time, then shakes the means."""
+        """Relocates and adds Gaussians on schedule; adds noise to the means at every step."""
         super().adapt(population, step, rate)
         with torch.no_grad():
             self._shake(population, rate, self._generator(step, 1))

@@ -1,4 +1,4 @@
-"""The compressed PLY of PlayCanvas and SuperSplat: 16 bytes per Gaussian, bounds per 256 of them.
+"""Compressed PLY of PlayCanvas and SuperSplat: 16 bytes per Gaussian, bounds per 256 Gaussians.
 
 Layout and rounding follow PlayCanvas' splat-transform (MIT).
 """
@@ -36,7 +36,7 @@ class _Range:
 
 
 def read(tables: dict[str, NDArray[Any]]) -> RawGaussians:
-    """Gaussians of a compressed PLY file's tables `chunk`, `vertex` and, where there is one, `sh`.
+    """Decodes Gaussians from the tables `chunk`, `vertex` and (optional) `sh` of a compressed PLY.
 
     Raises:
         GaussianFileError: If tables or columns are missing or do not fit together.

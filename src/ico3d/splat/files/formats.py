@@ -1,4 +1,4 @@
-"""Reading and writing files of 3D Gaussians, recognised by what is in them."""
+"""Reads and writes files of 3D Gaussians; formats are recognised by a file's contents."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,11 +15,11 @@ _HEAD_BYTES = 64 * 32
 
 @dataclass(frozen=True)
 class GaussianFile:
-    """What was in a file.
+    """A file of Gaussians that was read.
 
     Attributes:
-        kind: The format in words.
-        gaussians: Its contents, finite.
+        kind: The format, in words.
+        gaussians: The Gaussians; all values are finite.
     """
 
     kind: str
@@ -30,14 +30,14 @@ def read_gaussians(path: Path | str) -> RawGaussians:
     """Reads a file of 3D Gaussians: PLY (standard or compressed), SPZ or .splat.
 
     Raises:
-        GaussianFileError: If there is none, it is damaged, or a value is not finite.
-        MissingExtraError: If it is an SPZ of version 4 and zstandard is not installed.
+        GaussianFileError: If the file is missing or damaged, or a value is not finite.
+        MissingExtraError: If the file is SPZ version 4 and zstandard is not installed.
     """
     return read_file(path).gaussians
 
 
 def read_file(path: Path | str) -> GaussianFile:
-    """Like `read_gaussians`, and says which format it was."""
+    """Reads a file of 3D Gaussians and names its format; errors as for `read_gaussians`."""
     path = Path(path)
     try:
         with path.open("rb") as file:
@@ -81,7 +81,7 @@ def _read(kind: str, data: bytes) -> tuple[str, RawGaussians]:
 
 
 def check_writable(path: Path) -> None:
-    """Says before long work whether a file of this name can be written after it.
+    """Checks, before long work, that `write_gaussians` knows the format of a file name.
 
     Raises:
         SettingsError: If the name does not end in .ply or .spz.
@@ -91,10 +91,10 @@ def check_writable(path: Path) -> None:
 
 
 def write_gaussians(path: Path | str, gaussians: RawGaussians) -> None:
-    """Writes .ply (lossless) or .spz (small), by the name; never leaves half a file.
+    """Writes .ply (lossless) or .spz (small) by the file's suffix, atomically.
 
     Raises:
-        SettingsError: If the name ends otherwise.
+        SettingsError: If the name has another suffix.
         GaussianFileError: If a value is not finite, or the file cannot be written.
     """
     path = Path(path)

@@ -1,4 +1,4 @@
-"""PLY files in general: the header, and its tables of numbers, checked before they are read."""
+"""PLY files in general: parses the header and reads tables of numbers, after checking sizes."""
 
 import re
 import warnings
@@ -27,10 +27,10 @@ class Element:
     """One table of a PLY file.
 
     Attributes:
-        name: What the header calls the table.
-        count: Rows.
-        properties: Columns in file order: name and numpy type without byte order.
-        has_lists: Whether a column holds lists, so that the table's size is unknown.
+        name: Name of the table in the header.
+        count: Number of rows.
+        properties: Columns in file order: numpy type (without byte order) by column name.
+        has_lists: Whether a column holds lists, which makes the table's size unknown.
     """
 
     name: str
@@ -41,12 +41,12 @@ class Element:
 
 @dataclass(frozen=True)
 class Header:
-    """What a PLY file says about itself.
+    """The header of a PLY file.
 
     Attributes:
         order: Byte order "<" or ">", or "" for text.
-        elements: Tables in file order.
-        size: Bytes of the header: where the first table begins.
+        elements: Tables in file order, by name.
+        size: Length of the header in bytes, which is where the first table begins.
     """
 
     order: str
@@ -55,10 +55,10 @@ class Header:
 
 
 def parse_header(data: bytes) -> Header:
-    """Reads the header of a PLY file.
+    """Parses the header of a PLY file.
 
     Raises:
-        GaussianFileError: If it is damaged; names the byte.
+        GaussianFileError: If the header is damaged; the sentence names the byte.
     """
     end = re.search(rb"\nend_header[ \t]*\r?\n", data[:MAX_HEADER_BYTES])
     if end is None:
@@ -98,7 +98,7 @@ def _take_line(words: list[str], elements: dict[str, Element]) -> bool:
 
 
 def read_tables(data: bytes, header: Header) -> dict[str, NDArray[Any]]:
-    """The tables of a PLY file as structured arrays (rows,), up to the first that holds lists.
+    """The tables of a PLY file as structured arrays (rows,), up to the first table with lists.
 
     Binary tables are views of `data`.
 
@@ -181,7 +181,7 @@ def _parse_numbers(text: bytes, count: int, offset: int) -> NDArray[np.float32]:
 def columns(
     table: NDArray[Any], names: list[str] | tuple[str, ...], kind: str = "f4"
 ) -> NDArray[Any]:
-    """Columns of a table as an array (rows, len(names)) of the given numpy type."""
+    """Some columns of a table as an array (rows, len(names)) of numpy type `kind`."""
     picked = np.empty((len(table), len(names)), kind)
     with np.errstate(over="ignore"):  # doubles above float32's range: not finite, refused later
         for start in range(0, len(table), _ROWS_AT_ONCE):

@@ -1,4 +1,4 @@
-"""Gaussians as files hold them: before activation, so that nothing is lost between two files."""
+"""Gaussians as files store them: without activation functions, so copying loses nothing."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,7 +17,7 @@ OPACITY_MARGIN = 1e-6
 """Opacities are kept this far from 0 and 1, whose logits are infinite."""
 
 MAX_LOG_SCALE = 88.0
-"""Above it exp() overflows float32."""
+"""Largest logarithm whose exp() does not overflow float32."""
 
 PROPERTIES = {
     "means": ("x", "y", "z"),
@@ -34,23 +34,23 @@ _HALF_TURN_SH = np.array([-1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1], 
 
 
 def rest_properties(degree: int) -> list[str]:
-    """What 3DGS files call the harmonics above degree 0: red's first, then green's, then blue's."""
+    """Column names in 3DGS files of harmonics above degree 0: all of red, then green, then blue."""
     return [f"f_rest_{index}" for index in range(3 * ((degree + 1) ** 2 - 1))]
 
 
 @dataclass(frozen=True)
 class RawGaussians:
-    """N Gaussians with the unactivated parameters of the 3DGS files, float32.
+    """N Gaussians with the unactivated float32 parameters of 3DGS files.
 
     Attributes:
-        means: (N, 3) positions. Axes are those of PLY files, by convention x right, y down,
-            z forward (RDF).
-        dc: (N, 3) harmonics of degree 0.
-        rest: (N, K - 1, 3) harmonics of the degrees above, K = (degree + 1)².
+        means: (N, 3) positions in the axes of PLY files, by convention x right, y down, z forward
+            (RDF).
+        dc: (N, 3) coefficients of the spherical harmonic of degree 0.
+        rest: (N, K - 1, 3) coefficients of the higher degrees, K = (degree + 1)².
         opacities: (N,) logits.
         log_scales: (N, 3) natural logarithms of the standard deviations.
         quats: (N, 4) rotations wxyz, not normalised.
-        normals: (N, 3), which nobody uses but some files hold, or None.
+        normals: (N, 3), which some files hold although nothing uses them, or None.
     """
 
     means: Floats
@@ -67,12 +67,12 @@ class RawGaussians:
 
     @property
     def degree(self) -> int:
-        """The degree of the harmonics, 0 to 3."""
+        """The degree of the spherical harmonics, 0 to 3."""
         return harmonics.degree_of(self.rest.shape[1] + 1)
 
     @staticmethod
     def from_gaussians(gaussians: Gaussians) -> "RawGaussians":
-        """The raw parameters of activated Gaussians, opacities kept off 0 and 1."""
+        """Raw parameters of activated Gaussians; opacities are kept away from 0 and 1."""
         parts = gaussians.detach().to("cpu").map(lambda tensor: tensor.float())
         if parts.sh is not None:
             sh = parts.sh.numpy()  # (N, K, 3)
@@ -89,7 +89,7 @@ class RawGaussians:
         )
 
     def to_gaussians(self) -> Gaussians:
-        """The Gaussians ready to render, colours as harmonics whatever the degree."""
+        """Activated Gaussians, ready to render; colours are given as harmonics at every degree."""
         sh = np.concatenate([self.dc[:, None], self.rest], 1)  # (N, K, 3)
         return Gaussians(
             means=torch.tensor(self.means),
@@ -100,10 +100,10 @@ class RawGaussians:
         )
 
     def with_degree(self, degree: int) -> "RawGaussians":
-        """The same Gaussians without the harmonics above a degree.
+        """The same Gaussians without harmonics above `degree`.
 
         Raises:
-            SettingsError: If they have fewer than asked for.
+            SettingsError: If the Gaussians have a lower degree than asked for.
         """
         if degree > self.degree:
             raise SettingsError(
@@ -113,7 +113,10 @@ class RawGaussians:
         return replace(self, rest=self.rest[:, : (degree + 1) ** 2 - 1])
 
     def half_turn(self) -> "RawGaussians":
-        """Turned by 180° about x, exactly: RDF to RUB (x right, y up, z backward) or back."""
+        """The Gaussians turned by 180° about x, losslessly.
+
+        RDF axes (x right, y down, z forward) become RUB (x right, y up, z backward) and vice versa.
+        """
         moved = ("means", "rest", "quats", "normals")
         copies = {name: np.copy(v) for name in moved if (v := getattr(self, name)) is not None}
         turned = replace(self, **copies)
@@ -121,10 +124,11 @@ class RawGaussians:
         return turned
 
     def checked(self) -> "RawGaussians":
-        """Itself.
+        """Returns these Gaussians after checking them.
 
         Raises:
-            GaussianFileError: If a value activates to no finite number; names the first.
+            GaussianFileError: If a value is not finite once activated; the sentence names the first
+                one.
         """
         bad = [found for found in map(self._first_bad, (*PROPERTIES, "rest")) if found]
         if bad:
@@ -146,7 +150,7 @@ class RawGaussians:
 
 
 def half_turn_in_place(gaussians: RawGaussians) -> None:
-    """`RawGaussians.half_turn` for arrays that nobody else holds."""
+    """Like `RawGaussians.half_turn`, but overwrites the arrays."""
     flip = np.array([1, -1, -1], np.float32)
     np.multiply(gaussians.means, flip, out=gaussians.means)
     if gaussians.normals is not None:
@@ -177,16 +181,16 @@ def _property_name(field: str, where: tuple[int, ...], per_channel: int) -> str:
 
 
 def logits(opacities: NDArray[Any]) -> Floats:
-    """Logits of opacities in [0, 1], any shape."""
+    """Logits of opacities in [0, 1], of any shape; opacities are kept away from 0 and 1."""
     inside = np.clip(opacities, OPACITY_MARGIN, 1 - OPACITY_MARGIN, dtype=np.float64)
     return np.log(inside / (1 - inside)).astype(np.float32)
 
 
 def logarithms(scales: NDArray[Any]) -> Floats:
-    """Logarithms of standard deviations, any shape; 0 counts as the smallest normal number."""
+    """Logarithms of standard deviations, any shape; 0 is taken as the smallest normal float32."""
     return np.log(np.maximum(scales, np.finfo(np.float32).tiny)).astype(np.float32)
 
 
 def dc_of_colors(colors: NDArray[Any]) -> Floats:
-    """Harmonics of degree 0 (N, 3) of colours (N, 3) in [0, 1]."""
+    """Coefficients (N, 3) of the harmonic of degree 0 for colours (N, 3) in [0, 1]."""
     return ((colors - 0.5) / harmonics.C0).astype(np.float32)

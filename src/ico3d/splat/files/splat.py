@@ -14,9 +14,9 @@ _NORM_ERROR = 0.03
 
 
 def looks_like(data: bytes, size: int) -> bool:
-    """Whether a file that begins with `data` and has `size` bytes can be a `.splat`.
+    """Whether a file that begins with `data` and has `size` bytes may be a `.splat` file.
 
-    Its rotations tell: four bytes make a unit quaternion by chance in one of 14 rows.
+    The test is whether rotations are unit quaternions; random bytes pass in one of 14 rows.
     """
     rows = np.frombuffer(data, _ROW, len(data) // _ROW.itemsize)[:64]
     if size % _ROW.itemsize or not len(rows):
@@ -34,10 +34,10 @@ def _quats(rows: NDArray[Any]) -> NDArray[Any]:
 
 
 def read(data: bytes) -> RawGaussians:
-    """Gaussians of a `.splat` file.
+    """Decodes the Gaussians of a `.splat` file.
 
     Raises:
-        GaussianFileError: If it is empty, ends within a Gaussian, or a scale is below 0.
+        GaussianFileError: If the file is empty or ends within a Gaussian, or a scale is negative.
     """
     if not data:
         raise GaussianFileError("a .splat file without a byte")

@@ -1,8 +1,8 @@
-"""SPZ files of Niantic: about a fifth of a PLY, with errors that hardly show.
+"""Niantic's SPZ files: about a fifth of the size of PLY, with hardly visible errors.
 
-Axes are x right, y up, z backward (RUB) by the format's definition; they are turned on the way in
-and out, so that `RawGaussians` always have the axes of PLY files. Quantisation follows Niantic's
-reference code (MIT), harmonics with all their 8 bits.
+The format defines its axes as x right, y up, z backward (RUB). Reading and writing convert, so that
+`RawGaussians` always have the axes of PLY files. Quantisation follows Niantic's reference code
+(MIT), but spherical harmonics keep all 8 bits.
 """
 
 import gzip
@@ -26,11 +26,11 @@ _SMALL = np.float32(np.sqrt(0.5) / 511)
 
 
 def read(data: bytes) -> RawGaussians:
-    """Gaussians of an SPZ file.
+    """Decodes the Gaussians of an SPZ file.
 
     Raises:
-        GaussianFileError: If it is damaged or unpacks to far more than its size.
-        MissingExtraError: If it is of version 4 and the package zstandard is not installed.
+        GaussianFileError: If the file is damaged or unpacks to far more than its size.
+        MissingExtraError: If the file is version 4 and the package zstandard is not installed.
     """
     header, sections = unpack(data)
     gaussians = RawGaussians(
@@ -49,7 +49,7 @@ def write(gaussians: RawGaussians, path: Path) -> None:
     """Writes an SPZ file of version 3.
 
     Raises:
-        GaussianFileError: If a Gaussian lies further away than the format can say (8,388,607 m).
+        GaussianFileError: If a Gaussian lies farther away than the format allows (8,388,607 m).
     """
     turned = gaussians.half_turn()
     bits = _fractional_bits(turned.means)

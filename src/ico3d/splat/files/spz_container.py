@@ -1,4 +1,4 @@
-"""SPZ files of Niantic: the header, and unpacking that never takes more memory than it may.
+"""Container of Niantic's SPZ files: header, and decompression with a limit on memory.
 
 Versions 2 and 3 are one gzip stream; version 4 is a plain header and one zstd stream per attribute.
 """
@@ -26,20 +26,20 @@ MAX_RATIO = 8
 """Unpacked bytes per byte of file: 1.2 to 1.7 as a rule, 3.7 if all harmonics are 0."""
 
 FREE_BYTES = 1 << 18
-"""Unpacked bytes that any file may have: a few equal Gaussians pack better than real ones."""
+"""Unpacked bytes that are allowed at any ratio: a few equal Gaussians compress very well."""
 
 
 @dataclass(frozen=True)
 class Header:
-    """What an SPZ file says about itself.
+    """The header of an SPZ file.
 
     Attributes:
-        version: 2, 3 or 4.
-        count: Gaussians.
+        version: Version of the format: 2, 3 or 4.
+        count: Number of Gaussians.
         degree: Degree of the spherical harmonics, 0 to 3.
-        fractional_bits: Of the positions' fixed-point numbers.
-        flags: 1 for trained with antialiasing; the others announce further data.
-        streams: Number of streams, version 4 only.
+        fractional_bits: Fractional bits of the fixed-point positions.
+        flags: 1 if trained with antialiasing; all other bits announce further data.
+        streams: Number of compressed streams, in version 4 only.
     """
 
     version: int
@@ -51,7 +51,7 @@ class Header:
 
     @property
     def sections(self) -> dict[str, int]:
-        """Bytes per Gaussian of each attribute, in file order."""
+        """Bytes per Gaussian of each attribute, by name in file order."""
         rotation = 3 if self.version == 2 else 4
         rest = 3 * ((self.degree + 1) ** 2 - 1)
         widths = {"positions": 9, "alphas": 1, "colors": 3, "scales": 3, "rotations": rotation}
@@ -59,21 +59,22 @@ class Header:
 
     @property
     def size(self) -> int:
-        """Bytes of all attributes."""
+        """Bytes of all attributes of all Gaussians."""
         return self.count * sum(self.sections.values())
 
     def pack(self) -> bytes:
-        """The 16 bytes that a file begins with."""
+        """The 16 bytes with which the file begins."""
         return _HEADER.pack(
             MAGIC, self.version, self.count, self.degree, self.fractional_bits, self.flags, 0
         )
 
 
 def parse_header(head: bytes) -> Header:
-    """Reads the first 16 bytes.
+    """Parses the first 16 bytes of an SPZ file.
 
     Raises:
-        GaussianFileError: If they are none of an SPZ file this code can read; names the byte.
+        GaussianFileError: If they are no header of a readable SPZ file; the sentence names the
+            byte.
     """
     if len(head) < _HEADER.size or head[:4] != MAGIC:
         raise GaussianFileError("byte 0 of the SPZ data does not begin a header 'NGSP' of 16 bytes")
@@ -88,12 +89,12 @@ def parse_header(head: bytes) -> Header:
 
 
 def unpack(data: bytes) -> tuple[Header, dict[str, NDArray[np.uint8]]]:
-    """The header and the attributes, each (N, bytes), of an SPZ file.
+    """The header and the decompressed attributes, each (N, bytes), of an SPZ file.
 
     Raises:
-        GaussianFileError: If it is damaged, or unpacks to more than `MAX_RATIO` times its size
-            (and `FREE_BYTES`); names the byte.
-        MissingExtraError: If it is of version 4 and the package zstandard is not installed.
+        GaussianFileError: If the file is damaged, or unpacks to more than both `FREE_BYTES` and
+            `MAX_RATIO` times its size; the sentence names the byte.
+        MissingExtraError: If the file is version 4 and the package zstandard is not installed.
     """
     header, packed = _unpack_gzip(data) if data[:2] == GZIP_MAGIC else _unpack_zstd(data)
     sections: dict[str, NDArray[np.uint8]] = {}

@@ -14,7 +14,7 @@ _DEGREES = {len(rest_properties(degree)): degree for degree in range(4)}
 
 
 def read(table: NDArray[Any]) -> RawGaussians:
-    """Gaussians of a PLY file's vertex table (N,), columns in any order, unknown ones ignored.
+    """Gaussians from a PLY file's vertex table (N,); column order is free, extra ones are ignored.
 
     Raises:
         GaussianFileError: If a column is missing or there are harmonics above degree 3.
@@ -37,13 +37,13 @@ def read(table: NDArray[Any]) -> RawGaussians:
 
 
 def by_coefficient(channels: NDArray[Any]) -> NDArray[Any]:
-    """Harmonics (N, K - 1, 3) of file columns (N, 3·(K - 1)): red's, then green's, then blue's."""
+    """Harmonics (N, K - 1, 3) from columns (N, 3·(K - 1)) that hold red, then green, then blue."""
     per_channel = channels.shape[1] // 3
     return channels.reshape(len(channels), 3, per_channel).transpose(0, 2, 1)
 
 
 def header(count: int, degree: int) -> bytes:
-    """The header that the original code writes."""
+    """The PLY header that the original code writes, for `count` Gaussians."""
     return "\n".join(
         [
             "ply",
@@ -56,7 +56,7 @@ def header(count: int, degree: int) -> bytes:
 
 
 def property_order(degree: int) -> list[str]:
-    """All columns in the order of the original code."""
+    """Names of all columns, in the order of the original code."""
     before, after = ("means", "normals", "dc"), ("opacities", "log_scales", "quats")
     return [
         *(name for field in before for name in PROPERTIES[field]),
@@ -66,7 +66,7 @@ def property_order(degree: int) -> list[str]:
 
 
 def write(gaussians: RawGaussians, path: Path) -> None:
-    """Writes a PLY file; missing normals are written as 0, as the original code does."""
+    """Writes a PLY file; missing normals are written as 0, as in the original code."""
     count = len(gaussians)
     normals = np.zeros((count, 3), np.float32) if gaussians.normals is None else gaussians.normals
     parts = [

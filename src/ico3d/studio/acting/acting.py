@@ -1,4 +1,4 @@
-"""From what hands, feet and torso do to the rotations of all joints."""
+"""Turns goals for hands, feet and torso into rotations of all joints."""
 
 from dataclasses import dataclass
 
@@ -12,32 +12,32 @@ SPINE = ("spine05", "spine04", "spine03", "spine02", "spine01")
 NECK = ("neck01", "neck02", "neck03", "head")
 FINGERS = ("finger2", "finger3", "finger4", "finger5")
 LIFTED = np.radians((-6.0, 26.0))
-"""Rotation of the shoulder girdle with the hand down, and with it above the head."""
+"""Rotation of the shoulder girdle in radians: with the hand down, and with it above the head."""
 UPPER_TWIST = 0.5
-"""Part of the upper arm's twist that its first bone takes; the second one takes the rest."""
+"""Share of the upper arm's twist that goes to the first of its two bones."""
 GATHERED = 0.7
-"""Part of the spread of the fingers at rest that is taken back."""
+"""Share of the fingers' spread at rest that is undone."""
 THUMB_CURL = 0.35
-"""How far the thumb bends, next to the fingers."""
+"""Bend of the thumb's joints, as a factor of that of the fingers' joints."""
 
 
 @dataclass(frozen=True)
 class Acting:
-    """What a body does in F frames. Two rows are the person's left and right.
+    """What a body does in F frames; where there are two rows, they are the person's left and right.
 
     Attributes:
-        shift: (F, 3) metres that the pelvis moves from its rest.
-        pelvis: (F, 3) its turn in radians about X, Y, Z.
-        chest: (F, 3) turn of the chest against the pelvis.
-        head: (F, 3) turn of the head against the chest.
-        wrists: (2, F, 3) metres from the shoulder's rest, in the chest's axes.
-        elbows: (2, F, 3) where elbows point, in the chest's axes.
-        palms: (2, F) radians that the forearm turns its palm upwards.
-        flexed: (2, F) radians that the wrist bends towards the palm.
-        curled: (2, F) radians that each finger joint bends.
-        ankles: (2, F, 3) metres, canonical head space.
-        tiptoe: (2, F) radians that the toes point down.
-        toes_out: (2,) radians that the feet turn outwards.
+        shift: (F, 3) displacement of the pelvis from its rest position, metres.
+        pelvis: (F, 3) turn of the pelvis about X, Y, Z, radians.
+        chest: (F, 3) turn of the chest relative to the pelvis about X, Y, Z, radians.
+        head: (F, 3) turn of the head relative to the chest about X, Y, Z, radians.
+        wrists: (2, F, 3) wrists relative to the shoulders at rest, in the chest's axes, metres.
+        elbows: (2, F, 3) directions in which elbows point, in the chest's axes.
+        palms: (2, F) rotation of the forearm that turns the palm upwards, radians.
+        flexed: (2, F) bend of the wrist towards the palm, radians.
+        curled: (2, F) bend of each finger joint, radians.
+        ankles: (2, F, 3) ankles in canonical head space, metres.
+        tiptoe: (2, F) angle by which the toes point down, radians.
+        toes_out: (2,) angle by which the feet turn outwards, radians.
     """
 
     shift: np.ndarray
@@ -55,10 +55,11 @@ class Acting:
 
 
 def pose(skeleton: Skeleton, acting: Acting) -> np.ndarray:
-    """Where the joints take what is bound to them.
+    """The joints' transforms of a body that acts.
 
     Returns:
-        (F, J, 4, 4) float64, posed from rest, both in canonical head space of the rest pose.
+        (F, J, 4, 4) float64 transforms from the rest pose to the posed body, both in canonical head
+        space at rest.
     """
     frames, joints = len(acting.shift), len(skeleton.names)
     rotations = np.tile(np.eye(3), (frames, joints, 1, 1))  # (F, J, 3, 3)

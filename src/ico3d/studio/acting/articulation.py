@@ -1,4 +1,4 @@
-"""From phonemes to the face that makes them: visemes, coarticulation, closed lips."""
+"""From phonemes to blendshapes of the mouth: visemes, coarticulation, closed lips."""
 
 from collections.abc import Sequence
 
@@ -7,13 +7,13 @@ import numpy as np
 from ico3d.common.espeak import Phoneme
 
 STEP = 0.005
-"""Seconds between the rows that are computed before frames are read off."""
+"""Seconds between the rows that are computed; frames are interpolated between them."""
 SPREAD = 0.034
-"""Standard deviation in seconds of the window over which sounds shape one another."""
+"""Standard deviation in seconds of the window over which neighbouring sounds blend."""
 CLOSING = 0.05
-"""Seconds that lips take to close before, and to open after, p, b and m."""
+"""Seconds in which lips close before p, b and m, and open afterwards."""
 LEAST_CLOSED = 0.045
-"""Seconds that lips stay closed at least: more than a frame of 25 per second."""
+"""Least time in seconds for which lips stay closed: longer than a frame at 25 per second."""
 
 BILABIALS = frozenset("pbm")
 SILENCE = "sil"
@@ -40,7 +40,7 @@ VISEMES_OF = {
     **{key: {"SS": 1.0} for key in "sz"},
     **{key: {"CH": 1.0} for key in "ʃʒ"},
 }
-"""Which visemes a letter of IPA mixes; letters that are not here take their neighbours' shape."""
+"""Visemes that each IPA letter mixes; missing letters take the shape of their neighbours."""
 
 STRENGTH = {"PP": 4.0, "FF": 3.0, "CH": 2.0, "ou": 1.6, "oh": 1.2, "SS": 1.2, "TH": 1.0}
 STRENGTH |= dict.fromkeys(("aa", "E", "ih", "sil"), 1.0) | {"RR": 0.9}
@@ -54,16 +54,16 @@ STRESSED, UNSTRESSED = 1.1, 0.85
 def articulate(
     phonemes: Sequence[Phoneme], end: float, visemes: dict[str, np.ndarray], times: np.ndarray
 ) -> np.ndarray:
-    """The mouth at given times.
+    """Blendshape weights of the mouth at given times.
 
-    Each sound asks for its viseme while it lasts. Neighbours blend under a symmetric window, by
-    their dominance, so that lips move neither early nor late; at p, b and m lips close whatever
-    the neighbours ask for.
+    Each phoneme has a viseme as its target. Neighbouring phonemes blend under a symmetric window,
+    weighted by dominance, so that lips move neither early nor late. At p, b and m the lips close
+    whatever the neighbours are.
 
     Args:
-        phonemes: What is spoken, in the order of time.
-        end: When the last one ends, seconds.
-        visemes: Viseme name to (K,) blendshape weights.
+        phonemes: Phonemes in order of time.
+        end: Time in seconds at which the last phoneme ends.
+        visemes: (K,) blendshape weights by name of the viseme.
         times: (F,) seconds.
 
     Returns:
@@ -82,7 +82,7 @@ def articulate(
 
 
 def closure(phonemes: Sequence[Phoneme], end: float, times: np.ndarray) -> np.ndarray:
-    """(F,) how far p, b and m close the lips at given times: 1 while they are shut."""
+    """(F,) how far p, b and m close the lips at times (F,) in seconds: 1 while fully closed."""
     closed = np.zeros(len(times))
     for first, last, symbol in _segments(phonemes, end):
         if symbol.strip("ˈˌː")[:1] not in BILABIALS:

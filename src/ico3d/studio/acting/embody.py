@@ -1,4 +1,4 @@
-"""Gives a performance a body."""
+"""Adds a moving body to a performance of the head."""
 
 from dataclasses import replace
 
@@ -19,15 +19,15 @@ def embodied(
     seed: int,
     clear: bool = False,
 ) -> Performance:
-    """The performance with a body that moves; the head goes where the neck takes it.
+    """The performance with a body that moves and carries the head.
 
     Args:
         subject: A whole person.
-        acted: The performance of the head alone.
-        motion: One of `MOTIONS`.
+        acted: Performance of the head alone.
+        motion: What the body does, one of `MOTIONS`.
         fps: Frames per second.
-        seed: Decides what the body does.
-        clear: Whether hands stay away from hips and thighs.
+        seed: Seed of the body's movements.
+        clear: Whether hands keep away from hips and thighs.
 
     Raises:
         SettingsError: If the person has no skeleton.

@@ -1,4 +1,4 @@
-"""What a synthetic body does: stands, gestures, moves fast, sways, walks in place."""
+"""Movements of a synthetic body: standing, gesturing, fast movements, swaying, walking in place."""
 
 from dataclasses import dataclass, replace
 
@@ -11,31 +11,38 @@ from ico3d.studio.person.skeleton import Skeleton
 
 MOTIONS = ("showcase", "talk", "walk", "sway")
 ARM = 0.517
-"""Metres from shoulder to wrist of the person for whom lengths are written here; they are scaled
-for others."""
+"""Length in metres, shoulder to wrist, of the arm for which lengths in this module are written.
+
+The lengths are scaled for other people.
+"""
 STANCE = 0.13
-"""Metres between an ankle and the middle."""
+"""Distance of an ankle from the body's middle, metres."""
 SOFT_KNEES = 0.006
-"""Metres that the pelvis sinks from the rest pose, so that no sway overstretches a leg."""
+"""Metres by which the pelvis is lowered from the rest pose, so that sway overstretches no leg."""
 TOES_OUT = np.radians(9.0)
 FAST = 0.4
-"""Seconds in which a hand goes above the head."""
+"""Seconds in which a hand is raised above the head."""
 GESTURE = (0.3, 0.6)
-"""Seconds that a hand takes from one place to the next, at least."""
+"""Range of the random duration in seconds of a hand's movement; `PACE` may prolong it."""
 PACE = 0.8
-"""Metres per second that a gesturing wrist moves at most, on average over a movement."""
+"""Highest mean speed of a gesturing wrist over a movement, metres per second."""
 HIP_TURNS = ((np.radians(13.0), 0.45), (np.radians(26.0), FAST))
-"""How far swaying hips turn to either side, and about how many seconds from one side to the other:
-first calmly, then quickly."""
+"""Turns of swaying hips: largest angle in radians, and seconds from one side to the other.
+
+The first pair is for calm, the second for quick sway.
+"""
 COUNTER = 0.75
-"""Part of a turn of the hips that the chest takes back."""
+"""Share of a turn of the hips that the chest turns back."""
 BENT_KNEES = 0.03
-"""Metres that the pelvis sinks, so that feet can stay where they are while the hips turn."""
+"""Metres by which the pelvis is lowered so that feet can stay in place while the hips turn."""
 ASIDE = 0.05
-"""Metres that the pelvis goes aside per radian that it turns."""
+"""Sideways displacement of the pelvis per turn of the hips, metres per radian."""
 CLEAR = (-0.46, -0.28, 0.17)
-"""Who wears a skirt keeps the hands off it: below the second height, above or at the first, wrists
-go outwards by up to the third; metres from the shoulder."""
+"""How hands keep off a skirt: two heights, and a distance outwards, metres from the shoulder.
+
+Wrists below the second height are moved outwards, more and more down to the first height, from
+which on the distance is the full one.
+"""
 STEPS = 1.7
 """Steps per second."""
 STEP_HEIGHT = 0.13
@@ -43,14 +50,14 @@ STEP_HEIGHT = 0.13
 
 @dataclass(frozen=True)
 class Hand:
-    """A place for the left hand; the right one mirrors it.
+    """A pose of the left hand; the right hand mirrors it.
 
     Attributes:
-        wrist: Metres from the shoulder: outwards, upwards, forwards.
-        elbow: Where the elbow points, in the same axes.
-        palm: Degrees that the forearm turns.
-        flexed: Degrees that the wrist bends towards the palm.
-        curled: Degrees that each finger joint bends.
+        wrist: Wrist relative to the shoulder in metres: outwards, upwards, forwards.
+        elbow: Direction in which the elbow points, in the axes of `wrist`.
+        palm: Rotation of the forearm that turns the palm upwards, degrees.
+        flexed: Bend of the wrist towards the palm, degrees.
+        curled: Bend of each finger joint, degrees.
     """
 
     wrist: tuple[float, float, float]
@@ -60,7 +67,7 @@ class Hand:
     curled: float = 14.0
 
     def row(self) -> np.ndarray:
-        """(9,) numbers to blend."""
+        """The pose as (9,) numbers that can be interpolated."""
         angles = np.radians([self.palm, self.flexed, self.curled])
         return np.array([*self.wrist, *self.elbow, *angles])
 
@@ -74,29 +81,29 @@ PLACES = (
     Hand((0.02, -0.12, 0.37), (0.6, -0.9, -0.2), palm=15.0, flexed=-10.0, curled=20.0),
     Hand((0.10, -0.10, 0.34), (0.6, -0.8, -0.3), palm=-20.0, curled=28.0),
 )
-"""Where hands go while somebody talks."""
+"""Poses of the hands during speech."""
 RAISED = (
     Hand((0.05, 0.42, 0.13), (0.9, -0.1, 0.35), palm=10.0, curled=5.0),
     Hand((0.12, 0.40, 0.16), (0.9, -0.1, 0.35), palm=-10.0, curled=8.0),
 )
 READY = Hand((0.06, -0.25, 0.31), (0.6, -0.8, -0.3), palm=-25.0, curled=12.0)
-"""Where a hand is before and after it goes above the head."""
+"""Pose of a hand before and after it is raised above the head."""
 
 
 class Track:
-    """Where one hand is: keys with places, minimum-jerk movements between them."""
+    """Movement of one hand: poses at key times, and minimum-jerk interpolation between them."""
 
     def __init__(self):
-        """The hand hangs down at time 0."""
+        """Starts with the hand hanging down at time 0."""
         self.times, self.rows = [0.0], [DOWN.row()]
 
     def hold(self, until: float) -> None:
-        """Stays in place."""
+        """Keeps the pose until time `until` in seconds."""
         self.times.append(max(until, self.times[-1]))
         self.rows.append(self.rows[-1])
 
     def go(self, hand: Hand, seconds: float, jitter: np.ndarray | None = None) -> None:
-        """Moves to a place, (3,) metres beside it."""
+        """Moves to a pose within `seconds`; `jitter` (3,) displaces the wrist, metres."""
         row = hand.row()
         if jitter is not None:
             row[:3] += jitter
@@ -105,11 +112,11 @@ class Track:
 
     @property
     def now(self) -> float:
-        """Seconds of the last key."""
+        """Time of the last key in seconds."""
         return self.times[-1]
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """(F, 9) rows at (F,) seconds."""
+        """(F, 9) poses at times (F,) in seconds, as `Hand.row` writes them."""
         return _minimum_jerk(np.array(self.times), np.stack(self.rows), times)
 
 
@@ -125,16 +132,16 @@ def _minimum_jerk(keys: np.ndarray, rows: np.ndarray, times: np.ndarray) -> np.n
 def act(
     skeleton: Skeleton, motion: str, times: np.ndarray, seed: int, clear: bool = False
 ) -> Acting:
-    """What a body does at given times.
+    """The movements of a body at given times.
 
     Args:
-        skeleton: Whose.
-        motion: One of `MOTIONS`: `showcase` stands calmly, gestures and moves fast, a third of the
-            time each; `sway` does so too, and turns the hips, first slowly, then fast; `talk`
-            stands and gestures in turn; `walk` walks in place.
+        skeleton: Skeleton of the person.
+        motion: One of `MOTIONS`. `showcase`: stands calmly, gestures, moves fast, a third of the
+            time each. `sway`: the same, but also turns the hips, first slowly, then fast. `talk`:
+            stands and gestures in turn. `walk`: walks in place.
         times: (F,) seconds, ascending from 0.
-        seed: Decides everything that is random.
-        clear: Whether hands stay away from hips and thighs.
+        seed: Seed of all random choices.
+        clear: Whether hands keep away from hips and thighs.
     """
     random = np.random.default_rng([seed, 3])
     end = float(times[-1])

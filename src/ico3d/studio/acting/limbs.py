@@ -1,4 +1,4 @@
-"""Arms and legs that reach where hands and feet are to be: two bones and a hinge."""
+"""Inverse kinematics of arms and legs: two bones and a hinge that reach for a goal."""
 
 from dataclasses import dataclass
 
@@ -7,22 +7,22 @@ import numpy as np
 from ico3d.studio.person.skeleton import Skeleton, about
 
 REACH = 0.9995
-"""Longest part of a limb's length that it stretches to: a hinge never locks."""
+"""Largest share of a limb's length that is used, so that the hinge is never fully straight."""
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) of length 1."""
+    """Vectors (..., 3), scaled to length 1."""
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 @dataclass(frozen=True)
 class Bend:
-    """How the two bones of a limb lie.
+    """Directions of the two bones of a limb.
 
     Attributes:
-        upper: (F, 3) direction of the upper bone.
-        lower: (F, 3) direction of the lower bone.
-        hinge: (F, 3) axis between them, at right angles to both.
+        upper: (F, 3) unit direction of the upper bone.
+        lower: (F, 3) unit direction of the lower bone.
+        hinge: (F, 3) unit axis of the hinge, perpendicular to both bones.
     """
 
     upper: np.ndarray
@@ -31,13 +31,16 @@ class Bend:
 
 
 def reach(start: np.ndarray, end: np.ndarray, lengths: tuple[float, float], pole: np.ndarray):
-    """Two bones from `start` towards `end` (law of cosines), the hinge moved towards `pole`.
+    """Places two bones from `start` towards `end` (law of cosines), bent towards `pole`.
 
     Args:
-        start: (F, 3).
-        end: (F, 3); nearer than the bones are long, or they only point to it.
-        lengths: Metres that the upper and the lower bone are long.
+        start: (F, 3) start of the upper bone, metres.
+        end: (F, 3) goal of the lower bone, metres; a goal out of reach is only pointed at.
+        lengths: Lengths of the upper and the lower bone, metres.
         pole: (F, 3) direction in which elbow or knee points.
+
+    Returns:
+        The directions of the bones.
     """
     first, second = lengths
     along = end - start
@@ -55,11 +58,11 @@ class Limb:
     """An arm or a leg at rest.
 
     Attributes:
-        upper: Joint at which it begins.
-        lower: Elbow or knee.
-        end: Wrist or ankle.
-        lengths: Of upper and lower bone, metres.
-        rest: How the bones lie at rest, with (3,) vectors.
+        upper: Index of the joint at which the limb begins.
+        lower: Index of elbow or knee.
+        end: Index of wrist or ankle.
+        lengths: Lengths of the upper and the lower bone, metres.
+        rest: Directions of the bones at rest, as (3,) vectors.
     """
 
     upper: int
@@ -70,7 +73,7 @@ class Limb:
 
     @staticmethod
     def of(skeleton: Skeleton, upper: str, lower: str, end: str) -> "Limb":
-        """The limb between three joints."""
+        """The limb between three named joints."""
         first, second, last = (skeleton.index(name) for name in (upper, lower, end))
         a, b, c = skeleton.at[[first, second, last]]
         lengths = (float(np.linalg.norm(b - a)), float(np.linalg.norm(c - b)))
@@ -78,7 +81,7 @@ class Limb:
         return Limb(first, second, last, lengths, Bend(one, two, unit(np.cross(one, two))))
 
     def rotations(self, bend: Bend) -> tuple[np.ndarray, np.ndarray]:
-        """(F, 3, 3) of the upper and of the lower bone, from rest, in canonical axes."""
+        """Rotations (F, 3, 3) from rest, in canonical axes: of the upper and of the lower bone."""
         pairs = ((bend.upper, self.rest.upper), (bend.lower, self.rest.lower))
         first, second = (
             _basis(now, bend.hinge) @ np.swapaxes(_basis(rest, self.rest.hinge), -1, -2)
@@ -93,15 +96,15 @@ def _basis(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
 
 
 def split_twist(rotation: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Splits rotations into a swing and the twist about a bone that comes before it.
+    """Splits rotations into a twist about a bone, which is applied first, and a swing.
 
     Args:
-        rotation: (F, 3, 3).
-        axis: (3,) the bone's direction at rest.
+        rotation: (F, 3, 3) rotations.
+        axis: (3,) unit direction of the bone at rest.
 
     Returns:
-        swing (F, 3, 3), the shortest rotation that takes the bone where it goes, and twist (F,) in
-        radians about the axis: rotation = swing · about(axis, twist).
+        swing (F, 3, 3), the shortest rotation that moves the bone to its new direction, and twist
+        (F,), radians about the axis: rotation = swing · about(axis, twist).
     """
     there = rotation @ axis  # (F, 3)
     cross = np.cross(axis, there)

@@ -1,4 +1,4 @@
-"""What a synthetic person does: speaks, blinks, moves the brows, and sways."""
+"""What a synthetic person's head does: speaks, blinks, moves the brows, sways."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,11 +16,11 @@ SOUND_RATE = 16000
 PAUSE = 0.25
 """Seconds of silence between sentences."""
 BLINK = (0.08, 0.03, 0.15)
-"""Seconds that a lid closes, stays shut, and opens."""
+"""Seconds in which a lid closes, for which it stays closed, and in which it opens."""
 YAW, PITCH, ROLL = 6.0, 3.5, 2.5
-"""Largest rotation of the sway, degrees."""
+"""Largest rotations of the head's sway, degrees."""
 SHIFT = (0.018, 0.006, 0.012)
-"""Largest shift of the sway, metres."""
+"""Largest displacements of the head's sway along x, y, z, metres."""
 
 MIMICRY = (
     (("browInnerUp",), 0.8),
@@ -41,19 +41,19 @@ MIMICRY = (
     (("mouthLeft", "jawLeft"), 0.3),
     (("mouthRight", "jawRight"), 0.3),
 )
-"""What a lively person's face does besides talking: shapes that move together, and how far.
+"""Facial expressions of a lively person besides speech: blendshapes that move together.
 
-Brows, lids, nose and cheeks most; the mouth has to speak.
+They move mostly brows, lids, nose and cheeks, because the mouth has to speak.
 """
 GAZE = (
     (("eyeLookInLeft", "eyeLookOutRight"), ("eyeLookOutLeft", "eyeLookInRight")),
     (("eyeLookUpLeft", "eyeLookUpRight"), ("eyeLookDownLeft", "eyeLookDownRight")),
 )
-"""Both eyes to the right or left of the person, up or down."""
+"""Blendshapes that turn both eyes to the person's right or left, up or down."""
 LOOK = (0.8, 0.5)
-"""How far the gaze wanders sideways, and up or down."""
+"""How far the gaze wanders sideways, and up or down, as a blendshape weight."""
 SACCADE = 0.06
-"""Seconds in which the eyes jump."""
+"""Seconds in which the eyes jump to a new direction."""
 
 
 @dataclass(frozen=True)
@@ -63,14 +63,14 @@ class Performance:
     Attributes:
         samples: (S,) float32 sound at `SOUND_RATE`; sample 0 belongs to frame 0.
         text: What is said.
-        phonemes: What is spoken, with times in seconds.
+        phonemes: Phonemes that are spoken, with times in seconds.
         weights: (F, K) float32 blendshape weights.
         eyes: (F, 7) float32 in the order of `EYE_NAMES`.
-        world_from_head: (F, 4, 4) float64.
-        joints: (F, J, 4, 4) float64, of a whole person: takes what is bound to each joint from
-            canonical head space at rest to the world; None for a bust.
-        cloth: (F, N, 3) float32 metres in the world, where the last N vertices of the person are:
-            cloth that swings instead of following joints; None without.
+        world_from_head: (F, 4, 4) float64 head poses.
+        joints: (F, J, 4, 4) float64 transforms of each joint of a whole person, from canonical head
+            space at rest to the world; None for a bust.
+        cloth: (F, N, 3) float32 positions in the world, metres, of the person's last N vertices,
+            which are swinging cloth and follow no joints; None without such cloth.
     """
 
     samples: np.ndarray
@@ -83,7 +83,7 @@ class Performance:
     cloth: np.ndarray | None = None
 
     def vertices(self, subject: Subject, frame: int) -> np.ndarray:
-        """(V, 3) float32 the mesh of a frame, in canonical head space."""
+        """(V, 3) float32 vertices of the mesh in a frame, in canonical head space, metres."""
         shape = subject.posed(self.weights[frame])
         if self.joints is None or subject.skeleton is None:
             return shape
@@ -99,15 +99,15 @@ class Performance:
 def perform(
     subject: Subject, text: str, frames: int, fps: float, seed: int, lively: bool
 ) -> Performance:
-    """Makes up a performance.
+    """Makes up the performance of a head.
 
     Args:
-        subject: Who speaks.
-        text: What to say, repeated until the time is over; empty for a long text of its own.
-        frames: How many frames to perform.
+        subject: The person.
+        text: What to say, repeated until the end; if empty, the built-in sentences.
+        frames: Number of frames.
         fps: Frames per second.
-        seed: Decides voice, order of sentences, blinks, brows and sway.
-        lively: Whether the face shows moods and glances too, which the sound does not tell.
+        seed: Seed of voice, order of sentences, blinks, brows and sway.
+        lively: Whether to add expressions and glances that cannot be inferred from the sound.
 
     Raises:
         MissingExtraError: If espeakng-loader or soxr is not installed.
@@ -222,7 +222,7 @@ def _blinks(times: np.ndarray, random: np.random.Generator) -> np.ndarray:
 
 
 def wander(times: np.ndarray, fastest: float, random: np.random.Generator) -> np.ndarray:
-    """(F,) a smooth random curve in [-1, 1] without frequencies above `fastest` Hz."""
+    """(F,) a smooth random curve in [-1, 1] at `times`, without frequencies above `fastest` Hz."""
     frequencies = random.uniform(0.15, 1.0, 5) * fastest
     phases = random.uniform(0, 2 * np.pi, 5)
     waves = np.sin(2 * np.pi * frequencies * times[:, None] + phases)  # (F, 5)

@@ -1,4 +1,4 @@
-"""What synthetic people say when nobody tells them: sentences with all sorts of mouths."""
+"""Built-in sentences for synthetic people, with a variety of mouth shapes."""
 
 import re
 
@@ -40,9 +40,9 @@ SENTENCES = (
     "An hour ago the whole orchestra was waiting outside in the snow.",
     "Peter, Paul and Mabel prepared a plan to paint the old barn.",
 )
-"""Spoken in an order that the seed decides."""
+"""The sentences; the seed of a recording decides their order."""
 
 
 def sentences_of(text: str) -> list[str]:
-    """Splits a text after full stops, question marks and exclamation marks."""
+    """Splits a text behind full stops, question marks and exclamation marks."""
     return [s.strip() for s in re.split(r"(?<=[.!?])\s+", text) if s.strip()]

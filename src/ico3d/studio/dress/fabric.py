@@ -1,8 +1,9 @@
-"""How cloth moves: points with mass, held by springs without mass, pushed away by round limbs.
+"""Simulates cloth: point masses held by massless springs and pushed away by round limbs.
 
-Extended position-based dynamics (Macklin, Müller and Chentanez, "XPBD: position-based simulation of
-compliant constrained dynamics", 2016) in many small steps of one iteration each (Macklin et al.,
-"Small steps in physics simulation", 2019). Cloth does not meet itself.
+The method is extended position-based dynamics (Macklin, Müller and Chentanez, "XPBD: position-based
+simulation of compliant constrained dynamics", 2016) in many small steps of one iteration each
+(Macklin et al., "Small steps in physics simulation", 2019). Collisions of the cloth with itself are
+ignored.
 """
 
 from dataclasses import dataclass
@@ -14,33 +15,35 @@ from scipy.interpolate import CubicSpline
 STEPS_PER_SECOND = 3600
 GRAVITY = 9.81
 DENSITY = 0.22
-"""Kilograms per square metre: a light wool."""
+"""Mass of the cloth, that of a light wool, kilograms per square metre."""
 DRAG = 1.6
-"""Part of a velocity that the air takes per second."""
+"""Share of a velocity that air resistance removes per second."""
 VISCOSITY = 40.0
-"""Part of the difference between the velocities of neighbours that is lost per second."""
+"""Share of the velocity difference of neighbouring points that is lost per second."""
 FRICTION = 0.3
-"""Coulomb's, between cloth and limb."""
+"""Coulomb's coefficient of friction between cloth and limbs."""
 THICKNESS = 0.005
-"""Metres that cloth keeps off a limb."""
+"""Distance in metres that cloth keeps from a limb."""
 STRETCH, SHEAR, BEND = 0.0, 0.15, 0.05
-"""Compliance, metres per newton: along the threads, along diagonals, from one thread over the
-next."""
+"""Compliances, metres per newton: along threads, along diagonals, and of bending.
+
+Bending springs join points that are two threads apart.
+"""
 DRESSING, SETTLING = 0.6, 1.8
-"""Seconds in which the person goes from rest to the first frame, and stands there before it."""
+"""Seconds before the first frame: to move from rest to the first pose, and to settle there."""
 
 
 @dataclass(frozen=True)
 class Cloth:
-    """N points of a cloth and what holds them together.
+    """N points of a cloth, and the springs between them.
 
     Attributes:
         points: (N, 3) float64 metres, canonical head space at rest.
-        masses: (N,) kilograms.
-        pinned: P; the first P points go where the body takes them.
-        pairs: (E, 2) int32 points that keep their distance.
-        lengths: (E,) metres that are kept.
-        compliance: (E,) metres per newton.
+        masses: (N,) masses of the points, kilograms.
+        pinned: P; the first P points are carried by the body.
+        pairs: (E, 2) int32 points that each spring joins.
+        lengths: (E,) rest lengths of the springs, metres.
+        compliance: (E,) compliances of the springs, metres per newton.
     """
 
     points: np.ndarray
@@ -53,13 +56,14 @@ class Cloth:
 
 @dataclass(frozen=True)
 class Course:
-    """Where pinned points and limbs are in F frames, in the world.
+    """Positions of pinned points and limbs in F frames, in the world, metres.
 
     Attributes:
-        rest: Pinned points (P, 3) and ends of limbs (C, 2, 3) where the person was dressed.
-        pins: (F, P, 3).
-        ends: (F, C, 2, 3).
-        radii: (C, 2) metres.
+        rest: Pinned points (P, 3) and limb ends (C, 2, 3) in the rest pose, in which the cloth is
+            put on.
+        pins: (F, P, 3) pinned points.
+        ends: (F, C, 2, 3) two ends of each limb.
+        radii: (C, 2) radius of each limb at its two ends.
         fps: Frames per second.
     """
 
@@ -71,13 +75,17 @@ class Course:
 
 
 def hung(cloth: Cloth, course: Course) -> np.ndarray:
-    """Lets a cloth hang, then follows it through all frames.
+    """Simulates a cloth through all frames.
 
-    Before the first frame the person goes from rest, where the cloth is put on, to the pose of
-    that frame and stands still until the cloth does.
+    Before the first frame the person moves from rest, where the cloth is put on, to the first pose
+    and stands still until the cloth has settled.
+
+    Args:
+        cloth: The cloth.
+        course: Positions of what carries the cloth and of what the cloth meets.
 
     Returns:
-        (F, N, 3) float64 points in the world.
+        (F, N, 3) float64 positions of the points in the world, metres.
     """
     steps = max(1, round(STEPS_PER_SECOND / course.fps))
     step = 1.0 / (steps * course.fps)

@@ -1,4 +1,4 @@
-"""Round limbs that stand for a body where cloth meets it."""
+"""Approximates a body by round limbs with which cloth collides."""
 
 from dataclasses import dataclass, replace
 
@@ -11,31 +11,31 @@ from ico3d.studio.person.subject import CARDS, Subject
 THIGH = ("upperleg01", "upperleg02")
 SHIN = ("lowerleg01", "lowerleg02")
 ARM = ("clavicle", "shoulder", "upperarm", "lowerarm", "wrist", "metacarpal", "finger")
-"""How the names of bones begin, MakeHuman's default rig."""
+"""Beginnings of the names of the arm's joints in MakeHuman's default rig."""
 WAIST = "spine04"
-"""The joint at whose height a skirt is hung."""
+"""Joint whose height is that of the waist, where a skirt hangs."""
 CUTS = 4
-"""Sections that are taken of a limb."""
+"""Number of cross sections taken of a limb."""
 PLANES = 9
-"""Planes that stand for a slice of the hips: the hem of a shirt lies between two sections."""
+"""Number of cutting planes for a slice of the hips, so that no hem between them is missed."""
 BULGE = 0.006
-"""Metres that hips grow where a leg turns in them: their skin follows the thigh in part."""
+"""Metres by which hips are enlarged, because their skin partly follows a turning thigh."""
 ENDS = (0.05, 0.95)
-"""Where the first and the last one lie, in lengths of the bone."""
+"""Positions of the first and the last cross section along the bone, as shares of its length."""
 SEAT = 0.15
-"""How far the hips reach below the hip joints, in lengths of a thigh."""
+"""How far the hips reach below the hip joints, as a share of the thigh's length."""
 ROUND = 0.3
-"""Below the hip joint, in lengths of a thigh, where a thigh begins to be round."""
+"""Distance below the hip joint from which a thigh is round, as a share of the thigh's length."""
 
 
 @dataclass(frozen=True)
 class Limbs:
-    """C segments; the radius changes evenly from one end to the other.
+    """C straight segments whose radius changes linearly from one end to the other.
 
     Attributes:
-        joints: (C,) int that carry them.
-        ends: (C, 2, 3) metres, canonical head space at rest.
-        radii: (C, 2) metres.
+        joints: (C,) int, index of the joint that carries each segment.
+        ends: (C, 2, 3) ends of the segments, metres, canonical head space at rest.
+        radii: (C, 2) radii at the two ends, metres.
     """
 
     joints: np.ndarray
@@ -43,7 +43,7 @@ class Limbs:
     radii: np.ndarray
 
     def posed(self, matrices: np.ndarray) -> np.ndarray:
-        """(F, C, 2, 3) ends of the segments, moved by joints (F, J, 4, 4)."""
+        """(F, C, 2, 3) ends of the segments for joint transforms (F, J, 4, 4)."""
         carried = matrices[:, self.joints]  # (F, C, 4, 4)
         turned = np.einsum("fcab,ceb->fcea", carried[..., :3, :3], self.ends)
         return turned + carried[:, :, None, :3, 3]
@@ -51,13 +51,15 @@ class Limbs:
 
 @dataclass(frozen=True)
 class Section:
-    """What a horizontal plane cuts of a trunk, as a stadium that lies across.
+    """A horizontal cut through a trunk, approximated by a stadium whose long side lies along X.
+
+    All of the trunk's cut lies inside the stadium.
 
     Attributes:
-        height: Metres, canonical head space at rest.
-        middle: Its middle along Z.
-        half_length: Half of the straight part, along X.
-        radius: Of its round ends; nothing lies outside.
+        height: Height of the cut, metres, canonical head space at rest.
+        middle: Z of the stadium's centre, metres.
+        half_length: Half of the stadium's straight part, metres.
+        radius: Radius of the stadium's round ends, metres.
     """
 
     height: float
@@ -66,7 +68,7 @@ class Section:
     radius: float
 
     def ends(self) -> np.ndarray:
-        """(2, 3) centres of its round ends, left and right."""
+        """(2, 3) centres of the stadium's round ends, left and right."""
         left = np.array([self.half_length, self.height, self.middle])
         return np.stack([left, left * (-1, 1, 1)])
 
@@ -75,7 +77,7 @@ def limbs_of(subject: Subject) -> Limbs:
     """Hips, thighs and shins of a whole person.
 
     Raises:
-        SettingsError: If the mesh has nothing where one of them should be.
+        SettingsError: If the mesh has no vertices where a limb should be.
     """
     bones = _bones(subject)
     found = [_hips(subject)]
@@ -88,16 +90,16 @@ def limbs_of(subject: Subject) -> Limbs:
 
 
 def trunk_section(subject: Subject, height: float, around: float = 0.0) -> Section:
-    """The trunk without arms, cut by a horizontal plane.
+    """The horizontal cut through the trunk, without arms, at some height.
 
     Args:
         subject: A whole person at rest.
-        height: Metres, canonical head space.
-        around: Metres up and down within which more planes are cut; the section is as wide and
-            deep as the widest and deepest of them.
+        height: Height in metres, canonical head space at rest.
+        around: Metres up and down within which further cuts are made; the result is as wide as the
+            widest and as deep as the deepest.
 
     Raises:
-        SettingsError: If there is nothing at that height.
+        SettingsError: If the mesh has nothing at that height.
     """
     bones = _bones(subject)
     trunk = bones.weights[:, _columns(bones, ARM)].sum(axis=1) < 0.5
@@ -111,7 +113,7 @@ def trunk_section(subject: Subject, height: float, around: float = 0.0) -> Secti
 
 
 def waist_height(subject: Subject) -> float:
-    """Metres, canonical head space at rest."""
+    """Height of the waist, metres, canonical head space at rest."""
     bones = _bones(subject)
     return float(bones.at[bones.index(WAIST), 1])
 
@@ -162,7 +164,7 @@ def _limb(
 
 
 def hip_sections(subject: Subject) -> list[Section]:
-    """Sections of what lies between waist and thighs, the waist first.
+    """Horizontal cuts from the waist down to the thighs, the waist first.
 
     Raises:
         SettingsError: If the subject is a bust, or its mesh has gaps.

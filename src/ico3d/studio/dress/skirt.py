@@ -1,4 +1,4 @@
-"""Cuts a flared skirt for a person: a grid of threads that hangs on the waist."""
+"""Cuts a flared skirt for a person: a grid of threads that hangs from the waist."""
 
 from dataclasses import dataclass, replace
 
@@ -10,24 +10,25 @@ from ico3d.studio.person.subject import Subject
 
 COLUMNS = 60
 THREAD = 0.02
-"""Metres from one row to the next."""
+"""Distance between two rows of the grid, metres."""
 FLARE = 0.4
-"""Metres that the radius grows per metre of height."""
+"""Growth of the skirt's radius per metre downwards, metres."""
 EASE = 0.009
-"""Metres between the waistband and where cloth would touch the body."""
+"""Gap in metres between the waistband and the distance at which cloth touches the body."""
 BELOW_KNEE = 0.03
-"""Metres that the hem hangs below the knee, if the skirt stood off like a bell."""
+"""Metres by which the hem lies below the knee while the skirt stands off like a bell."""
 
 
 @dataclass(frozen=True)
 class Skirt:
-    """A skirt at rest; the waistband is its first row.
+    """A skirt at rest; the waistband is the first row of its points.
 
     Attributes:
-        cloth: What is simulated; point r · `columns` + c lies in row r, the columns go around.
-        columns: Points of a row.
-        faces: (F, 3) int32 points, counter-clockwise seen from outside.
-        corner_uv: (F, 3, 2) float32: once around from 0 to 1, metres down from the waist.
+        cloth: The cloth to simulate; point r · `columns` + c lies in row r, and columns go around.
+        columns: Number of points per row.
+        faces: (F, 3) int32 triangles of points, counter-clockwise seen from outside.
+        corner_uv: (F, 3, 2) float32 texture coordinates: 0 to 1 once around, metres below the
+            waist.
     """
 
     cloth: Cloth
@@ -39,8 +40,12 @@ class Skirt:
 def cut_skirt(subject: Subject, columns: int = COLUMNS) -> Skirt:
     """Cuts a skirt for a whole person.
 
+    Args:
+        subject: The person at rest.
+        columns: Number of points per row.
+
     Raises:
-        SettingsError: If the subject is a bust, or its mesh lacks a waist.
+        SettingsError: If the subject is a bust, or the mesh has nothing at the waist.
     """
     bones = subject.skeleton
     sections = hip_sections(subject)

@@ -1,4 +1,4 @@
-"""Puts garments that swing on people."""
+"""Puts swinging garments on synthetic people."""
 
 from dataclasses import replace
 
@@ -13,24 +13,27 @@ from ico3d.studio.person.subject import Material, Subject
 
 GARMENTS = ("none", "skirt")
 TUCKED = 0.02
-"""Metres below the waist down to which a shirt is kept."""
+"""Metres below the waist at which a shirt under a skirt ends."""
 PELVIS = 0
-"""The root of the skeleton, which carries the waistband."""
+"""Index of the root joint of the skeleton, which carries the waistband."""
 
 
 def dressed(
     subject: Subject, acted: Performance, garment: str, fps: float
 ) -> tuple[Subject, Performance]:
-    """A person and what they do, with a garment over their clothes.
+    """A person and a performance, with a garment over the person's clothes.
 
     Args:
         subject: A whole person.
-        acted: What the body does.
-        garment: One of `GARMENTS`; none changes nothing.
+        acted: Performance of the whole body.
+        garment: One of `GARMENTS`; `none` changes nothing.
         fps: Frames per second.
 
+    Returns:
+        The person with the garment's mesh added, and the performance with the cloth's positions.
+
     Raises:
-        SettingsError: If the subject or the performance is a bust's.
+        SettingsError: If the subject is a bust, or the performance has no body.
     """
     if garment == "none":
         return subject, acted
@@ -41,7 +44,7 @@ def dressed(
 
 
 def tucked_in(subject: Subject) -> Subject:
-    """The person without what a shirt has below the waist, where a skirt covers it."""
+    """The person without the part of a shirt that lies below the waist, under a skirt."""
     height = subject.vertices[:, 1][subject.faces].max(axis=1)  # (F,)
     kept = (subject.materials != Material.CLOTH) | (height > waist_height(subject) - TUCKED)
     return replace(

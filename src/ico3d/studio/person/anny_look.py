@@ -1,4 +1,4 @@
-"""What the body model `anny` lacks to be recorded: landmarks, visemes, lips, brows and hair."""
+"""Additions to the body model `anny` for recordings: landmarks, visemes, lips, brows and hair."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ LANDMARKS = (
     3732, 472, 520, 7228, 10400, 7264, 540, 517,
 )
 # fmt: on
-"""Vertices of the base mesh nearest to where a face tracker sees the Multi-PIE landmarks."""
+"""Vertices of the base mesh nearest to the Multi-PIE landmarks that face trackers use."""
 
 LOOK = Look(
     skin=(0.30, 0.160, 0.100),
@@ -56,12 +56,12 @@ VISEMES: dict[str, dict[str, float]] = {
     "oh": {"jawOpen": 0.32, "mouthFunnel": 0.6, "mouthPucker": 0.2},
     "ou": {"jawOpen": 0.12, "mouthFunnel": 0.25, "mouthPucker": 0.75},
 }
-"""Visemes as weights of facial actions, made by hand."""
+"""Visemes as weights of facial actions, tuned by hand."""
 
 BROW_WIDTH = 0.009
 HAIRLINE_ANGLE = np.radians([0.0, 40.0, 68.0, 84.0, 100.0, 130.0, 180.0])
 HAIRLINE_HEIGHT = np.array([0.066, 0.058, 0.036, -0.012, 0.012, -0.045, -0.070])
-"""Height of the hairline above the eyes by the angle from the front, metres."""
+"""Height of the hairline above the eyes in metres, for each of `HAIRLINE_ANGLE` from the front."""
 HAIR_DEPTH = 0.020
 SKULL = np.array([0.0, 0.020, -0.005])
 SKULL_HALF_WIDTH = 0.074
@@ -70,7 +70,7 @@ CROWN = np.array([0.0, 0.85, -0.5])
 
 
 def finished(subject: Subject) -> Subject:
-    """Smooths the mesh and adds lips, brows and hair."""
+    """Smooths the person's mesh and adds lips, brows and hair."""
     smooth = smoothed(subject, np.ones(len(subject.faces), bool))
     smooth = replace(smooth, lip_mask=_lip_mask(smooth))
     for side in (range(21, 16, -1), range(22, 27)):

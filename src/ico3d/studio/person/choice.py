@@ -1,4 +1,4 @@
-"""Whom the studio can record."""
+"""Loads the person to record, by name or from a file."""
 
 from pathlib import Path
 
@@ -12,12 +12,13 @@ def load_subject(subject: str, whole: bool = False) -> Subject:
     """Loads a person.
 
     Args:
-        subject: `anny`, or the path of an `.npz` file in the layout of `subject_npz`.
-        whole: The whole person with a skeleton; otherwise a bust.
+        subject: `anny`, or the path of an `.npz` file in the layout of docs/captures/synthetic.md,
+            "Subject files".
+        whole: True for the whole person with a skeleton, False for a bust.
 
     Raises:
-        SettingsError: If `anny` is to be whole.
-        CaptureError: If there is no such file or it is not in that layout.
+        SettingsError: If `anny`, who is a bust only, is to be a whole person.
+        CaptureError: If the file is missing, or is not in that layout.
         MissingExtraError: If `anny` is asked for and not installed.
     """
     if subject == "anny" and whole:

@@ -1,4 +1,4 @@
-"""Hair: where its sheets end and where its strands run."""
+"""Geometry of hair: edges of its sheets and directions of its strands."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from ico3d.studio.person.subject import Material, Subject
 
 
 def hair_edge(subject: Subject) -> np.ndarray:
-    """Vertices (N,) on open edges of the hair: where sheets of hair end."""
+    """Indices (N,) of vertices on open edges of the hair mesh, where sheets of hair end."""
     hair = subject.faces[subject.materials == Material.HAIR]
     corners = np.sort(hair[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     edges, count = np.unique(corners, axis=0, return_counts=True)
@@ -14,10 +14,10 @@ def hair_edge(subject: Subject) -> np.ndarray:
 
 
 def strand_frames(subject: Subject) -> np.ndarray:
-    """Where strands run at each vertex, from texture coordinates.
+    """Direction and density of hair strands at each vertex, from texture coordinates.
 
     Returns:
-        (V, 4) float32: unit vector along v, and units of u per metre across it.
+        (V, 4) float32: the unit vector along which v grows, and u per metre across the strands.
     """
     corners, uv = subject.vertices[subject.faces], subject.corner_uv
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]  # (F, 3)

@@ -1,6 +1,6 @@
-"""Reads a person from an `.npz` file: ICT-FaceKit head on a MakeHuman body.
+"""Reads a person from an `.npz` file: a head of ICT-FaceKit on a MakeHuman body.
 
-The layout is the one of `docs/captures/synthetic.md`, "Subject files".
+The layout is described in `docs/captures/synthetic.md`, "Subject files".
 """
 
 from pathlib import Path
@@ -34,14 +34,14 @@ MATERIAL_BELOW = {
     "shoes": Material.SHOE,
     "socks": Material.SOCK,
 }
-"""What only a whole person wears."""
+"""Materials of garments that only a whole person wears."""
 BUST_DEPTH = 0.55
-"""How far below the eyes the person is kept, metres; no camera of the head rig sees lower."""
+"""Distance below the eyes at which a bust ends, metres; no camera of the head rig sees lower."""
 
 LASH_CARDS = (0.0235, 0.1665, 0.122)
-"""Where the first lash card begins in the atlas, how far apart cards lie, how high each is."""
+"""Lash cards in the texture: start of the first, distance between two, height of each."""
 IRIS_SHOWN = 0.8
-"""Visible part of the iris mesh's radius; the rest lies behind the white."""
+"""Visible share of the iris mesh's radius; the rest is covered by the white of the eye."""
 
 RELAXED_ARMS = {
     "shoulder01.L": (0.0, 0.0, -6.0),
@@ -51,7 +51,7 @@ RELAXED_ARMS = {
     "upperarm01.R": (8.0, 0.0, 30.0),
     "lowerarm01.R": (0.0, 0.0, -5.0),
 }
-"""Degrees about the world axes X, Y, Z (applied X first) that lower the arms of the rest pose."""
+"""Rotations that lower the arms of the rest pose: degrees about X, Y, Z, X applied first."""
 
 FAIR = Look(
     skin=(0.60, 0.37, 0.27),
@@ -80,10 +80,10 @@ def load_npz(path: Path, whole: bool = False) -> Subject:
 
     Args:
         path: The file.
-        whole: The whole person with a skeleton, in the rest pose; otherwise a bust.
+        whole: True for the whole person with a skeleton, in the rest pose, False for a bust.
 
     Raises:
-        CaptureError: If the file is missing, is no npz, or lacks an array.
+        CaptureError: If the file is missing, is not in npz format, or lacks an array.
     """
     if not path.is_file():
         raise CaptureError(f"there is no subject file {path}: name an .npz file, or 'anny'.")

@@ -1,4 +1,4 @@
-"""Bones under a mesh: linear blend skinning."""
+"""A skeleton that moves a mesh by linear blend skinning."""
 
 from dataclasses import dataclass
 
@@ -8,16 +8,17 @@ from numpy.typing import ArrayLike
 
 @dataclass(frozen=True)
 class Skeleton:
-    """J joints of a person at rest, and which vertices hang on them.
+    """J joints of a person at rest, and the skinning weights of the mesh.
 
-    Rotations are given about the joint, in the axes of canonical head space, in which the rest
-    pose stands; a joint carries all that lies below it.
+    A rotation turns everything below a joint about that joint, in the axes of canonical head space,
+    in which the rest pose is given.
 
     Attributes:
-        names: J names, MakeHuman's default rig.
-        parents: (J,) int, parents before children, -1 for the root.
-        at: (J, 3) float64 joints at rest, canonical head space.
-        weights: (V, J) float32 part of each joint in each vertex; rows sum to 1.
+        names: Names of the joints in MakeHuman's default rig.
+        parents: (J,) int index of each joint's parent, -1 for the root; parents come before
+            children.
+        at: (J, 3) float64 positions of the joints at rest, metres, canonical head space.
+        weights: (V, J) float32 share of each joint in each vertex; rows sum to 1.
     """
 
     names: tuple[str, ...]
@@ -26,18 +27,18 @@ class Skeleton:
     weights: np.ndarray
 
     def index(self, name: str) -> int:
-        """Number of a joint; ValueError if there is none of that name."""
+        """Index of a joint; ValueError if no joint has this name."""
         return self.names.index(name)
 
     def matrices(self, rotations: np.ndarray, shift: np.ndarray) -> np.ndarray:
-        """Where each joint takes what is bound to it.
+        """Transforms of all joints from the rest pose.
 
         Args:
-            rotations: (F, J, 3, 3) of each joint about itself.
-            shift: (F, 3) metres that the root moves.
+            rotations: (F, J, 3, 3) rotation of each joint about itself.
+            shift: (F, 3) displacement of the root, metres.
 
         Returns:
-            (F, J, 4, 4) float64: posed from rest.
+            (F, J, 4, 4) float64 transforms from rest to pose.
         """
         local = np.tile(np.eye(4), (*rotations.shape[:2], 1, 1))  # (F, J, 4, 4)
         local[..., :3, :3] = rotations
@@ -50,7 +51,7 @@ class Skeleton:
         return world
 
     def skinned(self, vertices: np.ndarray, matrices: np.ndarray) -> np.ndarray:
-        """Vertices (V, 3) float32 that follow joints (J, 4, 4)."""
+        """Vertices (V, 3) float32, moved by joint transforms (J, 4, 4)."""
         rows = matrices[:, :3].reshape(len(matrices), 12).astype(np.float32)
         mixed = (self.weights @ rows).reshape(-1, 3, 4)  # (V, 3, 4)
         return np.einsum("vab,vb->va", mixed[..., :3], vertices) + mixed[..., 3]
@@ -60,11 +61,11 @@ def about(axis: np.ndarray, angles: ArrayLike) -> np.ndarray:
     """Rotations about axes (Rodrigues' formula).
 
     Args:
-        axis: (..., 3) unit vectors.
-        angles: (...,) radians; both are broadcast.
+        axis: (..., 3) unit vectors, broadcast against the angles.
+        angles: (...,) radians.
 
     Returns:
-        (..., 3, 3).
+        (..., 3, 3) rotation matrices.
     """
     axis, angles = np.asarray(axis, float), np.asarray(angles, float)
     x, y, z = np.moveaxis(axis, -1, 0)
@@ -77,6 +78,6 @@ def about(axis: np.ndarray, angles: ArrayLike) -> np.ndarray:
 
 
 def turned(turns: np.ndarray) -> np.ndarray:
-    """(F, 3, 3) rotations from (F, 3) radians about X, Y, Z: first about Z, then X, then Y."""
+    """Rotations (F, 3, 3) of angles (F, 3) about X, Y, Z in radians, applied in order Z, X, Y."""
     x, y, z = (about(np.eye(3)[i], turns[:, i]) for i in range(3))
     return y @ x @ z

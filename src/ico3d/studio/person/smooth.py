@@ -1,4 +1,4 @@
-"""Makes a coarse mesh smooth where it shows: triangles split in four, following the normals."""
+"""Smooths the visible parts of a coarse mesh: splits triangles in four, following the normals."""
 
 from dataclasses import replace
 
@@ -9,15 +9,15 @@ from ico3d.studio.person.subject import Subject
 from ico3d.studio.raster import vertex_normals
 
 BULGE = 0.75
-"""How far split edges move from the flat triangle to the surface the normals tell of."""
+"""How far new vertices move from the flat triangle (0) to the curved surface (1)."""
 
 
 def smoothed(subject: Subject, chosen: np.ndarray) -> Subject:
-    """Splits triangles into four that bulge as their normals tell (Phong tessellation).
+    """Splits triangles into four that bulge as their normals imply (Phong tessellation).
 
     Args:
-        subject: The person; landmarks and eyes stay where they are.
-        chosen: (F,) bool, the faces to split; they must not share edges with others.
+        subject: The person; landmarks and eyes are not changed.
+        chosen: (F,) bool, the faces to split; they must not share edges with unsplit faces.
     """
     coarse = subject.faces[chosen]
     if len(coarse) == 0:

@@ -1,4 +1,4 @@
-"""A synthetic person: one deforming mesh with everything a studio needs to record it."""
+"""A synthetic person: a deformable mesh with everything needed to record it."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -9,7 +9,7 @@ from ico3d.studio.person.skeleton import Skeleton
 
 
 class Material(IntEnum):
-    """What a face of the mesh is made of; the number is the one the shader switches on."""
+    """Material of a face of the mesh; the shader selects by these numbers."""
 
     SKIN = 0
     MOUTH = 1
@@ -28,18 +28,18 @@ class Material(IntEnum):
 
 
 CARDS = (Material.BROW, Material.LASH)
-"""Materials that are drawn with an alpha over what lies behind them."""
+"""Materials of flat cards that are blended over what lies behind them."""
 GARMENTS = (Material.CLOTH, Material.TROUSERS, Material.SHOE, Material.SOCK)
 
 
 @dataclass(frozen=True)
 class Eye:
-    """An eyeball that does not turn.
+    """An eyeball at rest.
 
     Attributes:
-        centre: (3,) metres, canonical head space.
-        axis: (3,) unit vector through the middle of the pupil.
-        iris_radius: Metres, measured at right angles to the axis.
+        centre: (3,) centre in canonical head space, metres.
+        axis: (3,) unit vector from the centre through the pupil.
+        iris_radius: Radius of the iris, perpendicular to the axis, metres.
     """
 
     centre: np.ndarray
@@ -49,7 +49,7 @@ class Eye:
 
 @dataclass(frozen=True)
 class Look:
-    """Colours of a person, linear RGB.
+    """Colours of a person in linear RGB.
 
     Attributes:
         skin: (3,) albedo of the cheek.
@@ -57,9 +57,9 @@ class Look:
         hair: (3,) albedo of a strand.
         iris: (3,) albedo of the iris.
         cloth: (2, 3) albedo of the cloth and of its pattern.
-        stripes: Whether the pattern is stripes; flowers otherwise.
-        freckles: How many, 0 to 1.
-        stubble: How much shaved beard shows, 0 to 1.
+        stripes: Whether the pattern of the cloth is stripes; otherwise flowers.
+        freckles: Amount of freckles, 0 to 1.
+        stubble: Visibility of a shaved beard, 0 to 1.
         accent: (3,) albedo of the third colour of a whole person's shirt.
         trousers: (2, 3) albedo of the trousers and of their checks.
         shoe: (3,) albedo of the leather.
@@ -92,26 +92,28 @@ class Subject:
 
     Attributes:
         name: Name used in reports.
-        vertices: (V, 3) float32, neutral.
+        vertices: (V, 3) float32 vertices of the neutral face, metres.
         faces: (F, 3) int32, counter-clockwise seen from outside.
-        materials: (F,) uint8 of `Material`.
+        materials: (F,) uint8, the `Material` of each face.
         corner_uv: (F, 3, 2) float32 texture coordinates. Hair: strands run along v. Cloth: metres.
-            Brows: u from the nose outwards, v upwards. Lashes: u along the lid (plus 2 on the
-            lower one), v from root to tip.
+            Brows: u from the nose outwards, v upwards. Lashes: u along the lid (plus 2 on the lower
+            lid), v from root to tip.
         lip_mask: (V,) float32, 1 on the red of the lips.
-        blendshape_names: K ARKit names.
-        delta_vertices: (M,) int32, the vertices that blendshapes move.
-        deltas: (K, M, 3) float32 metres at weight 1.
-        visemes: Oculus viseme name to (K,) weights.
-        landmark_vertices: (68,) int32, Multi-PIE order.
-        eyes: Left and right (the person's).
-        neck_base: (3,) the point that the body sways about.
-        head_in_world: (3,) where the canonical origin is at rest; the floor is y = 0.
-        male: Whether a man's voice suits.
-        look: Colours.
-        sources: What the geometry was made from, with licences.
-        licence: Licence of pictures of this person.
-        skeleton: Of a whole person, who stands in the mesh's rest pose; None for a bust.
+        blendshape_names: ARKit names of the K blendshapes.
+        delta_vertices: (M,) int32 indices of the vertices that blendshapes move.
+        deltas: (K, M, 3) float32 displacements at weight 1, metres.
+        visemes: (K,) blendshape weights by Oculus viseme name.
+        landmark_vertices: (68,) int32 indices of vertices in Multi-PIE order.
+        eyes: The person's left and right eye.
+        neck_base: (3,) point about which the head sways, metres.
+        head_in_world: (3,) position of the canonical origin in the world at rest, metres; the floor
+            is y = 0.
+        male: Whether the voice should be a man's.
+        look: Colours of the person.
+        sources: Names and licences of what the geometry was made from.
+        licence: Licence of pictures that show this person.
+        skeleton: Skeleton of a whole person, whose vertices are given in the skeleton's rest pose;
+            None for a bust.
     """
 
     name: str
@@ -135,16 +137,16 @@ class Subject:
     skeleton: Skeleton | None = None
 
     def posed(self, weights: np.ndarray) -> np.ndarray:
-        """Vertices (V, 3) float32 for blendshape weights (K,)."""
+        """Vertices (V, 3) float32 for blendshape weights (K,), metres."""
         vertices = self.vertices.copy()
         moved = np.einsum("k,kmc->mc", weights.astype(np.float32), self.deltas)  # (M, 3)
         vertices[self.delta_vertices] += moved
         return vertices
 
     def landmarks(self, vertices: np.ndarray) -> np.ndarray:
-        """(68, 3) float32 landmarks on posed vertices (V, 3)."""
+        """(68, 3) float32 landmarks of posed vertices (V, 3)."""
         return vertices[self.landmark_vertices]
 
     def weights(self, values: dict[str, float]) -> np.ndarray:
-        """(K,) float32 weights from names; names this person lacks are left out."""
+        """(K,) float32 weights from values by name; names this person lacks are ignored."""
         return np.array([values.get(name, 0.0) for name in self.blendshape_names], np.float32)

@@ -1,4 +1,4 @@
-"""What a whole person wears: prints that show from metres away and stick to the cloth."""
+"""Textures of a whole person's clothes: prints that are visible from metres away."""
 
 import math
 
@@ -8,11 +8,11 @@ from ico3d.studio.picture.materials import Spot
 from ico3d.studio.picture.textures import grain, noise, smoothstep
 
 TROUSER_CHECK = 0.052
-"""Metres from one line of the checks to the next."""
+"""Distance between two lines of the trousers' checks, metres."""
 CHECKS = 10
-"""Lines around a leg."""
+"""Number of lines of the checks around a leg."""
 GORES = 14
-"""Panels around a skirt, in two colours by turns."""
+"""Number of panels around a skirt, in two alternating colours."""
 
 
 @njit(cache=True, nogil=True)
@@ -33,7 +33,7 @@ def _band(t, width, pixel):
 
 @njit(cache=True, nogil=True)
 def printed(colors, x, y, z, pixel):
-    """A shirt in bands of which each is sprinkled with patches of the next colour."""
+    """A shirt in bands, each sprinkled with patches of the next band's colour."""
     warp = 0.012 * (noise(x / 0.06, y / 0.06, z / 0.06) - 0.5)
     broad = _band((y + warp) / 0.088, 0.5, pixel / 0.088)
     large = _patch(x, y, z, 0.042, 0.58, pixel)
@@ -55,7 +55,7 @@ def printed(colors, x, y, z, pixel):
 
 @njit(cache=True, nogil=True)
 def trousers(colors, x, y, z, pixel):
-    """A checked cloth with worn patches."""
+    """Checked cloth with worn patches."""
     hip, ankle = colors.legs[0], colors.legs[1]
     down = (hip[1] - y) / (hip[1] - ankle[1])
     out = abs(x) - hip[0] - down * (ankle[0] - hip[0])
@@ -77,7 +77,7 @@ def trousers(colors, x, y, z, pixel):
 
 @njit(cache=True, nogil=True)
 def shoe(colors, x, y, z, pixel):
-    """Leather on a light sole."""
+    """A leather shoe with a light sole."""
     floor = colors.floor
     shade = 1.0 + 0.14 * grain(x, y, z, 0.012, pixel) + 0.10 * grain(x, y, z, 0.005, pixel)
     sole = 1.0 - smoothstep(0.022 - 0.4 * pixel, 0.022 + 0.4 * pixel, y - floor)
@@ -92,14 +92,14 @@ def shoe(colors, x, y, z, pixel):
 
 @njit(cache=True, nogil=True)
 def sock(x, y, z, pixel):
-    """Grey ribs."""
+    """A grey ribbed sock."""
     shade = 1.0 + 0.25 * grain(x, y * 0.2, z, 0.008, pixel)
     return Spot(0.25 * shade, 0.25 * shade, 0.27 * shade, 6.0, 0.02, 0.3, 0.1)
 
 
 @njit(cache=True, nogil=True)
 def skirt(colors, u, v, x, y, z, pixel):
-    """Gores with patches, and bands around; u goes once around from 0 to 1, v metres down."""
+    """A skirt of panels with patches and bands; u is 0 to 1 once around, v metres downwards."""
     gore = _band(GORES / 2 * u, 0.5, pixel * GORES / 2 / (1.0 + 2.0 * v))
     bands = _band(v / 0.13, 0.22, pixel / 0.13)
     large = _patch(x + 3.0, y, z, 0.05, 0.62, pixel)

@@ -1,4 +1,4 @@
-"""The lights of the studio and how surfaces answer them, in linear light."""
+"""The lights of the studio, and how surfaces reflect them, in linear light."""
 
 import math
 from dataclasses import dataclass
@@ -11,19 +11,22 @@ from ico3d.studio.picture.paint import light_basis, light_screen
 from ico3d.studio.raster import empty_buffers, rasterise
 
 SHADOW_BIAS = 0.004
-"""Metres behind the shadow map that are still lit: less speckles, more leaks."""
+"""Depth in metres behind the shadow map that still counts as lit.
+
+A larger value gives fewer speckles but lets more light leak into shadows.
+"""
 
 
 @dataclass(frozen=True)
 class Lamps:
-    """How a studio is lit: lights far away, linear RGB.
+    """The lights of a studio: distant lamps and surrounding light, in linear RGB.
 
     Attributes:
-        directions: (3, 3) rows: towards key, fill and rim light, in the world.
-        colors: (3, 3) of these.
+        directions: (3, 3) rows: unit vectors towards key, fill and rim light, in the world.
+        colors: (3, 3) rows: colours of key, fill and rim light.
         sky: (3,) light from above.
         ground: (3,) light from below.
-        cloth: (3,) what the grey cloth behind the person sends back.
+        cloth: (3,) light that the grey cloth behind the person reflects.
     """
 
     directions: np.ndarray
@@ -49,18 +52,19 @@ STUDIOS = {
         np.array([1.15, 0.93, 0.70]),
     ),
 }
-"""`studio`: neutral, key light from the person's right. `warm`: like bulbs, from their left."""
+"""`studio`: neutral, key light from the person's right; `warm`: like bulbs, from the left."""
 
 
 @dataclass(frozen=True)
 class ShadowMap:
-    """What a depth map of the key light covers.
+    """The region that a depth map of the key light covers.
 
     Attributes:
-        size: Side in texels.
-        reach: Half the side in metres.
-        centre: (3,) its middle, in the world if `whole`, else in canonical head space.
-        whole: Whether it covers the whole person.
+        size: Side of the map in texels.
+        reach: Half of the side in metres.
+        centre: (3,) centre of the region, in the world if `whole`, else in canonical head space,
+            metres.
+        whole: Whether the region holds the whole person.
     """
 
     size: int
@@ -74,18 +78,18 @@ WHOLE = ShadowMap(1024, 1.25, np.array([0.0, 1.05, 0.0]), True)
 
 
 class Lights(NamedTuple):
-    """Lights as the person's canonical space sees them in one frame.
+    """The lights of one frame in the person's canonical space.
 
     Attributes:
         directions: (3, 3) float32 rows: unit vectors towards key, fill and rim light.
         colors: (3, 3) float32 linear RGB.
-        up: (3,) float32, the world's up.
-        sky: (3,) float32 light from above; `ground` from below.
-        ground: (3,) float32.
+        up: (3,) float32, upward direction of the world.
+        sky: (3,) float32 light from above.
+        ground: (3,) float32 light from below.
         shadow: (S, S) float32 depth map of the key light.
-        basis: (3, 3) float32 of the key light's depth map.
-        centre: (3,) float32 middle of the depth map.
-        scale: Its texels per metre.
+        basis: (3, 3) float32 axes of the depth map (see `light_basis`).
+        centre: (3,) float32 centre of the depth map, metres.
+        scale: Texels of the depth map per metre.
     """
 
     directions: np.ndarray
@@ -113,7 +117,7 @@ def lights_on(
         solid: (F, 3) int32 faces that cast shadows.
         world_from_head: (4, 4) pose of the head.
         lamps: How the studio is lit.
-        covered: Where shadows are looked for.
+        covered: The region in which shadows are computed.
     """
     unit = lamps.directions / np.linalg.norm(lamps.directions, axis=1, keepdims=True)
     rotation = world_from_head[:3, :3]
@@ -139,7 +143,7 @@ def lights_on(
 
 @njit(cache=True, nogil=True)
 def key_visibility(lights, x, y, z):
-    """Part of the key light that reaches a point, 0 to 1: a soft 4×4 look-up."""
+    """Share of the key light that reaches a point, 0 to 1: a soft 4×4 look-up in the depth map."""
     basis, shadow = lights.basis, lights.shadow
     size = shadow.shape[0]
     scale = lights.scale
@@ -161,14 +165,14 @@ def key_visibility(lights, x, y, z):
 
 @njit(cache=True, nogil=True)
 def wrapped(cosine, wrap):
-    """Diffuse light that bleeds past the terminator, as under skin; energy is kept."""
+    """Diffuse light that reaches past the terminator, as in skin; total energy is kept."""
     value = max(0.0, (cosine + wrap) / (1.0 + wrap))
     return value / (1.0 + wrap)
 
 
 @njit(cache=True, nogil=True)
 def gloss(n_dot_h, n_dot_l, v_dot_h, power, facing):
-    """Normalised Blinn-Phong highlight with Fresnel, `facing` = reflectance head on."""
+    """Normalised Blinn-Phong highlight with Fresnel effect; `facing` is the frontal reflectance."""
     if n_dot_l <= 0.0 or n_dot_h <= 0.0:
         return 0.0
     fresnel = facing + (1.0 - facing) * (1.0 - max(0.0, v_dot_h)) ** 5

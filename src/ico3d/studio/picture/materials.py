@@ -1,4 +1,4 @@
-"""What each material looks like at one spot: albedo and how it shines, before any light."""
+"""Procedural materials: albedo and gloss of each material at one point, before any light."""
 
 import math
 from typing import NamedTuple
@@ -10,16 +10,16 @@ from ico3d.studio.picture.textures import grain, noise, smoothstep, spots, stran
 
 
 class Spot(NamedTuple):
-    """A surface at one spot.
+    """Surface properties at one point.
 
     Attributes:
-        red: Albedo, linear.
-        green: Albedo, linear.
-        blue: Albedo, linear.
-        power: Sharpness of the highlight.
-        facing: Reflectance head on; 0 for none.
-        wrap: How far light bleeds past the terminator.
-        bump: How far the normal is tilted by fine relief.
+        red: Albedo, linear, red.
+        green: Albedo, linear, green.
+        blue: Albedo, linear, blue.
+        power: Exponent of the highlight: higher is sharper.
+        facing: Reflectance at frontal view; 0 for no highlight.
+        wrap: How far diffuse light reaches past the terminator.
+        bump: How far fine relief tilts the normal.
     """
 
     red: float
@@ -32,10 +32,11 @@ class Spot(NamedTuple):
 
 
 class Colors(NamedTuple):
-    """`Look` as arrays for the shader.
+    """The colours of a `Look` as arrays for the shader, and some lengths.
 
-    `bold`: whether the shirt has a print that shows from far away. `floor`: height of the ground in
-    canonical head space at rest. `legs`: (2, 3) left hip and ankle at rest.
+    `bold`: whether the shirt has a print that is visible from far away. `floor`: height of the
+    ground in canonical head space at rest, metres. `legs`: (2, 3) left hip and ankle at rest,
+    metres.
     """
 
     skin: np.ndarray
@@ -86,7 +87,7 @@ def skin(colors, channels, x, y, z, pixel):
 
 @njit(cache=True, nogil=True)
 def eye(colors, radius, angle, iris_radius, x, y, z, pixel):
-    """Sclera, limbal ring, iris fibres and pupil by the distance `radius` from the axis."""
+    """Sclera, limbal ring, iris fibres and pupil, by the distance `radius` from the axis."""
     soft = max(0.00025, 0.5 * pixel)
     vein = smoothstep(0.25, 0.9, grain(x, y * 1.5, z, 0.0016, pixel)) * 0.12
     far = smoothstep(1.2 * iris_radius, 2.0 * iris_radius, radius)
@@ -109,7 +110,7 @@ def eye(colors, radius, angle, iris_radius, x, y, z, pixel):
 
 @njit(cache=True, nogil=True)
 def teeth(x, y, z, pixel):
-    """Ivory with a warmer neck."""
+    """Ivory that is warmer near the gums."""
     shade = 1.0 + 0.04 * grain(x, y, z, 0.003, pixel)
     return Spot(0.70 * shade, 0.63 * shade, 0.52 * shade, 70.0, 0.045, 0.3, 0.0)
 
@@ -123,7 +124,7 @@ def flesh(red, green, blue, x, y, z, pixel):
 
 @njit(cache=True, nogil=True)
 def hair(colors, u, v, x, y, z, pixel_u):
-    """Strands along v; highlights are added where the light is known."""
+    """Strands along v; highlights are added by the shader."""
     fine = strands(u, v, 700.0, pixel_u)
     lock = 2.0 * noise(u * 34.0, v * 2.0, 3.0) - 1.0
     shade = 1.0 + 0.75 * fine + 0.40 * lock

@@ -1,4 +1,4 @@
-"""What is painted on a person once: flush, freckles, beard, and how deep in a fold things lie."""
+"""What is painted on a person once: flush, freckles, beard, and ambient occlusion."""
 
 from dataclasses import dataclass
 
@@ -11,33 +11,35 @@ from ico3d.studio.person.subject import CARDS, Subject
 from ico3d.studio.raster import empty_buffers, rasterise, vertex_normals
 
 OPENINGS = (0.0, 0.12, 0.25, 0.45)
-"""Weights of `jawOpen` at which occlusion is computed; frames blend between them."""
+"""Weights of `jawOpen` for which occlusion is computed; frames interpolate between them."""
 DIRECTIONS = 64
 HEAD_MAP = (448, 0.24)
-"""Texels along the side of a depth map, and half of it in metres: the head and the neck; what lies
-outside is lit."""
+"""Depth map of head and neck: texels along the side, and half of the side in metres.
+
+Everything outside of the map counts as lit.
+"""
 BODY_MAP = (640, 1.1)
-"""Texels along the side of a depth map of a whole person, and half of it in metres."""
+"""Depth map of a whole person: texels along the side, and half of the side in metres."""
 NECK = -0.2
-"""Height below which the occlusion of a whole person comes from the map of the body, metres."""
+"""Height in metres below which a whole person's occlusion comes from the map of the body."""
 BIAS = 1.4
-"""Texels that a surface may lie behind the depth map and still count as lit."""
+"""Depth in texels behind a depth map at which a surface still counts as lit."""
 SCALP_REACH = 0.006
-"""Metres over which the roots of hair shade the skin."""
+"""Distance in metres over which roots of hair darken the skin."""
 WIDE = 0.06
-"""Part of the light that reaches the deepest fold by way of other skin."""
+"""Share of light that reaches the deepest fold after reflection from other skin."""
 
 
 @dataclass(frozen=True)
 class Paint:
-    """Values per vertex that textures need.
+    """Values per vertex that textures and shading need.
 
     Attributes:
-        channels: (V, 6) float32: lip, redness, freckles, beard, scalp, each 0 to 1, and metres
-            behind the lips.
-        strands: (V, 4) float32 of `strand_frames`.
-        openings: (O,) float32 inner-lip gap in metres at each computed opening, ascending.
-        occlusion: (O, V) float32: 1 = sees the whole sky, at each opening.
+        channels: (V, 6) float32: lip, redness, freckles, beard, scalp, each 0 to 1, and the depth
+            behind the lips in metres.
+        strands: (V, 4) float32, as `strand_frames` returns them.
+        openings: (O,) float32 gap of the inner lips in metres for each of `OPENINGS`, ascending.
+        occlusion: (O, V) float32 visible share of the sky for each of `OPENINGS`.
     """
 
     channels: np.ndarray
@@ -46,7 +48,7 @@ class Paint:
     occlusion: np.ndarray
 
     def occlusion_at(self, gap: float) -> np.ndarray:
-        """(V,) float32 occlusion for an inner-lip gap in metres."""
+        """(V,) float32 visible share of the sky for a gap of the inner lips in metres."""
         at = float(np.interp(gap, self.openings, np.arange(len(self.openings))))
         low = min(int(at), len(self.openings) - 2)
         part = np.float32(at - low)
@@ -54,7 +56,7 @@ class Paint:
 
 
 def paint(subject: Subject) -> Paint:
-    """Paints a person; takes about a second."""
+    """Computes the painted values of a person; takes about a second."""
     gaps, occlusion = [], []
     for opening in OPENINGS:
         shape = {"jawOpen": opening}
@@ -75,7 +77,7 @@ def paint(subject: Subject) -> Paint:
 
 
 def lip_gap(landmarks: np.ndarray) -> float:
-    """Distance in metres between the middles of the inner lips, from (68, 3) landmarks."""
+    """Distance in metres between the middles of the inner lips in landmarks (68, 3)."""
     return float(np.linalg.norm(landmarks[62] - landmarks[66]))
 
 
@@ -172,7 +174,7 @@ def _sphere(count: int) -> np.ndarray:
 
 
 def light_basis(direction: np.ndarray) -> np.ndarray:
-    """(3, 3) rows: right, down, towards the light, for parallel light from `direction`."""
+    """(3, 3) rows right, down and towards the light, for parallel light from `direction`."""
     towards = direction / np.linalg.norm(direction)
     up = np.array([0.0, 1.0, 0.0]) if abs(towards[1]) < 0.99 else np.array([0.0, 0.0, 1.0])
     right = np.cross(up, towards)
@@ -183,11 +185,11 @@ def light_basis(direction: np.ndarray) -> np.ndarray:
 def light_screen(
     vertices: np.ndarray, direction: np.ndarray, size: int, reach: float
 ) -> np.ndarray:
-    """The person as parallel light sees them, for `rasterise`.
+    """Projects the person along parallel light, for `rasterise`.
 
     Args:
-        vertices: (V, 3) metres from the middle of the depth map.
-        direction: (3,) towards the light.
+        vertices: (V, 3) metres relative to the centre of the depth map.
+        direction: (3,) unit vector towards the light.
         size: Side of the depth map in texels.
         reach: Half the side of the depth map in metres.
 

@@ -1,4 +1,4 @@
-"""Deferred shading: colours the samples of which the rasteriser knows the triangle."""
+"""Deferred shading: colours samples whose triangle the rasteriser has found."""
 
 import math
 from typing import NamedTuple
@@ -21,7 +21,7 @@ SKIRT = int(Material.SKIRT)
 
 
 MOUTH_DEPTH = 0.026
-"""Metres behind the lips over which light fades to 1/e in the mouth."""
+"""Distance in metres behind the lips over which light in the mouth falls to 1/e."""
 
 
 class Scene(NamedTuple):
@@ -31,13 +31,13 @@ class Scene(NamedTuple):
         faces: (F, 3) int32.
         materials: (F,) uint8.
         corner_uv: (F, 3, 2) float32.
-        rest: (V, 3) float32 neutral vertices: where textures are looked up.
-        vertices: (V, 3) float32 posed, canonical head space.
+        rest: (V, 3) float32 neutral vertices, at which textures are evaluated, metres.
+        vertices: (V, 3) float32 posed vertices, canonical head space, metres.
         normals: (V, 3) float32.
-        channels: (V, 6) float32 of `Paint`.
-        strands: (V, 4) float32 of `Paint`.
-        occlusion: (V,) float32 of `Paint`.
-        eyes: (2, 7) float32: centre, axis, iris radius; left, right.
+        channels: (V, 6) float32 `Paint.channels`.
+        strands: (V, 4) float32 `Paint.strands`.
+        occlusion: (V,) float32 `Paint.occlusion_at` of this frame.
+        eyes: (2, 7) float32 left and right eye: centre (3), axis (3), iris radius, metres.
     """
 
     faces: np.ndarray
@@ -118,7 +118,7 @@ def _painted(scene, f, a, b, c):
 
 @njit(cache=True, nogil=True)
 def display(value):
-    """Linear light to a display value in [0, 1]: a soft shoulder, then the sRGB curve."""
+    """Converts linear light to a display value in [0, 1]: a soft shoulder, then the sRGB curve."""
     if value > 0.6:
         value = 0.6 + 0.4 * (1.0 - math.exp(-(value - 0.6) / 0.4))
     if value <= 0.0031308:
@@ -276,17 +276,17 @@ def _shade_one(scene, colors, lights, f, a, b, c, camera, pixel):
 
 @njit(cache=True, nogil=True)
 def shade(scene, colors, lights, screen, triangle, barycentric, camera, pixel, out):
-    """Colours solid samples.
+    """Colours the samples of solid faces.
 
     Args:
-        scene: `Scene`.
-        colors: `Colors`.
-        lights: `Lights`.
-        screen: (V, 3) float32 of `to_screen`.
-        triangle: (H, W) int32 of `rasterise`.
-        barycentric: (H, W, 2) float32 of `rasterise`.
+        scene: The posed person.
+        colors: Colours of the person.
+        lights: Lights of the frame.
+        screen: (V, 3) float32 from `to_screen`.
+        triangle: (H, W) int32 from `rasterise`.
+        barycentric: (H, W, 2) float32 from `rasterise`.
         camera: (3,) the camera's centre in canonical head space.
-        pixel: Metres that a pixel covers at the head.
+        pixel: Size of a pixel at the head, metres.
         out: (H, W, 4) float32 display RGB and alpha, premultiplied; changed where covered.
     """
     height, width = triangle.shape
@@ -319,10 +319,20 @@ def _card_alpha(material, u, v, pixel_u):
 def shade_cards(
     scene, colors, lights, screen, nearest, triangle, barycentric, solid, camera, pixel, out
 ):
-    """Draws brows and lashes over what `shade` has drawn.
+    """Draws brows and lashes over the picture that `shade` has drawn.
 
-    Args as for `shade`, and: `nearest`, `triangle`, `barycentric` of the cards, `solid` (H, W)
-    float32 nearness of the solid faces.
+    Args:
+        scene: The posed person.
+        colors: Colours of the person.
+        lights: Lights of the frame.
+        screen: (V, 3) float32 from `to_screen`.
+        nearest: (H, W) float32 nearness of the cards, from `rasterise`.
+        triangle: (H, W) int32 triangles of the cards, from `rasterise`.
+        barycentric: (H, W, 2) float32 of the cards, from `rasterise`.
+        solid: (H, W) float32 nearness of the solid faces, which hide cards behind them.
+        camera: (3,) the camera's centre in canonical head space.
+        pixel: Size of a pixel at the head, metres.
+        out: (H, W, 4) float32 display RGB and alpha, premultiplied; changed where cards cover it.
     """
     height, width = triangle.shape
     for y in range(height):

@@ -1,7 +1,7 @@
-"""Procedural textures, evaluated per sample at rest positions so that they stick to the skin.
+"""Procedural textures, evaluated at rest positions so that they stick to the surface.
 
-Every texture takes the size of a pixel on the surface and fades out before it would alias: the
-same spot then looks the same in every frame.
+Every texture knows the size of a pixel on the surface and fades out before aliasing, so that a spot
+looks the same in every frame.
 """
 
 import math
@@ -11,7 +11,7 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def hashed(i, j, k):
-    """A number in [0, 1) that depends on three integers."""
+    """A pseudo-random number in [0, 1) from three integers."""
     h = (i * 374761393 + j * 668265263 + k * 1274126177) & 0xFFFFFFFF
     h = ((h ^ (h >> 13)) * 1103515245) & 0xFFFFFFFF
     h = ((h ^ (h >> 16)) * 2654435761) & 0xFFFFFFFF
@@ -20,14 +20,14 @@ def hashed(i, j, k):
 
 @njit(cache=True, nogil=True)
 def smoothstep(low, high, value):
-    """0 below `low`, 1 above `high`, smooth between."""
+    """0 below `low`, 1 above `high`, a smooth transition between."""
     t = min(1.0, max(0.0, (value - low) / (high - low)))
     return t * t * (3.0 - 2.0 * t)
 
 
 @njit(cache=True, nogil=True)
 def noise(x, y, z):
-    """Value noise in [0, 1], one feature per unit."""
+    """Value noise in [0, 1] with features of size 1."""
     fx, fy, fz = math.floor(x), math.floor(y), math.floor(z)
     i, j, k = int(fx), int(fy), int(fz)
     u, v, w = x - fx, y - fy, z - fz
@@ -43,13 +43,13 @@ def noise(x, y, z):
 
 @njit(cache=True, nogil=True)
 def visible(feature, pixel):
-    """How much of a texture with features of this size survives at this pixel size, 0 to 1."""
+    """Visibility, 0 to 1, of a texture with features of this size at this pixel size."""
     return min(1.0, max(0.0, feature / pixel - 1.0))
 
 
 @njit(cache=True, nogil=True)
 def grain(x, y, z, feature, pixel):
-    """Noise in [-1, 1] with features of `feature` metres, faded where pixels are larger."""
+    """Noise in [-1, 1] with features of `feature` metres; fades out where pixels are larger."""
     fade = visible(feature, pixel)
     if fade == 0.0:
         return 0.0
@@ -77,8 +77,8 @@ def strands(across, along, count, pixel_across):
     """Streaks in [-1, 1] that run along one texture axis.
 
     Args:
-        across: Texture coordinate at right angles to the strands.
-        along: Texture coordinate along them.
+        across: Texture coordinate perpendicular to the strands.
+        along: Texture coordinate along the strands.
         count: Strands per unit of `across`.
         pixel_across: Size of a pixel in units of `across`.
     """
