@@ -50,6 +50,31 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: item.path not in slow)
 
 
+TOGETHER = (
+    "chat/services/language/test_qwen.py",
+    "chat/services/recognition/test_whisper.py",
+    "head/test_encoders.py",
+    "measure/test_expression.py",
+    "speech/test_hubert.py",
+)
+"""Files that need transformers, which takes three seconds to be imported: one process runs them."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Processes take whole files, as `--dist loadfile` has it, and those in `TOGETHER` at once."""
+    if config.getoption("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class Scheduling(LoadFileScheduling):
+        def _split_scope(self, nodeid):
+            file = super()._split_scope(nodeid)
+            return "transformers" if file.endswith(TOGETHER) else file
+
+    return Scheduling(config, log)
+
+
 def pytest_make_parametrize_id(val: object) -> str | None:
     """Names bytes by their length: names made of content differ where content does.
 
