@@ -1,5 +1,6 @@
 """What holds for all tests."""
 
+import gc
 import os
 from multiprocessing import forkserver
 
@@ -9,6 +10,9 @@ import pytest
 # this once, when it is imported; what tests start inherits it.
 for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")
+
+# What is imported stays: looking for garbage in it takes a fifth of the time of collecting tests.
+gc.disable()
 
 
 @pytest.fixture(scope="module")
@@ -34,10 +38,41 @@ def cuda(monkeypatch):
     cuda_fault.cache_clear()
 
 
+def pytest_collection_finish() -> None:
+    """From here on there is garbage; what was imported is none, and is not looked at again."""
+    gc.freeze()
+    gc.enable()
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Files with slow tests come first: begun last, they would keep one process long alone."""
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: item.path not in slow)
+
+
+TOGETHER = (
+    "chat/services/language/test_qwen.py",
+    "chat/services/recognition/test_whisper.py",
+    "head/test_encoders.py",
+    "measure/test_expression.py",
+    "speech/test_hubert.py",
+)
+"""Files that need transformers, which takes three seconds to be imported: one process runs them."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Processes take whole files, as `--dist loadfile` has it, and those in `TOGETHER` at once."""
+    if config.getoption("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class Scheduling(LoadFileScheduling):
+        def _split_scope(self, nodeid):
+            file = super()._split_scope(nodeid)
+            return "transformers" if file.endswith(TOGETHER) else file
+
+    return Scheduling(config, log)
 
 
 def pytest_make_parametrize_id(val: object) -> str | None:

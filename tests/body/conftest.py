@@ -5,6 +5,7 @@ import pytest
 from support.bodies.moving_ball import MovingBall
 from support.bodies.recorded_capture import record
 from support.bodies.window_tasks import files_of_a_sequence
+from support.made_once import made_once
 
 
 @pytest.fixture
@@ -21,7 +22,11 @@ def recorded(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope="session")
-def sequence(recorded, tmp_path_factory):
-    """Contents of the windows' files if they train one after another."""
-    return files_of_a_sequence(recorded, tmp_path_factory.mktemp("sequence"))
+@pytest.fixture(scope="module")
+def sequence(two_threads, recorded, tmp_path_factory):
+    """Contents of the windows' files if they train one after another.
+
+    Whichever process of the tests asks first has them trained, for all.
+    """
+    with made_once(tmp_path_factory, "sequence") as folder:
+        return files_of_a_sequence(recorded, folder)

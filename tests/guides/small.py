@@ -4,8 +4,8 @@ Each command of a guide runs as it stands there, with these words behind it.
 """
 
 HEAD = (
-    "--steps 40 --initial.gaussians 500 --density.max-gaussians 600 --density.begin 20 "
-    "--density.every 20 --network.hidden 16 --network.features 8"
+    "--steps 20 --initial.gaussians 500 --density.max-gaussians 600 --density.begin 10 "
+    "--density.every 10 --network.hidden 16 --network.features 8"
 )
 BODY = (
     "--steps-per-frame 5 --warmup-steps 10 --finetune.steps 10 --joining.color-steps 10 "

@@ -33,7 +33,7 @@ def body(face):
 @pytest.fixture(autouse=True)
 def quick_bakes(monkeypatch):
     """What is baked has hardly been trained: its small network need not be exact."""
-    monkeypatch.setattr(head_bundle, "BakeSettings", partial(BakeSettings, 32, steps=200))
+    monkeypatch.setattr(head_bundle, "BakeSettings", partial(BakeSettings, 32, steps=60))
 
 
 @pytest.fixture

@@ -45,7 +45,8 @@ def head(capture, tmp_path_factory):
     return train_head(capture, folder, HeadJob("blendshapes", "full", "builtin", 0, SETTINGS))
 
 
-def test_all_of_the_person_is_learnt(head, capture):
+def test_all_of_the_person_is_learnt(head, capture, monkeypatch):
+    monkeypatch.setattr("ico3d.measure.head.landmark_reader", lambda: None)  # balls have no lips
     scores = evaluate_head(head, capture, capture.split.test, None)
     assert scores["psnr_mask"] > 24
     assert scores["psnr"] > 22  # the curtain is no part of the comparison

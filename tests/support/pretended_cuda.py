@@ -67,11 +67,13 @@ class PretendedCuda(TorchFunctionMode):
     """Active within `with`; then torch finds a CUDA device."""
 
     def __torch_function__(self, func, types, args=(), kwargs=None):
-        kwargs = dict(kwargs or {})
-        given = _tensors((*args, kwargs))
+        kwargs = dict(kwargs) if kwargs else {}
+        given = _tensors((*args, kwargs) if kwargs else args)
         moved = any(map(is_moved, given))
         if func in _OF_DEVICES:
             return _OF_DEVICES[func](func, args, kwargs, moved)
+        if not moved and kwargs.get("device") is None:  # what nobody moved is computed here
+            return func(*args, **kwargs)
         if func == Tensor.__deepcopy__:
             moved = is_moved(args[0])
         target = _target(kwargs, moved)
@@ -170,6 +172,10 @@ def _widest(given: list[Tensor]) -> Tensor:
 def _marked_new(result: Any, given: list[Tensor], moved: bool) -> Any:
     """What a function made, on its device; what it was given stays where it is."""
     known = {id(tensor) for tensor in given}
+    if isinstance(result, Tensor):  # mostly
+        if id(result) not in known:
+            result._pretends = moved
+        return result
     if isinstance(result, Iterator):
         return iter([_marked_new(part, given, moved) for part in result])
     for leaf in _tensors((result,)):

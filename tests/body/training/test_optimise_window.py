@@ -33,7 +33,7 @@ def learned(tmp_path_factory):
     def errors(method):
         trainer = trainer_of(capture, method)
         before = ends_error(capture, trainer.model)
-        for index in range(250):
+        for index in range(200):
             trainer.step(index)
         return before, ends_error(capture, trainer.model), len(trainer.model)
 
@@ -138,7 +138,7 @@ def test_cameras_that_see_other_colors_are_corrected(capture):
     capture.image = lambda c, f: picture(c, f) * (0.8 if c == 1 else 1.0)
     capture.background = lambda c: plate(c) * (0.8 if c == 1 else 1.0)
     trainer = trainer_of(capture, color_correction=True, **{"rates.motion": 2e-2})
-    for index in range(250):
+    for index in range(160):
         trainer.step(index)
     affine = trainer.tensors()["affine"].detach()
     grey = (affine @ torch.tensor([0.5, 0.5, 0.5, 1.0])).mean(1)  # (C,)

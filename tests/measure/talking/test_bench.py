@@ -104,11 +104,16 @@ def test_a_page_that_pauses_goes_on_where_it_stood():
     assert player.clock(13.4) is None
 
 
-def test_speech_is_cut_where_it_is_audible():
+@pytest.fixture(scope="module")
+def said():
+    """What synthetic voices ask and object."""
+    return sayings(None)
+
+
+def test_speech_is_cut_where_it_is_audible(said):
     sound = np.full(3300, 30, np.int16)  # the room
     sound[650:1500] = 5000
     assert audible(sound).tolist() == sound[640:1600].tolist()  # whole moments of 20 ms
-    said = sayings(None)
     assert len(said.questions) == 4 and len(said.objections) == 8 and len(said.assent) == 8
     assert all(s.dtype == np.int16 and s.any() for s in said.questions + said.assent)
 
@@ -164,9 +169,9 @@ def test_a_trial_with_real_servers(tmp_path):
 
 
 @pytest.mark.slow
-async def test_trials_of_each_kind(demo):
+async def test_trials_of_each_kind(demo, said):
     """All services are the real ones of the packaged avatar."""
-    results, said = Results(), sayings(None)
+    results = Results()
     kinds = ("questions", "interruptions", "assent")
     async with serving(demo, ChatSettings()) as (url, _):
         await talk(url, said, kinds, 1, results, lambda kind: None)
@@ -179,14 +184,14 @@ async def test_trials_of_each_kind(demo):
     assert 0 < found["duck_ms"]["p50"] <= found["stop_ms"]["p50"] < 800
 
 
-async def test_a_server_adds_little_to_what_its_services_take(demo):
+async def test_a_server_adds_little_to_what_its_services_take(demo, said):
     def scripted(avatar):
         return replace(avatar, services=SCRIPT.services())
 
     results = Results()
     async with serving(demo, ChatSettings(turns=TURNS), adapt=scripted) as (url, _):
         began = asyncio.get_running_loop().time()
-        await shares(url, sayings(None), 2, results, lambda kind: None)
+        await shares(url, said, 2, results, lambda kind: None)
         took = asyncio.get_running_loop().time() - began
     assert -60 < figures(results)["server_share_ms"]["p95"] < 60
     assert took < 20  # nobody waits for longer than until nothing is said

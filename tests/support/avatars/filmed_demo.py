@@ -28,9 +28,9 @@ WIDTH, HEIGHT, WIDE, AWAY = 300, 300, 0.6, 1.6
 """Of the pictures in pixels, and metres that they show and are taken from."""
 AZIMUTHS = (-50, -25, 0, 25, 50)
 ABROAD = np.eye(4)
-"""The head's own studio from the space of the demo's head: another way up, another place."""
-ABROAD[:3, :3] = 1.05 * Rotation.from_euler("xyz", (90, 0, 30), degrees=True).as_matrix()
-ABROAD[:3, 3] = 0.2, -0.4, 1.3
+"""The head's own studio from the space of the demo's head: another way up, unit and place."""
+ABROAD[:3, :3] = 7.3 * Rotation.from_euler("xyz", (-70, 130, 20), degrees=True).as_matrix()
+ABROAD[:3, 3] = 5, -3, 9
 POSED = np.eye(4)
 """The space of the recording's head poses from that of the demo's."""
 POSED[:3, :3] = Rotation.from_euler("xyz", (10, -20, 5), degrees=True).as_matrix()

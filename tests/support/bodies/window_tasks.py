@@ -73,15 +73,19 @@ def files_of_a_sequence(capture: Path, folder: Path) -> list[bytes]:
     """What the windows are if one after another trains in one process.
 
     A process that has just compiled a kernel rounds otherwise than one that finds it compiled, as
-    all later ones do: the first trains briefly, for the compiled code alone.
+    all later ones do: the first trains briefly, for the compiled code alone. Windows that the
+    folder holds already are not trained again.
     """
+    files = [task.file for task in tasks(capture, folder / "trained")]
+    if all(file.exists() for file in files):
+        return [file.read_bytes() for file in files]
     processes = fork_server("ico3d.body.workers.jobs")
     for name, changes in (("compiled", {"steps_per_frame": 8}), ("trained", {})):
         process = processes.Process(target=_one_by_one, args=(capture, folder / name, changes))
         process.start()
         process.join()
         assert process.exitcode == 0
-    return [task.file.read_bytes() for task in tasks(capture, folder / "trained")]
+    return [file.read_bytes() for file in files]
 
 
 def _one_by_one(capture: Path, folder: Path, changes: dict) -> None:
