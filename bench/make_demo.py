@@ -33,7 +33,8 @@ class Demo:
         licences: Notices that the subject's sources ask for.
         out: The bundle to write.
         head_frames: Frames of the head at 25 per second.
-        body_frames: Frames of the body at 15 per second.
+        body_frames: Frames of the body at 8 per second: in 9 s both arms leave the body, and what
+            never did cannot be told from it.
         size: Height of the pictures.
         body: More options of ico3d assemble in one word, as --body="--steps 5000".
         seed: Of recording and training.
@@ -56,7 +57,7 @@ class Demo:
         face = ("--rig", "bust", "--light", "studio", "--no-lively", "--cameras", 6)
         self._record(work / "head-capture", self.head_frames, *face)
         rings = ("--rig", "body", "--light", "warm", "--motion", "talk", "--cameras", 20)
-        self._record(work / "body-capture", self.body_frames, *rings, "--fps", 15)
+        self._record(work / "body-capture", self.body_frames, *rings, "--fps", 8)
         ico3d("train head", work / "head-capture", work / "head", "--inputs", "speech", *seed)
         if not (work / "body-capture" / "body_track.safetensors").exists():
             ico3d("capture pose", work / "body-capture")

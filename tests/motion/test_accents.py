@@ -13,6 +13,7 @@ from ico3d.motion.composing.accents import (
     loudness,
     smoothed,
     timed_words,
+    unknown_words,
 )
 from ico3d.motion.composing.lexicon import meanings, requested, stressed
 from ico3d.motion.composing.listening import APART, Listener
@@ -138,3 +139,15 @@ def test_loudness_is_the_same_in_whatever_pieces_sound_comes(seed, rate):
     whole = loudness(samples, rate)
     assert 0 <= len(whole) - len(growing.levels) <= 2
     np.testing.assert_allclose(growing.levels, whole[: len(growing.levels)], atol=1e-6)
+
+
+def test_words_that_nobody_wrote_down_mean_nothing():
+    """As many as fill the sound, with accents like any."""
+    levels = np.full(300, -80.0)
+    levels[50:260] = -20 + 5 * np.sin(np.arange(210) / 5)
+    words = unknown_words(levels)
+    assert len(words) == 6 and all(stressed(word) for word in words)
+    assert words[0].begin == pytest.approx(0.5) and words[-1].end == pytest.approx(2.6)
+    assert meanings(words) == {} and len(accents(words, levels, True)) >= 4
+    silence = np.full(50, -80.0)
+    assert accents(unknown_words(silence), silence, True) == ()
