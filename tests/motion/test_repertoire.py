@@ -11,9 +11,9 @@ from ico3d.motion.clip import Clip, Marks, to_bytes
 from ico3d.motion.curves import Curve
 from ico3d.motion.figure import alike, figure_of
 from ico3d.motion.living import living
-from ico3d.motion.repertoire import clips_for, repertoire_bytes
+from ico3d.motion.repertoire import clips_for, hung_of, repertoire_bytes
 from ico3d.motion.roles import ROLES
-from ico3d.rig.quaternions import IDENTITY, from_rotvec
+from ico3d.rig.quaternions import IDENTITY, from_rotvec, multiply
 from ico3d.rig.rig import Rig
 from support.rigs import rig_of
 
@@ -88,3 +88,21 @@ def test_figures_differ_by_more_than_rounding():
     assert alike({"a": [1.0, None, [2]]}, {"a": [1.0 + 1e-9, None, [2]]})
     for other in ({"a": [1.1, None, [2]]}, {"a": [1.0, None]}, {"b": []}, {"a": [1.0, 0.5, [2]]}):
         assert not alike({"a": [1.0, None, [2]]}, other)
+
+
+def test_arms_hang_as_the_file_says(rig):
+    turn = from_rotvec(np.array([0.2, 0.0, 0.0]))
+    hung = multiply(turn, living(rig, 3).hung)
+    content = repertoire_bytes(living(rig, 3, hung), CLIPS)
+    np.testing.assert_allclose(hung_of(content), hung, atol=1e-12)
+    assert set(clips_for(content, rig)) == set(CLIPS)
+    np.testing.assert_allclose(living(rig, 3, hung).hung, hung)
+
+
+@pytest.mark.parametrize("hung", [None, [[1, 0, 0, 0]], [[2, 0, 0, 0]] * len(ROLES), "no", [[]]])
+def test_arms_that_hang_in_no_rotations_are_refused(rig, content, hung):
+    size = int.from_bytes(content[:8], "little")
+    about = json.loads(content[8 : 8 + size])["__metadata__"]
+    about["figure"] = json.dumps({**json.loads(about["figure"]), "hung": hung})
+    with pytest.raises(SettingsError, match="does not say how arms hang"):
+        clips_for(save(load(content), about), rig)

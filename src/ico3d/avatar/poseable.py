@@ -23,7 +23,7 @@ from ico3d.motion.gestures.library import library
 from ico3d.motion.living import Living, living
 from ico3d.motion.recorded.cut import Cut
 from ico3d.motion.recorded.cutting import find_cuts
-from ico3d.motion.recorded.making import recorded_clips
+from ico3d.motion.recorded.making import hung_in, recorded_clips
 from ico3d.motion.recorded.recording import recording_of
 from ico3d.motion.repertoire import preferring
 from ico3d.rig.quaternions import Array
@@ -62,7 +62,7 @@ class Poseable:
         """Their gestures by name."""
         if self.known is not None:
             return self.known
-        return preferring(self.made, library(self.living.person))
+        return preferring(self.made, library(self.living.person, hung=self.living.hung))
 
     @cached_property
     def footing(self) -> Footing:
@@ -135,7 +135,7 @@ def _baked(bundle: Bundle, frame: int | None) -> Poseable | None:
     frame = baked.info.num_frames // 2 if frame is None else frame
     stands = recorded_pose(baked, frame)
     return Poseable(
-        living(baked.rig, 0),
+        living(baked.rig, 0, bundle.hung),
         (stands.rotations, stands.root),
         lambda rotations, root: skinned_gaussians(baked, any_pose(baked, rotations, root)),
         _baked_head(bundle, frame),
@@ -169,9 +169,9 @@ def _trained(
 
     head = _trained_head(model, frame) if isinstance(model, TrainedAvatar) else None
     recording = recording_of(rig, body.fps, rotations)
-    made = recorded_clips(recording, find_cuts(recording) if cuts is None else cuts)
-    stands = rotations[frame], roots[frame]
-    return Poseable(living(rig, 0), stands, posed, head, made=made)
+    cuts = find_cuts(recording) if cuts is None else cuts
+    rest, stands = living(rig, 0, hung_in(recording, cuts)), (rotations[frame], roots[frame])
+    return Poseable(rest, stands, posed, head, made=recorded_clips(recording, cuts))
 
 
 def _trained_head(avatar: TrainedAvatar, frame: int) -> DrawHead:

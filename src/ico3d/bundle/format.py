@@ -40,6 +40,7 @@ class Bundle:
         skinned: The body on a skeleton, or None.
         gestures: Gestures of the body on a skeleton besides the recorded motion, by name, or None.
         cuts: Frames of the recording that are gestures; empty where nobody says which.
+        hung: Rotations (R, 4) by role of hanging arms; None without gestures.
         animation: Procedural motion of a whole person; None for a head or a body alone.
     """
 
@@ -49,6 +50,7 @@ class Bundle:
     skinned: BakedSkinned | None
     gestures: dict[str, Clip] | None
     cuts: tuple[Cut, ...]
+    hung: np.ndarray | None
     animation: Animation | None
 
     def __init__(self, archive: Archive):
@@ -133,11 +135,12 @@ class Bundle:
         for index in range(len(self.manifest.body.windows) if self.manifest.body else 0):
             self.window(index)  # not kept: together they may be large
         self.skinned = self.gestures = self.animation = None
-        self.cuts = ()
+        self.cuts, self.hung = (), None
         if self.manifest.skinned is not None:
             self.skinned = BakedSkinned.from_bytes(self.read(SKINNED), self.manifest.skinned)
             if GESTURES in self.manifest.files:
-                self.gestures, self.cuts = gestures_from(self.read(GESTURES), self.skinned)
+                found = gestures_from(self.read(GESTURES), self.skinned)
+                self.gestures, self.cuts, self.hung = found.clips, found.cuts, found.hung
         if self.manifest.is_whole and self.manifest.any_body is not None:
             self.animation = Animation.from_bytes(self.read(ANIMATION))
             self.animation.check_body(self.manifest.any_body)

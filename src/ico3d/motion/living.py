@@ -113,15 +113,17 @@ class Living:
                 pose[..., row, :] = multiply(what, pose[..., row, :])
 
 
-def living(rig: Rig, seed: int) -> Living:
+def living(rig: Rig, seed: int, hung: Array | None = None) -> Living:
     """Somebody at rest.
 
     Args:
         rig: Whose body.
         seed: Decides all that is by chance.
+        hung: (R, 4) by role, how their arms hang; by default as near as the body allows.
 
     Raises:
         SettingsError: If the rig lacks a role without which nobody stands.
     """
     person = person_of(rig)
-    return Living(person, stance_of(person), hanging(person), seed)
+    hung = hanging(person) if hung is None else hung
+    return Living(person, stance_of(person), hung, seed)

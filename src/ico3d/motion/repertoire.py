@@ -3,13 +3,16 @@
 import json
 from typing import Any, cast
 
+import numpy as np
 from safetensors.numpy import save
 
 from ico3d.common.typed import parse_json
 from ico3d.errors import SettingsError
 from ico3d.motion.clip import Clip, from_bytes, header_of, meaning, other_hand, tensors_of
-from ico3d.motion.figure import alike, figure_of
+from ico3d.motion.figure import NEAR, alike, figure_of
 from ico3d.motion.living import Living, living
+from ico3d.motion.roles import ROLES
+from ico3d.rig.quaternions import Array
 from ico3d.rig.rig import Rig
 
 
@@ -43,13 +46,33 @@ def clips_for(content: bytes, rig: Rig) -> dict[str, Clip]:
         SettingsError: If the file is damaged, or its figure is not that of the rig.
     """
     clips = from_bytes(content)  # it is sound from here on, but for the figure
-    try:
-        figure = parse_json(_metadata(content, "figure").encode(), "the figure", ValueError)
-    except ValueError as error:
-        raise SettingsError("the file of gestures tells no figure.") from error
-    if not alike(figure_of(living(rig, 0)), figure):
+    if not alike(figure_of(living(rig, 0, hung_of(content))), _figure(content)):
         raise SettingsError("the file of gestures was made for another rig.")
     return clips
+
+
+def hung_of(content: bytes) -> Array:
+    """(R, 4) by role: how arms hang, of a sound file but for its figure.
+
+    Raises:
+        SettingsError: If its figure does not say so in rotations.
+    """
+    figure = _figure(content)
+    try:
+        hung = np.array(cast(dict[str, Any], figure)["hung"], np.float64)
+    except (TypeError, KeyError, ValueError, OverflowError):
+        hung = np.zeros(0)
+    turned = hung.shape == (len(ROLES), 4)
+    if not turned or not (np.abs(np.linalg.norm(hung, axis=-1) - 1) < NEAR).all():
+        raise SettingsError("the file of gestures does not say how arms hang.")
+    return hung
+
+
+def _figure(content: bytes) -> Any:
+    try:
+        return parse_json(_metadata(content, "figure").encode(), "the figure", ValueError)
+    except ValueError as error:
+        raise SettingsError("the file of gestures tells no figure.") from error
 
 
 def cuts_text(content: bytes) -> str:

@@ -46,6 +46,12 @@ NEEDED = (
 """Roles without which nobody stands or gestures."""
 
 
+def arm_roles(side: str) -> tuple[str, ...]:
+    """Roles of an arm, from the collarbone to the fingertips."""
+    own = (role for role in ROLES if role.startswith(f"{side}_"))
+    return tuple(role for role in own if role.partition("_")[2] not in LEG)
+
+
 def mirrored_role(role: str) -> str:
     """The same role on the other side."""
     side, _, part = role.partition("_")

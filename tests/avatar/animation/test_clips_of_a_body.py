@@ -1,5 +1,7 @@
 """`ico3d animate` and `ico3d bake` on a body that waved when it was recorded."""
 
+from functools import partial
+
 import pytest
 from PIL import Image
 
@@ -53,7 +55,7 @@ def test_clips_are_shown_renamed_and_baked(body, tmp_path, capsys, monkeypatch):
     ]
     file.write_text(file.read_text().replace('"wave"', '"take_a_bow"'))
     with monkeypatch.context() as patch:  # of the package's gestures one is drawn besides
-        patch.setattr("ico3d.avatar.poseable.library", lambda person: library(person, ("nod",)))
+        patch.setattr("ico3d.avatar.poseable.library", partial(library, names=("nod",)))
         assert main(["animate", str(body), "--contact-sheet", str(sheet)]) == 0
     assert [row[0] for row in rows(capsys.readouterr().out)] == ["rest", "take_a_bow"]
     with Image.open(sheet) as picture:

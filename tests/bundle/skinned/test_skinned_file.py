@@ -245,8 +245,8 @@ def test_what_was_recorded_travels_with_its_cuts(tmp_path):
     assert set(found) == {"rest", "wave"} and found["wave"].hands == "left"
     bow = [replace(found["wave"], name="bow")]
     named = gestures_from(gesture_files(baked, bow)[GESTURES], baked)
-    assert set(named[0]) == {*SCRIPTS, "bow"} and named[1] == tuple(bow)
-    assert "right_wrist" in named[0]["wave"].curves
+    assert set(named.clips) == {*SCRIPTS, "bow"} and named.cuts == tuple(bow)
+    assert "right_wrist" in named.clips["wave"].curves
     longer = replace(baked, info=replace(baked.info, num_frames=99))
     with pytest.raises(BundleError, match="the list of clips is of a recording of"):
         gestures_from(files[GESTURES], longer)

@@ -1,6 +1,7 @@
 """The gestures of a body on a skeleton, and its figure, as a file of the bundle."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.posing import recorded_rotations
@@ -10,9 +11,10 @@ from ico3d.motion.gestures.library import library
 from ico3d.motion.living import living
 from ico3d.motion.recorded.cut import Cut, from_toml, to_toml
 from ico3d.motion.recorded.cutting import find_cuts
-from ico3d.motion.recorded.making import recorded_clips
+from ico3d.motion.recorded.making import hung_in, recorded_clips
 from ico3d.motion.recorded.recording import Recording, recording_of
-from ico3d.motion.repertoire import clips_for, cuts_text, preferring, repertoire_bytes
+from ico3d.motion.repertoire import clips_for, cuts_text, hung_of, preferring, repertoire_bytes
+from ico3d.rig.quaternions import Array
 
 GESTURES = "body/gestures.safetensors"
 """The file; a body whose rig lacks roles has none, and repeats what was recorded."""
@@ -31,9 +33,10 @@ def gesture_files(baked: BakedSkinned, cuts: Sequence[Cut] | None = None) -> dic
     recording = recording_in(baked)
     if recording is None:
         return {}
-    somebody, info = living(baked.rig, 0), baked.info
-    cuts = find_cuts(recording) if cuts is None else cuts
-    clips = preferring(recorded_clips(recording, cuts), library(somebody.person))
+    info, cuts = baked.info, find_cuts(recording) if cuts is None else cuts
+    somebody = living(baked.rig, 0, hung_in(recording, cuts))
+    others = library(somebody.person, hung=somebody.hung)
+    clips = preferring(recorded_clips(recording, cuts), others)
     text = to_toml(cuts, info.fps, info.num_frames)
     return {GESTURES: repertoire_bytes(somebody, clips, text)}
 
@@ -46,8 +49,23 @@ def recording_in(baked: BakedSkinned) -> Recording | None:
         return None
 
 
-def gestures_from(data: bytes, baked: BakedSkinned) -> tuple[dict[str, Clip], tuple[Cut, ...]]:
-    """The gestures in a file by name, and which frames of the recording some of them are.
+@dataclass(frozen=True, eq=False)
+class Repertoire:
+    """What somebody can do.
+
+    Attributes:
+        clips: Gestures by name.
+        cuts: Which frames of the recording some of them are.
+        hung: (R, 4) by role, how arms hang.
+    """
+
+    clips: dict[str, Clip]
+    cuts: tuple[Cut, ...]
+    hung: Array
+
+
+def gestures_from(data: bytes, baked: BakedSkinned) -> Repertoire:
+    """What a file of gestures holds.
 
     Raises:
         BundleError: If the file is damaged, or not of this body.
@@ -59,4 +77,4 @@ def gestures_from(data: bytes, baked: BakedSkinned) -> tuple[dict[str, Clip], tu
         cuts = from_toml(text.encode(), *about) if text else ()
     except SettingsError as error:
         raise BundleError(f"{GESTURES}: {error}") from error
-    return clips, cuts
+    return Repertoire(clips, cuts, hung_of(data))

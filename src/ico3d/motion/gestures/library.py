@@ -29,7 +29,15 @@ def gesture(
     return clip_of(name, marks, np.arange(len(poses)) / RATE, poses, roles, tolerance)
 
 
-def library(person: Person, names: tuple[str, ...] = tuple(SCRIPTS)) -> dict[str, Clip]:
-    """The gestures of the package by name; those of one hand are made with the right one."""
-    hung = hanging(person)
+def library(
+    person: Person, names: tuple[str, ...] = tuple(SCRIPTS), hung: Array | None = None
+) -> dict[str, Clip]:
+    """The gestures of the package by name; those of one hand are made with the right one.
+
+    Args:
+        person: Who makes them.
+        names: Which.
+        hung: (R, 4) by role, how arms hang before and after; by default as `hanging` has them.
+    """
+    hung = hanging(person) if hung is None else hung
     return {name: gesture(person, name, SCRIPTS[name], hung) for name in names}

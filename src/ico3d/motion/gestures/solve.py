@@ -11,7 +11,7 @@ from ico3d.motion.gestures.shapes import fingers, shape
 from ico3d.motion.limbs import reach
 from ico3d.motion.person import Person
 from ico3d.motion.retarget import DOWN, HINGE, PALM
-from ico3d.motion.roles import INDEX, MIRROR, ROLES, SIDES
+from ico3d.motion.roles import INDEX, MIRROR, ROLES, SIDES, arm_roles
 from ico3d.motion.turning import about, across, aligned, mirrored, power, twist_angle, unit
 from ico3d.rig.quaternions import (
     IDENTITY,
@@ -141,11 +141,7 @@ def _gesture(
     poses[:, INDEX[limb[1]]] = continuous(multiply(conjugate(upper), lower))
     poses[:, INDEX[limb[2]]] = continuous(multiply(conjugate(lower), hand))
     _bend_fingers(side, arm.shapes, poses)
-    return [role for role in ROLES if role.startswith(f"{side}_") and not _of_leg(role)]
-
-
-def _of_leg(role: str) -> bool:
-    return role.endswith(("_hip", "_knee", "_ankle"))
+    return list(arm_roles(side))
 
 
 def _bend_fingers(side: str, shapes: Array, poses: Array) -> None:

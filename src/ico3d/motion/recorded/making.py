@@ -11,7 +11,7 @@ from ico3d.motion.gestures.hanging import hanging
 from ico3d.motion.gestures.solve import RATE, SHARED, eased
 from ico3d.motion.recorded.cut import REST, Cut, named
 from ico3d.motion.recorded.recording import Recording
-from ico3d.motion.roles import INDEX, ROLES
+from ico3d.motion.roles import INDEX, ROLES, SIDES, arm_roles
 from ico3d.motion.turning import power
 from ico3d.rig.quaternions import (
     IDENTITY,
@@ -48,9 +48,28 @@ FARTHEST = np.radians(20.0), np.radians(25.0)
 
 def recorded_clips(recording: Recording, cuts: Iterable[Cut]) -> dict[str, Clip]:
     """Clips by name; further ones of a name are numbered from 2 on. What is rest is no clip."""
-    still = _still(recording, cuts := list(cuts))
+    cuts = list(cuts)
+    still, hung = _still(recording, cuts), hung_in(recording, cuts)
     gestures = named(cut for cut in cuts if cut.name != REST)
-    return {name: _Take(recording, cut, still).clip(name) for name, cut in gestures}
+    return {name: _Take(recording, cut, still, hung).clip(name) for name, cut in gestures}
+
+
+def hung_in(recording: Recording, cuts: Iterable[Cut]) -> Array:
+    """(R, 4) by role: arms as they hang where somebody rests, all else as in the standard pose.
+
+    Where nobody rests, arms hang as near as the body allows.
+    """
+    hung = hanging(recording.person)
+    if not any(cut.name == REST for cut in cuts):
+        return hung
+    still = _still(recording, list(cuts))
+    for side in SIDES:
+        own = [INDEX[role] for role in arm_roles(side)]
+        hung[own] = still[own]
+        collar, shoulder = INDEX[f"{side}_clavicle"], INDEX[f"{side}_shoulder"]
+        hung[shoulder] = multiply(still[collar], still[shoulder])
+        hung[collar] = IDENTITY
+    return hung
 
 
 def _still(recording: Recording, cuts: list[Cut]) -> Array:
@@ -68,11 +87,13 @@ class _Take:
         recording: Of whom.
         cut: Which frames.
         still: (R, 4) by role, at rest.
+        hung: (R, 4) by role, with hanging arms.
     """
 
     recording: Recording
     cut: Cut
     still: Array
+    hung: Array
 
     def clip(self, name: str) -> Clip:
         """The clip under a name."""
@@ -101,15 +122,10 @@ class _Take:
         """Those that move: of the hands that take part, of head and torso where they do."""
         there = self.recording.person.cast.joints
         torso = ("spine", "chest", "neck", "head") if self.cut.sides else ("neck", "head")
-        found = [
-            role
-            for role in ROLES
-            if role in there
-            and (role in torso or role.partition("_")[0] in self.cut.sides)
-            and not role.endswith(("_hip", "_knee", "_ankle"))
-        ]
         turned = angles(IDENTITY, frames).max(0)  # (R,) degrees
-        return tuple(role for role in found if role not in torso or turned[INDEX[role]] > FAINT)
+        own = [role for role in torso if turned[INDEX[role]] > FAINT]
+        own += [role for side in self.cut.sides for role in arm_roles(side)]
+        return tuple(role for role in ROLES if role in own and role in there)
 
     def _hold(self) -> float:
         """Seconds of the hold: of a head none, of hands that repeat something one time round."""
@@ -184,7 +200,7 @@ class _Take:
 
     def _brought(self, times: Array, own: Array, lead: float, end: float) -> Array:
         """Lets arms hang at second 0 and at the last one, where they do not."""
-        hung = np.broadcast_to(hanging(self.recording.person), own.shape)
+        hung = np.broadcast_to(self.hung, own.shape)
         down = np.zeros_like(times)  # (T,) how far arms hang
         if lead:
             down = 1 - eased(times / lead)
