@@ -77,7 +77,11 @@ class SyntheticCapture(Capture):
         return _read_png(file, self.cameras[camera], "RGB", f"the background of camera {name}")
 
     def audio(self) -> Sound | None:
-        """The sound, 16 kHz mono."""
+        """The sound, 16 kHz mono.
+
+        Raises:
+            CaptureError: If the sound is damaged.
+        """
         file = self.path / "audio.wav"
         try:
             with wave.open(str(file), "rb") as sound:

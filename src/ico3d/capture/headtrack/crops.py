@@ -56,7 +56,7 @@ def around(camera: Camera, center: np.ndarray, size: float = HEAD) -> Part | Non
     """The part of a camera's picture that shows a ball around a point.
 
     Args:
-        camera: Who looks.
+        camera: The camera that looks at the ball.
         center: (3,) the point in the world, metres.
         size: Diameter of the ball, metres.
 

@@ -106,7 +106,11 @@ class MultiviewCapture(Capture):
         return seen.project(self._track.landmarks[frame])[0]
 
     def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) points of `points/FRAME.npy`; else, for heads, the visual hull; else None."""
+        """(P, 3) points of `points/FRAME.npy`; else, for heads, the visual hull; else None.
+
+        Raises:
+            CaptureError: If the file of points is damaged.
+        """
         file = self.path / "points" / f"{self._index(frame):06d}.npy"
         if not file.is_file():
             return head_hull(self, frame) if self._shows_head else None

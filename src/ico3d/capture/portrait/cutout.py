@@ -96,7 +96,7 @@ def learn(images: list[np.ndarray], landmarks: np.ndarray) -> Models:
     """Learns colours and the clean plate from a few frames.
 
     Args:
-        images: uint8 RGB pictures in working size, spread over the clip.
+        images: uint8 RGB pictures (h, w, 3) in working size, spread over the clip.
         landmarks: (F, 478, 2) in pixels of these pictures.
     """
     import cv2

@@ -97,7 +97,11 @@ class TalkingPortrait(Capture):
         return None if self._blendshapes is None else self._blendshapes[frame]
 
     def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
-        """(68, 2) pixels from the `.lms` file of the frame."""
+        """(68, 2) pixels from the `.lms` file of the frame.
+
+        Raises:
+            CaptureError: If the file is damaged.
+        """
         path = self.path / "ori_imgs" / f"{frame}.lms"
         if frame not in self._poses or not path.is_file():
             return None

@@ -100,7 +100,11 @@ class FlameFits:
         )
 
     def vertices(self, frame: int) -> np.ndarray | None:
-        """(5023, 3) vertices in the capture's world, metres; None without a fit."""
+        """(5023, 3) vertices in the capture's world, metres; None without a fit.
+
+        Raises:
+            CaptureError: If an array is missing or damaged.
+        """
         if frame not in self.frames:
             return None
         vertices = self._part(frame, "verts", VERTICES * 3).reshape(VERTICES, 3)

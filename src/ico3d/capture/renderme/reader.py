@@ -86,7 +86,11 @@ class RenderMe360(SmcCapture):
         return unit(device.lens.straightened(largest_channel(picture)))
 
     def audio(self) -> Sound | None:
-        """The whole sound, mono at 16 kHz; only parts with speech have one."""
+        """The whole sound, mono at 16 kHz; only parts with speech have one.
+
+        Raises:
+            CaptureError: If the sound is damaged.
+        """
         file = self._holding(SOUND)
         shape, rate = file.shape(f"{SOUND}/audio"), self._sample_rate()
         if not shape or rate is None:
@@ -115,7 +119,11 @@ class RenderMe360(SmcCapture):
         return super().landmarks(camera, frame) if own is None else own
 
     def keypoints_2d(self, camera: int, frame: int) -> np.ndarray | None:
-        """(106, 2) pixels of the undistorted picture; None if the face was not found."""
+        """(106, 2) pixels of the undistorted picture; None if the face was not found.
+
+        Raises:
+            CaptureError: If the landmarks are damaged.
+        """
         lens, name = self._devices[camera].lens, self._devices[camera].name
         inside = f"Keypoints2d/{name}/{self.index(frame)}"
         file = self._holding("Keypoints2d")

@@ -52,7 +52,11 @@ class SmcFile:
             return self._find(inside) is not None
 
     def attribute(self, inside: str, name: str) -> Any:
-        """An attribute of a group, or None if missing."""
+        """An attribute of a group, or None if missing.
+
+        Raises:
+            CaptureError: If the file or the attribute is damaged.
+        """
         with self._guard(inside):
             node = self._find(inside)
             if node is None or name not in node.attrs:
@@ -62,7 +66,11 @@ class SmcFile:
             return node.attrs[name]
 
     def encoded(self, inside: str) -> bytes | None:
-        """Bytes of an encoded picture (JPEG or PNG), or None if missing."""
+        """Bytes of an encoded picture (JPEG or PNG), or None if missing.
+
+        Raises:
+            CaptureError: If the file or the dataset is damaged.
+        """
         values = self._read(inside)
         if values is None:
             return None
@@ -114,7 +122,11 @@ class SmcFile:
             return node.shape if _is(node, "Dataset") else None
 
     def pixels(self, inside: str) -> np.ndarray | None:
-        """(H, W) integers of an uncompressed picture, or None if missing."""
+        """(H, W) integers of an uncompressed picture, or None if missing.
+
+        Raises:
+            CaptureError: If the file or the dataset is damaged.
+        """
         values = self._read(inside)
         if values is not None and (values.ndim != 2 or values.dtype.kind != "u"):
             raise self._damaged(inside)

@@ -160,8 +160,8 @@ class ChatSettings:
         language: Question to answer.
         voice: Text to speech.
         turns: Who speaks when.
-        patience: How long services may take.
-        expression: Where sound becomes a moving face.
+        patience: Time limits of services.
+        expression: Where the face is computed from sound.
         max_sessions: How many visitors may talk at once, including those whose connection was lost
             a moment ago.
         idle_minutes: A session ends after this time without speech, typing or playback; 0 for
@@ -273,7 +273,12 @@ class SettingsRules(Rules):
         return f"{where.table}: '{where.name}' must be {described(where.kind)}."
 
     def own(self, kind: Kind, value: Any, where: Setting) -> Any:
-        """Converts a `Choice`, which may be given as a name alone."""
+        """Converts a `Choice`, which may be given as a name alone.
+
+        Raises:
+            SettingsError: If the value is neither a name nor a table whose `use`, if given, is a
+                name.
+        """
         if kind.bare is not Choice:
             return NotImplemented
         if isinstance(value, str):

@@ -57,7 +57,7 @@ def key_for(url: str, key_variable: str, where: str) -> str:
         where: Name of the setting, for errors.
 
     Raises:
-        SettingsError: As for `check_key`, or if the environment variable is not set.
+        SettingsError: If `check_key` refuses the address, or the environment variable is not set.
     """
     check_key(url, key_variable, where)
     variable = key_variable or (OPENAI_KEY if is_openai(url) else "")

@@ -101,7 +101,11 @@ def decode(frame: str | bytes, known: tuple[type, ...]) -> Any:
 
 
 def unpack(text: str) -> dict[str, Any]:
-    """The JSON object of a text frame."""
+    """The JSON object of a text frame.
+
+    Raises:
+        ProtocolError: If the text is not a JSON object; `OversizedError` if it is too long.
+    """
     try:
         check_size(text.encode(), protocol.MAX_TEXT_FRAME)
         value = json.loads(text, parse_constant=refuse_constant)
@@ -115,7 +119,11 @@ def unpack(text: str) -> dict[str, Any]:
 
 
 def split_binary(frame: bytes) -> tuple[dict[str, Any], bytes]:
-    """Header and payload of a binary frame."""
+    """Header and payload of a binary frame.
+
+    Raises:
+        ProtocolError: If the frame is malformed; `OversizedError` if it is too long.
+    """
     check_size(frame, protocol.MAX_BINARY_FRAME)
     if len(frame) < HEADER_LENGTH.size:
         raise ProtocolError("a binary frame is too short for its header.")
@@ -131,7 +139,11 @@ def split_binary(frame: bytes) -> tuple[dict[str, Any], bytes]:
 
 
 def check_size(frame: bytes, limit: int) -> None:
-    """Refuses a frame above `limit` bytes."""
+    """Refuses a frame above `limit` bytes.
+
+    Raises:
+        OversizedError: If the frame is larger.
+    """
     if len(frame) > limit:
         raise OversizedError(f"a frame of {len(frame)} bytes is over the limit of {limit}.")
 
@@ -139,7 +151,11 @@ def check_size(frame: bytes, limit: int) -> None:
 def read_tensors(
     tensors: dict[str, Tensor], header: dict[str, Any], payload: bytes, where: str
 ) -> dict[str, np.ndarray]:
-    """Cuts the payload of a message into arrays with the shapes in the header."""
+    """Cuts the payload of a message into arrays with the shapes in the header.
+
+    Raises:
+        ProtocolError: If a shape is refused or the payload has another size.
+    """
     arrays, at = {}, 0
     for name, tensor in tensors.items():
         shape, dtype = header[name], np.dtype(tensor.dtype)
@@ -205,7 +221,11 @@ RULES = WireRules(ProtocolError)
 
 
 def check_shape(value: Any, tensor: Tensor, where: str) -> None:
-    """Checks the shape that the header states for an array."""
+    """Checks the shape that the header states for an array.
+
+    Raises:
+        ProtocolError: If the shape has other dimensions or too many elements.
+    """
     for size in parsed(list[int], value, where, RULES):
         check_limit(size, Range(0, tensor.max_size), where)
     if len(value) != tensor.dims:
@@ -214,7 +234,11 @@ def check_shape(value: Any, tensor: Tensor, where: str) -> None:
 
 
 def check_limit(value: Any, mark: Any, where: str) -> None:
-    """Checks a value against a `Range` or `Length`."""
+    """Checks a value against a `Range` or `Length`.
+
+    Raises:
+        ProtocolError: If the value violates the limit.
+    """
     if isinstance(mark, Range) and not mark.low <= value <= mark.high:
         raise ProtocolError(f"{where}: must lie in [{mark.low:g}, {mark.high:g}].")
     if isinstance(mark, Length) and not mark.low <= len(value) <= mark.high:

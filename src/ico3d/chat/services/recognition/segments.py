@@ -79,7 +79,7 @@ class Segments(SegmentedSTTService):
         Args:
             longest: Longest time in seconds for a transcript.
             longest_speech: Seconds of unbroken speech after which it is cut.
-            options: Of pipecat's service.
+            options: Options of pipecat's service.
         """
         super().__init__(ttfs_p99_latency=longest, **options)
         self._longest_speech = longest_speech

@@ -178,7 +178,12 @@ def permitted(settings: Settings) -> Recording | None:
 
 @contextlib.contextmanager
 def loading() -> Iterator[None]:
-    """Turns errors in the `with` block into one sentence on what is missing; prevents downloads."""
+    """Turns errors in the `with` block into one sentence on what is missing; prevents downloads.
+
+    Raises:
+        SettingsError: If a package is not installed or an option is refused.
+        MissingModelError: If files of a model are not installed.
+    """
     try:
         with offline():
             yield
