@@ -15,13 +15,13 @@ export const MAX_AHEAD_SECONDS = 2;
 
 /** One of the three services that make the conversation. */
 export interface Service {
-  /** For the visitor's eyes. */
+  /** Name, as shown to visitors. */
   name: string;
-  /** True for the small offline ones that the page says plainly are in use. */
+  /** True for one of the simple offline services, about which the page tells visitors. */
   stand_in: boolean;
 }
 
-/** Who listens, thinks and speaks. */
+/** The services of the conversation. */
 export interface Services {
   /** Speech to text. */
   recognition: Service;
@@ -31,47 +31,47 @@ export interface Services {
   voice: Service;
 }
 
-/** The visitor's browser is to recognise speech, besides sending it. */
+/** Asks the page to let the browser recognise speech, besides sending the sound. */
 export interface Dictation {
-  /** BCP 47 tag of what is spoken; empty for the browser's own language. */
+  /** BCP 47 tag of the spoken language; empty for the browser's language. */
   language: string;
-  /** Who listens where the browser cannot, for the visitor's eyes; null for nobody. */
+  /** Recogniser for browsers without recognition, as shown to visitors; null for none. */
   fallback: string | null;
 }
 
-/** A service that could do one of the three jobs; the best ones come first. */
+/** A service that visitors may choose; preferred ones come first. */
 export interface Offer {
-  /** Which job. */
+  /** Kind of the service. */
   kind: "recognition" | "language" | "voice";
   /** Name of the service in settings and wishes. */
   key: string;
-  /** For the visitor's eyes, as in `services`. */
+  /** Name, as shown to visitors. */
   name: string;
-  /** What keeps it from working and what would mend it; empty if it works. */
+  /** What prevents the service from working and what would help; empty if it works. */
   hindrance: string;
 }
 
-/** A gesture to make; times are the utterance's. */
+/** A gesture to make; times are seconds of the utterance. */
 export interface Cue {
-  /** Counts the cues of the utterance. */
+  /** Number of the cue in the utterance. */
   number: number;
-  /** Of the gesture in the bundle. */
+  /** Name of the gesture in the bundle. */
   name: string;
-  /** Whether with the other hand. */
+  /** Whether to make the gesture with the other hand. */
   mirror: boolean;
-  /** When it begins. */
+  /** Time at which the gesture begins. */
   begin: number;
-  /** When its stroke arrives: on an accent. */
+  /** Time at which the stroke arrives, which is that of an accent. */
   stroke: number;
-  /** Seconds of the gesture's beginning that are left out. */
+  /** Seconds of the gesture's beginning to leave out. */
   skip: number;
 }
 
-/** A gesture that is held is let go. */
+/** The end of a gesture that is being held. */
 export interface Release {
-  /** Of its cue. */
+  /** Number of the gesture's cue. */
   number: number;
-  /** When hands begin to come down, on the utterance's time. */
+  /** Time at which the hands begin to come down, in seconds of the utterance. */
   time: number;
 }
 
@@ -80,74 +80,74 @@ export interface HelloMessage {
   type: "hello";
   /** Protocol version of the page. */
   version: number;
-  /** The session to go on with after a dropped connection; null for a new one. */
+  /** Id of the session to resume after a lost connection; null for a new one. */
   session: string | null;
-  /** `index` of the last speech message that arrived; -1 when new. */
+  /** `index` of the last speech message that arrived; -1 for a new session. */
   last_index: number;
-  /** Keys of offers by kind that a new session is to use; heeded where `welcome` offers. */
+  /** Services wished for in a new session: keys of offers, by kind; only offered ones are used. */
   wishes: Record<string, string>;
 }
 
 /** Sound from the microphone (binary). */
 export interface AudioMessage {
   type: "audio";
-  /** Index of the first sample since the microphone opened; where it jumps, the page left sound out that the network did not carry. */
+  /** Index of the first sample since the microphone was opened; a jump means that the page left out sound that the network could not carry. */
   sample: number;
-  /** (n,) int16 at 16 kHz, at most 1 s; 20-100 ms serve best. */
+  /** (n,) int16 at 16 kHz, at most 1 s; 20-100 ms are best. */
   pcm: Int16Array;
-  /** The utterance that left the loudspeaker when the last sample was recorded; null in silence. */
+  /** Utterance that the loudspeaker was playing when the last sample was recorded; null in silence. */
   playing: number | null;
-  /** Seconds of it that had been heard by then; 0 in silence. */
+  /** Seconds of the utterance `playing` that had been heard by then; 0 in silence. */
   position: number;
 }
 
 /** A typed question. */
 export interface TextMessage {
   type: "text";
-  /** What was typed. */
+  /** The question. */
   text: string;
 }
 
-/** The visitor wants silence. */
+/** The visitor asks the avatar to be silent. */
 export interface InterruptMessage {
   type: "interrupt";
-  /** The utterance to stop; null for whatever speaks. */
+  /** The utterance to stop; null for the current one. */
   utterance: number | null;
 }
 
-/** How far the page has played; every 100-250 ms while it plays, and once at the very end. */
+/** Position of playback; sent every 100-250 ms during playback, and once at the very end. */
 export interface ClockMessage {
   type: "clock";
-  /** The utterance that plays. */
+  /** The utterance that is playing. */
   utterance: number;
-  /** Seconds of it already heard (output latency included). */
+  /** Seconds of the utterance that have been heard (output latency included). */
   position: number;
-  /** Seconds on the body's own time line; 0 without a body. */
+  /** Body time in seconds; 0 without a body. */
   body_time: number;
 }
 
-/** Push to talk: the visitor holds the button or lets it go. While it is held everything that comes from the microphone is one turn, whatever its pauses; letting go ends the turn at once. */
+/** Push to talk: the visitor presses or releases the button. While the button is held, all sound of the microphone is one turn, whatever its pauses; releasing the button ends the turn at once. */
 export interface TalkMessage {
   type: "talk";
-  /** True when the button goes down. */
+  /** True when the button was pressed, false when it was released. */
   pressed: boolean;
 }
 
-/** What the browser's recogniser understood, where `welcome` asked for it. */
+/** Transcript of the browser's recogniser, if `welcome` asked for it. */
 export interface HeardMessage {
   type: "heard";
-  /** Counts up behind each final text; while it stays, a text replaces the last one. */
+  /** Number of the result, one higher after each final text; a text replaces an earlier one with the same number. */
   result: number;
   /** All words of this result so far. */
   text: string;
-  /** Whether they stay as they are. */
+  /** Whether the words will not change any more. */
   final: boolean;
 }
 
-/** The browser cannot recognise speech after all: the server is to do it. */
+/** The browser cannot recognise speech after all, so the server has to. */
 export interface DeafMessage {
   type: "deaf";
-  /** What the browser says about it, for the server's log. */
+  /** The browser's error, for the server's log. */
   reason: string;
 }
 
@@ -156,64 +156,64 @@ export interface WelcomeMessage {
   type: "welcome";
   /** Protocol version of the server. */
   version: number;
-  /** Name of the session, to be kept for a resume. */
+  /** Id of the session, needed to resume it. */
   session: string;
-  /** True if this goes on with the session that `hello` named. */
+  /** True if the session is the one that `hello` named. */
   resumed: boolean;
-  /** Who listens, thinks and speaks. */
+  /** The services of the conversation. */
   services: Services;
-  /** Sentences the page shows once (what this avatar cannot do). */
+  /** Sentences that the page shows once, on what this avatar cannot do. */
   notices: string[];
-  /** How the browser is to recognise speech; null where the server does. */
+  /** How the browser is to recognise speech; null if the server does. */
   dictation: Dictation | null;
-  /** Services to choose from; none where strangers may be talking. */
+  /** Services to choose from; empty where strangers may be talking. */
   offers: Offer[];
 }
 
-/** Binary frames of this connection have arrived, whatever became of them. Neither page nor browser can tell otherwise what a network still holds. A page sends sound only a little ahead of what is acknowledged: after a stall no old sound arrives. */
+/** Number of binary frames of this connection that have arrived, whether used or not. Neither page nor browser can otherwise tell what a network still holds. A page sends sound only slightly ahead of what is acknowledged, so that no old sound arrives after a stall. */
 export interface AckMessage {
   type: "ack";
-  /** How many so far. */
+  /** Number of frames so far. */
   frames: number;
 }
 
-/** What the avatar does now. */
+/** The avatar's state. */
 export interface StateMessage {
   type: "state";
   /** `listening` while the visitor speaks, `thinking` until sound comes, `speaking`. */
   state: "idle" | "listening" | "thinking" | "speaking";
 }
 
-/** What the visitor was understood to say. */
+/** The visitor's words, as recognised. */
 export interface TranscriptMessage {
   type: "transcript";
   /** All words of this turn so far. */
   text: string;
-  /** False while he still speaks: the next one replaces this one. */
+  /** False while the visitor is still speaking; the next transcript then replaces this one. */
   final: boolean;
 }
 
-/** One sentence of the answer, just before its sound. */
+/** One sentence of the answer, sent just before its sound. */
 export interface AnswerMessage {
   type: "answer";
-  /** Counts up by one for each answer in a session. */
+  /** Number of the answer, one higher for each answer in a session. */
   utterance: number;
-  /** Where in the utterance its sound starts (24 kHz). */
+  /** Index of the sentence's first sample in the utterance, at 24 kHz. */
   first_sample: number;
   /** The sentence. */
   text: string;
 }
 
-/** 100-200 ms of sound and the face that belongs to it (binary). Expression row `first_expression` + j belongs to the utterance's time (first_expression + j) / 25 s. */
+/** 100-200 ms of sound with the matching face (binary). Expression row `first_expression` + j belongs to the utterance's time (first_expression + j) / 25 s. */
 export interface SpeechMessage {
   type: "speech";
-  /** Which answer. */
+  /** Number of the answer. */
   utterance: number;
-  /** Counts the session's speech messages. */
+  /** Number of this speech message in the session. */
   index: number;
-  /** Of the utterance, at 24 kHz. */
+  /** Index of the first sample in the utterance, at 24 kHz. */
   first_sample: number;
-  /** Index in the utterance of the first row. */
+  /** Index of the first row of expressions in the utterance. */
   first_expression: number;
   /** (n,) int16 at 24 kHz. */
   pcm: Int16Array;
@@ -221,57 +221,57 @@ export interface SpeechMessage {
   expressions: Matrix;
 }
 
-/** Which body time belongs to which time of the sound, straight between the points. The points go on where those of an earlier message ended; what was planned from the first one's time on is replaced. After the last one the body stays, until the utterance ends. */
+/** Body time over the time of the sound, linear between points. The points continue those of earlier messages; earlier points from the first new one's time on are replaced. After the last point the body stands still until the utterance ends. */
 export interface TimelineMessage {
   type: "timeline";
-  /** Which answer. */
+  /** Number of the answer. */
   utterance: number;
-  /** (audio time, body time) pairs, seconds, audio time ascending. */
+  /** Pairs (audio time, body time) in seconds, ascending in audio time. */
   points: [number, number][];
 }
 
-/** What a body on a skeleton does while it speaks; nothing that was sent is taken back. */
+/** Gestures of a body on a skeleton during speech; cues that were sent are never withdrawn. */
 export interface CuesMessage {
   type: "cues";
-  /** Which answer. */
+  /** Number of the answer. */
   utterance: number;
-  /** Gestures to make, later ones upon earlier ones. */
+  /** Gestures to make; later ones are blended over earlier ones. */
   cues: Cue[];
-  /** Of these or of earlier ones. */
+  /** Releases of gestures in this or in earlier messages. */
   releases: Release[];
 }
 
 /** All sound of an utterance has been sent. */
 export interface EndMessage {
   type: "end";
-  /** Which answer. */
+  /** Number of the answer. */
   utterance: number;
   /** Length of the utterance at 24 kHz. */
   samples: number;
 }
 
-/** Fall silent at once and drop everything that belongs to an utterance. */
+/** The page must fall silent at once and drop everything about an utterance. */
 export interface StopMessage {
   type: "stop";
-  /** Which answer. */
+  /** Number of the answer. */
   utterance: number;
 }
 
-/** Somebody may speak: fall silent at once, but keep it all; `resume` or `stop` follows. */
+/** Somebody may be speaking: the page falls silent at once but keeps the utterance. A message `resume` or `stop` follows. */
 export interface PauseMessage {
   type: "pause";
-  /** Which answer. */
+  /** Number of the answer. */
   utterance: number;
 }
 
-/** It was no interruption: go on with the sample at which an utterance fell silent. */
+/** There was no interruption: the page continues at the sample where it fell silent. */
 export interface ResumeMessage {
   type: "resume";
-  /** Which answer. */
+  /** Number of the answer. */
   utterance: number;
 }
 
-/** How long something took. */
+/** Measured durations. */
 export interface MetricsMessage {
   type: "metrics";
   /** What was measured. */
@@ -283,11 +283,11 @@ export interface MetricsMessage {
 /** Something went wrong. */
 export interface ErrorMessage {
   type: "error";
-  /** One sentence. */
+  /** One sentence for the visitor. */
   message: string;
-  /** True if the server closes the connection after it; the session is over. */
+  /** True if the session is over and the server closes the connection. */
   fatal: boolean;
-  /** Whether, after a fatal one, a new session may succeed: the page offers to try again. */
+  /** After a fatal error: whether a new session may succeed, so that the page offers one. */
   again: boolean;
 }
 

@@ -1,4 +1,4 @@
-"""What cameras and microphones recorded, behind one lazy interface."""
+"""The interface of all recordings: what cameras and microphones recorded, read lazily."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -18,8 +18,8 @@ class Sound:
     """Mono sound.
 
     Attributes:
-        samples: (S,) float32 in [-1, 1]; sample 0 is heard at the time of frame 0.
-        rate: Samples per second; captures give 16,000.
+        samples: (S,) float32 in [-1, 1]; sample 0 belongs to the time of frame 0.
+        rate: Samples per second; captures return 16,000.
     """
 
     samples: np.ndarray
@@ -28,12 +28,12 @@ class Sound:
 
 @dataclass(frozen=True)
 class Split:
-    """Which pictures train and which test (docs/architecture.md); indices ascend.
+    """Which pictures are for training and which for tests (docs/architecture.md); sorted.
 
     Attributes:
-        train: Frames to learn from.
-        test: Frames to measure with; bodies have none of their own and test with cameras.
-        test_cameras: Cameras that only measure.
+        train: Frames for training.
+        test: Frames for tests; empty for bodies, which are tested with cameras.
+        test_cameras: Indices of cameras that are used for tests only.
     """
 
     train: tuple[int, ...]
@@ -42,10 +42,11 @@ class Split:
 
 
 class Capture(ABC):
-    """A recording. Images are read when asked for and never kept.
+    """A recording. Pictures are read when asked for and are not cached.
 
-    Frames are numbered 0 … num_frames − 1; frame i is at i / fps seconds. What a source lacks is
-    None. Images are float32 RGB (H, W, 3) in [0, 1]; masks float32 (H, W) in [0, 1].
+    Frames are numbered 0 … num_frames − 1; frame i is at i / fps seconds. Methods return None for
+    what a recording does not contain. Pictures are float32 RGB (H, W, 3) in [0, 1], masks float32
+    (H, W) in [0, 1].
     """
 
     kind: str
@@ -58,38 +59,38 @@ class Capture(ABC):
 
     @abstractmethod
     def image(self, camera: int, frame: int) -> np.ndarray | None:
-        """The picture, or None where this camera has no view of this frame."""
+        """The picture of a camera in a frame, or None if it was not recorded."""
 
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """The person: 1 inside."""
+        """The mask (H, W) of the person in a picture: 1 inside."""
         return None
 
     def head_mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """Where `psnr_mask` is measured: the person, for portraits face + hair + mouth."""
+        """The mask (H, W) for `psnr_mask`: the person; in portraits face, hair and mouth."""
         return self.mask(camera, frame)
 
     def background(self, camera: int) -> np.ndarray | None:
-        """What the camera sees without the person (H, W, 3)."""
+        """The clean plate (H, W, 3): what the camera sees without the person."""
         return None
 
     def audio(self) -> Sound | None:
-        """The whole sound, 16 kHz mono."""
+        """The whole sound, mono at 16 kHz."""
         return None
 
     def world_from_head(self, frame: int) -> np.ndarray | None:
-        """W_i (4, 4): takes canonical head space (metres, fixed to the skull) to the world."""
+        """Head pose W_i (4, 4): canonical head space (metres, fixed to the skull) to world."""
         return None
 
     def eyes(self, frame: int) -> np.ndarray | None:
-        """(7,) values in the order of `EYE_NAMES`."""
+        """(7,) eye and brow values of a frame, in the order of `EYE_NAMES`."""
         return None
 
     def blendshapes(self, frame: int) -> np.ndarray | None:
-        """(len(blendshape_names),) weights."""
+        """(len(blendshape_names),) blendshape weights of a frame."""
         return None
 
     def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
-        """(68, 2) Multi-PIE landmarks in pixels of this camera, also for views without image."""
+        """(68, 2) Multi-PIE landmarks in pixels of a camera, even for views without a picture."""
         return None
 
     def landmarks_3d(self, frame: int) -> np.ndarray | None:
@@ -97,7 +98,7 @@ class Capture(ABC):
         return None
 
     def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) surface points of a frame: of bodies in the world, else in head space."""
+        """(P, 3) surface points of a frame, metres: of bodies in the world, else in head space."""
         return None
 
     def whole_body_points(self, frame: int) -> np.ndarray | None:
@@ -105,7 +106,7 @@ class Capture(ABC):
         return None
 
     def body_track(self) -> BodyTrack | None:
-        """How the person moved, as `ico3d capture pose` found it; None where it has not.
+        """The motion of the body that `ico3d capture pose` found; None where that has not run.
 
         Raises:
             CaptureError: If the track is damaged or belongs to another recording.
@@ -113,17 +114,17 @@ class Capture(ABC):
         return read_body_track(self.path, self.num_frames, self.fps)
 
     def inspect(self) -> list[Finding]:
-        """What is missing or damaged in the files of this format, found without decoding them."""
+        """Missing or damaged files of this format, found without decoding them."""
         return []
 
     @property
     def provenance(self) -> dict:
-        """Who was recorded, how, and under which licence: goes into the bundle's manifest."""
+        """Who was recorded, how, and under which licence; copied into a bundle's manifest."""
         return {"kind": self.kind, "sources": [], "consent": "", "licence": ""}
 
 
 def last_eleventh(num_frames: int) -> Split:
-    """The test split of heads: the last 1/11 of the frames."""
+    """The split of heads: the last 1/11 of the frames are for tests."""
     first_test = num_frames * 10 // 11
     return Split(tuple(range(first_test)), tuple(range(first_test, num_frames)))
 
@@ -132,10 +133,10 @@ TEST_CAMERA_EVERY = 5
 
 
 def all_frames(num_frames: int, cameras: Sequence[Camera]) -> Split:
-    """The split of bodies: all frames train; every fifth camera by azimuth tests.
+    """The split of bodies: all frames are for training, every fifth camera by azimuth for tests.
 
-    Azimuth is measured about the upward axis y through the middle of the cameras; the first test
-    camera is the third of the ring, so that three cameras suffice for one.
+    The azimuth is measured about the upward axis y through the centre of the cameras. The first
+    test camera is the third of the ring, so that a ring of three cameras already has one.
     """
     centers = np.stack([camera.camera_to_world[:3, 3] for camera in cameras])  # (C, 3)
     across = centers - centers.mean(0)

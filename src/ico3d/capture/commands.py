@@ -1,4 +1,4 @@
-"""Command line of the capture room."""
+"""The verbs `ico3d capture portrait` and `ico3d capture check`."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,19 +13,18 @@ from ico3d.common.device import DeviceName
 class Portrait:
     """Track a talking-head video: poses, expressions, masks, background, sound.
 
-    The camera should stand still, one person face it. Pictures are resampled to 25 per second and
-    scaled down to at most `size`. The result is a folder in the talking-portrait layout.
+    The camera should stand still and one person face it. Pictures are resampled to 25 per second
+    and scaled down to at most `size`. The result is a folder in the talking-portrait layout.
 
     Attributes:
         video: The video file.
         out: Folder to make.
         intrinsics: Focal length in pixels of the video, or "estimated".
-        size: Longest short side of the pictures in pixels.
-        refine: Correct the poses by the pictures of the whole head, a minute or more.
+        size: Upper limit of the pictures' short side in pixels.
+        refine: Correct the poses by pictures of the whole head, which takes a minute or more.
         consent: What the person agreed to; goes into the avatar's manifest.
         licence: Licence of the recording; goes into the avatar's manifest.
-        device: Where the poses are corrected: by default with CUDA where that works, else on the
-            CPU.
+        device: Where to correct the poses: by default CUDA where that works, else the CPU.
     """
 
     video: Annotated[Path, tyro.conf.Positional]
@@ -38,7 +37,7 @@ class Portrait:
     device: DeviceName = "auto"
 
     def run(self) -> None:
-        """Runs it."""
+        """Tracks the video and writes the folder."""
         from ico3d.capture.portrait.track import PortraitSettings, track_portrait
 
         focal = None if self.intrinsics == "estimated" else self.intrinsics
@@ -51,22 +50,22 @@ class Portrait:
 class Check:
     """Examine a capture of any format, and draw a contact sheet.
 
-    Exit status 1 where something is wrong; warnings leave it 0.
+    The exit status is 1 if there is an error; warnings leave it 0.
 
     Attributes:
-        path: The capture.
-        out: The contact sheet, a PNG; `check.png` inside the capture by default, or beside it
-            where it is a file.
+        path: The capture, a folder or a file.
+        out: The contact sheet, a PNG; by default `check.png` inside the capture's folder, or beside
+            the capture's file.
     """
 
     path: Annotated[Path, tyro.conf.Positional]
     out: Path | None = None
 
     def run(self) -> None:
-        """Runs it.
+        """Prints the findings and draws the contact sheet.
 
         Raises:
-            CaptureError: If anything is inconsistent; the sentence is the first such finding.
+            CaptureError: If there is an error; the sentence is the first one.
         """
         from ico3d.capture.checking.check import report
         from ico3d.capture.formats import open_capture

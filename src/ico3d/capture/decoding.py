@@ -1,4 +1,4 @@
-"""Decoding pictures, whole or not at all: half a JPEG is an error, not a grey half."""
+"""Decodes pictures completely or not at all: a truncated JPEG is an error, not half grey."""
 
 import io
 from pathlib import Path
@@ -9,21 +9,21 @@ from PIL import Image, UnidentifiedImageError
 from ico3d.errors import CaptureError
 
 DAMAGED = (OSError, SyntaxError, ValueError, EOFError, Image.DecompressionBombError)
-"""What Pillow raises for files it cannot read; a broken PNG is a SyntaxError to it."""
+"""What Pillow raises for files that it cannot read; SyntaxError stands for a broken PNG."""
 
 
 def decoded(source: Path | bytes, what: str) -> np.ndarray:
-    """The pixels of a picture as they are stored: no rotation by metadata, no colour management.
+    """The pixels of a picture as stored: without rotation by metadata or colour management.
 
     Args:
-        source: A file, or what one holds.
-        what: What an error calls the picture.
+        source: A file, or the content of one.
+        what: Name of the picture in errors.
 
     Returns:
-        uint8 (H, W, 3) RGB, or (H, W, 4) where there is transparency.
+        uint8 (H, W, 3) RGB, or (H, W, 4) RGBA where the file has transparency.
 
     Raises:
-        CaptureError: If it is damaged or has more than 8 bits per value.
+        CaptureError: If the picture is damaged or has more than 8 bits per value.
     """
     try:
         with Image.open(io.BytesIO(source) if isinstance(source, bytes) else source) as picture:
@@ -38,10 +38,10 @@ def decoded(source: Path | bytes, what: str) -> np.ndarray:
 
 
 def size_of(source: Path | bytes, what: str) -> tuple[int, int]:
-    """Width and height of a picture; only its head is read.
+    """Width and height of a picture in pixels, from the file's header alone.
 
     Raises:
-        CaptureError: If it is missing or damaged.
+        CaptureError: If the picture is missing or damaged.
     """
     try:
         with Image.open(io.BytesIO(source) if isinstance(source, bytes) else source) as picture:
@@ -53,11 +53,11 @@ def size_of(source: Path | bytes, what: str) -> tuple[int, int]:
 
 
 def unit(picture: np.ndarray) -> np.ndarray:
-    """Bytes as float32 in [0, 1]."""
+    """Converts uint8 to float32 in [0, 1]."""
     return picture.astype(np.float32) / np.float32(255)
 
 
 def largest_channel(picture: np.ndarray) -> np.ndarray:
-    """(H, W) the largest of red, green and blue: what mask pictures mean."""
+    """(H, W) maximum of red, green and blue, which is the value of mask pictures."""
     # Ten times as fast as a maximum along an axis of length 3.
     return np.maximum(np.maximum(picture[..., 0], picture[..., 1]), picture[..., 2])

@@ -7,18 +7,18 @@ from ico3d.errors import MissingExtraError
 
 
 def opencv(purpose: str) -> ModuleType:
-    """The module cv2; arguments and errors as of `hdf5`."""
+    """Imports the module cv2; argument and errors as for `hdf5`."""
     return _optional("cv2", "opencv-contrib-python", purpose)
 
 
 def hdf5(purpose: str) -> ModuleType:
-    """The module h5py.
+    """Imports the module h5py.
 
     Args:
-        purpose: What needs the package; the error begins with it.
+        purpose: What needs the package, at the start of the error sentence.
 
     Raises:
-        MissingExtraError: If it is not installed.
+        MissingExtraError: If the package is not installed.
     """
     return _optional("h5py", "h5py", purpose)
 

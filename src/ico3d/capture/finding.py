@@ -1,4 +1,4 @@
-"""One line of a capture's examination."""
+"""Findings: the lines that `ico3d capture check` prints."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -8,12 +8,12 @@ Level = Literal["ok", "warn", "error"]
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found.
+    """The result of one check.
 
     Attributes:
-        what: What was examined.
-        level: `ok`, or how bad it is.
-        text: The finding in words.
+        what: What was checked.
+        level: `ok`, `warn` or `error`.
+        text: The result in words.
     """
 
     what: str
@@ -24,13 +24,13 @@ class Finding:
 def missing_and_damaged(
     what: str, total: int, missing: list[tuple[str, int]], damaged: list[tuple[str, int]]
 ) -> Finding:
-    """A finding about files that each belong to a camera and a frame.
+    """A finding about files of which there is one for each camera and frame.
 
     Args:
-        what: What was examined.
-        total: How many files there should be.
-        missing: (camera, frame) of those that are not there; a capture may lack views.
-        damaged: (camera, frame) of those that cannot be pictures.
+        what: What was checked.
+        total: Number of files that there should be.
+        missing: Pairs (camera, frame) without a file, which is allowed, as captures may lack views.
+        damaged: Pairs (camera, frame) whose file cannot be a picture.
     """
     parts = [
         f"{word}: camera {faults[0][0]}, frame {faults[0][1]}"

@@ -1,4 +1,4 @@
-"""Which reader opens which capture; each is imported only when its format is met."""
+"""The formats of captures; a reader is imported only when a capture of its format is opened."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -64,12 +64,12 @@ def _holds(name: str) -> Callable[[Path], bool]:
 
 @dataclass(frozen=True)
 class Format:
-    """One way in which captures are stored.
+    """A format of captures.
 
     Attributes:
-        name: What an error calls it, with the files by which it is known.
-        recognises: Whether a path holds such a capture.
-        read: Opens one.
+        name: Name of the format in errors, with the files by which it is recognised.
+        recognises: Whether a path holds a capture of this format.
+        read: Opens a capture.
     """
 
     name: str
@@ -88,14 +88,17 @@ FORMATS = (
     Format("a RenderMe-360 recording (_raw.smc and _anno.smc)", _is_renderme, _renderme),
     Format("a DNA-Rendering recording (.smc and _annots.smc)", _is_dna, _dna),
 )
-"""The first that recognises a path reads it; SMC files of unknown names are DNA-Rendering's."""
+"""All formats; the first one that recognises a path reads it.
+
+SMC files of unknown names are read as DNA-Rendering.
+"""
 
 
 def open_capture(path: Path | str) -> Capture:
-    """Opens a capture, whatever its format, with the head that was tracked in it.
+    """Opens a capture of any format, with the tracked head if there is a track.
 
     Raises:
-        CaptureError: If there is none, or the format is not recognised, or it is damaged.
+        CaptureError: If the capture is missing or damaged, or no format recognises it.
     """
     from ico3d.capture.headpose.tracked import with_track
 

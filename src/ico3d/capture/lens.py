@@ -1,4 +1,4 @@
-"""Lenses that bend straight lines, and how pictures are straightened."""
+"""Lenses with distortion, and the removal of distortion from pictures."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,21 +10,21 @@ from ico3d.errors import CaptureError
 
 PURPOSE = "straightening the pictures of a lens with distortion"
 COEFFICIENTS = (0, 4, 5, 8, 12, 14)
-"""How many distortion coefficients OpenCV's models have."""
+"""Numbers of distortion coefficients that OpenCV's models may have."""
 MOST_CHANGE = 3.0
-"""Straightening changes a focal length by no more than this factor, or the lens is nonsense."""
+"""Largest factor by which undistortion may change a focal length before the lens is refused."""
 
 
 @dataclass(frozen=True)
 class Lens:
-    """A camera without its place: what a calibration says about lens and sensor.
+    """A camera without its pose: lens and sensor as calibrated.
 
     Attributes:
         name: Name of the camera, for errors.
-        width: Pixels.
-        height: Pixels.
+        width: Picture width in pixels.
+        height: Picture height in pixels.
         intrinsics: (3, 3) fx, fy, cx, cy in pixels, pixel centres at +0.5.
-        distortion: OpenCV's k1, k2, p1, p2, k3, …; empty or zero where lines stay straight.
+        distortion: OpenCV's k1, k2, p1, p2, k3, …; empty or zero for a lens without distortion.
     """
 
     name: str
@@ -59,19 +59,19 @@ class Lens:
 
     @property
     def bends(self) -> bool:
-        """Whether there is any distortion."""
+        """Whether the lens has any distortion."""
         return any(self.distortion)
 
     @cached_property
     def straight_intrinsics(self) -> np.ndarray:
-        """(3, 3) of the pinhole camera that took the straightened pictures.
+        """(3, 3) intrinsics of the pinhole camera to which undistorted pictures belong.
 
-        OpenCV's optimal matrix for pictures that hold recorded pixels only: with the matrix of the
-        calibration, a large k3 would bring rings of repeated picture into the corners.
+        This is OpenCV's optimal matrix for pictures that show recorded pixels only. With the matrix
+        of the calibration, a large k3 would repeat parts of the picture in the corners.
 
         Raises:
             CaptureError: If the distortion cannot be undone.
-            MissingExtraError: If OpenCV is needed and not installed.
+            MissingExtraError: If the lens has distortion and OpenCV is not installed.
         """
         if not self.bends:
             return self.intrinsics
@@ -88,7 +88,7 @@ class Lens:
         return _our_matrix(matrix)
 
     def straightened(self, picture: np.ndarray) -> np.ndarray:
-        """A picture (H, W, ...) uint8 or float32 as the pinhole camera would have taken it."""
+        """Undistorts a picture (H, W, ...), uint8 or float32."""
         if not self.bends:
             return picture
         return opencv(PURPOSE).undistort(
@@ -100,7 +100,7 @@ class Lens:
         )
 
     def straightened_points(self, pixels: np.ndarray) -> np.ndarray:
-        """Where (P, 2) pixels of the recorded picture lie in the straightened one."""
+        """Undistorts pixel positions (P, 2)."""
         if not self.bends or not len(pixels):
             return np.asarray(pixels, np.float64)
         moved = opencv(PURPOSE).undistortPoints(
@@ -112,7 +112,7 @@ class Lens:
         return moved[:, 0] + 0.5
 
     def resized(self, width: int, height: int) -> "Lens":
-        """The same lens on a sensor with another number of pixels."""
+        """The same lens for pictures of another size in pixels."""
         scale = np.diag([width / self.width, height / self.height, 1.0])
         return Lens(self.name, width, height, scale @ self.intrinsics, self.distortion)
 

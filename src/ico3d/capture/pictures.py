@@ -1,4 +1,4 @@
-"""Which pictures a training looks at, and how they stay in memory."""
+"""Views of a capture for training, and a cache for their pictures."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from ico3d.common.camera import Camera
 
 @dataclass(frozen=True)
 class View:
-    """One picture of one frame.
+    """A view: one frame as one camera shows it.
 
     Attributes:
-        camera_index: Number of the camera that took the picture.
+        camera_index: Index of the camera in the capture.
         frame: Number of the frame.
-        camera: That camera, in the space of what is trained.
+        camera: The camera, in the space of the trained model.
     """
 
     camera_index: int
@@ -25,30 +25,30 @@ class View:
 
 
 def train_cameras(capture: Capture) -> tuple[int, ...]:
-    """Numbers of the cameras that may be learnt from."""
+    """Indices of the cameras that are not reserved for tests."""
     return tuple(i for i in range(len(capture.cameras)) if i not in capture.split.test_cameras)
 
 
 Layers = tuple[np.ndarray | None, ...]
-"""A picture and what belongs to it, such as masks: (H, W, ...) each."""
+"""A picture and arrays that belong to it, such as masks: (H, W, ...) each, or None."""
 
 
 class LayerCache:
-    """Layers kept as bytes within a budget, else read again at each use."""
+    """Layers, kept in memory as bytes up to a limit, otherwise read at each use."""
 
     def __init__(self, read: Callable[[int, int], Layers | None], budget_gib: float):
-        """Keeps up to `budget_gib` GiB of what `read` gives for a camera and a frame.
+        """Sets the reader and the limit of memory.
 
         Args:
-            read: Gives values in [0, 1], or None where there is no picture.
-            budget_gib: Memory.
+            read: Returns layers in [0, 1] for a camera and a frame, or None if there is no picture.
+            budget_gib: Limit of memory, GiB.
         """
         self._read = read
         self._left = int(budget_gib * 2**30)
         self._kept: dict[tuple[int, int], Layers] = {}
 
     def layers(self, camera: int, frame: int) -> Layers | None:
-        """The layers as uint8, or None where there is no picture."""
+        """The layers as uint8, or None if there is no picture."""
         if (camera, frame) in self._kept:
             return self._kept[camera, frame]
         values = self._read(camera, frame)

@@ -1,4 +1,4 @@
-"""Poses of cameras: made exact, and worlds turned so that +y is up."""
+"""Camera poses: orthonormalised rotations, and worlds turned so that +y is up."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ from ico3d.errors import CaptureError
 
 
 def up_of_cameras(cameras_to_world: Sequence[np.ndarray]) -> np.ndarray:
-    """(3,) mean upward direction of (4, 4) OpenCV cameras, which people hold upright."""
+    """(3,) mean upward direction of cameras (4, 4) in OpenCV axes, assumed to be held upright."""
     ups = -np.stack([matrix[:3, 1] for matrix in cameras_to_world])  # (C, 3)
     mean = ups.mean(0)
     length = float(np.linalg.norm(mean))
@@ -16,7 +16,7 @@ def up_of_cameras(cameras_to_world: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def nearest_axis(direction: np.ndarray) -> np.ndarray:
-    """(3,) the signed coordinate axis nearest to a direction."""
+    """(3,) the coordinate axis, with its sign, that is nearest to a direction."""
     axis = np.zeros(3)
     largest = int(np.abs(direction).argmax())
     axis[largest] = 1.0 if direction[largest] >= 0 else -1.0
@@ -24,9 +24,9 @@ def nearest_axis(direction: np.ndarray) -> np.ndarray:
 
 
 def turn_upright(up: np.ndarray) -> np.ndarray:
-    """The smallest rotation (3, 3) that takes a unit direction to +y.
+    """The smallest rotation (3, 3) that takes a unit vector to +y.
 
-    Directions along coordinate axes give matrices of exact zeros and ones.
+    For coordinate axes the entries are exactly 0 and ±1.
     """
     x, y, z = (float(value) for value in up)
     if y < -1 + 1e-9:
@@ -37,7 +37,7 @@ def turn_upright(up: np.ndarray) -> np.ndarray:
 
 
 def turned(rotation: np.ndarray, camera_to_world: np.ndarray) -> np.ndarray:
-    """A (4, 4) pose in the world that a (3, 3) rotation makes of the old one."""
+    """A camera's pose (4, 4) in a world that was turned by a rotation (3, 3)."""
     matrix = np.eye(4)
     matrix[:3, :3] = rotation @ camera_to_world[:3, :3]
     matrix[:3, 3] = rotation @ camera_to_world[:3, 3]
@@ -45,17 +45,17 @@ def turned(rotation: np.ndarray, camera_to_world: np.ndarray) -> np.ndarray:
 
 
 def rigid(matrix: np.ndarray, what: str) -> np.ndarray:
-    """A (4, 4) pose, its rotation made exact.
+    """A (4, 4) pose with its rotation orthonormalised.
 
     Args:
-        matrix: (4, 4) or (3, 4) as the file has it.
-        what: Whose pose it is, for the error.
+        matrix: (4, 4) or (3, 4) as the file states it.
+        what: Whose pose it is, for errors.
 
     Returns:
-        (4, 4) with the nearest rotation.
+        (4, 4) pose with the nearest rotation matrix.
 
     Raises:
-        CaptureError: If it is no rotation and translation.
+        CaptureError: If the matrix is far from a rotation with a translation.
     """
     turn = matrix[:3, :3].clip(-2, 2)
     wrong = np.abs(turn @ turn.T - np.eye(3)).max() > 1e-3 or np.linalg.det(turn) < 0

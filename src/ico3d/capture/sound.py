@@ -1,4 +1,4 @@
-"""Sound files that lie beside pictures."""
+"""Reads sound files of captures."""
 
 from pathlib import Path
 
@@ -12,14 +12,15 @@ RATE = 16_000
 
 
 def read_sound_file(path: Path, wanted: int = RATE) -> Sound | None:
-    """A sound file as mono, or None where there is none.
+    """A sound file as mono; None if there is no file.
 
     Args:
-        path: Of any kind that libsndfile reads.
+        path: A file of any format that libsndfile reads.
         wanted: Samples per second of the result.
 
     Raises:
-        CaptureError: If it is damaged, or claims what is not taken.
+        CaptureError: If the file is damaged, or claims more than is accepted
+            (`common.sound.fault`).
     """
     import soundfile
 
@@ -34,10 +35,10 @@ def read_sound_file(path: Path, wanted: int = RATE) -> Sound | None:
 
 
 def check_claim(place: Path | str, claim: Claim) -> None:
-    """Judges a sound before it is decoded or resampled.
+    """Checks what a sound file claims before it is decoded or resampled.
 
     Raises:
-        CaptureError: If it claims what is not taken.
+        CaptureError: If the claim is refused by `common.sound.fault`.
     """
     wrong = fault(claim)
     if wrong:
@@ -45,7 +46,7 @@ def check_claim(place: Path | str, claim: Claim) -> None:
 
 
 def mono(samples: np.ndarray, rate: int, wanted: int = RATE) -> Sound:
-    """Samples (S,) or (S, channels) float32 of a judged rate as mono at another, 16 kHz."""
+    """Converts samples (S,) or (S, channels) float32 to mono at `wanted` samples per second."""
     import soxr
 
     one = samples.mean(1) if samples.ndim == 2 else samples

@@ -1,4 +1,4 @@
-"""Reads a synthetic capture: `docs/captures/synthetic.md`, "Synthetic captures"."""
+"""Reads a synthetic capture (docs/captures/synthetic.md, "Synthetic captures")."""
 
 import json
 import wave
@@ -17,12 +17,12 @@ from ico3d.errors import CaptureError
 
 FORMAT, VERSION = "ico3d-synthetic", 2
 READABLE = (1, 2)
-"""Version 1 knew heads only, and did not say so."""
+"""Versions that can be read; version 1 has no field for what is shown and is always a head."""
 NEEDED = ("format", "version", "fps", "num_frames", "blendshape_names", "cameras", "sources")
 
 
 class SyntheticCapture(Capture):
-    """A synthetic person recorded by `ico3d capture synthetic`, with exact truth."""
+    """A synthetic person recorded by `ico3d capture synthetic`, with exact ground truth."""
 
     kind = "synthetic"
 
@@ -49,12 +49,12 @@ class SyntheticCapture(Capture):
 
     @property
     def phonemes(self) -> tuple[tuple[float, str], ...]:
-        """(start in seconds, IPA symbol) of what is said; an empty symbol is a pause."""
+        """Pairs of start in seconds and IPA symbol of what is said; an empty symbol is a pause."""
         return tuple((float(t), str(s)) for t, s in self._about.get("phonemes", ()))
 
     @property
     def provenance(self) -> dict:
-        """Sources of the geometry and the voice with their licences."""
+        """Sources of geometry and voice, with their licences."""
         return {
             "kind": self.kind,
             "sources": list(self._about["sources"]),
@@ -63,21 +63,25 @@ class SyntheticCapture(Capture):
         }
 
     def image(self, camera: int, frame: int) -> np.ndarray | None:
-        """The picture, or None where this camera took none of this frame."""
+        """The picture, or None if the camera did not record this frame."""
         return self._picture("images", camera, frame, "RGB")
 
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """(H, W) exact coverage of the person, or None where there is no picture."""
+        """(H, W) exact coverage of the person, or None without a picture."""
         return self._picture("masks", camera, frame, "L")
 
     def background(self, camera: int) -> np.ndarray | None:
-        """(H, W, 3) the backdrop."""
+        """(H, W, 3) clean plate: the backdrop."""
         name = self.cameras[camera].name
         file = self.path / "backgrounds" / f"{name}.png"
         return _read_png(file, self.cameras[camera], "RGB", f"the background of camera {name}")
 
     def audio(self) -> Sound | None:
-        """The sound, 16 kHz mono."""
+        """The sound, 16 kHz mono.
+
+        Raises:
+            CaptureError: If the sound is damaged.
+        """
         file = self.path / "audio.wav"
         try:
             with wave.open(str(file), "rb") as sound:
@@ -90,7 +94,7 @@ class SyntheticCapture(Capture):
         return Sound(np.frombuffer(data, "<i2").astype(np.float32) / 32767, rate)
 
     def world_from_head(self, frame: int) -> np.ndarray | None:
-        """(4, 4) float64 exact pose."""
+        """(4, 4) float64 exact head pose."""
         return self._frames["world_from_head"][self._index(frame)]
 
     def eyes(self, frame: int) -> np.ndarray | None:
@@ -98,11 +102,11 @@ class SyntheticCapture(Capture):
         return self._frames["eyes"][self._index(frame)]
 
     def blendshapes(self, frame: int) -> np.ndarray | None:
-        """(K,) the weights that made the face."""
+        """(K,) weights from which the face was made."""
         return self._frames["blendshapes"][self._index(frame)]
 
     def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
-        """(68, 2) exact landmarks in pixels, also where there is no picture."""
+        """(68, 2) exact landmarks in pixels, even for views without a picture."""
         seen = self.cameras[camera].moved(self._frames["world_from_head"][self._index(frame)])
         return seen.project(self._frames["landmarks"][frame])[0]
 
@@ -111,7 +115,7 @@ class SyntheticCapture(Capture):
         return self._frames["landmarks"][self._index(frame)]
 
     def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) surface points: of a body in this frame, of a head neutral in its own space."""
+        """(P, 3) surface points, metres: of a body in the frame, else of a neutral head."""
         points = self._frames["points"]
         return points[self._index(frame)] if self.shows_body else points
 

@@ -1,4 +1,4 @@
-"""Reading a video file: pictures by time, sound from the moment of the first picture."""
+"""Reads video files: pictures by time, and sound from the time of the first picture."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -17,17 +17,17 @@ SOUND_RATE = 16_000
 
 @dataclass
 class Video:
-    """What a video file says about itself, completed while it is read.
+    """Facts about a video file; counts are updated while the file is read.
 
     Attributes:
         path: The file.
-        width: Width in pixels of what `frames` gives, display rotation applied.
-        height: Height in pixels of what `frames` gives, display rotation applied.
-        scale: Pixels given over pixels of the file.
-        announced: Pictures the file says it has; 0 where it does not say.
-        rate: Pictures per second it says it has on average; 0 where it does not say.
-        damaged: Packets that could not be decoded.
-        decoded: Pictures that could be decoded.
+        width: Width in pixels of the pictures that `frames` yields, display rotation applied.
+        height: Height in pixels of the pictures that `frames` yields, display rotation applied.
+        scale: Size of yielded pictures as a factor of that in the file.
+        announced: Number of pictures that the file claims; 0 if it does not say.
+        rate: Mean pictures per second that the file claims; 0 if it does not say.
+        damaged: Number of packets that could not be decoded.
+        decoded: Number of pictures that were decoded.
     """
 
     path: Path
@@ -40,16 +40,16 @@ class Video:
     decoded: int = field(default=0)
 
     def frames(self, fps: float) -> Iterator[np.ndarray]:
-        """Pictures resampled by time: number k is the one nearest to k / fps seconds.
+        """Yields pictures resampled by time: number k is the one nearest to k / fps seconds.
 
         Args:
-            fps: Pictures per second to give.
+            fps: Pictures per second to yield.
 
         Yields:
             uint8 RGB (height, width, 3), contiguous.
 
         Raises:
-            CaptureError: If not one picture can be decoded.
+            CaptureError: If not a single picture can be decoded.
         """
         count, before = 0, None
         for now in self._timed():
@@ -89,14 +89,14 @@ class Video:
 
 
 def open_video(path: Path, size: int) -> Video:
-    """Looks into a video file.
+    """Opens a video file and reads its facts.
 
     Args:
         path: The file.
-        size: Longest short side to give, in pixels; larger videos are scaled down.
+        size: Upper limit of the pictures' short side in pixels; larger videos are scaled down.
 
     Raises:
-        CaptureError: If it is missing, no video, or damaged beyond opening.
+        CaptureError: If the file is missing, is no video, or cannot be opened.
     """
     import av
     from av.error import FFmpegError
@@ -122,13 +122,13 @@ def open_video(path: Path, size: int) -> Video:
 
 
 def read_sound(path: Path) -> Sound | None:
-    """The sound of a video file, mono at 16 kHz; sample 0 is heard with the first picture.
+    """The sound of a video file, mono at 16 kHz; sample 0 belongs to the first picture.
 
     Returns:
-        The sound, or None where the file has none.
+        The sound, or None if the file has none.
 
     Raises:
-        CaptureError: If it claims what is not taken.
+        CaptureError: If the sound claims more than is accepted (`common.sound.fault`).
     """
     import av
     import soxr
@@ -179,11 +179,11 @@ def _shifted(samples: np.ndarray, later: int) -> np.ndarray:
 
 
 def decoded_frames(container: Any, stream: Any) -> Iterator[Any]:
-    """Decodes packet by packet, so that a damaged one costs only itself.
+    """Decodes packet by packet, so that a damaged packet does not affect others.
 
     Args:
-        container: An open file of PyAV, from where it stands.
-        stream: The pictures or the sound in it.
+        container: An open PyAV container, from its current position on.
+        stream: The stream of pictures or sound.
 
     Yields:
         Frames of PyAV; None for a packet that is damaged.

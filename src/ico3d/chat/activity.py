@@ -1,4 +1,4 @@
-"""Whether anybody is still there."""
+"""Detects visitors who have left although their page is still open."""
 
 from collections.abc import Callable
 
@@ -19,27 +19,27 @@ SIGNS = (
 
 
 class Activity(BaseObserver):
-    """Knows since when a session has neither spoken nor typed nor played.
+    """Measures for how long a visitor has neither spoken nor typed and nothing was played.
 
-    pipecat's own idle timer starts when the avatar falls silent and knows nothing of typing: a
-    visitor whom nothing was ever said to would stay forever.
+    pipecat's own idle timer starts when the avatar falls silent and does not know of typed
+    questions. A visitor to whom nothing was ever said would stay forever.
     """
 
     def __init__(self, now: Callable[[], float]):
-        """Active now; reads the clock `now`, in seconds."""
+        """Starts as active; `now` returns the time in seconds."""
         super().__init__(observe_every_push=False)
         self._now = now
         self._last = now()
 
     def touch(self) -> None:
-        """Something happened that only a visitor does."""
+        """Registers a sign of activity."""
         self._last = self._now()
 
     def idle_seconds(self) -> float:
-        """Seconds since the last sign."""
+        """Seconds since the last sign of activity."""
         return self._now() - self._last
 
     async def on_push_frame(self, data: FramePushed):
-        """Looks for voices."""
+        """Registers voices among the frames of the pipeline."""
         if isinstance(data.frame, SIGNS):
             self.touch()

@@ -1,4 +1,4 @@
-"""The verbs `serve` and `demo`."""
+"""The verbs `ico3d serve` and `ico3d demo`."""
 
 import itertools
 import sys
@@ -15,17 +15,18 @@ from ico3d.chat.observing.operator_log import set_up_log
 
 @dataclass(frozen=True)
 class Serve:
-    """Serves a bundle: a page where anyone can talk with it, or watch it if it is a body alone.
+    """Serves a bundle: a page on which visitors talk with it, or only watch a body without a head.
 
     Attributes:
-        bundle: The avatar: NAME.ico3d or its folder; `demo` is the one of the package.
-        host: Address to listen on; other machines reach it only if it is not 127.0.0.1.
-        port: Port to listen on; 0 takes any that is free.
+        bundle: The avatar: NAME.ico3d or its folder; `demo` is the avatar of the package.
+        host: Address to listen on; with 127.0.0.1 other machines cannot reach the server.
+        port: Port to listen on; 0 takes any free port.
         settings: TOML or JSON file that chooses services and timing.
-        persona: TOML or JSON file that says who the avatar is; by default as its bundle says.
+        persona: TOML or JSON file that says who the avatar is; by default that of the bundle.
         open: Open the page in a browser.
-        log: File that gets a line of JSON for each turn: times and counts, no words.
-        verbose: Print what happens inside.
+        log: File to which a line of JSON is appended for each turn, with times and counts but no
+            words.
+        verbose: Print all log messages, including what visitors say.
     """
 
     bundle: Annotated[Path, tyro.conf.Positional]
@@ -38,11 +39,11 @@ class Serve:
     verbose: bool = False
 
     def run(self) -> None:
-        """Serves until it is interrupted.
+        """Serves until interrupted.
 
         Raises:
-            Ico3dError: If the bundle, the settings or the port cannot be used, or a service
-                cannot be made.
+            Ico3dError: If the bundle, the settings or the port cannot be used, or a service cannot
+                be started.
         """
         set_up_log(self.verbose)
         from ico3d.bundle.format import Bundle
@@ -80,15 +81,15 @@ class Serve:
 
 @dataclass(frozen=True)
 class Demo:
-    """Talks with the avatar that comes in the package.
+    """Serves the avatar that is part of the package, and opens its page.
 
     Attributes:
         host: Address to listen on.
-        port: Port to listen on; 0 takes any that is free.
+        port: Port to listen on; 0 takes any free port.
         settings: TOML or JSON file that chooses services and timing.
-        persona: TOML or JSON file that says who the avatar is; by default as its bundle says.
+        persona: TOML or JSON file that says who the avatar is; by default that of the bundle.
         open: Open the page in a browser.
-        verbose: Print what happens inside.
+        verbose: Print all log messages, including what visitors say.
     """
 
     host: str = "127.0.0.1"
@@ -99,10 +100,10 @@ class Demo:
     verbose: bool = False
 
     def run(self) -> None:
-        """Serves the packaged avatar until it is interrupted.
+        """Serves the packaged avatar until interrupted.
 
         Raises:
-            BundleError: If the package came without it.
+            BundleError: If this installation of the package has no avatar.
         """
         demo = Path(packaged.NAME)
         where = (self.host, self.port, self.settings, self.persona)
@@ -110,7 +111,7 @@ class Demo:
 
 
 def described(services, offers) -> list[str]:
-    """What serves, one line each; and what would be better, with what it needs."""
+    """The services in use, one line each, and better ones with what they still need."""
     verbs = {"recognition": "listens", "language": "thinks", "voice": "speaks"}
     lines, stand_ins = [], False
     for kind, verb in verbs.items():

@@ -1,4 +1,4 @@
-"""One conversation: the pipecat pipeline between a page's messages and the page."""
+"""One conversation: the pipecat pipeline between a page's incoming and outgoing messages."""
 
 import asyncio
 from collections.abc import Callable
@@ -64,19 +64,19 @@ NOTHING_HEARD = 3.0  # s without a sign of the recogniser after which a turn is 
 
 
 class Conversation:
-    """A running pipeline: takes the page's messages, and sends its own to `Page`."""
+    """The pipeline of one session: handles the page's messages and sends others to the `Page`."""
 
     def __init__(
         self, avatar: Avatar, page: Page, visitor: Visitor, ended: Callable[[], None], seed: int
     ):
-        """A conversation that has not started.
+        """Creates a conversation that has not started.
 
         Args:
-            avatar: Who talks, and how.
-            page: Where its messages go.
-            visitor: Counts what happens.
-            ended: Called if the pipeline ends without having been closed.
-            seed: Decides what eyes, brows and body do by chance.
+            avatar: What all sessions of the server share.
+            page: Receives the messages for the visitor's page.
+            visitor: Counts events for the operator's figures.
+            ended: Called if the pipeline ends by itself, without `close`.
+            seed: Seed of random movements of eyes, brows and body.
         """
         self._avatar, self._page, self._ended, self._seed = avatar, page, ended, seed
         self._now = now = asyncio.get_running_loop().time  # for all that waits and measures
@@ -94,10 +94,13 @@ class Conversation:
         self._dictates = False  # whether the browser recognises speech
 
     async def start(self) -> Parts:
-        """Builds and starts the pipeline (about 0.5 s, most of it in a thread).
+        """Builds and starts the pipeline, which takes about 0.5 s, mostly in a thread.
+
+        Returns:
+            The session's services.
 
         Raises:
-            Ico3dError: If a service cannot be made, whatever the reason.
+            Ico3dError: If a service cannot be created.
         """
         parts = await make_aside(self._avatar)
         self._dictates = parts.dictation is not None
@@ -122,7 +125,7 @@ class Conversation:
         return parts
 
     async def close(self) -> None:
-        """Ends the pipeline and everything it started."""
+        """Stops the pipeline and all of its tasks."""
         if self._worker is None or self._task is None:
             return
         self._task.remove_done_callback(self._stopped)
@@ -130,16 +133,16 @@ class Conversation:
         await asyncio.gather(self._task, return_exceptions=True)
 
     async def greet(self) -> None:
-        """Says the persona's first words."""
+        """Says the persona's greeting."""
         if self._avatar.persona.greeting.strip():
             await self._input.say(self._avatar.persona.greeting)
 
     @singledispatchmethod
     async def handle(self, message: ClientMessage) -> None:
-        """Does what a message of the page asks for; its type chooses the handler below.
+        """Handles a message of the page; registered handlers are chosen by the message's type.
 
         Raises:
-            ProtocolError: If the page may not send such a message now.
+            ProtocolError: If the page may not send this message now.
         """
         raise TypeError(f"no handler for {type(message).__name__}")
 
@@ -185,11 +188,11 @@ class Conversation:
         await self._input.pass_on(message)  # to the BrowserRecognition
 
     def hold(self) -> None:
-        """The connection dropped."""
+        """Pauses playback estimates, because the connection was lost."""
         self._speaker.hold()
 
     def release(self) -> None:
-        """The page is back."""
+        """Resumes, because the page has reconnected."""
         self._speaker.release()
 
     def _stopped(self, task: asyncio.Task) -> None:
@@ -290,7 +293,7 @@ class Conversation:
 
 
 def make_face(avatar: Avatar, seed: int) -> Face:
-    """The face of one session, whose mouth another machine may move."""
+    """Creates the face of one session; its mouth may be computed on another machine."""
     settings, remote = avatar.settings.expression, None
     if settings.use == "remote" and avatar.speech is not None:
         remote = RemoteMouth(settings, avatar.speech, avatar.speech_sha256)
@@ -303,7 +306,7 @@ def aggregators(
     language: FrameProcessor,
     context: LLMContext,
 ) -> LLMContextAggregatorPair:
-    """The two halves that keep the conversation's context and decide on turns."""
+    """The pair of processors that keep the conversation's context and decide on turns."""
     params = LLMUserAggregatorParams(
         user_turn_strategies=strategies,
         user_turn_stop_timeout=max(NOTHING_HEARD, 2 * settings.turns.end_silence),

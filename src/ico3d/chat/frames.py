@@ -1,4 +1,4 @@
-"""Frames that only this pipeline has: what comes from the page, and sound with its face."""
+"""Frames that only this pipeline has: messages of the page, and sound with its face."""
 
 from dataclasses import dataclass
 from typing import TypeVar
@@ -13,15 +13,15 @@ Message = TypeVar("Message")
 
 @dataclass
 class SpeechFrame(DataFrame):
-    """100-200 ms of sound with the face that belongs to it: one thing, so it cannot drift.
+    """100 to 200 ms of sound with the matching face, in one frame so that both stay in step.
 
     Parameters:
-        utterance: Which answer.
-        first_sample: Of the utterance, at 24 kHz.
-        first_expression: Index of the first row.
-        pcm: (n,) int16.
+        utterance: Number of the answer.
+        first_sample: Index of the first sample in the utterance, at 24 kHz.
+        first_expression: Index of the first row of expressions in the utterance.
+        pcm: (n,) int16 at 24 kHz.
         expressions: (rows, B) float32.
-        text: The sentence that starts with this piece, if one does.
+        text: The sentence that starts with this piece, or None.
     """
 
     utterance: int
@@ -34,11 +34,11 @@ class SpeechFrame(DataFrame):
 
 @dataclass
 class UtteranceEndFrame(DataFrame):
-    """All sound of an utterance has been made.
+    """All sound of an utterance has been synthesised.
 
     Parameters:
-        utterance: Which answer.
-        samples: Length of its sound at 24 kHz.
+        utterance: Number of the answer.
+        samples: Length of the utterance's sound at 24 kHz.
     """
 
     utterance: int
@@ -50,8 +50,8 @@ class MicrophoneFrame(InputAudioRawFrame):
     """Sound from the microphone, and what the page played when its last sample was recorded.
 
     Parameters:
-        playing: The utterance; None in silence.
-        position: Seconds of it that had been heard.
+        playing: Number of the utterance that was playing; None in silence.
+        position: Seconds of that utterance that had been heard.
     """
 
     playing: int | None = None
@@ -60,15 +60,15 @@ class MicrophoneFrame(InputAudioRawFrame):
 
 @dataclass
 class VoiceFrame(SystemFrame):
-    """What the last 20-100 ms from the microphone were; long before the VAD is sure.
+    """A quick judgement of the last 20-100 ms of sound, long before the VAD is sure.
 
     Parameters:
-        at: Seconds that the microphone had sent before.
-        seconds: How long this is.
-        voiced: Whether there is a voice in them.
-        plain: Whether all of the voice so far was one and the same vowel or hum.
-        fading: Whether it is much quieter than it was, as at the end of a word.
-        silence: Seconds for which the VAD, which still knows of a voice, has not heard it.
+        at: Seconds of sound that the microphone had sent before.
+        seconds: Duration of this sound.
+        voiced: Whether the sound contains a voice.
+        plain: Whether the voice has been a single, unchanging vowel or hum so far.
+        fading: Whether the voice is much quieter than before, as at the end of a word.
+        silence: Seconds for which the voice has been silent although the VAD has not ended it.
     """
 
     at: float = 0.0
@@ -84,56 +84,56 @@ class PageFrame(SystemFrame):
     """A message from the page on its way to the processor that acts on it.
 
     Parameters:
-        message: What the page sent; `message_in` takes it out.
+        message: The page's message; `message_in` returns it by type.
     """
 
     message: ClientMessage
 
 
 def message_in(frame: Frame, kind: type[Message]) -> Message | None:
-    """The message of a `PageFrame` if it is of a certain kind; None for every other frame."""
+    """The message of a `PageFrame` if it has the type `kind`; None for every other frame."""
     carried = frame.message if isinstance(frame, PageFrame) else None
     return carried if isinstance(carried, kind) else None
 
 
 @dataclass
 class TypedFrame(SystemFrame):
-    """A typed question, behind the interruption that it is.
+    """A typed question; it follows the interruption frame that it causes.
 
     Parameters:
-        text: What was typed.
+        text: The question.
     """
 
     text: str = ""
 
 
 class Utterances:
-    """Numbers the answers of a session; knows how long they are and which were stopped."""
+    """Numbers the answers of a session; knows their lengths and which ones were stopped."""
 
     def __init__(self):
-        """None yet."""
+        """Starts without answers."""
         self.last = -1
         self._stopped_through = -1
         self._sound: dict[int, tuple[float, bool]] = {}
 
     def begin(self) -> int:
-        """The number of a new answer."""
+        """Returns the number of a new answer."""
         self.last += 1
         return self.last
 
     def made(self, utterance: int, samples: int, complete: bool = False) -> None:
-        """So many samples of an answer have been made, sent or not; all of them if complete."""
+        """Registers how much of an answer has been synthesised: samples, and whether all."""
         self._sound = {n: sound for n, sound in self._sound.items() if n > self._stopped_through}
         self._sound[utterance] = samples / SPEECH_RATE, complete
 
     def sound(self, utterance: int) -> tuple[float, bool]:
-        """Seconds of an answer that have been made, and whether that is all of it."""
+        """Seconds of an answer that have been synthesised, and whether these are all."""
         return self._sound.get(utterance, (0.0, False))
 
     def stop_all(self) -> None:
-        """Everything begun so far is over."""
+        """Marks all answers so far as stopped."""
         self._stopped_through = self.last
 
     def is_stopped(self, utterance: int) -> bool:
-        """Whether pieces of an answer that still arrive are to be dropped."""
+        """Whether an answer was stopped, so that further pieces of it must be dropped."""
         return utterance <= self._stopped_through

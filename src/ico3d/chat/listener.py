@@ -1,4 +1,4 @@
-"""The input of the pipeline, and the processor that shows the visitor what was understood."""
+"""The input of the pipeline, and the processor that shows transcripts to the visitor."""
 
 from pipecat.frames.frames import (
     Frame,
@@ -20,46 +20,49 @@ from ico3d.chat.wire.protocol import MICROPHONE_RATE, Audio, ClientMessage, Tran
 
 
 class PageInput(FrameProcessor):
-    """Where the page's messages enter the pipeline."""
+    """The processor through which the page's messages enter the pipeline."""
 
     def __init__(self):
-        """Nothing was asked."""
+        """Starts without a pending question."""
         super().__init__()
         self._question: TypedFrame | None = None  # that is to be answered
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
-        """Passes everything on."""
+        """Passes every frame on."""
         await super().process_frame(frame, direction)
         await self.push_frame(frame, direction)
 
     async def hear(self, sound: Audio) -> None:
-        """Sound from the microphone."""
+        """Pushes sound of the microphone into the pipeline."""
         pcm = sound.pcm.tobytes()
         frame = MicrophoneFrame(pcm, MICROPHONE_RATE, 1, sound.playing, sound.position)
         await self.push_frame(frame)
 
     async def pass_on(self, message: ClientMessage) -> None:
-        """A message that a processor behind this one acts on, as `PageFrame`."""
+        """Pushes a message as `PageFrame`, for a processor further down the pipeline."""
         await self.push_frame(PageFrame(message))
 
     async def ask(self, text: str) -> None:
-        """A typed question: whatever is being said stops; `answer` comes when all have stopped."""
+        """Stops speech and sends a typed question down the pipeline; `answer` must follow."""
         self._question = TypedFrame(text)
         await self.broadcast_interruption()
         await self.push_frame(self._question)
 
     async def interrupt(self) -> None:
-        """Whatever is being said or prepared stops."""
+        """Stops current and prepared speech."""
         self._question = None
         await self.broadcast_interruption()
 
     async def answer(self, question: TypedFrame) -> None:
-        """Asks the language model, which knows the question, unless it was taken back since."""
+        """Lets the language model answer a typed question, unless a newer one has replaced it.
+
+        Called once all speech has stopped and the question is in the model's context.
+        """
         if question is self._question:
             await self.push_frame(LLMRunFrame())
 
     async def say(self, text: str) -> None:
-        """Lets the avatar say something by itself, as if the language model had."""
+        """Makes the avatar say a text that does not come from the language model."""
         for frame in (LLMFullResponseStartFrame(), LLMTextFrame(text), LLMFullResponseEndFrame()):
             await self.push_frame(frame)
 
@@ -67,11 +70,11 @@ class PageInput(FrameProcessor):
 class Captions(FrameProcessor):
     """Sends transcripts and the listening state to the page; stands behind the recogniser.
 
-    What is said over the avatar's voice is shown once it has become a turn.
+    Words spoken over the avatar's voice are shown only once they have become a turn.
     """
 
     def __init__(self, page: Page):
-        """Captions for one session."""
+        """Creates the captions of one session."""
         super().__init__()
         self._page = page
         self._words = ""  # of the pieces of this turn that are final
@@ -79,7 +82,7 @@ class Captions(FrameProcessor):
         self._early: Transcript | None = None  # of a voice that may become a turn
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
-        """Looks at what passes; the aggregator's frames come from the other side."""
+        """Watches frames in both directions; the aggregator's frames come from further down."""
         await super().process_frame(frame, direction)
         if isinstance(frame, InterimTranscriptionFrame | TranscriptionFrame):
             self._transcribed(frame.text, isinstance(frame, TranscriptionFrame))

@@ -1,4 +1,4 @@
-"""What a language model still knows of a long conversation: its end, and a summary of the rest."""
+"""Limits what a language model remembers: the latest messages and a summary of the rest."""
 
 from pipecat.processors.aggregators.llm_context import LLMContext
 from pipecat.processors.aggregators.llm_response_universal import LLMAssistantAggregatorParams
@@ -27,11 +27,11 @@ REMINDER = "(What we talked about before, in short: {summary})"
 
 
 def remembering(memory: Memory, language: FrameProcessor) -> LLMAssistantAggregatorParams:
-    """When pipecat is to summarise, and how.
+    """Settings of pipecat's summaries.
 
     Args:
-        memory: How much may be kept.
-        language: The model; the offline one cannot summarise (`forget` does for it).
+        memory: Limit of the conversation's length.
+        language: The language model; the offline one cannot summarise, so `forget` is used instead.
     """
     summary = LLMContextSummaryConfig(
         target_context_tokens=memory.tokens // SHARE,
@@ -51,13 +51,13 @@ def remembering(memory: Memory, language: FrameProcessor) -> LLMAssistantAggrega
 
 
 def forget(context: LLMContext, memory: Memory) -> None:
-    """Drops the oldest questions with their answers where no summary has made a talk shorter.
+    """Drops the oldest questions with their answers if no summary has shortened the conversation.
 
-    The offline model cannot make one, and one that is to be made may fail every time.
+    The offline model cannot summarise, and another model may fail to do so every time.
 
     Args:
-        context: What the model knows of the talk; the latest question always stays.
-        memory: How much may be kept.
+        context: Context of the language model; the latest question is always kept.
+        memory: Limit of the conversation's length.
     """
     while LLMContextSummarizationUtil.estimate_context_tokens(context) > MOST * memory.tokens:
         messages = context.get_messages()
@@ -68,5 +68,8 @@ def forget(context: LLMContext, memory: Memory) -> None:
 
 
 def is_question(message: object) -> bool:
-    """Whether a message is the visitor's; a tool's result must not lose the call before it."""
+    """Whether a message is the visitor's.
+
+    Only there may a conversation be cut: elsewhere a tool's call could lose its result.
+    """
     return isinstance(message, dict) and message.get("role") == "user"

@@ -1,6 +1,6 @@
-"""The visitor's page as the conversation sees it: a place to send messages to.
+"""The visitor's page as the conversation sees it: a receiver of messages.
 
-It outlives a connection: what the page missed is sent again when it comes back.
+A page outlives its connection: messages that were lost are sent again after it reconnects.
 """
 
 import asyncio
@@ -17,16 +17,16 @@ MAX_WAITING = 2000  # messages a page may leave unread before its connection is 
 
 
 class Outbox:
-    """Messages on their way into one connection."""
+    """Queue of messages for one connection."""
 
     def __init__(self):
-        """Empty and open."""
+        """Starts empty and open."""
         self._waiting: deque[ServerMessage] = deque()
         self._filled = asyncio.Event()
         self._closed = False
 
     def put(self, message: ServerMessage) -> None:
-        """Adds a message; a page that does not read is given up."""
+        """Adds a message; closes the outbox if the page does not read its messages."""
         if len(self._waiting) >= MAX_WAITING:
             self.close()
         if not self._closed:
@@ -34,7 +34,7 @@ class Outbox:
         self._filled.set()
 
     async def get(self) -> ServerMessage | None:
-        """The next message; None when the outbox is closed and empty."""
+        """Waits for the next message; None if the outbox is closed and empty."""
         while not self._waiting:
             if self._closed:
                 return None
@@ -43,7 +43,7 @@ class Outbox:
         return self._waiting.popleft()
 
     def drop(self, utterance: int) -> None:
-        """Forgets what belongs to an utterance."""
+        """Removes the messages of an utterance."""
         kept = [message for message in self._waiting if _utterance_of(message) != utterance]
         self._waiting = deque(kept)
 
@@ -53,51 +53,51 @@ class Outbox:
         return self._closed
 
     def close(self) -> None:
-        """Ends the connection once everything has been read."""
+        """Closes the outbox; messages in it are still delivered."""
         self._closed = True
         self._filled.set()
 
 
 class Page:
-    """Sends messages to whatever connection the page has now."""
+    """Sends messages to the page's current connection."""
 
     def __init__(self):
-        """A new page: idle, not connected."""
+        """Starts idle and without a connection."""
         self._outbox: Outbox | None = None
         self._log: deque[ServerMessage] = deque(maxlen=KEPT)
         self._next_index = 0
         self._state = State("idle")
 
     def attach(self, outbox: Outbox) -> None:
-        """A connection opened; an earlier one of the same page ends."""
+        """Sets the page's connection and closes an earlier one."""
         if self._outbox is not None:
             self._outbox.close()
         self._outbox = outbox
 
     def detach(self, outbox: Outbox) -> bool:
-        """A connection closed; tells whether the page is without one now."""
+        """Removes a connection that has closed; returns whether the page is now without one."""
         if self._outbox is outbox:
             self._outbox = None
         return self._outbox is None
 
     def end(self, last: ServerMessage) -> None:
-        """Sends a last message and ends the connection, if there is one."""
+        """Sends a last message and closes the connection, if there is one."""
         self._put(last)
         if self._outbox is not None:
             self._outbox.close()
 
     @property
     def is_attached(self) -> bool:
-        """Whether a connection is open."""
+        """Whether the page has a connection."""
         return self._outbox is not None
 
     @property
     def state(self) -> str:
-        """What the page was told last."""
+        """The state that the page was last told."""
         return self._state.state
 
     def replay(self, last_index: int) -> None:
-        """Sends again what followed the speech message `last_index`, and the state."""
+        """Sends again all messages after the speech message `last_index`, and the state."""
         log = list(self._log)
         known = [isinstance(m, Speech) and m.index <= last_index for m in log]
         after = len(log) - known[::-1].index(True) if any(known) else 0
@@ -105,7 +105,7 @@ class Page:
             self._put(message)
 
     def send(self, message: ServerMessage) -> None:
-        """Sends a message, or keeps it for the page's return."""
+        """Sends a message, or keeps it until the page reconnects."""
         if isinstance(message, Stop):
             self._forget(message.utterance)
         final = isinstance(message, Transcript) and message.final
@@ -114,14 +114,14 @@ class Page:
         self._put(message)
 
     def send_speech(self, frame: SpeechFrame) -> None:
-        """Sends a piece of speech under the session's next index."""
+        """Sends a piece of speech with the session's next index."""
         index, self._next_index = self._next_index, self._next_index + 1
         rows = np.clip(frame.expressions, -HALF, HALF).astype(np.float16)  # (rows, B)
         first = (frame.first_sample, frame.first_expression)
         self.send(Speech(frame.utterance, index, *first, frame.pcm, rows))
 
     def show(self, state: str) -> None:
-        """Tells the state if it changed."""
+        """Sends the state if it has changed."""
         if state != self._state.state:
             self._state = State(state)  # type: ignore[arg-type]
             self._put(self._state)

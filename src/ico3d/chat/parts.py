@@ -1,7 +1,7 @@
-"""What conversations are made of: what all share, and what each has for itself.
+"""The components of conversations: those that all sessions share, and those of each session.
 
-Services are looked up and made here and nowhere else: it may take seconds, for servers are asked
-and models loaded, so while visitors talk it happens in threads of its own.
+Only this module looks up and creates services. That may take seconds, because servers are asked and
+models loaded, so while visitors talk it is done in threads.
 """
 
 import asyncio
@@ -37,18 +37,18 @@ _threads = ThreadPoolExecutor(AT_ONCE, "making")  # the loop's own have conversa
 
 @dataclass(frozen=True)
 class Avatar:
-    """What all sessions of a server share, read only.
+    """Everything that the sessions of a server share, read-only.
 
     Attributes:
-        head: The head's sizes.
-        speech: Sound to mouth; null for heads driven by blendshapes.
+        head: Sizes of the baked head.
+        speech: Model from sound to mouth; None for heads driven by blendshapes.
         persona: Who the avatar is.
-        services: Who listens, thinks and speaks.
-        settings: Services and timing.
-        animation: How its body moves; None for a head alone.
-        speech_sha256: Of the file of `speech`, by which a remote module knows that it is its own.
-        clips: Gestures of a body on a skeleton, by name; None where it is none, or has none.
-        workers: Threads in which faces are made.
+        services: The chosen recogniser, language model and voice.
+        settings: Settings of the conversation.
+        animation: Procedural motion of the body; None for a head alone.
+        speech_sha256: SHA-256 of the file of `speech`, by which a remote module is matched.
+        clips: Gestures of a body on a skeleton, by name; None without such a body or gestures.
+        workers: Threads that compute faces.
     """
 
     head: HeadInfo
@@ -64,16 +64,16 @@ class Avatar:
 
 @dataclass(frozen=True)
 class Parts:
-    """What takes a while to make, and what takes a while to find out.
+    """Components of one session that are slow to create.
 
     Attributes:
-        vad: Hears voices.
-        turn: Tells whether a turn is over.
-        recognition: Speech to text.
-        language: Question to answer.
-        voice: Text to speech.
-        services: Names of the three services, as the page is told.
-        dictation: How the browser is to recognise speech; None where the server does.
+        vad: Detector of voices.
+        turn: Detector of ends of turns.
+        recognition: Recogniser: speech to text.
+        language: Language model: question to answer.
+        voice: Voice: text to speech.
+        services: Names of the three services for the page.
+        dictation: How the browser is to recognise speech; None if the server does.
     """
 
     vad: EagerSilero
@@ -86,10 +86,10 @@ class Parts:
 
 
 def make_parts(avatar: Avatar) -> Parts:
-    """Makes what one session has for itself; loads what it shares with others.
+    """Creates the components of one session, and loads what they share with other sessions.
 
     Raises:
-        Ico3dError: If a service cannot be made, whatever the reason.
+        Ico3dError: If a service cannot be created.
     """
     turns, services = avatar.settings.turns, avatar.services
     context = Context(avatar.persona, avatar.head, avatar.animation)
@@ -108,7 +108,7 @@ def make_parts(avatar: Avatar) -> Parts:
 
 
 def warm_up(parts: Parts) -> None:
-    """Lets a language model on a server answer once, in a thread, before visitors ask."""
+    """Has a language model on a server answer once, in a thread, before visitors ask."""
 
     def ask(model: WarmsUp) -> None:
         try:
@@ -121,10 +121,10 @@ def warm_up(parts: Parts) -> None:
 
 
 async def make_aside(avatar: Avatar) -> Parts:
-    """`make_parts` beside the event loop.
+    """Runs `make_parts` in a thread.
 
     Raises:
-        Ico3dError: If a service cannot be made, whatever the reason.
+        Ico3dError: If a service cannot be created.
     """
     return await asyncio.get_running_loop().run_in_executor(_threads, make_parts, avatar)
 

@@ -1,7 +1,7 @@
-"""Every place at which this program reaches into pipecat beyond what pipecat documents.
+"""All uses of pipecat's undocumented parts.
 
-Each function says in one sentence what is touched and why. `touches` records it, and a test fails
-when a version of pipecat no longer has it; pyproject.toml allows one minor version for that reason.
+Each function says what it uses and why. `touches` records the attributes, and a test fails if a
+version of pipecat lacks one; for that reason pyproject.toml allows only one minor version.
 """
 
 import asyncio
@@ -13,7 +13,7 @@ from pipecat.frames.frames import Frame, VADUserStoppedSpeakingFrame
 Function = TypeVar("Function", bound=Callable)
 
 TOUCHED: list[tuple[str, str]] = []
-"""Class (`module:name`) and attribute of pipecat that a function below relies on."""
+"""Class (`module:name`) and attribute of pipecat on which a function below relies."""
 
 OVERRIDDEN: tuple[tuple[str, str, str], ...] = (
     (
@@ -32,7 +32,7 @@ OVERRIDDEN: tuple[tuple[str, str, str], ...] = (
         "one model serves all sessions, where pipecat would load one for each",
     ),
 )
-"""Class, method that a class of ours overrides, and why."""
+"""Class of pipecat, method that a class of ico3d overrides, and why."""
 
 
 def touches(where: str, *names: str) -> Callable[[Function], Function]:
@@ -57,63 +57,63 @@ async def push_text(model: Any, text: str) -> None:
 
 @touches(_LANGUAGE, "_check_response_schema")
 def check_schema(model: Any, schema: Any) -> None:
-    """Refuses a schema of the answer in pipecat's words, for a model that cannot heed one."""
+    """Raises pipecat's error for a model that does not support a schema of the answer."""
     model._check_response_schema(schema)
 
 
 @touches("pipecat.services.ai_service:AIService", "_settings")
 def settings_of(service: Any) -> Any:
-    """The settings of a service as frames may have changed them since it was made."""
+    """The settings of a service, including changes by frames since it was created."""
     return service._settings
 
 
 @touches(_RECOGNITION, "_user_speaking")
 def is_user_speaking(recognition: Any) -> bool:
-    """Whether the VAD hears a voice; a recogniser has followed its frames already."""
+    """Whether the VAD hears a voice, as the recogniser's base class knows from frames."""
     return recognition._user_speaking
 
 
 @touches(_SEGMENTS, "_audio_buffer")
 def segment(recognition: Any) -> bytearray:
-    """The sound (PCM16) of the voice so far, to look for a place at which it can be cut."""
+    """The sound (PCM16) of the current voice, in which a place to cut is searched."""
     return recognition._audio_buffer
 
 
 @touches(_SEGMENTS, "_audio_buffer", "_user_speaking", "_handle_user_stopped_speaking")
 async def transcribe_segment(recognition: Any) -> None:
-    """Has the sound so far transcribed while the voice goes on: pipecat waits for its end."""
+    """Transcribes the sound so far although the voice goes on; pipecat would wait for its end."""
     await recognition._handle_user_stopped_speaking(VADUserStoppedSpeakingFrame())
     recognition._user_speaking = True
 
 
 @touches(_SEGMENTS, "_audio_buffer")
 def keep_segment(recognition: Any, sound: bytearray) -> None:
-    """Goes on with a part of the sound, where the rest was transcribed or given up."""
+    """Replaces the buffered sound by a part of it, after the rest was transcribed or dropped."""
     recognition._audio_buffer = sound
 
 
 @touches("pipecat.services.whisper.stt:WhisperSTTService", "_model")
 def use_model(recognition: Any, model: Any) -> None:
-    """Lets a Whisper recogniser use a model that is loaded already."""
+    """Gives a Whisper recogniser a model that is already loaded."""
     recognition._model = model
 
 
 @touches("pipecat.utils.base_object:BaseObject", "_call_event_handler")
 async def raise_event(processor: Any, name: str, *args: Any) -> None:
-    """Tells a processor's listeners of an event that happened to a part of it."""
+    """Calls a processor's event handlers, for an event in a component of it."""
     await processor._call_event_handler(name, *args)
 
 
 @touches("pipecat.services.openai.tts:OpenAITTSService", "_client")
 @touches("pipecat.services.whisper.base_stt:BaseWhisperSTTService", "_client")
 def client_of(service: Any) -> Any:
-    """The OpenAI client of a voice or a recogniser, to ask with it as pipecat does not."""
+    """The OpenAI client of a voice or a recogniser, for requests that pipecat does not offer."""
     return service._client
 
 
 @touches(_VOICE, "_resampler")
 def use_resampler(voice: Any, resampler: Any) -> None:
-    """Replaces a voice's resampler, which forgets the sound before a pause of 0.2 s."""
+    """Replaces a voice's resampler, which would forget the sound before a pause of 0.2 s."""
     voice._resampler = resampler
 
 
@@ -121,53 +121,53 @@ def use_resampler(voice: Any, resampler: Any) -> None:
 def audio_frames(
     voice: Any, pieces: AsyncIterator[bytes], **options: Any
 ) -> AsyncGenerator[Frame, None]:
-    """Sound that comes in pieces of any size as frames, cut and resampled by pipecat."""
+    """Frames of a sound that arrives in pieces of any size, cut and resampled by pipecat."""
     return voice._stream_audio_frames_from_iterator(pieces, **options)
 
 
 @touches(_VOICE, "_is_yielding_frames_synchronously")
 def mark_synchronous(voice: Any) -> None:
-    """Says that a voice's sound is complete when `run_tts` ends, also of one that made none."""
+    """Tells pipecat that a voice's sound is complete when `run_tts` ends, even if there is none."""
     voice._is_yielding_frames_synchronously = True
 
 
 def replace_run_tts(voice: Any, run_tts: Callable) -> None:
-    """Puts something around the method that pipecat calls for each sentence of a voice."""
+    """Replaces the method that pipecat calls for each sentence of a voice, to wrap it."""
     voice.run_tts = run_tts
 
 
 @touches(_AGGREGATOR, "_text")
 def aggregated(aggregator: Any) -> str:
-    """The text that an aggregator has not given out yet, to cut it at more than sentences."""
+    """The text that an aggregator still holds, in order to cut it elsewhere than at sentences."""
     return aggregator._text
 
 
 @touches(_AGGREGATOR, "_text")
 def set_aggregated(aggregator: Any, text: str) -> None:
-    """Replaces the text that an aggregator has not given out yet."""
+    """Replaces the text that an aggregator still holds."""
     aggregator._text = text
 
 
 @touches(_AGGREGATOR, "_check_sentence_with_lookahead")
 async def sentence_end(aggregator: Any, char: str) -> Any:
-    """Pipecat's verdict on whether a sentence is complete with the next letter seen."""
+    """Pipecat's decision whether a sentence is complete, given the next character."""
     return await aggregator._check_sentence_with_lookahead(char)
 
 
 @touches(_TURN, "_audio_buffer")
 def turn_sound(analyzer: Any) -> list[tuple[float, Any]]:
-    """What Smart-Turn heard in this turn, to judge it before the pause is over."""
+    """The sound of the turn that Smart-Turn holds, to judge it before the pause is over."""
     return analyzer._audio_buffer
 
 
 @touches(_TURN, "_audio_buffer")
 def keep_turn_sound(analyzer: Any, sound: list[tuple[float, Any]]) -> None:
-    """Replaces what Smart-Turn heard by its end, which is all that it looks at."""
+    """Replaces the sound that Smart-Turn holds by its end, as only the end is examined."""
     analyzer._audio_buffer = sound
 
 
 @touches(_TURN, "_model_executor", "_process_speech_segment")
 def judge_turn(analyzer: Any, sound: list[tuple[float, Any]]) -> asyncio.Future:
-    """Smart-Turn's verdict on a sound, in the thread in which it judges all others."""
+    """Smart-Turn's verdict on a sound, computed in its own thread."""
     loop = asyncio.get_running_loop()
     return loop.run_in_executor(analyzer._model_executor, analyzer._process_speech_segment, sound)

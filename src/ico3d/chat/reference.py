@@ -1,6 +1,6 @@
-"""Writes `docs/settings.md` from the dataclasses of the settings: every table and every key.
+"""Generates `docs/settings.md` from the dataclasses of the settings.
 
-Run `python -m ico3d.chat.reference` after each change of one of them.
+Run `python -m ico3d.chat.reference` after each change of a setting.
 """
 
 import dataclasses
@@ -45,7 +45,7 @@ In no file: words behind `ico3d serve-module`, [more](conversation/modules.md).
 
 
 def markdown() -> str:
-    """The whole page."""
+    """The contents of `docs/settings.md`."""
     fields = dataclasses.fields(ChatSettings)
     blocks = [
         HEAD,
@@ -61,19 +61,19 @@ def markdown() -> str:
 
 
 def is_table(field: dataclasses.Field) -> bool:
-    """Whether a setting is a table of the file, or a list of them."""
+    """Whether a setting is a table of the settings file, or a list of tables."""
     return part_of(field) is not None
 
 
 def part_of(field: dataclasses.Field) -> Any:
-    """The dataclass that a table of the file fills, None for settings that are no table."""
+    """The dataclass of a setting that is a table; None for other settings."""
     return entry_kind_of(field.type) or (
         field.type if dataclasses.is_dataclass(field.type) else None
     )
 
 
 def section(field: dataclasses.Field) -> str:
-    """All that there is about one table of the file."""
+    """The text about one table of the settings file."""
     name = f"[[{field.name}]]" if entry_kind_of(field.type) else f"[{field.name}]"
     blocks = [f"## `{name}`\n", notes(ChatSettings)[field.name] + "\n"]
     kind = part_of(field)
@@ -95,22 +95,22 @@ def chapter(kind: str, name: str, provider: Provider) -> str:
 
 
 def rows_of(kind: type, before: str = "") -> str:
-    """The keys of a dataclass, with what stands before their names."""
+    """Rows for the fields of a dataclass; `before` precedes each key."""
     return table([row(field, notes(kind), before) for field in dataclasses.fields(kind)])
 
 
 def table(rows: list[str]) -> str:
-    """Rows under their heads."""
+    """A table with a heading and these rows."""
     return "\n".join(["| key | type | default | what it is |", "|---|---|---|---|", *rows, ""])
 
 
 def row(field: dataclasses.Field, sentences: dict[str, str], before: str = "") -> str:
-    """One key.
+    """The row of one key.
 
     Args:
-        field: Of the dataclass.
-        sentences: What each field is.
-        before: Stands before the key's name.
+        field: Field of the dataclass.
+        sentences: Description of each field, by name.
+        before: Text before the key.
     """
     sentence = sentences[field.name].replace("|", "\\|")
     shown = default(field).replace("|", "\\|")
@@ -118,7 +118,7 @@ def row(field: dataclasses.Field, sentences: dict[str, str], before: str = "") -
 
 
 def default(field: dataclasses.Field) -> str:
-    """What a setting is where the file does not say it, as the file would."""
+    """The default of a setting, written as in the file."""
     if field.default is None:
         return "not given"
     if field.default is not dataclasses.MISSING:
@@ -129,7 +129,7 @@ def default(field: dataclasses.Field) -> str:
 
 
 def written(value: Any) -> str:
-    """A value as TOML has it; of tables the empty one only."""
+    """A value in TOML's notation; of tables only an empty one."""
     return json.dumps(value, ensure_ascii=False)
 
 

@@ -1,8 +1,8 @@
-"""The output of the pipeline: sends speech ahead of its playback and knows when it has ended.
+"""The output of the pipeline: sends speech ahead of playback and knows when it has ended.
 
-pipecat's own output transports re-cut sound and pace it by sleeping; what belongs to a piece of
-sound would be lost on the way. Here sound and face travel in one message, at most 2 s ahead, the
-page schedules it, and its `clock` tells when the avatar has really fallen silent.
+pipecat's own output transports cut sound into new pieces and sleep between them, by which data that
+belong to a piece would be lost. Here sound and face travel in one message, at most 2 s ahead; the
+page schedules them, and its `clock` messages tell when the avatar has really fallen silent.
 """
 
 import asyncio
@@ -34,7 +34,7 @@ SOONEST = 0.005  # s between two looks at the clock
 
 
 class Speaker(FrameProcessor):
-    """Sends `SpeechFrame`s to the page, paced by what it has played."""
+    """Sends `SpeechFrame`s to the page, paced by the page's playback."""
 
     def __init__(
         self,
@@ -44,14 +44,14 @@ class Speaker(FrameProcessor):
         gestures: Gestures | Cueing | None = None,
         now: Callable[[], float] = time.monotonic,
     ):
-        """A speaker for one session.
+        """Creates the speaker of one session.
 
         Args:
-            page: Who hears it.
-            utterances: Which answers were stopped.
-            sent: Is told what the page can play, and may come back as echo.
-            gestures: Move the avatar's body, if it has one.
-            now: The clock, seconds.
+            page: Receives the speech.
+            utterances: Knows which answers were stopped.
+            sent: Receives sound that the page may play and that may come back as echo.
+            gestures: Moves the avatar's body, if it has one.
+            now: Returns the time in seconds.
         """
         super().__init__()
         self._page, self._utterances, self._sent, self._now = page, utterances, sent, now
@@ -63,22 +63,22 @@ class Speaker(FrameProcessor):
         self._calls: set[str] = set()  # functions that the language model waits for
 
     def clock(self, message: Clock) -> None:
-        """The page says how far it has played."""
+        """Takes a report of the page's playback."""
         self._playback.clock(message.utterance, message.position, self._now())
         self._moved.set()
         if message.utterance == self._speaking and self._gestures is not None:
             self._gestures.clock(message, self._playback.position(self._now()))
 
     def hold(self) -> None:
-        """The connection dropped: send nothing that nobody plays."""
+        """Stops sending, because the connection was lost."""
         self._playback.hold(self._now())
 
     def release(self) -> None:
-        """The page is back."""
+        """Resumes sending, because the page has reconnected."""
         self._go_on()
 
     def hush(self, silent: bool) -> None:
-        """Pauses what is heard, or goes on with it; nothing of it is lost."""
+        """Pauses playback, or resumes it without loss."""
         if self._speaking is None or silent == self._paused:
             return
         self._paused = silent
@@ -94,13 +94,13 @@ class Speaker(FrameProcessor):
         self._moved.set()
 
     def is_speaking(self, utterance: int | None) -> bool:
-        """Whether an utterance (any, for null) is being played or about to be."""
+        """Whether an utterance (for None, any) is being played or about to be."""
         if self._speaking is None:
             return False
         return utterance is None or utterance == self._speaking
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
-        """Sends speech, ends and stops utterances, passes the rest on."""
+        """Sends speech, ends and stops utterances, and passes other frames on."""
         await super().process_frame(frame, direction)
         if isinstance(frame, SpeechFrame):
             await self._send(frame)

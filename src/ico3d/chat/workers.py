@@ -1,4 +1,4 @@
-"""Threads that all sessions of a server share: who needs a result soonest is served first."""
+"""Threads shared by all sessions of a server; the most urgent work runs first."""
 
 import asyncio
 import heapq
@@ -14,30 +14,31 @@ MOST = 4  # threads; more of them only take the interpreter from one another
 
 
 class Run(Protocol):
-    """Does work besides the event loop; `due` says when its result is needed."""
+    """Function that runs work outside of the event loop; `due` is when its result is needed."""
 
     async def __call__(self, due: float, work: Callable[..., Result], *args: Any) -> Result:
-        """What the work returns."""
+        """Returns the result of the work."""
         ...
 
 
 async def at_once(due: float, work: Callable[..., Result], *args: Any) -> Result:
-    """Runs work that only waits, for another machine: nobody has to wait for a thread."""
+    """Runs work that only waits for another machine, without queueing for a thread."""
     return await asyncio.to_thread(work, *args)
 
 
 class Workers:
-    """Runs work in threads, by the time at which it is due.
+    """Runs work in threads, in the order of due times.
 
-    Twenty faces are made faster than they are watched, but not if each answer is made to its end
-    as soon as it is known: the next sentence of one would come too late for the end of another.
+    The server computes twenty faces faster than they are watched, but not if each answer is
+    computed to its end at once: one visitor's next sentence would then be too late because of the
+    end of another visitor's answer.
     """
 
     def __init__(self, threads: int | None = None):
-        """Nothing to do yet.
+        """Starts without work.
 
         Args:
-            threads: How many; by default one less than there are cores, at least one.
+            threads: Number of threads; by default one less than there are cores, at least one.
         """
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
         self._free = threads or max(1, min(MOST, (cores or 1) - 1))
@@ -45,11 +46,11 @@ class Workers:
         self._numbers = itertools.count()
 
     async def run(self, due: float, work: Callable[..., Result], *args: Any) -> Result:
-        """Waits for a thread, and for the work.
+        """Waits for a thread and runs work in it; returns the result.
 
         Args:
-            due: When the result is needed, seconds of one clock for all.
-            work: What to do.
+            due: Time at which the result is needed, in seconds of one clock for all work.
+            work: The function to call.
             *args: What it takes.
         """
         async with self.turn(due):
@@ -57,7 +58,7 @@ class Workers:
 
     @asynccontextmanager
     async def turn(self, due: float) -> AsyncIterator[None]:
-        """Waits until something that is due then may run; within, a thread is free for it."""
+        """Waits until work with this due time may run; its thread is free in the `with` block."""
         await self._enter(due)
         try:
             yield

@@ -126,7 +126,7 @@ def fill(kind: type[T], value: Any, where: Any, rules: Rules) -> T:
             converts.
         value: The parsed data.
         where: Place of the data, named in errors.
-        rules: How strict to be.
+        rules: The strictness, and the wording of errors.
 
     Raises:
         Exception: `rules.error`, at the first value that does not fit.

@@ -143,7 +143,11 @@ class PictureCache:
         return plate
 
     def picture(self, view: View, device: torch.device) -> Picture:
-        """The picture and masks of a recorded view, on `device`."""
+        """The picture and masks of a recorded view, on `device`.
+
+        Raises:
+            CaptureError: If the view was not recorded.
+        """
         layers = self._cache.layers(view.camera_index, view.frame)
         if layers is None:
             raise CaptureError(

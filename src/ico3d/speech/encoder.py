@@ -112,7 +112,11 @@ def load_builtin(path: Path) -> FrozenEncoder:
 
 
 def load_ave(path: Path) -> FrozenEncoder:
-    """Loads SyncTalk's encoder from its published file; logs its licence as a warning."""
+    """Loads SyncTalk's encoder from its published file; logs its licence as a warning.
+
+    Raises:
+        ModelError: If the file cannot be read or does not hold this encoder.
+    """
     warnings.warn(TABLE["ave"].notice, stacklevel=2)
     data = _read(path)
     try:

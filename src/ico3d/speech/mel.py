@@ -123,7 +123,11 @@ def resampling_stream(rate: int) -> Callable[[np.ndarray, bool], np.ndarray]:
 
 
 def soxr() -> ModuleType:
-    """Imports the resampling package soxr."""
+    """Imports the resampling package soxr.
+
+    Raises:
+        MissingExtraError: If soxr is not installed.
+    """
     try:
         import soxr
     except ImportError:

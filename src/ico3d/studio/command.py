@@ -57,7 +57,11 @@ class Synthetic:
     """Number of threads that draw pictures."""
 
     def run(self) -> None:
-        """Records, and prints where the capture lies."""
+        """Records, and prints where the capture lies.
+
+        Raises:
+            MissingExtraError: If a package that the studio needs is not installed.
+        """
         from rich import print as say
 
         try:

@@ -1,4 +1,4 @@
-"""Is a capture consistent? What training would stumble over, found beforehand."""
+"""Checks whether a capture is consistent, to find problems before training does."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,18 +17,18 @@ from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 
 SHOWN = 17
-"""Frames on the contact sheet, three rows with the background."""
+"""Number of pictures on the contact sheet, three rows together with the background."""
 FASTEST = 15.0
-"""Metres per second at which no joint of a person moves who is recorded indoors."""
+"""Speed in metres per second that no joint of a person indoors exceeds."""
 LOOKED_AT = 24
-"""Frames of which pictures and masks are examined; poses and tables are examined whole."""
+"""Number of frames whose pictures and masks are checked; poses and tables are checked in full."""
 
 
 def examine(capture: Capture) -> list[Finding]:
-    """Examines an open capture.
+    """Checks an open capture.
 
     Returns:
-        A finding for each thing looked at, in a fixed order.
+        One finding per check, in a fixed order.
     """
     checks: tuple[tuple[str, Callable[[Capture], Finding]], ...] = (
         ("split", _split),
@@ -196,14 +196,14 @@ def _provenance(capture: Capture) -> Finding:
 
 
 def report(capture: Capture, sheet: Path) -> None:
-    """Prints what `examine` finds and draws the contact sheet.
+    """Prints the findings of `examine` and draws the contact sheet.
 
     Args:
         capture: An open capture.
         sheet: The PNG to write.
 
     Raises:
-        CaptureError: If there is an error among the findings.
+        CaptureError: If a finding is an error.
     """
     findings = examine(capture)
     table = Table("", "", "finding", title=f"{capture.kind}: {capture.path}", title_justify="left")

@@ -1,4 +1,4 @@
-"""A picture that shows at a glance whether a capture is sound."""
+"""The contact sheet: one picture by which people judge whether a capture is sound."""
 
 from itertools import pairwise
 
@@ -12,17 +12,18 @@ from ico3d.rig.body_track import BodyTrack
 TILE = 256
 COLUMNS = 6
 AXIS = 0.1
-"""Metres of the drawn head axes."""
+"""Length of the drawn axes of the head, metres."""
 
 
 def contact_sheet(capture: Capture, views: list[tuple[int, int]]) -> Image.Image:
-    """Draws views with what is known about them, the background, and the sound.
+    """Draws some views with all known data, the background, and the sound.
 
-    In a view: landmarks, outlines of masks, head axes, skeleton and its surface's outline.
+    A view shows landmarks, outlines of masks, axes of the head, the skeleton and the outline of its
+    surface.
 
     Args:
         capture: An open capture.
-        views: (camera, frame) pairs that have pictures.
+        views: Pairs (camera, frame) that have pictures.
     """
     track = capture.body_track()
     tiles = [_view(capture, track, camera, frame) for camera, frame in views]

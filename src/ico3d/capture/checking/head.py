@@ -1,4 +1,4 @@
-"""Examining what a capture says about the head: poses, landmarks, expressions, points."""
+"""Checks a capture's data of the head: poses, landmarks, expressions, points."""
 
 from collections.abc import Iterator
 
@@ -8,11 +8,11 @@ from ico3d.capture.capture import Capture
 from ico3d.capture.finding import Finding
 
 STEADY = (27, 28, 29, 30, 36, 39, 42, 45)
-"""Landmarks that hardly move with the expression: nose bridge and eye corners."""
+"""Landmarks that hardly move with the expression: bridge of the nose and corners of the eyes."""
 
 
 USUAL_FPS = 25.0
-"""At fewer frames per second, heads move further between them."""
+"""Usual frame rate; at lower rates, heads move farther from frame to frame."""
 
 
 def _all_poses(capture: Capture) -> Iterator[tuple[int, np.ndarray]]:
@@ -24,7 +24,7 @@ def _all_poses(capture: Capture) -> Iterator[tuple[int, np.ndarray]]:
 
 
 def poses(capture: Capture) -> Finding:
-    """Every pose a rotation and a translation, in front of the camera."""
+    """Checks that every head pose is rigid and lies in front of a camera."""
     number = 0
     for frame, pose in _all_poses(capture):
         number += 1
@@ -41,7 +41,7 @@ def poses(capture: Capture) -> Finding:
 
 
 def motion(capture: Capture) -> Finding:
-    """How abruptly the head moves: second differences between neighbouring frames."""
+    """Checks how abruptly the head moves, by second differences of neighbouring frames."""
     poses = dict(_all_poses(capture))
     turns, moves = [], []
     for frame, pose in poses.items():
@@ -63,7 +63,7 @@ def motion(capture: Capture) -> Finding:
 
 
 def landmarks(capture: Capture) -> Finding:
-    """Steady landmarks must be fixed points of the head, best so without a shift in time."""
+    """Checks that steady landmarks are fixed to the head and poses not shifted in time."""
     errors = {shift: _rigid_errors(capture, shift) for shift in (0, -1, 1)}
     if not len(errors[0]):
         return Finding("landmarks", "warn", "no landmarks")
@@ -128,7 +128,7 @@ def _face_width(capture: Capture) -> float:
 
 
 def expressions(capture: Capture) -> Finding:
-    """Blendshapes and eyes: finite, in range, and not frozen."""
+    """Checks that blendshapes and eye values are finite, in range, and not constant."""
     shapes = [capture.blendshapes(f) for f in range(capture.num_frames)]
     eyes = [capture.eyes(f) for f in range(capture.num_frames)]
     parts = []
@@ -152,7 +152,7 @@ def expressions(capture: Capture) -> Finding:
 
 
 def points(capture: Capture) -> Finding:
-    """Where Gaussians start."""
+    """Checks the surface points from which Gaussians start."""
     found = capture.points()
     if found is None:
         return Finding("points", "warn", "no surface points")

@@ -8,21 +8,21 @@ from ico3d.common.camera import Camera
 from ico3d.rig.body_track import BodyTrack
 
 BONE, OUTLINE, GUESSED = (255, 80, 220), (0, 220, 255), (255, 160, 0)
-"""Colours of bones, of the template's outline, and of bones of frames that are interpolated."""
+"""Colours of bones, of the template's outline, and of bones in interpolated frames."""
 SHARP = 2
-"""Times finer than the picture that the surface is drawn to find its outline."""
+"""Resolution at which the outline is found, as a factor of the picture's."""
 
 
 def draw_skeleton(
     picture: Image.Image, track: BodyTrack, camera: Camera, frame: int
 ) -> Image.Image:
-    """A picture with bones and the template's outline over it.
+    """Draws bones and the template's outline over a picture.
 
     Args:
-        picture: Of any size and the camera's shape.
-        track: The track.
-        camera: Who took it.
-        frame: When.
+        picture: A picture of any size with the camera's aspect ratio.
+        track: The motion of the body.
+        camera: The camera that took the picture.
+        frame: Frame of the picture.
     """
     lens = camera.resized(*picture.size)
     outline = _outline(track, lens, frame)

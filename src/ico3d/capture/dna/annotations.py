@@ -1,4 +1,4 @@
-"""What the annotations of a DNA-Rendering recording say about the body: SMPL-X and keypoints."""
+"""Annotations of a DNA-Rendering recording about the body: SMPL-X parameters and keypoints."""
 
 import logging
 from dataclasses import dataclass
@@ -11,24 +11,24 @@ from ico3d.capture.smc.file import SmcFile
 log = logging.getLogger(__name__)
 JOINTS = 55
 SHORT = ("betas", "expression")
-"""Parts of which published files lack rows."""
+"""Arrays that have too few rows in some published files."""
 
 
 @dataclass(frozen=True)
 class SmplX:
-    """The SMPL-X body fitted to one frame; the body model itself is not part of ico3d.
+    """SMPL-X parameters of one frame; the SMPL-X model itself is not part of ico3d.
 
-    Its vertices, computed with `flat_hand_mean=False, use_pca=False`, lie in the world of the
-    files: world_from_fit takes them to the capture's world.
+    Vertices that SMPL-X computes from these with `flat_hand_mean=False, use_pca=False` lie in the
+    world of the files; `world_from_fit` takes them to the capture's world.
 
     Attributes:
-        betas: (10,) shape.
-        expression: (10,) of the face.
-        fullpose: (55, 3) axis-angles of all joints.
-        transl: (3,) metres.
-        scale: Of the body, as the fit states it.
-        gender: "male", "female" or "neutral": which body model was fitted.
-        world_from_fit: (4, 4) rotation.
+        betas: (10,) shape parameters.
+        expression: (10,) expression parameters of the face.
+        fullpose: (55, 3) axis-angle rotations of all joints, radians.
+        transl: (3,) translation, metres.
+        scale: Scale of the body, as stated by the fit.
+        gender: Variant of the body model: "male", "female" or "neutral".
+        world_from_fit: (4, 4) rotation from the world of the files to the capture's world.
     """
 
     betas: np.ndarray
@@ -41,53 +41,53 @@ class SmplX:
 
     @property
     def global_orient(self) -> np.ndarray:
-        """(3,) the whole body."""
+        """(3,) axis-angle rotation of the whole body."""
         return self.fullpose[0]
 
     @property
     def body_pose(self) -> np.ndarray:
-        """(21, 3) joints 1 to 21."""
+        """(21, 3) axis-angle rotations of joints 1 to 21."""
         return self.fullpose[1:22]
 
     @property
     def jaw_pose(self) -> np.ndarray:
-        """(3,)."""
+        """(3,) axis-angle rotation of the jaw."""
         return self.fullpose[22]
 
     @property
     def eye_poses(self) -> np.ndarray:
-        """(2, 3) left, right."""
+        """(2, 3) axis-angle rotations of the left and the right eye."""
         return self.fullpose[23:25]
 
     @property
     def left_hand_pose(self) -> np.ndarray:
-        """(15, 3)."""
+        """(15, 3) axis-angle rotations of the left hand's joints."""
         return self.fullpose[25:40]
 
     @property
     def right_hand_pose(self) -> np.ndarray:
-        """(15, 3)."""
+        """(15, 3) axis-angle rotations of the right hand's joints."""
         return self.fullpose[40:55]
 
 
 class BodyFits:
-    """The SMPL-X parameters of all frames.
+    """SMPL-X parameters of all frames.
 
-    Some published files have one row of betas, or 40 rows of expressions for 225 frames. Their
-    last row then stands for the frames after it, which is said once.
+    Some published files have one row of betas, or 40 rows of expressions for 225 frames. The last
+    row is then used for all later frames, and a warning is logged once.
     """
 
     def __init__(self, file: SmcFile, num_frames: int, gender: str, world_from_fit: np.ndarray):
         """Reads the parameters, some hundred kilobytes.
 
         Args:
-            file: The annotations; they must have a group SMPLx.
-            num_frames: Frames of the recording.
+            file: File with annotations, which must have a group SMPLx.
+            num_frames: Number of frames of the recording.
             gender: Gender of the SMPL-X model that was fitted.
-            world_from_fit: (4, 4), see `SmplX`.
+            world_from_fit: (4, 4) rotation, see `SmplX`.
 
         Raises:
-            CaptureError: If a part is damaged.
+            CaptureError: If an array is damaged.
         """
         self._gender, self._world_from_fit = gender, world_from_fit
         parts = {name: file.numbers(f"SMPLx/{name}", (None, 10)) for name in SHORT}
@@ -105,7 +105,7 @@ class BodyFits:
         self._path, self._told = file.path, False
 
     def at(self, frame: int) -> SmplX | None:
-        """The fit of a frame, or None where there is none."""
+        """The parameters of a frame, or None."""
         if self.faults and not self._told:
             self._told = True
             log.warning("%s: %s.", self._path, "; ".join(self.faults))
@@ -130,16 +130,16 @@ class BodyFits:
 
 
 def gender_of(value: object) -> str:
-    """The body model that belongs to the root attribute `gender`."""
+    """The variant of the body model for the root attribute `gender` of a file."""
     text = value.decode(errors="replace") if isinstance(value, bytes) else str(value)
     return text if text in ("male", "female") else "neutral"
 
 
 def row(table: np.ndarray | None, frame: int) -> np.ndarray | None:
-    """A frame's row of a table with a row per frame, or None where it has none."""
+    """The row of a frame in a table with one row per frame; None if the table is too short."""
     return None if table is None or frame >= len(table) else table[frame]
 
 
 def person(picture: np.ndarray) -> np.ndarray:
-    """uint8 (H, W) of a mask picture: 255 where its largest channel is above the middle."""
+    """uint8 (H, W) from a mask picture: 255 where the largest channel exceeds half, else 0."""
     return np.where(largest_channel(picture) > 127, np.uint8(255), np.uint8(0))

@@ -1,4 +1,4 @@
-"""Cameras of a DNA-Rendering recording: where they stand, their lenses and their colours."""
+"""Cameras of a DNA-Rendering recording: positions, lenses and colour correction."""
 
 from dataclasses import dataclass
 
@@ -13,11 +13,11 @@ GROUPS = ("Camera_5mp", "Camera_12mp")
 
 @dataclass(frozen=True)
 class Device(SmcCamera):
-    """One camera as the files describe it.
+    """A camera as the files describe it.
 
     Attributes:
-        number: Its number in the files, 0 to 59.
-        colours: (256, 3) uint8 for RGB: what each recorded value is corrected to.
+        number: Number of the camera in the files, 0 to 59.
+        colours: (256, 3) uint8 corrected value for each recorded value of red, green and blue.
     """
 
     number: int
@@ -25,13 +25,13 @@ class Device(SmcCamera):
 
 
 def read_devices(main: SmcFile, annotations: SmcFile) -> tuple[list[Device], list[str]]:
-    """All cameras that have pictures and a calibration, by number.
+    """All cameras that have pictures and a calibration, in order of their numbers.
 
     Returns:
         The cameras, and the names of those that have pictures but no calibration.
 
     Raises:
-        CaptureError: If there are none, or one is damaged.
+        CaptureError: If there is no such camera, or a calibration is damaged.
     """
     devices, lost = [], []
     for group in GROUPS:
@@ -63,8 +63,8 @@ def colours(polynomial: np.ndarray | None) -> np.ndarray:
     """The colour correction as a table.
 
     Args:
-        polynomial: (3, 3) rows (a, b, c) for blue, green and red: x' = a x² + b x + c on 0 to 255;
-            None leaves colours as they are.
+        polynomial: (3, 3) rows (a, b, c) for blue, green and red: x' = a x² + b x + c, x in 0 to
+            255; None for no correction.
 
     Returns:
         (256, 3) uint8, columns red, green and blue.

@@ -1,4 +1,4 @@
-"""Examining the files of a DNA-Rendering recording without decoding a picture."""
+"""Checks the files of a DNA-Rendering recording without decoding pictures."""
 
 from ico3d.capture.dna.calibration import Device
 from ico3d.capture.finding import Finding
@@ -9,14 +9,14 @@ from ico3d.capture.smc.reader import examine_views
 def examine_files(
     main: SmcFile, annotations: SmcFile, devices: list[Device], num_frames: int, faults: list[str]
 ) -> list[Finding]:
-    """What is missing or damaged.
+    """Missing or damaged pictures and annotations.
 
     Args:
-        main: Pictures.
-        annotations: Masks.
+        main: File with the pictures.
+        annotations: File with the masks.
         devices: The cameras.
-        num_frames: Frames each should have.
-        faults: What is wrong with the SMPL-X parameters.
+        num_frames: Number of frames that each camera should have.
+        faults: Problems with the SMPL-X parameters, in words.
     """
     masked = bool(annotations.keys("Mask"))
     findings = [examine_views("views", main, {d.name: d.pictures for d in devices}, num_frames)]

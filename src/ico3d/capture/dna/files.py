@@ -1,4 +1,4 @@
-"""Which files make a DNA-Rendering recording."""
+"""Finds the files of a DNA-Rendering recording."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +14,10 @@ class Files:
     """The files of one recording.
 
     Attributes:
-        main: Pictures.
-        annotations: Calibration, and in parts 1 and 2 masks, keypoints and SMPL-X.
-        kinect: Depth; None where it was not fetched.
+        main: File with the pictures.
+        annotations: File with the calibration, and in parts 1 and 2 of the data set masks,
+            keypoints and SMPL-X.
+        kinect: File with depth, or None if it was not downloaded.
     """
 
     main: Path
@@ -25,21 +26,21 @@ class Files:
 
 
 def is_recording(path: Path) -> bool:
-    """Whether a path is, or a folder holds, a main SMC file."""
+    """Whether a path is a main SMC file or a folder that holds one."""
     return path.suffix == ".smc" if path.is_file() else bool(_mains(path))
 
 
 def find_files(path: Path) -> Files:
-    """Finds what belongs together.
+    """Finds the files that belong to one recording.
 
-    Annotations and depth lie beside the main file, or where the data set has them: in folders
-    named like that of the main file with "annotations" and "kinect" for "main".
+    Annotations and depth lie beside the main file, or where the data set puts them: in folders
+    named like that of the main file, but with "annotations" and "kinect" instead of "main".
 
     Args:
         path: The main file, or a folder that holds one recording.
 
     Raises:
-        CaptureError: If there are several recordings, or there are no annotations.
+        CaptureError: If the folder holds several recordings, or annotations are missing.
     """
     main = _only_main(path)
     annotations = _companion(main, "annotations", ANNOTATIONS)

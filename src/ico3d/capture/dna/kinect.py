@@ -13,12 +13,12 @@ from ico3d.errors import CaptureError
 
 @dataclass(frozen=True)
 class KinectCalibration:
-    """One depth camera; its pictures are not straightened.
+    """One depth camera; pictures of depth cameras are not undistorted.
 
     Attributes:
-        intrinsics: (3, 3) as the file has it: pixel centres at whole numbers.
-        distortion: (D,) OpenCV's coefficients.
-        camera_to_world: (4, 4) in the capture's world.
+        intrinsics: (3, 3) as stored in the file: pixel centres at whole numbers.
+        distortion: (D,) OpenCV's distortion coefficients.
+        camera_to_world: (4, 4) pose in the capture's world, metres.
     """
 
     intrinsics: np.ndarray
@@ -27,14 +27,14 @@ class KinectCalibration:
 
 
 class Kinect:
-    """Depth, masks and calibration from `…_kinect.smc`."""
+    """Depth, masks and calibration from the file `…_kinect.smc`."""
 
     def __init__(self, file: SmcFile, upright: np.ndarray):
-        """Lists the cameras.
+        """Lists the depth cameras.
 
         Args:
-            file: The Kinect file.
-            upright: (3, 3) rotation from the world of the files to the capture's.
+            file: The file `…_kinect.smc`.
+            upright: (3, 3) rotation from the world of the files to the capture's world.
 
         Raises:
             CaptureError: If the file is damaged.
@@ -44,10 +44,10 @@ class Kinect:
         self.cameras: tuple[int, ...] = tuple(sorted(found))
 
     def calibration(self, camera: int) -> KinectCalibration:
-        """Lens and place of a camera.
+        """Lens and pose of a depth camera.
 
         Raises:
-            CaptureError: If there is none, or it is damaged.
+            CaptureError: If there is no such camera, or the calibration is damaged.
         """
         inside = f"Calibration/Kinect/{camera:02d}"
         lens = self._file.numbers(f"{inside}/K", (3, 3))
@@ -59,11 +59,11 @@ class Kinect:
         return KinectCalibration(lens, bent, turned(self._upright, place))
 
     def depth(self, camera: int, frame: int) -> np.ndarray | None:
-        """(H, W) uint16 as the Kinect measured it, or None where there is none."""
+        """(H, W) uint16 depth in the Kinect's own unit, as stored; None if missing."""
         return self._file.pixels(f"Kinect/{camera}/depth/{frame}")
 
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """(H, W) float32, 1 on the person, or None where there is none."""
+        """(H, W) float32 mask, 1 on the person; None if missing."""
         inside = f"Kinect/{camera}/mask/{frame}"
         held = self._file.encoded(inside)
         return None if held is None else unit(person(decoded(held, f"{self._file.path}: {inside}")))

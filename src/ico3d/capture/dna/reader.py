@@ -22,15 +22,15 @@ from ico3d.capture.smc.reader import SmcCapture, count_frames
 log = logging.getLogger(__name__)
 FPS = 15.0
 WHOLE_BODY = 133
-"""Keypoints of COCO-WholeBody: 17 of the body, 6 of the feet, 68 of the face, 42 of the hands."""
+"""Number of COCO-WholeBody keypoints: 17 of the body, 6 of feet, 68 of the face, 42 of hands."""
 FACE = np.arange(23, 91)
 
 
 class DnaRendering(SmcCapture):
     """One performance of DNA-Rendering: 60 cameras around a whole person.
 
-    Pictures and masks come straightened, colours corrected. What the files say in their own world,
-    such as SMPL-X, states how to get to the capture's.
+    Pictures and masks are undistorted, colours corrected. Data in the world of the files, such as
+    SMPL-X, come with the transform to the capture's world.
     """
 
     kind = "dna-rendering"
@@ -57,7 +57,7 @@ class DnaRendering(SmcCapture):
         self.split = all_frames(self.num_frames, self.cameras)
 
     def image(self, camera: int, frame: int) -> np.ndarray | None:
-        """The straightened picture with corrected colours, or None where there is none."""
+        """The undistorted picture with corrected colours, or None."""
         device = self._devices[camera]
         picture = self.decoded(self._main, device, f"{device.pictures}/{self.index(frame)}")
         if picture is None:
@@ -66,14 +66,14 @@ class DnaRendering(SmcCapture):
         return unit(device.lens.straightened(corrected))
 
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """The straightened mask; None in parts of the data set that have none."""
+        """The undistorted mask; None in parts of the data set without masks."""
         device = self._devices[camera]
         inside = f"Mask/{device.number}/mask/{self.index(frame)}"
         picture = self.decoded(self._annotations, device, inside)
         return None if picture is None else unit(device.lens.straightened(person(picture)))
 
     def keypoints_2d(self, camera: int, frame: int) -> np.ndarray | None:
-        """(J, 3) pixels of the straightened picture, and confidence; None where there are none."""
+        """(J, 3) keypoints: pixels of the undistorted picture, and confidence; None if missing."""
         device = self._devices[camera]
         table = self._annotations.numbers(f"Keypoints_2D/{device.name}", (None, None, 3))
         found = row(table, self.index(frame))
@@ -83,12 +83,12 @@ class DnaRendering(SmcCapture):
         return np.concatenate([pixels, found[:, 2:]], 1)
 
     def keypoints_3d(self, frame: int) -> np.ndarray | None:
-        """(J, 3) metres in the capture's world, or None where there are none; NaN if not found."""
+        """(J, 3) keypoints in the capture's world, metres, NaN where not found; None if missing."""
         found = row(self._all_keypoints(), self.index(frame))
         return None if found is None else found @ self.upright.T
 
     def whole_body_points(self, frame: int) -> np.ndarray | None:
-        """(133, 3) keypoints in the world; NaN where triangulation could not find one."""
+        """(133, 3) keypoints in the world, metres; NaN where triangulation failed."""
         found = self.keypoints_3d(frame)
         if found is None or len(found) != WHOLE_BODY:
             return None
@@ -96,7 +96,7 @@ class DnaRendering(SmcCapture):
         return np.where(lost, np.nan, found)
 
     def face_points(self) -> np.ndarray | None:
-        """(F, 68, 3) face keypoints of COCO-WholeBody, which are in the order of Multi-PIE."""
+        """(F, 68, 3) face keypoints of COCO-WholeBody, whose order is that of Multi-PIE, metres."""
         table = self._all_keypoints()
         if table is None or table.shape[1] != WHOLE_BODY:
             return None
@@ -112,19 +112,19 @@ class DnaRendering(SmcCapture):
         return self._annotations.numbers(inside, (None, None, 3), holes=True)
 
     def smplx(self, frame: int) -> SmplX | None:
-        """The body model's parameters of a frame, or None where there are none."""
+        """SMPL-X parameters of a frame, or None."""
         return None if self._fits is None else self._fits.at(self.index(frame))
 
     @cached_property
     def kinect(self) -> Kinect | None:
-        """The depth cameras, or None where their file is not there."""
+        """The depth cameras; None if their file is missing."""
         if self._kinect_path is None:
             return None
         return Kinect(SmcFile(self._kinect_path), self.upright)
 
     @property
     def provenance(self) -> dict:
-        """The data set, and the licence that whoever fetched it has signed."""
+        """The data set, and the licence that its users have signed."""
         return {
             "kind": self.kind,
             "sources": [f"DNA-Rendering (ICCV 2023), recording {self.path.stem}"],
@@ -133,7 +133,7 @@ class DnaRendering(SmcCapture):
         }
 
     def inspect(self) -> list[Finding]:
-        """Missing and damaged pictures and annotations."""
+        """Missing or damaged pictures and annotations."""
         return examine_files(
             self._main,
             self._annotations,

@@ -1,4 +1,4 @@
-"""Where the landmarks of a face are in canonical head space."""
+"""The mean landmarks of a face in canonical head space."""
 
 import numpy as np
 
@@ -6,15 +6,15 @@ from ico3d.capture.capture import Capture
 from ico3d.common.spread import spread
 
 MOST_FRAMES = 60
-"""Of a capture that are looked at, spread evenly."""
+"""Number of frames that are used, spread evenly over the capture."""
 LEAST_RAYS = 2
 
 
 def canonical_landmarks(capture: Capture) -> np.ndarray | None:
-    """(68, 3) mean landmarks in canonical head space, metres; None where a capture has none.
+    """(68, 3) mean landmarks in canonical head space, metres; None if a capture has none.
 
-    Given in space where the format has them so; else from all cameras and frames at once: the head
-    poses make one picture of them all.
+    The landmarks are 3D landmarks where the format has them. Otherwise they are triangulated from
+    2D landmarks of all cameras and frames at once, which head poses bring into one space.
     """
     frames = spread(capture.num_frames, MOST_FRAMES)
     given = [capture.landmarks_3d(frame) for frame in frames]

@@ -21,22 +21,22 @@ BLENDSHAPES = (
     "noseSneerLeft", "noseSneerRight",
 )
 # fmt: on
-"""MediaPipe's 52, in its order: what `bs.npy` of talking-portrait tools holds."""
+"""MediaPipe's 52 blendshapes in its order, which is that of `bs.npy` of talking-portrait tools."""
 
 AU_COLUMNS = ("AU01_r", "AU02_r", "AU04_r", "AU45_r")
-"""OpenFace intensities (0 to 5) that eyes and brows are taken from."""
+"""Columns of OpenFace's action-unit intensities (0 to 5) for eyes and brows."""
 
 
 def eyes_of_blendshapes(blendshapes: np.ndarray, names: Sequence[str]) -> np.ndarray:
-    """(N, 7) in the order of `EYE_NAMES`, smoothed, from (N, len(names)) weights."""
+    """Smoothed eye values (N, 7) in the order of `EYE_NAMES`, from weights (N, len(names))."""
     return smoothed(blendshapes[:, [names.index(name) for name in EYE_NAMES]])
 
 
 def eyes_of_action_units(units: Mapping[str, np.ndarray]) -> np.ndarray:
-    """(N, 7) in the order of `EYE_NAMES`, smoothed.
+    """Smoothed eye values (N, 7) in the order of `EYE_NAMES`, from action units.
 
-    Blink = clip(AU45, 0, 2) / 2; brow lowerer (4), inner (1) and outer (2) raiser over their
-    range of 5. Action units do not tell left from right.
+    Blink = clip(AU45, 0, 2) / 2. Brow lowerer (AU4), inner (AU1) and outer (AU2) brow raiser are
+    divided by their range of 5. Action units do not distinguish left from right.
     """
     down, inner, outer = (np.clip(units[name] / 5, 0, 1) for name in ("AU04_r", "AU01_r", "AU02_r"))
     blink = np.clip(units["AU45_r"], 0, 2) / 2
@@ -44,7 +44,7 @@ def eyes_of_action_units(units: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def smoothed(values: np.ndarray) -> np.ndarray:
-    """Savitzky-Golay (5, 3) along the first axis, kept in [0, 1]; float32."""
+    """Savitzky-Golay filter (5, 3) along the first axis, result limited to [0, 1]; float32."""
     from scipy.signal import savgol_filter
 
     calm = savgol_filter(values, 5, 3, axis=0) if len(values) >= 5 else values

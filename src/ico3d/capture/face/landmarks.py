@@ -1,4 +1,4 @@
-"""The 68 Multi-PIE landmarks, and other parts of the face, among MediaPipe's 478."""
+"""Indices of the 68 Multi-PIE landmarks and of parts of the face among MediaPipe's 478."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ MULTI_PIE = np.array([
     61, 39, 37, 0, 267, 269, 291, 405, 314, 17, 84, 181,  # outer lips
     78, 82, 13, 312, 308, 317, 14, 87,  # inner lips
 ])
-"""MediaPipe index of each of the 68."""
+"""MediaPipe's index for each of the 68 Multi-PIE landmarks."""
 
 FACE_OVAL = np.array([
     10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377,
@@ -30,5 +30,5 @@ JAW = np.array([
 CHIN = 152
 FOREHEAD = 10
 SIDES = (234, 454)
-"""Outermost points of the face beside the ears, the person's right first."""
+"""Outermost points of the face beside the ears: the person's right, then left."""
 NOSE_BRIDGE = 168

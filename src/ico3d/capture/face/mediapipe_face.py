@@ -1,4 +1,4 @@
-"""MediaPipe's face model: landmarks and blendshapes of a picture, and its canonical face."""
+"""MediaPipe's face model: landmarks and blendshapes of a picture, and the canonical face."""
 
 import struct
 import zipfile
@@ -14,18 +14,18 @@ from ico3d.errors import CaptureError, MissingExtraError
 
 LANDMARKS = 478
 MESH_LANDMARKS = 468
-"""The landmarks on the face; the ten after them are the irises."""
+"""Number of landmarks on the face's surface; the ten that follow are on the irises."""
 
 
 @dataclass(frozen=True)
 class Face:
-    """One face in one picture.
+    """A face found in a picture.
 
     Attributes:
         landmarks: (478, 2) pixels, pixel centres at +0.5.
         blendshapes: (52,) weights.
-        pose: (4, 4) canonical face (cm) to a camera of 63 degrees vertical field of view, OpenGL
-            axes: good enough to start from, no more.
+        pose: (4, 4) from MediaPipe's canonical face (cm) to a camera of 63 degrees vertical field
+            of view in OpenGL axes; only accurate enough as a starting point.
     """
 
     landmarks: np.ndarray
@@ -34,17 +34,18 @@ class Face:
 
 
 class FaceReader:
-    """Finds the face in pictures, each one for itself.
+    """Finds the face in single pictures.
 
     MediaPipe's video mode filters landmarks over time, which delays them by about half a frame
-    (measured on a 25-fps clip); pictures one by one have no delay, and we smooth without one.
+    (measured on a clip of 25 frames per second). Single pictures have no delay, and ico3d smooths
+    without one.
     """
 
     def __init__(self, model: Path):
         """Loads the model.
 
         Args:
-            model: `face_landmarker.task`.
+            model: Path of `face_landmarker.task`.
 
         Raises:
             MissingExtraError: If MediaPipe is not installed.
@@ -76,13 +77,13 @@ class FaceReader:
         self._landmarker.close()
 
     def read(self, image: np.ndarray) -> Face | None:
-        """The face in a picture; one of them if there are several.
+        """The face in a picture, or one of several; None if there is none.
 
         Args:
             image: uint8 RGB (H, W, 3), contiguous.
 
         Returns:
-            The face, or None where there is none.
+            The face, or None.
         """
         height, width = image.shape[:2]
         packed = self._mediapipe.Image(
@@ -101,12 +102,13 @@ class FaceReader:
 
 @dataclass(frozen=True)
 class CanonicalFace:
-    """The mean face that MediaPipe's landmarks belong to.
+    """MediaPipe's canonical face, the mean shape of its landmarks.
 
     Attributes:
-        vertices: (468, 3) metres; +X the person's left, +Y up, +Z facing, origin mid-head.
-        triangles: (T, 3) vertex indices.
-        rigidity: (468,) weights in [0, 1] of the landmarks that MediaPipe itself aligns heads by.
+        vertices: (468, 3) metres; +x to the person's left, +y up, +z forward, origin in the middle
+            of the head.
+        triangles: (T, 3) indices of vertices.
+        rigidity: (468,) weights in [0, 1] by which MediaPipe aligns heads.
     """
 
     vertices: np.ndarray
@@ -115,13 +117,13 @@ class CanonicalFace:
 
 
 def canonical_face(model: Path) -> CanonicalFace:
-    """Reads the canonical face out of the model file.
+    """Reads the canonical face from the model file.
 
     Args:
         model: `face_landmarker.task`, a zip that holds the mesh as a protocol buffer.
 
     Raises:
-        CaptureError: If the mesh is not where it should be.
+        CaptureError: If the file does not hold the mesh where expected.
     """
     try:
         with zipfile.ZipFile(model) as archive:

@@ -1,4 +1,4 @@
-"""Head poses from the 68 landmarks of a face in space."""
+"""Head poses from the 68 landmarks of a face in 3D."""
 
 from dataclasses import dataclass
 
@@ -12,26 +12,26 @@ LANDMARKS = 68
 HOLDING = np.ones(LANDMARKS, bool)
 HOLDING[4:13] = False
 HOLDING[48:] = False
-"""Landmarks that may hold the head: all but those of the jaw and the lips."""
+"""(68,) bool: landmarks that may define the head's pose: all but those of jaw and lips."""
 EYE_CORNERS = (36, 45)
-"""The outer ones, the person's right first."""
+"""Landmarks of the outer corners of the eyes, the person's right first."""
 BRIDGE, SUBNASAL = 27, 33
 BEHIND = 0.07
-"""Metres from the line of the outer eye corners back to the origin."""
+"""Distance in metres of the origin behind the line through the outer corners of the eyes."""
 
 
 @dataclass(frozen=True)
 class HeadMotion:
-    """Where a head was.
+    """The motion of a head through F frames.
 
-    Canonical head space: origin in the head between the eyes, +x to the person's left, +y up the
-    nose, +z forward, metres.
+    Canonical head space: origin in the head between the eyes, +x to the person's left, +y up along
+    the nose, +z forward, metres.
 
     Attributes:
-        world_from_head: (F, 4, 4); NaN where the head was not found.
-        face: (68, 3) mean landmarks in canonical head space; NaN for those never seen.
-        points: (F, 68, 3) landmarks of each frame in the world; those that were not seen are the
-            mean face's; NaN where the head was not found.
+        world_from_head: (F, 4, 4) head poses; NaN where the head was not found.
+        face: (68, 3) mean landmarks in canonical head space, metres; NaN for landmarks never seen.
+        points: (F, 68, 3) landmarks in the world, metres; unseen ones are those of the mean face;
+            NaN where the head was not found.
     """
 
     world_from_head: np.ndarray
@@ -39,12 +39,12 @@ class HeadMotion:
     points: np.ndarray
 
     def pose(self, frame: int) -> np.ndarray | None:
-        """(4, 4) world from head, or None where the head was not found."""
+        """The head pose (4, 4) of a frame, or None if the head was not found."""
         pose = self.world_from_head[frame]
         return pose if np.isfinite(pose).all() else None
 
     def landmarks(self, frame: int) -> np.ndarray | None:
-        """(68, 3) in the world, or None where not all are known."""
+        """(68, 3) landmarks of a frame in the world, metres; None if some are unknown."""
         points = self.points[frame]
         return points if np.isfinite(points).all() else None
 
@@ -52,14 +52,15 @@ class HeadMotion:
 def head_from_landmarks(points: np.ndarray) -> HeadMotion | None:
     """Fits a rigid head to the landmarks of a face.
 
-    Generalised Procrustes analysis over all frames, by landmarks that the expression moves little,
-    each counting by how little it strays; smoothed over time as much as their noise asks for.
+    Generalised Procrustes analysis over all frames uses landmarks that hardly move with the
+    expression, weighted by their steadiness. The poses are then smoothed as far as their noise
+    requires.
 
     Args:
         points: (F, 68, 3) Multi-PIE landmarks in the world, metres; NaN where not seen.
 
     Returns:
-        The track, or None where no frame shows enough.
+        The motion, or None if no frame has enough landmarks.
     """
     motion = procrustes(points, HOLDING)
     needed = motion.shape[[*EYE_CORNERS, BRIDGE, SUBNASAL]]
@@ -73,7 +74,7 @@ def head_from_landmarks(points: np.ndarray) -> HeadMotion | None:
 
 
 def head_frame(face: np.ndarray) -> np.ndarray:
-    """(4, 4) canonical head space in the coordinates of (68, 3) landmarks of a face."""
+    """The transform (4, 4) from canonical head space to that of a face's landmarks (68, 3)."""
     right, left = face[list(EYE_CORNERS)]
     across = (left - right) / np.linalg.norm(left - right)
     up = face[BRIDGE] - face[SUBNASAL]

@@ -1,4 +1,4 @@
-"""Rigid motion of points of which some are missing or wrong, and how steady each of them is."""
+"""Generalised Procrustes analysis: rigid motion of points, some of them missing or wrong."""
 
 from dataclasses import dataclass
 
@@ -7,25 +7,29 @@ import numpy as np
 from ico3d.capture.headpose.shape import inverse, moved, rigid_fit
 
 FEWEST_POINTS = 6
-"""Points that a frame must show; fewer may lie on a line."""
+"""Least number of points that a frame must have; fewer may lie on a line."""
 ROUNDS = 40
 SPREAD_FLOOR = 1e-9
-"""Least standard deviation of a point in metres: points without any noise have finite weights."""
+"""Least standard deviation of a point in metres, which keeps weights finite without noise."""
 STEADY_QUARTER, STEADIEST = 0.25, 0.5
-"""No point counts as steadier than half of what the steadiest quarter stray: it would be alone."""
+"""A quantile of the points' deviations, and a factor of that quantile: no deviation is less.
+
+Otherwise a single very steady point would determine everything.
+"""
 MEDIAN_LENGTH = 1.538
-"""Median length of a vector whose three components are normal with deviation 1."""
+"""Median length of a 3D vector with standard normal components."""
 
 
 @dataclass(frozen=True)
 class RigidMotion:
-    """Generalised Procrustes analysis of points over time.
+    """Rigid motion of K points through F frames, as Procrustes analysis finds it.
 
     Attributes:
-        shape: (K, 3) where the points are on the body, metres; NaN for those never seen.
-        poses: (F, 4, 4) frame from body; NaN for frames that show too little.
-        spreads: (K,) metres by which each point strays along an axis; infinite if never seen.
-        weights: (F, K) inverse variances that the poses were fitted with; 0 where not seen.
+        shape: (K, 3) positions on the body, metres; NaN for points never seen.
+        poses: (F, 4, 4) from the body's space to each frame; NaN for frames with too few points.
+        spreads: (K,) standard deviation of each point along an axis, metres; infinite if never
+            seen.
+        weights: (F, K) inverse variances used for the poses; 0 for unseen points.
     """
 
     shape: np.ndarray
@@ -41,15 +45,16 @@ class RigidMotion:
 
 
 def fit_poses(shape: np.ndarray, points: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """The rigid motions that take a shape to where its points are seen.
+    """The rigid motions that bring a shape closest to the points of each frame.
 
     Args:
-        shape: (K, 3) metres.
-        points: (F, K, 3) in each frame; anything finite where the weight is 0.
-        weights: (F, K).
+        shape: (K, 3) positions on the body, metres.
+        points: (F, K, 3) positions in each frame, metres; any finite value where the weight is 0.
+        weights: (F, K) weights of the points.
 
     Returns:
-        (F, 4, 4) least-squares poses; NaN for frames with fewer than `FEWEST_POINTS` weights.
+        (F, 4, 4) least-squares poses; NaN for frames with fewer than `FEWEST_POINTS` weighted
+        points.
     """
     enough = (weights > 0).sum(1) >= FEWEST_POINTS
     poses = np.full((len(points), 4, 4), np.nan)
@@ -60,15 +65,15 @@ def fit_poses(shape: np.ndarray, points: np.ndarray, weights: np.ndarray) -> np.
 def procrustes(points: np.ndarray, held: np.ndarray) -> RigidMotion:
     """Finds shape and motion of a body, and how steady each of its points is.
 
-    Points count by how little they stray, measured over time; in each frame, those that are far
-    off count less (Cauchy). Without noise the result is exact.
+    Points are weighted by their steadiness over time; in each frame, outliers are weighted down
+    (Cauchy). Without noise the result is exact.
 
     Args:
         points: (F, K, 3) metres; NaN where a point was not seen.
-        held: (K,) bool: points that may hold the body; the others only follow.
+        held: (K,) bool: points that may determine the poses.
 
     Returns:
-        The motion; the body's coordinate frame is that of the frame with most points.
+        The motion; the body's coordinate frame is that of the frame with the most points.
     """
     seen = np.isfinite(points.sum(-1))  # (F, K)
     filled = np.where(seen[..., None], points, 0.0)

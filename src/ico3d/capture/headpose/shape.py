@@ -1,4 +1,4 @@
-"""One rigid head behind the landmarks of all frames: generalised Procrustes analysis."""
+"""Generalised Procrustes analysis of landmarks without gaps: one rigid head for all frames."""
 
 from dataclasses import dataclass
 
@@ -6,19 +6,19 @@ import numpy as np
 
 ROUNDS = 20
 STEADY, MOVING = 0.0015, 0.005
-"""Metres by which landmarks on bone, and those that the expression moves, usually stray."""
+"""Usual deviations in metres of landmarks on bone, and of those that move with the expression."""
 BELIEF = 20
-"""That guess counts as much as this many frames."""
+"""Number of frames as much as which those usual deviations count."""
 
 
 @dataclass(frozen=True)
 class RigidHead:
-    """A head that moves without changing.
+    """A head that moves rigidly through F frames.
 
     Attributes:
-        shape: (N, 3) its landmarks, metres.
-        spreads: (N,) metres by which each landmark strays from it.
-        poses: (F, 4, 4) takes the shape's space to that of the landmarks.
+        shape: (N, 3) landmarks of the head, metres.
+        spreads: (N,) deviation of each landmark from the rigid shape, metres.
+        poses: (F, 4, 4) from the shape's space to the world of the landmarks.
     """
 
     shape: np.ndarray
@@ -27,21 +27,21 @@ class RigidHead:
 
 
 def rigid_fit(source: np.ndarray, target: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """The rigid motion of the least weighted squared distances (Kabsch).
+    """Rigid motions with the least weighted sum of squared distances (Kabsch).
 
     Args:
-        source: (N, 3) or (F, N, 3).
-        target: (F, N, 3).
+        source: (N, 3) or (F, N, 3) points.
+        target: (F, N, 3) points.
         weights: (N,) or (F, N), not negative.
 
     Returns:
-        (F, 4, 4) takes source to target.
+        (F, 4, 4) from source to target.
     """
     return _fit(source, target, weights)[0]
 
 
 def similarity_fit(source: np.ndarray, target: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """The same with a scale (Umeyama); the upper left 3x3 of each (4, 4) is scale · rotation."""
+    """Like `rigid_fit`, with a scale (Umeyama): the upper left 3×3 is scale · rotation."""
     poses, scales = _fit(source, target, weights)
     share = weights / weights.sum(-1, keepdims=True)
     middles = [np.einsum("...n,...nc->...c", share, points) for points in (source, target)]
@@ -69,7 +69,7 @@ def _fit(
 
 
 def moved(poses: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """(F, N, 3): points (N, 3) or (F, N, 3) taken through (F, 4, 4)."""
+    """(F, N, 3): points (N, 3) or (F, N, 3), transformed by (F, 4, 4)."""
     return points @ poses[:, :3, :3].transpose(0, 2, 1) + poses[:, None, :3, 3]
 
 
@@ -82,16 +82,16 @@ def inverse(poses: np.ndarray) -> np.ndarray:
 
 
 def rigid_head(points: np.ndarray, canonical: np.ndarray, steady: np.ndarray) -> RigidHead:
-    """The head behind landmarks of many frames, in the space of a canonical face.
+    """The rigid head behind landmarks of many frames, in the space of a canonical face.
 
-    Mean shape and poses are found in turn; each landmark counts by how little it strays, which is
-    measured from frame to frame. The shape keeps its size: only place and turn are the canonical
-    face's.
+    Mean shape and poses are computed in turn. Landmarks are weighted by their steadiness from frame
+    to frame. The shape keeps its size; only position and orientation are those of the canonical
+    face.
 
     Args:
         points: (F, N, 3) metres in the world.
-        canonical: (N, 3) a face of about that shape, metres.
-        steady: (N,) bool: landmarks that the expression hardly moves.
+        canonical: (N, 3) a face of roughly that shape, metres.
+        steady: (N,) bool: landmarks that hardly move with the expression.
     """
     guess = np.where(steady, STEADY, MOVING)
     spreads, shape = guess, canonical

@@ -1,34 +1,35 @@
-"""Values and poses over time: gaps filled, noise taken out without delay.
+"""Fills gaps in values and poses over time, and removes noise without delay.
 
-The filter is Savitzky and Golay's: at each frame, a parabola through the frames around it. Looking
-as far ahead as back it has no lag; a parabola follows the turning points of a nod, which a moving
-average would flatten. Its window is a time, so that captures of all frame rates are treated alike.
+The filter is that of Savitzky and Golay: at each frame a parabola is fitted to the neighbouring
+frames. It looks as far ahead as back and therefore has no delay. A parabola follows the turning
+points of a nod, which a moving average would flatten. The window is defined in seconds, so that all
+frame rates are treated alike.
 """
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 WINDOW = 0.3
-"""Seconds that a pose is fitted over; heads do not shake within less."""
+"""Window of the filter for poses in seconds; heads do not shake faster."""
 DEGREE = 2
 LEAST, MOST = 5, 15
-"""Frames of the window, whatever the frame rate."""
+"""Limits of the window in frames."""
 
 
 def window_of(fps: float, num_frames: int) -> int:
-    """Odd number of frames of the window; 1 where a capture is too short to smooth."""
+    """Size of the window in frames, odd; 1 for captures that are too short."""
     count = 2 * round(WINDOW * fps / 2) + 1
     count = min(max(count, LEAST), MOST)
     return count if num_frames >= count else (LEAST if num_frames >= LEAST else 1)
 
 
 def filled(values: np.ndarray, frames: np.ndarray, num_frames: int) -> np.ndarray:
-    """Values of all frames: linear between those known, constant before and after them.
+    """Values of all frames: linear between known ones, constant before and after.
 
     Args:
-        values: (K, ...) at the frames known.
+        values: (K, ...) values at the known frames.
         frames: (K,) ascending frame numbers.
-        num_frames: How many frames the clip has.
+        num_frames: Number of frames of the clip.
 
     Returns:
         (num_frames, ...).
@@ -39,12 +40,12 @@ def filled(values: np.ndarray, frames: np.ndarray, num_frames: int) -> np.ndarra
 
 
 def filled_poses(poses: np.ndarray, frames: np.ndarray, num_frames: int) -> np.ndarray:
-    """(num_frames, 4, 4) from (K, 4, 4): the turn goes along the shortest arc, the place straight.
+    """(num_frames, 4, 4): rotations along the shortest arc, positions along straight lines.
 
     Args:
-        poses: Rigid, at the frames known.
+        poses: (K, 4, 4) rigid poses at the known frames.
         frames: (K,) ascending frame numbers.
-        num_frames: How many frames the clip has.
+        num_frames: Number of frames of the clip.
     """
     every = np.tile(np.eye(4), (num_frames, 1, 1))
     every[:, :3, 3] = filled(poses[:, :3, 3], frames, num_frames)
@@ -60,8 +61,8 @@ def filled_poses(poses: np.ndarray, frames: np.ndarray, num_frames: int) -> np.n
 def smoothed_poses(poses: np.ndarray, fps: float) -> np.ndarray:
     """Rigid poses (F, 4, 4) without the jitter of single frames.
 
-    Turns are fitted as rotation vectors about the frame's own turn, so that a person may turn all
-    the way round.
+    Rotations are fitted as rotation vectors relative to each frame's own rotation, so that a person
+    may turn all the way round.
     """
     count = len(poses)
     window = window_of(fps, count)

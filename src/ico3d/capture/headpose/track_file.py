@@ -1,4 +1,4 @@
-"""The file of a tracked head, `tracking.safetensors`: `docs/captures/multiview.md`."""
+"""The file of a tracked head, `tracking.safetensors` (docs/captures/multiview.md)."""
 
 import os
 from dataclasses import dataclass, fields
@@ -19,15 +19,15 @@ NAME = "tracking.safetensors"
 
 @dataclass(frozen=True)
 class HeadTrack:
-    """A head through F frames recorded by C cameras.
+    """A tracked head through F frames of a recording by C cameras.
 
     Attributes:
-        world_from_head: (F, 4, 4) float64, rigid, metres.
+        world_from_head: (F, 4, 4) float64 rigid head poses, metres.
         landmarks: (F, 68, 3) float32, Multi-PIE, in canonical head space, metres.
         eyes: (F, 7) float32 in the order of `EYE_NAMES`.
-        blendshapes: (F, 52) float32, MediaPipe's, in its order.
-        views: (F, C) uint8, 1 where the camera's picture tells of the frame; frames that no camera
-            tells of are interpolated.
+        blendshapes: (F, 52) float32, in the order of MediaPipe.
+        views: (F, C) uint8, 1 where the camera's picture was used for the frame; frames without any
+            are interpolated.
     """
 
     world_from_head: np.ndarray
@@ -38,7 +38,7 @@ class HeadTrack:
 
     @property
     def tracked(self) -> np.ndarray:
-        """(F,) bool: frames that were measured."""
+        """(F,) bool: frames that were measured, not interpolated."""
         return np.any(self.views, axis=1)
 
     @property
@@ -48,7 +48,7 @@ class HeadTrack:
         return [(int(start), int(stop) - 1) for start, stop in edges.reshape(-1, 2)]
 
     def finding(self) -> Finding:
-        """A line for `ico3d capture check` that tells which frames are interpolated."""
+        """A finding for `ico3d capture check` about the interpolated frames."""
         found = self.gaps
         if not found:
             return Finding("head", "ok", f"tracked in all {len(self.views)} frames")
@@ -60,10 +60,13 @@ class HeadTrack:
         return Finding("head", "warn", text)
 
     def write(self, recording: Path) -> Path:
-        """Writes the file of a recording, whole or not at all.
+        """Writes the track of a recording, atomically.
+
+        Args:
+            recording: Path of the recording.
 
         Raises:
-            CaptureError: If nothing can be written where the recording lies.
+            CaptureError: If the recording's folder is not writable.
         """
         arrays = {f.name: np.ascontiguousarray(getattr(self, f.name)) for f in fields(self)}
         file = track_file(recording)
@@ -75,10 +78,10 @@ class HeadTrack:
 
 
 def check_writable(recording: Path) -> None:
-    """Checks before hours of tracking that the track can be written.
+    """Checks, before hours of tracking, that the track can be written.
 
     Raises:
-        CaptureError: If nothing can be written where the recording lies.
+        CaptureError: If the recording's folder is not writable.
     """
     if not os.access(track_file(recording).parent, os.W_OK):
         raise _unwritable(recording, "Read-only")
@@ -92,7 +95,7 @@ def _unwritable(recording: Path, why: str | None) -> CaptureError:
 
 
 def track_file(recording: Path) -> Path:
-    """Where the track of a recording lies: in its folder, or beside it where that is a file."""
+    """Path of a recording's track: in the recording's folder, or beside the recording's file."""
     return recording / NAME if recording.is_dir() else recording.with_suffix(f".{NAME}")
 
 
@@ -100,12 +103,12 @@ def read_track(recording: Path, num_frames: int, num_cameras: int) -> HeadTrack 
     """Reads the track of a recording.
 
     Args:
-        recording: The `path` of its capture.
-        num_frames: Its frames.
-        num_cameras: Its cameras.
+        recording: The `path` of the capture.
+        num_frames: Number of frames of the capture.
+        num_cameras: Number of cameras of the capture.
 
     Returns:
-        The track, or None where there is none.
+        The track, or None if there is no file.
 
     Raises:
         CaptureError: If the file is damaged or belongs to another recording.

@@ -1,4 +1,4 @@
-"""Any recording with the head that `ico3d capture track` found in it."""
+"""A recording of any format, with the head that `ico3d capture track` found."""
 
 import numpy as np
 
@@ -11,10 +11,10 @@ from ico3d.errors import CaptureError
 
 
 class TrackedCapture(Capture):
-    """A recording whose head is that of a track; everything else is its own.
+    """A recording whose data about the head come from a track.
 
     Attributes:
-        whole: The recording itself, for what only its format has.
+        whole: The wrapped recording, for methods that only its format has.
     """
 
     blendshape_names = BLENDSHAPES
@@ -30,11 +30,11 @@ class TrackedCapture(Capture):
         return self.whole.image(camera, frame)
 
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """The person."""
+        """The mask of the person."""
         return self.whole.mask(camera, frame)
 
     def head_mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """The part that is measured."""
+        """The mask for `psnr_mask`."""
         return self.whole.head_mask(camera, frame)
 
     def background(self, camera: int) -> np.ndarray | None:
@@ -46,7 +46,7 @@ class TrackedCapture(Capture):
         return self.whole.audio()
 
     def world_from_head(self, frame: int) -> np.ndarray:
-        """(4, 4) as it was tracked."""
+        """The tracked head pose (4, 4) of a frame."""
         return self._track.world_from_head[self._index(frame)]
 
     def eyes(self, frame: int) -> np.ndarray:
@@ -62,12 +62,12 @@ class TrackedCapture(Capture):
         return self._track.landmarks[self._index(frame)]
 
     def landmarks(self, camera: int, frame: int) -> np.ndarray:
-        """(68, 2) the tracked landmarks in pixels of the camera, wherever it looks."""
+        """(68, 2) tracked landmarks in pixels of a camera, even of one that sees no face."""
         seen = self.cameras[camera].moved(self.world_from_head(frame))
         return seen.project(self.landmarks_3d(frame))[0]
 
     def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) the recording's own: of heads, moved to the head space of the track."""
+        """(P, 3) surface points of the recording, metres; of heads, in the track's head space."""
         points = self.whole.points(frame)
         if not self.split.test:  # a body, whose points lie in the world
             return points
@@ -78,12 +78,12 @@ class TrackedCapture(Capture):
         return points @ between[:3, :3].T + between[:3, 3]
 
     def inspect(self) -> list[Finding]:
-        """What is wrong with the files of the recording, and where its head is interpolated."""
+        """Findings about the recording's files, and about interpolated frames of the track."""
         return [*self.whole.inspect(), self._track.finding()]
 
     @property
     def provenance(self) -> dict:
-        """What the recording says of itself: the track adds nothing."""
+        """The provenance of the wrapped recording."""
         return self.whole.provenance
 
     def _index(self, frame: int) -> int:
@@ -93,7 +93,7 @@ class TrackedCapture(Capture):
 
 
 def with_track(capture: Capture) -> Capture:
-    """A recording of any format with the track that lies beside it, if one does.
+    """A recording with its head track if there is one, else the recording itself.
 
     Raises:
         CaptureError: If the track is damaged or belongs to another recording.

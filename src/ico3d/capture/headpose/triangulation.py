@@ -1,8 +1,8 @@
-"""Points in space from where several calibrated cameras see them, some of them wrongly.
+"""Robust triangulation: 3D points from sightings by several calibrated cameras, some wrong.
 
-Residuals are metres: how far a camera's ray passes by a point, across the viewing direction. What
-a network reads off a face cut out and scaled to one size errs by a share of the face, so that
-cameras near and far, fine and coarse, err by alike distances.
+Residuals are in metres: the distance at which a camera's ray passes a point. Landmark networks read
+faces that are cut out and scaled to one size, so their errors are a share of the face's size, equal
+for cameras near and far, of low and high resolution.
 """
 
 from dataclasses import dataclass
@@ -13,12 +13,11 @@ import numpy as np
 from ico3d.common.camera import Camera
 
 SPREAD = 0.003
-"""Metres by which landmarks of a face usually stray from where they are."""
+"""Usual error of a face's landmarks in metres."""
 AGREEING = 0.012
-"""Metres by which half of a camera's landmarks may miss those of others: else it shows another
-face."""
+"""Median residual in metres up to which a camera is taken to show the same face as others."""
 LEAST_ANGLE = np.radians(4.0)
-"""Rays that meet at a smaller angle leave the depth open."""
+"""Least angle in radians between rays; at smaller angles the depth is undetermined."""
 ROUNDS = 8
 
 
@@ -27,26 +26,26 @@ class Sightings:
     """Where C cameras see the same N points at one moment.
 
     Attributes:
-        world_to_camera: (C, 3, 4) OpenCV axes, metres.
-        rays: (C, N, 2) where each ray crosses the plane at depth 1 of its camera.
+        world_to_camera: (C, 3, 4) poses in OpenCV axes, metres.
+        rays: (C, N, 2) point at which each ray crosses the plane z = 1 of its camera.
     """
 
     world_to_camera: np.ndarray
     rays: np.ndarray
 
     def of(self, cameras: np.ndarray) -> "Sightings":
-        """Those of some of the cameras, an index or mask along the first axis."""
+        """The sightings of some cameras, chosen by indices or by a mask (C,)."""
         return Sightings(self.world_to_camera[cameras], self.rays[cameras])
 
     @property
     def centers(self) -> np.ndarray:
-        """(C, 3) where the cameras stand."""
+        """(C, 3) positions of the cameras, metres."""
         turns, shifts = self.world_to_camera[:, :, :3], self.world_to_camera[:, :, 3:]
         return -(turns.transpose(0, 2, 1) @ shifts)[..., 0]  # (C, 3)
 
 
 def sightings(cameras: list[Camera], pixels: np.ndarray) -> Sightings:
-    """Sightings from pixels (C, N, 2), pixel centres at +0.5."""
+    """Sightings from pixels (C, N, 2), with pixel centres at +0.5."""
     lenses = np.stack([camera.intrinsics for camera in cameras])  # (C, 3, 3)
     focal, center = lenses[:, [0, 1], [0, 1]], lenses[:, :2, 2]  # (C, 2)
     rays = (pixels - center[:, None]) / focal[:, None]  # (C, N, 2)
@@ -54,11 +53,11 @@ def sightings(cameras: list[Camera], pixels: np.ndarray) -> Sightings:
 
 
 def triangulate(seen: Sightings, weights: np.ndarray) -> np.ndarray:
-    """(N, 3) points of the least weighted sum of squared residuals.
+    """(N, 3) points with the least weighted sum of squared residuals, metres.
 
     Args:
-        seen: By at least two cameras.
-        weights: (C, N); each point needs two cameras with weight.
+        seen: Sightings by at least two cameras.
+        weights: (C, N) weights; each point needs two cameras with a positive weight.
     """
     matrix, right = _system(seen)
     weighted = matrix * weights[..., None, None]
@@ -68,7 +67,7 @@ def triangulate(seen: Sightings, weights: np.ndarray) -> np.ndarray:
 
 
 def misses(seen: Sightings, points: np.ndarray) -> np.ndarray:
-    """(C, N) metres by which the rays pass by points (N, 3); infinite behind the camera."""
+    """(C, N) residuals of points (N, 3), metres; infinite for points behind the camera."""
     matrix, right = _system(seen)
     away = np.linalg.norm(np.einsum("cnrp,np->cnr", matrix, points) - right, axis=-1)
     last = seen.world_to_camera[:, 2]
@@ -79,8 +78,9 @@ def misses(seen: Sightings, points: np.ndarray) -> np.ndarray:
 def agreeing(seen: Sightings, tolerance: float = AGREEING) -> np.ndarray:
     """(C,) bool: the largest set of cameras that show one face.
 
-    Every pair of cameras places the face; the pair wins that most others agree with, then the
-    closest (RANSAC with all pairs, for there are few). None agree where no pair does.
+    Each pair of cameras gives a position of the face. The pair wins with which most other cameras
+    agree, then the one with the smallest residuals (RANSAC over all pairs, which are few). If no
+    pair agrees, no camera is chosen.
     """
     best, best_score = np.zeros(len(seen.rays), bool), (1, 0.0)
     for pair in combinations(range(len(seen.rays)), 2):
@@ -99,15 +99,16 @@ def agreeing(seen: Sightings, tolerance: float = AGREEING) -> np.ndarray:
 def robust(
     seen: Sightings, weights: np.ndarray, spread: float = SPREAD
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Points of least robust residuals: a camera that errs about a landmark loses its say there.
+    """Robust triangulation: a camera with a large residual at a point is weighted down there.
 
     Args:
-        seen: By cameras that agree.
+        seen: Sightings by cameras that agree.
         weights: (C, N) positive: how well each camera sees each point.
-        spread: Metres by which sightings usually stray.
+        spread: Usual error of the sightings, metres.
 
     Returns:
-        (N, 3) points, and the (C, N) weights they were found with (Cauchy's, times `weights`).
+        (N, 3) points in metres, and the weights (C, N) of the last round (Cauchy's, times
+        `weights`).
     """
     kept = weights
     for _ in range(ROUNDS):

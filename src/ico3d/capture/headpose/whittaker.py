@@ -1,4 +1,4 @@
-"""Poses without the jitter of what they were measured by."""
+"""Smooths poses as far as their measurement noise requires (Whittaker smoother)."""
 
 from itertools import pairwise
 
@@ -9,23 +9,23 @@ from scipy.spatial.transform import Rotation
 from ico3d.capture.headpose.procrustes import RigidMotion
 
 LONGEST_GAP = 5
-"""Frames without a pose that are bridged between two that have one."""
+"""Longest gap in frames that is bridged between two poses."""
 CALMEST = 1e-3
-"""Accelerations are taken for no less than this part of what noise alone would look like."""
+"""Least variance of accelerations, as a share of that of noise alone."""
 
 
 def smoothed_poses(motion: RigidMotion) -> np.ndarray:
-    """The poses of a motion, smoothed as much as its noise asks for; short gaps are bridged.
+    """The poses of a motion, smoothed as far as their noise requires; short gaps are bridged.
 
-    A Whittaker smoother over quaternions and the place of the body's middle: deviations cost by
-    the variance that the points' spread gives each pose, second differences by the variance that
-    they have beyond noise. Poses without noise stay as they are.
+    A Whittaker smoother over quaternions and the position of the body's centre. Deviations are
+    weighted by the variance of each pose, which follows from the points' spread, and second
+    differences by the variance that they have beyond noise. Poses without noise stay as they are.
 
     Args:
         motion: Shape, poses and weights.
 
     Returns:
-        (F, 4, 4); NaN before the first and after the last pose, and in longer gaps.
+        (F, 4, 4) poses; NaN before the first and after the last pose, and in longer gaps.
     """
     poses = motion.poses
     known = np.isfinite(poses[:, 0, 0])

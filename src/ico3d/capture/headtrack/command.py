@@ -8,24 +8,24 @@ from typing import Annotated
 import tyro
 
 MOST_WORKERS = 8
-"""Each holds a large picture and a face model."""
+"""Upper limit of the default number of threads; each holds a large picture and a face model."""
 MOST_GAPS = 5
-"""Gaps that the report lists."""
+"""Number of gaps that the report lists."""
 
 
 @dataclass(frozen=True)
 class Track:
     """Find the head in a multiview recording: its pose, landmarks, eyes and blendshapes.
 
-    MediaPipe reads the face in every camera that sees it; what the cameras agree on becomes one
-    rigid head that moves through the recording. Writes tracking.safetensors into the folder,
-    or beside the file, that holds the recording, anew at each run; from then on the recording has
-    that head.
+    MediaPipe finds the face in every camera that sees it. What the cameras agree on becomes one
+    rigid head that moves through the recording. The result is written to tracking.safetensors in
+    the recording's folder, or beside the recording's file, and replaces an earlier one. From then
+    on the recording is opened with that head.
 
     Attributes:
         folder: A recording by several cameras, of any format.
-        check: A contact sheet to draw, .jpg or .png.
-        workers: Threads.
+        check: Also draw a contact sheet to this file, .jpg or .png.
+        workers: Number of threads.
     """
 
     folder: Annotated[Path, tyro.conf.Positional]
@@ -33,13 +33,13 @@ class Track:
     workers: int = field(default_factory=lambda: min(os.cpu_count() or 1, MOST_WORKERS))
 
     def run(self) -> None:
-        """Runs it.
+        """Tracks the head, writes the file and prints a report.
 
         Raises:
-            CaptureError: If no two cameras see a face, or nothing can be written there.
+            CaptureError: If no two cameras see a face, or the folder is not writable.
             MissingExtraError: If MediaPipe or SciPy is not installed.
-            MissingModelError: If MediaPipe's face model is not there.
-            SettingsError: If the contact sheet's name is not that of a picture.
+            MissingModelError: If MediaPipe's face model is not installed.
+            SettingsError: If the contact sheet's name has another suffix.
         """
         from rich.console import Console
 

@@ -1,7 +1,7 @@
-"""Parts of pictures in which a face is looked for.
+"""Parts of pictures in which MediaPipe looks for a face.
 
-MediaPipe finds faces that fill a fifth of a picture and more. In pictures of whole bodies they are
-30 to 60 pixels high, so it is shown parts, scaled to one size.
+MediaPipe finds faces that fill at least a fifth of a picture. In pictures of whole bodies faces are
+30 to 60 pixels high, so MediaPipe gets parts of the picture, scaled to one size.
 """
 
 from dataclasses import dataclass
@@ -12,23 +12,23 @@ from PIL import Image
 from ico3d.common.camera import Camera
 
 READ_AT = 384
-"""Pixels of the side of what MediaPipe is shown."""
+"""Side in pixels of the pictures that MediaPipe gets."""
 HEAD = 0.48
-"""Metres that a part around a head shows: twice its height."""
+"""Size in metres of the part around a head: twice the head's height."""
 STEPS = (1, 2, 4)
-"""A search looks at the whole person, at halves and at quarters of the height."""
+"""Sizes of searched parts: the whole person, a half and a quarter of the height."""
 FILLED = 0.05
-"""Share of a part that the person must fill for a look at it."""
+"""Least share of a part that the person must fill for the part to be searched."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """A square part of a picture; it may reach beyond the picture, which is black there.
+    """A square part of a picture; outside of the picture it is black.
 
     Attributes:
-        left: First column.
-        top: First row.
-        side: Pixels.
+        left: First column in pixels; may be negative.
+        top: First row in pixels; may be negative.
+        side: Side in pixels.
     """
 
     left: int
@@ -36,7 +36,7 @@ class Part:
     side: int
 
     def cut(self, image: np.ndarray) -> np.ndarray:
-        """uint8 RGB (READ_AT, READ_AT, 3) of a picture (H, W, 3), float in [0, 1]."""
+        """The part of a picture (H, W, 3), float in [0, 1], as uint8 RGB (READ_AT, READ_AT, 3)."""
         rows = slice(max(self.top, 0), max(self.top + self.side, 0))
         columns = slice(max(self.left, 0), max(self.left + self.side, 0))
         inside = image[rows, columns]
@@ -48,20 +48,20 @@ class Part:
         return np.asarray(scaled)
 
     def whole(self, pixels: np.ndarray) -> np.ndarray:
-        """Pixels (N, 2) of what `cut` gives as pixels of the whole picture."""
+        """Converts pixels (N, 2) of the part that `cut` returns to pixels of the whole picture."""
         return pixels * (self.side / READ_AT) + (self.left, self.top)
 
 
 def around(camera: Camera, center: np.ndarray, size: float = HEAD) -> Part | None:
-    """The part that shows a ball around a point of the world.
+    """The part of a camera's picture that shows a ball around a point.
 
     Args:
-        camera: Who looks.
-        center: (3,) metres.
-        size: Metres across.
+        camera: The camera that looks at the ball.
+        center: (3,) the point in the world, metres.
+        size: Diameter of the ball, metres.
 
     Returns:
-        The part, or None where it lies outside the picture or behind the camera.
+        The part, or None if the ball is outside of the picture or behind the camera.
     """
     pixel, depth = camera.project(center)
     if depth <= 0:
@@ -73,12 +73,12 @@ def around(camera: Camera, center: np.ndarray, size: float = HEAD) -> Part | Non
 
 
 def search(height: int, width: int, mask: np.ndarray | None) -> list[Part]:
-    """Parts of a picture one of which shows a person's face large enough, likely ones first.
+    """Parts to search for a face, likely ones first; one of them shows the face large enough.
 
     Args:
         height: Rows of the picture.
-        width: Columns.
-        mask: (H, W) the person, 1 inside; the whole picture is searched where it is None.
+        width: Columns of the picture.
+        mask: (H, W) the person, 1 inside; None searches the whole picture.
     """
     person = np.ones((height, width), bool) if mask is None else mask > 0.5
     rows, columns = np.flatnonzero(person.any(1)), np.flatnonzero(person.any(0))

@@ -1,4 +1,4 @@
-"""The face of one moment in all cameras that see it."""
+"""Finds the face of one moment in all cameras that see it."""
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -17,24 +17,25 @@ from ico3d.capture.headtrack.crops import HEAD, Part, around, search
 from ico3d.errors import CaptureError
 
 SEES_FACE = np.cos(np.radians(100.0))
-"""Cameras further round the head are not asked again; MediaPipe knows faces up to some 80°."""
+"""Cosine of the angle to the face beyond which cameras are skipped; MediaPipe manages some 80°."""
 SIDEWAYS = np.cos(np.radians(75.0))
-"""Cameras that see a face from further aside guess most of it."""
+"""Cosine of the angle to the face beyond which landmarks are mostly guessed."""
 SPARSE = 6
-"""One landmark in so many suffices to see which cameras agree."""
+"""Every 6th landmark is used to decide which cameras agree."""
 LEAST_FRONTAL, LEAST_SIGHT = 0.02, 0.05
-"""What a camera's word counts from there, and about a landmark that faces away from it."""
+"""Least weights: of cameras at the side, and of landmarks that face away from a camera."""
 
 
 @dataclass(frozen=True)
 class Head:
-    """A head of one moment.
+    """A head at one moment.
 
     Attributes:
-        points: (468, 3) metres in the world.
-        center: (3,) the middle of the head.
-        forward: (3,) where it faces.
-        faces: Of the cameras that agree: what each shows, landmarks in pixels of its picture.
+        points: (468, 3) landmarks in the world, metres.
+        center: (3,) centre of the head in the world, metres.
+        forward: (3,) unit direction of the face in the world.
+        faces: Faces in the pictures of agreeing cameras, by camera; landmarks in pixels of the
+            picture.
     """
 
     points: np.ndarray
@@ -43,21 +44,21 @@ class Head:
     faces: dict[int, Face]
 
     def frontality(self, capture: Capture, camera: int) -> float:
-        """Cosine of the angle between where the head faces and where the camera stands."""
+        """Cosine of the angle between the face's direction and the direction to a camera."""
         way = capture.cameras[camera].camera_to_world[:3, 3] - self.center
         return float(_cosine(self.forward, way))
 
     def most_frontal(self, capture: Capture) -> int:
-        """The camera that sees the face best, of those that agree."""
+        """Index of the camera that sees the face best, among those that agree."""
         return max(self.faces, key=lambda camera: self.frontality(capture, camera))
 
 
 class Finder:
-    """Finds a head in the pictures of all cameras, several at a time.
+    """Finds the head in the pictures of all cameras, with several threads.
 
     Attributes:
         capture: The recording.
-        disagreements: At how many moments cameras showed faces, but no two cameras the same face.
+        disagreements: Number of moments at which cameras showed faces, but no two the same face.
     """
 
     def __init__(
@@ -66,11 +67,11 @@ class Finder:
         canonical: CanonicalFace,
         readers: Sequence[FaceReader],
     ):
-        """Opens the capture once for each camera: their videos are decoded side by side.
+        """Opens the capture once for each camera, so that videos are decoded in parallel.
 
         Args:
-            open_capture: Gives the capture; one that is open already, where there is one reader.
-            canonical: MediaPipe's face.
+            open_capture: Opens the capture; with a single reader it may return an open one.
+            canonical: MediaPipe's canonical face.
             readers: Face readers, one for each thread.
         """
         self.capture = open_capture()
@@ -84,18 +85,18 @@ class Finder:
         self.disagreements = 0
 
     def close(self) -> None:
-        """Ends the threads."""
+        """Stops the threads."""
         self._pool.shutdown(cancel_futures=True)
 
     def find(self, frame: int, before: Head | None) -> Head | None:
-        """The head of a frame.
+        """Finds the head in a frame.
 
         Args:
             frame: Number of the frame.
-            before: The head a moment ago, if it was found.
+            before: The head in the frame before, or None.
 
         Returns:
-            The head, or None where fewer than two cameras show one face.
+            The head, or None if fewer than two cameras show the same face.
         """
         head = None if before is None else self._placed(self._near(frame, before))
         if head is not None:
@@ -211,10 +212,10 @@ class Finder:
 def finder(
     open_capture: Callable[[], Capture], canonical: CanonicalFace, model: Path, workers: int
 ) -> Iterator[Finder]:
-    """A finder whose models are closed in the end.
+    """A finder whose threads and models are closed at the end of the `with` block.
 
     Raises:
-        CaptureError: If the capture has one camera only.
+        CaptureError: If the capture has only one camera.
     """
     with ExitStack() as stack:
         readers = [stack.enter_context(FaceReader(model)) for _ in range(workers)]
@@ -235,7 +236,7 @@ def _cosine(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def vertex_normals(face: CanonicalFace) -> np.ndarray:
-    """(468, 3) outward unit normals, means of those of the triangles around by their areas."""
+    """(468, 3) outward unit normals: means of the adjacent triangles' normals, weighted by area."""
     corners = face.vertices[face.triangles]  # (T, 3, 3)
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # (T, 3)
     normals = np.zeros_like(face.vertices)
@@ -247,6 +248,6 @@ def vertex_normals(face: CanonicalFace) -> np.ndarray:
 
 
 def opposite_vertices(face: CanonicalFace) -> np.ndarray:
-    """(468,) for each vertex the one on the other side of the symmetric face."""
+    """(468,) index of the mirror-image vertex on the symmetric canonical face."""
     mirrored = face.vertices * [-1, 1, 1]
     return np.linalg.norm(mirrored[:, None] - face.vertices, axis=-1).argmin(1)

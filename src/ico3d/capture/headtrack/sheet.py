@@ -1,4 +1,4 @@
-"""A picture that shows at a glance whether a head was tracked."""
+"""The contact sheet of a tracked head, by which people judge the track."""
 
 import io
 from pathlib import Path
@@ -14,26 +14,26 @@ from ico3d.common.spread import spread
 from ico3d.errors import SettingsError
 
 FRAMES, CAMERAS = 6, 4
-"""Rows, and columns at most."""
+"""Number of rows, and highest number of columns."""
 SHOWN = 0.34
-"""Metres that a tile shows."""
+"""Size of what a tile shows, metres."""
 AXIS = 0.1
-"""Metres of the drawn head axes."""
+"""Length of the drawn axes of the head, metres."""
 COLOURS = ((255, 60, 60), (60, 220, 60), (80, 150, 255))
 """Colours in which the head's axes x, y and z are drawn."""
 FORMATS = {".jpg": "JPEG", ".jpeg": "JPEG", ".png": "PNG"}
 
 
 def write_sheet(capture: Capture, track: HeadTrack, path: Path) -> None:
-    """Draws landmarks and head axes over frames of the recording: a row each, a column a camera.
+    """Draws landmarks and axes of the head over pictures; a row for each frame.
 
     Args:
         capture: The recording.
-        track: Its track.
-        path: Picture to write.
+        track: The track of the recording.
+        path: The picture to write.
 
     Raises:
-        SettingsError: If the file's name is not that of a JPEG or PNG.
+        SettingsError: If the file's suffix is not that of a JPEG or PNG.
     """
     check_name(path)
     known = np.flatnonzero(track.tracked)
@@ -50,10 +50,10 @@ def write_sheet(capture: Capture, track: HeadTrack, path: Path) -> None:
 
 
 def check_name(path: Path) -> None:
-    """Whether a contact sheet can be written under a name.
+    """Checks that a contact sheet can be written under a name.
 
     Raises:
-        SettingsError: If not.
+        SettingsError: If the suffix is not that of a JPEG or PNG.
     """
     if path.suffix.lower() not in FORMATS:
         raise SettingsError(f"{path}: name the contact sheet .jpg or .png.")

@@ -1,4 +1,4 @@
-"""A head through a recording by several cameras: from pictures to poses."""
+"""Tracks a head through a recording by several cameras."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,18 +21,18 @@ from ico3d.errors import CaptureError
 
 PURPOSE = "tracking a head"
 SIZES = (0.6, 1.6)
-"""Smallest and largest head by the usual one, children included."""
+"""Smallest and largest head, as a factor of the canonical face; children are included."""
 
 
 @dataclass(frozen=True)
 class Report:
-    """How well a head was tracked.
+    """Quality of a track.
 
     Attributes:
-        num_frames: Frames of the recording.
-        tracked: Frames that were measured.
-        reprojection: Pixels between the landmarks of the track and those seen, on average.
-        views: Cameras that tell of a tracked frame, on average.
+        num_frames: Number of frames of the recording.
+        tracked: Number of frames that were measured.
+        reprojection: Mean distance in pixels between the track's landmarks and those seen.
+        views: Mean number of cameras that were used for a tracked frame.
         gaps: First and last frame of each run of frames that were interpolated.
     """
 
@@ -48,15 +48,16 @@ def track_head(source: Path, workers: int) -> tuple[HeadTrack, Report]:
 
     Args:
         source: A capture by several calibrated cameras, of any format.
-        workers: Threads.
+        workers: Number of threads.
 
     Returns:
-        The track and how good it is.
+        The track and its quality.
 
     Raises:
-        CaptureError: If no two cameras agree on a face in any frame, or its size is not human.
+        CaptureError: If no two cameras agree on a face in any frame, or the size of the head is not
+            human.
         MissingExtraError: If MediaPipe is not installed.
-        MissingModelError: If the face model is not there.
+        MissingModelError: If MediaPipe's face model is not installed.
     """
     model = model_file("face_landmarker.task", PURPOSE)
     canonical = canonical_face(model)
@@ -88,15 +89,15 @@ def _nothing(found: Finder) -> str:
 
 
 def assemble(capture: Capture, heads: dict[int, Head], canonical: np.ndarray) -> HeadTrack:
-    """One motion of one head out of the heads of single frames.
+    """Combines the heads of single frames to one rigid head in motion.
 
     Args:
-        capture: Who recorded them.
-        heads: Frame to head.
-        canonical: (468, 3) MediaPipe's face, metres.
+        capture: The recording.
+        heads: Heads by frame.
+        canonical: (468, 3) vertices of the canonical face, metres.
 
     Raises:
-        CaptureError: If the head is so large or small that the world cannot be in metres.
+        CaptureError: If the head is so large or small that the world's unit cannot be metres.
     """
     frames, count = np.array(sorted(heads)), capture.num_frames
     points = np.stack([heads[frame].points for frame in frames])  # (K, 468, 3)
@@ -131,7 +132,7 @@ def _check_size(capture: Capture, shape: np.ndarray, canonical: np.ndarray) -> N
 
 
 def report(capture: Capture, heads: dict[int, Head], track: HeadTrack) -> Report:
-    """Compares a track with what the cameras show."""
+    """Compares a track with the faces that the cameras show."""
     errors = []
     for frame, head in heads.items():
         places = moved(track.world_from_head[frame][None], track.landmarks[frame])[0]

@@ -1,4 +1,4 @@
-"""Reads sparse models of COLMAP, text and binary (its documentation, "Output Format")."""
+"""Reads COLMAP's sparse models, text and binary (COLMAP's documentation, "Output Format")."""
 
 import struct
 from collections.abc import Iterator
@@ -18,10 +18,10 @@ MODELS = {
     4: ("OPENCV", 8),
     6: ("FULL_OPENCV", 12),
 }
-"""Camera models that are read: number → name, number of parameters."""
+"""Supported camera models: number, name and number of parameters."""
 ONE_FOCAL = ("SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL")
 Pose = tuple[str, int, np.ndarray]
-"""Picture, camera, (7,) quaternion wxyz and translation of world to camera."""
+"""Picture's file name, camera's id, and (7,) quaternion wxyz and translation, world to camera."""
 
 
 def is_model(folder: Path) -> bool:
@@ -33,11 +33,11 @@ def is_model(folder: Path) -> bool:
 
 
 def read_colmap(model: Path, images: Path) -> Foreign:
-    """Reads a sparse model; each picture becomes a camera of its own.
+    """Reads a sparse model; each picture becomes a separate camera.
 
     Args:
-        model: Folder of cameras, images and points3D, binary or text.
-        images: Folder that its picture names start from.
+        model: Folder with cameras, images and points3D, binary or text.
+        images: Folder to which the pictures' names are relative.
 
     Raises:
         CaptureError: If a file is missing or damaged, or a camera model is not supported.

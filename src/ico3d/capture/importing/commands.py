@@ -1,4 +1,4 @@
-"""The commands that make and complete multiview folders."""
+"""The verbs `ico3d capture import`, `ico3d capture masks` and `ico3d capture resize`."""
 
 import os
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ import tyro
 from ico3d.capture.importing.settings import ImportSettings
 
 MOST_WORKERS = 8
-"""Each needs room for some large pictures."""
+"""Upper limit of the default number of threads; each needs memory for some large pictures."""
 
 
 def _workers() -> int:
@@ -19,16 +19,16 @@ def _workers() -> int:
 
 @dataclass(frozen=True)
 class Import:
-    """Take over a recording that COLMAP, nerfstudio or instant-ngp calibrated.
+    """Imports a recording that COLMAP, nerfstudio or instant-ngp has calibrated.
 
-    Pictures are copied as they are into a multiview folder; lenses with distortion are straightened
-    when it is read. The world is turned so that +y is up. Pictures without times become cameras of
-    one moment.
+    Pictures are copied unchanged into a multiview folder; lens distortion is removed when they are
+    read. The world is turned so that +y is up. Pictures without times become cameras of a single
+    frame.
 
     Attributes:
         source: A COLMAP sparse model (binary or text) or a folder around one, or transforms.json.
         out: Folder to make.
-        settings: How the recording is taken over.
+        settings: What the source does not say itself.
     """
 
     source: Annotated[Path, tyro.conf.Positional]
@@ -38,10 +38,10 @@ class Import:
     )
 
     def run(self) -> None:
-        """Runs it.
+        """Imports the recording and prints what was written.
 
         Raises:
-            CaptureError: If the source is damaged or not known, or `out` exists.
+            CaptureError: If the source is damaged or of an unknown kind, or `out` exists.
         """
         from ico3d.capture.importing.recording import import_recording
 
@@ -51,24 +51,24 @@ class Import:
 
 @dataclass(frozen=True)
 class Masks:
-    """Cut the person out of every picture of a multiview folder by its clean plates.
+    """Cuts the person out of every picture of a multiview folder by means of clean plates.
 
-    Writes `masks/CAMERA/FRAME.png`; masks that are there stay, so that one can be mended by hand
-    and an interrupted run goes on.
+    Writes `masks/CAMERA/FRAME.png`. Existing masks are kept, so that masks can be corrected by hand
+    and an interrupted run can be continued.
 
     Attributes:
         folder: A multiview folder with `backgrounds/CAMERA.png`.
-        workers: Threads.
+        workers: Number of threads.
     """
 
     folder: Annotated[Path, tyro.conf.Positional]
     workers: int = field(default_factory=_workers)
 
     def run(self) -> None:
-        """Runs it.
+        """Writes the missing masks.
 
         Raises:
-            CaptureError: If there is no clean plate, or a picture is damaged.
+            CaptureError: If the folder has no clean plate, or a picture is damaged.
         """
         from rich import print as say
 
@@ -80,17 +80,17 @@ class Masks:
 
 @dataclass(frozen=True)
 class Resize:
-    """Write any capture again with smaller pictures, as a multiview folder.
+    """Copies a capture of any format with smaller pictures into a multiview folder.
 
-    Recordings of 5 or 12 megapixels are decoded, corrected and straightened once instead of at each
-    look. Keeps pictures, masks, clean plates, sound, surface points and the tracked head of a
-    multiview folder.
+    Pictures of 5 or 12 megapixels are then decoded, corrected and undistorted only once instead of
+    at each use. Pictures, masks, clean plates, sound, surface points and the tracked head of a
+    multiview folder are copied.
 
     Attributes:
         source: A capture of any format.
         out: Folder to make.
-        height: Pixels that pictures have at most.
-        workers: Threads.
+        height: Upper limit of the pictures' height in pixels.
+        workers: Number of threads.
     """
 
     source: Annotated[Path, tyro.conf.Positional]
@@ -99,7 +99,7 @@ class Resize:
     workers: int = field(default_factory=_workers)
 
     def run(self) -> None:
-        """Runs it.
+        """Writes the folder and prints what was written.
 
         Raises:
             CaptureError: If the source cannot be read, or `out` exists.

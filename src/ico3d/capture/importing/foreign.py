@@ -1,4 +1,4 @@
-"""What recordings of other tools come down to before they become a multiview folder."""
+"""Recordings of other programs in a common form, before they become a multiview folder."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,19 +11,19 @@ from ico3d.capture.multiview.files import PICTURES
 from ico3d.errors import CaptureError
 
 SAME_SHAPE = 0.01
-"""Relative difference of aspect ratios that rounding may bring."""
+"""Relative difference of aspect ratios up to which rounding is the explanation."""
 
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture.
+    """One picture of another program's recording.
 
     Attributes:
-        file: Where it lies.
-        lens: That of the picture, in the picture's size.
-        camera_to_world: (4, 4) rigid, OpenCV axes, in units of the source.
-        time: When it was taken, in any unit; None where all are of one moment.
-        mask: A picture of the person's mask.
+        file: Path of the picture.
+        lens: Lens of the camera, for the size of the picture.
+        camera_to_world: (4, 4) rigid pose, OpenCV axes, in units of the source.
+        time: Time of the picture in any unit; None if all pictures show the same moment.
+        mask: Path of the person's mask, or None.
     """
 
     file: Path
@@ -35,13 +35,13 @@ class Shot:
 
 @dataclass(frozen=True)
 class Foreign:
-    """A recording of another tool.
+    """A recording of another program.
 
     Attributes:
-        tool: Its name.
+        tool: Name of the program.
         shots: All pictures.
-        points: (P, 3) surface points of the first moment, in units of the source.
-        axes_mean_up: Whether +y or +z of the source is meant to be up if it nearly is.
+        points: (P, 3) surface points of the first moment, in units of the source, or None.
+        axes_mean_up: Whether the source's +y or +z is taken to be up if it nearly is.
     """
 
     tool: str
@@ -51,15 +51,15 @@ class Foreign:
 
 
 def inside(folder: Path, name: str, what: str) -> Path:
-    """A file that another file names.
+    """The path of a file whose name another file states.
 
     Args:
-        folder: Where it must lie, or below.
-        name: Its path from there; of a picture the suffix may lack.
-        what: Who names it, for the error.
+        folder: The file must lie in this folder or below.
+        name: Path relative to the folder; for pictures the suffix may be missing.
+        what: Name of the file that states the name, for errors.
 
     Raises:
-        CaptureError: If it lies elsewhere, is missing, or is in no format read here.
+        CaptureError: If the file lies elsewhere, is missing, or has an unknown format.
     """
     root = folder.resolve()
     try:
@@ -75,10 +75,10 @@ def inside(folder: Path, name: str, what: str) -> Path:
 
 
 def fitted(lens: Lens, file: Path) -> Lens:
-    """A lens for a picture as it is; calibrations are often made at another size.
+    """A lens, rescaled to the actual size of a picture; calibrations often use another size.
 
     Raises:
-        CaptureError: If the picture is damaged or has another shape.
+        CaptureError: If the picture is damaged or has another aspect ratio.
     """
     width, height = size_of(file, str(file))
     if (width, height) == (lens.width, lens.height):

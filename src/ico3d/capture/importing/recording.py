@@ -1,4 +1,4 @@
-"""Makes a multiview folder of a recording that another tool has calibrated."""
+"""Makes a multiview folder from a recording that another program has calibrated."""
 
 import re
 import shutil
@@ -19,15 +19,15 @@ from ico3d.capture.poses import nearest_axis, turn_upright, turned, up_of_camera
 from ico3d.errors import CaptureError
 
 NEARLY = np.cos(np.radians(20))
-"""An axis of the source is taken to be meant as up if the cameras' mean is within 20° of it."""
+"""Cosine of the angle (20°) up to which an axis of the source counts as the upward direction."""
 UNEVEN = 0.1
-"""Part of a frame by which times may be off."""
+"""Share of a frame's duration by which times may deviate from an even rate."""
 MOST_GAPS = 10
-"""Frames per frame that has a picture."""
+"""Largest number of frames of a recording, per frame that has a picture."""
 
 
 def import_recording(source: Path, out: Path, settings: ImportSettings) -> Description:
-    """Copies a recording into a multiview folder; `out` appears only when it is complete.
+    """Copies a recording into a multiview folder, which appears only once it is complete.
 
     Args:
         source: A COLMAP model or a folder around one, or a transforms.json or its folder.
@@ -35,10 +35,10 @@ def import_recording(source: Path, out: Path, settings: ImportSettings) -> Descr
         settings: What the source does not say itself.
 
     Returns:
-        What was written.
+        The contents of the new `cameras.json`.
 
     Raises:
-        CaptureError: If `out` exists, or the source is not known, or something in it is damaged.
+        CaptureError: If `out` exists, the source is of an unknown kind, or a file is damaged.
     """
     foreign = _read(source, settings.images)
     cameras, frames = _grouped(foreign)

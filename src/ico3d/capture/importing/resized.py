@@ -1,4 +1,4 @@
-"""Any capture with smaller pictures."""
+"""A capture whose pictures are scaled down when they are read."""
 
 import numpy as np
 
@@ -10,18 +10,19 @@ from ico3d.errors import SettingsError
 
 
 class ResizedCapture(Capture):
-    """A capture whose pictures are scaled down as they are read; everything else is its own.
+    """A capture of any format with smaller pictures; all other data are unchanged.
 
     Attributes:
-        whole: The capture itself, for what only its format has.
+        whole: The wrapped capture, for methods that only its format has.
     """
 
     def __init__(self, capture: Capture, height: int):
         """Wraps an open capture.
 
         Args:
-            capture: Of any format; its cameras may differ in size.
-            height: Pixels that pictures have at most; smaller ones stay as they are.
+            capture: The capture; its cameras may differ in size.
+            height: Upper limit of the pictures' height in pixels; smaller pictures stay as they
+                are.
 
         Raises:
             SettingsError: If the height is below 1.
@@ -35,15 +36,15 @@ class ResizedCapture(Capture):
         self.cameras = tuple(_resized(camera, height) for camera in capture.cameras)
 
     def image(self, camera: int, frame: int) -> np.ndarray | None:
-        """The picture, each pixel the mean of what it covers."""
+        """The picture of a view; each pixel is the mean of those it replaces."""
         return self._shrunk(self.whole.image(camera, frame), camera)
 
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """The person: between 0 and 1 along the edge."""
+        """The mask of the person, with values between 0 and 1 along the edge."""
         return self._shrunk(self.whole.mask(camera, frame), camera)
 
     def head_mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """Where `psnr_mask` is measured, as large as the pictures."""
+        """The mask for `psnr_mask`, in the size of the pictures."""
         return self._shrunk(self.whole.head_mask(camera, frame), camera)
 
     def background(self, camera: int) -> np.ndarray | None:
@@ -51,43 +52,43 @@ class ResizedCapture(Capture):
         return self._shrunk(self.whole.background(camera), camera)
 
     def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
-        """(68, 2) in pixels of the smaller picture."""
+        """(68, 2) landmarks in pixels of the smaller picture."""
         marks = self.whole.landmarks(camera, frame)
         small, large = self.cameras[camera], self.whole.cameras[camera]
         scale = (small.width / large.width, small.height / large.height)
         return None if marks is None else marks * scale
 
     def landmarks_3d(self, frame: int) -> np.ndarray | None:
-        """(68, 3) of the capture."""
+        """(68, 3) landmarks of the wrapped capture."""
         return self.whole.landmarks_3d(frame)
 
     def audio(self) -> Sound | None:
-        """The sound of the capture."""
+        """The sound of the wrapped capture."""
         return self.whole.audio()
 
     def world_from_head(self, frame: int) -> np.ndarray | None:
-        """(4, 4) of the capture."""
+        """(4, 4) head pose of the wrapped capture."""
         return self.whole.world_from_head(frame)
 
     def eyes(self, frame: int) -> np.ndarray | None:
-        """(7,) of the capture."""
+        """(7,) eye values of the wrapped capture."""
         return self.whole.eyes(frame)
 
     def blendshapes(self, frame: int) -> np.ndarray | None:
-        """Weights of the capture."""
+        """Blendshape weights of the wrapped capture."""
         return self.whole.blendshapes(frame)
 
     def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) of the capture."""
+        """(P, 3) surface points of the wrapped capture."""
         return self.whole.points(frame)
 
     def inspect(self) -> list[Finding]:
-        """What is wrong with the files of the capture."""
+        """Findings about the files of the wrapped capture."""
         return self.whole.inspect()
 
     @property
     def provenance(self) -> dict:
-        """That of the capture with the larger pictures."""
+        """The provenance of the wrapped capture."""
         return self.whole.provenance
 
     def _shrunk(self, picture: np.ndarray | None, camera: int) -> np.ndarray | None:

@@ -18,16 +18,18 @@ from ico3d.common.camera import Camera
 
 
 def resize_capture(source: Path, out: Path, height: int, workers: int) -> Description:
-    """Writes pictures, masks, clean plates, sound and surface points; `out` appears at the end.
+    """Writes pictures, masks, clean plates, sound and surface points into a multiview folder.
+
+    The folder appears only once it is complete.
 
     Args:
         source: A capture of any format.
         out: Folder to make.
-        height: Pixels that pictures have at most.
-        workers: Threads.
+        height: Upper limit of the pictures' height in pixels.
+        workers: Number of threads.
 
     Returns:
-        What was written.
+        The contents of the new `cameras.json`.
 
     Raises:
         CaptureError: If `out` exists, or the capture cannot be read.

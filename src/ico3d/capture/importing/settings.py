@@ -1,4 +1,4 @@
-"""Settings of taking over other programs' recordings."""
+"""Settings for importing recordings of other programs."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -10,15 +10,15 @@ from ico3d.errors import SettingsError
 
 @dataclass(frozen=True)
 class ImportSettings:
-    """How a recording is taken over.
+    """What an imported recording does not say itself.
 
     Attributes:
-        images: Folder of the pictures of a COLMAP model; `images` nearby by default.
-        fps: Frames per second of recordings whose frames have a time.
-        scale: Metres per unit of the source; COLMAP's worlds have any size.
+        images: Folder of a COLMAP model's pictures; by default a folder `images` nearby.
+        fps: Frames per second, for recordings whose pictures have times.
+        scale: Metres per unit of the source; COLMAP's unit is arbitrary.
         consent: What the person agreed to; goes into the avatar's manifest.
         licence: Licence of the recording; goes into the avatar's manifest.
-        shows: What fills the pictures: the whole body, or the head, to train one on.
+        shows: What fills the pictures: the whole body, or the head (for training a head).
     """
 
     images: Path | None = None

@@ -18,13 +18,14 @@ FARTHEST = 1e6
 
 
 def read_transforms(file: Path) -> Foreign:
-    """Reads the cameras of a file; each frame may have its own intrinsics.
+    """Reads cameras and pictures of a file; each frame may have intrinsics of its own.
 
     Args:
-        file: Paths of pictures start from its folder.
+        file: The file; the pictures' paths are relative to its folder.
 
     Raises:
-        CaptureError: If it is damaged, a picture is missing, or lenses are of another kind.
+        CaptureError: If the file is damaged, a picture is missing, or a lens model is not
+            supported.
     """
     content = read_json(file)
     frames = content.get("frames")

@@ -1,4 +1,4 @@
-"""Any picture of a video by its number, in any order."""
+"""Random access to the pictures of a video."""
 
 import os
 from bisect import bisect_right
@@ -13,22 +13,22 @@ from ico3d.capture.video import decoded_frames
 from ico3d.errors import CaptureError, MissingExtraError
 
 MOST_OPEN = 4
-"""Decoders kept: each holds a dozen pictures for reference."""
+"""Number of decoders that are kept; each holds a dozen reference pictures."""
 
 
 class Clip:
     """A video whose picture k, in the order of display, is frame k.
 
-    Pictures that follow one another are decoded once; others from the key picture before them.
-    Decoding has one thread and belongs to one process: a copy that was pickled, or inherited by a
-    forked process, opens the file anew.
+    Consecutive pictures are decoded once; for others decoding starts at the preceding key picture.
+    Decoding uses one thread and belongs to one process: a copy that was pickled, or inherited by a
+    forked process, opens the file again.
     """
 
     def __init__(self, path: Path):
-        """Names the file.
+        """Takes the path; the file is opened when a picture is needed.
 
         Args:
-            path: Where it lies.
+            path: Path of the video.
         """
         self.path = path
         self._index: _Index | None = None
@@ -39,18 +39,18 @@ class Clip:
 
     @property
     def count(self) -> int:
-        """How many pictures the file holds.
+        """Number of pictures in the file.
 
         Raises:
-            CaptureError: If it cannot be read.
+            CaptureError: If the file cannot be read.
         """
         return len(self._known().times)
 
     def picture(self, number: int) -> np.ndarray | None:
-        """A picture, uint8 RGB (H, W, 3), or None where the video ends before it.
+        """A picture, uint8 RGB (H, W, 3), or None if the video has fewer pictures.
 
         Raises:
-            CaptureError: If it cannot be decoded.
+            CaptureError: If the picture cannot be decoded.
         """
         index = self._known()
         if number >= len(index.times):
@@ -65,7 +65,7 @@ class Clip:
         return np.ascontiguousarray(np.rot90(frame.to_ndarray(format="rgb24", threads=1), turns))
 
     def close(self) -> None:
-        """Closes the file; the next picture opens it again."""
+        """Closes the file; the next call of `picture` opens it again."""
         if self._decoder is not None:
             self._decoder.close()
         self._decoder = None
@@ -77,14 +77,14 @@ class Clip:
 
 
 class OpenClips:
-    """Clips of which the last used ones stay open."""
+    """A cache of open clips, from which the least recently used ones are closed."""
 
     def __init__(self):
-        """Starts with none open."""
+        """Starts with an empty cache."""
         self._used: OrderedDict[Path, Clip] = OrderedDict()
 
     def picture(self, clip: Clip, number: int) -> np.ndarray | None:
-        """A picture of a clip, as `Clip.picture` gives it."""
+        """A picture of a clip, as `Clip.picture` returns it."""
         self._used[clip.path] = clip
         self._used.move_to_end(clip.path)
         if len(self._used) > MOST_OPEN:

@@ -1,4 +1,4 @@
-"""The person in front of a clean plate, by colour."""
+"""Cuts out a person by comparing a picture with the clean plate."""
 
 import numpy as np
 
@@ -7,36 +7,36 @@ from ico3d.errors import CaptureError
 
 PURPOSE = "cutting people out of their background"
 SURE, MAYBE = 34.0, 13.0
-"""Differences, in levels of 255, that a person must and that its parts may have."""
+"""Differences of colour, of 255, that some part of a person must have, and that others may have."""
 DARKEST_SHADOW = 0.72
-"""What darkens the plate evenly, by no more than this, is a shadow."""
+"""Least factor by which an even darkening of the plate still counts as a shadow."""
 EVEN = 0.03
-"""By how much the darkening of a shadow varies within a few pixels."""
+"""Largest variation of a shadow's darkening factor within a few pixels."""
 GAIN = 1.25
-"""Largest change of exposure between plate and picture."""
+"""Largest factor of exposure between plate and picture."""
 RIM = 1 / 250
-"""Width of the rim that is compared with what lies further inside, over the picture's height."""
+"""Width of the rim that is compared with a part's inside, as a share of the picture's height."""
 SHARP = 0.5
-"""At the outline of a shadow, the difference rises by less than this share of its inside."""
+"""At the outline of a shadow, the difference rises by less than this share of its inner value."""
 SMALLEST_PART = 0.004
-"""Parts smaller than this share of the largest are noise."""
+"""Size below which parts are noise, as a share of the largest part."""
 LARGEST_HOLE = 0.01
-"""Holes smaller than this share of the person are filled: spots of the plate's colour."""
+"""Size below which holes are filled, as a share of the person: clothes can match the plate."""
 EDGE = 1 / 500
-"""Half the width of the soft edge over the picture's height."""
+"""Half the width of the soft edge, as a share of the picture's height."""
 
 
 def matte(picture: np.ndarray, plate: np.ndarray) -> np.ndarray:
-    """Cuts out what differs from the plate.
+    """Cuts out what differs from the clean plate.
 
-    The exposure is matched, differences that neighbouring pixels of the plate explain are noise or
-    a camera that trembled, and even darkening is a shadow. What clearly differs, with all that
-    slightly differs around it, is the person; along its edge, opacity is where the colour lies
-    between plate and person.
+    The exposures are matched. Differences that neighbouring pixels of the plate explain are noise
+    or camera shake; even darkening is a shadow. Everything that differs clearly, together with
+    adjacent parts that differ slightly, is the person. Along the edge, opacity follows from where
+    the colour lies between plate and person.
 
     Args:
         picture: uint8 RGB (H, W, 3).
-        plate: (H, W, 3), of the same camera without the person.
+        plate: uint8 RGB (H, W, 3) of the same camera without the person.
 
     Returns:
         uint8 (H, W), 255 on the person.
@@ -56,7 +56,7 @@ def matte(picture: np.ndarray, plate: np.ndarray) -> np.ndarray:
 
 
 def exposure(picture: np.ndarray, plate: np.ndarray) -> np.ndarray:
-    """(3,) factors that make the plate as bright as the picture, by the median of likely pixels."""
+    """(3,) factors from the plate's to the picture's brightness, median over background pixels."""
     few = (slice(None, None, 4), slice(None, None, 4))
     ratio = (picture[few] + 1) / (plate[few] + 1)
     bright = plate[few].min(-1) > 24
@@ -68,7 +68,7 @@ def exposure(picture: np.ndarray, plate: np.ndarray) -> np.ndarray:
 
 
 def unexplained(picture: np.ndarray, plate: np.ndarray) -> np.ndarray:
-    """(H, W) by how much colours differ from the plate around them and from its shadows."""
+    """(H, W) difference of colour that neither nearby plate pixels nor shadows explain."""
     cv2 = opencv(PURPOSE)
     near = np.ones((3, 3), np.uint8)
     low, high = cv2.erode(plate, near), cv2.dilate(plate, near)
@@ -91,17 +91,17 @@ def _spread(values: np.ndarray, where: np.ndarray) -> np.ndarray:
 
 
 def soft_parts(difference: np.ndarray, parts: np.ndarray) -> np.ndarray:
-    """Those connected parts of a mask that fade in over many pixels, as shadows do.
+    """Connected parts of a mask that fade in over many pixels, as shadows do.
 
-    Grey clothes before a grey wall differ from it like a shadow, but their outline is sharp: the
-    difference inside is there at once.
+    Grey clothes before a grey wall differ from the wall like a shadow, but their outline is sharp:
+    the difference has its full value right at the edge.
 
     Args:
-        difference: (H, W) from the plate.
-        parts: (H, W) bool.
+        difference: (H, W) difference from the plate.
+        parts: (H, W) bool mask.
 
     Returns:
-        (H, W) bool.
+        (H, W) bool, the soft parts.
     """
     cv2 = opencv(PURPOSE)
     near = np.ones((3, 3), np.uint8)
@@ -125,11 +125,11 @@ def _means(values: np.ndarray, labels: np.ndarray, count: int) -> np.ndarray:
 
 
 def solid(sure: np.ndarray, maybe: np.ndarray) -> np.ndarray:
-    """(H, W) bool: connected parts of `maybe` that hold something sure, without specks and holes.
+    """(H, W) bool: connected parts of `maybe` that contain `sure` pixels, without specks and holes.
 
     Args:
-        sure: (H, W) bool.
-        maybe: (H, W) bool.
+        sure: (H, W) bool, pixels that certainly show the person.
+        maybe: (H, W) bool, pixels that may show the person.
     """
     cv2 = opencv(PURPOSE)
     near = np.ones((3, 3), np.uint8)
@@ -151,12 +151,12 @@ def solid(sure: np.ndarray, maybe: np.ndarray) -> np.ndarray:
 
 
 def soft_edge(picture: np.ndarray, plate: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """uint8 (H, W): opacity between the colours of the person and the plate along the outline.
+    """uint8 (H, W) opacity, soft along the outline by comparing colours of person and plate.
 
     Args:
-        picture: float32 (H, W, 3).
-        plate: (H, W, 3), without the person, in the exposure of the picture.
-        inside: (H, W) bool.
+        picture: float32 (H, W, 3) picture.
+        plate: float32 (H, W, 3) clean plate, matched to the picture's exposure.
+        inside: (H, W) bool, the person.
     """
     cv2 = opencv(PURPOSE)
     half = max(2, round(EDGE * inside.shape[0]))

@@ -1,4 +1,4 @@
-"""The file `cameras.json` of a multiview folder: `docs/captures/multiview.md`."""
+"""The file `cameras.json` of a multiview folder (docs/captures/multiview.md)."""
 
 import json
 import re
@@ -18,16 +18,16 @@ FORMAT, VERSION = "ico3d-multiview", 1
 MOST_FRAMES = 10_000_000
 SUBJECTS = ("body", "head")
 SAFE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
-"""Camera names are names of folders and files."""
+"""Allowed camera names, which are also names of folders and files."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """One camera: a lens and where it stands.
+    """A camera: lens, name and pose.
 
     Attributes:
-        lens: Of the recorded pictures; carries the name.
-        world_to_camera: (4, 4) rigid, OpenCV axes, metres.
+        lens: Lens of the recorded pictures; also holds the camera's name.
+        world_to_camera: (4, 4) rigid pose, OpenCV axes, metres.
     """
 
     lens: Lens
@@ -36,16 +36,16 @@ class Place:
 
 @dataclass(frozen=True)
 class Description:
-    """What `cameras.json` says.
+    """The contents of `cameras.json`.
 
     Attributes:
         fps: Frames per second.
-        num_frames: How many frames every camera took.
+        num_frames: Number of frames of every camera.
         places: The cameras.
-        sources: What the recording was made from.
+        sources: Data from which the recording was made.
         consent: What the person agreed to.
         licence: Licence of the recording.
-        shows: What fills the pictures: "body", or "head", with or without shoulders.
+        shows: What fills the pictures: "body", or "head" (with or without shoulders).
     """
 
     fps: float
@@ -57,7 +57,7 @@ class Description:
     shows: str = "body"
 
     def write(self, folder: Path) -> None:
-        """Writes the file into a folder."""
+        """Writes `cameras.json` into a folder."""
         content = {
             "format": FORMAT,
             "version": VERSION,
@@ -73,10 +73,10 @@ class Description:
 
 
 def read_description(folder: Path) -> Description:
-    """Reads `cameras.json`.
+    """Reads `cameras.json` from a folder.
 
     Raises:
-        CaptureError: If it is missing or damaged, or says what cannot be.
+        CaptureError: If the file is missing or damaged, or a value is impossible.
     """
     file = folder / NAME
     content = read_json(file)
@@ -125,17 +125,17 @@ def read_json(file: Path) -> dict:
 
 
 def number(entry: dict, key: str, where: str, least: float, most: float) -> float:
-    """A number of a JSON object.
+    """A number in a JSON object.
 
     Args:
         entry: The object.
-        key: Its name.
-        where: What the object is, for the error.
-        least: Smallest value that makes sense.
-        most: Largest value that makes sense.
+        key: Key of the number.
+        where: Name of the object, for errors.
+        least: Smallest allowed value.
+        most: Largest allowed value.
 
     Raises:
-        CaptureError: If it is missing, no number, or outside.
+        CaptureError: If the value is missing, no number, or outside of the limits.
     """
     value: Any = entry.get(key)
     # NaN is in no range; Python's whole numbers know no bounds, so they are compared as they are.
@@ -146,10 +146,10 @@ def number(entry: dict, key: str, where: str, least: float, most: float) -> floa
 
 
 def matrix(entry: dict, key: str, where: str, size: int) -> np.ndarray:
-    """A square matrix of a JSON object.
+    """A square matrix (size, size) in a JSON object; arguments as for `number`.
 
     Raises:
-        CaptureError: If it is missing or no finite matrix of this size.
+        CaptureError: If the value is missing or no finite matrix of this size.
     """
     try:
         values = np.array(entry.get(key), np.float64)

@@ -1,4 +1,4 @@
-"""The pictures of a multiview folder, as recorded: before lenses are straightened."""
+"""The files of a multiview folder: pictures as recorded, with lens distortion."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ VIDEOS = (".mp4", ".mkv", ".mov", ".webm", ".avi")
 
 
 class RecordedFiles:
-    """Pictures, masks and clean plates of all cameras of a folder."""
+    """Pictures, masks and clean plates of all cameras of a multiview folder."""
 
     def __init__(self, folder: Path, lenses: list[Lens]):
         """Finds out which cameras have pictures and which have videos.
@@ -27,11 +27,11 @@ class RecordedFiles:
         self._open = OpenClips()
 
     def clip(self, camera: int) -> Clip | None:
-        """The video of a camera, or None where it has pictures."""
+        """The video of a camera, or None for a camera with single pictures."""
         return self._clips[camera]
 
     def picture(self, camera: int, frame: int) -> np.ndarray | None:
-        """uint8 RGB or RGBA (H, W, C), or None where there is none."""
+        """uint8 RGB or RGBA (H, W, C), or None if missing."""
         clip = self._clips[camera]
         if clip is None:
             return self._decoded("images", camera, frame)
@@ -41,12 +41,12 @@ class RecordedFiles:
         return picture
 
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """uint8 (H, W), the largest channel of the mask picture, or None where there is none."""
+        """uint8 (H, W) largest channel of the mask picture, or None if missing."""
         picture = self._decoded("masks", camera, frame)
         return None if picture is None else largest_channel(picture)
 
     def plate(self, camera: int) -> np.ndarray | None:
-        """The clean plate, uint8 RGB (H, W, 3), or None where there is none."""
+        """uint8 RGB (H, W, 3) clean plate, or None if missing."""
         name = self._lenses[camera].name
         file = _existing(self.folder / "backgrounds", name)
         if file is None:
@@ -57,11 +57,11 @@ class RecordedFiles:
         return picture
 
     def file(self, kind: str, camera: int, frame: int) -> Path | None:
-        """The file of a picture ("images") or a mask ("masks"), or None where there is none."""
+        """Path of a picture (kind "images") or a mask (kind "masks"), or None if missing."""
         return _existing(self.folder / kind / self._lenses[camera].name, f"{frame:06d}")
 
     def is_damaged(self, kind: str, camera: int, frame: int) -> bool:
-        """Whether a file that is there cannot be a picture of its camera, by its first bytes."""
+        """Whether the first bytes of an existing file show that it is no picture of this camera."""
         file, lens = self.file(kind, camera, frame), self._lenses[camera]
         try:
             return file is not None and size_of(file, "") != (lens.width, lens.height)

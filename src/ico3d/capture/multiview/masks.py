@@ -1,4 +1,4 @@
-"""Masks of a multiview folder from its clean plates."""
+"""Computes masks of a multiview folder from the clean plates."""
 
 import io
 import logging
@@ -17,14 +17,14 @@ log = logging.getLogger(__name__)
 
 
 def make_masks(folder: Path, workers: int) -> int:
-    """Writes the masks that are missing; those that are there stay.
+    """Writes the missing masks; existing ones are kept.
 
     Args:
         folder: A multiview folder with `backgrounds/`.
-        workers: Threads.
+        workers: Number of threads.
 
     Returns:
-        How many masks were written.
+        The number of masks written.
 
     Raises:
         CaptureError: If the folder has no clean plate, or a picture is damaged.
@@ -62,7 +62,7 @@ def _masker(folder: Path, camera: int) -> View:
 
 
 def png(picture: np.ndarray) -> bytes:
-    """A uint8 picture as a PNG file."""
+    """Encodes a uint8 picture as PNG."""
     stream = io.BytesIO()
     Image.fromarray(picture).save(stream, "PNG", compress_level=3)
     return stream.getvalue()

@@ -1,4 +1,4 @@
-"""Work on all pictures of a capture, one thread for a camera at a time."""
+"""Processes all pictures of a capture in parallel, each camera in one thread."""
 
 import threading
 from collections.abc import Callable, Sequence
@@ -7,20 +7,20 @@ from concurrent.futures import ThreadPoolExecutor
 from ico3d.capture.multiview.writing import shown
 
 View = Callable[[int], int]
-"""Does something with a frame of one camera, and gives a count."""
+"""Function that processes a frame of one camera and returns a count."""
 
 
 def each_camera(
     start: Callable[[int], View], cameras: Sequence[int], num_frames: int, workers: int, what: str
 ) -> int:
-    """Calls a function for every view, a camera's frames in order: videos are decoded once.
+    """Processes every view, each camera's frames in order, so that videos are decoded once.
 
     Args:
-        start: Gives the function for a camera, with all it needs opened for it alone.
-        cameras: Numbers of the cameras.
-        num_frames: Frames of each.
-        workers: Threads.
-        what: What the progress bar says.
+        start: Returns the function for a camera, which opens files for itself alone.
+        cameras: Indices of the cameras.
+        num_frames: Number of frames of each camera.
+        workers: Number of threads.
+        what: Label of the progress bar.
 
     Returns:
         The sum of the counts.

@@ -1,4 +1,4 @@
-"""Reads a multiview folder: `docs/captures/multiview.md`."""
+"""Reads a multiview folder (docs/captures/multiview.md)."""
 
 from pathlib import Path
 
@@ -19,10 +19,10 @@ from ico3d.errors import CaptureError
 
 
 class MultiviewCapture(Capture):
-    """A recording by several cameras that stand still and run in step.
+    """A recording by several fixed, synchronised cameras.
 
-    Pictures, masks and plates come straightened where the lens bends lines. A picture with
-    transparency is its own mask, before black.
+    Pictures, masks and plates are undistorted. The transparency of an RGBA picture is its mask; the
+    picture is shown on black.
     """
 
     kind = "multiview"
@@ -58,7 +58,7 @@ class MultiviewCapture(Capture):
         self.blendshape_names = None if self._track is None else BLENDSHAPES
 
     def image(self, camera: int, frame: int) -> np.ndarray | None:
-        """The straightened picture, or None where there is none."""
+        """The undistorted picture, or None if missing."""
         picture = self.files.picture(camera, self._index(frame))
         if picture is None:
             return None
@@ -66,7 +66,7 @@ class MultiviewCapture(Capture):
         return straight[..., :3] * straight[..., 3:] if picture.shape[-1] == 4 else straight
 
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """The straightened mask, else the picture's opacity, else None."""
+        """The undistorted mask, else the picture's opacity, else None."""
         mask = self.files.mask(camera, self._index(frame))
         if mask is None and self.files.clip(camera) is None:
             picture = self.files.picture(camera, frame)
@@ -74,24 +74,24 @@ class MultiviewCapture(Capture):
         return None if mask is None else unit(self.lenses[camera].straightened(mask))
 
     def background(self, camera: int) -> np.ndarray | None:
-        """The straightened clean plate, or None where there is none."""
+        """The undistorted clean plate, or None if missing."""
         plate = self.files.plate(camera)
         return None if plate is None else unit(self.lenses[camera].straightened(plate))
 
     def audio(self) -> Sound | None:
-        """`audio.wav`, or None."""
+        """The sound of `audio.wav`, or None if missing."""
         return read_sound_file(self.path / "audio.wav")
 
     def world_from_head(self, frame: int) -> np.ndarray | None:
-        """(4, 4) as `ico3d capture track` found it, or None where it has not."""
+        """Head pose (4, 4) from `ico3d capture track`; None where that has not run."""
         return None if self._track is None else self._track.world_from_head[self._index(frame)]
 
     def eyes(self, frame: int) -> np.ndarray | None:
-        """(7,) eye and brow values that `ico3d capture track` found; None where it did not run."""
+        """(7,) eye and brow values from `ico3d capture track`; None where that has not run."""
         return None if self._track is None else self._track.eyes[self._index(frame)]
 
     def blendshapes(self, frame: int) -> np.ndarray | None:
-        """(52,) blendshapes that `ico3d capture track` found; None where it did not run."""
+        """(52,) blendshapes from `ico3d capture track`; None where that has not run."""
         return None if self._track is None else self._track.blendshapes[self._index(frame)]
 
     def landmarks_3d(self, frame: int) -> np.ndarray | None:
@@ -99,14 +99,18 @@ class MultiviewCapture(Capture):
         return None if self._track is None else self._track.landmarks[self._index(frame)]
 
     def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
-        """(68, 2) the tracked landmarks in pixels of the camera, wherever it looks."""
+        """(68, 2) tracked landmarks in pixels of a camera, even of one that sees no face."""
         if self._track is None:
             return None
         seen = self.cameras[camera].moved(self._track.world_from_head[self._index(frame)])
         return seen.project(self._track.landmarks[frame])[0]
 
     def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) of `points/FRAME.npy`; of heads, else, the visual hull; None where neither is."""
+        """(P, 3) points of `points/FRAME.npy`; else, for heads, the visual hull; else None.
+
+        Raises:
+            CaptureError: If the file of points is damaged.
+        """
         file = self.path / "points" / f"{self._index(frame):06d}.npy"
         if not file.is_file():
             return head_hull(self, frame) if self._shows_head else None
@@ -122,7 +126,7 @@ class MultiviewCapture(Capture):
 
     @property
     def provenance(self) -> dict:
-        """What `cameras.json` says about it."""
+        """Sources, consent and licence from `cameras.json`."""
         return {
             "kind": self.kind,
             "sources": list(self._about.sources),
@@ -131,7 +135,7 @@ class MultiviewCapture(Capture):
         }
 
     def inspect(self) -> list[Finding]:
-        """Pictures and masks that are missing or damaged, and videos that are too short."""
+        """Missing or damaged pictures and masks, and videos that are too short."""
         findings = [self._inspect_pictures()]
         if (self.path / "masks").is_dir():
             findings.append(self._inspect_masks())

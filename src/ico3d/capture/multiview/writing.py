@@ -1,4 +1,4 @@
-"""Writing multiview folders."""
+"""Helpers for writing multiview folders."""
 
 import shutil
 import tempfile
@@ -14,7 +14,7 @@ from ico3d.errors import CaptureError
 
 @contextmanager
 def new_folder(out: Path) -> Iterator[Path]:
-    """A folder to write into that becomes `out` when all went well, and is removed otherwise.
+    """A temporary folder that becomes `out` after the `with` block, or is removed if it raises.
 
     Raises:
         CaptureError: If `out` exists.
@@ -33,7 +33,7 @@ def new_folder(out: Path) -> Iterator[Path]:
 
 @contextmanager
 def shown(what: str, total: int) -> Iterator[Callable[[], None]]:
-    """A progress bar; the function it gives is called once for each step done."""
+    """A progress bar; yields a function to call after each step."""
     columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True)) as progress:
         task = progress.add_task(what, total=total)

@@ -1,8 +1,8 @@
-"""Who is person and who is background in a portrait clip with a steady camera.
+"""Separates person and background in a portrait clip with a fixed camera.
 
-There is no segmentation network here: colours of person and background are learnt on a few
-frames (GrabCut, seeded by the face), the background seen in any frame becomes a clean plate, and
-every frame is cut by colour, plate and face together.
+No segmentation network is used. Colours of person and background are learnt on a few frames
+(GrabCut, seeded by the face); background that is visible in any frame becomes a clean plate; every
+frame is then cut by colour, plate and face together.
 """
 
 from dataclasses import dataclass
@@ -12,18 +12,18 @@ import numpy as np
 from ico3d.capture.face.landmarks import CHIN, FACE_OVAL, FOREHEAD, SIDES
 
 WORK_SIZE = 256
-"""Short side in pixels of the images that are cut; edges are then found in full resolution."""
+"""Short side in pixels at which pictures are cut; edges are then refined at full resolution."""
 
 
 @dataclass(frozen=True)
 class Models:
-    """Colours of person and background.
+    """Colours of person and background, and the clean plate.
 
     Attributes:
         person: (1, 65) OpenCV's Gaussian mixture of the person.
-        background: (1, 65) likewise of the background.
-        plate: (h, w, 3) uint8 clean background in working size.
-        known: (h, w) bool, where the plate was seen.
+        background: (1, 65) OpenCV's Gaussian mixture of the background.
+        plate: (h, w, 3) uint8 clean plate in working size.
+        known: (h, w) bool, where background was visible.
     """
 
     person: np.ndarray
@@ -33,7 +33,7 @@ class Models:
 
 
 def working(image: np.ndarray) -> np.ndarray:
-    """The image in working size."""
+    """The picture, scaled down to working size."""
     import cv2
 
     scale = min(1.0, WORK_SIZE / min(image.shape[:2]))
@@ -41,14 +41,14 @@ def working(image: np.ndarray) -> np.ndarray:
 
 
 def seeds(shape: tuple[int, ...], landmarks: np.ndarray) -> np.ndarray:
-    """What the face tells about the rest of the picture.
+    """Initial labels of person and background, derived from the face.
 
     Args:
-        shape: (h, w, …) of the image.
-        landmarks: (478, 2) in its pixels.
+        shape: (h, w, …) shape of the picture.
+        landmarks: (478, 2) in pixels of the picture.
 
     Returns:
-        (h, w) uint8 of OpenCV's GrabCut classes.
+        (h, w) uint8 labels of OpenCV's GrabCut.
     """
     import cv2
 
@@ -93,11 +93,11 @@ def _trapezoid(top: np.ndarray, half_top: float, bottom: float, half_bottom: flo
 
 
 def learn(images: list[np.ndarray], landmarks: np.ndarray) -> Models:
-    """Learns the colours and the clean plate on a few frames.
+    """Learns colours and the clean plate from a few frames.
 
     Args:
-        images: uint8 RGB pictures in working size, spread over the clip.
-        landmarks: (F, 478, 2) of these, in their pixels.
+        images: uint8 RGB pictures (h, w, 3) in working size, spread over the clip.
+        landmarks: (F, 478, 2) in pixels of these pictures.
     """
     import cv2
 
@@ -122,7 +122,7 @@ def cut(image: np.ndarray, landmarks: np.ndarray, models: Models) -> np.ndarray:
     Args:
         image: uint8 RGB (H, W, 3).
         landmarks: (478, 2) pixels.
-        models: The colours of person and background, as `learn` gives them.
+        models: Colours and plate that `learn` returned.
 
     Returns:
         (H, W) float32 in [0, 1], 1 on the person.

@@ -1,4 +1,4 @@
-"""Writing the talking-portrait layout (reference: AD-NeRF, SyncTalk, TalkingGaussian)."""
+"""Reads and writes files of the talking-portrait layout (AD-NeRF, SyncTalk, TalkingGaussian)."""
 
 import json
 from collections.abc import Sequence
@@ -8,12 +8,12 @@ import numpy as np
 from PIL import Image
 
 DETAILS = "ico3d.json"
-"""File for what the talking-portrait layout has no place for."""
+"""File for data that have no place in the talking-portrait layout."""
 OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 def save_picture(path: Path, image: np.ndarray) -> None:
-    """Writes uint8 RGB(A) or grey; JPEGs with full colour resolution."""
+    """Writes uint8 RGB(A) or grey; JPEGs without chroma subsampling."""
     path.parent.mkdir(parents=True, exist_ok=True)
     picture = Image.fromarray(image)
     if path.suffix == ".jpg":
@@ -23,20 +23,20 @@ def save_picture(path: Path, image: np.ndarray) -> None:
 
 
 def save_landmarks(path: Path, landmarks: np.ndarray) -> None:
-    """Writes (68, 2) pixels as text, "x y" a line."""
+    """Writes landmarks (68, 2) in pixels as text, one line "x y" each."""
     path.write_text("".join(f"{x:.4f} {y:.4f}\n" for x, y in landmarks))
 
 
 def load_landmarks(path: Path) -> np.ndarray:
-    """Reads (68, 2) pixels."""
+    """Reads landmarks (68, 2) in pixels."""
     return np.loadtxt(path, dtype=np.float64).reshape(-1, 2)
 
 
 def camera_to_world(camera_from_head: np.ndarray) -> np.ndarray:
-    """`transform_matrix` of the layout, where the head stands still and the camera moves.
+    """The layout's `transform_matrix` (4, 4): the head is fixed in the world, the camera moves.
 
     Args:
-        camera_from_head: (4, 4) rigid, OpenGL camera axes.
+        camera_from_head: (4, 4) rigid head pose, OpenGL camera axes.
     """
     rotation, translation = camera_from_head[:3, :3], camera_from_head[:3, 3]
     matrix = np.eye(4)
@@ -56,9 +56,9 @@ def save_transforms(
 
     Args:
         folder: The capture.
-        focal: Pixels.
+        focal: Focal length in pixels.
         center: Principal point in pixels.
-        frames: True frame numbers of those with a face, ascending.
+        frames: Numbers of the frames with a face, ascending.
         poses: (len(frames), 4, 4) camera from head, OpenGL axes.
     """
     first_test = len(frames) * 10 // 11
@@ -72,7 +72,7 @@ def save_transforms(
 
 
 def save_torso(path: Path, image: np.ndarray, torso: np.ndarray) -> None:
-    """Writes the torso as RGBA; colour is 0 where alpha is.
+    """Writes the torso as RGBA; transparent pixels are black.
 
     Args:
         path: The PNG file.

@@ -1,4 +1,4 @@
-"""Face parsing pictures of the talking-portrait layout: which pixel is face, hair, neck, cloth."""
+"""Parsing pictures of the talking-portrait layout: a colour for face, hair, neck and cloth."""
 
 from dataclasses import dataclass
 
@@ -24,35 +24,35 @@ HAIR = (0, 0, 0)
 
 
 def is_class(parsing: np.ndarray, *colours: tuple[int, int, int]) -> np.ndarray:
-    """Where a parsing picture (H, W, 3) uint8 has one of the colours: float32 (H, W)."""
+    """float32 (H, W): 1 where a parsing picture (H, W, 3) uint8 has one of the colours."""
     hits = [(parsing == np.array(colour, np.uint8)).all(-1) for colour in colours]
     return np.logical_or.reduce(hits).astype(np.float32)
 
 
 @dataclass(frozen=True)
 class PartColours:
-    """How likely a colour is on each part.
+    """Distribution of colours on each part of a person.
 
     Attributes:
-        tables: Logarithm of the density over coarse CIELAB cells, by the part's parsing colour.
+        tables: Log density over coarse CIELAB cells, by the part's parsing colour.
     """
 
     tables: dict[tuple[int, int, int], np.ndarray]
 
 
 CELLS = (16, 32, 32)
-"""Cells of lightness, a and b."""
+"""Number of cells of lightness, a and b."""
 
 
 def learn_colours(
     images: list[np.ndarray], alphas: list[np.ndarray], landmarks: np.ndarray
 ) -> PartColours:
-    """Learns the colours of hair, skin and cloth where it is plain which is which.
+    """Learns the colours of hair, skin and cloth where the parts are unambiguous.
 
     Args:
         images: uint8 RGB (h, w, 3) pictures.
-        alphas: (h, w) person in each.
-        landmarks: (F, 478, 2) in their pixels.
+        alphas: (h, w) mask of the person in each picture.
+        landmarks: (F, 478, 2) in pixels of the pictures.
     """
     from scipy.ndimage import gaussian_filter
 
@@ -86,16 +86,16 @@ def _plain(person: np.ndarray, landmarks: np.ndarray) -> dict[tuple, np.ndarray]
 def parse(
     image: np.ndarray, alpha: np.ndarray, landmarks: np.ndarray, colours: PartColours
 ) -> np.ndarray:
-    """Colours the parts of a person.
+    """Labels the parts of a person by colour.
 
-    Face and mouth come from the landmarks; hair, neck and cloth are told apart by colour and by
-    where they are to the jaw line, which is carried on straight beside the face.
+    Face and mouth come from the landmarks. Hair, neck and cloth are distinguished by colour and by
+    their position relative to the jaw line, which is extended straight beside the face.
 
     Args:
         image: uint8 RGB (H, W, 3).
-        alpha: (H, W) person.
+        alpha: (H, W) mask of the person.
         landmarks: (478, 2) pixels.
-        colours: The colours of the parts, as `learn_colours` gives them.
+        colours: Colours that `learn_colours` returned.
 
     Returns:
         uint8 RGB (H, W, 3).
@@ -144,7 +144,7 @@ def _cells(image: np.ndarray) -> np.ndarray:
 
 
 def face_size(landmarks: np.ndarray) -> tuple[float, float]:
-    """Forehead to chin, and side to side, in pixels."""
+    """Size of a face in pixels: forehead to chin, and side to side."""
     tall = np.linalg.norm(landmarks[CHIN] - landmarks[FOREHEAD])
     return float(tall), float(np.linalg.norm(landmarks[SIDES[1]] - landmarks[SIDES[0]]))
 

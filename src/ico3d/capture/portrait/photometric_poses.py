@@ -1,9 +1,9 @@
-"""Poses by which one rigid cloud of Gaussians explains all pictures of a head.
+"""Corrects head poses so that one rigid cloud of Gaussians explains all pictures.
 
-Landmarks know the face; hair and ears lie far behind it, where half a degree is seen. A static
-cloud is fitted to the pictures together with a small correction of every pose, as portraits have
-been tracked photometrically since Face2Face. What speaks and blinks is the few percent of the head
-that L1 does not follow.
+Landmarks cover only the face; hair and ears lie far behind, where half a degree is visible. A
+static cloud is fitted to the pictures together with a small correction of every pose, in the manner
+of photometric tracking since Face2Face. L1 largely ignores the few percent of the head that speak
+and blink.
 """
 
 from collections.abc import Callable
@@ -26,29 +26,32 @@ from ico3d.splat.render import render
 console = Console(stderr=True)
 
 COUNT = 8_000
-"""Gaussians of the cloud."""
+"""Number of Gaussians of the cloud."""
 VISITS = 25
-"""How often each frame is looked at."""
+"""Number of times that each frame is used."""
 STEPS = (2_000, 30_000)
-"""Fewest and most steps: short clips need more visits, long ones share what they teach."""
+"""Limits of the number of steps: short clips need more visits per frame, long ones fewer."""
 WARM_UP = 0.05
-"""Share of the steps in which the poses stay: a grey cloud tells nothing about them."""
+"""Share of the steps with fixed poses, because an untrained cloud cannot correct them."""
 RATES = {"means": 1e-2, "quats": 2e-2, "log_scales": 3e-2, "colors": 5e-2, "opacities": 5e-2}
-"""Learning rates; that of the means times half the size of the cloud."""
+"""Learning rates; that of the means is also multiplied by half the size of the cloud."""
 DECAYS = {"means": 0.01, "quats": 0.1, "log_scales": 0.1, "colors": 0.1, "opacities": 0.1}
-"""Factors to which the rates have decayed at the last step."""
+"""Learning rates at the last step, as factors of those at the first."""
 POSE_RATE, POSE_DECAY = 3e-3, 0.1
-"""Radians; shifts learn by the same times `METRES_PER_RADIAN`."""
+"""Learning rate of rotations in radians, and its factor at the last step.
+
+Translations learn at the same rate times `METRES_PER_RADIAN`.
+"""
 METRES_PER_RADIAN = 1 / 6
 
 
 @dataclass(frozen=True)
 class Look:
-    """A picture to explain.
+    """A picture to be explained.
 
     Attributes:
         image: (H, W, 3) float32 in [0, 1].
-        head: (H, W) float32 in [0, 1], where it shows the head; elsewhere nothing is explained.
+        head: (H, W) float32 in [0, 1], 1 on the head; other pixels are ignored.
     """
 
     image: np.ndarray
@@ -57,12 +60,12 @@ class Look:
 
 @dataclass(frozen=True)
 class Refined:
-    """Corrected poses, and how much better pictures agree with them.
+    """Corrected poses, and the size of the corrections.
 
     Attributes:
-        poses: (F, 4, 4) camera from head.
-        turn: Mean angle in degrees by which poses were turned.
-        shift: Mean length in metres by which they were shifted.
+        poses: (F, 4, 4) corrected poses, camera from head.
+        turn: Mean rotation of a correction, degrees.
+        shift: Mean translation of a correction, metres.
     """
 
     poses: np.ndarray
@@ -71,10 +74,10 @@ class Refined:
 
 
 class Cloud(nn.Module):
-    """Static Gaussians and one correction per pose."""
+    """Static Gaussians, and one correction for each pose."""
 
     def __init__(self, points: np.ndarray, frames: int, rng: np.random.Generator):
-        """Grey, half transparent, no correction."""
+        """Starts with grey, half transparent Gaussians and no corrections."""
         super().__init__()
         chosen = resampled(np.asarray(points, np.float64), COUNT, rng)  # (N, 3)
         size = torch.from_numpy(np.log(spacing(chosen))).float()
@@ -87,7 +90,7 @@ class Cloud(nn.Module):
         nn.init.zeros_(self.corrections.weight)
 
     def forward(self, frame: int) -> Gaussians:
-        """The cloud as the corrected pose of a frame shows it."""
+        """The cloud, moved by the corrected pose of a frame."""
         rigid = Gaussians(
             self.means,
             self.quats,
@@ -100,7 +103,7 @@ class Cloud(nn.Module):
 
 
 def rigid_motion(correction: Tensor) -> Tensor:
-    """(4, 4) of a correction (6,): a rotation vector in radians, then a shift in the same unit."""
+    """(4, 4) of a correction (6,): rotation vector in radians, translation in the same unit."""
     zero = torch.zeros_like(correction[0])
     x, y, z = correction[:3]
     skew = torch.stack([zero, -z, y, z, zero, -x, -y, x, zero]).view(3, 3)
@@ -118,19 +121,19 @@ def refine_poses(
     device: DeviceName = "auto",
     seed: int = 0,
 ) -> Refined:
-    """Corrects poses by what the pictures show.
+    """Corrects poses so that they agree with the pictures.
 
     Args:
-        poses: (F, 4, 4) camera from head, from landmarks; the camera's own axes.
+        poses: (F, 4, 4) poses from landmarks, canonical head space to OpenCV camera axes.
         points: (P, 3) on the head, canonical head space, metres.
-        camera: Takes all pictures, from the origin of the space that `poses` lead to.
-        background: (H, W, 3) what it sees without the person.
-        look: Gives the picture of a pose by its place.
+        camera: The camera of all pictures, at the origin of the space to which `poses` lead.
+        background: (H, W, 3) clean plate of the camera.
+        look: Returns the picture of a pose, given the pose's index.
         device: Where to compute.
-        seed: Order of the pictures and choice of the points.
+        seed: Seed of the order of pictures and the choice of points.
 
     Returns:
-        Poses in the same canonical space: what all corrections have in common is taken out.
+        Corrected poses in the same canonical space; the common part of all corrections is removed.
     """
     rng = np.random.default_rng(seed)
     place = computing_device(device)

@@ -1,14 +1,14 @@
-"""Poses that the picture itself agrees with.
+"""Refines head poses by following points of the rigid face through the pictures.
 
-Face landmarks are guesses of a network and jitter by about a pixel. Skin, nose, glasses do not:
-points of the rigid face are followed from reference frames into every frame (Lucas-Kanade), and
-the poses are fitted to where they are found. Every reference speaks for itself; their mean
-decides, so that no single frame's error is handed on.
+Landmarks are estimates of a network and jitter by about a pixel. Points on skin, nose and glasses
+are therefore followed from reference frames into every frame (Lucas-Kanade), and poses are fitted
+to the positions found. The results of several references are averaged, so that no single frame's
+error is passed on.
 
-Only place, size and the turn in the picture come from there: patches of a nearly flat face hardly
-tell a turn out of the picture from a shift. Left free, that turn shrank on a real clip to a quarter
-of what all landmarks, the outline among them, agree on, and hair and shoulders were 20 px off. It
-comes from the landmarks, smoothed over time.
+Only position, size and rotation in the image plane come from these points, because patches of a
+nearly flat face hardly distinguish rotation out of the plane from translation. Fitted freely on a
+real clip, that rotation shrank to a quarter of what all landmarks agree on, and hair and shoulders
+were off by 20 pixels. Rotation out of the plane therefore comes from landmarks, smoothed over time.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,23 +21,23 @@ from ico3d.capture.portrait import rigid_head
 from ico3d.capture.portrait.rigid_head import Track
 
 REFERENCES = 8
-"""Reference frames, spread over the head poses of the clip."""
+"""Number of reference frames, spread over the head poses of the clip."""
 NEAREST = 4
-"""References that each frame is compared with: those closest in pose."""
+"""Number of references, closest in pose, that each frame is compared with."""
 ROUNDS = 3
 SMOOTHING = (9, 2)
-"""Window in frames and degree of the Savitzky-Golay filter over turns out of the picture."""
+"""Savitzky-Golay filter for rotations out of the image plane: window in frames, degree."""
 PATCH = 21
-"""Side in pixels of the patch that is followed, for a face 250 pixels wide."""
+"""Side in pixels of the patches that are followed, for a face 250 pixels wide."""
 
 
 @dataclass(frozen=True)
 class Reference:
-    """A frame that others are compared with.
+    """A frame with which others are compared.
 
     Attributes:
-        index: Its place in the track.
-        image: (H, W) uint8 grey.
+        index: Index of the frame in the track.
+        image: (H, W) uint8 grey picture.
     """
 
     index: int
@@ -45,15 +45,15 @@ class Reference:
 
 
 def align(track: Track, rigid: np.ndarray, load: Callable[[int], np.ndarray]) -> Track:
-    """Refines the poses of a track by what the pictures show.
+    """Refines the poses of a track so that they agree with the pictures.
 
     Args:
         track: Shape, focal length and poses from landmarks.
         rigid: (K,) bool: landmarks that do not move with the expression.
-        load: Gives the grey picture (H, W) uint8 of a frame by its place in the track.
+        load: Returns the grey picture (H, W) uint8 of a frame, given its index in the track.
 
     Returns:
-        The track with better poses; shape and focal length stay.
+        The track with refined poses; shape and focal length are unchanged.
     """
     track = replace(track, rotations=_smooth(track.rotations))
     references = [Reference(i, load(i)) for i in spread_poses(track, REFERENCES)]
@@ -81,7 +81,8 @@ def _smooth(rotations: np.ndarray) -> np.ndarray:
 def rigid_landmarks(canonical: np.ndarray) -> np.ndarray:
     """(K,) bool: nose, cheekbones and temples of the canonical face (K, 3), metres.
 
-    Lips, jaw, lids and brows move with the expression; the outline slides over the skin.
+    Lips, jaw, lids and brows move with the expression, and landmarks of the outline slide over the
+    skin.
     """
     x, y, z = np.abs(canonical[:, 0]), canonical[:, 1], canonical[:, 2]
     nose = (x < 0.022) & (y > -0.016) & (y < 0.045)
@@ -105,15 +106,15 @@ def spread_poses(track: Track, count: int) -> list[int]:
 def follow(
     track: Track, references: Sequence[Reference], load: Callable[[int], np.ndarray]
 ) -> np.ndarray:
-    """Where the pictures show the rigid points.
+    """Positions of the rigid points in all pictures.
 
     Args:
         track: Shape and poses to start from.
-        references: The frames to compare with.
-        load: Gives the grey picture of a frame.
+        references: Frames to compare with.
+        load: Returns the grey picture (H, W) uint8 of a frame, given its index in the track.
 
     Returns:
-        (F, K, 2) pixels: mean over the references; the projection where none finds a point.
+        (F, K, 2) pixels: mean over the references, or the projected point where none finds it.
     """
     pixels = track.project()
     width = np.ptp(pixels[:, :, 0], axis=1).mean()

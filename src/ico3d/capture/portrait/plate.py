@@ -3,18 +3,18 @@
 import numpy as np
 
 SAMPLES = 24
-"""Frames whose median makes the plate."""
+"""Number of frames whose median makes the plate."""
 
 
 def clean_plate(images: list[np.ndarray], alphas: list[np.ndarray]) -> tuple[np.ndarray, float]:
-    """Median of the pixels that show background, and a smooth guess where none ever does.
+    """Median of background pixels, with a smooth guess where background is never visible.
 
     Args:
         images: uint8 RGB (H, W, 3) pictures.
-        alphas: (H, W) person in each.
+        alphas: (H, W) mask of the person in each picture.
 
     Returns:
-        uint8 RGB (H, W, 3), and the share of pixels that were seen.
+        uint8 RGB (H, W, 3), and the share of pixels where background was visible.
     """
     import cv2
 
@@ -27,7 +27,7 @@ def clean_plate(images: list[np.ndarray], alphas: list[np.ndarray]) -> tuple[np.
 
 
 def mismatch(plate: np.ndarray, images: list[np.ndarray], alphas: list[np.ndarray]) -> float:
-    """Median over pictures of the mean difference, 0 to 1, between plate and what is around."""
+    """Mean difference, 0 to 1, between plate and background pixels; median over the pictures."""
     around = [alpha < 0.01 for alpha in alphas]
     return float(
         np.median(
@@ -40,11 +40,11 @@ def mismatch(plate: np.ndarray, images: list[np.ndarray], alphas: list[np.ndarra
 
 
 def filled(image: np.ndarray, seen: np.ndarray) -> np.ndarray:
-    """Fills what was not seen from its surroundings: halve until nothing is missing, and back.
+    """Fills unseen pixels from their surroundings, by a pyramid of halved pictures.
 
     Args:
         image: (H, W, 3) float32.
-        seen: (H, W) bool.
+        seen: (H, W) bool, pixels with a known value.
     """
     import cv2
 

@@ -1,4 +1,4 @@
-"""Reading the talking-portrait layout, ours and that of other tools."""
+"""Reads the talking-portrait layout, written by ico3d or by other programs."""
 
 import json
 from collections.abc import Callable
@@ -25,18 +25,18 @@ Result = TypeVar("Result")
 class TalkingPortrait(Capture):
     """A talking-portrait folder: one steady camera, one head.
 
-    The world is the camera's own frame with OpenGL axes (y up, the camera looks along -z), so a
-    person facing the camera faces +Z. Frame numbers are the file numbers; a frame without a face
-    has no image and no pose, and is in neither part of the split.
+    The world is the camera's frame in OpenGL axes (y up, camera looks along -z), so a person who
+    faces the camera faces +z. Frame numbers are those of the files. A frame without a face has no
+    picture and no pose, and is in neither part of the split.
     """
 
     kind = "portrait"
 
     def __init__(self, path: Path):
-        """Opens the folder and checks that its parts agree; pictures are read when asked for.
+        """Opens the folder and checks that its files agree; pictures are read when asked for.
 
         Raises:
-            CaptureError: Naming the file and the frame that is missing, damaged or off.
+            CaptureError: If a file is missing or damaged; the sentence names file and frame.
         """
         self.path = path
         self._details = _read_json(path / DETAILS) if (path / DETAILS).is_file() else {}
@@ -57,13 +57,13 @@ class TalkingPortrait(Capture):
         self._check_rows()
 
     def image(self, camera: int, frame: int) -> np.ndarray | None:
-        """The person before the clean plate where the folder has that, else the frame itself."""
+        """The person on the clean plate if the folder has one, else the recorded picture."""
         if frame not in self._poses:
             return None
         return _picture(self._first(f"gt_imgs/{frame}.jpg", f"ori_imgs/{frame}.jpg"))
 
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """The person: our soft mask, else everything that parsing does not call background."""
+        """The soft mask that ico3d writes, else all pixels not parsed as background."""
         soft = self.path / "alpha" / f"{frame}.png"
         if frame in self._poses and soft.is_file():
             return _picture(soft)
@@ -71,7 +71,7 @@ class TalkingPortrait(Capture):
         return None if parsing is None else 1.0 - is_class(parsing, BACKGROUND)
 
     def head_mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """Face, hair and mouth."""
+        """The mask of face, hair and mouth."""
         parsing = self._parsing(frame)
         return None if parsing is None else is_class(parsing, FACE, HAIR, MOUTH)
 
@@ -81,23 +81,27 @@ class TalkingPortrait(Capture):
         return _picture(plate) if plate.is_file() else None
 
     def audio(self) -> Sound | None:
-        """`aud.wav`, at 16 kHz."""
+        """The sound of `aud.wav` at 16 kHz."""
         return read_sound_file(self.path / "aud.wav")
 
     def world_from_head(self, frame: int) -> np.ndarray | None:
-        """The pose of a frame with a face."""
+        """The head pose (4, 4) of a frame; None without a face."""
         return self._poses.get(frame)
 
     def eyes(self, frame: int) -> np.ndarray | None:
-        """From blendshapes, else from action units, smoothed over time."""
+        """(7,) eye values from blendshapes, else from action units, smoothed over time."""
         return None if self._eyes is None or frame >= len(self._eyes) else self._eyes[frame]
 
     def blendshapes(self, frame: int) -> np.ndarray | None:
-        """A row of `bs.npy`."""
+        """(52,) weights from `bs.npy`."""
         return None if self._blendshapes is None else self._blendshapes[frame]
 
     def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
-        """The `.lms` file beside the frame."""
+        """(68, 2) pixels from the `.lms` file of the frame.
+
+        Raises:
+            CaptureError: If the file is damaged.
+        """
         path = self.path / "ori_imgs" / f"{frame}.lms"
         if frame not in self._poses or not path.is_file():
             return None
@@ -107,7 +111,7 @@ class TalkingPortrait(Capture):
         return points
 
     def points(self, frame: int = 0) -> np.ndarray | None:
-        """The tracked face with a guess of the body around it, or a guess of both."""
+        """(P, 3) tracked face with a guessed body around it, or a guess of both."""
         path = self.path / "points.npy"
         if not path.is_file():
             return unknown_person()
@@ -115,13 +119,13 @@ class TalkingPortrait(Capture):
 
     @property
     def provenance(self) -> dict:
-        """What the folder says about itself."""
+        """Consent, licence and sources, as far as the folder states them."""
         unknown = {"sources": [self.path.name], "consent": "not stated", "licence": "not stated"}
         return {"kind": self.kind, **unknown, **self._details.get("provenance", {})}
 
     @property
     def details(self) -> dict:
-        """`ico3d.json`: what our own tracker adds; empty for folders of other tools."""
+        """Contents of `ico3d.json`, which ico3d's tracker writes; empty for other folders."""
         return self._details
 
     @cached_property

@@ -1,9 +1,9 @@
-"""One rigid head through a whole clip: focal length, head shape and a pose per frame.
+"""Fits one rigid head to a whole clip: focal length, shape, and a pose for each frame.
 
-Bundle adjustment over face landmarks. The head model that is trained on the result has static
-geometry, so the poses must be those of the skull: landmarks that move with the expression are
-recognised by their residuals and lose their say. Camera axes are OpenGL's (x right, y up, the
-camera looks along -z), as in the talking-portrait layout.
+This is a bundle adjustment over face landmarks. The head model that is trained on the result has
+static geometry, so the poses must be those of the skull: landmarks that move with the expression
+are recognised by their residuals and weighted down. Camera axes are OpenGL's (x right, y up, camera
+looks along -z), as in the talking-portrait layout.
 """
 
 from dataclasses import dataclass, replace
@@ -14,35 +14,35 @@ from scipy.spatial.transform import Rotation
 from ico3d.common.spread import spread
 
 FOCAL_GUESS = 2.3
-"""Focal length over the longer image side of a usual portrait video."""
+"""Focal length of a usual portrait video, as a factor of the longer image side."""
 FOCAL_SPREAD = 0.4
-"""Standard deviation of the logarithm of that guess."""
+"""Standard deviation of the logarithm of `FOCAL_GUESS`."""
 SHAPE_SPREAD = 0.004
-"""Metres by which a person's landmarks differ from the canonical face."""
+"""Usual deviation of a person's landmarks from the canonical face, metres."""
 INDEPENDENT = 20
-"""Landmark errors repeat from frame to frame: a clip tells as much as this many separate frames."""
+"""Number of independent frames that a clip is worth, as landmark errors repeat over frames."""
 FIT_FRAMES = 120
-"""Frames that shape and focal length are fitted on; poses are then found for all."""
+"""Number of frames on which shape and focal length are fitted; poses follow for all frames."""
 
 ALL_FREEDOMS = (0, 1, 2, 3, 4, 5)
-"""Turns about the camera's axes, then shifts along them."""
+"""Degrees of freedom of a pose: rotations about the camera's axes, then translations along them."""
 IN_PLANE = (2, 3, 4, 5)
-"""What a picture of a nearly flat face tells well: its turn in the picture, place and size."""
+"""Degrees that a flat face determines well: rotation in the image plane, position and size."""
 CHUNK = 256
-"""Frames whose poses are solved for at once."""
+"""Number of frames whose poses are solved for at once."""
 
 
 @dataclass(frozen=True)
 class Track:
-    """A tracked head.
+    """A tracked head in a portrait clip.
 
     Attributes:
-        focal: Pixels.
+        focal: Focal length in pixels.
         center: (2,) principal point in pixels.
         shape: (K, 3) the person's landmarks at rest in canonical head space, metres.
         rotations: (F, 3, 3) camera from head, OpenGL axes.
-        translations: (F, 3) metres, the head's origin in these camera axes.
-        sigmas: (K,) pixels by which each landmark strays from the rigid head.
+        translations: (F, 3) position of the head's origin in OpenGL camera axes, metres.
+        sigmas: (K,) deviation of each landmark from the rigid head, pixels.
     """
 
     focal: float
@@ -53,11 +53,11 @@ class Track:
     sigmas: np.ndarray
 
     def project(self) -> np.ndarray:
-        """(F, K, 2) pixels of the rigid landmarks in all frames."""
+        """(F, K, 2) the rigid landmarks of all frames in pixels."""
         return _project(self, _local(self))
 
     def poses(self) -> np.ndarray:
-        """(F, 4, 4) camera from head, OpenGL axes."""
+        """(F, 4, 4) camera from head, OpenGL axes, metres."""
         poses = np.tile(np.eye(4), (len(self.rotations), 1, 1))
         poses[:, :3, :3], poses[:, :3, 3] = self.rotations, self.translations
         return poses
@@ -71,18 +71,18 @@ def fit(
     image_size: tuple[int, int],
     focal: float | None = None,
 ) -> Track:
-    """Fits focal length, shape and poses.
+    """Fits focal length, shape and poses to landmarks.
 
     Args:
         landmarks: (F, K, 2) pixels.
-        start: (F, 4, 4) rough camera-from-head poses (OpenGL axes, metres, any focal length).
+        start: (F, 4, 4) rough poses, camera from head (OpenGL axes, metres, any focal length).
         shape: (K, 3) the canonical face in metres.
-        rigidity: (K,) in [0, 1]: which landmarks to trust before anything is known.
+        rigidity: (K,) initial trust in each landmark, in [0, 1].
         image_size: (width, height) in pixels.
-        focal: Focal length in pixels where it is known.
+        focal: Focal length in pixels, or None to estimate it.
 
     Returns:
-        The track; its poses are as noisy as the landmarks (see `alignment`).
+        The track; its poses are as noisy as the landmarks (`picture_poses.align` refines them).
     """
     chosen = spread(len(landmarks), FIT_FRAMES)
     track = _start(start[chosen], shape, image_size, focal)
@@ -104,13 +104,13 @@ def place(
     start: np.ndarray,
     freedoms: tuple[int, ...] = ALL_FREEDOMS,
 ) -> Track:
-    """Poses for the landmarks of any frames, shape and focal length given.
+    """Fits poses to landmarks of any frames, with known shape and focal length.
 
     Args:
         track: Shape, focal length and weights.
         landmarks: (F, K, 2) pixels.
-        start: (F, 4, 4) poses to start from.
-        freedoms: Which of `ALL_FREEDOMS` to solve for; the others stay as in `start`.
+        start: (F, 4, 4) initial poses, camera from head.
+        freedoms: Those of `ALL_FREEDOMS` to solve for; the others keep their initial values.
     """
     parts = [
         _placed(track, landmarks[first : first + CHUNK], start[first : first + CHUNK], freedoms)

@@ -1,4 +1,4 @@
-"""From a video of somebody talking to a tracked capture in the talking-portrait layout."""
+"""Tracks a video of somebody talking and writes a capture in the talking-portrait layout."""
 
 import json
 import shutil
@@ -43,9 +43,9 @@ from ico3d.errors import CaptureError
 
 FPS = 25.0
 MOVING = 0.04
-"""Mean difference from the clean plate above which a camera cannot have stood still."""
+"""Mean difference from the clean plate, 0 to 1, above which the camera must have moved."""
 REFINED_SIZE = 256
-"""Pixels of the short side of pictures that refine poses."""
+"""Short side in pixels of the pictures by which poses are corrected."""
 console = Console(stderr=True)
 
 
@@ -54,12 +54,12 @@ class PortraitSettings:
     """How a video becomes a portrait capture.
 
     Attributes:
-        size: Longest short side of the pictures in pixels; larger videos are scaled down.
-        focal: Focal length in pixels of the video as it is; estimated where None.
-        refine: Whether poses are corrected by the pictures of the whole head.
+        size: Upper limit of the pictures' short side in pixels; larger videos are scaled down.
+        focal: Focal length in pixels of the original video; None to estimate it.
+        refine: Whether to correct the poses by pictures of the whole head.
         consent: What the person agreed to.
         licence: Licence of the recording.
-        device: Where poses are corrected.
+        device: Where to correct the poses.
     """
 
     size: int = 512
@@ -72,14 +72,14 @@ class PortraitSettings:
 
 @dataclass
 class Readings:
-    """What the face model says about a clip.
+    """What MediaPipe's face model finds in a clip.
 
     Attributes:
-        landmarks: One (478, 2) per frame with a face, pixels.
-        blendshapes: (52,) for each frame in which a face was found.
-        poses: (4, 4) for each such frame, as the face detector guesses the head's pose.
-        frames: The numbers of these frames.
-        missing: The numbers of the frames without a face.
+        landmarks: (478, 2) pixels for each frame with a face.
+        blendshapes: (52,) weights for each frame with a face.
+        poses: (4, 4) rough head pose for each frame with a face, see `Face.pose`.
+        frames: Numbers of the frames with a face.
+        missing: Numbers of the frames without a face.
         names: Names of the blendshapes.
     """
 
@@ -92,23 +92,23 @@ class Readings:
 
     @property
     def total(self) -> int:
-        """All frames of the clip."""
+        """Number of all frames of the clip."""
         return len(self.frames) + len(self.missing)
 
 
 def track_portrait(video: Path, out: Path, settings: PortraitSettings) -> None:
-    """Tracks a video and writes the capture; `out` appears only when everything is there.
+    """Tracks a video and writes the capture; `out` appears only once it is complete.
 
     Args:
-        video: A video file of one person, steady camera.
+        video: A video of one person by a fixed camera.
         out: Folder to make.
-        settings: Size, focal length and what goes into the manifest.
+        settings: Size, focal length, and data for the avatar's manifest.
 
     Raises:
         CaptureError: If `out` exists, or the video cannot be read or shows no face.
-        SettingsError: If poses shall be corrected with CUDA, and it does not work.
+        SettingsError: If CUDA is asked for and does not work.
         MissingExtraError: If MediaPipe is not installed.
-        MissingModelError: If the face model is not there.
+        MissingModelError: If the face model is not installed.
     """
     if out.exists():
         raise CaptureError(f"{out} exists already: remove it or choose another folder.")

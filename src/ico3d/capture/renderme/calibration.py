@@ -7,19 +7,19 @@ from ico3d.capture.smc.file import SmcFile
 from ico3d.errors import CaptureError
 
 FPS, MANY_FPS = 30.0, 15.0
-"""Speech that many cameras recorded has every other frame."""
+"""Usual frame rate, and that of speech recorded by many cameras: every other frame is kept."""
 MANY = 38
-"""How many cameras have pictures in a recording at `MANY_FPS`."""
+"""Number of cameras with pictures from which on a speech recording has the rate `MANY_FPS`."""
 
 
 def read_cameras(raw: SmcFile, calibration: SmcFile) -> tuple[list[SmcCamera], list[str]]:
-    """All cameras that have pictures and a calibration, by number.
+    """All cameras that have pictures and a calibration, in order of their numbers.
 
     Returns:
         The cameras, and the names of those that have pictures but no calibration.
 
     Raises:
-        CaptureError: If there are none, or one is damaged.
+        CaptureError: If there is no such camera, or a calibration is damaged.
     """
     cameras, lost = [], []
     for name in sorted(key for key in raw.keys("Camera") if key.isdecimal()):
@@ -46,10 +46,10 @@ def frame_rate(
     """Frames per second, which the files do not state.
 
     Args:
-        part: What was performed.
+        part: Name of the performed part, see `Files.part`.
         cameras: The cameras that have pictures.
-        num_frames: How many frames each has.
-        seconds: Length of the sound, which decides where there is one.
+        num_frames: Number of frames of each camera.
+        seconds: Duration of the sound, which decides the rate; None without sound.
     """
     if seconds:
         measured = num_frames / seconds

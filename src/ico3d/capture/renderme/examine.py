@@ -1,4 +1,4 @@
-"""Examining the files of a RenderMe-360 recording without decoding a picture."""
+"""Checks the files of a RenderMe-360 recording without decoding pictures."""
 
 from collections.abc import Sequence
 
@@ -16,15 +16,15 @@ def examine_files(
     fitted: int,
     points: int,
 ) -> list[Finding]:
-    """What is missing or damaged.
+    """Missing or damaged pictures and annotations.
 
     Args:
-        raw: Pictures.
-        masks: The file with the masks.
+        raw: File with the pictures.
+        masks: File with the masks.
         cameras: The cameras.
-        num_frames: Frames each should have.
-        fitted: Frames with a FLAME fit.
-        points: Frames with landmarks in space.
+        num_frames: Number of frames that each camera should have.
+        fitted: Number of frames with a FLAME fit.
+        points: Number of frames with 3D landmarks.
     """
     folders = {camera.name: camera.pictures for camera in cameras}
     findings = [examine_views("views", raw, folders, num_frames)]
@@ -39,5 +39,5 @@ def examine_files(
 
 
 def mask_folder(name: str) -> str:
-    """The group of a camera's mattes."""
+    """Path of the group with a camera's masks."""
     return f"Camera/{name}/mask"

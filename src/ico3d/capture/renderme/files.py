@@ -1,4 +1,4 @@
-"""Which files make a RenderMe-360 recording."""
+"""Finds the files of a RenderMe-360 recording."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,8 +14,8 @@ class Files:
     """The files of one recording.
 
     Attributes:
-        raw: Pictures, and often the sound.
-        annotations: Masks, calibration, FLAME, keypoints; None where they were not fetched.
+        raw: File with the pictures, and often the sound.
+        annotations: File with masks, calibration, FLAME and keypoints; None if not downloaded.
     """
 
     raw: Path
@@ -23,31 +23,31 @@ class Files:
 
     @property
     def name(self) -> str:
-        """Person and part, such as "0026_e0"."""
+        """Person and part of the recording, such as "0026_e0"."""
         return self.raw.stem.removesuffix(RAW)
 
     @property
     def part(self) -> str:
-        """What was performed: "e" and a number for expressions, "h…" hair, "s…" speech."""
+        """The performed part: "e" and a number for expressions, "h…" for hair, "s…" for speech."""
         return self.name.partition("_")[2]
 
 
 def is_recording(path: Path) -> bool:
-    """Whether a path is, or a folder holds, an SMC file named as RenderMe-360 names them."""
+    """Whether a path is an SMC file named as in RenderMe-360, or a folder that holds one."""
     return any(p.stem.endswith((RAW, ANNOTATIONS)) for p in _candidates(path))
 
 
 def find_files(path: Path) -> Files:
-    """Finds what belongs together.
+    """Finds the files that belong to one recording.
 
-    Annotations lie beside the raw file, or where the data set has them: in a folder "anno" that
-    has the place of the folder "raw".
+    Annotations lie beside the raw file, or where the data set puts them: in a folder "anno" beside
+    the folder "raw".
 
     Args:
         path: The raw file, or a folder that holds one recording.
 
     Raises:
-        CaptureError: If there are several recordings, or there are no pictures.
+        CaptureError: If the folder holds several recordings, or pictures are missing.
     """
     if path.is_file() and not path.stem.endswith(RAW):
         raise CaptureError(f"{path} has no pictures: name the file that ends in _raw.smc instead.")

@@ -1,8 +1,8 @@
-"""FLAME fits of a RenderMe-360 recording, and the pose of the skull that they show.
+"""FLAME fits of a RenderMe-360 recording, and head poses that follow from them.
 
-The face model itself is not needed: the files hold its vertices. These exclude the fit's
-translation, world = verts + cam[1:4], and the neck turns the head against the root joint, so the
-pose is taken from the vertices of the upper head: a rigid fit of the mean skull to each frame.
+The FLAME model itself is not needed, because the files contain its vertices. These lack the fit's
+translation: world = verts + cam[1:4]. FLAME's neck joint turns the head relative to the root, so
+the head pose is computed from the vertices: the mean upper head is fitted rigidly to each frame.
 """
 
 from dataclasses import dataclass
@@ -18,9 +18,9 @@ from ico3d.errors import CaptureError
 
 VERTICES = 5023
 UPPER = 0.7
-"""Vertices above this part of the mesh's height are the upper head: eyes, forehead and skull."""
+"""Vertices above this share of the mesh's height form the upper head: eyes, forehead and skull."""
 MEASURED = 24
-"""Frames that tell how steady each vertex is."""
+"""Number of frames in which the steadiness of each vertex is measured."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +28,12 @@ class FlameFit:
     """The FLAME model fitted to one frame.
 
     Attributes:
-        global_pose: (3,) axis-angle of the whole model, in the world of the files.
-        neck_pose: (3,) axis-angle of the head against it.
-        jaw_pose: (3,).
-        eye_poses: (2, 3) left, right.
-        shape: (100,).
-        expression: (50,).
+        global_pose: (3,) axis-angle rotation of the whole model, in the world of the files.
+        neck_pose: (3,) axis-angle rotation of the head relative to the whole model.
+        jaw_pose: (3,) axis-angle rotation of the jaw.
+        eye_poses: (2, 3) axis-angle rotations of the left and the right eye.
+        shape: (100,) shape parameters.
+        expression: (50,) expression parameters.
         vertices: (5023, 3) metres in the capture's world.
     """
 
@@ -48,12 +48,12 @@ class FlameFit:
 
 @dataclass(frozen=True)
 class Skull:
-    """The rigid part of the mesh.
+    """The rigid part of the FLAME mesh.
 
     Attributes:
-        chosen: (M,) which vertices.
-        points: (M, 3) where they are in canonical head space, metres.
-        weights: (M,) how much each counts.
+        chosen: (M,) indices of the vertices.
+        points: (M, 3) positions in canonical head space, metres.
+        weights: (M,) weights by steadiness.
     """
 
     chosen: np.ndarray
@@ -62,15 +62,15 @@ class Skull:
 
 
 class FlameFits:
-    """The fits of all frames, read one by one."""
+    """FLAME fits of all frames, read one at a time."""
 
     def __init__(self, file: SmcFile, num_frames: int, upright: np.ndarray):
         """Lists the frames that have a fit.
 
         Args:
             file: The file with the group FLAME.
-            num_frames: Frames of the recording.
-            upright: (3, 3) rotation from the world of the files to the capture's.
+            num_frames: Number of frames of the recording.
+            upright: (3, 3) rotation from the world of the files to the capture's world.
 
         Raises:
             CaptureError: If the file is damaged.
@@ -80,10 +80,10 @@ class FlameFits:
         self.frames: tuple[int, ...] = tuple(frame for frame in found if frame < num_frames)
 
     def at(self, frame: int) -> FlameFit | None:
-        """The fit of a frame, or None where there is none.
+        """The fit of a frame, or None.
 
         Raises:
-            CaptureError: If a part is missing or damaged.
+            CaptureError: If an array is missing or damaged.
         """
         vertices = self.vertices(frame)
         if vertices is None:
@@ -100,7 +100,11 @@ class FlameFits:
         )
 
     def vertices(self, frame: int) -> np.ndarray | None:
-        """(5023, 3) metres in the capture's world, or None where there is no fit."""
+        """(5023, 3) vertices in the capture's world, metres; None without a fit.
+
+        Raises:
+            CaptureError: If an array is missing or damaged.
+        """
         if frame not in self.frames:
             return None
         vertices = self._part(frame, "verts", VERTICES * 3).reshape(VERTICES, 3)
@@ -110,7 +114,7 @@ class FlameFits:
         return (vertices + translation) @ self._upright.T
 
     def pose(self, frame: int) -> np.ndarray | None:
-        """(4, 4) world from canonical head space, or None where there is no fit."""
+        """Head pose (4, 4), canonical head space to world; None without a fit."""
         vertices = self.vertices(frame)
         if vertices is None:
             return None

@@ -1,4 +1,4 @@
-"""The 106 landmarks in pictures of a RenderMe-360 recording: as Multi-PIE's 68, and in space."""
+"""The 106 landmarks of RenderMe-360: selection of Multi-PIE's 68, and triangulation."""
 
 import numpy as np
 
@@ -7,18 +7,21 @@ from ico3d.common.camera import Camera
 
 POINTS = 106
 MULTI_PIE = np.concatenate([np.arange(0, 33, 2), np.arange(33, 64), np.arange(84, 104)])
-"""Where Multi-PIE's 68 are among SenseTime's 106: every other point of the jaw, and brows, nose,
-eyes and lips without what lies between; both run from the person's right to the left."""
+"""Indices of Multi-PIE's 68 landmarks among SenseTime's 106.
+
+The selection takes every other point of the jaw, and brows, nose, eyes and lips without the points
+in between. Both sets run from the person's right to the left.
+"""
 LEAST_VIEWS = 2
 AGREEING = 3.0
-"""Rays that pass by a point within so many of the usual deviations see it."""
+"""A ray agrees with a point up to this residual, in usual deviations."""
 
 
 def in_known_order(face: np.ndarray) -> bool:
-    """Whether 68 landmarks (68, 2) in pixels can be Multi-PIE's.
+    """Whether landmarks (68, 2) in pixels can be in Multi-PIE's order.
 
-    The files do not state the order of their 106 points: eyes, nose, mouth and chin must come one
-    below the other, the eyes' corners from left to right, the nose between them.
+    The files do not state the order of their 106 points. Eyes, nose, mouth and chin must lie one
+    below the other, the corners of the eyes from left to right, with the nose between them.
     """
     across = face[45] - face[36]
     length = float(np.linalg.norm(across))
@@ -36,14 +39,14 @@ _PARTS_DOWNWARDS = (slice(17, 27), slice(36, 48), slice(31, 36), slice(48, 68), 
 
 
 def in_space(cameras: list[Camera], pixels: np.ndarray) -> np.ndarray:
-    """Landmarks in the world from several pictures of one moment.
+    """Triangulates landmarks from several pictures of one moment.
 
     Args:
-        cameras: C of them.
-        pixels: (C, 68, 2); NaN where not seen.
+        cameras: C cameras.
+        pixels: (C, 68, 2) landmarks; NaN where not seen.
 
     Returns:
-        (68, 3) metres; NaN where not two cameras agree.
+        (68, 3) in the world, metres; NaN where no two cameras agree.
     """
     seen = np.isfinite(pixels.sum(-1))  # (C, 68)
     if len(cameras) < LEAST_VIEWS or not seen.any():

@@ -27,16 +27,16 @@ log = logging.getLogger(__name__)
 SOUND = "Camera/00/audio"
 LOUDEST = 1.01
 JUDGED = 8
-"""Sets of landmarks by which their order is recognised."""
+"""Number of sets of landmarks by which their order is checked."""
 HEAD_RADIUS = 0.25
-"""Metres around the head that its surface is looked for in."""
+"""Radius in metres around the head within which its surface is searched."""
 
 
 class RenderMe360(SmcCapture):
     """One part of RenderMe-360: up to 60 cameras around a head.
 
-    Pictures and mattes come straightened. Head poses are those of the skull in the FLAME fits,
-    where there are any; else those of the landmarks that several cameras see.
+    Pictures and masks are undistorted. Head poses come from FLAME fits where there are any,
+    otherwise from landmarks that several cameras see.
     """
 
     kind = "renderme-360"
@@ -71,13 +71,13 @@ class RenderMe360(SmcCapture):
         self.flame_fits = FlameFits(self._holding("FLAME"), count, self.upright)
 
     def image(self, camera: int, frame: int) -> np.ndarray | None:
-        """The straightened picture, or None where there is none."""
+        """The undistorted picture, or None if missing."""
         device = self._devices[camera]
         picture = self.decoded(self._raw, device, f"{device.pictures}/{self.index(frame)}")
         return None if picture is None else unit(device.lens.straightened(picture))
 
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """The straightened matte, between 0 and 1 along hair; None where there is none."""
+        """The undistorted mask, soft along hair; None if missing."""
         device = self._devices[camera]
         folder = mask_folder(device.name)
         picture = self.decoded(self._holding(folder), device, f"{folder}/{self.index(frame)}")
@@ -86,7 +86,11 @@ class RenderMe360(SmcCapture):
         return unit(device.lens.straightened(largest_channel(picture)))
 
     def audio(self) -> Sound | None:
-        """The whole sound, 16 kHz mono; only parts with speech have one."""
+        """The whole sound, mono at 16 kHz; only parts with speech have one.
+
+        Raises:
+            CaptureError: If the sound is damaged.
+        """
         file = self._holding(SOUND)
         shape, rate = file.shape(f"{SOUND}/audio"), self._sample_rate()
         if not shape or rate is None:
@@ -100,22 +104,26 @@ class RenderMe360(SmcCapture):
         return mono(np.clip(samples, -1, 1).astype(np.float32), rate)
 
     def flame(self, frame: int) -> FlameFit | None:
-        """The face model's parameters and vertices, or None where there are none."""
+        """FLAME parameters and vertices of a frame, or None."""
         return self.flame_fits.at(self.index(frame))
 
     def world_from_head(self, frame: int) -> np.ndarray | None:
-        """(4, 4) of the skull in the FLAME fit, else of the landmarks in space, else None."""
+        """Head pose (4, 4) from the FLAME fit, else from 3D landmarks, else None."""
         if self.flame_fits.frames:
             return self.flame_fits.pose(self.index(frame))
         return super().world_from_head(frame)
 
     def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
-        """(68, 2) as the files have them; elsewhere those in space, projected; else None."""
+        """(68, 2) pixels: landmarks of the files, else projected 3D landmarks, else None."""
         own = self._landmarks_in(camera, self.index(frame)) if self._ordered else None
         return super().landmarks(camera, frame) if own is None else own
 
     def keypoints_2d(self, camera: int, frame: int) -> np.ndarray | None:
-        """(106, 2) pixels of the straightened picture; None where the face was not found."""
+        """(106, 2) pixels of the undistorted picture; None if the face was not found.
+
+        Raises:
+            CaptureError: If the landmarks are damaged.
+        """
         lens, name = self._devices[camera].lens, self._devices[camera].name
         inside = f"Keypoints2d/{name}/{self.index(frame)}"
         file = self._holding("Keypoints2d")
@@ -129,19 +137,19 @@ class RenderMe360(SmcCapture):
         return lens.straightened_points(found + 0.5)
 
     def keypoints_3d(self, frame: int) -> np.ndarray | None:
-        """(73, 3) metres in the capture's world, in the files' own order, or None."""
+        """(73, 3) in the capture's world, metres, in the order of the files; None if missing."""
         inside = f"Keypoints3d/{self.index(frame)}"
         found = self._holding("Keypoints3d").numbers(inside, None, holes=True)
         return None if found is None or not found.size else found.reshape(-1, 3) @ self.upright.T
 
     def face_points(self) -> np.ndarray | None:
-        """(F, 68, 3) triangulated from the cameras that have landmarks of a frame."""
+        """(F, 68, 3) landmarks in the world, triangulated from all cameras, metres; or None."""
         if len(self._face_cameras) < 2 or not self._ordered:
             return None
         return np.stack([self._in_space(frame) for frame in range(self.num_frames)])
 
     def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) in head space: FLAME's vertices, else the visual hull of the mattes, or None."""
+        """(P, 3) in head space: FLAME's vertices, else the visual hull of the masks, else None."""
         pose, vertices = self.world_from_head(frame), self.flame_fits.vertices(frame)
         if pose is None:
             return None
@@ -151,7 +159,7 @@ class RenderMe360(SmcCapture):
 
     @property
     def provenance(self) -> dict:
-        """The data set, and the licence that whoever fetched it has signed."""
+        """The data set, and the licence that its users have signed."""
         return {
             "kind": self.kind,
             "sources": [f"RenderMe-360 (NeurIPS 2023), recording {self._name}"],
@@ -160,7 +168,7 @@ class RenderMe360(SmcCapture):
         }
 
     def inspect(self) -> list[Finding]:
-        """Missing and damaged pictures and annotations."""
+        """Missing or damaged pictures and annotations."""
         masks = self._holding(mask_folder(self._devices[0].name))
         track = self.head_motion
         found = 0 if track is None else int(np.isfinite(track.points).all((1, 2)).sum())

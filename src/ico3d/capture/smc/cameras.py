@@ -1,4 +1,4 @@
-"""Cameras of recordings in SMC files: where they stand and their lenses."""
+"""Cameras of recordings in SMC files: poses and lenses."""
 
 from dataclasses import dataclass
 
@@ -13,12 +13,12 @@ from ico3d.errors import CaptureError
 
 @dataclass(frozen=True)
 class SmcCamera:
-    """One camera as the files describe it.
+    """A camera as the files describe it.
 
     Attributes:
         lens: Name, size, intrinsics and distortion of its recorded pictures.
-        camera_to_world: (4, 4) in the world of the files.
-        pictures: The group of its pictures in the file that holds them.
+        camera_to_world: (4, 4) pose in the world of the files, metres.
+        pictures: Path of the group with the camera's pictures in their file.
     """
 
     lens: Lens
@@ -27,24 +27,24 @@ class SmcCamera:
 
     @property
     def name(self) -> str:
-        """Two digits."""
+        """Name of the camera: two digits."""
         return self.lens.name
 
 
 def read_camera(
     file: SmcFile, inside: str, name: str, size: tuple[int, int], pictures: str
 ) -> SmcCamera:
-    """A camera from K (3, 3), D (5,) and RT (4, 4), camera to world.
+    """Reads a camera from K (3, 3), D (5,) and RT (4, 4), which is camera to world.
 
     Args:
         file: The file with the calibration.
-        inside: The camera's group in it.
-        name: Two digits.
-        size: Width and height of its pictures.
-        pictures: The group of its pictures.
+        inside: Path of the camera's group in the file.
+        name: Name of the camera: two digits.
+        size: Width and height of the camera's pictures in pixels.
+        pictures: Path of the group with the camera's pictures.
 
     Raises:
-        CaptureError: If a part is missing or damaged.
+        CaptureError: If an array is missing or damaged.
     """
 
     def read(part: str, shape: tuple[int, ...]) -> np.ndarray:
@@ -60,7 +60,7 @@ def read_camera(
 
 
 def picture_size(file: SmcFile, pictures: str) -> tuple[int, int] | None:
-    """Width and height of the first picture in a group, or None where it has none."""
+    """Width and height in pixels of the first picture in a group; None for an empty group."""
     for frame in file.keys(pictures)[:1]:
         where = f"{pictures}/{frame}"
         return size_of(file.encoded(where) or b"", f"{file.path}: {where}")

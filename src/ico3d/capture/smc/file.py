@@ -1,4 +1,4 @@
-"""One SMC file: HDF5, read piece by piece and never kept."""
+"""Reads SMC files, a kind of HDF5 file, one piece at a time."""
 
 import os
 from collections.abc import Iterator
@@ -13,25 +13,25 @@ from ico3d.errors import CaptureError
 
 PURPOSE = "reading SMC files"
 LARGEST = 256 * 2**20
-"""Bytes that one piece may have; a damaged header can promise any number."""
+"""Largest size of one piece in bytes; a damaged header can claim any number."""
 MOST_VALUES = 16
-"""Values that an attribute may have."""
+"""Largest number of values in an attribute."""
 DAMAGED = (OSError, KeyError, ValueError, TypeError, RuntimeError, OverflowError, MemoryError)
-"""What h5py raises for files with damage."""
+"""What h5py raises for damaged files."""
 
 
 class SmcFile:
     """An SMC file, opened when it is first read and anew in each process.
 
     HDF5 handles belong to the process that opened them; a copy that was pickled, or inherited by a
-    forked process, opens its own.
+    forked process, opens the file again.
     """
 
     def __init__(self, path: Path):
-        """Names the file.
+        """Takes the path; the file is opened when it is first read.
 
         Args:
-            path: Where it lies.
+            path: Path of the file.
         """
         self.path = path
         self._opened: tuple[int, Any] | None = None
@@ -40,19 +40,23 @@ class SmcFile:
         return {"path": self.path, "_opened": None}
 
     def keys(self, inside: str) -> list[str]:
-        """Names in a group; none where there is no such group."""
+        """Names in a group; empty if there is no such group."""
         with self._guard(inside):
             group = self._find(inside)
             # Names that are no UTF-8 come as bytes; ours are all digits.
             return [k for k in group if isinstance(k, str)] if _is(group, "Group") else []
 
     def holds(self, inside: str) -> bool:
-        """Whether there is such a group or dataset."""
+        """Whether there is a group or dataset at this path."""
         with self._guard(inside):
             return self._find(inside) is not None
 
     def attribute(self, inside: str, name: str) -> Any:
-        """An attribute of a group, or None."""
+        """An attribute of a group, or None if missing.
+
+        Raises:
+            CaptureError: If the file or the attribute is damaged.
+        """
         with self._guard(inside):
             node = self._find(inside)
             if node is None or name not in node.attrs:
@@ -62,7 +66,11 @@ class SmcFile:
             return node.attrs[name]
 
     def encoded(self, inside: str) -> bytes | None:
-        """What an encoded picture's dataset holds, or None where there is none."""
+        """Bytes of an encoded picture (JPEG or PNG), or None if missing.
+
+        Raises:
+            CaptureError: If the file or the dataset is damaged.
+        """
         values = self._read(inside)
         if values is None:
             return None
@@ -71,11 +79,11 @@ class SmcFile:
         return values.tobytes()
 
     def head(self, inside: str, count: int) -> bytes:
-        """The first bytes of an encoded picture; fewer where it has fewer, none where it is none.
+        """The first bytes of an encoded picture; empty if there is none.
 
         Args:
-            inside: The dataset.
-            count: How many values to read.
+            inside: Path of the dataset.
+            count: Highest number of bytes.
         """
         with self._guard(inside):
             node = self._find(inside)
@@ -85,15 +93,15 @@ class SmcFile:
     def numbers(
         self, inside: str, shape: tuple[int | None, ...] | None, holes: bool = False
     ) -> np.ndarray | None:
-        """Finite float64 numbers, or None where there is no such dataset.
+        """Finite float64 numbers of a dataset, or None if missing.
 
         Args:
-            inside: The dataset.
-            shape: What it must have; None stands for any length, or for any shape at all.
-            holes: Whether NaN may stand for what is not known.
+            inside: Path of the dataset.
+            shape: Required shape, in which None allows any length; None allows any shape.
+            holes: Whether NaN is allowed, for unknown values.
 
         Raises:
-            CaptureError: If they have another shape or are not finite.
+            CaptureError: If the dataset has another shape or a value is not finite.
         """
         values = self._read(inside)
         if values is None:
@@ -108,13 +116,17 @@ class SmcFile:
         return values.astype(np.float64)
 
     def shape(self, inside: str) -> tuple[int, ...] | None:
-        """The shape of a dataset, or None where there is none."""
+        """Shape of a dataset, or None if missing."""
         with self._guard(inside):
             node = self._find(inside)
             return node.shape if _is(node, "Dataset") else None
 
     def pixels(self, inside: str) -> np.ndarray | None:
-        """(H, W) whole numbers of a picture that is not encoded, or None where there is none."""
+        """(H, W) integers of an uncompressed picture, or None if missing.
+
+        Raises:
+            CaptureError: If the file or the dataset is damaged.
+        """
         values = self._read(inside)
         if values is not None and (values.ndim != 2 or values.dtype.kind != "u"):
             raise self._damaged(inside)

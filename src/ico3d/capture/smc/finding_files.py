@@ -1,4 +1,4 @@
-"""Which of the SMC files in a folder is meant."""
+"""Finds the SMC file of a recording in a folder."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,21 +7,21 @@ from ico3d.errors import CaptureError
 
 
 def smc_files(folder: Path) -> list[Path]:
-    """SMC files in a folder, by name."""
+    """SMC files in a folder, sorted by name."""
     if not folder.is_dir():
         return []
     return sorted(p for p in folder.iterdir() if p.suffix == ".smc" and p.is_file())
 
 
 def only_one(folder: Path, mains: Sequence[Path]) -> Path:
-    """The one recording in a folder.
+    """The only recording in a folder.
 
     Args:
-        folder: Where they lie, for the error.
-        mains: The file by which each recording there is known.
+        folder: The folder, for errors.
+        mains: Main file of each recording in the folder.
 
     Raises:
-        CaptureError: If there is none, or there are several.
+        CaptureError: If there is no recording, or more than one.
     """
     if len(mains) != 1:
         names = ", ".join(p.name for p in mains[:3]) + (", …" if mains[3:] else "")

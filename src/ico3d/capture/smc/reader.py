@@ -1,4 +1,4 @@
-"""What readers of SMC files share."""
+"""The common part of the readers of SMC files."""
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -23,16 +23,16 @@ MAGICS = (b"\xff\xd8\xff", b"\x89PNG")
 class SmcCapture(Capture):
     """A recording in SMC files.
 
-    The world of the files is turned by right angles so that +y is up.
+    The world of the files is turned by multiples of 90° so that +y is up.
     """
 
     def __init__(self, path: Path, devices: Sequence[SmcCamera], num_frames: int):
-        """Turns the cameras upright.
+        """Turns the cameras so that +y is up.
 
         Args:
-            path: The file that names the recording.
-            devices: Its cameras.
-            num_frames: How many frames the recording has.
+            path: The recording's main file.
+            devices: The recording's cameras.
+            num_frames: Number of frames of the recording.
         """
         self.path, self.num_frames = path, num_frames
         up = up_of_cameras([device.camera_to_world for device in devices])
@@ -40,22 +40,22 @@ class SmcCapture(Capture):
         self.cameras = tuple(self._straight_camera(device) for device in devices)
 
     def face_points(self) -> np.ndarray | None:
-        """(F, 68, 3) landmarks of all frames in the world; NaN where not seen; None without any."""
+        """(F, 68, 3) landmarks in the world, metres; NaN where not seen; None if there are none."""
         return None
 
     @cached_property
     def head_motion(self) -> HeadMotion | None:
-        """The head as its landmarks in space show it, or None where they do not."""
+        """Motion of the head from 3D landmarks; None if there are too few."""
         points = self.face_points()
         return None if points is None else head_from_landmarks(points)
 
     def world_from_head(self, frame: int) -> np.ndarray | None:
-        """(4, 4) W_i, or None where the face was not found."""
+        """Head pose W_i (4, 4); None if the face was not found."""
         index = self.index(frame)
         return None if self.head_motion is None else self.head_motion.pose(index)
 
     def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
-        """(68, 2) pixels of the landmarks in space, or None where the face was not found."""
+        """(68, 2) projected 3D landmarks in pixels; None if the face was not found."""
         index = self.index(frame)
         points = None if self.head_motion is None else self.head_motion.landmarks(index)
         return None if points is None else self.cameras[camera].project(points)[0]
@@ -63,7 +63,7 @@ class SmcCapture(Capture):
     def landmarks_3d(self, frame: int) -> np.ndarray | None:
         """(68, 3) in canonical head space, metres; None where the face was not found.
 
-        Landmarks that a frame lacks are those of the mean face.
+        Landmarks that are missing in a frame are taken from the mean face.
         """
         pose = self.world_from_head(frame)
         points = None if self.head_motion is None else self.head_motion.landmarks(frame)
@@ -72,7 +72,7 @@ class SmcCapture(Capture):
         return (points - pose[:3, 3]) @ pose[:3, :3]
 
     def index(self, frame: int) -> int:
-        """The frame itself.
+        """Returns the number of an existing frame.
 
         Raises:
             CaptureError: If there is no such frame.
@@ -82,10 +82,10 @@ class SmcCapture(Capture):
         return frame
 
     def decoded(self, file: SmcFile, device: SmcCamera, inside: str) -> np.ndarray | None:
-        """A picture of a camera as it was recorded, uint8 RGB (H, W, 3), or None.
+        """A picture as recorded, uint8 RGB (H, W, 3); None if missing.
 
         Raises:
-            CaptureError: If it is damaged or has another size than the camera's.
+            CaptureError: If the picture is damaged or has another size than the camera.
         """
         held = file.encoded(inside)
         if held is None:
@@ -109,15 +109,15 @@ class SmcCapture(Capture):
 
 
 def count_frames(file: SmcFile, groups: Sequence[str], pictures: str) -> int:
-    """Frames a file announces; without an announcement, those of one camera.
+    """Number of frames that a file announces, or else that the first camera has.
 
     Args:
         file: The file with the pictures.
-        groups: Those whose attribute `num_frame` counts.
-        pictures: The group of the first camera's pictures.
+        groups: Groups whose attribute `num_frame` announces a number.
+        pictures: Path of the group with the first camera's pictures.
 
     Raises:
-        CaptureError: If the number is damaged.
+        CaptureError: If the announced number is damaged.
     """
     announced = [file.attribute(group, "num_frame") for group in groups]
     try:
@@ -131,13 +131,13 @@ def count_frames(file: SmcFile, groups: Sequence[str], pictures: str) -> int:
 
 
 def examine_views(what: str, file: SmcFile, folders: Mapping[str, str], num_frames: int) -> Finding:
-    """Whether every camera has every frame and each begins like a picture.
+    """Checks that every camera has every frame, and that files begin like pictures.
 
     Args:
-        what: What the report calls the pictures.
-        file: Where.
-        folders: Group of each camera's pictures, by its name.
-        num_frames: Frames each should have.
+        what: Name of the pictures in the report.
+        file: The file with the pictures.
+        folders: Path of the group with each camera's pictures, by name of the camera.
+        num_frames: Number of frames that each camera should have.
     """
     missing, damaged = [], []
     for name, folder in folders.items():

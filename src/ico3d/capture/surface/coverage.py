@@ -1,4 +1,4 @@
-"""What masks show of a person where no surface point lies, and points for it."""
+"""Finds parts of a person that masks show but surface points miss, and points for them."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,31 +10,36 @@ from ico3d.capture.surface.hull import Silhouette, looked_at, visual_hull
 from ico3d.common.camera import Camera
 
 WORTH_FILLING = 0.03
-"""Share of the person below which nothing is missing: stray hair, edges of masks."""
+"""Least missing share of the person; less is stray hair or edges of masks."""
 VOXELS = 32
-"""Voxels of a hull, across half of what the pictures hold."""
+"""Voxels of a hull along half the width of the space that the pictures show."""
 HIDING = 3.0
-"""How many times their spacing (of a hull: its voxels' edge) points must lie behind others to be
-hidden by them: no hole between points is as wide, however they fell."""
+"""Depth behind other points at which a point counts as hidden, in spacings of the points.
+
+For a hull the spacing is a voxel's edge. The value exceeds the widest hole that random points
+leave.
+"""
 MOSTLY = 0.5
-"""Share of the moments in which a camera must show the person at a place: shoulders stray from a
-head that turns, and some masks are wrong."""
+"""Share of the moments in which a camera must show the person at a place.
+
+Shoulders move relative to a head that turns, and some masks are wrong.
+"""
 HELD = 0.5
-"""Share of the cameras above which they hold a place: a few alone agree on what is behind."""
+"""Share of the cameras that must show a place; few cameras alone may agree on background."""
 MISSING = 0.5
-"""Share of the pictures of a place that must show no point there."""
+"""Share of the pictures of a place in which no surface point may be near."""
 
 Moment = Mapping[int, Silhouette]
-"""What cameras, by their numbers, saw of the person at about the same time."""
+"""Silhouettes of the person at about the same time, by number of the camera."""
 
 
 @dataclass(frozen=True)
 class Gap:
-    """What surface points leave out of the person.
+    """Parts of a person that surface points miss.
 
     Attributes:
-        points: (Q, 3) points on what is left out; may be none.
-        share: The share of the person's pixels that is left out, 0 to 1.
+        points: (Q, 3) points on the missing parts, metres; Q may be 0.
+        share: Share of the person's pixels that is missing, 0 to 1.
     """
 
     points: np.ndarray
@@ -42,19 +47,20 @@ class Gap:
 
 
 def find_gap(points: np.ndarray, moments: Sequence[Moment], reach: float) -> Gap:
-    """Looks for what masks show of the person where no point projects.
+    """Finds places where masks show the person but no surface point projects.
 
-    It is filled from the visual hulls of the moments, where each camera agrees in most moments. A
-    place outside of a picture is unknown to that picture, so a person whom the pictures cut goes
-    on as far as they reach. A camera whose masks contradict all others in most moments has no say.
+    Points come from the visual hulls of the moments, at places on which each camera agrees in most
+    moments. A picture says nothing about places outside of it, so a person whom the pictures cut
+    off continues as far as they reach. A camera whose masks contradict all others in most moments
+    is ignored.
 
     Args:
-        points: (P, 3) known surface points.
-        moments: What was seen at some moments, in the space of the points.
-        reach: Metres around a point that it accounts for.
+        points: (P, 3) known surface points, metres.
+        moments: Silhouettes at some moments, in the space of the points.
+        reach: Distance from a point within which the point covers the surface, metres.
 
     Returns:
-        The gap; none, with the share 0, where the points account for nearly all of the person.
+        The gap; empty, with share 0, if the points cover nearly all of the person.
     """
     views = [
         _View.of(camera, seen, points, reach)
@@ -74,10 +80,10 @@ def find_gap(points: np.ndarray, moments: Sequence[Moment], reach: float) -> Gap
 
 
 def visible(points: np.ndarray, camera: Camera, gap: float) -> np.ndarray:
-    """(P,) bool: which surface points (P, 3) no others hide from a camera.
+    """(P,) bool: surface points (P, 3) that no other point hides from a camera.
 
-    The points themselves are the z-buffer, in cells of the picture as large as `gap` is there; a
-    point is hidden if another in its cell is nearer by more than `gap` metres.
+    The points themselves form a z-buffer with cells of size `gap` at their depth; a point is hidden
+    if another one in its cell is nearer by more than `gap` metres.
     """
     pixels, depths = camera.project(points)  # (P, 2), (P,)
     cell = gap * camera.intrinsics[0, 0] / max(float(np.median(depths)), gap)

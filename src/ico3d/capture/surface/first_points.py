@@ -1,22 +1,22 @@
-"""First surface points of a person, from which Gaussians start."""
+"""Initial surface points of a person in a portrait."""
 
 import numpy as np
 
 from ico3d.common.camera import Camera
 
 PER_TRIANGLE = 6
-"""Points drawn in each triangle of the face."""
+"""Number of points drawn in each triangle of the face."""
 THICKNESS = 0.008
-"""Standard deviation in metres of the depth of points that are only guessed."""
+"""Standard deviation in metres of the depth of guessed points."""
 
 
 def face_points(face: np.ndarray, triangles: np.ndarray, seed: int = 0) -> np.ndarray:
-    """Points on the tracked face.
+    """Random points on the tracked face.
 
     Args:
         face: (468, 3) landmarks in canonical head space, metres.
-        triangles: (T, 3) indices.
-        seed: Where in the triangles the points lie.
+        triangles: (T, 3) indices of landmarks.
+        seed: Seed of the positions within the triangles.
 
     Returns:
         (P, 3) float32 metres.
@@ -30,17 +30,17 @@ def face_points(face: np.ndarray, triangles: np.ndarray, seed: int = 0) -> np.nd
 def silhouette_points(
     mask: np.ndarray, camera: Camera, head: np.ndarray, depths: tuple[float, float], count: int
 ) -> np.ndarray:
-    """Points on a bulging sheet that fills a part of the picture.
+    """Points on a bulging sheet that fills a part of a picture.
 
     Args:
-        mask: (H, W) bool, the part.
-        camera: Who took the picture.
-        head: (4, 4) world from head in that picture.
-        depths: Metres by which outline and middle of the part lie nearer than the head's origin.
-        count: Points to draw.
+        mask: (H, W) bool, the part of the picture.
+        camera: The camera that took the picture.
+        head: (4, 4) head pose in that picture, head to world.
+        depths: Metres by which the sheet's outline and middle lie nearer than the head's origin.
+        count: Number of points.
 
     Returns:
-        (count, 3) float32 in canonical head space; none where the part is empty.
+        (count, 3) float32 in canonical head space, metres; empty if the mask is.
     """
     from scipy.ndimage import distance_transform_edt
 
@@ -60,7 +60,7 @@ def silhouette_points(
 
 
 def body_guess(face: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """(P, 3): an ellipsoid for skull and hair, a cylinder for the neck, a sheet for the chest."""
+    """(P, 3) points of a guessed body: ellipsoid for skull and hair, cylinder neck, chest sheet."""
     half = np.ptp(face[:, 0]) / 2
     top, chin = face[:, 1].max(), face[:, 1].min()
     depth = face[:, 2].min()
@@ -96,7 +96,7 @@ def _chest(random: np.random.Generator, half: float, chin: float, depth: float) 
 
 
 def unknown_person(seed: int = 0) -> np.ndarray:
-    """(P, 3) float32: a head of usual size where no tracked face tells better."""
+    """(P, 3) float32 points of a head of usual size, for captures without a tracked face."""
     random = np.random.default_rng(seed)
     half, top, chin, front = 0.075, 0.083, -0.094, 0.06
     face = _sphere(random, 5000) * [half, (top - chin) / 2, front] + [0, (top + chin) / 2, 0]

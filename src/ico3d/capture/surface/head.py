@@ -1,4 +1,4 @@
-"""The surface of a head from masks alone."""
+"""The surface of a head from masks alone (visual hull)."""
 
 from collections.abc import Sequence
 
@@ -8,18 +8,20 @@ from ico3d.capture.capture import Capture
 from ico3d.capture.surface.hull import Silhouette, visual_hull
 
 EDGE = 0.005
-"""Metres of a voxel's edge."""
+"""Edge of a voxel, metres."""
 
 
 def head_hull(capture: Capture, frame: int) -> np.ndarray | None:
-    """The visual hull of each camera's mask nearest in time: not all take all frames.
+    """The visual hull of a head in a frame.
+
+    Cameras that did not record the frame contribute their mask nearest in time.
 
     Args:
         capture: A recording with masks and head poses.
         frame: Number of the frame.
 
     Returns:
-        (P, 3) in canonical head space, metres; None where poses, masks or a hull are lacking.
+        (P, 3) surface points in canonical head space, metres; None without poses, masks or a hull.
     """
     seen = head_silhouettes(capture, frame, range(capture.num_frames))
     hull = visual_hull(list(seen.values()), EDGE)
@@ -27,15 +29,15 @@ def head_hull(capture: Capture, frame: int) -> np.ndarray | None:
 
 
 def head_silhouettes(capture: Capture, frame: int, among: Sequence[int]) -> dict[int, Silhouette]:
-    """Each camera's mask nearest in time to a frame, as seen from canonical head space.
+    """Each camera's mask nearest in time to a frame, with the camera in canonical head space.
 
     Args:
         capture: A recording with masks and head poses.
         frame: Number of the frame.
-        among: Frames whose masks may be taken.
+        among: Frames whose masks may be used.
 
     Returns:
-        By the camera's number, for cameras that have a mask of a frame with a head pose.
+        Silhouettes by number of the camera, for cameras with a mask of a frame with a head pose.
     """
     order = sorted(among, key=lambda other: (abs(other - frame), other))
     posed = [other for other in order if capture.world_from_head(other) is not None]

@@ -1,4 +1,4 @@
-"""The volume that all masks agree on: the visual hull (Laurentini 1994), carved out of voxels."""
+"""Visual hulls (Laurentini 1994): volumes on which all masks agree, carved out of voxels."""
 
 import math
 from collections.abc import Sequence
@@ -13,28 +13,28 @@ from scipy.ndimage import binary_dilation, label
 from ico3d.common.camera import Camera
 
 LARGEST_MASK = 512
-"""Pixels of a mask's longer side: more would be finer than any voxel."""
+"""Longer side in pixels to which masks are reduced; more would be finer than any voxel."""
 MARGIN = 1.1
-"""Of the carved box, beyond what the cameras' pictures are as wide as."""
+"""Size of the carved box as a factor of the width that the cameras' pictures show."""
 MOST_PARALLEL = 1e4
-"""Condition above which viewing directions count as parallel: under a degree apart."""
+"""Condition number above which viewing directions count as parallel (less than a degree apart)."""
 WORTH_IGNORING = 0.01
-"""A mask is bad if without it the hull fills so much more of the other masks."""
+"""A mask is bad if the hull without it fills this much more of the other masks."""
 CAMERAS_PER_BAD = 16
-"""One mask in so many may be bad; of four cameras or more, at least one."""
+"""One mask in this many may be bad; with four cameras or more, at least one."""
 HELD, SURELY_HELD = 0.5, 0.7
-"""Parts of the pictures that must hold a voxel, and one of those that it is connected to."""
+"""Shares of the pictures that must show a voxel, and one of the voxels connected to it."""
 BISECTIONS = 4
-"""Halvings of a voxel's edge when its surface is sought."""
+"""Number of times that a voxel's edge is halved to locate the surface."""
 
 
 @dataclass(frozen=True)
 class Silhouette:
-    """Where one camera saw the person.
+    """The person's outline as one camera saw it.
 
     Attributes:
-        camera: The camera, of the mask's size.
-        mask: (H, W) bool.
+        camera: The camera, with the size of the mask.
+        mask: (H, W) bool, true on the person.
     """
 
     camera: Camera
@@ -42,7 +42,7 @@ class Silhouette:
 
     @classmethod
     def of(cls, camera: Camera, mask: np.ndarray) -> "Silhouette":
-        """From a mask (H, W) in [0, 1] of the camera's size, made smaller where it is large."""
+        """The silhouette of a mask (H, W) in [0, 1]; large masks are reduced."""
         scale = min(1.0, LARGEST_MASK / max(mask.shape))
         height, width = (max(1, round(side * scale)) for side in mask.shape)
         picture = Image.fromarray(np.asarray(mask, np.float32))
@@ -55,8 +55,8 @@ class Hull:
     """A visual hull.
 
     Attributes:
-        surface: (P, 3) points on it, metres, about one for each voxel face; may be none.
-        ignored: Numbers of the silhouettes that contradict all others.
+        surface: (P, 3) points on the hull's surface, metres, about one per voxel face; P may be 0.
+        ignored: Indices of silhouettes that contradict all others.
     """
 
     surface: np.ndarray
@@ -64,20 +64,22 @@ class Hull:
 
 
 def visual_hull(silhouettes: Sequence[Silhouette], edge: float) -> Hull | None:
-    """Carves the box that the cameras look at by what they see.
+    """Carves the box that the cameras look at by their silhouettes.
 
-    A voxel belongs to the hull if no mask excludes it and half of the pictures, two at least,
-    hold it. Where it is outside of a picture, that picture says nothing; so that nothing appears
-    in the corners that two opposite cameras see alone, parts of the hull of which no voxel is in
-    most pictures are dropped. A hull of good masks fills them all, seen from their cameras; a few
-    masks without which it fills the others clearly better are bad and ignored.
+    A voxel belongs to the hull if no mask excludes it and at least half of the pictures, and at
+    least two, show its place. A picture says nothing about places outside of it. Parts of the hull
+    without any voxel that most pictures show are dropped; otherwise corners that only two opposite
+    cameras see would appear.
+
+    From good masks, a hull fills every mask when seen from that mask's camera. A few masks without
+    which the hull fills the others clearly better are bad and ignored.
 
     Args:
         silhouettes: What cameras around the person saw at one moment.
-        edge: Edge of a voxel in metres; the surface is found to a sixteenth of it.
+        edge: Edge of a voxel in metres; the surface is located to a sixteenth of that.
 
     Returns:
-        The hull, or None if the cameras do not look at one place from different sides.
+        The hull; None if the cameras do not look at one place from different sides.
     """
     box = looked_at([s.camera for s in silhouettes]) if len(silhouettes) > 1 else None
     if box is None:
@@ -93,9 +95,9 @@ def visual_hull(silhouettes: Sequence[Silhouette], edge: float) -> Hull | None:
 
 
 def looked_at(cameras: Sequence[Camera]) -> tuple[np.ndarray, float] | None:
-    """Middle (3,) of what the cameras look at, and the radius that their pictures hold.
+    """Centre (3,) of what the cameras look at, and the radius that their pictures show, metres.
 
-    None where they do not look at one place from different sides.
+    None if the cameras do not look at one place from different sides.
     """
     middle = focus(cameras)
     if middle is None:
@@ -109,9 +111,10 @@ def looked_at(cameras: Sequence[Camera]) -> tuple[np.ndarray, float] | None:
 
 
 def focus(cameras: Sequence[Camera]) -> np.ndarray | None:
-    """(3,) the place nearest to the middles of all pictures; None where these are all but parallel.
+    """(3,) point nearest to the centre rays of all pictures; None if these are nearly parallel.
 
-    Through the middle of a picture, because the optical axis of a cropped one lies elsewhere.
+    The rays go through the centres of the pictures, because the optical axis of a cropped picture
+    lies elsewhere.
     """
     poses = np.stack([camera.camera_to_world for camera in cameras])  # (C, 4, 4)
     middles = np.array([[c.width / 2, c.height / 2, 1.0] for c in cameras])  # (C, 3)

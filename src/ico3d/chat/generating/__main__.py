@@ -1,4 +1,4 @@
-"""Writes what is generated from the messages: `python -m ico3d.chat.generating`."""
+"""Writes all files that are generated from the messages: `python -m ico3d.chat.generating`."""
 
 from ico3d.chat.generating import reference, shared, typescript
 

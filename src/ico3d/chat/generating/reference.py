@@ -1,7 +1,7 @@
-"""Writes `docs/protocol.md`: tables made from the messages, around the prose of `protocol.md`.
+"""Generates `docs/protocol.md`: tables of all messages, inserted into the prose of `protocol.md`.
 
-Run `python -m ico3d.chat.generating` after each change of a message or of the prose. In the prose
-`$CLIENT`, `$SERVER` and `$PARTS` stand for tables, and other names in capitals for constants.
+Run `python -m ico3d.chat.generating` after each change of a message or of the prose. In the prose,
+`$CLIENT`, `$SERVER` and `$PARTS` stand for tables, and other capitalised names for constants.
 """
 
 import types
@@ -32,13 +32,13 @@ HUGE = 1e7  # bounds beyond it only keep out what no sane page sends
 
 
 def markdown() -> str:
-    """The whole page."""
+    """The contents of `docs/protocol.md`."""
     title, _, prose = PROSE.read_text(encoding="utf-8").partition("\n")
     return f"{title}\n\n{HEAD}{Template(prose).substitute(values())}"
 
 
 def values() -> dict[str, Any]:
-    """What the names in the prose stand for."""
+    """Replacements for the names in the prose."""
     constants = {
         name: f"{value:,}" if isinstance(value, int) else f"{value:g}"
         for module in (connection, limits, protocol)
@@ -56,24 +56,24 @@ def values() -> dict[str, Any]:
 
 
 def table(messages: tuple[type, ...]) -> str:
-    """All messages of one side, a row for each."""
+    """A table with a row for each message."""
     return "\n".join(["| type | what it says | fields |", "|---|---|---|", *map(row, messages)])
 
 
 def row(message: type) -> str:
-    """One message."""
+    """The row of one message."""
     name = message.__name__.lower() + ("` (binary)" if tensors_of(message) else "`")
     told = about(message).replace(" (binary)", "")
     return f"| `{name} | {cell(told)} | {cell('<br>'.join(fields(message)))} |"
 
 
 def part(kind: type) -> str:
-    """One dataclass that messages hold."""
+    """The description of a dataclass that messages contain."""
     return "\n  - ".join([f"- **{kind.__name__}**: {about(kind)}", *fields(kind)])
 
 
 def fields(kind: type) -> list[str]:
-    """The fields of a message or of a part of one: name, type and meaning."""
+    """Name, type and meaning of each field of a message or of a part of one."""
     told = notes(kind)
     return [
         f"`{name}` ({described(note)}): {told[name]}" for name, note in field_types(kind).items()
@@ -81,7 +81,7 @@ def fields(kind: type) -> list[str]:
 
 
 def described(annotation: Any) -> str:
-    """An annotation for people, with its limits."""
+    """A type annotation in words, with its limits."""
     kind = kind_of(annotation)
     if kind.bare is np.ndarray:
         tensor = kind.marks[0]
@@ -103,7 +103,7 @@ def described(annotation: Any) -> str:
 
 
 def bounds(marks: tuple) -> str:
-    """The limits of a value, as far as they tell something."""
+    """The limits of a value in words, unless they are too wide to matter."""
     for mark in marks:
         if isinstance(mark, Length):
             return f", {mark.low:,}–{mark.high:,}"
@@ -113,5 +113,5 @@ def bounds(marks: tuple) -> str:
 
 
 def cell(text: str) -> str:
-    """Text that may stand in a table."""
+    """Text, escaped for a cell of a table."""
     return text.replace("|", "\\|")

@@ -1,4 +1,4 @@
-"""Writes `viewer/src/shared.ts`: what Python and the page must agree on besides the messages.
+"""Generates `viewer/src/shared.ts`: constants that Python and the page share.
 
 Run `python -m ico3d.chat.generating` after each change of one of these values.
 """
@@ -46,15 +46,15 @@ VALUES: tuple[tuple[str, str, Any], ...] = (
     ("ROLE_PARENTS", "The number of each role's parent; -1 for the hips.", roles.PARENTS),
     ("LATENCY_PARTS", "Between a question and its answer, in order; observing/timing.py.", PARTS),
 )
-"""Name, what it is, value."""
+"""Name, description and value of each constant."""
 
 
 def typescript() -> str:
-    """The whole file."""
+    """The contents of `viewer/src/shared.ts`."""
     return "\n".join([HEAD, *(constant(*value) for value in VALUES)])
 
 
 def constant(name: str, about: str, value: Any) -> str:
-    """One documented constant; lists and records are as constant as numbers."""
+    """One documented constant; lists and records are made read-only."""
     fixed = " as const" if isinstance(value, list | tuple | dict) else ""
     return f"/** {about} */\nexport const {name} = {json.dumps(value)}{fixed};\n"

@@ -1,4 +1,4 @@
-"""Writes `viewer/src/protocol.ts` from `protocol.py`: constants, types, encode and decode.
+"""Generates `viewer/src/protocol.ts` from `protocol.py`: constants, types, encode and decode.
 
 Run `python -m ico3d.chat.generating` after each change of the protocol.
 """
@@ -116,7 +116,7 @@ function matrix(shape: number[], words: Uint16Array): Matrix {
 
 
 def typescript() -> str:
-    """The whole file."""
+    """The contents of `viewer/src/protocol.ts`."""
     constants = [
         f"export const {name} = {getattr(protocol, name):g};" + (f" // {unit}" if unit else "")
         for name, unit in CONSTANTS.items()
@@ -137,7 +137,7 @@ def typescript() -> str:
 
 
 def interface(kind: type, named: bool) -> str:
-    """One dataclass as a documented interface."""
+    """A dataclass as a documented TypeScript interface."""
     told = notes(kind)
     lines = [f"/** {about(kind)} */", f"export interface {exported(kind)} {{"]
     if named:
@@ -149,12 +149,15 @@ def interface(kind: type, named: bool) -> str:
 
 
 def exported(kind: type) -> str:
-    """`Text` and `Error` are names that browsers use already."""
+    """The TypeScript name of a dataclass.
+
+    Messages get the suffix `Message`, because browsers define `Text` and `Error`.
+    """
     return kind.__name__ + ("" if kind in NESTED else "Message")
 
 
 def translated(annotation: Any) -> str:
-    """A Python annotation as a TypeScript type."""
+    """The TypeScript type of a Python annotation."""
     kind = kind_of(annotation)
     if kind.bare is np.ndarray:
         return "Int16Array" if kind.marks[0].dims == 1 else "Matrix"
@@ -175,18 +178,18 @@ def translated(annotation: Any) -> str:
 
 
 def union(name: str, kinds: tuple[type, ...]) -> str:
-    """A union of messages."""
+    """A union type of messages."""
     return f"export type {name} =\n" + "\n".join(f"  | {exported(k)}" for k in kinds) + ";\n"
 
 
 def server_types() -> str:
-    """The names that `decode` accepts."""
+    """The list of message names that `decode` accepts."""
     names = ", ".join(f'"{kind.__name__.lower()}"' for kind in protocol.SERVER_MESSAGES)
     return f"const SERVER_TYPES = [{names}];\n"
 
 
 def tensors(messages: list[type]) -> str:
-    """The arrays in each binary message's payload, in order."""
+    """The arrays in the payload of each binary message, in order."""
     lines = ["const TENSORS: Record<string, readonly Tensor[]> = {"]
     for kind in filter(tensors_of, messages):
         marks = tensors_of(kind)

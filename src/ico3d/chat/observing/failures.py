@@ -1,7 +1,7 @@
-"""What may be told of a failure: its kind and cause, and no word that anybody said.
+"""Describes failures without quoting anything that was said: kinds and causes only.
 
-Messages of exceptions are not told. Servers put the request that they refuse into theirs, and with
-it the visitor's question or the answer.
+Messages of exceptions are not used, because servers quote the refused request in their errors, and
+with it the visitor's question or the answer.
 """
 
 import re
@@ -18,11 +18,14 @@ _CODE = re.compile(r"[a-z]+(_[a-z]+)+")  # such as model_not_found
 
 
 class ReportedError(ServiceError):
-    """What a service reported in its own words, which may hold what was said."""
+    """An error in a service's own words, which may quote what was said."""
 
 
 def cause(error: BaseException) -> str:
-    """Our own sentence, or the kinds of an exception and of those behind it, with their numbers."""
+    """The sentence of an ico3d error; of others, the exception types in the chain.
+
+    Status codes and error numbers are named, too.
+    """
     kinds: list[str] = []
     behind: BaseException | None = error
     while behind is not None and len(kinds) < DEEPEST:
@@ -35,7 +38,7 @@ def cause(error: BaseException) -> str:
 
 
 def cause_of(frame: "ErrorFrame") -> str:
-    """Why a processor of the pipeline reported an error."""
+    """The cause of an error that a processor of the pipeline reported."""
     known = cause(frame.exception) if frame.exception else ""
     status = _STATUS.search(frame.error)
     if status and status[1] not in known:

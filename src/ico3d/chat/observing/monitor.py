@@ -1,7 +1,7 @@
-"""What whoever runs a server may know of it: figures for Prometheus, and a log of turns.
+"""Figures for the operator of a server: metrics for Prometheus, and a log of turns.
 
-No word of a visitor goes in, and no name of a session: with that one its conversation could be
-taken over.
+They never contain words of visitors or ids of sessions; with an id, a conversation could be taken
+over.
 """
 
 import itertools
@@ -30,18 +30,18 @@ CONTENT_TYPE = CONTENT_TYPE_LATEST
 
 
 class TurnLog:
-    """A file with one JSON object per line for each turn: times and counts only."""
+    """A file with one line of JSON for each turn: times and counts only."""
 
     def __init__(self, file: TextIO):
-        """Use `TurnLog.open`."""
+        """Takes an open file; use `TurnLog.open`."""
         self._file = file
 
     @classmethod
     def open(cls, path: Path) -> "TurnLog":
-        """Goes on with a file or begins it.
+        """Opens a file for appending, or creates it.
 
         Raises:
-            SettingsError: If it cannot be written.
+            SettingsError: If the file cannot be written.
         """
         try:
             return cls(path.open("a", encoding="utf-8", buffering=1))
@@ -49,19 +49,19 @@ class TurnLog:
             raise SettingsError(f"--log {path}: cannot be written ({error.strerror}).") from error
 
     def write(self, entry: dict) -> None:
-        """Adds a line."""
+        """Appends a line."""
         self._file.write(json.dumps(entry) + "\n")
 
 
 class Monitor:
-    """Counts what happens on one server."""
+    """Counts the events of one server."""
 
     def __init__(self, log: TurnLog | None = None, today: Callable[[], datetime] | None = None):
-        """Nothing has happened yet.
+        """Starts with all counts at 0.
 
         Args:
-            log: Takes every turn.
-            today: The calendar's time, for the log.
+            log: Log of all turns, or None.
+            today: Returns date and time, for the log.
         """
         self._log, self._today = log, today or (lambda: datetime.now(UTC))
         self._numbers = itertools.count(1)
@@ -92,21 +92,21 @@ class Monitor:
         self.connections = Gauge("ico3d_connections", "Open connections.", registry=registry)
 
     def visitor(self) -> "Visitor":
-        """A session has opened."""
+        """Counts a new session."""
         self._sessions.inc()
         return Visitor(self, next(self._numbers))
 
     def left(self, why: str) -> None:
-        """A session has ended."""
+        """Counts the end of a session."""
         self._sessions.dec()
         self._ended.labels(why).inc()
 
     def failed(self, where: str, cause: str = "") -> None:
-        """Counts an error, and tells whoever runs the server why it happened, where that is known.
+        """Counts an error, and logs its cause for the operator if it is known.
 
         Args:
             where: Part of the conversation or of the server.
-            cause: Without a word that anybody said.
+            cause: Cause without quotes of what was said.
         """
         self._errors.labels(where).inc()
         if cause:
@@ -117,8 +117,8 @@ class Monitor:
 
         Args:
             session: Number of the session.
-            number: Number of the turn in it.
-            turn: When each part of it was done.
+            number: Number of the turn in the session.
+            turn: Times of the turn's parts.
         """
         parts = turn.parts()
         for part, milliseconds in parts.items():
@@ -148,17 +148,17 @@ class Monitor:
 
 
 class Visitor:
-    """One session as the monitor knows it: a number."""
+    """One session, known to the monitor only by a number."""
 
     def __init__(self, monitor: Monitor, number: int):
-        """Use `Monitor.visitor`."""
+        """Created by `Monitor.visitor`."""
         self._monitor, self._number = monitor, number
         self._turns = itertools.count(1)
 
     def turn(self, turn: Turn) -> None:
-        """A turn is over."""
+        """Counts a turn of this session."""
         self._monitor.turn(self._number, next(self._turns), turn)
 
     def failed(self, where: str, cause: str) -> None:
-        """Something went wrong; `cause` holds no word that anybody said."""
+        """Counts an error of this session; `cause` must not quote what was said."""
         self._monitor.failed(where, f"{cause} [session {self._number}]")

@@ -1,8 +1,8 @@
-"""What whoever runs a server reads on the standard error: never a word that visitors said.
+"""The operator's log on the standard error stream, without words of visitors.
 
-Our own code says what it means in its messages, and keeps to that (`failures.py`). Of what others
-log, which may hold a question, an answer or the whole request to a server, only the constant part
-of the message is shown: what stands in the source where it was logged.
+Messages of ico3d's own code are shown in full, because that code quotes nobody (`failures.py`).
+Messages of other packages may contain a question, an answer or a whole request. Of these only the
+constant part is shown, as it stands in the source code of the logging call.
 """
 
 import ast
@@ -32,15 +32,15 @@ LOGGING_CALL_LINES = 12  # source lines that one call of a logger takes at most
 
 
 class OperatorLog:
-    """Writes lines, and counts those that repeat themselves instead of writing them again."""
+    """Writes lines; repetitions are counted instead of written again."""
 
     def __init__(self, file: TextIO | None = None, now: Callable[[], float] = time.monotonic):
-        """Writes to `file`; by default to what is the standard error at that moment."""
+        """Writes to `file`, by default the current standard error stream; `now` gives seconds."""
         self._file, self._now = file, now
         self._seen: dict[str, tuple[float, int]] = {}  # when a line was written, how often since
 
     def write(self, level: str, line: str) -> None:
-        """Writes a line, unless it has just been written."""
+        """Writes a line, unless the same line was written recently."""
         now = self._now()
         since, more = self._seen.pop(line, (-QUIET, 0))
         if now - since < QUIET:
@@ -54,7 +54,7 @@ class OperatorLog:
         print(f"{when} {level}: {line}{again}", file=self._file or sys.stderr, flush=True)
 
     def take(self, message: "Message") -> None:
-        """A record of loguru: ours or pipecat's."""
+        """Handles a record of loguru, of ico3d or pipecat."""
         record = message.record
         name, place = record["name"] or "", (record["name"], record["function"])
         if name.startswith(OWN):
@@ -69,15 +69,15 @@ class OperatorLog:
 
 
 class StandardHandler(logging.Handler):
-    """Passes on what is logged with Python's own `logging`: by uvicorn, asyncio, clients."""
+    """Handles records of Python's `logging`: of uvicorn, asyncio and clients."""
 
     def __init__(self, log: OperatorLog):
-        """Takes warnings and what is worse."""
+        """Handles warnings and errors."""
         super().__init__(logging.WARNING)
         self._log = log
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Writes the constant part of a record; all of ours."""
+        """Writes a record: in full if it is ico3d's, else its constant part."""
         own = record.name.startswith(OWN)
         said = record.getMessage() if own else constant_part(record.pathname, record.lineno)
         error = record.exc_info[1] if record.exc_info else None
@@ -85,7 +85,7 @@ class StandardHandler(logging.Handler):
 
 
 def set_up_log(verbose: bool) -> None:
-    """Shows warnings and errors on the standard error; everything, with all words, if verbose.
+    """Shows warnings and errors on the standard error stream; if verbose, everything said, too.
 
     Raises:
         MissingExtraError: If the extra `chat` is not installed.
@@ -105,7 +105,7 @@ def set_up_log(verbose: bool) -> None:
 
 
 def constant_part(path: str, line: int) -> str:
-    """What a logging call always says: its message with … for what is filled in; else nothing."""
+    """The constant part of a logging call in the source, with … for filled-in values; or ""."""
     for node in ast.walk(_call(path, line) or ast.Pass()):
         if isinstance(node, ast.Call) and node.args:
             return _constant(node.args[0])

@@ -1,4 +1,4 @@
-"""How long the parts of a turn took, seen from beside the pipeline."""
+"""Measures the parts of a turn by watching the pipeline's frames."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -29,21 +29,21 @@ from ico3d.chat.observing.failures import cause_of
 from ico3d.chat.wire.protocol import SPEECH_RATE, Metrics
 
 PARTS = ("vad", "turn", "token", "clause", "voice", "expression", "send")
-"""What lies between the visitor's last word and the first sound on its way, in order."""
+"""Parts between the visitor's last word and the sending of the first sound, in order."""
 
 
 @dataclass
 class Turn:
-    """One question and its answer. Times are seconds of the pipeline's clock.
+    """One question and its answer; times are seconds of the pipeline's clock.
 
     Attributes:
-        asked: When the visitor's words ended.
-        typed: Whether they were typed.
-        marks: When each part was done; a part that was ready before it was needed took no time.
-        utterance: Number of the answer.
-        heard: When its first sample was heard.
-        seconds: How long the answer is, as far as it was made.
-        interrupted: Whether it was stopped.
+        asked: Time at which the visitor's words ended.
+        typed: Whether the question was typed.
+        marks: Time at which each part ended; a part that ended before it was needed took no time.
+        utterance: Number of the answer, or None.
+        heard: Time at which the answer's first sample was heard, or None.
+        seconds: Duration of the answer, as far as it was synthesised.
+        interrupted: Whether the answer was stopped.
     """
 
     asked: float
@@ -55,7 +55,7 @@ class Turn:
     interrupted: bool = False
 
     def parts(self) -> dict[str, float]:
-        """Milliseconds by part, in total, and of the recognition that ran besides."""
+        """Milliseconds of each part, in total, and of recognition, which ran in parallel."""
         before, values = self.asked, {}
         for part in PARTS:
             at = max(before, self.marks.get(part, before))
@@ -67,33 +67,33 @@ class Turn:
         return values
 
     def voice_to_voice(self) -> float | None:
-        """Milliseconds until the answer was heard; None if it was not."""
+        """Milliseconds from the question's end until the answer was heard; None if it was not."""
         return None if self.heard is None else 1000 * (self.heard - self.asked)
 
 
 class PipelineClock(BaseClock):
-    """Lets a pipeline stamp its frames by any clock."""
+    """A pipecat clock with another source of time."""
 
     def __init__(self, now: Callable[[], float]):
-        """Shows the seconds that `now` says."""
+        """`now` returns seconds."""
         self._now = now
 
     def get_time(self) -> int:
-        """Nanoseconds."""
+        """The time in nanoseconds."""
         return int(self._now() * 1e9)
 
     def start(self):
-        """Does nothing: the clock that is shown runs already."""
+        """Does nothing: the source of time runs already."""
 
 
 class TurnObserver(BaseObserver):
     """Takes the time from the end of the visitor's words to the first sound of the answer.
 
-    The parts in order: `vad` until silence is noticed, `turn` until the turn is taken to be over
-    (the recogniser finishes meanwhile: `recognition`), `token` until the language model's first
-    word, `clause` until the voice is asked for the first clause, `voice` until its first sound,
-    `expression` until its face, `send` until it is on its way. pipecat's own latency observer
-    needs services that report metrics and knows no faces; this one looks at frames only.
+    The parts in order: `vad` until silence is noticed; `turn` until the turn is considered over
+    (the recogniser finishes in parallel: `recognition`); `token` until the language model's first
+    word; `clause` until the voice gets the first clause; `voice` until the first sound;
+    `expression` until its face; `send` until both are sent. pipecat's own latency observer needs
+    services that report metrics and does not know faces; this one only watches frames.
     """
 
     def __init__(
@@ -103,13 +103,13 @@ class TurnObserver(BaseObserver):
         done: Callable[[Turn], None],
         failed: Callable[[str, str], None],
     ):
-        """An observer for one session.
+        """Creates the observer of one session.
 
         Args:
-            now: The pipeline's clock, in seconds.
-            report: Takes what the page shall know.
-            done: Takes every turn whose answer is over.
-            failed: Takes the part that reported an error, and the cause.
+            now: Returns the time of the pipeline's clock in seconds.
+            report: Receives the metrics for the page.
+            done: Receives every turn whose answer is over.
+            failed: Receives the name of a part that reported an error, and the cause.
         """
         super().__init__(observe_every_push=False)
         self._now, self._report, self._done, self._failed = now, report, done, failed
@@ -121,7 +121,7 @@ class TurnObserver(BaseObserver):
         self._made: tuple[int, float] = (-1, 0.0)  # utterance and seconds of its sound
 
     async def on_push_frame(self, data: FramePushed):
-        """Looks at a frame where it enters the pipeline."""
+        """Watches a frame when it is first pushed."""
         frame, at = data.frame, data.timestamp / 1e9
         if isinstance(frame, ErrorFrame):
             self._failed(part_of(data.source), cause_of(frame))
@@ -129,11 +129,11 @@ class TurnObserver(BaseObserver):
             self._look(frame, at)
 
     def clause(self) -> None:
-        """The voice is asked for something now."""
+        """Registers that the voice was given a text."""
         self._mark("clause", self._now())
 
     def heard(self, utterance: int, position: float) -> None:
-        """The page says that it has played so many seconds of an utterance."""
+        """Registers that the page has played `position` seconds of an utterance."""
         turn = self._turn
         if turn and turn.utterance == utterance and turn.heard is None and position > 0:
             turn.heard = self._now() - position
@@ -204,6 +204,6 @@ class TurnObserver(BaseObserver):
 
 
 def part_of(source: object) -> str:
-    """What the processor that pushed a frame does: for people who count errors."""
+    """The part of the conversation to which a processor belongs, for counting errors."""
     kinds = {STTService: "recognition", LLMService: "language", TTSService: "voice"}
     return next((name for kind, name in kinds.items() if isinstance(source, kind)), "pipeline")

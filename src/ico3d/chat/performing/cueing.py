@@ -1,4 +1,4 @@
-"""Gestures of a body on a skeleton: composed as sound is made, cued to the page that makes them."""
+"""Chooses gestures of a body on a skeleton from speech, and sends them to the page as cues."""
 
 from ico3d.chat.frames import SpeechFrame, UtteranceEndFrame
 from ico3d.chat.page import Page
@@ -14,22 +14,22 @@ from ico3d.motion.composing.takes import Takes
 from ico3d.motion.noise import scrambled
 
 LEAD = 0.8
-"""Seconds beyond what is heard up to which gestures are decided: cues come before they begin."""
+"""Seconds beyond the heard sound for which gestures are decided, so that cues arrive in time."""
 SOONEST = 0.15
-"""Seconds from the first that is heard of an utterance until a gesture begins."""
+"""Least time in seconds between the first heard sound of an utterance and a gesture."""
 
 
 class Cueing:
-    """Composes an utterance while the page says how far it has been heard."""
+    """Composes the gestures of an utterance while the page plays it."""
 
     def __init__(self, clips: dict[str, Clip], page: Page, moving: bool, seed: int):
-        """The gestures of one session.
+        """Creates the gestures of one session.
 
         Args:
-            clips: By name.
-            page: Gets `Cues`.
-            moving: False lets the body stand while the face talks.
-            seed: Decides, with the number of an utterance, everything that is by chance.
+            clips: Gestures of the bundle, by name.
+            page: Receives `Cues`.
+            moving: If False, the body makes no gestures.
+            seed: Together with an utterance's number, the seed of all random choices.
         """
         self._clips, self._page, self._moving, self._seed = clips, page, moving, seed
         self._scripts: dict[int, Script] = {}
@@ -38,32 +38,32 @@ class Cueing:
         self._composer: Composer | None = None  # until all is handed out
 
     def stop(self) -> None:
-        """Nothing is spoken any more: the page lets hands come down by itself."""
+        """Ends the utterance; the page lets the hands come down by itself."""
         self._composer = None
 
     @property
     def names(self) -> list[str]:
-        """Gestures that can be asked for."""
+        """Names of gestures that can be requested."""
         return Takes(self._clips).meanings if self._moving else []
 
     def request(self, name: str) -> None:
-        """A gesture to make next, in what is spoken now or in the utterance that follows."""
+        """Requests a gesture for the current utterance or, if there is none, for the next."""
         self._wanted = [name]
         self._hand_over()
 
     def asked(self, question: str) -> None:
-        """What a visitor says: who asks for a gesture gets it with the answer."""
+        """Looks for a requested gesture in the visitor's words, to be made with the answer."""
         name = requested(question, self.names)
         if name is not None and name in self.names:
             self.request(name)
 
     def forget(self) -> None:
-        """What was asked for is not to be made any more, and what it was for is over."""
+        """Drops requested gestures, because their utterance is over."""
         self._wanted = []
         self.stop()
 
     def read(self, frame: SpeechFrame | UtteranceEndFrame) -> None:
-        """Sound has been made, or all of an utterance."""
+        """Takes the next piece of synthesised sound, or the end of an utterance."""
         script = self._scripts.setdefault(frame.utterance, Script())
         if isinstance(frame, SpeechFrame):
             script.add(frame)
@@ -71,11 +71,11 @@ class Cueing:
             script.end()
 
     def clock(self, message: Clock, position: float) -> None:
-        """The page says where it is.
+        """Takes a report of the page's playback.
 
         Args:
-            message: Of the utterance that is spoken.
-            position: Seconds of it that can have been heard.
+            message: Report about the current utterance.
+            position: Seconds of the utterance that can have been heard.
         """
         script = self._scripts.get(message.utterance)
         if not self._moving or script is None:

@@ -1,4 +1,4 @@
-"""The processor between voice and page: gives every piece of sound its face."""
+"""The processor between voice and page, which adds a face to every piece of sound."""
 
 import asyncio
 import time
@@ -27,9 +27,9 @@ STEP = 3 * MOST * ROW  # samples that go through the model at once: the first fa
 
 
 class ExpressionProcessor(FrameProcessor):
-    """Turns the voice's audio frames into `SpeechFrame`s of numbered utterances.
+    """Turns audio frames of the voice into `SpeechFrame`s of numbered utterances.
 
-    An utterance is one answer of the language model, or one text spoken outside of an answer.
+    An utterance is one answer of the language model, or a text that is spoken outside of an answer.
     """
 
     def __init__(
@@ -39,14 +39,14 @@ class ExpressionProcessor(FrameProcessor):
         run: Run = at_once,
         made: Callable[[SpeechFrame | UtteranceEndFrame], None] | None = None,
     ):
-        """A processor for one session.
+        """Creates the processor of one session.
 
         Args:
-            face: What moves.
-            utterances: Which answers there are; by default only this processor counts them.
-            run: Does what takes a while, in time for the row that it is for; in any thread by
-                default.
-            made: Told of each piece when it is made, long before it is sent.
+            face: The face of the session.
+            utterances: Numbers of answers; by default only this processor counts them.
+            run: Runs slow work before the time at which its result is due; by default in any
+                thread.
+            made: Called with each piece when it is made, long before it is sent.
         """
         super().__init__()
         self._face, self._utterances, self._run = face, utterances or Utterances(), run
@@ -64,12 +64,12 @@ class ExpressionProcessor(FrameProcessor):
         self._start = 0.0
 
     async def cleanup(self):
-        """Lets the face go."""
+        """Closes the face."""
         await super().cleanup()
         await asyncio.to_thread(self._face.close)
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
-        """Replaces audio, watches where sentences and answers begin and end, passes the rest."""
+        """Replaces audio, detects the ends of sentences and answers, and passes other frames on."""
         await super().process_frame(frame, direction)
         if isinstance(frame, TTSAudioRawFrame):
             await self._speak(frame)

@@ -1,4 +1,4 @@
-"""The face that belongs to a sound: sentences in, pieces of sound with expression rows out."""
+"""Computes faces for sound: sentences in, pieces of sound with rows of expressions out."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -20,10 +20,10 @@ MOST, LEAST = 5, 3  # rows of a piece: 200 and 120 ms
 
 
 class Lips(Protocol):
-    """The mouth's part of the rows of one sentence, as its sound arrives."""
+    """Mouth values of the rows of one sentence, computed while its sound arrives."""
 
     def push(self, samples: np.ndarray) -> np.ndarray:
-        """Takes (S,) samples in [-1, 1]; returns the rows (n, C) known now."""
+        """Adds samples (S,) in [-1, 1]; returns the rows (n, C) that are now known."""
         ...
 
     def finish(self) -> np.ndarray:
@@ -32,7 +32,7 @@ class Lips(Protocol):
 
 
 class Face:
-    """What all sentences of one session share: the model, and eyes that live on."""
+    """The face of one session: the speech model, and eyes that keep moving between sentences."""
 
     def __init__(
         self,
@@ -41,13 +41,14 @@ class Face:
         seed: int,
         remote: RemoteMouth | None = None,
     ):
-        """A face.
+        """Creates the face of one session.
 
         Args:
-            info: What the head can do.
-            model: Sound to mouth; without one (heads driven by blendshapes) only the eyes move.
-            seed: Of the eyes' behaviour.
-            remote: Moves the mouth instead of the model.
+            info: Sizes of the baked head.
+            model: Model from sound to mouth; without one (heads driven by blendshapes) only the
+                eyes move.
+            seed: Seed of the eyes' behaviour.
+            remote: Computes the mouth on another machine instead of by the model.
         """
         self.moods = Moods()
         self._info = info
@@ -56,11 +57,11 @@ class Face:
 
     @property
     def is_remote(self) -> bool:
-        """Whether another machine moves the mouth."""
+        """Whether another machine computes the mouth."""
         return self._remote is not None
 
     def lips(self) -> Lips:
-        """The mouth for a new sentence."""
+        """A new object for the mouth of one sentence."""
         if self._remote is not None:
             return self._remote.lips()
         if self._model is not None:
@@ -68,16 +69,16 @@ class Face:
         return StillLips()
 
     def close(self) -> None:
-        """Nothing more will be said."""
+        """Closes the connection to a remote mouth, if there is one."""
         if self._remote is not None:
             self._remote.close()
 
     def rows(self, lips: np.ndarray, start: float) -> np.ndarray:
-        """Whole expression rows.
+        """Full rows of expressions from mouth values.
 
         Args:
-            lips: (n, C) what the mouth does; C = 0 for a mouth at rest.
-            start: Time of the first row in the session, seconds (eyes run on that clock).
+            lips: (n, C) mouth values; C = 0 for a mouth at rest.
+            start: Time of the first row on the session's clock in seconds, which the eyes follow.
 
         Returns:
             (n, B) float32.
@@ -89,31 +90,31 @@ class Face:
 
 
 class StillLips:
-    """A mouth at rest: rows without values, as many as the sound is long."""
+    """A mouth at rest: as many rows as the sound has, without values."""
 
     def __init__(self):
-        """No sound yet."""
+        """Starts a sentence."""
         self._samples = 0
         self._given = 0
 
     def push(self, samples: np.ndarray) -> np.ndarray:
-        """(n, 0) for every row whose sound is there."""
+        """Adds samples; returns (n, 0) for rows whose sound has arrived."""
         self._samples += len(samples)
         rows = np.zeros((self._samples // ROW - self._given, 0), np.float32)
         self._given += len(rows)
         return rows
 
     def finish(self) -> np.ndarray:
-        """(0, 0): a mouth at rest holds no rows back."""
+        """Returns (0, 0), because no rows are outstanding."""
         return np.zeros((0, 0), np.float32)
 
 
 def open_face(bundle: Bundle) -> tuple[HeadInfo, SpeechModel | None]:
-    """What a server needs of a bundle to move its face; the model serves all sessions.
+    """Sizes of a bundle's head and its speech model, which all sessions share.
 
     Raises:
         BundleError: If the bundle has no head.
-        MissingModelError: If it needs a speech encoder that is not on this machine.
+        MissingModelError: If the bundle needs a speech encoder that is not installed.
         ModelError: If the bundle's speech model cannot be used.
     """
     info = bundle.manifest.head
@@ -128,11 +129,12 @@ def open_face(bundle: Bundle) -> tuple[HeadInfo, SpeechModel | None]:
 
 @dataclass(frozen=True)
 class Piece:
-    """A part of a sentence that goes out as one message.
+    """A piece of a sentence that is sent as one message.
 
     Attributes:
-        first_row: Index in the utterance of its first row; its sound starts there too.
-        pcm: (rows · 960,) int16.
+        first_row: Index of the piece's first row in the utterance; its sound starts at the same
+            time.
+        pcm: (rows · 960,) int16 at 24 kHz.
         expressions: (rows, B) float32.
     """
 
@@ -142,18 +144,18 @@ class Piece:
 
 
 class Sentence:
-    """Cuts one sentence into pieces of 120-200 ms as soon as their rows are known.
+    """Cuts one sentence into pieces of 120 to 200 ms as soon as their rows are known.
 
-    A sentence is padded with silence to whole rows, so that the next one starts on a row too.
+    A sentence is padded with silence to whole rows, so that the next one starts on a row.
     """
 
     def __init__(self, face: Face, first_row: int, start: float):
-        """A sentence that begins at row `first_row` of its utterance.
+        """Starts a sentence at row `first_row` of its utterance.
 
         Args:
-            face: The session's face.
-            first_row: Where in the utterance it begins.
-            start: Time of the utterance's row 0 in the session, seconds.
+            face: The face of the session.
+            first_row: Row of the utterance at which the sentence starts.
+            start: Time of the utterance's row 0 on the session's clock, seconds.
         """
         self._face, self._lips = face, face.lips()
         self._start = start
@@ -164,11 +166,11 @@ class Sentence:
 
     @property
     def next_row(self) -> int:
-        """The row after the last one given out."""
+        """Index of the row after the last one that was returned."""
         return self._next
 
     def push(self, pcm: np.ndarray) -> list[Piece]:
-        """Takes (S,) int16 samples at 24 kHz; returns the pieces that are complete."""
+        """Adds samples (S,) int16 at 24 kHz; returns the pieces that are now complete."""
         self._take(pcm)
         pieces = []
         while len(self._rows) >= MOST + LEAST:  # enough stays back for a last piece
@@ -176,7 +178,7 @@ class Sentence:
         return pieces
 
     def finish(self) -> list[Piece]:
-        """Ends the sentence; returns what is left, in pieces of about one size."""
+        """Ends the sentence; returns the rest in pieces of similar size."""
         if self._length == 0:
             return []
         total = max(LEAST, -(-self._length // ROW))

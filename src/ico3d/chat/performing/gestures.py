@@ -1,4 +1,4 @@
-"""The body's motion while the avatar speaks: plans it as sound arrives, and tells the page."""
+"""Plans the motion of a body of windows while sound arrives, and sends it to the page."""
 
 import numpy as np
 
@@ -9,22 +9,22 @@ from ico3d.chat.page import Page
 from ico3d.chat.wire.protocol import MAX_AHEAD_SECONDS, MAX_POINTS, Clock, Timeline
 
 LEAD = 1.5
-"""Seconds of motion that the page gets beyond what is heard: decided late, it fits what comes."""
+"""Seconds of motion that the page has beyond the heard sound; small, so that decisions are late."""
 REFILL = 1.0
-"""Seconds below which it gets more."""
+"""Seconds of remaining motion below which the page gets more."""
 OVERRUN = 1.0
 """Seconds that hands may take to come down after a speech that ended unexpectedly."""
 APART = 0.05
-"""Seconds between two reports of the page that tell how fast the body moves, at least."""
+"""Least time in seconds between two reports of the page that are used to compute a speed."""
 STANDING = 0.1
-"""Body seconds per second below which it stands still."""
+"""Speed below which the body counts as standing still, body seconds per second."""
 
 
 class Gestures:
-    """Plans an utterance from where the page says that the body is, in which direction it moves.
+    """Plans the motion of each utterance from the body's current place and direction.
 
-    The page reports only while an utterance plays: its first two reports tell both, a moment
-    after the speech began. Until then its body goes on resting.
+    The page reports only while an utterance plays. Place and direction follow from its first two
+    reports, shortly after the speech has begun; until then the body continues to rest.
     """
 
     def __init__(
@@ -35,14 +35,14 @@ class Gestures:
         moving: bool,
         seed: int,
     ):
-        """The motion of one session.
+        """Creates the motion of one session.
 
         Args:
-            animation: The body's key frames.
-            page: Gets `Timeline`s.
-            utterances: Know how much sound of an utterance there is.
-            moving: False holds the body at rest while the face talks.
-            seed: Decides, with the number of an utterance, everything that is random.
+            animation: Key frames and limits of the body's motion.
+            page: Receives `Timeline`s.
+            utterances: Tells how much sound of an utterance has been made.
+            moving: If False, the body stays at rest while the face talks.
+            seed: Together with an utterance's number, the seed of all random choices.
         """
         self._animation, self._page, self._utterances = animation, page, utterances
         self._moving, self._seed = moving, seed
@@ -50,7 +50,7 @@ class Gestures:
         self.stop()
 
     def stop(self) -> None:
-        """Nothing is spoken any more: the page's body finds its way to rest by itself."""
+        """Ends the utterance; the page returns the body to rest by itself."""
         self._utterance: int | None = None
         self._first: tuple[float, float] | None = None  # position and body time
         self._planner: Planner | None = None
@@ -58,17 +58,17 @@ class Gestures:
 
     @property
     def names(self) -> list[str]:
-        """Gestures that can be asked for."""
+        """Names of gestures that can be requested."""
         return list(self._animation.gestures) if self._moving else []
 
     def request(self, name: str) -> None:
-        """A gesture to make next, in what is spoken now or in the utterance that follows."""
+        """Requests a gesture for the current utterance or, if there is none, for the next."""
         self._wanted = self._animation.gestures[name]
         if self._planner is not None:
             self._hand_over(self._planner)
 
     def forget(self) -> None:
-        """What was asked for is not to be made any more, and what it was for is over."""
+        """Drops requested gestures, because their utterance is over."""
         self._wanted = None
         self.stop()
 
@@ -78,11 +78,11 @@ class Gestures:
             self._wanted = None
 
     def clock(self, message: Clock, position: float) -> None:
-        """The page says where it is.
+        """Takes a report of the page's playback.
 
         Args:
-            message: Of the utterance that is spoken.
-            position: Seconds of it that can have been heard.
+            message: Report about the current utterance.
+            position: Seconds of the utterance that can have been heard.
         """
         if message.utterance != self._utterance:
             self.stop()

@@ -1,4 +1,4 @@
-"""What the brows do beyond their small steady motion: a mood, for the length of an utterance."""
+"""Moods, which move the brows for the length of an utterance."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from ico3d.common.expression import EYE_NAMES
 
 NEUTRAL = "neutral"
 EASE = 0.4
-"""Seconds from one mood to the next."""
+"""Seconds of the transition between two moods."""
 BROWS: dict[str, dict[str, float]] = {
     NEUTRAL: {},
     "happy": {"browInnerUp": 0.15, "browOuterUpLeft": 0.3, "browOuterUpRight": 0.3},
@@ -15,30 +15,30 @@ BROWS: dict[str, dict[str, float]] = {
     "worried": {"browInnerUp": 0.6, "browDownLeft": 0.15, "browDownRight": 0.15},
     "doubtful": {"browDownLeft": 0.3, "browOuterUpRight": 0.5},
 }
-"""What each mood adds to the brow values."""
+"""Values that each mood adds to those of the brows, by name."""
 
 
 class Moods:
-    """The brows of one session: eased from mood to mood along the rows that are made."""
+    """The brows of one session, with smooth transitions between moods."""
 
     def __init__(self):
-        """Neutral."""
+        """Starts neutral."""
         self._from = self._to = self._wanted = brows(NEUTRAL)
         self._since = -np.inf  # s, time of the first row of this mood
 
     def set(self, name: str) -> None:
-        """The mood from the next row on that is made."""
+        """Sets the mood from the next row on."""
         self._wanted = brows(name)
 
     def forget(self) -> None:
-        """The utterance is over: the page eases the face to rest, the next one begins neutral."""
+        """Resets to neutral when an utterance is over; the page eases its face by itself."""
         self._from = self._to = self._wanted = brows(NEUTRAL)
 
     def values(self, times: np.ndarray) -> np.ndarray:
-        """What to add to the eye and brow values.
+        """Values to add to those of eyes and brows.
 
         Args:
-            times: (n,) seconds of the rows, ascending from call to call within an utterance.
+            times: (n,) times of the rows in seconds, ascending over all calls within an utterance.
 
         Returns:
             (n, 7) float32.
@@ -55,6 +55,6 @@ class Moods:
 
 
 def brows(mood: str) -> np.ndarray:
-    """(7,) float32 what a mood adds."""
+    """(7,) float32 values that a mood adds, in the order of `EYE_NAMES`."""
     raised = BROWS[mood]
     return np.array([raised.get(name, 0.0) for name in EYE_NAMES], np.float32)

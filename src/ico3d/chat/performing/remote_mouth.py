@@ -1,4 +1,4 @@
-"""A remote expression module as the conversation uses it, with the own model behind it."""
+"""Client of a remote expression module; falls back to the local speech model."""
 
 import json
 import threading
@@ -23,7 +23,7 @@ FAILURES = (OSError, WebSocketException, Ico3dError, ValueError)  # TimeoutError
 
 
 class RemoteMouth:
-    """The mouths of one session's sentences, by one connection."""
+    """Computes the mouths of one session's sentences over one connection."""
 
     def __init__(
         self,
@@ -32,13 +32,13 @@ class RemoteMouth:
         sha256: str,
         now: Callable[[], float] = time.monotonic,
     ):
-        """A mouth that has not connected.
+        """Connects later, when it is needed.
 
         Args:
-            settings: Where the server is.
-            model: The avatar's own model, for when it fails.
-            sha256: Of the model's file; the server must have the same.
-            now: Clock, seconds.
+            settings: Address of the module, key and time limit.
+            model: The avatar's own speech model, as fallback.
+            sha256: SHA-256 of the model's file; the module must have the same model.
+            now: Returns the time in seconds.
         """
         self.model = model
         self._settings, self._sha256, self._now = settings, sha256, now
@@ -48,18 +48,18 @@ class RemoteMouth:
         self._avoided_until = float("-inf")
 
     def lips(self) -> "RemoteLips":
-        """The mouth for a new sentence."""
+        """A new object for the mouth of one sentence."""
         with self._lock:
             self._sentence += 1
             return RemoteLips(self, self._sentence)
 
     def ask(self, sentence: int, message: bytes | str, is_first: bool) -> np.ndarray:
-        """The rows (n, C) that a message of a sentence brings.
+        """Sends a message of a sentence; returns the rows (n, C) of the answer.
 
         Raises:
-            OSError: If the server does not answer, or not in time.
-            WebSocketException: If it ends the connection.
-            ServiceError: If it is not to be asked, or its answer is wrong.
+            OSError: If the module does not answer, or not in time.
+            WebSocketException: If the module closes the connection.
+            ServiceError: If the module failed recently, or its answer is invalid.
         """
         with self._lock:
             if sentence != self._sentence:
@@ -75,7 +75,7 @@ class RemoteMouth:
                 raise
 
     def close(self) -> None:
-        """Ends the connection."""
+        """Closes the connection."""
         with self._lock:
             self._hang_up()
 
@@ -121,17 +121,17 @@ class RemoteMouth:
 
 
 class RemoteLips:
-    """The mouth's part of one sentence; goes on with the own model where the server fails."""
+    """Mouth values of one sentence; continues with the local model if the module fails."""
 
     def __init__(self, mouth: RemoteMouth, sentence: int):
-        """A sentence that has not begun."""
+        """Starts a sentence."""
         self._mouth, self._sentence = mouth, sentence
         self._samples = np.zeros(0, np.float32)  # all that came
         self._given = 0  # rows
         self._own: StreamingExpressions | None = None
 
     def push(self, samples: np.ndarray) -> np.ndarray:
-        """Takes (S,) samples in [-1, 1]; returns the rows (n, C) known now."""
+        """Adds samples (S,) in [-1, 1]; returns the rows (n, C) that are now known."""
         if self._own is not None:
             return self._own.push(samples)
         is_first = len(self._samples) == 0

@@ -1,4 +1,4 @@
-"""What an utterance says, word by word, and how loudly, as far as it has been made."""
+"""Words and loudness of an utterance over time, as far as it has been synthesised."""
 
 import numpy as np
 
@@ -9,10 +9,10 @@ from ico3d.rig.quaternions import Array
 
 
 class Script:
-    """One utterance; words are known as soon as their sentence has been made."""
+    """Words and loudness of one utterance; the words of a sentence are added with its sound."""
 
     def __init__(self):
-        """Nothing has been made yet."""
+        """Starts empty."""
         self.words: tuple[Word, ...] = ()
         self.complete = False
         self.seconds = 0.0
@@ -21,11 +21,11 @@ class Script:
 
     @property
     def levels(self) -> Array:
-        """Loudness from the beginning."""
+        """Loudness from the beginning of the utterance."""
         return self._loudness.levels
 
     def add(self, frame: SpeechFrame) -> None:
-        """Takes the next piece of sound."""
+        """Adds the next piece of sound."""
         if frame.text is not None:
             self._end_sentence()
             self._sentence = frame.text, frame.first_sample / SPEECH_RATE
@@ -33,7 +33,7 @@ class Script:
         self.seconds = (frame.first_sample + len(frame.pcm)) / SPEECH_RATE
 
     def end(self) -> None:
-        """All has been made."""
+        """Marks the utterance as complete."""
         self._end_sentence()
         self.complete = True
 

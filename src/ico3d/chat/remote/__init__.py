@@ -1,1 +1,1 @@
-"""Recognition, language, voice and expression on another machine: servers, and their clients."""
+"""Recognition, language, voice and expression as servers for other machines."""

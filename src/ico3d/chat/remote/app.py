@@ -1,4 +1,4 @@
-"""One service as an HTTP server with the OpenAI-compatible API."""
+"""One service of the conversation as an HTTP server with the OpenAI-compatible API."""
 
 import time
 from collections.abc import Callable
@@ -27,15 +27,15 @@ def make_service_app(
     limits: Limits,
     key: str = "",
 ) -> Guard:
-    """Recognition, language or voice.
+    """The application for recognition, language or voice.
 
     Args:
-        kind: Which of the three.
-        name: What its model is called.
-        make: Makes a processor for one request; runs in a thread.
+        kind: `recognition`, `language` or `voice`.
+        name: Name of the model, as clients see it.
+        make: Creates a processor for one request; runs in a thread.
         host: The address that the server is bound to.
-        limits: How much it takes.
-        key: What clients must know; empty for none.
+        limits: Limits of requests.
+        key: Key that clients must send; empty for none.
     """
     app = _bare_app(kind, name)
     KINDS[kind].add_routes(app, name, Spares(make), limits.seconds)
@@ -45,14 +45,14 @@ def make_service_app(
 def make_expression_app(
     model: SpeechModel, sha256: str, host: str, limits: Limits, key: str = ""
 ) -> Guard:
-    """Expression: sound in, expression values out.
+    """The application for expression: sound in, expression values out.
 
     Args:
-        model: What turns sound into expressions.
-        sha256: Of its file, by which clients know that it is theirs.
+        model: Model from sound to expression values.
+        sha256: SHA-256 of the model's file, by which clients check that it is theirs.
         host: The address that the server is bound to.
-        limits: How much it takes.
-        key: What clients must know; empty for none.
+        limits: Limits of requests.
+        key: Key that clients must send; empty for none.
     """
     app = _bare_app("expression", sha256)
     expression.add_routes(app, model, sha256)

@@ -1,4 +1,4 @@
-"""The verb `serve-module`."""
+"""The verb `ico3d serve-module`."""
 
 import os
 import sys
@@ -20,17 +20,19 @@ LOOPBACK = ("127.0.0.1", "::1", "localhost")
 class ServeModule:
     """Serves one part of the conversation to other machines (docs/conversation/modules.md).
 
-    Recognition, language and voice speak the OpenAI-compatible API; expression has its own.
+    Recognition, language and voice use the OpenAI-compatible API; expression has an API of its own.
 
     Attributes:
-        kind: Which part: recognition, language, voice or expression.
-        settings: TOML or JSON file that chooses its provider, as for `serve`.
-        bundle: Whose persona language knows, and whose speech model expression runs.
-        host: Address to listen on; other machines reach it only if it is not 127.0.0.1.
-        port: Port to listen on; 0 takes any that is free.
-        key_variable: Environment variable with a key that clients must know; none by default.
-        limits: How much it takes.
-        verbose: Print what happens inside.
+        kind: Part to serve: recognition, language, voice or expression.
+        settings: TOML or JSON file that chooses the provider, as for `serve`.
+        bundle: Avatar whose persona is given to language, and whose speech model runs for
+            expression.
+        host: Address to listen on; with 127.0.0.1 other machines cannot reach the server.
+        port: Port to listen on; 0 takes any free port.
+        key_variable: Environment variable with a key that clients must send; by default no key is
+            needed.
+        limits: Limits of requests.
+        verbose: Print all log messages, including what visitors say.
     """
 
     kind: Annotated[Literal["recognition", "language", "voice", "expression"], tyro.conf.Positional]
@@ -43,7 +45,7 @@ class ServeModule:
     verbose: bool = False
 
     def run(self) -> None:
-        """Serves until it is interrupted.
+        """Serves until interrupted.
 
         Raises:
             Ico3dError: If the bundle, the settings, the key or the port cannot be used.

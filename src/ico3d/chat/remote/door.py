@@ -1,4 +1,4 @@
-"""What lets a request into a module: its key, its size, and how many there are."""
+"""Admission of requests to a module: key, size, and number at a time."""
 
 import hmac
 
@@ -13,15 +13,15 @@ BROKEN, BUSY = 1008, 1013  # WebSocket close codes
 
 
 class Door:
-    """ASGI middleware in front of a module."""
+    """ASGI middleware that admits requests to a module."""
 
     def __init__(self, app: ASGIApp, limits: Limits, key: str = ""):
-        """Guards `app`; an empty key lets everybody in."""
+        """Wraps `app`; with an empty key no key is needed."""
         self._app, self._limits, self._key = app, limits, key
         self._inside = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handles one request or WebSocket handshake."""
+        """Admits or refuses one request or WebSocket handshake."""
         if scope["type"] not in ("http", "websocket") or scope["path"] in OPEN_PATHS:
             await self._app(scope, receive, send)
             return
@@ -49,22 +49,22 @@ class Door:
 
 
 class Body:
-    """One request whose length is counted, for it may tell none; past the limit it is refused."""
+    """A request whose bytes are counted as they arrive, since headers may omit the length."""
 
     def __init__(self, megabytes: float, scope: Scope, receive: Receive, send: Send):
-        """Counts what `receive` brings, and answers by `send`."""
+        """Counts the bytes from `receive`, up to `megabytes`; answers through `send`."""
         self._megabytes, self._scope = megabytes, scope
         self._receive, self._send = receive, send
         self._taken, self._refused = 0, False
 
     async def receive(self) -> Message:
-        """The next message; the end of the connection past the limit."""
+        """The next message; beyond the limit, a message that the client has disconnected."""
         message = await self._receive()
         self._taken += len(message.get("body", b""))
         return {"type": "http.disconnect"} if self._is_over else message
 
     async def send(self, message: Message) -> None:
-        """Passes the answer on; whatever was made of a body that was cut off is a refusal."""
+        """Passes the answer on; after a request beyond the limit, sends a refusal instead."""
         if not self._is_over or self._scope["type"] != "http":
             await self._send(message)
         elif not self._refused and message["type"] == "http.response.start":
@@ -78,12 +78,12 @@ class Body:
 
 
 def too_large(megabytes: float) -> str:
-    """Why a request is refused."""
+    """The sentence that refuses a request beyond the limit."""
     return f"the request is larger than {megabytes:g} MB."
 
 
 def error_response(status: int, sentence: str) -> JSONResponse:
-    """An error in the form that clients of the OpenAI API expect."""
+    """An error in the form of the OpenAI API."""
     kind = "invalid_request_error" if status < 500 else "server_error"
     error = {"message": sentence, "type": kind, "param": None, "code": None}
     headers = {"Retry-After": "1"} if status in (429, 503) else {}

@@ -1,6 +1,6 @@
-"""`/v1/expressions`: a WebSocket that takes sound in pieces and gives the face that belongs to it.
+"""`/v1/expressions`: a WebSocket that takes sound in pieces and returns the matching face.
 
-What is said on it tells `ico3d.chat.wire.remote_expression`; rows are those of
+The protocol is described in `ico3d.chat.wire.remote_expression`; rows are those of
 `StreamingExpressions`.
 """
 
@@ -21,12 +21,12 @@ LARGEST = MAX_BINARY_FRAME  # bytes of one piece
 
 
 def add_routes(app: FastAPI, model: SpeechModel, sha256: str) -> None:
-    """Adds the WebSocket.
+    """Adds the WebSocket to an application.
 
     Args:
-        app: Where to.
-        model: What turns sound into expressions.
-        sha256: Of its file.
+        app: The application.
+        model: Model from sound to expression values.
+        sha256: SHA-256 of the model's file.
     """
     hello = {"model": sha256, "rate": SPEECH_RATE, "fps": EXPRESSION_FPS, "size": SPEECH_SIZE}
 
@@ -59,5 +59,5 @@ async def _serve(socket: WebSocket, model: SpeechModel) -> None:
 
 
 def samples_of(pcm: bytes) -> np.ndarray:
-    """PCM16 as (S,) float32 in [-1, 1), as everywhere in the conversation."""
+    """PCM16 as samples (S,) float32 in [-1, 1)."""
     return np.frombuffer(pcm, "<i2").astype(np.float32) / 32768

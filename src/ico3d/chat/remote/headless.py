@@ -1,4 +1,4 @@
-"""A service of the conversation without one: frames in, its frames out."""
+"""Runs a service of the conversation alone: frames in, frames out."""
 
 import asyncio
 import time
@@ -15,15 +15,15 @@ from ico3d.errors import ServiceError
 
 
 class Collector(FrameProcessor):
-    """The end of the pipeline: keeps what comes out."""
+    """The end of the pipeline, which collects the frames that arrive."""
 
     def __init__(self, found: asyncio.Queue[Frame | None]):
-        """Puts frames into `found`."""
+        """Puts frames into the queue `found`."""
         super().__init__()
         self._found = found
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
-        """Keeps what comes down."""
+        """Collects frames that come down the pipeline."""
         await super().process_frame(frame, direction)
         if direction == FrameDirection.DOWNSTREAM:
             self._found.put_nowait(frame)
@@ -33,18 +33,19 @@ class Collector(FrameProcessor):
 async def run(
     processor: FrameProcessor, frames: Sequence[Frame], seconds: float
 ) -> AsyncGenerator[Frame, None]:
-    """What a service makes of some frames, as it makes it; it is used up then.
+    """Runs a service on some frames; yields its output while it is produced.
 
-    pipecat promises that a service is done with everything when it lets an `EndFrame` through.
+    The service cannot be used again afterwards. pipecat guarantees that a service has finished all
+    work when it passes an `EndFrame` on.
 
     Args:
-        processor: A fresh one.
-        frames: What goes in.
-        seconds: That all of it may take.
+        processor: A service that was not used before.
+        frames: The input.
+        seconds: Time limit for everything.
 
     Raises:
-        ServiceError: If it reports an error.
-        TimeoutError: If it takes too long.
+        ServiceError: If the service reports an error.
+        TimeoutError: If the time limit is exceeded.
     """
     deadline = time.monotonic() + seconds
     found: asyncio.Queue[Frame | None] = asyncio.Queue()
@@ -87,18 +88,18 @@ async def run(
 
 
 class Spares:
-    """Fresh processors: each request has its own, one is always made ahead."""
+    """Creates services in advance: each request gets a new one, and one is always ready."""
 
     def __init__(self, make: Callable[[], FrameProcessor]):
-        """Makes with `make`, which may take a while and runs in a thread."""
+        """`make` creates a service; it may take a while and runs in a thread."""
         self._make = make
         self._next: asyncio.Task[FrameProcessor] | None = None
 
     async def take(self) -> FrameProcessor:
-        """A processor that nobody has used.
+        """A service that was not used before.
 
         Raises:
-            Ico3dError: If it cannot be made.
+            Ico3dError: If the service cannot be created.
         """
         taken, self._next = self._next or self._start(), None
         try:

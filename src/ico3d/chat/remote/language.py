@@ -1,4 +1,4 @@
-"""`POST /v1/chat/completions`: a conversation in, the next answer out, streamed or at once."""
+"""`POST /v1/chat/completions`: a conversation in, the next answer out, streamed or whole."""
 
 import contextlib
 import json
@@ -31,7 +31,7 @@ SAMPLING = ("temperature", "top_p", "max_tokens", "seed", "frequency_penalty", "
 
 
 class Function(BaseModel):
-    """What the model may call; `parameters` is a JSON schema of an object."""
+    """A function that the model may call; `parameters` is the JSON schema of an object."""
 
     name: str
     description: str = ""
@@ -39,13 +39,13 @@ class Function(BaseModel):
 
 
 class Tool(BaseModel):
-    """A function in its wrapping."""
+    """A function as the OpenAI API wraps it."""
 
     function: Function
 
 
 class ChatRequest(BaseModel):
-    """A conversation; further fields, and what clients call the model, are not looked at."""
+    """A conversation to continue; other fields, such as the model's name, are ignored."""
 
     messages: list[dict[str, Any]] = Field(min_length=1)
     stream: bool = False
@@ -60,13 +60,13 @@ class ChatRequest(BaseModel):
 
 
 def add_routes(app: FastAPI, name: str, spares: Spares, seconds: float) -> None:
-    """Adds the route.
+    """Adds the route to an application.
 
     Args:
-        app: Where to.
-        name: Of the model.
-        spares: Makes language models.
-        seconds: That a request may take.
+        app: The application.
+        name: Name of the model in answers.
+        spares: Creates language models.
+        seconds: Time limit of a request.
     """
 
     @app.post("/v1/chat/completions")
@@ -81,11 +81,11 @@ def add_routes(app: FastAPI, name: str, spares: Spares, seconds: float) -> None:
 async def answered(
     request: ChatRequest, spares: Spares, seconds: float
 ) -> AsyncGenerator[dict[str, Any], None]:
-    """The answer as the API's deltas: `content`, `tool_calls`, or `reasoning_content`.
+    """Yields the answer as the API's deltas: `content`, `tool_calls`, or `reasoning_content`.
 
     Raises:
         ServiceError: If the model fails or has no answer.
-        TimeoutError: If it takes too long.
+        TimeoutError: If the time limit is exceeded.
     """
     given = {name: value for name in SAMPLING if (value := getattr(request, name)) is not None}
     if request.max_completion_tokens is not None:

@@ -1,16 +1,16 @@
-"""How much a module takes."""
+"""Limits of a module's requests."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Limits:
-    """How much a module takes.
+    """Limits of a module's requests.
 
     Attributes:
-        requests: At once; further ones are answered with 429.
-        megabytes: Of one request; larger ones are answered with 413.
-        seconds: That one request may take; then it is answered with 504, or cut off.
+        requests: Requests at a time; further ones are answered with 429.
+        megabytes: Size of a request; larger ones are answered with 413.
+        seconds: Duration of a request; longer ones are answered with 504, or cut off.
     """
 
     requests: int = 8

@@ -1,4 +1,4 @@
-"""`POST /v1/audio/transcriptions`: a WAV file in, its words out."""
+"""`POST /v1/audio/transcriptions`: a WAV file in, the transcript out."""
 
 import asyncio
 import io
@@ -30,13 +30,13 @@ DTYPES = {1: np.uint8, 2: np.dtype("<i2"), 4: np.dtype("<i4")}  # by bytes of a 
 
 
 def add_routes(app: FastAPI, name: str, spares: Spares, seconds: float) -> None:
-    """Adds the route.
+    """Adds the route to an application.
 
     Args:
-        app: Where to.
-        name: Of the model; what clients call it is not looked at.
-        spares: Makes recognisers.
-        seconds: That a request may take.
+        app: The application.
+        name: Name of the model; the name in requests is ignored.
+        spares: Creates recognisers.
+        seconds: Time limit of a request.
     """
 
     @app.post("/v1/audio/transcriptions")
@@ -62,7 +62,7 @@ def _answer(said: list[TranscriptionFrame], duration: float, form: str) -> Respo
 
 
 def heard(pcm: np.ndarray) -> list[Frame]:
-    """(S,) int16 at 16 kHz as a conversation would bring it: one stretch of speech."""
+    """Frames for samples (S,) int16 at 16 kHz, as in a conversation with one stretch of speech."""
     pcm = np.concatenate([QUIET, pcm, QUIET])
     starts = range(0, len(pcm), MICROPHONE_CHUNK)
     pieces = [pcm[at : at + MICROPHONE_CHUNK].tobytes() for at in starts]
@@ -72,10 +72,10 @@ def heard(pcm: np.ndarray) -> list[Frame]:
 
 
 def read_wav(file: BinaryIO) -> np.ndarray:
-    """A WAV file as (S,) int16 mono at 16 kHz, judged by its header before its samples are read.
+    """Reads a WAV file as (S,) int16 mono at 16 kHz, after checking what its header claims.
 
     Raises:
-        ProtocolError: If it is none, has no sound, or claims what is not taken.
+        ProtocolError: If the file is no WAV, is empty, or claims more than is accepted.
         MissingExtraError: If soxr is needed and not installed.
     """
     size = file.seek(0, io.SEEK_END)

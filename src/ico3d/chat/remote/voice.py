@@ -1,4 +1,4 @@
-"""`POST /v1/audio/speech`: a text in, its sound out while it is made."""
+"""`POST /v1/audio/speech`: a text in, the sound out while it is synthesised."""
 
 import contextlib
 import struct
@@ -24,12 +24,12 @@ UNKNOWN = 0xFFFFFFFF  # length of a WAV file that is still being made
 
 
 class SpeechRequest(BaseModel):
-    """What is to be said; model, voice and further fields are not looked at: settings choose.
+    """A text to speak; other fields, such as model and voice, are ignored: settings decide.
 
     Attributes:
         input: The text.
-        response_format: Raw PCM16 at 24 kHz, or a WAV file of it.
-        speed: Only 1 is known.
+        response_format: `pcm`: raw PCM16 at 24 kHz; `wav`: a WAV file of the same.
+        speed: Only 1 is supported.
     """
 
     input: str = Field(min_length=1, max_length=4096)
@@ -38,13 +38,13 @@ class SpeechRequest(BaseModel):
 
 
 def add_routes(app: FastAPI, name: str, spares: Spares, seconds: float) -> None:
-    """Adds the route.
+    """Adds the route to an application.
 
     Args:
-        app: Where to.
-        name: Of the model; what clients call it is not looked at.
-        spares: Makes voices.
-        seconds: That a request may take.
+        app: The application.
+        name: Name of the model; the name in requests is ignored.
+        spares: Creates voices.
+        seconds: Time limit of a request.
     """
 
     @app.post("/v1/audio/speech")
@@ -58,11 +58,11 @@ def add_routes(app: FastAPI, name: str, spares: Spares, seconds: float) -> None:
 
 
 async def spoken(text: str, spares: Spares, seconds: float) -> AsyncGenerator[bytes, None]:
-    """PCM16 at 24 kHz of a text, sentence by sentence.
+    """Yields the sound of a text as PCM16 at 24 kHz, sentence by sentence.
 
     Raises:
-        ServiceError: If the voice fails or gives no sound.
-        TimeoutError: If it takes too long.
+        ServiceError: If the voice fails or produces no sound.
+        TimeoutError: If the time limit is exceeded.
     """
     frames: list[Frame] = [
         LLMFullResponseStartFrame(),
@@ -87,7 +87,7 @@ async def _joined(head: bytes, sound: AsyncGenerator[bytes, None]) -> AsyncGener
 
 
 def wav_header() -> bytes:
-    """Of PCM16 mono at 24 kHz whose length is not known yet."""
+    """The header of a WAV file, PCM16 mono at 24 kHz, of unknown length."""
     form = struct.pack("<4sIHHIIHH", b"fmt ", 16, 1, 1, SPEECH_RATE, 2 * SPEECH_RATE, 2, 16)
     head = struct.pack("<4sI4s", b"RIFF", UNKNOWN, b"WAVE")
     return head + form + struct.pack("<4sI", b"data", UNKNOWN)

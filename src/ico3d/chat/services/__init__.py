@@ -1,8 +1,8 @@
-"""The three services of a conversation, by name.
+"""The three services of a conversation, recognition, language and voice, by name.
 
-pipecat's own services serve wherever one exists; those in these folders are the offline three,
-which need no download, and what is too small to be elsewhere. A new one is a module with its
-`Settings` and one entry in the table of its kind.
+pipecat's own services are used wherever one exists. The modules in these folders are the three
+offline services, which need no download, and thin adapters. A new service is a module with a class
+`Settings`, and an entry in the table of its kind.
 """
 
 from collections.abc import Mapping
@@ -25,19 +25,19 @@ TABLES: Mapping[str, Table] = {
 
 @dataclass(frozen=True)
 class Chosen:
-    """The services that the settings name."""
+    """The services that the settings choose."""
 
     recognition: ChosenService
     language: ChosenService
     voice: ChosenService
 
     def described(self) -> protocol.Services:
-        """As the page is told."""
+        """Names of the services for the page."""
         services = (self.recognition, self.language, self.voice)
         return protocol.Services(*(service.described() for service in services))
 
     def dictation(self) -> protocol.Dictation | None:
-        """What the page is told where its browser recognises speech."""
+        """What the page needs to know if its browser recognises speech, else None."""
         options = self.recognition.options
         if not isinstance(options, browser.Settings):
             return None
@@ -49,11 +49,12 @@ def choose(settings: ChatSettings, voices: Mapping[str, str] | None = None) -> C
     """Finds the services that the settings name.
 
     Args:
-        settings: Which services.
-        voices: The persona's voice for each provider of voices; settings that name one win.
+        settings: Names and options of the services.
+        voices: The persona's voice for each provider of voices; a voice in the settings has
+            priority.
 
     Raises:
-        SettingsError: If one is unknown, or its options are wrong.
+        SettingsError: If a service is unknown, or its options are wrong.
     """
     return Chosen(
         chosen(recognition.PROVIDERS, settings.recognition, "recognition"),
@@ -63,7 +64,7 @@ def choose(settings: ChatSettings, voices: Mapping[str, str] | None = None) -> C
 
 
 def with_voice(service: ChosenService, choice: Choice, voices: Mapping[str, str]) -> ChosenService:
-    """A service that speaks with the persona's voice, unless the settings name another."""
+    """A service with the persona's voice, unless the settings name another voice."""
     names = [n for n, provider in voice.PROVIDERS.items() if provider is service.provider]
     own = next((voices[name] for name in names if name in voices), None)
     if own is None or "voice" in choice.options or not hasattr(service.options, "voice"):

@@ -1,4 +1,4 @@
-"""Which provider of a table does the job: the one that settings name, or the first that works."""
+"""Chooses a provider from a table: the one in the settings, or the first that works."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -17,34 +17,34 @@ class ChosenService:
     """A provider with its options.
 
     Attributes:
-        provider: Who does the job.
-        options: An instance of its settings.
+        provider: The provider.
+        options: Instance of the provider's settings.
     """
 
     provider: Provider
     options: Any
 
     def make(self, context: Context) -> FrameProcessor:
-        """The processor of one session; may take a while."""
+        """Creates the processor of one session; may take a while."""
         return self.provider.make(self.options, context)
 
     def described(self) -> protocol.Service:
-        """As the page is told."""
+        """Name of the service for the page."""
         title, detail = self.provider.title, self.provider.detail(self.options)
         name = f"{title} ({detail})" if detail else title
         return protocol.Service(name[:LONGEST_NAME], self.provider.stand_in)
 
 
 def chosen(table: Table, choice: Choice, kind: str) -> ChosenService:
-    """A service by its name, or the first of the table that works here.
+    """A provider by its name, or the first of the table that works on this machine.
 
     Args:
-        table: Providers of this kind.
-        choice: Which, and how.
-        kind: What an error calls it.
+        table: Providers of one kind, by name.
+        choice: Name and options.
+        kind: Name of the kind, for errors.
 
     Raises:
-        SettingsError: If it is unknown, its options are wrong, or none works.
+        SettingsError: If the provider is unknown, its options are wrong, or none works.
     """
     if choice.use == BEST:
         if choice.options:
@@ -59,10 +59,10 @@ def chosen(table: Table, choice: Choice, kind: str) -> ChosenService:
 
 
 def best(table: Table, kind: str) -> ChosenService:
-    """The first of a table that works here.
+    """The first provider of a table that works on this machine.
 
     Raises:
-        SettingsError: If none does.
+        SettingsError: If no provider works.
     """
     hindrance = ""
     for provider in table.values():

@@ -1,6 +1,6 @@
-"""How servers with an OpenAI-compatible API are called: by their own key, and never led elsewhere.
+"""Options for clients of OpenAI-compatible servers: each server gets only its own key.
 
-Slow to import.
+Importing this module is slow.
 """
 
 import os
@@ -11,25 +11,25 @@ from openai import DefaultAsyncHttpxClient
 from ico3d.chat.settings.keys import NONE, OPENAI, goes_here, is_openai, key_for
 
 OWN_HEADERS = ("OpenAI-Organization", "OpenAI-Project")
-"""What the SDK takes from the environment and sends to every server."""
+"""Headers that the SDK takes from the environment and sends to every server."""
 CUSTOM_HEADERS = "OPENAI_CUSTOM_HEADERS"
-"""Environment variable with more of them, one `Name: value` a line."""
+"""Environment variable with further such headers, one `Name: value` per line."""
 
 
 def client_options(url: str, key_variable: str, where: str, **http: Any) -> dict[str, Any]:
-    """What the SDK's client is made with for one server.
+    """Options of the SDK's client for one server.
 
-    It follows no redirects: neither key nor words go anywhere else. Servers of this machine are
-    not asked through a proxy.
+    Redirects are not followed, so that neither key nor words reach another server. Servers on this
+    machine are not asked through a proxy.
 
     Args:
-        url: Of the server; empty for OpenAI's.
-        key_variable: Environment variable that the settings name for its key; may be empty.
-        where: What an error names as the place.
+        url: Address of the server; empty for OpenAI's.
+        key_variable: Environment variable with the server's key, or empty.
+        where: Place of the setting, for errors.
         http: Options of the HTTP client.
 
     Raises:
-        SettingsError: If the key is missing or must not go there.
+        SettingsError: If the key is missing or may not be sent to this address.
     """
     key = key_for(url, key_variable, where) or NONE
     hooks = {} if is_openai(url) else {"request": [_without_openais(key)]}

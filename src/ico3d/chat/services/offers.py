@@ -1,4 +1,4 @@
-"""What visitors may choose from, and their choices."""
+"""The services that visitors may choose from, and their choices."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -11,10 +11,10 @@ LONGEST_HINDRANCE = 400  # characters: all offers go into one message
 
 
 def offers(settings: ChatSettings, voices: Mapping[str, str]) -> list[protocol.Offer]:
-    """All services with what hinders them, as the page is told; asks each, so it may take 1 s.
+    """All services and what hinders them, for the page; asking each of them may take 1 s.
 
     Args:
-        settings: Which services, and their options.
+        settings: Names and options of the services.
         voices: The persona's voice for each provider of voices.
 
     Raises:
@@ -31,10 +31,10 @@ def offers(settings: ChatSettings, voices: Mapping[str, str]) -> list[protocol.O
 
 
 def named(settings: ChatSettings, voices: Mapping[str, str], kind: str, key: str) -> ChosenService:
-    """A service of a table, as the settings and the persona describe it where they do.
+    """A service of a table with the options that settings and persona give for it.
 
     Raises:
-        SettingsError: If its options are wrong.
+        SettingsError: If the options are wrong.
     """
     set_choice: Choice = getattr(settings, kind)
     choice = set_choice if set_choice.use == key else Choice(key)
@@ -49,14 +49,14 @@ def wished(
     wishes: Mapping[str, str],
     offered: Sequence[protocol.Offer],
 ) -> Chosen:
-    """The services with a visitor's wishes, where they are offered and work.
+    """The services with a visitor's wishes, as far as those are offered and work.
 
     Args:
-        services: Those of visitors without wishes.
+        services: Services for visitors without wishes.
         settings: Options of all services.
         voices: The persona's voice for each provider of voices.
-        wishes: Keys of offers by kind.
-        offered: What may be wished for.
+        wishes: Wished services by kind, as keys of offers.
+        offered: Services that may be wished for.
     """
     working = {(offer.kind, offer.key) for offer in offered if not offer.hindrance}
     granted = {

@@ -1,4 +1,4 @@
-"""What a provider of recognition, language or voice is."""
+"""The interface of providers of recognition, language and voice."""
 
 import importlib.util
 import os
@@ -18,21 +18,21 @@ from ico3d.errors import MissingModelError, SettingsError
 
 @runtime_checkable
 class WarmsUp(Protocol):
-    """A service that is quicker once it has answered."""
+    """A service whose first answer is slow."""
 
     async def warm_up(self) -> None:
-        """Asks for something before visitors come."""
+        """Requests an answer before visitors come."""
         ...
 
 
 @dataclass(frozen=True)
 class Context:
-    """Whom a service works for.
+    """The avatar for which a service is created.
 
     Attributes:
         persona: Who the avatar is.
-        head: What its face can do.
-        animation: How its body can move; None for a head alone.
+        head: Sizes of the baked head.
+        animation: Procedural motion of the body; None for a head alone.
     """
 
     persona: Persona
@@ -41,20 +41,20 @@ class Context:
 
 
 def unhindered(settings: Any) -> str:
-    """For providers that need nothing beyond what `make` says is missing."""
+    """The `hindrance` of providers that always work."""
     del settings
     return ""
 
 
 def lacks_package(package: str, extra: str) -> str:
-    """What hinders a provider that needs a package: nothing, or that it is not installed."""
+    """A sentence if a package is not installed, else empty."""
     if importlib.util.find_spec(package) is not None:
         return ""
     return f"{package} is not installed: pip install 'ico3d[{extra}]'."
 
 
 def lacks_weights(name: str) -> str:
-    """What hinders a provider that needs weights: nothing, or that they are not here."""
+    """A sentence if weights are not installed, else empty."""
     try:
         model_of(name)
     except MissingModelError as error:
@@ -63,13 +63,13 @@ def lacks_weights(name: str) -> str:
 
 
 def nothing(settings: Any) -> str:
-    """For providers whose title says all."""
+    """The `detail` of providers whose title says everything."""
     del settings
     return ""
 
 
 def lacks_server(url: str, key_variable: str, kind: str) -> str:
-    """What hinders a provider that asks a server: none is named, or its key is not here."""
+    """A sentence if no server is named or its key is missing, else empty."""
     if not url and not os.environ.get(key_variable or OPENAI_KEY):
         return f'no server is chosen: set [{kind}] use = "openai" and url.'
     try:
@@ -81,18 +81,18 @@ def lacks_server(url: str, key_variable: str, kind: str) -> str:
 
 @dataclass(frozen=True)
 class Provider:
-    """One way to do a job; an entry in the table of its kind.
+    """One way to provide a service; an entry in the table of its kind.
 
     Attributes:
-        title: For the visitor's eyes.
-        settings: Dataclass of its options.
-        make: Makes the processor of one session from options and context; may take a while, runs
-            in a thread. What is heavy and read only is shared between sessions.
-        hindrance: What keeps it from working here as these options say (packages, weights, a
-            server that answers) and what would mend it, in one sentence for people; empty if
-            nothing does. Quick, and never raises: asked where the best is wanted.
-        stand_in: True for the offline three.
-        detail: Which model these options mean, for the visitor's eyes.
+        title: Name, as shown to visitors.
+        settings: Dataclass of the options.
+        make: Creates the processor of one session from options and context; may take a while and
+            runs in a thread. Large read-only data are shared between sessions.
+        hindrance: Returns one sentence on what prevents the service from working with these options
+            (packages, weights, a server) and what would help; empty if it works. Fast, and never
+            raises.
+        stand_in: Whether this is one of the three simple offline services.
+        detail: Returns the model that the options mean, as shown to visitors.
     """
 
     title: str
@@ -104,4 +104,4 @@ class Provider:
 
 
 Table = dict[str, Provider]
-"""Providers of one kind by name, the best first."""
+"""Providers of one kind by name, the preferred one first."""

@@ -1,4 +1,4 @@
-"""One WebSocket: from `hello` to its end."""
+"""One WebSocket connection, from `hello` to its end."""
 
 import asyncio
 import contextlib
@@ -22,24 +22,24 @@ UNREADY = "the avatar cannot talk now: something on the server does not start. T
 
 
 class Hangup(Exception):
-    """The connection is to be closed with an error."""
+    """Raised to close the connection with an error."""
 
     def __init__(self, code: int, message: str, again: bool = False):
-        """A close code, one sentence for the page, and whether a new session may succeed."""
+        """Takes a close code, a sentence for the page, and whether a new session may succeed."""
         super().__init__(message)
         self.code, self.again = code, again
 
 
 class Connection:
-    """Reads a page's messages and writes what its session has for it."""
+    """Reads the messages of a page and writes those of its session."""
 
     def __init__(self, socket: WebSocket, sessions: Sessions, notices: list[str]):
         """A connection.
 
         Args:
             socket: An accepted WebSocket.
-            sessions: Where its session comes from.
-            notices: What every page is told of the avatar.
+            sessions: Provides the session.
+            notices: Sentences about the avatar that every page shows.
         """
         self._socket, self._sessions, self._notices = socket, sessions, notices
         now = asyncio.get_running_loop().time
@@ -47,7 +47,7 @@ class Connection:
         self._outbox = Outbox()
 
     async def run(self) -> None:
-        """Talks until one of both sides ends it."""
+        """Exchanges messages until either side ends the connection."""
         with self._sessions.monitor.connections.track_inprogress():
             await self._run()
 

@@ -1,4 +1,4 @@
-"""Gives the memory of ended sessions back at once."""
+"""Returns the memory of ended sessions to the system at once."""
 
 import asyncio
 import ctypes
@@ -6,11 +6,12 @@ import gc
 
 
 async def give_back() -> None:
-    """Frees what only circles of objects still hold, and returns it to the system.
+    """Frees objects that are only kept by reference cycles, and returns their memory.
 
-    A pipeline refers to itself in circles. Python's collector sees its few small objects, but not
-    the models behind them, and comes too late; glibc keeps what threads freed. Over 30 sessions
-    with the offline services a server held 1,027 MB without this and 283 MB with it.
+    A pipeline contains reference cycles. Python's collector sees only a few small objects, not the
+    models behind them, and runs too late; glibc keeps memory that threads have freed. Over 30
+    sessions with the offline services a server held 1,027 MB without this function and 283 MB with
+    it.
     """
     gc.collect()
     await asyncio.to_thread(_trim)

@@ -1,7 +1,7 @@
-"""Keeps other web pages away from a local server, and the page to what it needs.
+"""Protects a local server from other web pages, and limits what the server's page may load.
 
-Any page that a browser shows can send requests to local ports; what it cannot do is forge the
-headers Origin and Host. A name that an attacker lets point to this machine shows in Host.
+Any page in a browser can send requests to local ports, but it cannot forge the headers Origin and
+Host. If an attacker lets a name point to this machine, that name appears in Host.
 """
 
 import ipaddress
@@ -38,15 +38,15 @@ HEADERS = {
 
 
 class Guard:
-    """ASGI middleware: 403 for foreign Origin or Host, security headers on every answer."""
+    """ASGI middleware: 403 for a foreign Origin or Host, security headers on every response."""
 
     def __init__(self, app: ASGIApp, host: str):
-        """Guards `app`, which is bound to the address `host`."""
+        """Wraps `app`, which is bound to the address `host`."""
         self._app = app
         self._host = host
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handles one request or WebSocket handshake."""
+        """Handles or refuses one request or WebSocket handshake."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
@@ -72,12 +72,12 @@ class Guard:
 
 
 def is_own(host: str | None, origin: str | None, bound: str) -> bool:
-    """Whether a request names this server in Host, and comes from its own page or from none.
+    """Whether Host names this server and Origin is this server's page or missing.
 
     Args:
         host: The Host header.
         origin: The Origin header; programs other than browsers send none.
-        bound: The address that the server is bound to.
+        bound: The address to which the server is bound.
     """
     name, port = split_host(host)
     if name is None or not is_own_name(name, bound):
@@ -92,14 +92,17 @@ def is_own(host: str | None, origin: str | None, bound: str) -> bool:
 
 
 def is_own_name(name: str, bound: str) -> bool:
-    """Loopback names, the bound address, and on a public address any number (no DNS trick)."""
+    """Whether a name is loopback, the bound address or, on a public address, numeric.
+
+    Numeric addresses cannot be the result of a DNS trick.
+    """
     if name in LOOPBACK or name == bound.casefold():
         return True
     return bound not in LOOPBACK and _is_number(name)
 
 
 def split_host(value: str | None) -> tuple[str | None, int | None]:
-    """Name and port of `name:port`; (None, None) if it is neither."""
+    """Name and port of `name:port`; (None, None) for a malformed value."""
     try:
         parts = urlsplit(f"//{value}")
         if not value or parts.username is not None or parts.path or parts.query or parts.fragment:

@@ -1,4 +1,4 @@
-"""How much a page may send, and what of late sound is still of use."""
+"""Limits of what a page may send, and the handling of sound that arrives late."""
 
 import time
 from collections import deque
@@ -28,15 +28,15 @@ KEPT = 5.0  # s of a backlog's latest sound that are still used: a question and 
 
 
 class Bucket:
-    """A token bucket: `rate` per second for long, `burst` at once."""
+    """A token bucket: `rate` per second on average, `burst` at once."""
 
     def __init__(self, rate: float, burst: float, now: Callable[[], float]):
-        """A full bucket."""
+        """Starts full."""
         self._rate, self._burst, self._now = rate, burst, now
         self._level, self._at = burst, now()
 
     def take(self, amount: float) -> bool:
-        """Takes an amount if it is there."""
+        """Takes an amount if the bucket has it; returns whether it has."""
         now = self._now()
         self._level = min(self._burst, self._level + self._rate * (now - self._at))
         self._at = now
@@ -49,57 +49,57 @@ class Bucket:
 class ConnectionLimits:
     """The limits of one connection.
 
-    Sound has wide ones: when a network that stalled comes back, all that the microphone made
-    meanwhile arrives at once, and that is nobody's fault.
+    The limit for sound is generous: when a stalled network recovers, all that the microphone
+    recorded meanwhile arrives at once, through no fault of the page.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic):
-        """A connection that has sent nothing yet."""
+        """Starts a connection; `now` returns the time in seconds."""
         self._texts = Bucket(MAX_RATE, MAX_BURST, now)
         self._sounds = Bucket(MAX_RATE, STALL * MICROPHONE_RATE / MICROPHONE_CHUNK, now)
         self._samples = Bucket(AUDIO_RATE, STALL * MICROPHONE_RATE, now)
         self._forgiveness = Bucket(1 / FORGOTTEN, FORGIVEN - 1, now)
 
     def check_frame(self, frame: str | bytes) -> None:
-        """Counts a frame; only sound comes in binary ones.
+        """Counts a frame; binary frames contain sound.
 
         Raises:
-            ProtocolError: If there are too many.
+            ProtocolError: If there are too many frames.
         """
         if not (self._sounds if isinstance(frame, bytes) else self._texts).take(1):
             raise ProtocolError(f"more than {MAX_RATE} messages per second.")
 
     def check_message(self, message: ClientMessage) -> None:
-        """Counts a message's sound.
+        """Counts the sound of a message.
 
         Raises:
-            ProtocolError: If more sound comes than a microphone makes.
+            ProtocolError: If more sound arrives than a microphone can record.
         """
         if isinstance(message, Audio) and not self._samples.take(len(message.pcm)):
             raise ProtocolError("more sound than a microphone makes.")
 
     def forgive(self) -> bool:
-        """Counts a broken rule; False when it was one too many in a short time."""
+        """Counts a violation; False if there were too many in a short time."""
         return self._forgiveness.take(1)
 
 
 class Inlet:
-    """Lets sound in as it arrives; of a backlog, only the latest seconds.
+    """Passes on sound that arrives in time; of a backlog, only the latest seconds.
 
-    What a network held back for many seconds comes much faster than it was said. To answer it
-    would be to answer the past, so it waits until sound comes in time again, and the oldest of
-    it is dropped. Whether sound is in time is told by its rate alone: the numbers of its samples
-    are no clock, for they stand still while the visitor's button is up.
+    Sound that a network has held back for many seconds arrives much faster than it was spoken.
+    Reacting to it at once would answer the past, so it is kept until sound arrives in time again,
+    and the oldest part is dropped. Only the rate of arrival tells whether sound is in time: sample
+    numbers are no clock, because they stand still while the visitor's button is up.
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic):
-        """No sound yet."""
+        """Starts without sound; `now` returns the time in seconds."""
         self._now, self._at = now, now()
         self._balance = BACKLOG  # s of sound that may still come at once; below 0 in a backlog
         self._waiting: deque[Audio] = deque()
 
     def admit(self, message: ClientMessage) -> list[ClientMessage]:
-        """Takes any message as it arrives; returns what is to be handled now, in order."""
+        """Takes a message on arrival; returns the messages to handle now, in order."""
         if isinstance(message, Audio):
             return [*self.take(message)]
         if isinstance(message, Talk):
@@ -107,7 +107,7 @@ class Inlet:
         return [message]
 
     def take(self, sound: Audio) -> list[Audio]:
-        """Takes sound as it arrives; returns what is to be heard now, in order."""
+        """Takes sound on arrival; returns the sound to handle now, in order."""
         now = self._now()
         since, self._at = now - self._at, now
         if since - seconds(sound) >= PAUSE:
@@ -124,12 +124,12 @@ class Inlet:
         return []
 
     def rest(self) -> list[Audio]:
-        """What still waits, for something that comes after it."""
+        """Returns the sound that is still kept, to be handled before a later message."""
         rest = list(self._waiting)
         self._waiting.clear()
         return rest
 
 
 def seconds(sound: Audio) -> float:
-    """How long a message's sound is."""
+    """Duration of a message's sound in seconds."""
     return len(sound.pcm) / MICROPHONE_RATE

@@ -1,9 +1,9 @@
-"""The built page's files: the smallest form that a browser takes, kept as long as it stays right.
+"""Serves the files of the built page, compressed and with caching.
 
-Vite writes each text file also as `NAME.br` and `NAME.gz` (`viewer/compression.ts`). Names under
-`assets/` hold a hash of their content, so that what a browser has of them never grows old;
-`index.html` names them and is asked for anew each time. A page built without compressed files is
-served as it is.
+Vite writes each text file also as `NAME.br` and `NAME.gz` (`viewer/compression.ts`). Names in
+`assets/` contain a hash of the content, so that browsers may keep these files for ever;
+`index.html`, which refers to them, is requested again each time. A page that was built without
+compressed files is served uncompressed.
 """
 
 import hashlib
@@ -20,26 +20,26 @@ from starlette.staticfiles import NotModifiedResponse, StaticFiles
 from starlette.types import Scope
 
 ENCODINGS = {"br": ".br", "gzip": ".gz"}
-"""Content codings and the suffixes of files that are in them, the smallest first."""
+"""Content codings and the suffixes of compressed files, the smallest first."""
 HASHED = "assets"
-"""The folder whose file names hold hashes."""
+"""Folder in which file names contain hashes."""
 FOR_EVER = "public, max-age=31536000, immutable"
 ASK_AGAIN = "no-cache"
 TYPES = {".css": "text/css", ".html": "text/html", ".js": "text/javascript"}
-"""What a machine's own list of types must not change: browsers refuse scripts of another type."""
+"""Content types that the machine's own table must not change: browsers check those of scripts."""
 WEIGHT = re.compile(r"0(\.\d{0,3})?|1(\.0{0,3})?")
 
 
 class PageFiles(StaticFiles):
-    """Serves a folder that Vite built."""
+    """Serves a folder that Vite has built."""
 
     def __init__(self, folder: Path):
-        """Serves the files of `folder`; `index.html` stands for the folder itself."""
+        """Serves the files of `folder`; the path / gives `index.html`."""
         super().__init__(directory=folder, html=True)
         self._hashed = folder.resolve() / HASHED
 
     def lookup_path(self, path: str) -> tuple[str, os.stat_result | None]:
-        """Finds a file; compressed ones are no files of their own."""
+        """Finds a file; compressed variants cannot be requested by name."""
         if path.endswith(tuple(ENCODINGS.values())):
             return "", None
         return super().lookup_path(path)
@@ -51,7 +51,7 @@ class PageFiles(StaticFiles):
         scope: Scope,
         status_code: int = 200,
     ) -> Response:
-        """The file in the best form that the request takes; 304 where the browser has that."""
+        """The file in the best coding that the request accepts; 304 if the browser has it."""
         plain, request = Path(full_path), Headers(scope=scope)
         forms = {name: Path(f"{plain}{suffix}") for name, suffix in ENCODINGS.items()}
         forms = {name: file for name, file in forms.items() if file.is_file()}
@@ -73,11 +73,11 @@ class PageFiles(StaticFiles):
 
 
 def preferred(accepted: str, offered: Collection[str]) -> str:
-    """The content coding to answer in; empty for none.
+    """The best content coding for an answer; empty for none.
 
     Args:
-        accepted: An Accept-Encoding header: codings with weights from 0 (never) to 1.
-        offered: What there is, the best first.
+        accepted: An Accept-Encoding header: codings with weights from 0 (refused) to 1.
+        offered: Available codings, the best first.
     """
     weights = dict(_coding(part) for part in accepted.split(","))
     weight = {name: weights.get(name, weights.get("*", 0.0)) for name in offered}

@@ -1,4 +1,4 @@
-"""The HTTP server: the page, the bundle's files, and the WebSocket of the conversation."""
+"""The HTTP server: the page, the files of the bundle, and the WebSocket of conversations."""
 
 import asyncio
 import contextlib
@@ -37,12 +37,12 @@ STILL = "This avatar is driven by blendshapes, not by sound: its lips do not mov
 
 
 def open_avatar(bundle: Bundle, settings: ChatSettings, persona: Persona | None = None) -> Avatar:
-    """What the sessions share.
+    """What all sessions of a server share.
 
     Args:
         bundle: The avatar.
-        settings: Services and timing.
-        persona: Who it is; the bundle's by default.
+        settings: Settings of the conversation.
+        persona: Who the avatar is; by default the bundle's persona.
 
     Raises:
         BundleError: If the bundle has no head.
@@ -60,13 +60,13 @@ def open_avatar(bundle: Bundle, settings: ChatSettings, persona: Persona | None 
 def make_app(
     bundle: Bundle, avatar: Avatar | None, host: str, sessions: Sessions | None = None
 ) -> Guard:
-    """The application.
+    """The application of the server.
 
     Args:
-        bundle: What the page loads.
-        avatar: What the sessions share; None for a body alone, which does not talk.
-        host: The address that the server is bound to.
-        sessions: Where sessions live; a new place by default.
+        bundle: The bundle that the page loads.
+        avatar: What the sessions share; None for a body without a head, which cannot talk.
+        host: Address to which the server is bound.
+        sessions: Manages the sessions; by default a new object.
     """
     if avatar is not None:
         sessions = Sessions(avatar) if sessions is None else sessions
@@ -101,7 +101,7 @@ def make_app(
 
 
 def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
-    """The WebSocket, and figures of what happens on it."""
+    """Adds the WebSocket of conversations and the route of their metrics."""
     notices = [] if avatar.speech else [STILL]
 
     @app.websocket("/ws")
@@ -115,14 +115,14 @@ def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
 
 
 def shown_manifest(bundle: Bundle, persona: Persona) -> bytes:
-    """The manifest with the name of who is there; what a persona's file knows stays here."""
+    """The manifest with the persona's name; a persona file's notes are not sent to the page."""
     if persona is bundle.manifest.persona:
         return bundle.read(MANIFEST)
     return replace(bundle.manifest, persona=Persona(persona.name, persona.greeting)).to_json()
 
 
 def serve_file(bundle: Bundle, name: str, request: Request) -> Response:
-    """One file of the bundle; browsers keep it as long as its hash stays the same."""
+    """Serves a file of the bundle; browsers keep the file as long as its hash is the same."""
     if name not in bundle.names:
         return PlainTextResponse(f"The bundle has no file {name[:80]!r}.\n", 404)
     entry = bundle.manifest.files.get(name)
@@ -140,7 +140,7 @@ def serve_file(bundle: Bundle, name: str, request: Request) -> Response:
 
 
 def add_page(app: FastAPI) -> None:
-    """The viewer's files, or a sentence on how to build them."""
+    """Adds the files of the page or, if it was not built, a sentence on how to build it."""
     if (STATIC / "index.html").is_file():
         app.mount("/", PageFiles(STATIC))
         return
@@ -151,10 +151,10 @@ def add_page(app: FastAPI) -> None:
 
 
 def bind(host: str, port: int) -> socket.socket:
-    """Takes the port before anything is loaded for it.
+    """Opens the port, before anything else is loaded.
 
     Raises:
-        SettingsError: If it cannot be had.
+        SettingsError: If the port cannot be opened.
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     # asyncio lets small messages out at once only where it knows the protocol
@@ -172,7 +172,7 @@ def bind(host: str, port: int) -> socket.socket:
 
 
 def address(listener: socket.socket) -> str:
-    """The URL to open."""
+    """The URL under which the page can be opened."""
     host, port = listener.getsockname()[:2]
     shown = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)
     return f"http://{shown}:{port}/"
@@ -181,8 +181,8 @@ def address(listener: socket.socket) -> str:
 def make_server(app: Guard) -> uvicorn.Server:
     """A server for `app`; run it with `server.run(sockets=[listener])`.
 
-    From now on numpy multiplies matrices in one thread. A server's are small, and others would
-    wait for the next one by spinning, on the cores that the conversation needs.
+    From then on numpy multiplies matrices in one thread. The server's matrices are small, and
+    further threads would busily wait on cores that conversations need.
     """
     threadpool_limits(1, user_api="blas")
     config = uvicorn.Config(

@@ -1,4 +1,4 @@
-"""Who talks with the avatar: sessions that outlive a dropped connection for a while."""
+"""Sessions of visitors, which survive a lost connection for a while."""
 
 import asyncio
 import secrets
@@ -24,14 +24,14 @@ STARTING = 30.0  # s that a conversation may take to start: a model may be loade
 
 
 class FullError(Exception):
-    """There are as many visitors as the server takes; says so in a sentence for the page."""
+    """The server has as many visitors as it accepts; the sentence is for the page."""
 
 
 class Session:
-    """One visitor: a page, a conversation, and nothing that another one could see."""
+    """One visitor: a page and a conversation, separate from all others."""
 
     def __init__(self, avatar: Avatar, visitor: Visitor, ended: Callable[["Session"], None]):
-        """A session whose conversation has not started; `ended` is told if that breaks off."""
+        """Creates a session; `ended` is called if its conversation breaks off."""
         self.id = secrets.token_urlsafe(16)
         self.page = Page()
         seed = secrets.randbits(32)  # no two visitors see the same blinks and gestures
@@ -42,7 +42,7 @@ class Session:
 
 
 class Sessions:
-    """Opens, keeps and closes sessions."""
+    """Opens, resumes and closes sessions."""
 
     def __init__(
         self,
@@ -51,13 +51,13 @@ class Sessions:
         monitor: Monitor | None = None,
         starting: float = STARTING,
     ):
-        """No visitors yet.
+        """Starts without visitors.
 
         Args:
-            avatar: What they share.
-            resume_seconds: How long a place is kept for a page whose connection dropped.
+            avatar: What all sessions share.
+            resume_seconds: Seconds for which a session is kept after its connection was lost.
             monitor: Counts visitors and errors.
-            starting: Seconds that a conversation may take to start.
+            starting: Time limit in seconds for the start of a conversation.
         """
         self.offers: list[Offer] = []
         """What visitors may choose from."""
@@ -74,13 +74,13 @@ class Sessions:
         return len(self._open)
 
     async def enter(self, hello: Hello, outbox: Outbox) -> tuple[Session, bool]:
-        """The session that a page goes on with, or a new one; its messages go to `outbox`.
+        """Resumes a session or opens a new one; `outbox` receives its messages.
 
         Returns:
-            The session and whether it is an old one.
+            The session, and whether it was resumed.
 
         Raises:
-            FullError: If there is no room: a place is kept even while its page is away.
+            FullError: If there is no room; sessions whose page is away count, too.
             Ico3dError: If the conversation does not start, or not in time.
         """
         session = self._open.get(hello.session or "")
@@ -95,7 +95,7 @@ class Sessions:
         return await self._begin(hello, outbox), False
 
     def leave(self, session: Session, outbox: Outbox, for_good: bool = False) -> None:
-        """A connection closed; unless that is for good its session waits for the page."""
+        """Handles a closed connection: ends the session if `for_good`, else keeps it a while."""
         if session.id not in self._open or not session.page.detach(outbox):
             return
         if for_good:
@@ -106,7 +106,7 @@ class Sessions:
         session.expiry = loop.call_later(self._resume_seconds, self._close_soon, session, "left")
 
     async def close_all(self) -> None:
-        """Ends every conversation."""
+        """Ends all sessions."""
         for session in list(self._open.values()):
             self._close_soon(session, "server")
         await asyncio.gather(*self._closing, return_exceptions=True)
@@ -172,7 +172,7 @@ class Sessions:
 
 
 async def dismantle(conversation: Conversation) -> None:
-    """Ends a conversation and frees its memory."""
+    """Ends a conversation and frees the memory."""
     await conversation.close()
     del conversation
     await give_back()

@@ -1,4 +1,4 @@
-"""What a conversation is made of: one settings file chooses the services and the timing."""
+"""Settings of a conversation, read from one file: services, turns, time limits and tools."""
 
 import dataclasses
 import json
@@ -15,17 +15,17 @@ from ico3d.common.typed import NAMES, Kind, Rules, fill, kind_of
 from ico3d.errors import SettingsError
 
 BEST = "best"
-"""Name that chooses the best service that works here as it is."""
+"""Name that stands for the best service that works on this machine without further settings."""
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class Choice:
-    """Which service does one of the jobs: a table of the settings file, or its name alone.
+    """The choice of a service: a table of the settings file, or the name of a provider alone.
 
     Attributes:
         use: Name of the provider, or `best`.
-        options: Settings of the provider by name; the rest of the table.
+        options: Options of the provider by name: all other keys of the table.
     """
 
     use: str = BEST
@@ -39,10 +39,10 @@ class Turns:
     Attributes:
         pause: Seconds of silence after which the end of a turn is considered.
         end_silence: Seconds of silence that end a turn even if it sounded unfinished.
-        speculate: Whether an answer is prepared as soon as the turn may be over; it is heard only
-            if it was. Costs a request for each pause within a turn.
+        speculate: Whether to prepare an answer as soon as the turn may be over. It is spoken only
+            if the turn really was over. Costs one request for each pause within a turn.
         interrupt_after: Seconds that a voice must last to interrupt the avatar.
-        longest_backchannel: Seconds after which even "uh-huh" and humming interrupt it.
+        longest_backchannel: Seconds after which even "uh-huh" and humming interrupt the avatar.
     """
 
     pause: float = 0.2
@@ -74,11 +74,11 @@ class Patience:
 
     Attributes:
         language: Seconds until the first words of an answer, and between two pieces of it.
-        reasoning: Seconds that a model may think before its first words, as long as it shows that
-            it does.
+        reasoning: Seconds that a model may think before the first words, as long as it shows that
+            it is thinking.
         voice: Seconds until the first sound of a sentence, and between two pieces of it.
-        apologies: Language that the avatar apologises in, such as `de`; empty for the persona's
-            first. English where it is none of those known.
+        apologies: Language in which the avatar apologises, such as `de`; empty for the persona's
+            first language. English for languages without apologies.
     """
 
     language: float = 12.0
@@ -101,13 +101,14 @@ class Expression:
     """Where sound becomes a moving face: the table `[expression]`.
 
     Attributes:
-        use: `own` for the avatar's speech model in this process; `remote` for the same one on
-            another machine, and in this process whenever that fails.
-        url: Of `ico3d serve-module expression`, such as `http://127.0.0.1:8766` where a tunnel
-            ends.
-        key_variable: Environment variable that holds its key, if it wants one. It is sent nowhere
-            unencrypted but to this machine.
-        timeout: Seconds that a piece of sound may take before the face goes on here.
+        use: `own`: the avatar's speech model runs in this process; `remote`: the same model runs on
+            another machine, and in this process whenever that machine fails.
+        url: Address of `ico3d serve-module expression`, such as `http://127.0.0.1:8766` for a
+            tunnel's local end.
+        key_variable: Environment variable that holds the module's key, if it needs one. A key is
+            never sent unencrypted to another machine.
+        timeout: Seconds that the module may take for a piece of sound before this process takes
+            over.
     """
 
     use: str = "own"
@@ -131,11 +132,11 @@ class Expression:
 
 @dataclass(frozen=True)
 class Memory:
-    """What a language model still knows of the conversation: the table `[memory]`.
+    """How much of a conversation the language model remembers: the table `[memory]`.
 
     Attributes:
-        tokens: About how long the conversation may get before all but its latest words is
-            summarised, the system instruction not counted.
+        tokens: Approximate length of the conversation, without the system instruction, beyond which
+            all but the latest messages are summarised.
     """
 
     tokens: int = 4000
@@ -152,23 +153,24 @@ class Memory:
 
 @dataclass(frozen=True)
 class ChatSettings:
-    """Services and timing of a conversation; the file may be TOML or JSON.
+    """Settings of a conversation; the file may be TOML or JSON.
 
     Attributes:
         recognition: Speech to text.
         language: Question to answer.
         voice: Text to speech.
         turns: Who speaks when.
-        patience: How long services may take.
-        expression: Where sound becomes a moving face.
-        max_sessions: How many visitors at once, those included whose connection dropped.
-        idle_minutes: A session ends when for so long nobody spoke or typed and nothing was played;
-            0 for never.
-        gestures: Whether a body gestures while it speaks; otherwise it is held at rest.
-        memory: What is still known of the conversation.
+        patience: Time limits of services.
+        expression: Where the face is computed from sound.
+        max_sessions: How many visitors may talk at once, including those whose connection was lost
+            a moment ago.
+        idle_minutes: A session ends after this time without speech, typing or playback; 0 for
+            never.
+        gestures: Whether the body gestures during speech; otherwise it stays at rest.
+        memory: How much of the conversation is remembered.
         tools: Functions over HTTP that the language model may call.
         allow: Hosts that tools may call, such as `api.example.org` or `127.0.0.1:9000`; private
-            addresses must be listed themselves.
+            addresses must be listed as such.
     """
 
     recognition: Choice = Choice()
@@ -198,37 +200,37 @@ class ChatSettings:
 
 
 def read_settings(path: Path | None) -> ChatSettings:
-    """Reads a settings file; the defaults where there is none.
+    """Reads a settings file; without a file, returns the defaults.
 
     Raises:
-        SettingsError: If the file is missing, malformed, or has unknown or wrong entries.
+        SettingsError: If the file is missing or malformed, or has unknown keys or invalid values.
     """
     return ChatSettings() if path is None else filled(ChatSettings, _parse(path), str(path))
 
 
 def filled(kind: type[T], values: Mapping[str, Any], where: str) -> T:
-    """A dataclass of settings with some values set.
+    """A dataclass of settings, filled from parsed TOML or JSON.
 
     Args:
-        kind: Its fields are numbers, words, truth values, lists of words, tables of anything, such
-            dataclasses or lists of them.
-        values: By name of the field, as TOML and JSON give them.
-        where: What an error names as the place.
+        kind: The dataclass; its fields are numbers, texts, truth values, lists of texts, free
+            tables, other such dataclasses or lists of them.
+        values: Values by name of the field.
+        where: Name of the file or table, for errors.
 
     Raises:
-        SettingsError: If a name is unknown or a value is of the wrong type.
+        SettingsError: If a name is unknown or a value has the wrong type.
     """
     return fill(kind, dict(values), Setting(where), SettingsRules(SettingsError))
 
 
 @dataclass(frozen=True)
 class Setting:
-    """The place of a setting.
+    """The place of a setting, for errors.
 
     Attributes:
-        table: The file, and the table in which it is.
+        table: Name of the file and of the table within.
         name: Name of the setting; empty for a table as a whole.
-        kind: Type that its value must have.
+        kind: Type of the setting's value.
     """
 
     table: str
@@ -237,7 +239,7 @@ class Setting:
 
     @property
     def inner(self) -> str:
-        """The table that the setting is, if it is one."""
+        """Name of the table, if the setting is one."""
         if not self.name:
             return self.table
         name = f"[[{self.name}]]" if entry_kind_of(self.kind) else f"[{self.name}]"
@@ -245,33 +247,38 @@ class Setting:
 
 
 class SettingsRules(Rules):
-    """Settings may be left out; sentences name what there is."""
+    """Rules for settings: they may be left out, and errors list what exists."""
 
     defaults, null, finite = True, False, False
 
     def field(self, where: Setting, name: str, kind: Kind) -> Setting:
-        """A setting of a table."""
+        """The place of a setting in a table."""
         return Setting(where.inner, name, kind.bare)
 
     def entry(self, where: Setting, key: int | str) -> Setting:
-        """Entries of a list are not told apart."""
+        """The place of the whole list or table: entries are not distinguished."""
         return where
 
     def unknown(self, where: Setting, name: str, kind: type) -> str:
-        """Refuses a name that no setting has."""
+        """The sentence for a name that is no setting."""
         names = " or ".join(field.name for field in dataclasses.fields(kind))
         return f"{where.inner}: there is no setting '{name}', use {names}."
 
     def missing(self, where: Setting, name: str) -> str:
-        """Refuses a table without what it must have."""
+        """The sentence for a missing required setting."""
         return f"{where.inner}: '{name}' is missing."
 
     def wrong(self, where: Setting, kind: Kind, value: Any) -> str:
-        """Refuses a value of another type."""
+        """The sentence for a value of the wrong type."""
         return f"{where.table}: '{where.name}' must be {described(where.kind)}."
 
     def own(self, kind: Kind, value: Any, where: Setting) -> Any:
-        """A `Choice`, which may be a name alone."""
+        """Converts a `Choice`, which may be given as a name alone.
+
+        Raises:
+            SettingsError: If the value is neither a name nor a table whose `use`, if given, is a
+                name.
+        """
         if kind.bare is not Choice:
             return NotImplemented
         if isinstance(value, str):
@@ -283,13 +290,13 @@ class SettingsRules(Rules):
 
 
 def entry_kind_of(kind: Any) -> Any:
-    """The dataclass of which a setting is a list, if it is one."""
+    """The dataclass of a list's entries, if the setting is a list of tables, else None."""
     entry = get_args(kind)[0] if get_origin(kind) is tuple else None
     return entry if dataclasses.is_dataclass(entry) else None
 
 
 def described(kind: Any) -> str:
-    """The type of a setting, for people."""
+    """The type of a setting, in words for users."""
     kind = kind_of(kind).optional or kind
     if kind is Choice:
         return "a provider's name or a table with 'use'"

@@ -1,8 +1,8 @@
-"""Which key goes to which server: to the one that it belongs to, and to no other.
+"""Decides which key is sent to which server.
 
-A key is a secret of one server's. One that the settings name for an address goes there; OpenAI's
-own goes to OpenAI's own address by itself, and nowhere else by itself. None travels unencrypted
-but on this machine.
+A key is the secret of one server. A key that the settings name for an address is sent there.
+OpenAI's own key is sent to OpenAI's address by default, and nowhere else by default. No key is sent
+unencrypted, except on this machine.
 """
 
 import ipaddress
@@ -15,7 +15,7 @@ OPENAI_HOST = "api.openai.com"
 OPENAI = f"https://{OPENAI_HOST}/v1"
 OPENAI_KEY = "OPENAI_API_KEY"
 NONE = "none"
-"""Sent where there is no key: clients insist on one."""
+"""Sent in place of a missing key, because clients need some key."""
 _ADDRESS = re.compile(
     r"(?P<scheme>https?)://(?P<host>\[[0-9a-f:.]+\]|[\w.-]+)(?P<port>:\d{1,5})?([/?#][!-~]*)?",
     re.IGNORECASE,
@@ -24,15 +24,16 @@ _ADDRESS = re.compile(
 
 
 def check_key(url: str, key_variable: str, where: str) -> None:
-    """Checks an address and whether a key may go there.
+    """Checks an address, and whether a key may be sent there.
 
     Args:
-        url: Of a server; empty for OpenAI's.
-        key_variable: Environment variable that the settings name for its key; may be empty.
-        where: What an error names as the place.
+        url: Address of a server; empty for OpenAI's.
+        key_variable: Environment variable with the server's key; may be empty.
+        where: Name of the setting, for errors.
 
     Raises:
-        SettingsError: If it is no address, or the key would be sent unencrypted to another machine.
+        SettingsError: If the address is invalid, or a key would be sent unencrypted to another
+            machine.
     """
     found = _ADDRESS.fullmatch(url or OPENAI)
     if found is None:
@@ -48,15 +49,15 @@ def check_key(url: str, key_variable: str, where: str) -> None:
 
 
 def key_for(url: str, key_variable: str, where: str) -> str:
-    """The key to send to a server; empty for none.
+    """The key for a server; empty for none.
 
     Args:
-        url: Of the server; empty for OpenAI's.
-        key_variable: As in `check_key`.
-        where: As in `check_key`.
+        url: Address of the server; empty for OpenAI's.
+        key_variable: Environment variable with the server's key; may be empty.
+        where: Name of the setting, for errors.
 
     Raises:
-        SettingsError: As `check_key`, or if the environment lacks the key.
+        SettingsError: If `check_key` refuses the address, or the environment variable is not set.
     """
     check_key(url, key_variable, where)
     variable = key_variable or (OPENAI_KEY if is_openai(url) else "")
@@ -67,13 +68,13 @@ def key_for(url: str, key_variable: str, where: str) -> str:
 
 
 def goes_here(url: str) -> bool:
-    """Whether an address is one of this machine."""
+    """Whether an address is on this machine."""
     found = _ADDRESS.fullmatch(url)
     return found is not None and is_this_machine(found["host"])
 
 
 def is_openai(url: str) -> bool:
-    """Whether an address is OpenAI's own, which its key belongs to."""
+    """Whether an address is OpenAI's own, to which OpenAI's key belongs."""
     found = _ADDRESS.fullmatch(url or OPENAI)
     if found is None or found["scheme"].lower() != "https" or found["port"] not in (None, ":443"):
         return False
@@ -82,7 +83,7 @@ def is_openai(url: str) -> bool:
 
 
 def is_this_machine(host: str) -> bool:
-    """Whether a host, as an address names it, can be no other machine."""
+    """Whether a host name in an address can only be this machine."""
     try:
         ip = ipaddress.ip_address(host.strip("[]"))
     except ValueError:

@@ -1,4 +1,4 @@
-"""The functions that a user gives to the language model: the tables `[[tools]]`."""
+"""Settings of functions over HTTP for the language model: the tables `[[tools]]`."""
 
 import re
 from collections.abc import Mapping
@@ -16,16 +16,16 @@ PORTS = {"http": 80, "https": 443}
 
 @dataclass(frozen=True)
 class Tool:
-    """A function over HTTP.
+    """A function over HTTP that the language model may call.
 
     Attributes:
-        name: What the model calls it.
-        description: When to call it and what it answers, for the model.
-        url: `http` or `https`, its host listed in `allow`; `{parameter}` in its path or query is
-            replaced by that parameter.
-        method: `GET` (other parameters go into the query) or `POST` (they are a JSON body).
-        parameters: JSON schema of its parameters, of type `object`.
-        seconds: How long an answer may take.
+        name: Name of the function, for the model.
+        description: When to call the function and what it returns, for the model.
+        url: Address, `http` or `https`, with a host that is listed in `allow`; `{parameter}` in
+            path or query is replaced by the parameter's value.
+        method: `GET` (other parameters are added to the query) or `POST` (they form a JSON body).
+        parameters: JSON schema of the parameters, of type `object`.
+        seconds: Time limit of a call, s.
     """
 
     name: str
@@ -61,25 +61,25 @@ class Tool:
 
     @property
     def properties(self) -> dict[str, Any]:
-        """Schema of each parameter."""
+        """Schema of each parameter, by name."""
         return dict(self.parameters.get("properties", {}))
 
     @property
     def required(self) -> list[str]:
-        """Parameters that must be given."""
+        """Names of required parameters."""
         return list(self.parameters.get("required", []))
 
     @property
     def placeholders(self) -> list[str]:
-        """Parameters that are part of the URL."""
+        """Names of parameters that are part of the URL."""
         return [name for _, name, _, _ in Formatter().parse(self.url) if name is not None]
 
 
 def check_tools(tools: tuple[Tool, ...], allow: tuple[str, ...]) -> None:
-    """Checks tools against each other and the hosts they may call.
+    """Checks that tools have different names and listed hosts.
 
     Raises:
-        SettingsError: If two have one name or a host is not listed.
+        SettingsError: If two tools have the same name, or a host is not listed.
     """
     names, hosts = [tool.name for tool in tools], {host.lower() for host in allow}
     for tool in tools:
@@ -90,7 +90,7 @@ def check_tools(tools: tuple[Tool, ...], allow: tuple[str, ...]) -> None:
 
 
 def host_of(url: SplitResult) -> str:
-    """Host as `allow` lists it: with the port if it is not the usual one."""
+    """The host as listed in `allow`: with the port unless it is the default one."""
     name = (url.hostname or "").lower()
     shown = f"[{name}]" if ":" in name else name
     return shown if url.port in (None, PORTS.get(url.scheme)) else f"{shown}:{url.port}"

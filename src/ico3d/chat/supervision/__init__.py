@@ -1,1 +1,1 @@
-"""What happens when a service fails: the avatar apologises, the turn ends, the next one works."""
+"""Handling of failed services: the avatar apologises, the turn ends, and the next one works."""

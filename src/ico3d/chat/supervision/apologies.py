@@ -1,4 +1,4 @@
-"""What the avatar says when one of its services failed."""
+"""Sentences that the avatar says when a service has failed."""
 
 from typing import Literal
 
@@ -63,25 +63,25 @@ APOLOGIES: dict[str, dict[Failed, str]] = {
         "voice": "عذرًا، صوتي لا يعمل. من فضلك اقرأ جوابي.",
     },
 }
-"""By language (ISO 639-1), then by what failed."""
+"""Apologies by language (ISO 639-1) and failed service."""
 
 
 def apology(failed: Failed, language: str) -> str:
-    """One sentence, in English where the language has none.
+    """The apology for a failed service; in English for languages without one.
 
     Args:
-        failed: Which service.
+        failed: The failed service.
         language: A code such as `de` or `pt-BR`.
     """
     return APOLOGIES.get(base(language), APOLOGIES["en"])[failed]
 
 
 def espeak_voice(language: str) -> str:
-    """The voice of espeak-ng that says it."""
+    """espeak-ng's voice for apologies in a language."""
     code = base(language)
     return espeak.voice_of(code if code in APOLOGIES else "en")
 
 
 def base(language: str) -> str:
-    """`pt` of `pt-BR`."""
+    """A language code without region: `pt` for `pt-BR`."""
     return language.split("-")[0].lower()

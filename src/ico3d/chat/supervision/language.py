@@ -1,4 +1,4 @@
-"""Stands behind the language model: an answer that does not come becomes an apology."""
+"""Turns a missing answer of the language model into an apology."""
 
 import asyncio
 
@@ -21,23 +21,23 @@ from ico3d.chat.supervision.apologies import Failed, apology
 
 
 class AnswerGuard(FrameProcessor):
-    """Watches answers on their way from the language model to the voice.
+    """Watches answers between language model and voice.
 
-    The visitor hears one sentence instead of silence when the model gives no words, breaks off,
-    or takes longer than `patience`; and when the recogniser failed. What a model thinks is a sign
-    of life that goes no further. All else passes unchanged.
+    The visitor hears an apology instead of silence if the model returns no words, breaks off, or
+    exceeds the limits of `patience`, and if the recogniser has failed. Thoughts of a model count as
+    a sign of life and are not passed on. All other frames pass unchanged.
     """
 
     def __init__(
         self, recognition: FrameProcessor, language: FrameProcessor, patience: Patience, tongue: str
     ):
-        """A guard for one session.
+        """Creates the guard of one session.
 
         Args:
-            recognition: Whose errors are apologised for.
-            language: Whose answers are watched.
-            patience: How long an answer, a piece of it, and thinking may take.
-            tongue: Language of the apologies.
+            recognition: Recogniser for whose errors to apologise.
+            language: Language model whose answers are watched.
+            patience: Time limits of an answer, of a piece of it, and of thinking.
+            tongue: Language code of the apologies.
         """
         super().__init__()
         self._patience, self._tongue = patience, tongue
@@ -50,7 +50,7 @@ class AnswerGuard(FrameProcessor):
         recognition.add_event_handler("on_error", self._recognition_failed)
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
-        """Follows the answer; replaces its end where there was none of it."""
+        """Follows an answer; adds an apology at the end of an empty or broken one."""
         await super().process_frame(frame, direction)
         if isinstance(frame, InterruptionFrame):
             self._stop_timer()
@@ -73,7 +73,7 @@ class AnswerGuard(FrameProcessor):
         await self.push_frame(frame, direction)
 
     async def cleanup(self):
-        """Ends the timer."""
+        """Cancels the timer."""
         await super().cleanup()
         self._stop_timer()
 

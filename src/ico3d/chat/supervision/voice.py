@@ -1,7 +1,7 @@
-"""A voice that never leaves an answer without sound.
+"""Makes sure that no sentence stays without sound when a voice fails.
 
-It waits no longer than told, tries twice, then apologises with another voice and lets the captions
-speak.
+A voice gets a time limit and a second attempt. After that, another voice apologises, and the answer
+is shown as captions only.
 """
 
 import asyncio
@@ -29,29 +29,30 @@ Speak = Callable[[str, str], AsyncGenerator[Frame | None, None]]
 
 
 class LateError(ServiceError):
-    """A voice takes too long."""
+    """A voice has exceeded its time limit."""
 
 
 class EnduringVoice:
-    """Stands around a voice's `run_tts`, which pipecat calls for every sentence."""
+    """Wraps a voice's `run_tts`, which pipecat calls for every sentence."""
 
     def __init__(
         self, speak: Speak, patience: float, language: str, complain: Callable[[str], None]
     ):
-        """For one session.
+        """Creates the wrapper for one session.
 
         Args:
             speak: The voice's own `run_tts`.
-            patience: Seconds until a sentence's first sound, and between two pieces of it.
-            language: Of the apology.
-            complain: Takes a sentence for the page where not even the apology can be spoken.
+            patience: Time limit in seconds for a sentence's first sound, and between two pieces of
+                it.
+            language: Language code of the apology.
+            complain: Receives a sentence for the page if not even the apology can be spoken.
         """
         self._speak, self._patience = speak, patience
         self._language, self._complain = language, complain
         self._lost = ""  # the answer whose apology has been said
 
     async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame | None, None]:
-        """Yields a sentence's sound: the voice's, or what stands in for it."""
+        """Yields the sound of a sentence: the voice's, or a replacement."""
         if context_id == self._lost:
             yield _sound(silence(text), context_id)
             return
@@ -111,13 +112,13 @@ class EnduringVoice:
 def endure(
     voice: TTSService, patience: float, language: str, complain: Callable[[str], None]
 ) -> None:
-    """Puts an `EnduringVoice` around a voice; pipecat has no place for one, so it is set here."""
+    """Wraps a voice in an `EnduringVoice` by replacing `run_tts`; pipecat has no hook for that."""
     enduring = EnduringVoice(voice.run_tts, patience, language, complain)
     replace_run_tts(voice, enduring.run_tts)
 
 
 def silence(text: str) -> np.ndarray:
-    """(S,) int16 samples at 24 kHz: as long as a text takes to read."""
+    """Silence for the time that it takes to read a text, (S,) int16 at 24 kHz."""
     seconds = float(np.clip(len(text) / READING, SHORTEST, LONGEST))
     return np.zeros(int(seconds * SPEECH_RATE), np.int16)
 

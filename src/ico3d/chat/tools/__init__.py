@@ -1,4 +1,4 @@
-"""What a language model can do besides talking: move the avatar, call users' tools."""
+"""Functions for the language model: moving the avatar, and users' tools."""
 
 from pipecat.adapters.llm.schemas.tools_schema import ToolsSchema
 from pipecat.processors.aggregators.llm_context import NOT_GIVEN, NotGiven
@@ -22,11 +22,11 @@ def functions(
     """The functions of one session.
 
     Args:
-        language: The model that calls them.
-        gestures: Of its body; None without one.
-        moods: Of its brows; None where the head has no inputs for them.
-        tools: The user's.
-        allow: Hosts that those may call.
+        language: The language model that calls them.
+        gestures: Gestures of the body; None without a body.
+        moods: Moods of the brows; None if the head has no inputs for brows.
+        tools: The user's tools.
+        allow: Hosts that tools may call.
     """
     said = Said([moved.forget for moved in (moods, gestures) if moved is not None])
     said.watch(language)

@@ -1,4 +1,4 @@
-"""Functions that move the avatar itself: gestures of its body, moods of its brows."""
+"""Functions by which the language model moves the avatar: gestures and moods."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -25,20 +25,21 @@ BESIDE = "Call it in the same message as the words that it goes with; never spea
 
 
 class Said:
-    """Whether a response of the model has words beside its function calls.
+    """Whether a response of the language model contains words beside function calls.
 
-    Then it is not asked to go on after a gesture: it would say everything again. What it asked
-    for before an interruption is forgotten as that passes the model: further down the line it
-    may pass after what the model asks for next.
+    After such a response the model is not asked to continue when a gesture is done, because it
+    would repeat everything. Gestures and moods that were requested before an interruption are
+    dropped when the interruption passes the language model; at a later processor, new requests
+    could already have been made.
     """
 
     def __init__(self, forget: Sequence[Callable[[], None]]):
-        """No response yet; `forget` are called at an interruption."""
+        """Starts without a response; the functions `forget` are called at an interruption."""
         self._words = self._others = False
         self._forget = forget
 
     def watch(self, language: FrameProcessor) -> None:
-        """Follows what a language model sends."""
+        """Follows the frames that a language model sends."""
         language.add_event_handler("on_before_push_frame", self._see)
 
     async def _see(self, _: FrameProcessor, frame: Frame) -> None:
@@ -53,14 +54,14 @@ class Said:
             self._others = any(call.function_name not in OWN for call in frame.function_calls)
 
     def properties(self) -> FunctionCallResultProperties | None:
-        """What to do after a gesture: nothing where all has been said, else the usual."""
+        """What pipecat is to do after a gesture: nothing if there were words, else the default."""
         if self._words and not self._others:
             return FunctionCallResultProperties(run_llm=False)
         return None
 
 
 def gesture_function(gestures: Gestures | Cueing, said: Said) -> FunctionSchema:
-    """`gesture(name)`."""
+    """The function `gesture(name)`."""
 
     async def call(params: FunctionCallParams) -> None:
         await _try(params, gestures.names, gestures.request, said)
@@ -70,7 +71,7 @@ def gesture_function(gestures: Gestures | Cueing, said: Said) -> FunctionSchema:
 
 
 def mood_function(moods: Moods, said: Said) -> FunctionSchema:
-    """`mood(name)`."""
+    """The function `mood(name)`."""
 
     async def call(params: FunctionCallParams) -> None:
         await _try(params, list(BROWS), moods.set, said)

@@ -1,7 +1,7 @@
-"""Functions over HTTP, for which a language model may not go anywhere it likes.
+"""Calls of users' tools over HTTP, restricted to protect the server's network.
 
-Only listed hosts are called, under addresses that are public or listed themselves; redirects stay
-on their host; time and size are limited.
+Only listed hosts are called, at addresses that are public or listed themselves; redirects must stay
+on the same host; time and size are limited.
 """
 
 import contextlib
@@ -26,42 +26,42 @@ REDIRECTS = (301, 302, 303, 307, 308)
 
 
 class Refused(OSError):
-    """A call that is not made."""
+    """A call that was refused."""
 
 
 class CheckedResolver(AbstractResolver):
-    """Finds addresses, and refuses those that lead into the house."""
+    """A DNS resolver that refuses addresses of private networks."""
 
     def __init__(self, allow: tuple[str, ...]):
-        """Addresses in `allow` are no matter where they lead."""
+        """Addresses listed in `allow` are accepted even if private."""
         self._allow = allow
         self._resolver = DefaultResolver()
 
     async def resolve(
         self, host: str, port: int = 0, family: socket.AddressFamily = socket.AF_INET
     ) -> list[ResolveResult]:
-        """Addresses of a host, of which every one must be permitted."""
+        """The addresses of a host, all of which must be permitted."""
         found = await self._resolver.resolve(host, port, family)
         for entry in found:
             check_address(entry["host"], host, port, self._allow)
         return found
 
     async def close(self) -> None:
-        """Ends the resolver underneath."""
+        """Closes the underlying resolver."""
         await self._resolver.close()
 
 
 def check_address(address: str, host: str, port: int, allow: tuple[str, ...]) -> None:
-    """Refuses addresses of this machine and its networks unless they are listed.
+    """Refuses addresses of this machine and of private networks unless they are listed.
 
     Args:
-        address: Of the machine that would be called.
-        host: The name under which it was found; `localhost` stands for its addresses.
-        port: Of the call.
-        allow: Hosts that are listed, with their port if it is not the usual one.
+        address: Address that would be called.
+        host: Name that resolved to the address; `localhost` stands for its addresses.
+        port: Port of the call.
+        allow: Listed hosts, with the port unless it is the default one.
 
     Raises:
-        Refused: If it may not be called.
+        Refused: If the address may not be called.
     """
     ip = ipaddress.ip_address(address.partition("%")[0])
     if isinstance(ip, ipaddress.IPv6Address) and ip.ipv4_mapped:
@@ -76,7 +76,7 @@ def check_address(address: str, host: str, port: int, allow: tuple[str, ...]) ->
 
 
 def http_function(tool: Tool, allow: tuple[str, ...]) -> FunctionSchema:
-    """A user's tool as a function of the language model."""
+    """A user's tool as a function for the language model."""
 
     async def call(params: FunctionCallParams) -> None:
         await params.result_callback(await answer(tool, params.arguments, allow))
@@ -87,7 +87,7 @@ def http_function(tool: Tool, allow: tuple[str, ...]) -> FunctionSchema:
 async def answer(
     tool: Tool, arguments: Mapping[str, Any], allow: tuple[str, ...]
 ) -> dict[str, Any]:
-    """What a tool answers: `status` and `body`, or `error` in one sentence for the model."""
+    """Calls a tool: returns `status` and `body`, or `error` in one sentence for the model."""
     try:
         return await _fetch(tool, _request(tool, arguments), allow)
     except TimeoutError:

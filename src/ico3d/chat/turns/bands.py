@@ -1,4 +1,4 @@
-"""Sound as energy in a few bands over time: enough to tell what resembles what."""
+"""Energy of sound in frequency bands over time, for comparing sounds."""
 
 import numpy as np
 
@@ -8,10 +8,10 @@ LOWEST, HIGHEST = 100.0, 6500.0  # Hz
 
 
 class Bands:
-    """Energies of frames of 20 ms in bands equally wide on the mel scale."""
+    """Energies of 20 ms frames in bands of equal width on the mel scale."""
 
     def __init__(self, rate: int):
-        """For sound of `rate` Hz; energies of different rates compare."""
+        """For sound of `rate` Hz; energies at different rates are comparable."""
         self.length = round(rate * FRAME)
         """Samples of a frame."""
         self._window = np.hanning(self.length)
@@ -21,7 +21,7 @@ class Bands:
         self._sums = inside.T / (self._window**2).sum() / self.length
 
     def energies(self, samples: np.ndarray) -> np.ndarray:
-        """(S,) samples in [-1, 1], whole frames, as (frames, COUNT) mean squares."""
+        """Mean squares (frames, COUNT) of samples (S,) in [-1, 1], S being whole frames."""
         frames = samples.reshape(-1, self.length) * self._window
         return np.abs(np.fft.rfft(frames)) ** 2 @ self._sums
 

@@ -1,4 +1,4 @@
-"""Hears voices: Silero's verdict for turns, and its first hint for falling silent early."""
+"""Detects voices: Silero's decision for turns, and an early hint for pausing the avatar."""
 
 import numpy as np
 from pipecat.audio.vad.silero import SileroVADAnalyzer
@@ -27,10 +27,10 @@ AFTERGLOW = 1.0  # s of silence behind a voice that are told of, too
 
 
 class EagerSilero(SileroVADAnalyzer):
-    """Silero, which also tells what it hears before it is sure."""
+    """The Silero VAD, which also reports early hints of a voice."""
 
     def __init__(self, pause: float):
-        """Takes the seconds of silence after which a voice is over."""
+        """A voice is over after `pause` seconds of silence."""
         super().__init__(
             sample_rate=MICROPHONE_RATE, params=VADParams(stop_secs=pause, min_volume=QUIETEST)
         )
@@ -38,7 +38,10 @@ class EagerSilero(SileroVADAnalyzer):
         self.silence = 0.0  # s of a pause that may end the voice
 
     async def analyze_audio(self, buffer: bytes) -> VADState:
-        """Silero's verdict; `voiced` tells of this very sound, `silence` of those before too."""
+        """Silero's state of the voice after this sound.
+
+        Afterwards `voiced` describes this sound alone, and `silence` counts earlier silence, too.
+        """
         self._hint = False
         state = await super().analyze_audio(buffer)
         seconds = len(buffer) / 2 / MICROPHONE_RATE
@@ -47,7 +50,7 @@ class EagerSilero(SileroVADAnalyzer):
         return state
 
     def voice_confidence(self, buffer: bytes) -> float:
-        """Silero's confidence for 32 ms; runs in a thread."""
+        """Silero's confidence in a voice for 32 ms of sound; runs in a thread."""
         confidence = super().voice_confidence(buffer)
         if confidence >= HINT:
             samples = np.frombuffer(buffer, np.int16) / 32768
@@ -56,23 +59,23 @@ class EagerSilero(SileroVADAnalyzer):
 
 
 class Timbre:
-    """Whether a voice has been one and the same sound so far: "uh-huh", "aha", a hum.
+    """Detects voices that consist of a single sound: "uh-huh", "aha", humming.
 
-    Such sounds differ only in loudness; words change their spectrum from sound to sound.
+    Such voices vary only in loudness, whereas the spectrum of words changes from sound to sound.
     """
 
     def __init__(self):
-        """No voice yet."""
+        """Starts without a voice."""
         self._bands = Bands(MICROPHONE_RATE)
         self.forget()
 
     def forget(self) -> None:
-        """The voice is over."""
+        """Ends the voice."""
         self._energies = np.zeros((0, 0))
         self._rest = np.zeros(0)
 
     def hear(self, samples: np.ndarray) -> None:
-        """More of a voice: (S,) in [-1, 1] at 16 kHz."""
+        """Adds sound of the voice, (S,) in [-1, 1] at 16 kHz."""
         samples = np.concatenate([self._rest, samples])
         whole = len(samples) - len(samples) % self._bands.length
         self._rest = samples[whole:]
@@ -82,18 +85,18 @@ class Timbre:
 
     @property
     def is_plain(self) -> bool:
-        """Whether the spectrum's shape has stayed the same."""
+        """Whether the shape of the spectrum has not changed."""
         return bool(self.spread < PLAIN)
 
     @property
     def is_fading(self) -> bool:
-        """Whether its last frames are much quieter than its loudest."""
+        """Whether the voice's last frames are much quieter than its loudest."""
         total = self._energies.sum(axis=1)
         return bool(total[-2:].mean() < FADED * total.max()) if len(total) else False
 
     @property
     def spread(self) -> float:
-        """How much the spectrum's shape varies, dB (mean over bands of their deviations)."""
+        """Variation of the spectrum's shape in dB: standard deviations, mean over the bands."""
         total = self._energies.sum(axis=1)
         if not total.any():
             return 0.0
@@ -103,10 +106,10 @@ class Timbre:
 
 
 class VoiceDetector(VADProcessor):
-    """Tells when voices begin and end; while the button is held, that alone says so."""
+    """Detects beginnings and ends of voices; while the button is in use, it alone decides."""
 
     def __init__(self, vad: EagerSilero):
-        """A detector for one session."""
+        """Creates the detector of one session."""
         super().__init__(vad_analyzer=vad)
         self._vad = vad
         self._timbre = Timbre()
@@ -115,7 +118,7 @@ class VoiceDetector(VADProcessor):
         self._held = False
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
-        """Passes everything on, and what it heard."""
+        """Passes frames on, and adds frames about voices."""
         if isinstance(frame, InputAudioRawFrame) and self._held:
             await self.push_frame(frame, direction)
             return

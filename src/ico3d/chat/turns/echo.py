@@ -1,10 +1,9 @@
-"""Tells the avatar's own sound, come back through the microphone, from a visitor's voice.
+"""Distinguishes the avatar's own sound, picked up by the microphone, from a visitor's voice.
 
-Browsers cancel echo themselves; this is for what they leave, and for loudspeakers that they cannot
-know of. It compares energies in bands: they survive a room, a codec and two unsynchronised clocks,
-which samples do not. What the loudspeaker played when a sound was recorded the page says with that
-sound, so that nothing depends on how long messages travel; how much later and how loud it comes
-back is learnt from the sound itself.
+Browsers cancel echo; this module handles the rest, and loudspeakers that browsers do not know of.
+It compares energies in bands, which, unlike samples, survive a room, a codec and two unsynchronised
+clocks. The page sends with each piece of sound what the loudspeaker was playing, so network delays
+do not matter. Delay and loudness of the echo are learnt from the sound itself.
 """
 
 import numpy as np
@@ -32,23 +31,23 @@ ROOM = 3e-7  # mean square of a band; noise of a quiet room
 
 
 class SentSound:
-    """Band energies of what the avatar says, by utterance and time."""
+    """Band energies of the avatar's speech, by utterance and time."""
 
     def __init__(self):
-        """Nothing was said."""
+        """Starts empty."""
         self._bands = Bands(SPEECH_RATE)
         self._utterance = -1
         self._forget()
 
     def add(self, utterance: int, pcm: np.ndarray) -> None:
-        """The next (n,) int16 samples at 24 kHz of an utterance."""
+        """Adds the next samples (n,) int16 at 24 kHz of an utterance."""
         if utterance != self._utterance:
             self._utterance = utterance
             self._forget()
         self._fresh.append(pcm)
 
     def at(self, utterance: int | None, seconds: float) -> np.ndarray:
-        """(COUNT,) energies around a time of an utterance; zero in silence (None)."""
+        """Energies (COUNT,) around a time of an utterance; 0 in silence (None)."""
         row = int(seconds / FRAME) if utterance == self._utterance else -1
         if row >= 0 and self._fresh:
             self._look()
@@ -69,10 +68,10 @@ class SentSound:
 
 
 class EchoGuard:
-    """Decides for each piece of microphone sound whether it is nothing but echo."""
+    """Decides for each piece of microphone sound whether it contains only echo."""
 
     def __init__(self):
-        """A guard that knows nothing of the room's echo yet."""
+        """Starts without knowledge of the room's echo."""
         self.sent = SentSound()
         self._bands = Bands(MICROPHONE_RATE)
         self._rest = np.zeros(0)
@@ -87,21 +86,22 @@ class EchoGuard:
 
     @property
     def lag(self) -> float | None:
-        """Seconds after which the echo comes; None if there is none."""
+        """Delay of the echo in seconds; None if there is no echo."""
         return None if self._lag is None else self._lag * FRAME
 
     @property
     def gain(self) -> float:
-        """Of the echo, dB: microphone against what was sent, at most."""
+        """Gain of the echo in dB, from sent to recorded sound; maximum over the bands."""
         return float(10 * np.log10(self._gains.max() + 1e-12))
 
     def is_echo(self, pcm: np.ndarray, playing: int | None, position: float) -> bool:
-        """Whether a piece of microphone sound holds no voice but the avatar's.
+        """Whether a piece of microphone sound contains no voice but the avatar's.
 
         Args:
             pcm: (n,) int16 at 16 kHz.
-            playing: The utterance that is heard when the piece ends; None in silence.
-            position: Seconds of it that have been heard by then.
+            playing: Number of the utterance that is playing at the end of the piece; None in
+                silence.
+            position: Seconds of that utterance that have been heard at the end of the piece.
         """
         samples = np.concatenate([self._rest, pcm / 32768])
         count = len(samples) // self._bands.length
@@ -173,9 +173,9 @@ class EchoGuard:
 
 
 def similarity(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(…,) normalised correlation of (…, COUNT, frames) envelopes with (COUNT, frames) of one.
+    """Normalised correlation (…) of envelopes (…, COUNT, frames) with one (COUNT, frames).
 
-    Each band is taken about its own mean.
+    The mean of each band is subtracted first.
     """
     a, b = a - a.mean(axis=-1, keepdims=True), b - b.mean(axis=-1, keepdims=True)
     product = np.sqrt(np.einsum("...cf,...cf", a, a) * (b**2).sum())

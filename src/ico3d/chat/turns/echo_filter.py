@@ -1,4 +1,4 @@
-"""The processor that keeps the avatar from hearing itself."""
+"""The processor that prevents the avatar from hearing its own voice."""
 
 from dataclasses import replace
 
@@ -11,15 +11,15 @@ from ico3d.chat.turns.echo import EchoGuard
 
 
 class EchoFilter(FrameProcessor):
-    """Puts silence in the place of microphone sound that is nothing but the avatar's own."""
+    """Replaces microphone sound that contains only echo by silence."""
 
     def __init__(self, guard: EchoGuard):
-        """A filter for one session, whose guard knows the avatar's sound and learns the room."""
+        """Creates the filter of one session; `guard` learns the echo of the room."""
         super().__init__()
         self._guard = guard
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
-        """Passes everything on, echo as silence of the same length."""
+        """Passes frames on; echo becomes silence of the same length."""
         await super().process_frame(frame, direction)
         if isinstance(frame, MicrophoneFrame):
             pcm = np.frombuffer(frame.audio, np.int16)

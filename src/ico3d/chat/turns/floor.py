@@ -1,9 +1,9 @@
-"""Who has the floor: whether a voice over the avatar's is an interruption.
+"""Decides whether a voice during the avatar's speech is an interruption.
 
-The avatar falls silent at the first sign of a voice, which costs nothing: its sound waits. What
-follows decides: a voice that goes on takes the floor, and so do words; "uh-huh" and a cough give
-it back. Voices are measured by the microphone's samples: sound that a busy machine takes late is
-no longer for it.
+The avatar is paused at the first sign of a voice, which loses nothing. What follows decides: a
+voice that continues interrupts, and so do words; "uh-huh" and a cough let the avatar resume.
+Durations are counted in samples of the microphone, so that a busy machine that processes sound late
+does not make a voice seem longer.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ LATE = 3.0  # s after which words do not belong to that voice any more
 
 
 class Verdict(Enum):
-    """What the avatar is to do."""
+    """What the avatar is to do: pause, resume, or yield to the visitor."""
 
     PAUSE = "pause"
     RESUME = "resume"
@@ -31,13 +31,13 @@ class Verdict(Enum):
 
 @dataclass
 class Voice:
-    """A voice that began while the avatar spoke.
+    """A voice that began during the avatar's speech.
 
     Attributes:
-        since: When it began, seconds of microphone.
-        last: When it was last heard.
-        words: What the recogniser has understood so far.
-        paused: Whether the avatar is silent for it.
+        since: Time of its beginning, in seconds of microphone sound.
+        last: Time at which the voice was last heard, in seconds of microphone sound.
+        words: Words that the recogniser has understood so far.
+        paused: Whether the avatar is paused because of this voice.
     """
 
     since: float
@@ -47,17 +47,17 @@ class Voice:
 
 
 class Floor:
-    """Judges voices that are heard while the avatar speaks."""
+    """Judges voices during the avatar's speech."""
 
     def __init__(self, settings: Turns, phrases: Phrases, trusted: bool, now: Callable[[], float]):
-        """Nobody speaks.
+        """Starts in silence.
 
         Args:
-            settings: How long a voice must last.
-            phrases: Words that are none of a turn.
-            trusted: Whether the recogniser hears short words rightly. One that does not turns
-                "uh-huh" into any words; of it only commands are believed.
-            now: The clock, seconds.
+            settings: Durations that decide on interruptions.
+            phrases: Words that do not start a turn, and commands.
+            trusted: Whether the recogniser understands short words reliably. Of an unreliable one,
+                which may turn "uh-huh" into any word, only commands are believed.
+            now: Returns the time in seconds.
         """
         self._settings, self._phrases, self._trusted, self._now = settings, phrases, trusted, now
         self._speaking = False
@@ -66,27 +66,27 @@ class Floor:
 
     @property
     def is_paused(self) -> bool:
-        """Whether the avatar is silent until it is known what is heard."""
+        """Whether the avatar is paused until the voice has been judged."""
         return self._voice is not None and self._voice.paused
 
     @property
     def is_disputed(self) -> bool:
-        """Whether words that come now may be those of a voice over the avatar's."""
+        """Whether words that arrive now may belong to a voice during the avatar's speech."""
         return self._voice is not None and self._time() - self._voice.last <= LATE
 
     @property
     def is_speaking(self) -> bool:
-        """Whether the avatar has the floor, paused or not."""
+        """Whether it is the avatar's turn to speak, paused or not."""
         return self._speaking
 
     def avatar(self, speaking: bool) -> None:
-        """The avatar begins or ends to speak."""
+        """Registers that the avatar begins or ends to speak."""
         self._speaking = speaking
         if not speaking and self.is_paused:
             self._voice = None
 
     def hear(self, sound: VoiceFrame) -> Verdict | None:
-        """The next piece from the microphone."""
+        """Takes the next piece of microphone sound; returns a verdict if there is a new one."""
         end = sound.at + sound.seconds
         self._behind = self._now() - end
         if sound.voiced and self._speaking and not self.is_paused:
@@ -101,7 +101,7 @@ class Floor:
         return self._yield() if lasts else None
 
     def wait(self) -> Verdict | None:
-        """Time passes."""
+        """Checks whether the passage of time allows a verdict."""
         voice = self._voice
         if voice is None or not voice.paused:
             return None
@@ -112,7 +112,7 @@ class Floor:
         return Verdict.RESUME
 
     def understand(self, text: str, final: bool) -> Verdict | None:
-        """The recogniser tells what the voice says; late words may take the floor too."""
+        """Takes words of the recogniser; late words may interrupt, too."""
         voice = self._voice
         if voice is None or not self.is_disputed:
             return None

@@ -1,4 +1,4 @@
-"""Words that are no turn of their own ("uh-huh"), and words that end another's ("stop")."""
+"""Phrases that are no turn of their own ("uh-huh"), and phrases that interrupt ("stop")."""
 
 import json
 import re
@@ -7,23 +7,23 @@ from functools import cache
 from pathlib import Path
 
 TABLE = Path(__file__).parents[1] / "data" / "phrases.json"
-"""By language: what people say while they listen, and what they say to be listened to."""
+"""File with the phrases of each language: backchannels of listeners, and commands."""
 
 
 @dataclass(frozen=True)
 class Phrases:
-    """The table's phrases of some languages.
+    """Phrases of one or several languages.
 
     Attributes:
-        backchannels: What people say while they listen.
-        commands: What they say to silence somebody.
+        backchannels: Phrases that people say while they listen.
+        commands: Phrases by which people silence somebody.
     """
 
     backchannels: frozenset[str]
     commands: frozenset[str]
 
     def are_backchannels(self, text: str) -> bool:
-        """Whether a text consists of such phrases alone, said once or more; not if it is empty."""
+        """Whether a text consists only of backchannels; False for an empty text."""
         return covered(plain(text).split(), self.backchannels)
 
     def is_command(self, text: str) -> bool:
@@ -34,14 +34,14 @@ class Phrases:
 
 @cache
 def phrases() -> Phrases:
-    """Those of all languages: nobody is told in which one the visitor speaks."""
+    """Phrases of all languages, because the visitor's language is not known."""
     table = json.loads(TABLE.read_text(encoding="utf-8")).values()
     kinds = ("backchannels", "commands")
     return Phrases(*(frozenset(p for entry in table for p in entry[kind]) for kind in kinds))
 
 
 def covered(words: list[str], known: frozenset[str]) -> bool:
-    """Whether words can be cut into known phrases without a rest."""
+    """Whether a list of words can be divided into known phrases completely."""
     reached = {0}
     for end in range(1, len(words) + 1):
         if any(start in reached and " ".join(words[start:end]) in known for start in range(end)):
@@ -50,5 +50,5 @@ def covered(words: list[str], known: frozenset[str]) -> bool:
 
 
 def plain(text: str) -> str:
-    """Lower case, letters and digits of any script, single spaces."""
+    """Normalises a text: lower case, letters and digits of any script, single spaces."""
     return " ".join(re.findall(r"\w+", text.casefold()))

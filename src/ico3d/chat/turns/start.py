@@ -1,4 +1,4 @@
-"""When a turn of the visitor begins: at once in silence, as the floor decides over the avatar."""
+"""Starts the visitor's turns: at once in silence; during the avatar's speech `Floor` decides."""
 
 import asyncio
 from collections.abc import Callable
@@ -24,10 +24,10 @@ LOOK = 0.05  # s between two looks at the clock while the avatar waits
 
 
 class FloorTurnStart(BaseUserTurnStartStrategy):
-    """Starts turns; silences and resumes the avatar while it is not known whether one starts."""
+    """Starts turns, and pauses and resumes the avatar while a voice is being judged."""
 
     def __init__(self, floor: Floor, hush: Callable[[bool], None]):
-        """A strategy for one session; `hush(True)` pauses the avatar, `hush(False)` resumes it."""
+        """Creates the strategy of one session; `hush(True)` pauses, `hush(False)` resumes."""
         super().__init__()
         self._floor, self._hush = floor, hush
         self._in_turn = False
@@ -35,22 +35,22 @@ class FloorTurnStart(BaseUserTurnStartStrategy):
         self._watch: asyncio.Task | None = None
 
     async def cleanup(self):
-        """Ends the look at the clock."""
+        """Cancels the timer."""
         await super().cleanup()
         if self._watch is not None:
             await self.task_manager.cancel_task(self._watch)
             self._watch = None
 
     async def handle_user_turn_started(self):
-        """A turn has begun, by this or another way."""
+        """Registers that a turn has begun, by this strategy or another."""
         self._in_turn = True
 
     async def handle_user_turn_stopped(self):
-        """The turn is over."""
+        """Registers that the turn has ended."""
         self._in_turn = False
 
     async def process_frame(self, frame: Frame) -> ProcessFrameResult:
-        """Follows voices, words and the avatar."""
+        """Follows voices, words and the avatar's speech."""
         await super().process_frame(frame)
         if isinstance(frame, BotStartedSpeakingFrame):
             self._floor.avatar(True)

@@ -1,4 +1,4 @@
-"""When a turn of the visitor ends, and the answer that is prepared before that is certain."""
+"""Ends the visitor's turns, and prepares answers before the end is certain."""
 
 import asyncio
 
@@ -22,15 +22,15 @@ from ico3d.chat.wire.protocol import Talk
 
 
 class SpeculativeTurnStop(TurnAnalyzerUserTurnStopStrategy):
-    """Smart-Turn's decision; while it waits for more, an answer is prepared.
+    """Ends turns by Smart-Turn; prepares an answer while the decision is open.
 
-    A pause that sounds unfinished ends the turn only after a longer silence. The language model
-    gets the words at once, on a copy of the context, and pipecat's gate holds its answer: until
-    the turn ends with these words, or for ever, when the visitor goes on.
+    After a pause that sounds unfinished, the turn ends only if the silence continues. The language
+    model gets the words at once, on a copy of the context. pipecat's gate holds the answer back
+    until the turn ends with these very words; if the visitor continues, the answer is discarded.
     """
 
     def __init__(self, speculate: bool, analyzer: EagerSmartTurn, **kwargs):
-        """A strategy for one session; the rest as the base takes it."""
+        """Creates the strategy of one session; further arguments are those of the base class."""
         super().__init__(turn_analyzer=analyzer, **kwargs)
         self._speculate, self._analyzer = speculate, analyzer
         self._match = NormalizedMatch()
@@ -40,18 +40,18 @@ class SpeculativeTurnStop(TurnAnalyzerUserTurnStopStrategy):
         self._silent = True
 
     async def handle_user_turn_started(self):
-        """A turn has begun."""
+        """Registers that a turn has begun."""
         await super().handle_user_turn_started()
         self._said, self._open = "", True
 
     async def handle_user_turn_stopped(self):
-        """The turn has ended, by this or another way."""
+        """Registers that the turn has ended, by this strategy or another."""
         self._open = False
         await self._withdraw()
         await super().handle_user_turn_stopped()
 
     async def process_frame(self, frame: Frame) -> ProcessFrameResult:
-        """Follows voice and words."""
+        """Follows the voice and the words."""
         if isinstance(frame, VoiceFrame):
             self._analyzer.listen(frame.silence)
         elif isinstance(frame, VADUserStartedSpeakingFrame):
@@ -67,7 +67,7 @@ class SpeculativeTurnStop(TurnAnalyzerUserTurnStopStrategy):
         return result
 
     async def trigger_user_turn_stopped(self, *, enable_user_speaking_frames: bool | None = None):
-        """Ends the turn; what was prepared for these very words is released."""
+        """Ends the turn; releases the answer if it was prepared for these very words."""
         prepared, self._prepared = self._prepared, None
         if prepared is not None and self._match.matches(prepared, self._said):
             await self.trigger_user_turn_finalized(
@@ -96,13 +96,13 @@ class SpeculativeTurnStop(TurnAnalyzerUserTurnStopStrategy):
 
 
 class ReleaseTurnStop(BaseUserTurnStopStrategy):
-    """Push to talk: while the button is held nothing ends the turn, letting go does at once.
+    """Push to talk: no turn ends while the button is held; releasing the button ends it at once.
 
-    It comes before other strategies and keeps from them what happens meanwhile.
+    This strategy must precede others and hides from them what happens while the button is held.
     """
 
     def __init__(self):
-        """Nobody holds the button."""
+        """Starts with the button released."""
         super().__init__()
         self._patience = 0.0  # s that the recogniser may need for the last words
         self._held = self._released = False
@@ -110,12 +110,12 @@ class ReleaseTurnStop(BaseUserTurnStopStrategy):
         self._timer: asyncio.Task | None = None
 
     async def cleanup(self):
-        """Ends the timer."""
+        """Cancels the timer."""
         await super().cleanup()
         await self._stop_timer()
 
     async def handle_user_turn_stopped(self):
-        """The turn has ended, by this or another way."""
+        """Registers that the turn has ended, by this strategy or another."""
         self._released = self._words = False
         await self._stop_timer()
 

@@ -1,4 +1,4 @@
-"""How turns begin and end, as pipecat takes it."""
+"""Strategies of beginnings and ends of turns, in pipecat's form."""
 
 import time
 from collections.abc import Callable
@@ -23,11 +23,11 @@ def strategies(
     """The strategies of one session.
 
     Args:
-        analyzer: Hears whether a pause ends a turn.
-        settings: Who speaks when.
-        trusted: Whether the recogniser hears short words rightly.
-        hush: Pauses what the avatar says (True) or goes on with it (False).
-        now: The clock, seconds.
+        analyzer: Judges whether a pause ends a turn.
+        settings: Durations that decide on turns.
+        trusted: Whether the recogniser understands short words reliably.
+        hush: Pauses the avatar's speech (True) or resumes it (False).
+        now: Returns the time in seconds.
     """
     floor = Floor(settings, phrases(), trusted, now)
     return UserTurnStrategies(

@@ -1,4 +1,4 @@
-"""Messages to frames and back, checked against the annotations in `protocol.py`."""
+"""Encodes and decodes messages, and checks them against the annotations in `protocol.py`."""
 
 import json
 import math
@@ -29,17 +29,17 @@ HEADER_LENGTH = struct.Struct("<I")
 
 
 class OversizedError(ProtocolError):
-    """A frame is larger than the protocol allows."""
+    """A frame exceeds the protocol's limits."""
 
 
 def encode(message: ClientMessage | ServerMessage) -> str | bytes:
-    """A message as a WebSocket frame.
+    """Encodes a message as a WebSocket frame.
 
     Returns:
         Text (JSON) or, for messages with arrays, bytes: u32 header length, JSON header, payload.
 
     Raises:
-        ProtocolError: If a field breaks its own limits or the frame is too long.
+        ProtocolError: If a field violates its limits or the frame is too long.
     """
     kind = type(message)
     name = kind.__name__.lower()
@@ -60,28 +60,28 @@ def encode(message: ClientMessage | ServerMessage) -> str | bytes:
 
 
 def decode_client(frame: str | bytes) -> ClientMessage:
-    """A frame from a page as a checked message.
+    """Decodes and checks a frame from a page.
 
     Raises:
-        ProtocolError: If it is malformed; `OversizedError` if it is too long.
+        ProtocolError: If the frame is malformed; `OversizedError` if it is too long.
     """
     return decode(frame, protocol.CLIENT_MESSAGES)
 
 
 def decode_server(frame: str | bytes) -> ServerMessage:
-    """A frame from a server as a checked message.
+    """Decodes and checks a frame from a server.
 
     Raises:
-        ProtocolError: If it is malformed; `OversizedError` if it is too long.
+        ProtocolError: If the frame is malformed; `OversizedError` if it is too long.
     """
     return decode(frame, protocol.SERVER_MESSAGES)
 
 
 def decode(frame: str | bytes, known: tuple[type, ...]) -> Any:
-    """A frame as one of the `known` messages.
+    """Decodes and checks a frame that must contain one of the messages `known`.
 
     Raises:
-        ProtocolError: If it is malformed; `OversizedError` if it is too long.
+        ProtocolError: If the frame is malformed; `OversizedError` if it is too long.
     """
     header, payload = (unpack(frame), None) if isinstance(frame, str) else split_binary(frame)
     by_name = {message.__name__.lower(): message for message in known}
@@ -101,7 +101,11 @@ def decode(frame: str | bytes, known: tuple[type, ...]) -> Any:
 
 
 def unpack(text: str) -> dict[str, Any]:
-    """The JSON object of a text frame."""
+    """The JSON object of a text frame.
+
+    Raises:
+        ProtocolError: If the text is not a JSON object; `OversizedError` if it is too long.
+    """
     try:
         check_size(text.encode(), protocol.MAX_TEXT_FRAME)
         value = json.loads(text, parse_constant=refuse_constant)
@@ -115,7 +119,11 @@ def unpack(text: str) -> dict[str, Any]:
 
 
 def split_binary(frame: bytes) -> tuple[dict[str, Any], bytes]:
-    """Header and payload of a binary frame."""
+    """Header and payload of a binary frame.
+
+    Raises:
+        ProtocolError: If the frame is malformed; `OversizedError` if it is too long.
+    """
     check_size(frame, protocol.MAX_BINARY_FRAME)
     if len(frame) < HEADER_LENGTH.size:
         raise ProtocolError("a binary frame is too short for its header.")
@@ -131,7 +139,11 @@ def split_binary(frame: bytes) -> tuple[dict[str, Any], bytes]:
 
 
 def check_size(frame: bytes, limit: int) -> None:
-    """Refuses a frame above `limit` bytes."""
+    """Refuses a frame above `limit` bytes.
+
+    Raises:
+        OversizedError: If the frame is larger.
+    """
     if len(frame) > limit:
         raise OversizedError(f"a frame of {len(frame)} bytes is over the limit of {limit}.")
 
@@ -139,7 +151,11 @@ def check_size(frame: bytes, limit: int) -> None:
 def read_tensors(
     tensors: dict[str, Tensor], header: dict[str, Any], payload: bytes, where: str
 ) -> dict[str, np.ndarray]:
-    """Cuts the payload of a message into the arrays whose shapes the header gives."""
+    """Cuts the payload of a message into arrays with the shapes in the header.
+
+    Raises:
+        ProtocolError: If a shape is refused or the payload has another size.
+    """
     arrays, at = {}, 0
     for name, tensor in tensors.items():
         shape, dtype = header[name], np.dtype(tensor.dtype)
@@ -155,34 +171,34 @@ def read_tensors(
 
 @cache
 def tensors_of(message: type) -> dict[str, Tensor]:
-    """The marks of the fields that are arrays; none for messages that travel as text."""
+    """Marks of a message's array fields, by name; empty for messages that are text."""
     kinds = {name: kind_of(note) for name, note in field_types(message).items()}
     return {name: kind.marks[0] for name, kind in kinds.items() if kind.bare is np.ndarray}
 
 
 class WireRules(Rules):
-    """A message has all its fields and no other; marks say what their values must be like."""
+    """Rules for messages: all fields are required, no others allowed, and marks limit values."""
 
     finite = False  # the ranges say so
 
     def entry(self, where: str, key: int | str) -> str:
-        """Entries are not told apart."""
+        """The place of the whole list: entries are not distinguished."""
         return where
 
     def unknown(self, where: str, name: str, kind: type) -> str:
-        """Refuses a name that no field has."""
+        """The sentence for a name that is no field."""
         return f"{where}: unknown field {short(name)}."
 
     def missing(self, where: str, name: str) -> str:
-        """Refuses a message without one of its fields."""
+        """The sentence for a missing field."""
         return f"{where}: field '{name}' is missing."
 
     def count(self, where: str, wanted: int, given: int) -> str:
-        """Refuses a list of another length."""
+        """The sentence for a list of the wrong length."""
         return f"{where}: must have {wanted} items."
 
     def wrong(self, where: str, kind: Kind, value: Any) -> str:
-        """Refuses a value of another type."""
+        """The sentence for a value of the wrong type."""
         if kind.origin is Literal:
             return f"{where}: must be one of {', '.join(kind.arguments)}."
         wanted = {list: list, tuple: list, dict: dict}.get(kind.origin, kind.bare)
@@ -190,14 +206,14 @@ class WireRules(Rules):
         return f"{where}: must be {name}, not {type(value).__name__}."
 
     def own(self, kind: Kind, value: Any, where: str) -> Any:
-        """The shape of an array, which its header field holds."""
+        """Converts the shape of an array, which the header contains in its field."""
         if kind.bare is not np.ndarray:
             return NotImplemented
         check_shape(value, kind.marks[0], where)
         return value
 
     def check(self, value: Any, mark: Any, where: str) -> None:
-        """Checks a limit."""
+        """Checks a value against a mark of its field."""
         check_limit(value, mark, where)
 
 
@@ -205,7 +221,11 @@ RULES = WireRules(ProtocolError)
 
 
 def check_shape(value: Any, tensor: Tensor, where: str) -> None:
-    """Checks the shape that a header gives for an array."""
+    """Checks the shape that the header states for an array.
+
+    Raises:
+        ProtocolError: If the shape has other dimensions or too many elements.
+    """
     for size in parsed(list[int], value, where, RULES):
         check_limit(size, Range(0, tensor.max_size), where)
     if len(value) != tensor.dims:
@@ -214,7 +234,11 @@ def check_shape(value: Any, tensor: Tensor, where: str) -> None:
 
 
 def check_limit(value: Any, mark: Any, where: str) -> None:
-    """Checks a `Range` or `Length`."""
+    """Checks a value against a `Range` or `Length`.
+
+    Raises:
+        ProtocolError: If the value violates the limit.
+    """
     if isinstance(mark, Range) and not mark.low <= value <= mark.high:
         raise ProtocolError(f"{where}: must lie in [{mark.low:g}, {mark.high:g}].")
     if isinstance(mark, Length) and not mark.low <= len(value) <= mark.high:
@@ -222,5 +246,5 @@ def check_limit(value: Any, mark: Any, where: str) -> None:
 
 
 def short(value: Any) -> str:
-    """A hostile value, short enough and plain enough to be quoted."""
+    """A possibly hostile value, shortened and escaped for quoting."""
     return ascii(value)[:40]

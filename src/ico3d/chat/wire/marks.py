@@ -1,4 +1,4 @@
-"""Marks on the fields of messages: what their values must be like."""
+"""Marks on the fields of messages, which limit their values."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -9,7 +9,7 @@ LONGEST_NAME = 200
 
 @dataclass(frozen=True)
 class Range:
-    """Bounds of a number, both included."""
+    """Limits of a number, both included."""
 
     low: float
     high: float
@@ -17,7 +17,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Length:
-    """Bounds of a text's characters or a list's items, both included."""
+    """Limits of the number of characters or items, both included."""
 
     low: int
     high: int
@@ -25,12 +25,12 @@ class Length:
 
 @dataclass(frozen=True)
 class Tensor:
-    """An array in the payload of a binary message; its header field holds the shape.
+    """An array in the payload of a binary message; the header has its shape.
 
     Attributes:
-        dtype: numpy name, little-endian: `<i2` or `<f2`.
+        dtype: numpy's name of the type, little-endian: `<i2` or `<f2`.
         dims: Number of dimensions.
-        max_size: Most elements.
+        max_size: Largest number of elements.
     """
 
     dtype: str

@@ -1,7 +1,8 @@
-"""The vocabulary of the wire: every message between page and server, and the limits.
+"""The protocol between page and server: all messages, and the limits.
 
-`codec.py` encodes, decodes and checks by the annotations in this file, the one source, and
-`python -m ico3d.chat.generating` writes `viewer/src/protocol.ts` and `docs/protocol.md` from them.
+The annotations in this file are the only definition. `codec.py` encodes, decodes and checks by
+them, and `python -m ico3d.chat.generating` generates `viewer/src/protocol.ts` and
+`docs/protocol.md`.
 """
 
 from dataclasses import dataclass, field
@@ -43,9 +44,10 @@ class Hello:
 
     Attributes:
         version: Protocol version of the page.
-        session: The session to go on with after a dropped connection; null for a new one.
-        last_index: `index` of the last speech message that arrived; -1 when new.
-        wishes: Keys of offers by kind that a new session is to use; heeded where `welcome` offers.
+        session: Id of the session to resume after a lost connection; null for a new one.
+        last_index: `index` of the last speech message that arrived; -1 for a new session.
+        wishes: Services wished for in a new session: keys of offers, by kind; only offered ones are
+            used.
     """
 
     version: Count
@@ -59,12 +61,12 @@ class Audio:
     """Sound from the microphone (binary).
 
     Attributes:
-        sample: Index of the first sample since the microphone opened; where it jumps, the page
-            left sound out that the network did not carry.
-        pcm: (n,) int16 at 16 kHz, at most 1 s; 20-100 ms serve best.
-        playing: The utterance that left the loudspeaker when the last sample was recorded; null
+        sample: Index of the first sample since the microphone was opened; a jump means that the
+            page left out sound that the network could not carry.
+        pcm: (n,) int16 at 16 kHz, at most 1 s; 20-100 ms are best.
+        playing: Utterance that the loudspeaker was playing when the last sample was recorded; null
             in silence.
-        position: Seconds of it that had been heard by then; 0 in silence.
+        position: Seconds of the utterance `playing` that had been heard by then; 0 in silence.
     """
 
     sample: Count
@@ -78,7 +80,7 @@ class Text:
     """A typed question.
 
     Attributes:
-        text: What was typed.
+        text: The question.
     """
 
     text: Annotated[str, Length(1, 2000)]
@@ -86,10 +88,10 @@ class Text:
 
 @dataclass(frozen=True)
 class Interrupt:
-    """The visitor wants silence.
+    """The visitor asks the avatar to be silent.
 
     Attributes:
-        utterance: The utterance to stop; null for whatever speaks.
+        utterance: The utterance to stop; null for the current one.
     """
 
     utterance: Count | None
@@ -97,12 +99,12 @@ class Interrupt:
 
 @dataclass(frozen=True)
 class Clock:
-    """How far the page has played; every 100-250 ms while it plays, and once at the very end.
+    """Position of playback; sent every 100-250 ms during playback, and once at the very end.
 
     Attributes:
-        utterance: The utterance that plays.
-        position: Seconds of it already heard (output latency included).
-        body_time: Seconds on the body's own time line; 0 without a body.
+        utterance: The utterance that is playing.
+        position: Seconds of the utterance that have been heard (output latency included).
+        body_time: Body time in seconds; 0 without a body.
     """
 
     utterance: Count
@@ -112,13 +114,13 @@ class Clock:
 
 @dataclass(frozen=True)
 class Talk:
-    """Push to talk: the visitor holds the button or lets it go.
+    """Push to talk: the visitor presses or releases the button.
 
-    While it is held everything that comes from the microphone is one turn, whatever its pauses;
-    letting go ends the turn at once.
+    While the button is held, all sound of the microphone is one turn, whatever its pauses;
+    releasing the button ends the turn at once.
 
     Attributes:
-        pressed: True when the button goes down.
+        pressed: True when the button was pressed, false when it was released.
     """
 
     pressed: bool
@@ -126,12 +128,13 @@ class Talk:
 
 @dataclass(frozen=True)
 class Heard:
-    """What the browser's recogniser understood, where `welcome` asked for it.
+    """Transcript of the browser's recogniser, if `welcome` asked for it.
 
     Attributes:
-        result: Counts up behind each final text; while it stays, a text replaces the last one.
+        result: Number of the result, one higher after each final text; a text replaces an earlier
+            one with the same number.
         text: All words of this result so far.
-        final: Whether they stay as they are.
+        final: Whether the words will not change any more.
     """
 
     result: Count
@@ -141,10 +144,10 @@ class Heard:
 
 @dataclass(frozen=True)
 class Deaf:
-    """The browser cannot recognise speech after all: the server is to do it.
+    """The browser cannot recognise speech after all, so the server has to.
 
     Attributes:
-        reason: What the browser says about it, for the server's log.
+        reason: The browser's error, for the server's log.
     """
 
     reason: Annotated[str, Length(0, 200)]
@@ -156,12 +159,12 @@ class Welcome:
 
     Attributes:
         version: Protocol version of the server.
-        session: Name of the session, to be kept for a resume.
-        resumed: True if this goes on with the session that `hello` named.
-        services: Who listens, thinks and speaks.
-        notices: Sentences the page shows once (what this avatar cannot do).
-        dictation: How the browser is to recognise speech; null where the server does.
-        offers: Services to choose from; none where strangers may be talking.
+        session: Id of the session, needed to resume it.
+        resumed: True if the session is the one that `hello` named.
+        services: The services of the conversation.
+        notices: Sentences that the page shows once, on what this avatar cannot do.
+        dictation: How the browser is to recognise speech; null if the server does.
+        offers: Services to choose from; empty where strangers may be talking.
     """
 
     version: Count
@@ -175,13 +178,13 @@ class Welcome:
 
 @dataclass(frozen=True)
 class Ack:
-    """Binary frames of this connection have arrived, whatever became of them.
+    """Number of binary frames of this connection that have arrived, whether used or not.
 
-    Neither page nor browser can tell otherwise what a network still holds. A page sends sound
-    only a little ahead of what is acknowledged: after a stall no old sound arrives.
+    Neither page nor browser can otherwise tell what a network still holds. A page sends sound only
+    slightly ahead of what is acknowledged, so that no old sound arrives after a stall.
 
     Attributes:
-        frames: How many so far.
+        frames: Number of frames so far.
     """
 
     frames: Count
@@ -189,7 +192,7 @@ class Ack:
 
 @dataclass(frozen=True)
 class State:
-    """What the avatar does now.
+    """The avatar's state.
 
     Attributes:
         state: `listening` while the visitor speaks, `thinking` until sound comes, `speaking`.
@@ -200,11 +203,12 @@ class State:
 
 @dataclass(frozen=True)
 class Transcript:
-    """What the visitor was understood to say.
+    """The visitor's words, as recognised.
 
     Attributes:
         text: All words of this turn so far.
-        final: False while he still speaks: the next one replaces this one.
+        final: False while the visitor is still speaking; the next transcript then replaces this
+            one.
     """
 
     text: Words
@@ -213,11 +217,11 @@ class Transcript:
 
 @dataclass(frozen=True)
 class Answer:
-    """One sentence of the answer, just before its sound.
+    """One sentence of the answer, sent just before its sound.
 
     Attributes:
-        utterance: Counts up by one for each answer in a session.
-        first_sample: Where in the utterance its sound starts (24 kHz).
+        utterance: Number of the answer, one higher for each answer in a session.
+        first_sample: Index of the sentence's first sample in the utterance, at 24 kHz.
         text: The sentence.
     """
 
@@ -228,16 +232,16 @@ class Answer:
 
 @dataclass(frozen=True, eq=False)
 class Speech:
-    """100-200 ms of sound and the face that belongs to it (binary).
+    """100-200 ms of sound with the matching face (binary).
 
     Expression row `first_expression` + j belongs to the utterance's time
     (first_expression + j) / 25 s.
 
     Attributes:
-        utterance: Which answer.
-        index: Counts the session's speech messages.
-        first_sample: Of the utterance, at 24 kHz.
-        first_expression: Index in the utterance of the first row.
+        utterance: Number of the answer.
+        index: Number of this speech message in the session.
+        first_sample: Index of the first sample in the utterance, at 24 kHz.
+        first_expression: Index of the first row of expressions in the utterance.
         pcm: (n,) int16 at 24 kHz.
         expressions: (rows, B) float16.
     """
@@ -252,14 +256,14 @@ class Speech:
 
 @dataclass(frozen=True)
 class Timeline:
-    """Which body time belongs to which time of the sound, straight between the points.
+    """Body time over the time of the sound, linear between points.
 
-    The points go on where those of an earlier message ended; what was planned from the first
-    one's time on is replaced. After the last one the body stays, until the utterance ends.
+    The points continue those of earlier messages; earlier points from the first new one's time on
+    are replaced. After the last point the body stands still until the utterance ends.
 
     Attributes:
-        utterance: Which answer.
-        points: (audio time, body time) pairs, seconds, audio time ascending.
+        utterance: Number of the answer.
+        points: Pairs (audio time, body time) in seconds, ascending in audio time.
     """
 
     utterance: Count
@@ -268,12 +272,12 @@ class Timeline:
 
 @dataclass(frozen=True)
 class Cues:
-    """What a body on a skeleton does while it speaks; nothing that was sent is taken back.
+    """Gestures of a body on a skeleton during speech; cues that were sent are never withdrawn.
 
     Attributes:
-        utterance: Which answer.
-        cues: Gestures to make, later ones upon earlier ones.
-        releases: Of these or of earlier ones.
+        utterance: Number of the answer.
+        cues: Gestures to make; later ones are blended over earlier ones.
+        releases: Releases of gestures in this or in earlier messages.
     """
 
     utterance: Count
@@ -286,7 +290,7 @@ class End:
     """All sound of an utterance has been sent.
 
     Attributes:
-        utterance: Which answer.
+        utterance: Number of the answer.
         samples: Length of the utterance at 24 kHz.
     """
 
@@ -296,10 +300,10 @@ class End:
 
 @dataclass(frozen=True)
 class Stop:
-    """Fall silent at once and drop everything that belongs to an utterance.
+    """The page must fall silent at once and drop everything about an utterance.
 
     Attributes:
-        utterance: Which answer.
+        utterance: Number of the answer.
     """
 
     utterance: Count
@@ -307,10 +311,12 @@ class Stop:
 
 @dataclass(frozen=True)
 class Pause:
-    """Somebody may speak: fall silent at once, but keep it all; `resume` or `stop` follows.
+    """Somebody may be speaking: the page falls silent at once but keeps the utterance.
+
+    A message `resume` or `stop` follows.
 
     Attributes:
-        utterance: Which answer.
+        utterance: Number of the answer.
     """
 
     utterance: Count
@@ -318,10 +324,10 @@ class Pause:
 
 @dataclass(frozen=True)
 class Resume:
-    """It was no interruption: go on with the sample at which an utterance fell silent.
+    """There was no interruption: the page continues at the sample where it fell silent.
 
     Attributes:
-        utterance: Which answer.
+        utterance: Number of the answer.
     """
 
     utterance: Count
@@ -329,7 +335,7 @@ class Resume:
 
 @dataclass(frozen=True)
 class Metrics:
-    """How long something took.
+    """Measured durations.
 
     Attributes:
         name: What was measured.
@@ -345,9 +351,9 @@ class Error:
     """Something went wrong.
 
     Attributes:
-        message: One sentence.
-        fatal: True if the server closes the connection after it; the session is over.
-        again: Whether, after a fatal one, a new session may succeed: the page offers to try again.
+        message: One sentence for the visitor.
+        fatal: True if the session is over and the server closes the connection.
+        again: After a fatal error: whether a new session may succeed, so that the page offers one.
     """
 
     message: Words
@@ -375,4 +381,4 @@ ServerMessage = (
 CLIENT_MESSAGES = get_args(ClientMessage)
 SERVER_MESSAGES = get_args(ServerMessage)
 PARTS = (Service, Services, Dictation, Offer, Cue, Release)
-"""Dataclasses that messages hold."""
+"""Dataclasses that messages contain."""

@@ -1,4 +1,4 @@
-"""What messages say of gestures on a skeleton."""
+"""Parts of messages about gestures of a body on a skeleton."""
 
 from dataclasses import dataclass
 
@@ -9,15 +9,15 @@ MAX_CUES = 64  # in one message
 
 @dataclass(frozen=True)
 class Cue:
-    """A gesture to make; times are the utterance's.
+    """A gesture to make; times are seconds of the utterance.
 
     Attributes:
-        number: Counts the cues of the utterance.
-        name: Of the gesture in the bundle.
-        mirror: Whether with the other hand.
-        begin: When it begins.
-        stroke: When its stroke arrives: on an accent.
-        skip: Seconds of the gesture's beginning that are left out.
+        number: Number of the cue in the utterance.
+        name: Name of the gesture in the bundle.
+        mirror: Whether to make the gesture with the other hand.
+        begin: Time at which the gesture begins.
+        stroke: Time at which the stroke arrives, which is that of an accent.
+        skip: Seconds of the gesture's beginning to leave out.
     """
 
     number: Count
@@ -30,11 +30,11 @@ class Cue:
 
 @dataclass(frozen=True)
 class Release:
-    """A gesture that is held is let go.
+    """The end of a gesture that is being held.
 
     Attributes:
-        number: Of its cue.
-        time: When hands begin to come down, on the utterance's time.
+        number: Number of the gesture's cue.
+        time: Time at which the hands begin to come down, in seconds of the utterance.
     """
 
     number: Count

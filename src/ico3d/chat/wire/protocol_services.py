@@ -1,4 +1,4 @@
-"""What messages say of the services that make a conversation; a part of `protocol.py`."""
+"""Parts of messages about the services of a conversation; part of `protocol.py`."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -11,8 +11,8 @@ class Service:
     """One of the three services that make the conversation.
 
     Attributes:
-        name: For the visitor's eyes.
-        stand_in: True for the small offline ones that the page says plainly are in use.
+        name: Name, as shown to visitors.
+        stand_in: True for one of the simple offline services, about which the page tells visitors.
     """
 
     name: Name
@@ -21,7 +21,7 @@ class Service:
 
 @dataclass(frozen=True)
 class Services:
-    """Who listens, thinks and speaks.
+    """The services of the conversation.
 
     Attributes:
         recognition: Speech to text.
@@ -36,13 +36,13 @@ class Services:
 
 @dataclass(frozen=True)
 class Offer:
-    """A service that could do one of the three jobs; the best ones come first.
+    """A service that visitors may choose; preferred ones come first.
 
     Attributes:
-        kind: Which job.
+        kind: Kind of the service.
         key: Name of the service in settings and wishes.
-        name: For the visitor's eyes, as in `services`.
-        hindrance: What keeps it from working and what would mend it; empty if it works.
+        name: Name, as shown to visitors.
+        hindrance: What prevents the service from working and what would help; empty if it works.
     """
 
     kind: Literal["recognition", "language", "voice"]
@@ -53,11 +53,11 @@ class Offer:
 
 @dataclass(frozen=True)
 class Dictation:
-    """The visitor's browser is to recognise speech, besides sending it.
+    """Asks the page to let the browser recognise speech, besides sending the sound.
 
     Attributes:
-        language: BCP 47 tag of what is spoken; empty for the browser's own language.
-        fallback: Who listens where the browser cannot, for the visitor's eyes; null for nobody.
+        language: BCP 47 tag of the spoken language; empty for the browser's language.
+        fallback: Recogniser for browsers without recognition, as shown to visitors; null for none.
     """
 
     language: Annotated[str, Length(0, 35)]

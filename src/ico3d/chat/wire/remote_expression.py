@@ -1,9 +1,9 @@
-"""What both ends of a remote expression server know (`/v1/expressions`).
+"""The protocol of remote expression modules (`/v1/expressions`), for client and server.
 
-The server says `{"model": sha256, "rate": 24000, "fps": 25, "size": C}`. The text frame `start`
-begins a sound. Every binary frame (PCM16, mono, little-endian, at most 64 KiB) is answered by one
-binary frame with the rows known now ((n, C) float32, little-endian, n may be 0), and the text
-frame `finish` by the rows that are left.
+The server first sends `{"model": sha256, "rate": 24000, "fps": 25, "size": C}`. The text frame
+`start` begins a sound. The server answers every binary frame (PCM16, mono, little-endian, at most
+64 KiB) with one binary frame that contains the rows known so far ((n, C) float32, little-endian, n
+may be 0), and the text frame `finish` with the remaining rows.
 """
 
 import numpy as np

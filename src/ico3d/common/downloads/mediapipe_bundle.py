@@ -76,6 +76,9 @@ def mediapipe_tasks(module: str) -> Any:
     Args:
         module: The module's name without the prefix `mediapipe.tasks.`.
 
+    Returns:
+        The imported module.
+
     Raises:
         MissingExtraError: If MediaPipe is not installed.
     """

@@ -1,4 +1,4 @@
-"""Question to answer."""
+"""Language models: question to answer."""
 
 from ico3d.chat.services.language import local, openai, persona, qwen
 from ico3d.chat.services.provider import Provider, Table

@@ -1,4 +1,4 @@
-"""pipecat's OpenAI service, for servers that lack some of what OpenAI's has."""
+"""pipecat's OpenAI service, adapted to servers that lack some of OpenAI's features."""
 
 import contextlib
 from collections.abc import AsyncGenerator
@@ -20,9 +20,9 @@ from ico3d.chat.services.language.reasoning import Parts, Thoughts, field_of, wi
 from ico3d.chat.settings.keys import is_openai
 
 MOST_ROUNDS = 4
-"""How often in a turn a model may call functions before it must speak."""
+"""How often a model may call functions in one turn before it must answer in words."""
 COMPLETE = ("stop", "tool_calls", "function_call")
-"""Why an answer ended that was not cut off."""
+"""Reasons for the end of an answer that was not cut off."""
 _opens: dict[tuple[str, str], bool] = {}
 """By server and model: whether its chat template opens a thought, so that a stream holds only the
 end of it. One answer tells (`warm_up` asks for one); of a model that is not in here the first is
@@ -32,7 +32,7 @@ _summarising: ContextVar[bool] = ContextVar("summarising", default=False)
 
 
 class CompatibleModel(OpenAILLMService):
-    """A language model that goes without functions where its server cannot call any."""
+    """A language model that does without functions if its server does not support them."""
 
     supports_developer_role = False  # chat templates of open models do not know it
 
@@ -44,14 +44,14 @@ class CompatibleModel(OpenAILLMService):
         functions: bool,
         sampling: dict[str, Any],
     ):
-        """A model for one session.
+        """Creates the language model of one session.
 
         Args:
-            client: What the SDK's client is made with.
+            client: Options of the SDK's client.
             model: Name of the model.
-            instruction: Who it is.
-            functions: Whether it may call functions.
-            sampling: What else pipecat's settings say of a request.
+            instruction: System instruction: who the avatar is.
+            functions: Whether the model may call functions.
+            sampling: Further settings of pipecat for a request.
         """
         self._made_with = client
         super().__init__(
@@ -65,13 +65,13 @@ class CompatibleModel(OpenAILLMService):
             _opens.setdefault(self._place, False)  # its thoughts stay with it
 
     def create_client(self, *_, **__) -> AsyncOpenAI:
-        """The client that pipecat asks by."""
+        """Creates the client for pipecat's requests."""
         return AsyncOpenAI(**self._made_with)
 
     def build_chat_completion_params(
         self, params_from_context: OpenAILLMInvocationParams
     ) -> dict[str, Any]:
-        """The request, without functions where there are none."""
+        """The parameters of a request, without functions if there are none."""
         params = super().build_chat_completion_params(params_from_context)
         if not self._functions_allowed or rounds(params["messages"]) >= MOST_ROUNDS:
             for name in ("tools", "tool_choice"):
@@ -81,7 +81,7 @@ class CompatibleModel(OpenAILLMService):
         return params
 
     async def run_inference(self, *args: Any, **options: Any) -> str | None:
-        """A whole answer beside the conversation, such as a summary, of a length of its own."""
+        """A whole answer outside of the conversation, such as a summary, of its own length."""
         token = _summarising.set(True)
         try:
             text = await super().run_inference(*args, **options)
@@ -92,7 +92,7 @@ class CompatibleModel(OpenAILLMService):
     async def get_chat_completions(
         self, context: LLMContext
     ) -> AsyncGenerator[ChatCompletionChunk, None]:
-        """Asks, and takes thoughts out of the answer."""
+        """Sends a request and removes thoughts from the answer."""
         return self._without_thoughts(await self._asked(context))
 
     async def _without_thoughts(
@@ -113,10 +113,11 @@ class CompatibleModel(OpenAILLMService):
         self._learn(thoughts, end)
 
     async def warm_up(self) -> None:
-        """Asks for a word before visitors come.
+        """Requests a short answer before visitors come.
 
-        A server loads its model with the first question, and the answer tells whether answers of
-        this model can be given out while they come.
+        A server loads its model with the first request. The answer also shows whether the model's
+        text begins within a thought; unless it does, later answers can be passed on while they
+        arrive.
 
         Raises:
             OpenAIError: If the server does not answer.
@@ -184,7 +185,7 @@ async def _closing(
 
 
 def rounds(messages: list[dict[str, Any]]) -> int:
-    """How often functions were called since the visitor spoke."""
+    """How often functions were called since the visitor's last message."""
     count = 0
     for message in reversed(messages):
         if message["role"] == "user":

@@ -1,7 +1,6 @@
 """A causal language model of transformers as a service of the pipeline.
 
-torch is imported inside transformers only, so that what serves needs none as long as nobody asks
-for this.
+torch is imported only by transformers, so a server without this service does not need torch.
 """
 
 import asyncio
@@ -47,18 +46,18 @@ _loading = threading.Lock()
 
 
 class Stop(StoppingCriteria):
-    """Ends a generation from outside, after the token that is being made."""
+    """A stopping criterion that ends a generation from outside, after the current token."""
 
     def __init__(self):
-        """Goes on until it is set."""
+        """Starts unset."""
         self._event = threading.Event()
 
     def set(self) -> None:
-        """No more tokens."""
+        """Ends the generation."""
         self._event.set()
 
     def __call__(self, input_ids: Any, scores: Any, **kwargs: Any) -> Any:
-        """Whether to stop; transformers takes one answer for the whole batch too."""
+        """Whether to stop; transformers accepts one value for the whole batch."""
         return self._event.is_set()
 
 
@@ -67,10 +66,10 @@ class Loaded:
     """A model that all sessions share.
 
     Attributes:
-        name: Where it came from.
-        model: transformers' causal language model.
-        tokenizer: Of the model, with a chat template.
-        threads: Where it generates.
+        name: Folder or hub name of the model.
+        model: The causal language model of transformers.
+        tokenizer: The model's tokenizer, with a chat template.
+        threads: Threads that generate.
     """
 
     name: str
@@ -82,7 +81,7 @@ class Loaded:
 
     @cached_property
     def opens(self) -> bool:
-        """Whether its chat template opens a thought, so that answers hold only the end of it."""
+        """Whether the chat template opens a thought, so that answers contain only its end mark."""
         try:
             prompt = self.tokenizer.apply_chat_template(
                 [{"role": "user", "content": "?"}], add_generation_prompt=True, tokenize=False
@@ -94,12 +93,12 @@ class Loaded:
     async def stream(
         self, messages: list[dict[str, Any]], most: int, temperature: float | None = None
     ) -> AsyncGenerator[str, None]:
-        """An answer, piece by piece; generation stops when the caller does.
+        """Yields an answer piece by piece; generation stops when the caller stops iterating.
 
         Args:
             messages: Roles and contents, the system instruction first.
-            most: Tokens at most.
-            temperature: Of the choice of tokens; None for the model's own way.
+            most: Highest number of tokens.
+            temperature: Temperature of sampling; None for the model's own settings.
         """
         streamer = AsyncTextIteratorStreamer(
             self.tokenizer, skip_prompt=True, skip_special_tokens=True
@@ -133,7 +132,7 @@ class Loaded:
 
 
 def chosen(most: int, temperature: float | None) -> dict[str, Any]:
-    """How tokens are chosen, as transformers takes it; how else is in the model's own file."""
+    """Options of sampling for transformers; others come from the model's own file."""
     how: dict[str, Any] = {"max_new_tokens": most}
     if temperature is None:
         return how
@@ -143,12 +142,12 @@ def chosen(most: int, temperature: float | None) -> dict[str, Any]:
 
 
 def on_cuda() -> bool:
-    """Whether models run on a GPU."""
+    """Whether models run on a CUDA device."""
     return is_torch_cuda_available()
 
 
 def load(name: str) -> Loaded:
-    """The model of a folder or of the Hugging Face cache, loaded at its first use."""
+    """Loads a model from a folder or the Hugging Face cache; later calls share it."""
     with _loading:
         return _load(name)
 
@@ -163,18 +162,18 @@ def _load(name: str) -> Loaded:
 
 
 class InProcessModel(LLMService):
-    """Streams its answers; calls no functions."""
+    """A language model in this process; streams its answers, cannot call functions."""
 
     def __init__(
         self, loaded: Loaded, instruction: str, max_tokens: int, temperature: float | None = None
     ):
-        """A model for one session.
+        """Creates the language model of one session.
 
         Args:
-            loaded: Shared by all.
-            instruction: Who it is.
-            max_tokens: Longest answer.
-            temperature: Of the choice of tokens; None for the model's own way.
+            loaded: The shared model.
+            instruction: System instruction: who the avatar is.
+            max_tokens: Highest number of tokens of an answer.
+            temperature: Temperature of sampling; None for the model's own settings.
         """
         super().__init__(
             settings=LLMSettings(
@@ -194,7 +193,7 @@ class InProcessModel(LLMService):
         self._loaded, self._max_tokens = loaded, max_tokens
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
-        """Answers contexts, passes everything else."""
+        """Answers frames with a context and passes all other frames on."""
         await super().process_frame(frame, direction)
         if not isinstance(frame, LLMContextFrame):
             await self.push_frame(frame, direction)
@@ -222,7 +221,7 @@ class InProcessModel(LLMService):
         system_instruction: str | None = None,
         response_schema: dict[str, Any] | None = None,
     ) -> str | None:
-        """A whole answer beside the conversation, such as a summary of it."""
+        """A whole answer outside of the conversation, such as a summary of it."""
         check_schema(self, response_schema)
         messages = await self._messages(context, system_instruction)
         most, temperature = self._limits()

@@ -1,4 +1,4 @@
-"""What a language model is told about who it is."""
+"""The system instruction that tells a language model who the avatar is."""
 
 from ico3d.bundle.persona import Persona
 
@@ -9,7 +9,7 @@ SPOKEN = (
 
 
 def instruction(persona: Persona) -> str:
-    """The system instruction for a persona: who it is, how it talks, what it knows."""
+    """The system instruction for a persona: who the avatar is, how it talks, what it knows."""
     parts = [
         f"You are {persona.name}, talking with a visitor face to face.",
         persona.manner.strip(),
@@ -47,5 +47,5 @@ def _notes(notes: tuple[str, ...]) -> str:
 
 
 def words(topic: str) -> list[str]:
-    """The names of a forbidden topic."""
+    """The names of a forbidden topic, "word | other word"."""
     return [word.strip() for word in topic.split("|")]

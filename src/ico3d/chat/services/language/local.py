@@ -13,20 +13,21 @@ from ico3d.chat.services.provider import Context
 from ico3d.errors import SettingsError
 
 PORTS = (11434, 8000, 8080)
-"""Where such servers are as a rule: Ollama; vLLM and `transformers serve`; llama.cpp."""
+"""Usual ports of such servers: Ollama; vLLM and `transformers serve`; llama.cpp."""
 QUICK = 0.25  # s until one answers that is to be the best by itself
 PATIENT = 2.0  # s until one answers that was chosen
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Which of its models.
+    """Options of the language model `local`.
 
     Attributes:
         model: Name of the model; empty for the first that the server offers.
         functions: Whether the model may call functions (gestures, moods, tools).
-        temperature: Of the choice of words, 0 to 2; left to the server where not given.
-        max_tokens: Longest answer, thoughts included; left to the server where not given.
+        temperature: Temperature of sampling, 0 to 2; the server's own if not given.
+        max_tokens: Highest number of tokens of an answer, thoughts included; the server's own if
+            not given.
         extra: Further fields of each request, such as `{ top_k = 20 }` or
             `{ chat_template_kwargs = { enable_thinking = false } }`.
     """
@@ -48,29 +49,29 @@ class Settings:
 
 
 def find(settings: Settings, seconds: float) -> tuple[str, str] | None:
-    """Address and model of the first server that answers within some seconds."""
+    """Address and model of the first server that answers within `seconds`, or None."""
     found = first_server([f"http://127.0.0.1:{port}/v1" for port in PORTS], seconds)
     return found and (found[0], settings.model or found[1])
 
 
 def hindrance(settings: Settings) -> str:
-    """Says so where no language server answers on this machine; empty where one does."""
+    """A sentence if no language server answers on this machine, else empty."""
     if find(settings, QUICK) is not None:
         return ""
     return f"none answers on the ports {', '.join(map(str, PORTS))}: start Ollama, for example."
 
 
 def detail(settings: Settings) -> str:
-    """For the visitor's eyes: which model."""
+    """The model, as shown to visitors."""
     found = find(settings, PATIENT)
     return found[1] if found else settings.model
 
 
 def make(settings: Settings, context: Context) -> FrameProcessor:
-    """A language model for one session.
+    """Creates the language model of one session.
 
     Raises:
-        SettingsError: If none answers any more.
+        SettingsError: If no server answers any more.
     """
     found = find(settings, PATIENT)
     if found is None:

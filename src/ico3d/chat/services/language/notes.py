@@ -1,4 +1,4 @@
-"""Finds the note that answers a question: robust to other wording and to misheard words."""
+"""Finds the note that answers a question; tolerates other wordings and misheard words."""
 
 import math
 import re
@@ -40,11 +40,11 @@ GOODBYE = frozenset(["bye", "goodbye", "farewell"])
 
 @dataclass(frozen=True)
 class Note:
-    """One note of a persona.
+    """A note with an answer.
 
     Attributes:
-        questions: Ways to ask for it.
-        answer: What is said.
+        questions: Wordings of the question.
+        answer: The answer.
     """
 
     questions: tuple[str, ...]
@@ -52,10 +52,10 @@ class Note:
 
 
 class Notes:
-    """Answers from the persona's notes, or says honestly what it can talk about."""
+    """Answers from a persona's notes; otherwise says what can be asked."""
 
     def __init__(self, persona: Persona):
-        """Prepares the notes; those without `=>` are skipped."""
+        """Parses the notes; those without `=>` are skipped."""
         self._persona = persona
         self.notes = [note for text in persona.notes if (note := parse_note(text))]
         documents = [words(q) for note in self.notes for q in note.questions]
@@ -64,7 +64,7 @@ class Notes:
         self._unknown = UNKNOWN_WEIGHT * math.log(1 + len(documents))
 
     def answer(self, question: str) -> str:
-        """The best answer there is to a question in natural language."""
+        """The answer to a question in natural language."""
         if any(concerns(question, topic) for topic in self._persona.forbidden):
             return self.refusal()
         best, score = self.best(question)
@@ -73,7 +73,7 @@ class Notes:
         return self._pleasantry(question) or self.fallback()
 
     def best(self, question: str) -> tuple[Note | None, float]:
-        """The note that fits best, and how well: 0 to 1."""
+        """The note that matches best, and the score of the match, 0 to 1."""
         scored = [
             (self._likeness(question, asked), note)
             for note in self.notes
@@ -83,7 +83,7 @@ class Notes:
         return note, score
 
     def fallback(self) -> str:
-        """What is said when no note fits."""
+        """The answer if no note matches."""
         if not self.notes:
             return "I do not know that. I have no notes to answer from yet."
         examples = [f"“{note.questions[0]}”" for note in self.notes[:EXAMPLES]]
@@ -91,11 +91,11 @@ class Notes:
         return f"I do not know that. You can ask me, for example: {listed}."
 
     def refusal(self) -> str:
-        """What is said to a question about a forbidden topic."""
+        """The answer to a question about a forbidden topic."""
         return "I would rather not talk about that. Is there something else you would like to know?"
 
     def not_understood(self) -> str:
-        """What is said when nothing was understood."""
+        """The answer if nothing was understood."""
         return "Sorry, I did not catch that. Could you say it again?"
 
     def _pleasantry(self, question: str) -> str | None:
@@ -119,7 +119,7 @@ class Notes:
 
 
 def parse_note(text: str) -> Note | None:
-    """A note from `question | question => answer`."""
+    """A note from `question | question => answer`; None for other texts."""
     asked, arrow, answer = text.partition("=>")
     questions = tuple(q.strip() for q in asked.split("|") if q.strip())
     if not arrow or not questions or not answer.strip():
@@ -128,10 +128,10 @@ def parse_note(text: str) -> Note | None:
 
 
 def concerns(question: str, topic: str) -> bool:
-    """Whether a question has all words of one of a topic's names, in any form.
+    """Whether a question contains all words of one of a topic's names, in any form.
 
     Args:
-        question: As the visitor said it.
+        question: The visitor's words.
         topic: "word | other word".
     """
     said = plain(question).split()
@@ -148,7 +148,7 @@ def _is_form(word: str, topic: str) -> bool:
 
 
 def plain(text: str) -> str:
-    """Lower case, contractions written out, letters and digits of any script, single spaces."""
+    """Normalises a text: lower case, contractions expanded, letters and digits, single spaces."""
     text = unicodedata.normalize("NFKC", text).casefold().replace("’", "'")
     for pattern, full in CONTRACTIONS:
         text = re.sub(pattern, full, text)
@@ -161,7 +161,7 @@ def words(text: str) -> list[str]:
 
 
 def stem(word: str) -> str:
-    """A word without its common English endings."""
+    """A word without common English endings."""
     for ending in ENDINGS:
         if word.endswith(ending) and len(word) - len(ending) >= 3:
             word = word[: -len(ending)]
@@ -170,7 +170,7 @@ def stem(word: str) -> str:
 
 
 def triples(text: str) -> dict[str, float]:
-    """Letter triples of a text, which misheard words still share."""
+    """Weights of a text's letter triples, many of which survive misheard words."""
     spaced = f" {plain(text)} "
     return dict(Counter(spaced[i : i + 3] for i in range(len(spaced) - 2)))
 

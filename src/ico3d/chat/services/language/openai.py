@@ -1,4 +1,4 @@
-"""Any language model behind an OpenAI-compatible server, through pipecat's own service."""
+"""Language models on OpenAI-compatible servers, through pipecat's own service."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,17 +20,18 @@ SLOWEST = 5.0  # s for the list of a server's models
 
 @dataclass(frozen=True)
 class Settings:
-    """Which server: vLLM, Ollama, llama.cpp, `transformers serve`, or a provider's.
+    """Options of `openai`: vLLM, Ollama, llama.cpp, `transformers serve`, or a provider's server.
 
     Attributes:
-        url: Its address, such as `http://localhost:11434/v1`; empty for OpenAI's own.
-        model: Name of its model; empty for the first that the server offers.
-        key_variable: Environment variable that holds the key; empty for none, or for
-            OPENAI_API_KEY where the server is OpenAI's. It is sent nowhere unencrypted but to
-            this machine.
+        url: Address of the server, such as `http://localhost:11434/v1`; empty for OpenAI's own.
+        model: Name of the model; empty for the first that the server offers.
+        key_variable: Environment variable that holds the server's key; empty for none, or for
+            OPENAI_API_KEY where the server is OpenAI's. A key is never sent unencrypted to another
+            machine.
         functions: Whether the model may call functions (gestures, moods, tools).
-        temperature: Of the choice of words, 0 to 2; left to the server where not given.
-        max_tokens: Longest answer, thoughts included; left to the server where not given.
+        temperature: Temperature of sampling, 0 to 2; the server's own if not given.
+        max_tokens: Highest number of tokens of an answer, thoughts included; the server's own if
+            not given.
         extra: Further fields of each request, such as `{ top_k = 20 }` or
             `{ chat_template_kwargs = { enable_thinking = false } }`.
     """
@@ -54,10 +55,10 @@ class Settings:
 
 
 def make(settings: Settings, context: Context) -> FrameProcessor:
-    """A language model for one session that knows who it is.
+    """Creates the language model of one session.
 
     Raises:
-        SettingsError: If no key is there, or the server does not say which models it has.
+        SettingsError: If the key is missing, or the server does not list its models.
     """
     from pipecat.utils.http import connection_limits
 
@@ -77,7 +78,7 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
 
 
 def sampling(settings: Settings) -> dict[str, Any]:
-    """What pipecat's settings say of a request; OpenAI's own models know another name of one."""
+    """Settings of pipecat for a request; OpenAI's own models use another name for one of them."""
     longest = "max_completion_tokens" if is_openai(settings.url) else "max_tokens"
     given = {"temperature": settings.temperature, longest: settings.max_tokens}
     found: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
@@ -85,20 +86,20 @@ def sampling(settings: Settings) -> dict[str, Any]:
 
 
 def hindrance(settings: Settings) -> str:
-    """Whether a server is chosen."""
+    """A sentence if the settings name no server, else empty."""
     return lacks_server(settings.url, settings.key_variable, "language")
 
 
 def detail(settings: Settings) -> str:
-    """For the visitor's eyes: which model, as far as the settings say."""
+    """The model, as shown to visitors, if the settings name one."""
     return settings.model or settings.url or OWN_MODEL
 
 
 def model(settings: Settings) -> str:
-    """The model to ask for.
+    """The name of the model to request.
 
     Raises:
-        SettingsError: If the settings name none and the server offers none.
+        SettingsError: If the settings name no model and the server offers none.
     """
     if settings.model or not settings.url:
         return settings.model or OWN_MODEL

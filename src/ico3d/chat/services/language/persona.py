@@ -1,4 +1,4 @@
-"""The offline language model: answers looked up in the persona's notes, sentence by sentence."""
+"""The offline language model: answers are looked up in the persona's notes."""
 
 import re
 from dataclasses import dataclass
@@ -19,16 +19,16 @@ from ico3d.chat.services.provider import Context
 
 
 class PersonaModel(FrameProcessor):
-    """Stands where a language model service stands in the pipeline."""
+    """A service of the pipeline that answers from a persona's notes."""
 
     def __init__(self, notes: Notes):
-        """A model for one session."""
+        """Creates the model of one session."""
         super().__init__()
         self._notes = notes
         self._gate = SpeculationGate()
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
-        """Answers contexts, passes everything else."""
+        """Answers frames with a context and passes all other frames on."""
         await super().process_frame(frame, direction)
         if not isinstance(frame, LLMContextFrame):
             await self.push_frame(frame, direction)
@@ -40,7 +40,7 @@ class PersonaModel(FrameProcessor):
         await self.push_frame(LLMFullResponseEndFrame())
 
     async def push_frame(self, frame: Frame, direction: FrameDirection = FrameDirection.DOWNSTREAM):
-        """Holds an answer until the turn that it answers has ended, as pipecat's services do."""
+        """Holds an answer back until the visitor's turn has ended, as pipecat's services do."""
         for released in self._gate.process(frame, direction):
             await super().push_frame(*released)
 
@@ -53,15 +53,15 @@ class PersonaModel(FrameProcessor):
 
 
 def sentences(text: str) -> list[str]:
-    """A text cut behind its sentences' ends."""
+    """Splits a text into sentences."""
     return [part for part in re.split(r"(?<=[.!?…])\s+", text.strip()) if part]
 
 
 @dataclass(frozen=True)
 class Settings:
-    """A persona's notes need no settings."""
+    """Options of the language model `persona-notes`: none."""
 
 
 def make(settings: Settings, context: Context) -> PersonaModel:
-    """A model for one session."""
+    """Creates the model of one session."""
     return PersonaModel(Notes(context.persona))

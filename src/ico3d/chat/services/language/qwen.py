@@ -13,22 +13,22 @@ from ico3d.common.weights import cached, weights_named
 from ico3d.errors import MissingExtraError, MissingModelError
 
 PLAIN, QUANTISED = "qwen2", "qwen2-awq"
-"""Names in the table of weights."""
+"""Names in the table of weights: full precision, and quantised (AWQ)."""
 PACKAGES = ("transformers", "torch")
 KERNELS = "gptqmodel"
-"""What transformers runs AWQ weights with."""
+"""Package that transformers needs for AWQ weights."""
 WEIGHTS = ("model.safetensors", "model.safetensors.index.json")
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Which weights.
+    """Options of the language model `qwen`.
 
     Attributes:
         model: A folder, or a name on the Hugging Face hub whose files are in its cache; empty for
-            Qwen2-0.5B-Instruct, on CUDA its AWQ form if that is there.
-        max_tokens: Longest answer, thoughts included.
-        temperature: Of the choice of words, 0 to 2; the model's own where not given.
+            Qwen2-0.5B-Instruct, on CUDA in its AWQ form if installed.
+        max_tokens: Highest number of tokens of an answer, thoughts included.
+        temperature: Temperature of sampling, 0 to 2; the model's own if not given.
     """
 
     model: str = ""
@@ -45,7 +45,7 @@ class Settings:
 
 
 def hindrance(settings: Settings) -> str:
-    """What is missing: a package, or the weights."""
+    """A sentence on a missing package or missing weights, else empty."""
     missing = next(filter(None, (lacks_package(name, "qwen") for name in PACKAGES)), "")
     if missing or source(settings, cuda=False) is not None:
         return missing
@@ -53,16 +53,16 @@ def hindrance(settings: Settings) -> str:
 
 
 def detail(settings: Settings) -> str:
-    """For the visitor's eyes: which model."""
+    """The model, as shown to visitors."""
     return Path(settings.model or weights_named(PLAIN).repository).name
 
 
 def make(settings: Settings, context: Context) -> FrameProcessor:
-    """A language model for one session; the weights are loaded once for all (some seconds).
+    """Creates the language model of one session; the weights are loaded once for all sessions.
 
     Raises:
         MissingExtraError: If transformers or torch is not installed.
-        MissingModelError: If the weights are not on this machine.
+        MissingModelError: If the weights are not installed.
     """
     for name in PACKAGES:
         if find_spec(name) is None:
@@ -82,7 +82,7 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
 
 
 def source(settings: Settings, cuda: bool) -> str | None:
-    """The folder or hub name to load, None where the files are not here."""
+    """Folder or hub name of the model; None if its files are not installed."""
     if settings.model:
         return settings.model if is_here(settings.model) else None
     quantised = [QUANTISED] if cuda and find_spec(KERNELS) else []

@@ -1,8 +1,9 @@
-"""Keeps what a language model thinks apart from what it says.
+"""Separates a language model's thoughts from its answers.
 
-Models mark their thoughts with tags, each family with its own; servers may put them into a field
-of their own; and some chat templates open the tag themselves, so that the stream holds its end
-alone. pipecat's filter, a part of its service for NVIDIA, knows one tag at the very beginning.
+Models mark thoughts with tags that differ between families. Servers may return thoughts in a
+separate field. Some chat templates open the tag themselves, so that the stream contains only the
+end tag. pipecat's own filter, part of its service for NVIDIA, knows only one tag at the very
+beginning.
 """
 
 import re
@@ -10,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 FIELDS = ("reasoning_content", "reasoning")
-"""Where servers put thoughts that they have taken out of the text themselves."""
+"""Fields in which servers return thoughts that they have separated from the text."""
 _NAMES = (
     *("think", "thinking", "thought", "thoughts", "reason", "reasoning", "reflection"),
     *("analysis", "scratchpad", "seed:think", "internal_monologue"),
@@ -51,11 +52,11 @@ _LONGEST = 100  # letters of a mark
 
 @dataclass(frozen=True)
 class Parts:
-    """A piece of a model's text, taken apart.
+    """A piece of a model's text, separated into answer and thoughts.
 
     Attributes:
-        said: Of the answer.
-        thought: Of the thoughts.
+        said: Text of the answer.
+        thought: Text of the thoughts.
     """
 
     said: str = ""
@@ -67,18 +68,18 @@ class Parts:
 
 
 class Thoughts:
-    """Takes one answer apart while it streams.
+    """Separates one answer from its thoughts while it is streamed.
 
     Attributes:
         opened: Whether the stream begins within a thought that the chat template has opened; None
-            while that is not known. Until then nothing of the answer is given out, for the end of
-            a thought may still come.
-        lone: Whether there was an end of a thought without its beginning.
-        begun: Whether some of the answer was given out.
+            while unknown. Until this is known, no text is returned as answer, because the end of a
+            thought may follow.
+        lone: Whether an end of a thought without a beginning was seen.
+        begun: Whether a part of the answer was returned.
     """
 
     def __init__(self, opened: bool | None = False):
-        """An answer that has not begun."""
+        """Starts an answer."""
         self.opened, self.lone, self.begun = opened, False, False
         self._depth = 1 if opened else 0
         self._rest = ""  # may be the beginning of a mark
@@ -88,7 +89,7 @@ class Thoughts:
         self._closed = False  # a thought has ended
 
     def push(self, text: str) -> Parts:
-        """Takes some more of the text; gives what is known of it."""
+        """Adds text; returns the parts that are now known."""
         text = self._rest + text
         parts, at = Parts(), 0
         for mark in _MARK.finditer(text):
@@ -110,20 +111,20 @@ class Thoughts:
         return parts + self._take(text[at:cut])
 
     def separate(self) -> Parts:
-        """The server takes thoughts out itself, so what it gives as text is the answer."""
+        """Notes that the server separates thoughts itself, so its text is the answer."""
         held, self._held = self._held, ""
         if self.opened is None:
             self.opened = False
         return Parts(self._spoken(held))
 
     def finish(self, complete: bool = True) -> Parts:
-        """The end of the text; the rest of it.
+        """Ends the text; returns the rest.
 
-        A thought may speak of such marks. So where all of a text would be thoughts although some
-        of them ended, the answer is what came after the last end.
+        A thought may mention such marks. If all of a text would be thoughts although some of them
+        ended, the answer is the text after the last end.
 
         Args:
-            complete: Whether the model came to its end, and was not cut off.
+            complete: Whether the model finished and was not cut off.
         """
         rest, self._rest = self._take(self._rest), ""
         parts = self.separate() + rest
@@ -155,19 +156,19 @@ class Thoughts:
 
 
 def without_thoughts(text: str, opened: bool | None = None) -> str:
-    """What a whole text says."""
+    """The answer in a whole text."""
     thoughts = Thoughts(opened)
     return thoughts.push(text).said + thoughts.finish().said
 
 
 def opens_thoughts(prompt: str) -> bool:
-    """Whether a prompt, as a chat template writes it, ends with the beginning of a thought."""
+    """Whether a prompt, written by a chat template, ends with the beginning of a thought."""
     marks = list(_MARK.finditer(prompt))
     return bool(marks and marks[-1]["open"] and not prompt[marks[-1].end() :].strip())
 
 
 def field_of(delta: Any) -> str | None:
-    """The thoughts that a server gives apart from the text; empty for a mere sign of them."""
+    """The thoughts that a server returns in a separate field; empty if there are none."""
     values = [getattr(delta, name, None) for name in FIELDS]
     return next((value for value in values if isinstance(value, str)), None)
 

@@ -1,4 +1,4 @@
-"""What a request to a language model says beside the conversation."""
+"""Checks options of a request to a language model."""
 
 import json
 from collections.abc import Mapping
@@ -11,22 +11,22 @@ OWN = (
     *("model", "messages", "stream", "stream_options", "tools", "tool_choice", "n"),
     *("temperature", "max_tokens", "max_completion_tokens"),
 )
-"""Fields of a request that ico3d fills."""
+"""Fields of a request that ico3d fills in and settings must not change."""
 
 
 def check_sampling(
     temperature: float | None, max_tokens: int | None, extra: Mapping[str, Any], where: str
 ) -> None:
-    """Checks what a request is to say.
+    """Checks temperature, length and further fields of a request.
 
     Args:
-        temperature: Of the choice of words; None leaves it to the server.
-        max_tokens: Longest answer, thoughts included; None leaves it to the server.
+        temperature: Temperature of sampling; None for the server's own.
+        max_tokens: Highest number of tokens, thoughts included; None for the server's own.
         extra: Further fields of the request.
-        where: What an error names as the place.
+        where: Place of the setting, for errors.
 
     Raises:
-        SettingsError: If something is out of range, ico3d's own, or no JSON.
+        SettingsError: If a value is out of range, a field belongs to ico3d, or a value is not JSON.
     """
     if temperature is not None and not 0 <= temperature <= HOTTEST:
         raise SettingsError(f"{where}: temperature must be 0 to {HOTTEST:g}.")

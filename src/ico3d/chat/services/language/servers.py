@@ -1,4 +1,4 @@
-"""Which models OpenAI-compatible servers offer, asked without waiting long."""
+"""Lists the models of OpenAI-compatible servers, with a time limit."""
 
 import json
 import re
@@ -9,17 +9,17 @@ from typing import Any
 import httpx
 
 OTHERS = re.compile(r"embed|rerank|whisper|speech|tts|kokoro|piper|transcri", re.IGNORECASE)
-"""In the names of models that are no language models."""
+"""Parts of names of models that are no language models."""
 MOST_BYTES = 1 << 20  # of a list of models
 
 
 def language_models(url: str, key: str, seconds: float) -> list[str]:
-    """Names of the language models that a server offers; none if it does not answer as one.
+    """Names of a server's language models; empty if it does not answer as expected.
 
     Args:
-        url: Its address, ending in `/v1` as a rule.
-        key: Sent as the bearer's.
-        seconds: How long all of it may take.
+        url: Address of the server, usually ending in `/v1`.
+        key: The key, sent as bearer token.
+        seconds: Time limit.
     """
     try:
         listed = json.loads(_read(url.rstrip("/") + "/models", key, seconds))
@@ -31,11 +31,11 @@ def language_models(url: str, key: str, seconds: float) -> list[str]:
 
 
 def first_server(urls: list[str], seconds: float) -> tuple[str, str] | None:
-    """The first of some servers that offers a language model, and its first model.
+    """The first server in the list that offers a language model, and its first model; or None.
 
     Args:
-        urls: Asked at the same time, the best first.
-        seconds: How long all of it may take.
+        urls: Addresses, the preferred one first; all are asked at the same time.
+        seconds: Time limit.
     """
     pool = ThreadPoolExecutor(len(urls), "language")
     asked = [pool.submit(language_models, url, "none", seconds) for url in urls]

@@ -1,4 +1,4 @@
-"""Speech to text."""
+"""Recognisers: speech to text."""
 
 from functools import partial
 
@@ -13,7 +13,7 @@ ON_SERVER: Table = {
     # never the best by themselves: they may take what is said out of the house
     "openai": Provider("OpenAI-compatible server", openai.Settings, openai.make, openai.hindrance),
 }
-"""Recognisers that get the visitor's sound."""
+"""Recognisers that run on the server or beyond it, and get the visitor's sound."""
 
 PROVIDERS: Table = ON_SERVER | {
     "browser": Provider(

@@ -1,6 +1,6 @@
-"""Speech recognition by the visitor's browser (Web Speech API): the page sends the words.
+"""Speech recognition by the visitor's browser (Web Speech API); the page sends transcripts.
 
-The sound comes to the server too: it alone tells when somebody speaks, and when he has finished.
+The sound is sent to the server, too, which decides when somebody speaks and has finished.
 """
 
 import asyncio
@@ -37,12 +37,13 @@ LATE = 3.0  # s after a voice in which its words may still come
 
 @dataclass(frozen=True)
 class Settings:
-    """In which language, and who listens where the browser cannot.
+    """Options of recognition by the browser.
 
     Attributes:
-        language: BCP 47 tag of what is spoken, such as `de-DE`; empty for the browser's language.
-        fallback: Name of another provider of recognition, with its default options; `best`; or
-            empty for nobody.
+        language: BCP 47 tag of the spoken language, such as `de-DE`; empty for the browser's
+            language.
+        fallback: Recogniser for browsers without recognition: name of another provider, with its
+            default options; `best`; or empty for none.
     """
 
     language: str = ""
@@ -50,13 +51,14 @@ class Settings:
 
 
 class BrowserRecognition(STTService):
-    """Turns the page's words into transcripts.
+    """Turns the page's words into transcripts of the pipeline.
 
-    Words that come while nobody speaks are dropped: browsers' recognisers hear the avatar too.
+    Words that arrive while nobody speaks are dropped, because browsers also recognise the avatar's
+    voice.
     """
 
     def __init__(self):
-        """A recogniser for one session."""
+        """Creates the recogniser of one session."""
         settings = STTSettings(model="browser", language=None)
         super().__init__(ttfs_p99_latency=SLOWEST, settings=settings)
         self._partial: Heard | None = None
@@ -66,16 +68,16 @@ class BrowserRecognition(STTService):
         self._timer: asyncio.Task | None = None
 
     async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame | None, None]:
-        """The sound is for others."""
+        """Yields nothing: this recogniser does not use sound."""
         yield None
 
     async def cleanup(self):
-        """Ends the timer."""
+        """Cancels the timer."""
         await super().cleanup()
         await self._stop_timer()
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
-        """Takes what comes from the page, passes everything else."""
+        """Handles the page's words and passes all other frames on."""
         if heard := message_in(frame, Heard):
             await self._hear(heard)
             return
@@ -134,10 +136,10 @@ class BrowserRecognition(STTService):
 
 
 class BrowserOrServer(ServiceSwitcher):
-    """The browser's recogniser until the page says that there is none."""
+    """The browser's recogniser until the page says that the browser has none."""
 
     def __init__(self, server: FrameProcessor):
-        """Takes the recogniser of the server."""
+        """Takes the recogniser to which to switch."""
         super().__init__([BrowserRecognition(), server])
         self._server = server
         server.add_event_handler("on_error", self._failed)
@@ -147,14 +149,14 @@ class BrowserOrServer(ServiceSwitcher):
         await raise_event(self, "on_error", error)
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
-        """Switches when it must."""
+        """Switches to the server's recogniser when the page asks for it."""
         if message_in(frame, Deaf):
             frame = ManuallySwitchServiceFrame(service=self._server)
         await super().process_frame(frame, direction)
 
 
 def hindrance(settings: Settings) -> str:
-    """Why `best` never chooses the browser's recogniser: it must be asked for."""
+    """A sentence that keeps `best` from choosing the browser, which must be asked for by name."""
     return (
         "the browser's maker may receive the sound: "
         'set [recognition] use = "browser" if that is wanted.'
@@ -162,14 +164,14 @@ def hindrance(settings: Settings) -> str:
 
 
 def fallback(table: Table, settings: Settings) -> ChosenService | None:
-    """The recogniser of the server for browsers that have none.
+    """The recogniser for browsers that have none, or None.
 
     Args:
-        table: The recognisers that work on the server.
-        settings: Which of them is wanted.
+        table: Recognisers that run on the server.
+        settings: Options, of which `fallback` is used.
 
     Raises:
-        SettingsError: If it is unknown, or none works.
+        SettingsError: If the recogniser is unknown, or none works.
     """
     if not settings.fallback:
         return None
@@ -177,15 +179,15 @@ def fallback(table: Table, settings: Settings) -> ChosenService | None:
 
 
 def make(table: Table, settings: Settings, context: Context) -> FrameProcessor:
-    """A recogniser for one session, with the server's own behind it.
+    """Creates the recogniser of one session, with a fallback on the server.
 
     Args:
-        table: The recognisers that work on the server.
-        settings: Which of them stands behind it.
-        context: Whom it works for.
+        table: Recognisers that run on the server.
+        settings: Options of recognition by the browser.
+        context: The avatar.
 
     Raises:
-        SettingsError: If there is no such fallback.
+        SettingsError: If the fallback does not exist.
     """
     listener = fallback(table, settings)
     return BrowserOrServer(listener.make(context)) if listener else BrowserRecognition()

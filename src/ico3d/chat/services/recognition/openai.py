@@ -12,7 +12,7 @@ KNOCK = 0.3  # s that a server may take to accept a connection
 
 
 def hindrance(settings: Settings) -> str:
-    """What keeps a server from recognising: none named, no key, no answer; empty if none."""
+    """A sentence if no server is named, its key is missing, or it does not answer; else empty."""
     lacking = lacks_server(settings.url, settings.key_variable, "recognition")
     if lacking or not settings.url:
         return lacking
@@ -26,10 +26,10 @@ def hindrance(settings: Settings) -> str:
 
 
 def make(settings: Settings, context: Context) -> FrameProcessor:
-    """A recogniser for one session.
+    """Creates the recogniser of one session.
 
     Raises:
-        SettingsError: If the key is not here.
+        SettingsError: If the key is missing.
     """
     from ico3d.chat.services.recognition.openai_service import OpenAIRecognition
 

@@ -1,4 +1,4 @@
-"""pipecat's OpenAI service with any language and an end to waiting; slow to import."""
+"""pipecat's OpenAI recogniser with any language and a time limit; slow to import."""
 
 import asyncio
 from collections.abc import AsyncGenerator
@@ -16,13 +16,13 @@ from ico3d.chat.services.recognition.segments import Segments
 
 
 class Transcriptions(OpenAISTTService):
-    """Asks for transcripts as our settings say.
+    """Requests transcripts with the options of ico3d's settings.
 
-    pipecat's own way insists on a language, and lets the client wait for ten minutes, thrice.
+    pipecat's own requests need a language, and let the client wait ten minutes, three times.
     """
 
     def __init__(self, options: Settings, **rest):
-        """A client of the server that the settings name."""
+        """Creates a client of the server in the settings."""
         super().__init__(
             **client_options(options.url, options.key_variable, WHERE),
             settings=OpenAISTTService.Settings(model=options.model),
@@ -35,7 +35,7 @@ class Transcriptions(OpenAISTTService):
         """Transcribes a WAV file.
 
         Raises:
-            ConnectionError: If no transcript came, or not in time.
+            ConnectionError: If no transcript arrives in time.
         """
         options = self._options
         place = options.url or "OpenAI's server"
@@ -55,8 +55,8 @@ class Transcriptions(OpenAISTTService):
 
 
 class OpenAIRecognition(Segments, Transcriptions):
-    """A server's recogniser for one session."""
+    """The recogniser of one session, on an OpenAI-compatible server."""
 
     def __init__(self, options: Settings):
-        """A recogniser as the settings say."""
+        """Creates the recogniser."""
         super().__init__(options.timeout, options.longest_speech, options=options)

@@ -1,4 +1,4 @@
-"""Which OpenAI-compatible server recognises speech."""
+"""Options of speech recognition by an OpenAI-compatible server."""
 
 from dataclasses import dataclass
 
@@ -10,18 +10,18 @@ WHERE = "chat settings: recognition 'openai'"
 
 @dataclass(frozen=True)
 class Settings:
-    """Which server.
+    """Options of the recogniser `openai`.
 
     Attributes:
-        url: Its address, such as `http://localhost:8000/v1`; empty for OpenAI's own.
-        model: Name of its model.
-        key_variable: Environment variable that holds the key; empty for none, or for
-            OPENAI_API_KEY where the server is OpenAI's. It is sent nowhere unencrypted but to
-            this machine.
-        language: Code of the language that is spoken, such as `de`; empty: the server tells.
+        url: Address of the server, such as `http://localhost:8000/v1`; empty for OpenAI's own.
+        model: Name of the model.
+        key_variable: Environment variable that holds the server's key; empty for none, or for
+            OPENAI_API_KEY where the server is OpenAI's. A key is never sent unencrypted to another
+            machine.
+        language: Code of the spoken language, such as `de`; empty to let the server detect it.
         timeout: Seconds after which a transcript is given up, one retry included.
-        longest_speech: Seconds of unbroken speech that are recognised at once, 5 to 300; what goes
-            on longer is cut at a quiet place, and the pieces make one turn.
+        longest_speech: Seconds of unbroken speech that are recognised at once, 5 to 300; longer
+            speech is cut at a quiet place, and the pieces form one turn.
     """
 
     url: str = ""

@@ -1,4 +1,4 @@
-"""What recognisers have in common that get to work when a stretch of speech is over."""
+"""Common base of recognisers that transcribe a stretch of speech after its end."""
 
 import asyncio
 import contextlib
@@ -22,7 +22,7 @@ from ico3d.chat.pipecat_internals import is_user_speaking, keep_segment, segment
 from ico3d.errors import SettingsError
 
 BLANK = " "
-"""Final transcript of speech without words: it ends a turn and adds nothing to the question."""
+"""Final transcript of speech without words: ends a turn, adds nothing to the question."""
 LONGEST_SPEECH = 30.0  # s of unbroken speech; a television never pauses
 SHORTEST_CUT, LONGEST_CUT = 5.0, 300.0  # s that it may be set to
 SEARCHED, MOMENT = (
@@ -34,15 +34,15 @@ SIGN_OF_LIFE = 0.5  # s; pipecat gives up a turn of which nothing is heard for m
 
 
 def blank() -> TranscriptionFrame:
-    """Says that no words will come for what the visitor said."""
+    """A frame that says that no words will follow for the visitor's speech."""
     return TranscriptionFrame(BLANK, "", time_now_iso8601(), finalized=True)
 
 
 def check_longest_speech(seconds: float, where: str) -> None:
-    """Checks a setting.
+    """Checks the setting `longest_speech`.
 
     Raises:
-        SettingsError: If it makes no sense.
+        SettingsError: If the value is out of range.
     """
     if not SHORTEST_CUT <= seconds <= LONGEST_CUT:
         raise SettingsError(
@@ -51,7 +51,7 @@ def check_longest_speech(seconds: float, where: str) -> None:
 
 
 def quiet_place(pcm: bytes | bytearray, rate: int) -> int:
-    """Where speech is cut: bytes of PCM16 before its quietest moment among the last seconds."""
+    """Bytes of PCM16 before the quietest moment of the last seconds, where speech is cut."""
     samples = np.frombuffer(pcm, np.int16)
     moment, searched = int(MOMENT * rate), min(int(SEARCHED * rate), len(samples) // 2)
     count = searched // moment
@@ -63,22 +63,23 @@ def quiet_place(pcm: bytes | bytearray, rate: int) -> int:
 
 
 class Segments(SegmentedSTTService):
-    """Answers each stretch of speech with one final transcript, and is waited for until then.
+    """Answers each stretch of speech with exactly one final transcript.
 
-    Put it before one of pipecat's segmented services among the bases of a class. Left alone those
-    would say nothing where they heard nothing, so that a turn of noise ends only by a time-out;
-    that same time-out would end a turn while a slow transcript is under way; and of two stretches
-    in the works the first transcript would end the turn without the second. And what is said
-    without a pause would be kept until there is one: here it is cut at a quiet place.
+    Put this class before one of pipecat's segmented services among the bases. On their own, those
+    services return nothing where they hear nothing, so that a turn of noise ends only by a
+    time-out; the same time-out would end a turn while a slow transcript is on its way; of two
+    stretches that are being transcribed, the first transcript would end the turn without the
+    second; and speech without a pause would be buffered without limit, whereas here it is cut at a
+    quiet place.
     """
 
     def __init__(self, longest: float, longest_speech: float = LONGEST_SPEECH, **options):
-        """A service.
+        """Sets the limits.
 
         Args:
-            longest: Seconds that a transcript may take at most.
+            longest: Longest time in seconds for a transcript.
             longest_speech: Seconds of unbroken speech after which it is cut.
-            options: Of pipecat's service.
+            options: Options of pipecat's service.
         """
         super().__init__(ttfs_p99_latency=longest, **options)
         self._longest_speech = longest_speech
@@ -91,7 +92,7 @@ class Segments(SegmentedSTTService):
         await super().process_frame(frame, direction)
 
     async def process_audio_frame(self, frame: InputAudioRawFrame, direction: FrameDirection):
-        """Takes more sound; speech that goes on and on is handed over piece by piece."""
+        """Adds sound; unbroken speech that exceeds the limit is transcribed in pieces."""
         await super().process_audio_frame(frame, direction)
         most = int(self._longest_speech * self.sample_rate) * 2
         while is_user_speaking(self) and len(segment(self)) >= most:
@@ -109,7 +110,7 @@ class Segments(SegmentedSTTService):
         keep_segment(self, rest)
 
     async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame | None, None]:
-        """Transcribes a stretch of speech; gives a signal from time to time until it is done."""
+        """Transcribes a stretch of speech; yields signs of life until it is done."""
         busy = self.create_task(self._say_busy(), "busy")
         frames: list[Frame | None] = []
         try:
@@ -128,7 +129,7 @@ class Segments(SegmentedSTTService):
             yield frame
 
     async def push_frame(self, frame: Frame, direction: FrameDirection = FrameDirection.DOWNSTREAM):
-        """Passes a frame on; a transcript is final only if nothing more is on its way."""
+        """Passes a frame on; a transcript is marked final only if no other is on its way."""
         if isinstance(frame, TranscriptionFrame):
             frame.text = frame.text.strip() or BLANK
             frame.finalized = not is_user_speaking(self) and self._unanswered == 0

@@ -1,4 +1,4 @@
-"""Speech recognition with pocketsphinx: offline, its model is inside the package."""
+"""Offline speech recognition with pocketsphinx, whose package contains the model."""
 
 import asyncio
 from collections.abc import AsyncGenerator
@@ -41,26 +41,26 @@ SLOWEST = 1.0  # s that the last words may take after speech has ended
 
 
 class End(Enum):
-    """The end of a stretch of sound."""
+    """How a stretch of sound ended."""
 
     CUT = "cut"  # speech goes on
     OVER = "over"
 
 
 class Leveller:
-    """Brings speech to one loudness, over a little noise.
+    """Brings speech to a constant loudness and adds a little noise.
 
-    On 16 synthetic questions it took the word error rate from 0.68 to 0.15; on two recordings of
-    people, with 22 words, 3 errors became 5.
+    On 16 synthetic questions the word error rate fell from 0.68 to 0.15; on two recordings of
+    people with 22 words, 3 errors became 5.
     """
 
     def __init__(self):
-        """Unit gain until the first utterance."""
+        """Starts with a gain of 1 until the first utterance."""
         self._random = np.random.default_rng(0)
         self._gain = 1.0
 
     def measure(self, lead_in: bytes) -> None:
-        """Sets the gain for an utterance from its first moments."""
+        """Sets the gain for an utterance from its first moments (PCM16)."""
         energy = np.frombuffer(lead_in, np.int16).astype(np.float64) ** 2
         count = min(len(energy), MICROPHONE_RATE // 5)
         if count == 0:
@@ -70,17 +70,17 @@ class Leveller:
         self._gain = float(np.clip(LOUDNESS / loudest, 1 / MOST_GAIN, MOST_GAIN))
 
     def apply(self, audio: bytes) -> bytes:
-        """The same sound, levelled."""
+        """The sound (PCM16) with gain and noise."""
         samples = np.frombuffer(audio, np.int16) * self._gain
         samples = samples + self._random.normal(0, NOISE, len(samples))
         return np.clip(samples, -32768, 32767).astype(np.int16).tobytes()
 
 
 class SphinxRecognition(STTService):
-    """Decodes while the visitor speaks; a transcript is final when the VAD says he paused."""
+    """Decodes while the visitor speaks; transcripts become final when the VAD detects the end."""
 
     def __init__(self, longest_speech: float = LONGEST_SPEECH):
-        """A recogniser with a decoder of its own, which cuts what lasts longer than so many s."""
+        """Creates a recogniser with a decoder; speech beyond `longest_speech` seconds is cut."""
         settings = STTSettings(model="en-us", language=None)
         super().__init__(ttfs_p99_latency=SLOWEST, settings=settings)
         self._decoder = SphinxProcess()
@@ -97,18 +97,18 @@ class SphinxRecognition(STTService):
         self._task: asyncio.Task | None = None
 
     async def start(self, frame: StartFrame):
-        """Starts the decoder, and the task that feeds it."""
+        """Starts the decoder and the task that feeds it."""
         await super().start(frame)
         await self._decoder.start()
         self._task = self._task or self.create_task(self._decode_all())
 
     async def stop(self, frame: EndFrame):
-        """Finishes what was said before the end."""
+        """Finishes the transcript before the end."""
         await self._sound.join()
         await super().stop(frame)
 
     async def cleanup(self):
-        """Ends the task and the decoder."""
+        """Stops the task and the decoder."""
         await super().cleanup()
         if self._task:
             await self.cancel_task(self._task)
@@ -116,7 +116,7 @@ class SphinxRecognition(STTService):
         await self._decoder.close()
 
     async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame | None, None]:
-        """Queues sound; transcripts come from the task that decodes it."""
+        """Queues sound; transcripts are pushed by the task that decodes."""
         if self._hearing and audio:
             await self._listen(audio)
         else:
@@ -197,11 +197,11 @@ class SphinxRecognition(STTService):
 
 @dataclass(frozen=True)
 class Settings:
-    """How long it listens at once.
+    """Options of the recogniser `pocketsphinx`.
 
     Attributes:
-        longest_speech: Seconds of unbroken speech that are recognised at once, 5 to 300; what goes
-            on longer is cut at a quiet place, and the pieces make one turn.
+        longest_speech: Seconds of unbroken speech that are recognised at once, 5 to 300; longer
+            speech is cut at a quiet place, and the pieces form one turn.
     """
 
     longest_speech: float = LONGEST_SPEECH
@@ -216,12 +216,12 @@ class Settings:
 
 
 def hindrance(settings: Settings) -> str:
-    """What pocketsphinx lacks here; empty if it works."""
+    """A sentence on what pocketsphinx needs on this machine; empty if it works."""
     return lacks_package("pocketsphinx", "chat")
 
 
 def make(settings: Settings, context: Context) -> SphinxRecognition:
-    """A recogniser for one session.
+    """Creates the recogniser of one session.
 
     Raises:
         MissingExtraError: If pocketsphinx is not installed.

@@ -24,19 +24,19 @@ _loading = threading.Lock()
 
 @dataclass(frozen=True)
 class Settings:
-    """Which Whisper, and where it computes.
+    """Options of the recogniser `whisper`.
 
     Attributes:
-        model: Name of a model whose weights are here, such as `large-v3` or `distil-large-v3`;
-            a folder with one that was converted for CTranslate2; or `auto`: the best that is
-            here and keeps up on this machine.
-        language: Code of the language that is spoken, such as `de`; empty if it is to be told
-            from each stretch of speech.
-        device: `cuda`, `cpu`, or `auto`: CUDA where there is a device.
+        model: Name of a model whose weights are installed, such as `large-v3` or `distil-large-v3`;
+            a folder with a model that was converted for CTranslate2; or `auto`: the best installed
+            model that is fast enough on this machine.
+        language: Code of the spoken language, such as `de`; empty to detect the language of each
+            stretch of speech.
+        device: `cuda`, `cpu`, or `auto`: CUDA if there is a device.
         precision: CTranslate2's type of computation, such as `int8`; `auto` takes `float16` on
             CUDA and `int8` on a CPU.
-        longest_speech: Seconds of unbroken speech that are recognised at once, 5 to 300; what goes
-            on longer is cut at a quiet place, and the pieces make one turn.
+        longest_speech: Seconds of unbroken speech that are recognised at once, 5 to 300; longer
+            speech is cut at a quiet place, and the pieces form one turn.
     """
 
     model: str = AUTO
@@ -55,7 +55,7 @@ class Settings:
 
 
 def hindrance(settings: Settings) -> str:
-    """A package or weights that are not here."""
+    """A sentence on a missing package or missing weights, else empty."""
     missing = lacks_package("faster_whisper", "whisper")
     if missing:
         return missing
@@ -67,12 +67,13 @@ def hindrance(settings: Settings) -> str:
 
 
 def make(settings: Settings, context: Context) -> FrameProcessor:
-    """A recogniser for one session; the model is loaded by the first and shared by all.
+    """Creates the recogniser of one session; all sessions share the model.
 
     Raises:
         MissingExtraError: If faster-whisper is not installed.
-        MissingModelError: If the weights are not here.
-        SettingsError: If the model cannot be loaded so, or does not know the language.
+        MissingModelError: If the weights are not installed.
+        SettingsError: If the model cannot be loaded with these options, or does not know the
+            language.
     """
     if lacks_package("faster_whisper", "whisper"):
         raise MissingExtraError("faster-whisper", "whisper", "Whisper")
@@ -92,11 +93,11 @@ def make(settings: Settings, context: Context) -> FrameProcessor:
 
 
 def find(settings: Settings) -> Path:
-    """The folder of the model that the settings choose.
+    """Folder of the model that the settings choose.
 
     Raises:
-        MissingModelError: If none is here; the sentence says how to get one.
-        SettingsError: If there is no such model.
+        MissingModelError: If no such model is installed; the sentence says how to get one.
+        SettingsError: If the name is unknown.
     """
     if Path(settings.model).is_dir():
         return complete(Path(settings.model))
@@ -113,10 +114,10 @@ def find(settings: Settings) -> Path:
 
 
 def candidates(settings: Settings) -> tuple[str, ...]:
-    """Names of models, the best first.
+    """Names of the models that the settings allow, the preferred one first.
 
     Raises:
-        SettingsError: If the settings name one that is unknown.
+        SettingsError: If the settings name an unknown model.
     """
     known = (*ON_CUDA, *ENGLISH)
     if settings.model != AUTO:
@@ -132,15 +133,15 @@ def candidates(settings: Settings) -> tuple[str, ...]:
 
 
 def weights_name(model: str) -> str:
-    """What `ico3d weights` calls a model."""
+    """Name of a model in `ico3d weights`."""
     return model if model in ENGLISH else f"whisper-{model}"
 
 
 def complete(folder: Path) -> Path:
-    """The folder, if it holds all that is needed.
+    """The folder itself, if it holds all files of a model.
 
     Raises:
-        MissingModelError: If it does not.
+        MissingModelError: If a file is missing.
     """
     for name in NEEDED:
         if not (folder / name).is_file():
@@ -149,7 +150,7 @@ def complete(folder: Path) -> Path:
 
 
 def computes_on(settings: Settings) -> str:
-    """`cuda` or `cpu`."""
+    """The device to compute on: `cuda` or `cpu`."""
     if settings.device == AUTO:
         return "cuda" if cuda_devices() else "cpu"
     return settings.device
@@ -157,7 +158,7 @@ def computes_on(settings: Settings) -> str:
 
 @functools.cache
 def cuda_devices() -> int:
-    """How many of them CTranslate2 can use."""
+    """Number of CUDA devices that CTranslate2 can use."""
     from ctranslate2 import get_cuda_device_count
 
     return get_cuda_device_count()
@@ -165,10 +166,10 @@ def cuda_devices() -> int:
 
 @functools.cache
 def load(folder: Path, device: str, precision: str) -> Any:
-    """A `faster_whisper.WhisperModel`, once per process.
+    """Loads a `faster_whisper.WhisperModel`, once per process.
 
     Raises:
-        SettingsError: If it cannot be loaded so.
+        SettingsError: If the model cannot be loaded with these options.
     """
     from faster_whisper import WhisperModel
 

@@ -1,4 +1,4 @@
-"""pipecat's Whisper service around a model that is there already; needs faster-whisper."""
+"""pipecat's Whisper service around a model that is already loaded; needs faster-whisper."""
 
 from typing import Any
 
@@ -11,26 +11,26 @@ LONGEST = 30.0  # s; a small machine with a long speech
 
 
 class Listener:
-    """A model as pipecat calls it, with options for talks."""
+    """A Whisper model with options for conversations, called by pipecat."""
 
     def __init__(self, model: Any):
         """Wraps a `faster_whisper.WhisperModel`."""
         self._model = model
 
     def transcribe(self, audio, **options):
-        """Transcribes at once what a stretch of speech holds.
+        """Transcribes a stretch of speech in a single pass.
 
-        One try: by default up to six follow one another where the model doubts, as it does with
-        noise, while the visitor waits.
+        By default, up to six passes follow one another if the model is unsure, as it is with noise,
+        while the visitor waits.
         """
         return self._model.transcribe(audio, temperature=0.0, **options)
 
 
 class WhisperRecognition(Segments, WhisperSTTService):
-    """Whisper for one session."""
+    """The recogniser of one session, with Whisper."""
 
     def __init__(self, model: Any, language: str | None, longest_speech: float = LONGEST_SPEECH):
-        """A recogniser around a shared `faster_whisper.WhisperModel`."""
+        """Takes a shared `faster_whisper.WhisperModel`."""
         self._shared = model
         settings = WhisperSTTService.Settings(model="shared", language=language)
         super().__init__(LONGEST, longest_speech, settings=settings)

@@ -1,4 +1,4 @@
-"""Text to speech."""
+"""Voices: text to speech."""
 
 from ico3d.chat.services.provider import Provider, Table
 from ico3d.chat.services.voice import espeak, kokoro, openai, openvoice, piper

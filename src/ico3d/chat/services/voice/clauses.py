@@ -1,8 +1,8 @@
-"""Cuts an answer, while it is being written, into the pieces that are spoken one by one.
+"""Cuts an answer, while it is being written, into pieces that are spoken one by one.
 
-pipecat's sentence rules (sentencex) find the ends of sentences: abbreviations, numbers, times,
-addresses and initials do not end one. Here, beyond that, the first piece of an answer may end at
-a clause, so that the voice can begin sooner, and a line ends a piece.
+pipecat's rules (sentencex) find the ends of sentences, so that abbreviations, numbers, times,
+addresses and initials do not end one. In addition, the first piece of an answer may end at a
+clause, so that the voice can begin sooner, and a line break ends a piece.
 """
 
 import re
@@ -38,13 +38,13 @@ _TRAILING = re.compile(rf"\s*{EMOJI}(\s|{_EMOJI.pattern})*")
 
 
 class Clauses(SimpleTextAggregator):
-    """Yields the first clause of an answer as soon as it is there, then sentence by sentence.
+    """Yields the first clause of an answer as soon as it is complete, then whole sentences.
 
-    What it yields, put together, is the answer but for white space at the joints.
+    All pieces together are the answer, except for white space between them.
     """
 
     def __init__(self, language: str | None = None):
-        """For answers in a language (a code such as `de`; English where not given)."""
+        """Sets the language of the answers, a code such as `de`; by default English."""
         super().__init__(language=language)
         self._first = True
 
@@ -58,12 +58,12 @@ class Clauses(SimpleTextAggregator):
         set_aggregated(self, text)
 
     async def begin(self) -> None:
-        """A new answer."""
+        """Starts a new answer."""
         await self.reset()
         self._first = True
 
     async def aggregate(self, text: str) -> AsyncIterator[Aggregation]:
-        """Takes some more of the answer; yields the pieces that are complete."""
+        """Adds text of the answer; yields the pieces that are complete."""
         for char in text:
             piece = await self._add(char)
             if piece is not None and piece.strip():
@@ -71,13 +71,13 @@ class Clauses(SimpleTextAggregator):
                 yield Aggregation(piece.strip(), TextType.SENTENCE)
 
     async def flush(self) -> Aggregation | None:
-        """The rest of the answer, if there is one."""
+        """The rest of the answer, or None."""
         rest = self._rest.strip()
         await self.begin()
         return Aggregation(rest, TextType.SENTENCE) if rest else None
 
     async def handle_interruption(self) -> None:
-        """The answer is over."""
+        """Discards the rest of the answer."""
         await self.begin()
 
     async def _add(self, char: str) -> str | None:
@@ -143,15 +143,15 @@ class Clauses(SimpleTextAggregator):
 
 
 class ClauseProcessor(LLMTextProcessor):
-    """Stands between language model and voice: turns streamed text into pieces to speak."""
+    """The processor between language model and voice, which turns streamed text into pieces."""
 
     def __init__(self, language: str | None = None):
-        """For one session."""
+        """Creates the processor of one session."""
         self._clauses = Clauses(language)
         super().__init__(text_aggregator=self._clauses)
 
     async def process_frame(self, frame: Frame, direction: FrameDirection) -> None:
-        """Replaces the model's text by pieces, passes everything else."""
+        """Replaces the model's text by pieces and passes all other frames on."""
         if isinstance(frame, LLMFullResponseStartFrame):
             await self._clauses.begin()
         await super().process_frame(frame, direction)

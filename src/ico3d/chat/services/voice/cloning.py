@@ -1,4 +1,4 @@
-"""The colour of a person's voice, taken from a recording only with that person's consent."""
+"""Tone colours of people's voices, taken from recordings only with consent."""
 
 import hashlib
 import json
@@ -20,22 +20,22 @@ KEY = "embedding"
 
 @dataclass(frozen=True)
 class Recording:
-    """A recorded voice that may be used.
+    """A recording of a voice that may be used.
 
     Attributes:
-        path: The WAV file.
-        digest: Its sha256, under which its consent and its embedding are kept.
+        path: Path of the WAV file.
+        digest: SHA-256 of the file, under which consent and embedding are stored.
     """
 
     path: Path
     digest: str
 
     def kept(self, suffix: str) -> Path:
-        """The file that is kept of it."""
+        """Path of a stored file about this recording."""
         return Path.home() / ".cache" / "ico3d" / "voices" / f"{self.digest}{suffix}"
 
     def embedding(self, extract: Callable[[str], np.ndarray]) -> np.ndarray:
-        """What `extract` makes of the file, float32; computed once."""
+        """The embedding (float32) that `extract` computes from the file, once; then stored."""
         cached = self.kept(".safetensors")
         try:
             return load(cached.read_bytes())[KEY]
@@ -46,16 +46,16 @@ class Recording:
 
 
 def permitted_recording(path: Path, consent: str, consent_by: str) -> Recording:
-    """A recorded voice whose owner has consented.
+    """A recording of a voice whose owner has consented.
 
     Args:
         path: WAV file of the voice.
-        consent: The owner's statement; may be empty where one is kept for this very recording.
+        consent: The owner's statement; may be empty if one is stored for this very recording.
         consent_by: The owner's name.
 
     Raises:
-        SettingsError: If the recording cannot be read, claims what is not taken, or nobody has
-            consented.
+        SettingsError: If the recording cannot be read, claims more than is accepted, or there is no
+            consent.
     """
     try:
         with path.open("rb") as file:
@@ -73,10 +73,10 @@ def permitted_recording(path: Path, consent: str, consent_by: str) -> Recording:
 
 
 def record_consent(recording: Recording, statement: str, by: str) -> None:
-    """Keeps a consent: who stated what, when, on which recording.
+    """Stores a consent: who stated what, when, about which recording.
 
     Raises:
-        SettingsError: If there is none, neither given nor kept.
+        SettingsError: If there is neither a given nor a stored consent.
     """
     record = recording.kept(".json")
     kept = read_consent(record)
@@ -99,7 +99,7 @@ def record_consent(recording: Recording, statement: str, by: str) -> None:
 
 
 def read_consent(record: Path) -> dict[str, str] | None:
-    """A kept consent; null where there is none that can be read."""
+    """A stored consent; None if there is none that can be read."""
     try:
         values = json.loads(record.read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""The voice of espeak-ng: offline, its library and voices are inside a package."""
+"""The offline voice, espeak-ng, whose library and voices are part of a Python package."""
 
 import unicodedata
 from collections import Counter
@@ -13,7 +13,7 @@ from ico3d.common.espeak import synthesize
 
 VARIANT = "+f3"
 NAMES = {"en": "en-us", "zh": "cmn"}
-"""espeak-ng's names of languages where they are not the codes."""
+"""espeak-ng's names of languages that differ from the language's code."""
 SCRIPTS = {
     "ARABIC": "ar fa ur ku sd ug",
     "ARMENIAN": "hy hyw",
@@ -39,18 +39,20 @@ SCRIPTS = {
     "TELUGU": "te",
     "THAI": "th",
 }
-"""espeak-ng's languages by script, the first where nothing else is known. Scripts are named by
-the first word of their letters' Unicode names."""
+"""espeak-ng's languages for each script, the default first.
+
+A script is named by the first word of its letters' Unicode names.
+"""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Which voice.
+    """Options of the voice `espeak-ng`.
 
     Attributes:
         voice: espeak-ng's language and variant, such as `de+f3`; empty for the persona's first
-            language, English where it has none. What is written in another script is spoken by
-            that script's language, with the same variant.
+            language, or English if it has none. Text in another script is spoken in a language of
+            that script, with the same variant.
         rate: Words per minute.
     """
 
@@ -59,13 +61,13 @@ class Settings:
 
 
 def voice_of(language: str) -> str:
-    """The voice for a language, given by its code such as `de` or `pt-BR`."""
+    """espeak-ng's voice for a language code such as `de` or `pt-BR`."""
     code = language.partition("-")[0].lower()
     return NAMES.get(code, code)
 
 
 def voice_for(text: str, voice: str) -> str:
-    """The voice for a text: the given one, or that of the script in which most of it is written."""
+    """The voice for a text: `voice`, or one for the script in which most of the text is written."""
     names = Counter(unicodedata.name(c, "").partition(" ")[0] for c in text if c.isalpha())
     kana = names["HIRAGANA"] + names["KATAKANA"]  # Japanese has more Chinese characters than these
     script = "HIRAGANA" if kana else max(names, key=lambda name: names[name], default="")
@@ -75,22 +77,22 @@ def voice_for(text: str, voice: str) -> str:
 
 
 def spoken(text: str, voice: str, rate: int) -> np.ndarray:
-    """A text as (S,) int16 samples at 24 kHz."""
+    """The sound of a text, (S,) int16 at 24 kHz."""
     speech = synthesize(text, voice_for(text, voice), rate)
     return at_speech_rate(speech.samples, speech.rate)
 
 
 def hindrance(settings: Settings) -> str:
-    """What espeak-ng lacks here, its packages included; empty if it works."""
+    """A sentence on what espeak-ng needs on this machine; empty if it works."""
     return lacks_package("espeakng_loader", "voice") or lacks_package("soxr", "chat")
 
 
 def make(settings: Settings, context: Context) -> PieceVoice:
-    """A voice for one session; it speaks a sentence in about 20 ms.
+    """Creates the voice of one session; a sentence takes about 20 ms.
 
     Raises:
         MissingExtraError: If espeakng-loader or soxr is not installed.
-        SettingsError: If there is no such voice.
+        SettingsError: If espeak-ng has no such voice.
     """
     languages = context.persona.languages or ("en",)
     voice = settings.voice or voice_of(languages[0]) + VARIANT

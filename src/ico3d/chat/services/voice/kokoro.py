@@ -24,19 +24,19 @@ LANGUAGES = {
     "p": "pt-br",
     "z": "cmn",
 }
-"""espeak-ng's names, which Kokoro's words go through, by the first letter of a voice."""
+"""espeak-ng's language for the first letter of a voice's name; it phonemises Kokoro's text."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Which of Kokoro's voices.
+    """Options of the voice `kokoro`.
 
     Attributes:
-        voice: Its name; the first letter is its language: `af_heart` American, `bf_emma` British,
-            `ef_dora` Spanish, `ff_siwis` French, `hf_alpha` Hindi, `if_sara` Italian, `jf_alpha`
-            Japanese, `pf_dora` Portuguese, `zf_xiaobei` Chinese.
-        language: What it speaks, such as `en-us`; empty for its own language.
-        speed: 1 is its own pace; 0.5 to 2.
+        voice: Name of the voice; the first letter stands for the language: `af_heart` American,
+            `bf_emma` British, `ef_dora` Spanish, `ff_siwis` French, `hf_alpha` Hindi, `if_sara`
+            Italian, `jf_alpha` Japanese, `pf_dora` Portuguese, `zf_xiaobei` Chinese.
+        language: Language to speak, such as `en-us`; empty for the voice's own language.
+        speed: Speed as a factor of the voice's own, 0.5 to 2.
     """
 
     voice: str = "af_heart"
@@ -54,22 +54,22 @@ class Settings:
 
 
 def language(settings: Settings) -> str:
-    """What the voice speaks, in espeak-ng's name."""
+    """espeak-ng's name of the language to speak."""
     return settings.language or LANGUAGES.get(settings.voice[:1], "en-us")
 
 
 def hindrance(settings: Settings) -> str:
-    """What Kokoro lacks here, its package or its weights; empty if it works."""
+    """A sentence on a missing package or missing weights; empty if Kokoro works."""
     return lacks_package("kokoro_onnx", "kokoro") or lacks_weights("kokoro")
 
 
 def make(settings: Settings, context: Context) -> TTSService:
-    """A voice for one session; all share one model.
+    """Creates the voice of one session; all sessions share one model.
 
     Raises:
         MissingExtraError: If kokoro-onnx is not installed.
-        MissingModelError: If its files are not there.
-        SettingsError: If there is no such voice.
+        MissingModelError: If Kokoro's files are not installed.
+        SettingsError: If Kokoro has no such voice.
     """
     try:
         from pipecat.services.kokoro.tts import KokoroTTSService
@@ -99,7 +99,7 @@ def make(settings: Settings, context: Context) -> TTSService:
 
 @functools.cache
 def engine(folder: Path) -> Any:
-    """The model, loaded once."""
+    """Loads the model, once per process."""
     from kokoro_onnx import Kokoro
 
     return Kokoro(str(folder / "kokoro-v1.0.onnx"), str(folder / "voices-v1.0.bin"))

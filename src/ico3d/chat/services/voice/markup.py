@@ -1,7 +1,8 @@
-"""What of a written answer is not read aloud: markup and emoji, never words.
+"""Removes from a written answer what is not spoken: markup and emoji, but no words.
 
-pipecat's own `strip_markdown` leaves out the words of code and of struck-through text, and sees
-only pairs of marks within one piece; here every word is spoken, and marks may lie in other pieces.
+pipecat's own `strip_markdown` drops the words of code and of struck-through text, and only
+recognises pairs of marks within one piece. Here every word is spoken, and the marks of a pair may
+lie in different pieces.
 """
 
 import re
@@ -11,7 +12,7 @@ EMOJI = (
     r"\U0001f004\U0001f0cf\U0001f18e\U0001f191-\U0001f19a\U0001f1e6-\U0001f1ff"
     r"\U0001f300-\U0001faff\U000e0020-\U000e007f]"
 )
-"""One code point of an emoji; what joins or modifies it may follow."""
+"""Pattern of one code point of an emoji, which joiners and modifiers may follow."""
 
 _RULES = tuple(
     (re.compile(pattern, re.MULTILINE), replacement)
@@ -39,14 +40,14 @@ _RULES = tuple(
 
 
 async def speakable(text: str, text_type: str = "") -> str:
-    """A piece of an answer as the voice gets it: a text transform of pipecat's.
+    """Prepares a piece of an answer for the voice; a text transform of pipecat.
 
     Args:
-        text: From one end of a line or sentence to the next.
-        text_type: What pipecat takes it for; makes no difference.
+        text: A sentence, a part of one, or a line.
+        text_type: pipecat's type of the text; ignored.
 
     Returns:
-        Its words; nothing where it has none, since not every voice bears a lone mark.
+        The words of the text; empty if it has none, since some voices fail on lone marks.
     """
     for pattern, replacement in _RULES:
         text = pattern.sub(replacement, text)

@@ -1,4 +1,4 @@
-"""Any voice behind an OpenAI-compatible server."""
+"""Voices on OpenAI-compatible servers."""
 
 from pipecat.processors.frame_processor import FrameProcessor
 
@@ -7,15 +7,15 @@ from ico3d.chat.services.voice.openai_settings import Settings
 
 
 def hindrance(settings: Settings) -> str:
-    """Whether a server is chosen."""
+    """A sentence if the settings name no server, else empty."""
     return lacks_server(settings.url, settings.key_variable, "voice")
 
 
 def make(settings: Settings, context: Context) -> FrameProcessor:
-    """A voice for one session.
+    """Creates the voice of one session.
 
     Raises:
-        SettingsError: If the key is not here.
+        SettingsError: If the key is missing.
     """
     from ico3d.chat.services.voice.openai_service import ServerVoice
 

@@ -1,4 +1,4 @@
-"""pipecat's OpenAI voice for sound of any rate, with short first pieces; slow to import."""
+"""pipecat's OpenAI voice, for any sample rate and with short first pieces; slow to import."""
 
 from collections.abc import AsyncGenerator, AsyncIterator
 from dataclasses import replace
@@ -19,10 +19,10 @@ CHUNK = 4800  # bytes that are passed on at once: 0.1 s
 
 
 class ServerVoice(Prompt, OpenAITTSService):
-    """pipecat's service for voices of any name and sound of any rate, with short first pieces."""
+    """pipecat's OpenAI voice, for any voice name and sample rate, with short first pieces."""
 
     def __init__(self, settings: Settings):
-        """For one session."""
+        """Creates the voice of one session."""
         where = (settings.url, settings.key_variable, WHERE)
         super().__init__(
             **client_options(*where, timeout=settings.timeout),
@@ -35,7 +35,7 @@ class ServerVoice(Prompt, OpenAITTSService):
         use_resampler(self, self._continuous)
 
     async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame, None]:
-        """Yields the sound as it comes, or the error that the server met."""
+        """Yields the sound while it arrives, or the server's error."""
         await self._continuous.reset()  # the piece before may have been interrupted
         options = self._options
         request = client_of(self).audio.speech.with_streaming_response.create(
@@ -69,14 +69,14 @@ class ServerVoice(Prompt, OpenAITTSService):
 
 
 async def judged(sound: AsyncIterator[bytes], rate: int) -> AsyncIterator[bytes]:
-    """The pieces of a server's answer, for as long as they are sound that is taken.
+    """Yields the pieces of a server's answer as long as they are acceptable sound.
 
     Args:
-        sound: PCM16, a WAV file's header before it or not.
-        rate: Samples per second, unless a header says so.
+        sound: PCM16, with or without the header of a WAV file.
+        rate: Samples per second, unless a header says otherwise.
 
     Raises:
-        ServiceError: If a header claims what is not taken, or the sound does not end in time.
+        ServiceError: If a header claims more than is accepted, or the sound does not end in time.
     """
     claim, frames, first = Claim(rate, width=2), 0, True
     async for piece in sound:

@@ -1,4 +1,4 @@
-"""Which OpenAI-compatible server speaks."""
+"""Options of the voice on an OpenAI-compatible server."""
 
 from dataclasses import dataclass
 
@@ -12,17 +12,18 @@ WHERE = "chat settings: voice 'openai'"
 
 @dataclass(frozen=True)
 class Settings:
-    """Which server.
+    """Options of the voice `openai`.
 
     Attributes:
-        url: Its address, such as `http://localhost:8880/v1`; empty for the provider's own.
-        model: Name of its model.
-        voice: Name of its voice.
-        key_variable: Environment variable that holds the key; empty for none, or for
-            OPENAI_API_KEY where the server is OpenAI's. It is sent nowhere unencrypted but to
-            this machine.
-        rate: Samples per second of its sound; a WAV file says so itself.
-        timeout: Seconds to wait for an answer, or for more of it.
+        url: Address of the server, such as `http://localhost:8880/v1`; empty for OpenAI's own.
+        model: Name of the model.
+        voice: Name of the voice.
+        key_variable: Environment variable that holds the server's key; empty for none, or for
+            OPENAI_API_KEY where the server is OpenAI's. A key is never sent unencrypted to another
+            machine.
+        rate: Samples per second of the server's sound, unless it sends WAV files, which state their
+            rate.
+        timeout: Seconds to wait for the first sound, and between two pieces of it.
     """
 
     url: str = ""

@@ -1,7 +1,7 @@
-"""OpenVoice V2: MeloTTS speaks, and a tone-colour converter gives it a person's voice.
+"""OpenVoice V2: MeloTTS speaks, and a tone-colour converter changes the voice to a person's.
 
-Neither is on the package index; `docs/conversation/voices.md` says how to install them. Both
-belong to MyShell and are MIT-licensed, as are their weights.
+Neither is in the package index; `docs/conversation/voices.md` says how to install them. Both belong
+to MyShell and are MIT-licensed, as are their weights.
 """
 
 import contextlib
@@ -30,23 +30,25 @@ LANGUAGES = {
     "JP": ("melotts-japanese", "こんにちは。"),
     "KR": ("melotts-korean", "안녕하세요."),
 }
-"""What it speaks: weights, and a first word, which loads the rest of its models."""
+"""For each language: the weights, and a first word, which makes MeloTTS load all of its models."""
 
 INSTALL = "the commands are in docs/conversation/voices.md."
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Whose voice.
+    """Options of the voice `openvoice`.
 
     Attributes:
-        voice: MeloTTS's speaker, who decides on the language: EN-US, EN-BR, EN_INDIA, EN-AU,
+        voice: MeloTTS's speaker, which determines the language: EN-US, EN-BR, EN_INDIA, EN-AU,
             EN-Default, ES, FR, ZH, JP or KR.
-        speed: 1 is its own pace; 0.25 to 4.
-        reference: WAV file of the voice to speak with; empty for the speaker's own voice.
-        consent: What the owner of that voice has agreed to, in one sentence; kept on this machine.
-        consent_by: The owner's name.
-        watermark: Whether converted speech carries OpenVoice's inaudible mark; it takes time.
+        speed: Speed as a factor of the speaker's own, 0.25 to 4.
+        reference: WAV file of the voice to imitate; empty for the speaker's own voice.
+        consent: What the owner of that voice has agreed to, in one sentence; stored on this
+            machine.
+        consent_by: Name of the voice's owner.
+        watermark: Whether converted speech carries OpenVoice's inaudible watermark, which takes
+            time.
         device: `auto`, `cpu`, `cuda` or `mps`.
     """
 
@@ -74,23 +76,23 @@ class Settings:
 
     @property
     def language(self) -> str:
-        """MeloTTS's code."""
+        """MeloTTS's code of the language."""
         return self.voice[:2]
 
     @property
     def weights(self) -> str:
-        """What `ico3d weights` calls MeloTTS's part for the language."""
+        """Name of the language's part of MeloTTS in `ico3d weights`."""
         return LANGUAGES[self.language][0]
 
 
 class Engine:
-    """The models of one choice of settings, shared by all sessions; one text at a time."""
+    """The models for some settings, shared by all sessions; speaks one text at a time."""
 
     def __init__(self, settings: Settings):
-        """Loads them, which takes a while.
+        """Loads the models, which takes a while.
 
         Raises:
-            MissingModelError: If files are not there.
+            MissingModelError: If files are not installed.
             SettingsError: If packages, speaker, recording or consent are missing.
         """
         self._settings = settings
@@ -105,7 +107,7 @@ class Engine:
             self.speak(LANGUAGES[settings.language][1])
 
     def speak(self, text: str) -> np.ndarray:
-        """A text as (S,) int16 samples at 24 kHz."""
+        """The sound of a text, (S,) int16 at 24 kHz."""
         with self._lock:
             samples = self._base.tts_to_file(
                 text, self._speaker_id, None, speed=self._settings.speed, quiet=True
@@ -163,10 +165,10 @@ class Engine:
 
 
 def permitted(settings: Settings) -> Recording | None:
-    """The recording to speak like; null for the speaker's own voice.
+    """The recording of the voice to imitate; None for the speaker's own voice.
 
     Raises:
-        SettingsError: If it cannot be read, or its owner has not consented.
+        SettingsError: If the recording cannot be read, or its owner has not consented.
     """
     if not settings.reference:
         return None
@@ -176,7 +178,12 @@ def permitted(settings: Settings) -> Recording | None:
 
 @contextlib.contextmanager
 def loading() -> Iterator[None]:
-    """Says in one sentence what is missing; nothing is downloaded meanwhile."""
+    """Turns errors in the `with` block into one sentence on what is missing; prevents downloads.
+
+    Raises:
+        SettingsError: If a package is not installed or an option is refused.
+        MissingModelError: If files of a model are not installed.
+    """
     try:
         with offline():
             yield
@@ -192,7 +199,7 @@ def loading() -> Iterator[None]:
 
 @contextlib.contextmanager
 def offline() -> Iterator[None]:
-    """Keeps Hugging Face's libraries from downloading; what is in their cache is found."""
+    """Keeps Hugging Face's libraries from downloading; they still use their cache."""
     try:
         from huggingface_hub import constants
     except ImportError:
@@ -206,11 +213,11 @@ def offline() -> Iterator[None]:
 
 
 engine = functools.cache(Engine)
-"""The engine of some settings, loaded once."""
+"""The engine for some settings, loaded once per process."""
 
 
 def hindrance(settings: Settings) -> str:
-    """What OpenVoice lacks here, packages or weights; empty if it works."""
+    """A sentence on missing packages or weights; empty if OpenVoice works."""
     for package in ("melo", "openvoice"):
         if importlib.util.find_spec(package) is None:
             return f"{package} is not installed: {INSTALL}"
@@ -219,10 +226,10 @@ def hindrance(settings: Settings) -> str:
 
 
 def make(settings: Settings, context: Context) -> PieceVoice:
-    """A voice for one session.
+    """Creates the voice of one session.
 
     Raises:
-        MissingModelError: If files are not there.
+        MissingModelError: If files are not installed.
         SettingsError: If packages, speaker, recording or consent are missing.
     """
     with LOADING:

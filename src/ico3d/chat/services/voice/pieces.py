@@ -1,4 +1,4 @@
-"""A voice that is one function from a text to its sound."""
+"""A voice that is a single function from text to sound."""
 
 import asyncio
 import threading
@@ -20,36 +20,36 @@ OPTIONS: dict[str, Any] = {
     "stop_frame_timeout_s": STARVED,
     "max_consecutive_zero_audio_contexts": 0,  # a voice that failed may work again
 }
-"""What every voice tells pipecat's base."""
+"""Options of pipecat's base class that are the same for all voices."""
 SYNCHRONOUS: dict[str, Any] = {"push_start_frame": True, "push_stop_frames": True}
-"""What those tell it besides that leave it to mark where a piece begins and ends."""
+"""Further options for voices that leave it to pipecat to mark the ends of pieces."""
 LOADING = threading.Lock()
-"""Held while models are loaded, so that visitors who come at once share them."""
+"""Lock that is held while models are loaded, so that simultaneous visitors share them."""
 
 
 class Prompt(TTSService):
     """A voice whose sound is complete when `run_tts` ends.
 
-    pipecat knows that only of one that made sound, and would wait for one that met an error.
+    pipecat assumes that only if the voice made sound, and would wait after an error.
     """
 
     async def tts_process_generator(
         self, context_id: str, generator: AsyncGenerator[Frame | None, None]
     ) -> None:
-        """Passes on what `run_tts` yields."""
+        """Passes on the frames of `run_tts`."""
         await super().tts_process_generator(context_id, generator)
         mark_synchronous(self)
 
 
 class PieceVoice(Prompt):
-    """Speaks piece by piece, in a thread, with what `speak` makes of a text."""
+    """Speaks each piece of an answer by calling a function in a thread."""
 
     def __init__(self, voice: str, speak: Callable[[str], np.ndarray]):
-        """For one session.
+        """Creates the voice of one session.
 
         Args:
             voice: Name of the voice.
-            speak: A text as (S,) int16 samples at 24 kHz; called from threads.
+            speak: Returns the sound of a text, (S,) int16 at 24 kHz; called from threads.
         """
         super().__init__(
             settings=TTSSettings(model=None, voice=voice, language=None),
@@ -59,7 +59,7 @@ class PieceVoice(Prompt):
         self._speak = speak
 
     async def run_tts(self, text: str, context_id: str) -> AsyncGenerator[Frame | None, None]:
-        """Yields the text's sound in one frame, or the error that it met."""
+        """Yields the sound of a text in one frame, or an error."""
         try:
             pcm = await asyncio.to_thread(self._speak, text)
         except Exception as error:
@@ -69,7 +69,7 @@ class PieceVoice(Prompt):
 
 
 def at_speech_rate(samples: np.ndarray, rate: int) -> np.ndarray:
-    """A whole piece as (S,) int16 at 24 kHz, from (S,) floats in [-1, 1] at another rate.
+    """Converts samples (S,) in [-1, 1] at another rate to (S,) int16 at 24 kHz.
 
     Raises:
         MissingExtraError: If soxr is not installed.

@@ -1,6 +1,6 @@
 """Piper through pipecat's own service: small voices for some forty languages, on the CPU.
 
-The package piper-tts is GPL-3.0: an extra that is loaded at run time.
+The package piper-tts is licensed under GPL-3.0; it is an optional extra, loaded at run time.
 """
 
 import functools
@@ -23,11 +23,11 @@ from ico3d.errors import MissingExtraError, MissingModelError, SettingsError
 
 @dataclass(frozen=True)
 class Settings:
-    """Which of Piper's voices.
+    """Options of the voice `piper`.
 
     Attributes:
-        voice: Its name, such as `en_US-ljspeech-high` or `de_DE-thorsten-medium`; each has its own
-            licence.
+        voice: Name of the voice, such as `en_US-ljspeech-high` or `de_DE-thorsten-medium`; each
+            voice has a licence of its own.
         cuda: Run on an NVIDIA GPU; needs onnxruntime-gpu.
     """
 
@@ -36,10 +36,10 @@ class Settings:
 
 
 def find_voice(settings: Settings) -> Path:
-    """The voice's model; its description lies beside it.
+    """Path of the voice's model; the description lies beside it.
 
     Raises:
-        MissingModelError: If it is not here.
+        MissingModelError: If the voice is not installed.
     """
     names = f"{settings.voice}.onnx", f"{settings.voice}.onnx.json"
     for folder in model_folders():
@@ -52,7 +52,7 @@ def find_voice(settings: Settings) -> Path:
 
 
 def hindrance(settings: Settings) -> str:
-    """What Piper lacks here, its package or the voice's files; empty if it works."""
+    """A sentence on a missing package or missing files; empty if Piper works."""
     try:
         find_voice(settings)
     except MissingModelError as error:
@@ -61,12 +61,12 @@ def hindrance(settings: Settings) -> str:
 
 
 def make(settings: Settings, context: Context) -> TTSService:
-    """A voice for one session; all share one model.
+    """Creates the voice of one session; all sessions share one model.
 
     Raises:
         MissingExtraError: If piper-tts is not installed.
-        MissingModelError: If the voice's files are not there.
-        SettingsError: If the voice would have to download more.
+        MissingModelError: If the voice's files are not installed.
+        SettingsError: If the voice would need further downloads.
     """
     try:
         from pipecat.services.piper.tts import PiperTTSService
@@ -97,10 +97,10 @@ def make(settings: Settings, context: Context) -> TTSService:
 
 @functools.cache
 def engine(model: Path, cuda: bool) -> Any:
-    """The model, loaded once.
+    """Loads the model, once per process.
 
     Raises:
-        SettingsError: If the voice would have to download more.
+        SettingsError: If the voice would need further downloads.
     """
     from piper import PiperVoice
 
