@@ -69,7 +69,7 @@ FAULTS = [
 @pytest.mark.parametrize("error", FAULTS, ids=lambda error: type(error).__name__)
 def test_whatever_goes_wrong_is_one_sentence(bundle, error):
     for kind in KINDS:
-        adapt, errors = failing(kind, error)
+        adapt, _ = failing(kind, error)
         avatar = adapt(open_avatar(bundle, OFFLINE))
         with pytest.raises(Ico3dError) as raised:
             make_parts(avatar)
@@ -77,8 +77,16 @@ def test_whatever_goes_wrong_is_one_sentence(bundle, error):
         assert sentence.endswith(".") and "\n" not in sentence and len(sentence) > 20
         if not isinstance(error, Ico3dError):
             assert sentence.startswith(f"{kind} with ") and type(error).__name__ in sentence
-        errors.clear()
-        assert make_parts(avatar).services.voice.stand_in
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_was_wrong_and_is_no_more_is_tried_again(bundle, kind):
+    adapt, errors = failing(kind, RuntimeError("busy"))
+    avatar = adapt(open_avatar(bundle, OFFLINE))
+    with pytest.raises(Ico3dError):
+        make_parts(avatar)
+    errors.clear()
+    assert make_parts(avatar).services.voice.stand_in
 
 
 @pytest.mark.parametrize("at_home", [True, False])
