@@ -13,8 +13,8 @@ demo: $(VENV)/.serve src/ico3d/chat/static/index.html ## talk with the packaged 
 
 test: ## everything CI runs
 	$(MAKE) --no-print-directory -j 2 install # Python's packages and the page's, side by side
-	$(MAKE) --no-print-directory $(VENV)/.kernels # before several processes ask for them
-	$(MAKE) --no-print-directory -j 4 unit e2e-beside lint page # talks mostly wait; lint and page take what they leave
+	$(MAKE) --no-print-directory -j 2 page $(VENV)/.kernels # before several processes ask for them
+	$(MAKE) --no-print-directory -j 3 unit e2e-beside lint # talks mostly wait, and types are checked meanwhile
 	$(MAKE) --no-print-directory e2e-alone
 
 quick: $(VENV)/.kernels src/ico3d/chat/static/index.html ## what one runs while working: checks, and the tests that take no time
@@ -34,7 +34,7 @@ lint: $(VENV)/.develop
 	lint-imports
 
 page: src/ico3d/chat/static/index.html
-	cd viewer && nice npm run --silent check && nice npm run --silent test
+	cd viewer && npm run --silent check && npm run --silent test
 
 unit: $(VENV)/.develop $(VENV)/.kernels src/ico3d/chat/static/index.html
 	# three files at a time on two cores: talking with an avatar is mostly waiting
