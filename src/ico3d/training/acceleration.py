@@ -50,8 +50,8 @@ def _compiled(network: Callable[..., Tensor]) -> Callable[..., Tensor]:
     names = [os.environ["CXX"]] if "CXX" in os.environ else ["g++", "clang++"]
     if not any(map(shutil.which, names)):
         raise SettingsError(
-            f"compile=true needs a C++ compiler ({' or '.join(names)}), and none is on the PATH: "
-            "install one, or leave compile out."
+            f"--compile needs a C++ compiler ({' or '.join(names)}), and none is on the PATH: "
+            "install one, or leave --compile out."
         )
     # The number of Gaussians is the first axis of parameters, and density control changes it.
     torch._dynamo.config.force_parameter_static_shapes = False
