@@ -27,6 +27,7 @@ from ico3d.chat.wire import protocol
 from ico3d.chat.workers import Workers
 from ico3d.errors import Ico3dError, ServiceError
 from ico3d.motion.clip import Clip
+from ico3d.motion.composing.takes import Takes
 from ico3d.speech.runtime import SpeechModel
 
 SLOWEST = 120.0  # s for a first answer, for which a server may load its model
@@ -92,7 +93,8 @@ def make_parts(avatar: Avatar) -> Parts:
         Ico3dError: If a service cannot be created.
     """
     turns, services = avatar.settings.turns, avatar.services
-    context = Context(avatar.persona, avatar.head, avatar.animation)
+    shown = Takes(avatar.clips or {}).meanings if avatar.settings.gestures else []
+    context = Context(avatar.persona, avatar.head, avatar.animation, tuple(shown))
     params = SmartTurnParams(stop_secs=turns.end_silence - turns.pause)
     with _explained("turn-taking"):
         vad, turn = EagerSilero(turns.pause), EagerSmartTurn(turns.pause, params=params)

@@ -71,6 +71,7 @@ class ServeModule:
         from ico3d.chat.services import TABLES, chosen
         from ico3d.chat.services.provider import Context
         from ico3d.chat.settings.conversation import read_settings
+        from ico3d.motion.composing.takes import Takes
 
         bundle = Bundle.open(self.bundle)
         head, model = open_face(bundle)
@@ -81,7 +82,8 @@ class ServeModule:
             return self.bundle, make_expression_app(model, sha256, self.host, self.limits, key)
         choice = getattr(read_settings(self.settings), self.kind)
         service = chosen(TABLES[self.kind], choice, self.kind)
-        context = Context(bundle.manifest.persona, head, bundle.animation)
+        shown = tuple(Takes(bundle.gestures or {}).meanings)
+        context = Context(bundle.manifest.persona, head, bundle.animation, shown)
         service.make(context)  # fails now rather than at the first request
         title = service.provider.title
         app = make_service_app(

@@ -33,11 +33,13 @@ class Context:
         persona: Who the avatar is.
         head: Sizes of the baked head.
         animation: Procedural motion of the body; None for a head alone.
+        gestures: Meanings of the gestures that the body makes when a visitor asks for one.
     """
 
     persona: Persona
     head: HeadInfo
     animation: Animation | None
+    gestures: tuple[str, ...] = ()
 
 
 def unhindered(settings: Any) -> str:

@@ -61,6 +61,21 @@ def test_pleasantries(notes):
     assert notes.answer("hello who are you") == "I am Ada."
 
 
+@pytest.mark.parametrize(
+    ("question", "answer"),
+    [
+        ("can you wave at me?", "Of course."),
+        ("Please take a bow", "Of course."),
+        ("please shrug", "I do not know that."),  # this body cannot
+        ("don't wave at me", "I do not know that."),
+        ("who are you", "I am Ada."),
+    ],
+)
+def test_what_the_body_shows_is_promised(question, answer):
+    persona = Persona("Ada", "Hello.", ("who are you => I am Ada.",))
+    assert Notes(persona, ("wave", "take_a_bow")).answer(question).startswith(answer)
+
+
 def test_a_persona_without_notes_says_so():
     answer = Notes(Persona("Ada", "Hello.", ())).answer("what is your name")
     assert "no notes" in answer

@@ -4,9 +4,11 @@ import math
 import re
 import unicodedata
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from ico3d.bundle.persona import Persona
+from ico3d.motion.composing.lexicon import requested
 
 CONFIDENT = 0.42  # score from which a note is taken as the answer
 WORDS, LETTERS = 0.7, 0.3  # weights of whole words and of letter triples
@@ -54,9 +56,14 @@ class Note:
 class Notes:
     """Answers from a persona's notes; otherwise says what can be asked."""
 
-    def __init__(self, persona: Persona):
-        """Parses the notes; those without `=>` are skipped."""
-        self._persona = persona
+    def __init__(self, persona: Persona, gestures: Collection[str] = ()):
+        """Parses the notes; those without `=>` are skipped.
+
+        Args:
+            persona: Who answers.
+            gestures: Meanings of the gestures that the body makes when it is asked to.
+        """
+        self._persona, self._gestures = persona, gestures
         self.notes = [note for text in persona.notes if (note := parse_note(text))]
         documents = [words(q) for note in self.notes for q in note.questions]
         counts = Counter(word for document in documents for word in set(document))
@@ -70,6 +77,8 @@ class Notes:
         best, score = self.best(question)
         if best is not None and score >= CONFIDENT:
             return best.answer
+        if requested(question, self._gestures) in self._gestures:
+            return "Of course."  # the body shows the rest
         return self._pleasantry(question) or self.fallback()
 
     def best(self, question: str) -> tuple[Note | None, float]:

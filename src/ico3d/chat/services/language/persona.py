@@ -64,4 +64,4 @@ class Settings:
 
 def make(settings: Settings, context: Context) -> PersonaModel:
     """Creates the model of one session."""
-    return PersonaModel(Notes(context.persona))
+    return PersonaModel(Notes(context.persona, context.gestures))
