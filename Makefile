@@ -13,8 +13,8 @@ demo: $(VENV)/.serve src/ico3d/chat/static/index.html ## talk with the packaged 
 
 test: ## everything CI runs
 	$(MAKE) --no-print-directory -j 2 install # Python's packages and the page's, side by side
-	$(MAKE) --no-print-directory -j 2 page $(VENV)/.kernels # before several processes ask for them
-	$(MAKE) --no-print-directory -j 3 unit e2e-beside lint # talks mostly wait, and types are checked meanwhile
+	$(MAKE) --no-print-directory -j 2 lint page $(VENV)/.kernels # none keeps time
+	$(MAKE) --no-print-directory -j 2 unit e2e-beside # browsers mostly wait for speech
 	$(MAKE) --no-print-directory e2e-alone
 
 quick: $(VENV)/.kernels src/ico3d/chat/static/index.html ## what one runs while working: checks, and the tests that take no time
@@ -30,7 +30,7 @@ viewer: src/ico3d/chat/static/index.html ## the page that servers serve
 
 lint: $(VENV)/.develop
 	ruff check . && ruff format --check .
-	nice pyright
+	pyright
 	lint-imports
 
 page: src/ico3d/chat/static/index.html
