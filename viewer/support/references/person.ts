@@ -48,7 +48,7 @@ export interface Step {
   heard: { utterance: number; seconds: number } | null;
 }
 
-const DRAWN = 4; // every so many pictures one is drawn
+const DRAWN = 16; // every so many pictures one is drawn
 
 declare global {
   interface Window {

@@ -10,13 +10,15 @@ const PERSONA = join(REPOSITORY, 'viewer/support/references/persona.json');
 /** Whether there is a real recording to make an avatar of. */
 export const hasClip = existsSync(CLIP);
 
+const SECONDS = '2'; // of the clip
 const SHORT =
   '--steps 150 --initial.gaussians 1000 --density.max-gaussians 1200 --density.begin 50 --density.until 100';
 
 /** From a video of a person to an avatar that can be talked with: track, train, bake. */
 export function makePortrait(folder: string): string {
-  const [capture, model, bundle] = ['capture', 'model', 'portrait.ico3d'].map((name) => join(folder, name));
-  ico3d('capture', 'portrait', CLIP, capture!, '--size', '128', '--no-refine');
+  const [clip, capture, model, bundle] = ['clip.mp4', 'capture', 'model', 'portrait.ico3d'].map((name) => join(folder, name));
+  runPython('references/short_clip.py', CLIP, clip!, SECONDS);
+  ico3d('capture', 'portrait', clip!, capture!, '--size', '128', '--no-refine');
   ico3d('train', 'head', capture!, model!, '--preset', 'cpu', ...SHORT.split(' '));
   // Forced: half a minute of training need not reach what avatars for people must.
   ico3d('bake', model!, capture!, bundle!, '--persona', PERSONA, '--force');
