@@ -1,1 +1,1 @@
-"""One person from parts: baking trained models into the bundle that is deployed."""
+"""Whole people: a head joined to a body, gestures, films, and the bundle that is deployed."""

@@ -1,4 +1,4 @@
-"""A whole person: a trained head on a trained body, as the exact models draw it."""
+"""A whole person before baking: a trained head on a trained body, drawn by the trained models."""
 
 import json
 from dataclasses import dataclass, replace
@@ -17,9 +17,9 @@ from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.training.checkpoint import load_tensors, save_tensors
 
 ABOUT = "avatar.json"
-"""The file by which a folder is known to hold an avatar."""
+"""Name of the file that marks a folder as an avatar's."""
 FACING = np.array([0.0, 0.0, 1.0])
-"""Where the face looks in the space of the head's model."""
+"""(3,) direction in which the face looks, in the space of the head's model."""
 HEAD, BODY, PLACEMENT = "head", "body", "placement.safetensors"
 
 
@@ -28,9 +28,9 @@ class Placement:
     """Where a head is on a body, frame by frame (docs/architecture.md, "Head poses").
 
     Attributes:
-        canonical_from_head: (4, 4) G: a similarity from the space of the head's model to that of
-            the head poses; the identity where both come from one capture.
-        world_from_canonical: (F, 4, 4) rigid W_i, one per frame of the body.
+        canonical_from_head: (4, 4) G, a similarity from the space of the head's model to the
+            canonical head space of the body's capture; the identity where both are one capture.
+        world_from_canonical: (F, 4, 4) rigid W_i, the head pose in each frame of the body.
     """
 
     canonical_from_head: np.ndarray
@@ -38,16 +38,21 @@ class Placement:
 
     @property
     def facing(self) -> np.ndarray:
-        """(3,) where the face looks in the world, on average over the frames; of any length."""
+        """(3,) mean direction in the world in which the face looks; not of length 1."""
         turns = self.world_from_canonical[:, :3, :3]  # (F, 3, 3)
         return turns.mean(axis=0) @ self.canonical_from_head[:3, :3] @ FACING  # (3,)
 
     def world_from_head(self, frame: float) -> np.ndarray:
-        """(4, 4) similarity W·G at a frame, between frames as viewers interpolate it."""
+        """(4, 4) similarity W·G from the head model's space to the world at a frame; see `pose`."""
         return self.pose(frame) @ self.canonical_from_head
 
     def pose(self, frame: float) -> np.ndarray:
-        """(4, 4) rigid W at a frame, which is clamped to the clip; turns by slerp between."""
+        """(4, 4) rigid W at a frame, as viewers interpolate it.
+
+        Args:
+            frame: Need not be whole, and is clamped to the clip. Between two frames rotations are
+                interpolated by slerp, positions linearly.
+        """
         poses = self.world_from_canonical
         place = min(max(frame, 0.0), len(poses) - 1.0)
         first = min(int(place), len(poses) - 2)
@@ -62,14 +67,15 @@ class Placement:
 
 @dataclass
 class TrainedAvatar:
-    """A head that was fitted to a body: Gaussians of the time and the expression.
+    """A head on a body; its Gaussians depend on the time of the clip and on the expression.
 
     Attributes:
-        head: Only those of its Gaussians that are drawn on the body, in the body's colours.
-        body: Trained around the head.
-        placement: Where the head is; on a skeleton, where its joint carries it (`joined`).
-        expressions: (F, B) what drives the head through the recorded clip.
-        summary: How it was made: provenance of both captures, what was measured, settings.
+        head: The head, cropped to the Gaussians that are drawn on the body, its colours matched.
+        body: The body, trained with the head in the picture.
+        placement: Where the head is in each frame; on a skeleton, where the head's joint carries
+            it (`joined`).
+        expressions: (F, B) expression in each frame of the clip.
+        summary: How the avatar was made: provenance of both captures, measurements, settings.
     """
 
     head: TrainedHead
@@ -80,7 +86,7 @@ class TrainedAvatar:
 
     @property
     def seconds(self) -> float:
-        """How long the clip lasts."""
+        """Length of the clip in seconds."""
         return self.body.seconds
 
     @property
@@ -89,13 +95,13 @@ class TrainedAvatar:
         return self.body.fps
 
     def to(self, device: torch.device) -> "TrainedAvatar":
-        """Moves head and body, and gives itself back."""
+        """Moves head and body to a device; returns this avatar."""
         self.head.to(device)
         self.body.to(device)
         return self
 
     def expression(self, seconds: float) -> np.ndarray:
-        """(B,) recorded expression at a time, linear between frames."""
+        """(B,) recorded expression at a time in seconds, interpolated linearly between frames."""
         place = min(max(seconds * self.fps, 0.0), len(self.expressions) - 1.0)
         first = min(int(place), max(len(self.expressions) - 2, 0))
         after = min(first + 1, len(self.expressions) - 1)
@@ -106,8 +112,8 @@ class TrainedAvatar:
         """The head alone, in the world.
 
         Args:
-            seconds: When, for its place.
-            expression: (B,); the recorded one by default.
+            seconds: Time in the clip, which decides where the head is.
+            expression: (B,); by default the recorded expression of that time.
         """
         values = self.expression(seconds) if expression is None else expression
         with torch.no_grad():
@@ -115,7 +121,12 @@ class TrainedAvatar:
             return drawn.transform(self.placement.world_from_head(seconds * self.fps))
 
     def gaussians(self, seconds: float, expression: np.ndarray | None = None) -> Gaussians:
-        """The whole person in the world, the body's Gaussians first; arguments as for the head."""
+        """The whole person in the world, the body's Gaussians first.
+
+        Args:
+            seconds: Time in the clip.
+            expression: (B,); by default the recorded expression of that time.
+        """
         with torch.no_grad():
             body = self.body.gaussians(seconds)
         return cat([body, self.head_gaussians(seconds, expression)])
@@ -129,33 +140,33 @@ class TrainedAvatar:
         expressions: np.ndarray,
         summary: dict,
     ) -> "TrainedAvatar":
-        """A head on a body: where it was recorded, or on its joint, where the body has one.
+        """An avatar whose head is where it was recorded or, on a skeleton, fixed to its joint.
 
         Args:
-            head: The head.
-            body: Trained around it.
+            head: The head, cropped.
+            body: The body, trained with this head in the picture.
             recorded: Where the head was in the body's recording.
-            expressions: (F, B) of its frames.
-            summary: As in the class.
+            expressions: (F, B) expression in each of the recording's frames.
+            summary: How the avatar was made.
         """
         poses = hung(recorded.world_from_canonical, body)
         placement = replace(recorded, world_from_canonical=poses)
         return cls(head, body, placement, expressions, summary)
 
     def save(self, folder: Path) -> None:
-        """Writes head and placement beside the body, which lies in `folder/body` already."""
+        """Writes head, placement and summary; the body has to lie in `folder/body` already."""
         (folder / HEAD).mkdir(parents=True, exist_ok=True)
         self.head.save(folder / HEAD)
         save_placement(folder / PLACEMENT, self.placement, self.expressions)
         self.save_summary(folder)
 
     def save_summary(self, folder: Path) -> None:
-        """Writes the file by which the folder is known, where all else lies already."""
+        """Writes `avatar.json`; head, body and placement have to lie in the folder already."""
         write_atomic(folder / ABOUT, json.dumps({"summary": self.summary}, indent=1).encode())
 
     @classmethod
     def load(cls, folder: Path | str) -> "TrainedAvatar":
-        """Reads what `save` wrote.
+        """Reads an avatar's folder, onto the CPU.
 
         Raises:
             ModelError: If the folder holds no avatar, or a damaged one.
@@ -180,7 +191,7 @@ class TrainedAvatar:
 
 
 def save_placement(file: Path, placement: Placement, expressions: np.ndarray) -> None:
-    """Writes where a head is and what drives it (F, B), frame by frame."""
+    """Writes the placement of a head and its expressions (F, B) into one file."""
     tensors = {
         "canonical_from_head": torch.from_numpy(placement.canonical_from_head),
         "world_from_canonical": torch.from_numpy(placement.world_from_canonical),
@@ -190,7 +201,7 @@ def save_placement(file: Path, placement: Placement, expressions: np.ndarray) ->
 
 
 def load_placement(file: Path) -> tuple[Placement, np.ndarray]:
-    """Reads what `save_placement` wrote.
+    """Reads the file of `save_placement`: the placement and the expressions (F, B).
 
     Raises:
         ModelError: If the file is missing or damaged.

@@ -1,4 +1,4 @@
-"""Baked bodies of either kind as Gaussians in the world."""
+"""Baked bodies, of windows or on a skeleton, as Gaussians in the world."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from ico3d.splat.gaussians import Gaussians
 
 
 class BakedBody(Protocol):
-    """A baked body through all of its clip."""
+    """A baked body that can be drawn at any time of its clip."""
 
     @property
     def fps(self) -> float:
@@ -37,11 +37,11 @@ class BakedBody(Protocol):
 
 @dataclass(frozen=True)
 class WindowedBody:
-    """A `BakedBody` of windows.
+    """A `BakedBody` that consists of windows.
 
     Attributes:
-        window: Gives a window by its number.
-        windows: Their frames.
+        window: Returns the baked window of an index.
+        windows: First and last frame of each window.
         fps: Frames per second.
     """
 
@@ -56,7 +56,7 @@ class WindowedBody:
 
 @dataclass(frozen=True)
 class WholeClip:
-    """A `Span` from frame 0 to `last`."""
+    """A `Span` that covers a whole clip: from frame 0 to `last`."""
 
     last: int
     first: int = 0
@@ -64,10 +64,10 @@ class WholeClip:
 
 @dataclass(frozen=True)
 class SkinnedBody:
-    """A `BakedBody` on a skeleton that repeats what was recorded: one window.
+    """A `BakedBody` on a skeleton that repeats its recorded motion, as one window.
 
     Attributes:
-        baked: The body.
+        baked: The body as the bundle holds it.
     """
 
     baked: BakedSkinned
@@ -79,20 +79,25 @@ class SkinnedBody:
 
     @property
     def windows(self) -> Sequence[Span]:
-        """The whole clip."""
+        """One span, which is the whole clip."""
         return (WholeClip(self.baked.info.num_frames - 1),)
 
     def window_gaussians(self, index: int, tau: float) -> Gaussians:
-        """The Gaussians in the recorded pose at τ in [0, 1] of the clip."""
+        """The Gaussians in the world, in the recorded pose at τ in [0, 1] of the clip.
+
+        Args:
+            index: 0, the only window.
+            tau: Time in the clip, 0 at the first frame and 1 at the last.
+        """
         frame = tau * self.windows[index].last
         return skinned_gaussians(self.baked, recorded_pose(self.baked, frame))
 
 
 def body_of(bundle: Bundle) -> WindowedBody | SkinnedBody:
-    """The body in a bundle; its windows are read as they come.
+    """The body in a bundle; each window is read when it is first drawn.
 
     Raises:
-        BundleError: If there is none.
+        BundleError: If the bundle has no body.
     """
     if bundle.skinned is not None:
         return SkinnedBody(bundle.skinned)
@@ -103,12 +108,20 @@ def body_of(bundle: Bundle) -> WindowedBody | SkinnedBody:
 
 
 def gaussians_at(body: BakedBody, seconds: float) -> Gaussians:
-    """A body in the world; before its first and after its last frame it stands still."""
+    """A body in the world at a time in seconds, which is clamped to the clip."""
     return body.window_gaussians(*place_in(body.windows, seconds * body.fps))
 
 
 def place_in(spans: Sequence[Span], frame: float) -> tuple[int, float]:
-    """The window that shows a frame, which is clamped to the clip, and τ in it."""
+    """Which window shows a frame, and when in that window.
+
+    Args:
+        spans: The windows, in order of time.
+        frame: Need not be whole; it is clamped to the clip.
+
+    Returns:
+        Index of the window, and τ in [0, 1].
+    """
     frame = min(max(frame, 0.0), spans[-1].last)
     index = next(i for i, span in enumerate(spans) if frame <= span.last)
     span = spans[index]
@@ -135,8 +148,8 @@ def skinned_gaussians(
 
     Args:
         baked: The body.
-        pose: How it stands.
-        count: Draws so many, the most important ones; by default all N.
+        pose: Pose of the skeleton, with the coefficients of the residual shapes.
+        count: Number of Gaussians, the most important ones; by default all N.
     """
     found = posed(baked, pose, count)
     return Gaussians(

@@ -1,4 +1,4 @@
-"""Where the camera of a film goes: around the person, or from key camera to key camera."""
+"""Camera paths of films: an orbit around the person, or a path through key cameras."""
 
 import json
 from collections.abc import Sequence
@@ -15,14 +15,18 @@ from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError, SettingsError
 
 AIR = 1.15
-"""How much larger the picture is than the person in it."""
+"""Size of an orbit's picture as a multiple of the person's size in it."""
 AWAY = 3.5
-"""Distance of an orbit, in halves of the person's larger side, where no capture says better."""
+"""Distance of the camera from the person's middle where no capture gives an orbit.
+
+In halves of the longest side of the person's bounding box.
+"""
 ELEVATION = np.radians(8)
-"""Angle of an orbit above the person's middle, where no capture says better."""
+"""Elevation of the camera above the person's middle, radians, where no capture gives an orbit."""
 OPPOSITE = np.radians(179)
-"""Turn between two key cameras from which on there is no shortest way."""
+"""Largest rotation between successive key cameras, radians: at π the shortest way is ambiguous."""
 FIELD_OF_VIEW = 40.0
+"""Vertical field of view of key cameras that name none, degrees."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +34,9 @@ class Ring:
     """The circle of an orbit.
 
     Attributes:
-        middle: (3,) what the camera looks at.
-        up: (3,) unit vector, the axis.
-        start: (3,) where the camera begins.
+        middle: (3,) point that the camera looks at, metres.
+        up: (3,) axis of the circle, of length 1.
+        start: (3,) first position of the camera, metres.
     """
 
     middle: np.ndarray
@@ -41,7 +45,11 @@ class Ring:
 
 
 def ring_around(points: np.ndarray) -> Ring:
-    """A circle around a person (P, 3) who stands in a world with y up and looks along z."""
+    """An orbit that begins in front of a person who looks along +z in a world with y up.
+
+    Args:
+        points: (P, 3) positions of the person's Gaussians in the world.
+    """
     low, high = points.min(0), points.max(0)
     middle, away = (low + high) / 2, AWAY * float((high - low).max()) / 2
     toward = np.array([0.0, np.sin(ELEVATION), np.cos(ELEVATION)])
@@ -49,11 +57,13 @@ def ring_around(points: np.ndarray) -> Ring:
 
 
 def ring_of(cameras: Sequence[Camera], points: np.ndarray) -> Ring:
-    """The circle nearest to recording cameras; it begins at the azimuth of the first.
+    """An orbit at the mean distance and height of recording cameras.
+
+    It begins at the azimuth of the first camera.
 
     Args:
-        cameras: They look at one place from different sides.
-        points: (P, 3) the person, who decides how high the middle is.
+        cameras: Cameras that look at one place from different sides.
+        points: (P, 3) positions of the person's Gaussians, for the height of the orbit's middle.
 
     Raises:
         CaptureError: If the cameras do not stand around anything.
@@ -75,14 +85,14 @@ def ring_of(cameras: Sequence[Camera], points: np.ndarray) -> Ring:
 
 
 def orbit(ring: Ring, points: np.ndarray, count: int, width: int, height: int) -> list[Camera]:
-    """Cameras on one turn of a circle, as far zoomed in as shows the whole person from all sides.
+    """Cameras on one turn of an orbit, with the field of view that holds the person throughout.
 
     Args:
-        ring: The circle.
-        points: (P, 3) the person.
-        count: How many cameras; the turn closes after the last.
+        ring: The orbit.
+        points: (P, 3) positions of the person's Gaussians in the world.
+        count: Number of cameras; one step after the last would be the first again.
         width: Width of the picture in pixels.
-        height: Its height.
+        height: Height of the picture in pixels.
     """
     fov = _enclosing_fov(ring, points, width / height)
     arm = ring.start - ring.middle
@@ -96,7 +106,7 @@ def orbit(ring: Ring, points: np.ndarray, count: int, width: int, height: int) -
 
 
 def _enclosing_fov(ring: Ring, points: np.ndarray, aspect: float) -> float:
-    """Vertical field of view, degrees, in which a person stays through the whole turn."""
+    """Vertical field of view, degrees, that holds a person (P, 3) through a whole orbit."""
     offsets = points - ring.middle
     heights = np.abs(offsets @ ring.up)  # (P,)
     around = np.linalg.norm(offsets - (offsets @ ring.up)[:, None] * ring.up, axis=1)  # (P,)
@@ -113,15 +123,16 @@ def _camera(eye, target, up, fov: float, width: int, height: int) -> Camera:
 def read_key_cameras(file: Path, width: int, height: int) -> list[Camera]:
     """Reads `{"cameras": [{"eye": [x, y, z], "target": [x, y, z], "up": …, "fov_y": …}, …]}`.
 
-    Metres in the world of the model; `up` is y where it is left out, `fov_y` 40 degrees.
+    Positions are metres in the world of the model. `up` is +y by default, `fov_y` (the vertical
+    field of view) 40 degrees.
 
     Args:
         file: The JSON file.
         width: Width of the picture in pixels.
-        height: Its height.
+        height: Height of the picture in pixels.
 
     Raises:
-        SettingsError: If it cannot be read, or makes no sense.
+        SettingsError: If the file cannot be read, or a camera in it makes no sense.
     """
     try:
         entries = json.loads(file.read_text())["cameras"]
@@ -137,10 +148,12 @@ def read_key_cameras(file: Path, width: int, height: int) -> list[Camera]:
 
 
 def _key_camera(entry: dict, width: int, height: int) -> Camera:
-    """One entry of a file.
+    """The camera of one entry in a file of key cameras.
 
     Raises:
-        ValueError: If a value makes no sense.
+        KeyError: If `eye` or `target` is missing.
+        TypeError: If a value has the wrong type.
+        ValueError: If a key is unknown, or a value makes no sense.
     """
     unknown = set(entry) - {"eye", "target", "up", "fov_y"}
     if unknown:
@@ -159,16 +172,17 @@ def _key_camera(entry: dict, width: int, height: int) -> Camera:
 
 
 def through(keys: Sequence[Camera], count: int) -> list[Camera]:
-    """Cameras from the first key camera to the last, equally long from key to key.
+    """Cameras on a path from the first key camera to the last, as long for each pair of keys.
 
-    Poses run along geodesics of SE(3), P·exp(s·log(P⁻¹·Q)), focal lengths geometrically.
+    From a key pose P to the next, Q, poses follow the geodesic P·exp(s·log(P⁻¹·Q)) of SE(3), and
+    focal lengths are interpolated geometrically.
 
     Args:
         keys: Key cameras of one picture size.
-        count: How many cameras.
+        count: Number of cameras to return.
 
     Raises:
-        SettingsError: If one key camera looks the opposite way of the one before.
+        SettingsError: If successive key cameras are turned by half a turn (`OPPOSITE`).
     """
     if len(keys) == 1:
         return list(keys) * count
@@ -190,7 +204,14 @@ def through(keys: Sequence[Camera], count: int) -> list[Camera]:
 
 
 def _mixed(before: Camera, after: Camera, part: float, pose: np.ndarray) -> Camera:
-    """A camera at a pose whose focal length lies between those of two others."""
+    """A camera with focal lengths between those of two cameras.
+
+    Args:
+        before: Camera for part 0; size and principal point are taken from it.
+        after: Camera for part 1.
+        part: From 0 to 1.
+        pose: (4, 4) `camera_to_world` of the result.
+    """
     intrinsics = before.intrinsics.copy()
     for axis in (0, 1):
         ratio = after.intrinsics[axis, axis] / before.intrinsics[axis, axis]

@@ -1,4 +1,4 @@
-"""Recorded pictures of a clip, and what is drawn of somebody beside them."""
+"""Recorded pictures of a clip, and a model's rendering from the same camera and time."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -15,21 +15,21 @@ from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
 VIEWS = 24
-"""Pictures of a window that are looked at."""
+"""Default number of pictures of a window that are compared."""
 At = Callable[[float], Gaussians]
-"""Somebody in the world at τ in [0, 1] of a span of time."""
+"""Returns a person's Gaussians in the world at τ in [0, 1] of a window or clip."""
 
 
 @dataclass(frozen=True)
 class View:
-    """A camera at a time of a window; picture and mask where they were recorded.
+    """A camera at a time of a window, with what it recorded there, if it did.
 
     Attributes:
         camera: The camera in the world.
-        tau: Moment of the window, 0 to 1.
-        background: (3,) or (H, W, 3) what stands behind the person.
-        truth: (H, W, 3), or None.
-        mask: (H, W) the person, or None.
+        tau: Time in the window, 0 at its first frame and 1 at its last.
+        background: (3,) or (H, W, 3) colour behind the person.
+        truth: (H, W, 3) recorded picture; None where nothing was recorded.
+        mask: (H, W) mask of the person; None where there is none.
     """
 
     camera: Camera
@@ -40,10 +40,15 @@ class View:
 
 
 def recorded_views(capture: Capture, span: Span, count: int = VIEWS) -> Iterator[View]:
-    """Pictures of the test cameras, or of all where none tests, spread over a window.
+    """Recorded pictures, spread evenly over the cameras that measure and the frames of a window.
 
-    One at a time: large recordings do not fit into memory. Where the capture lacks a clean
-    background, the person is cut out over a neutral colour.
+    They are read one at a time, as large recordings do not fit into memory. Where the capture
+    lacks a clean background, the person is cut out over a neutral colour.
+
+    Args:
+        capture: The recording.
+        span: The window.
+        count: Number of pictures at most.
     """
     frames, cameras = range(span.first, span.last + 1), measuring_cameras(capture)
     pairs = [(camera, frame) for frame in frames for camera in cameras]
@@ -54,12 +59,20 @@ def recorded_views(capture: Capture, span: Span, count: int = VIEWS) -> Iterator
 
 
 def measuring_cameras(capture: Capture) -> tuple[int, ...]:
-    """The test cameras, or all where none tests."""
+    """Indices of the cameras that measure: the test cameras, or all where there are none."""
     return capture.split.test_cameras or tuple(range(len(capture.cameras)))
 
 
 def recorded_view(capture: Capture, camera: int, frame: int, span: Span) -> View | None:
-    """One recorded picture; None where there is none, or nobody in it."""
+    """One recorded picture; None where there is no picture, or the mask shows nobody in it.
+
+    Args:
+        capture: The recording; without a clean background, the masked person is put over a neutral
+            colour.
+        camera: Index of the camera.
+        frame: Index of the frame.
+        span: The window in which the view's τ is told.
+    """
     truth, mask = capture.image(camera, frame), capture.mask(camera, frame)
     if truth is None or (mask is not None and not mask.any()):
         return None
@@ -73,7 +86,7 @@ def recorded_view(capture: Capture, camera: int, frame: int, span: Span) -> View
 
 
 def drawn(person: At, view: View) -> tuple[np.ndarray, np.ndarray]:
-    """What a view shows of somebody: (H, W, 3) and alpha (H, W)."""
+    """Renders a person for a view: RGB (H, W, 3) and alpha (H, W), float32."""
     with torch.no_grad():
         rendered = render(person(view.tau), [view.camera], view.background)
     return rendered.rgb[0].cpu().numpy(), rendered.alpha[0].cpu().numpy()

@@ -1,4 +1,4 @@
-"""A head on a skeleton: it hangs rigidly on its joint, in recorded poses and in any other."""
+"""A head on a skeleton: it is fixed rigidly to the head's joint, in every pose."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,7 +12,7 @@ from ico3d.rig.rig import Rig
 
 
 def head_joint(rig: Rig) -> int | None:
-    """The joint that carries the head; None in a rig that lacks the roles of a person."""
+    """Index of the joint that carries the head; None in a rig that lacks a person's joints."""
     try:
         return cast(rig).joints["head"][-1]
     except SettingsError:
@@ -20,7 +20,7 @@ def head_joint(rig: Rig) -> int | None:
 
 
 def rig_of(body: TrainedBody) -> Rig | None:
-    """The skeleton of a body; None of a body of windows."""
+    """The skeleton of a trained body; None for a body of windows, which has none."""
     model = body.models[0]
     if not isinstance(model.motion, Skinned):
         return None
@@ -29,21 +29,28 @@ def rig_of(body: TrainedBody) -> Rig | None:
 
 
 def trained_poses(body: TrainedBody) -> tuple[np.ndarray, np.ndarray]:
-    """Rotations (F, J, 4) and roots (F, 3) of a body on a skeleton, as they were trained."""
+    """The trained pose of each frame of a body on a skeleton.
+
+    Returns:
+        (F, J, 4) unit quaternions wxyz, one per joint, and (F, 3) translations of the root in
+        metres; float64.
+    """
     shared = body.models[0].shared
     rotations = shared["pose_rotations"].detach().cpu().double().numpy()  # (F, J, 4)
     return normalized(rotations), shared["pose_roots"].detach().cpu().double().numpy()
 
 
 def hung(world_from_canonical: np.ndarray, body: TrainedBody) -> np.ndarray:
-    """Head poses as the joint carries the head: on average over the clip where it was recorded.
+    """Head poses of a head that is fixed rigidly to its joint.
+
+    Its pose relative to the joint is the mean of the recorded poses relative to the joint.
 
     Args:
-        world_from_canonical: (F, 4, 4) rigid, as recorded.
-        body: With a trained pose for each of the frames.
+        world_from_canonical: (F, 4, 4) rigid head poses, as recorded.
+        body: A body with a trained pose for each of the F frames.
 
     Returns:
-        (F, 4, 4); what was recorded where the body has no joint for its head.
+        (F, 4, 4) rigid; the recorded poses unchanged where the body has no joint for its head.
     """
     rig = rig_of(body)
     joint = None if rig is None else head_joint(rig)

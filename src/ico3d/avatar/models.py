@@ -1,4 +1,4 @@
-"""Which folder holds which kind of model; one table that every verb asks."""
+"""Opens model folders and bundles: one table tells every verb which kind a folder holds."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from ico3d.scene.model_folder import ABOUT as SCENE
 from ico3d.scene.model_folder import TrainedScene
 
 Model = TrainedAvatar | TrainedBody | TrainedHead | TrainedScene | Bundle
-"""What can be opened."""
+"""All kinds of models that can be opened."""
 M = TypeVar("M", bound=Model)
 
 
@@ -28,11 +28,11 @@ class Kind:
     """One kind of model.
 
     Attributes:
-        name: What an error calls it.
-        file: The file by which a folder is known to hold one.
-        model: Its class.
-        read: Opens one, onto the CPU.
-        verb: Which verb of `ico3d` makes one.
+        name: The kind as error messages call it, such as "a body".
+        file: Name of the file that marks a folder of this kind.
+        model: Class of the opened model.
+        read: Opens a model of this kind, onto the CPU.
+        verb: The verb of `ico3d` that makes such models.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Kind:
     verb: str
 
     def __str__(self):
-        """The name, with the file and the verb."""
+        """Name, file and verb of the kind, for error messages."""
         return f"{self.name} ({self.file}, made by ico3d {self.verb})"
 
 
@@ -53,19 +53,20 @@ KINDS = (
     Kind("a static scene", SCENE, TrainedScene, TrainedScene.load, "train static"),
     Kind("a bundle", MANIFEST, Bundle, Bundle.open, "bake"),
 )
-"""The first whose file lies in a folder opens it; a bundle may be a single file, too."""
+"""All kinds, in the order in which a folder is tested; a bundle may be a single file, too."""
 
 
 def open_model(path: Path | str, *models: type[M]) -> M:
     """Opens a model folder or a bundle, onto the CPU.
 
     Args:
-        path: The folder, or the bundle; `demo` is the packaged one, where bundles are wanted.
-        models: The kinds that the caller can use.
+        path: The folder or bundle. Where `models` contains `Bundle`, "demo" names the bundle in
+            the package.
+        models: Classes of the models that the caller can use.
 
     Raises:
-        ModelError: If it holds none of them, or a damaged one.
-        BundleError: If it is a damaged bundle.
+        ModelError: If the path holds none of these kinds, or a damaged model.
+        BundleError: If the path is a damaged bundle.
     """
     path = bundle_path(path) if Bundle in models else Path(path)
     found = _kind_of(path)
@@ -77,7 +78,7 @@ def open_model(path: Path | str, *models: type[M]) -> M:
 
 
 def _kind_of(path: Path) -> Kind | None:
-    """What a path holds; any file is taken for a bundle."""
+    """The kind of model at a path, None if unknown; any single file is taken for a bundle."""
     return next((kind for kind in KINDS if _is(path, kind)), None)
 
 
@@ -86,7 +87,7 @@ def _is(path: Path, kind: Kind) -> bool:
 
 
 def _refusal(path: Path, found: Kind | None, wanted: list[Kind]) -> str:
-    """What there is instead, and what was expected."""
+    """Error message: what the path holds, and which kinds were expected."""
     *names, last = map(str, wanted)
     expected = f"{', '.join(names)} or {last}" if names else last
     if not path.exists():

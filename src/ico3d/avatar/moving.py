@@ -1,4 +1,4 @@
-"""What moves through the time of a clip: bodies and whole persons."""
+"""Protocols of what moves through the time of a clip: bodies and whole persons."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -9,9 +9,9 @@ import torch
 from ico3d.splat.gaussians import Gaussians
 
 MOMENTS = 9
-"""Of a clip, at which is looked where the person goes."""
+"""Number of moments of a clip that are sampled to find the space a person fills."""
 SEEN = 0.1
-"""Opacity from which a Gaussian counts for where the person is."""
+"""Opacity above which a Gaussian counts for the space a person fills."""
 
 
 class Span(Protocol):
@@ -29,11 +29,11 @@ class Span(Protocol):
 
 
 class MovingBody(Protocol):
-    """What is baked: `ico3d.body.model_folder.TrainedBody`, or anything that moves like it.
+    """A body that can be baked: `ico3d.body.model_folder.TrainedBody`, or one of its shape.
 
     Attributes:
         fps: Frames per second.
-        summary: How it was made; `capture` is the provenance of its recording.
+        summary: How the body was made; key `capture` has the provenance of its recording.
     """
 
     fps: float
@@ -45,25 +45,33 @@ class MovingBody(Protocol):
         ...
 
     def window_gaussians(self, index: int, tau: float) -> Gaussians:
-        """The Gaussians of a window at τ in [0, 1], with `colors`; always equally many."""
+        """The Gaussians of a window in the world at τ in [0, 1].
+
+        They have `colors`, and their number is the same at every τ of a window.
+        """
         ...
 
 
 class Moving(Protocol):
-    """Somebody who moves: `ico3d.body.model_folder.TrainedBody`, or anything that moves like it."""
+    """A moving person as Gaussians of the time, such as `ico3d.body.model_folder.TrainedBody`."""
 
     @property
     def seconds(self) -> float:
-        """How long the clip lasts."""
+        """Length of the clip in seconds."""
         ...
 
     def gaussians(self, seconds: float) -> Gaussians:
-        """Activated Gaussians in the world at a time."""
+        """Activated Gaussians in the world at a time in seconds."""
         ...
 
 
 def back_and_forth(seconds: float, length: float) -> float:
-    """The moment of a clip of some length that shows after so many seconds of endless play."""
+    """Time in a clip that plays forwards and backwards without end.
+
+    Args:
+        seconds: How long it has been playing.
+        length: Length of the clip in seconds; where it is 0, the result is 0.
+    """
     if length <= 0:
         return 0.0
     around = seconds % (2 * length)
@@ -72,7 +80,10 @@ def back_and_forth(seconds: float, length: float) -> float:
 
 @torch.no_grad()
 def extent(person: Moving) -> np.ndarray:
-    """(P, 3) places that somebody fills in the course of the clip, without stray Gaussians."""
+    """(P, 3) float64 positions of a person's visible Gaussians at moments of the whole clip.
+
+    Strays are left out: those beyond the 0.2 % and 99.8 % quantile of a coordinate.
+    """
     places = []
     for moment in np.linspace(0, person.seconds, MOMENTS):
         gaussians = person.gaussians(float(moment))

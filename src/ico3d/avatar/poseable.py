@@ -31,23 +31,29 @@ from ico3d.rig.rig import Rig
 from ico3d.splat.gaussians import Gaussians, cat
 
 DrawBody = Callable[[Array, Array], Gaussians]
-"""Rotations (J, 4) wxyz and the root's shift (3,) → the body in the world."""
+"""Draws a body in the world.
+
+Takes the joints' rotations (J, 4) wxyz and the root's translation (3,) in metres.
+"""
 DrawHead = Callable[[Array, np.ndarray], Gaussians]
-"""How the head moves (4, 4) from where it was recorded, and an expression (B,) → the head in the
-world."""
+"""Draws a head in the world.
+
+Takes the rigid motion (4, 4) from the head's recorded place, and the expression (B,).
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Poseable:
-    """Somebody on a skeleton, who stands where they stood in one recorded frame.
+    """A person on a skeleton who can take any pose, standing where one recorded frame has them.
 
     Attributes:
-        living: How they stand.
-        recorded: Rotations (J, 4) and root (3,) of that frame.
+        living: How the person stands and breathes.
+        recorded: Rotations (J, 4) wxyz and root (3,) in metres of that recorded frame.
         body: Draws the body.
-        head: Draws the head; None where there is a body alone.
-        known: Their gestures; None makes those of the package.
-        made: What they made in their recording, which comes before gestures of the package.
+        head: Draws the head; None for a body without one.
+        known: Gestures by name; None takes `made` and the package's gestures.
+        made: Gestures by name from the person's recording; they replace the package's gestures of
+            the same meaning.
     """
 
     living: Living
@@ -59,18 +65,22 @@ class Poseable:
 
     @cached_property
     def clips(self) -> dict[str, Clip]:
-        """Their gestures by name."""
+        """The person's gestures by name."""
         if self.known is not None:
             return self.known
         return preferring(self.made, library(self.living.person, hung=self.living.hung))
 
     @cached_property
     def footing(self) -> Footing:
-        """Where they stand."""
+        """How to place poses so that the person stands where the recorded frame has them."""
         return footing(self.living, *self.recorded)
 
     def performer(self, seed: int) -> Performer:
-        """Them, at rest, before they are told what to do."""
+        """A performer of this person, at rest.
+
+        Args:
+            seed: Seed of the small movements at rest.
+        """
         return Performer(replace(self.living, seed=seed), self.clips)
 
     @torch.no_grad()
@@ -78,9 +88,9 @@ class Poseable:
         """The whole person in the world, the body's Gaussians first.
 
         Args:
-            by_role: (R, 4) as `Performer` gives it.
-            root: (3,) metres that the root moves in rest space.
-            expression: (B,) of the face, where there is one.
+            by_role: (R, 4) rotations by role, as from `Performer.at`.
+            root: (3,) translation of the root in rest space, metres.
+            expression: (B,); not used without a head.
         """
         pose = self.footing.place(self.living.person.retarget.pose(by_role), root)
         body = self.body(*pose)
@@ -88,11 +98,11 @@ class Poseable:
 
     @torch.no_grad()
     def head_in(self, rotations: Array, root: Array, expression: np.ndarray) -> Gaussians:
-        """The head alone in a pose of the rig in the world; there must be one.
+        """The head alone, in the world, for a pose of the rig; the person must have a head.
 
         Args:
-            rotations: (J, 4) wxyz of each joint about itself.
-            root: (3,) metres that the root moves from rest.
+            rotations: (J, 4) local rotation of each joint, wxyz.
+            root: (3,) translation of the root from rest, metres.
             expression: (B,).
         """
         assert self.head is not None
@@ -107,16 +117,18 @@ def poseable_of(
     frame: int | None,
     cuts: Sequence[Cut] | None = None,
 ) -> Poseable | None:
-    """Somebody as a model has them.
+    """The poseable person of a trained model or bundle.
 
     Args:
-        model: Whoever can be posed; the face of a trained one takes expressions as recorded.
-        frame: In which they stand as they shall; by default the middle of the recording.
-        cuts: Gestures in the recording of a trained model; None finds them by rule. A bundle has
-            its own.
+        model: Avatar, body or bundle. The head of an avatar takes recorded expressions
+            (`TrainedHead.recorded`), that of a bundle takes expressions as speech drives them.
+        frame: Recorded frame that says where the person stands; by default the middle frame.
+        cuts: Gestures in the recording of a trained model; None finds them by rule. Not used for
+            bundles, which have their own.
 
     Returns:
-        None where the body has no skeleton, or one without the joints that gestures need.
+        The person; None where the body has no skeleton, or one without the joints that gestures
+        need.
     """
     try:
         if isinstance(model, Bundle):

@@ -1,4 +1,4 @@
-"""What a body on a skeleton did in its recording, and the file that says so."""
+"""The recorded motion of a body on a skeleton, and `clips.toml`, which cuts it into gestures."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from ico3d.motion.recorded.recording import Recording, recording_of
 
 
 def recording_of_body(body: TrainedBody) -> Recording | None:
-    """How a body moved, in its trained poses; None without a skeleton that has a person's roles."""
+    """The motion of a body's trained poses; None without a skeleton that has a person's joints."""
     rig = rig_of(body)
     if rig is None:
         return None
@@ -21,10 +21,10 @@ def recording_of_body(body: TrainedBody) -> Recording | None:
 
 
 def read_cuts(folder: Path, body: TrainedBody) -> tuple[Cut, ...] | None:
-    """The `clips.toml` of a model's folder; None where nobody put one there.
+    """Reads `clips.toml` of a model's folder; None where there is no such file.
 
     Raises:
-        SettingsError: If it makes no sense, or is of another body.
+        SettingsError: If the file makes no sense, or belongs to another body.
     """
     file = folder / CUTS
     if not file.is_file():

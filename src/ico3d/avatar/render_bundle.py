@@ -22,7 +22,7 @@ from ico3d.splat.render import render
 
 
 def baked_gaussians(head: BakedHead, expression: np.ndarray) -> Gaussians:
-    """The Gaussians (N) of an expression (B,) in canonical head space."""
+    """The N Gaussians of a baked head for an expression (B,), in canonical head space."""
     rgb, opacity = attributes(head, expression)
     return Gaussians(
         means=torch.tensor(head.means),
@@ -38,9 +38,9 @@ class BakedAvatar:
     """A whole person as a viewer draws it.
 
     Attributes:
-        head: The baked head in the space of the head poses.
+        head: The baked head, in the canonical head space that the head poses map to the world.
         body: The baked body.
-        world_from_head: (F, 4, 4) rigid, one per frame.
+        world_from_head: (F, 4, 4) rigid head pose in each frame of the body.
     """
 
     head: BakedHead
@@ -52,7 +52,7 @@ class BakedAvatar:
         """The person in a bundle.
 
         Raises:
-            BundleError: If it lacks the body or the head.
+            BundleError: If the bundle lacks the body or the head.
         """
         body = body_of(bundle)
         head, poses = bundle.require_head()
@@ -65,14 +65,14 @@ class BakedAvatar:
 
     @property
     def seconds(self) -> float:
-        """How long the clip lasts."""
+        """Length of the clip in seconds."""
         return self.body.windows[-1].last / self.fps
 
     def gaussians(self, seconds: float, expression: Sequence[float] | np.ndarray) -> Gaussians:
-        """In the world, the body's Gaussians first; the body's time places the head.
+        """The whole person in the world, the body's Gaussians first.
 
         Args:
-            seconds: Where in the body's motion; clamped to it.
+            seconds: Time in the body's clip, clamped to it; it also decides where the head is.
             expression: (B,).
         """
         head = baked_gaussians(self.head, np.asarray(expression, np.float32))
@@ -80,17 +80,17 @@ class BakedAvatar:
         return cat([self.body_gaussians(seconds), head.transform(pose)])
 
     def body_gaussians(self, seconds: float) -> Gaussians:
-        """The body alone, in the world."""
+        """The body alone, in the world, at a time of its clip."""
         return gaussians_at(self.body, seconds)
 
 
 def pose_at(world_from_head: np.ndarray, frame: float) -> np.ndarray:
-    """(4, 4) of poses (F, 4, 4) at a frame, which is clamped; between frames lerp and slerp."""
+    """(4, 4) head pose at a frame, interpolated as by `Placement.pose`, from poses (F, 4, 4)."""
     return Placement(np.eye(4), world_from_head).pose(frame)
 
 
 def body_gaussians(bundle: Bundle, seconds: float) -> Gaussians:
-    """The body at a time; before its first and after its last frame it stands still.
+    """A bundle's body in the world at a time, which is clamped to the clip.
 
     Raises:
         BundleError: If the bundle has no body.
@@ -110,10 +110,13 @@ def avatar_gaussians(
 
 
 def backdrop_gaussians(bundle: Bundle) -> Gaussians | None:
-    """What stands behind the person, in the world, without harmonics; None where nothing does.
+    """The bundle's background splats in the world, with colours instead of spherical harmonics.
+
+    Returns:
+        The Gaussians; None where the bundle has no background splats.
 
     Raises:
-        GaussianFileError: If the file is damaged.
+        GaussianFileError: If the file of splats is damaged.
     """
     if bundle.background is None:
         return None
@@ -137,10 +140,10 @@ def render_avatar(
 
     Args:
         bundle: A bundle of a head and a body.
-        body_seconds: Where in the body's motion.
+        body_seconds: Time in the body's clip, clamped to it.
         expression: (B,).
         camera: The camera in world space.
-        background: (3,) or (H, W, 3); the bundle's own colour by default.
+        background: (3,) or (H, W, 3) display RGB in [0, 1]; the bundle's own colour by default.
 
     Raises:
         BundleError: If the bundle lacks the body or the head.
@@ -153,7 +156,15 @@ def render_avatar(
 
 
 def render_body(bundle: Bundle, seconds: float, camera: Camera) -> np.ndarray:
-    """Renders a bundle's body as a viewer does: (H, W, 3) float32 display RGB.
+    """Renders a bundle's body, without its head, as a viewer does.
+
+    Args:
+        bundle: A bundle of a body.
+        seconds: Time in the body's clip, clamped to it.
+        camera: The camera in world space.
+
+    Returns:
+        (H, W, 3) float32 display RGB before the bundle's own background colour.
 
     Raises:
         BundleError: If the bundle has no body.
@@ -171,14 +182,14 @@ def render_bundle(
     background: np.ndarray | None = None,
     world_from_head: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Renders a bundle's head as a viewer does.
+    """Renders a bundle's head, without its body, as a viewer does.
 
     Args:
-        bundle: The avatar.
+        bundle: A bundle of a head.
         expression: (B,).
         camera: The camera in world space.
-        background: (3,) or (H, W, 3); the bundle's own colour by default.
-        world_from_head: (4, 4); the bundle's first head pose by default.
+        background: (3,) or (H, W, 3) display RGB in [0, 1]; the bundle's own colour by default.
+        world_from_head: (4, 4) rigid head pose; the bundle's first one by default.
 
     Returns:
         (H, W, 3) float32 display RGB.
@@ -196,7 +207,7 @@ def render_bundle(
 
 
 def visitor_camera(info: CameraInfo, width: int, height: int) -> Camera:
-    """The manifest's camera as a pinhole camera of this size."""
+    """The manifest's camera as a pinhole camera with a picture of this size in pixels."""
     focal = 0.5 * height / np.tan(np.deg2rad(info.fov_y) / 2)
     intrinsics = np.array([[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]])
     pose = look_at(np.array(info.eye), np.array(info.target), np.array(info.up))

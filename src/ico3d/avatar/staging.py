@@ -1,4 +1,4 @@
-"""How a baked avatar is presented: motion, the visitor's camera, background, thumbnail."""
+"""How a baked avatar is presented: idle motion, the visitor's camera, background, thumbnail."""
 
 import io
 from collections.abc import Iterable, Sequence
@@ -17,26 +17,32 @@ from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
 LONGEST = 10.0
-"""Seconds of head motion in a bundle."""
+"""Seconds of head motion in a bundle, at most."""
 _ARM = 0.1
-"""Metres from the head's centre at which a turn counts as a move."""
+"""Distance in metres from the head's origin at which the speed of turning is measured."""
 _SMOOTHING = 1.5
 """Standard deviation, in frames, of the smoothing of head poses (trackers jitter)."""
 _MARGIN = 1.2
+"""Size of the visitor's first picture as a multiple of the person's size in it."""
 _BODY_FOV, _BODY_MARGIN = 30.0, 1.3
-"""The margin leaves room for the player's bar below the feet."""
+"""A body's visitor: vertical field of view in degrees, and size of the view over the body's.
+
+The margin leaves room for the player's bar below the feet.
+"""
 _THUMBNAIL = 384
+"""Width and height of the thumbnail in pixels."""
 NEUTRAL = (0.84, 0.86, 0.88)
-"""Background where the capture has none: a light grey."""
+"""Background colour, a light grey, where the capture has no clean background."""
 
 
 def idle_motion(capture: Capture) -> np.ndarray:
-    """The stretch of head poses that best plays back and forth.
+    """The span of head poses that looks best when it is played back and forth.
 
-    It turns around at both ends, so the head should be slow there, and smooth in between.
+    Playback turns around at both ends, so the head should be slow there, and smooth in between.
 
     Returns:
-        (F, 4, 4) float64 at the capture's rate, F ≤ 10 s; one identity where there are no poses.
+        (F, 4, 4) float64 smoothed head poses at the capture's rate, 10 s at most; (1, 4, 4), the
+        identity, where there are no poses.
     """
     poses = _longest_run([capture.world_from_head(f) for f in range(capture.num_frames)])
     if len(poses) == 0:
@@ -49,17 +55,17 @@ def idle_motion(capture: Capture) -> np.ndarray:
 
 
 def frontal_camera(capture: Capture) -> int:
-    """The camera that sees the face most from the front, by the symmetry of its landmarks."""
+    """Index of the camera that sees the face most from the front, by symmetry of landmarks."""
     asymmetry = [_asymmetry(capture, camera) for camera in range(len(capture.cameras))]
     return int(np.argmin(asymmetry))
 
 
 def visitor_view(camera: Camera, points: np.ndarray) -> CameraInfo:
-    """Where the visitor starts: at the capture's camera, turned and zoomed to frame the person.
+    """The visitor's first camera: at the capture's camera, turned and zoomed to frame the person.
 
     Args:
         camera: The frontal camera, in world space.
-        points: (P, 3) world positions of the Gaussians that are seen.
+        points: (P, 3) world positions of the visible Gaussians, metres.
     """
     pixels, depths = camera.project(points)  # (P, 2), (P,)
     inside = depths > 0
@@ -67,8 +73,8 @@ def visitor_view(camera: Camera, points: np.ndarray) -> CameraInfo:
     size = np.array([camera.width, camera.height], float)
     low, high = np.clip(low, 0, size), np.clip(high, 0, size)
     centre, half = (low + high) / 2, (high - low).max() / 2 * _MARGIN
-    half = min(max(half, 1.0), size[1] / 2)  # never wider than what was recorded
-    centre[1] = min(centre[1], size[1] - half)  # nor lower: there the body just ends
+    half = min(max(half, 1.0), size[1] / 2)  # never taller than the recorded picture
+    centre[1] = min(centre[1], size[1] - half)  # nor below its lower edge, where the person ends
     ray = np.linalg.inv(camera.intrinsics) @ [*centre, 1.0]
     rotation, eye = camera.world_to_camera[:3, :3], camera.camera_to_world[:3, 3]
     target = eye + rotation.T @ ray * np.median(depths[inside])
@@ -77,7 +83,7 @@ def visitor_view(camera: Camera, points: np.ndarray) -> CameraInfo:
 
 
 def background_colour(capture: Capture, camera: int) -> tuple[float, float, float]:
-    """The mean colour of the clean background, or a light grey."""
+    """Mean RGB of a camera's clean background; a light grey where the capture has none."""
     picture = capture.background(camera)
     return NEUTRAL if picture is None else triple(picture.reshape(-1, 3).mean(axis=0))
 
@@ -85,13 +91,13 @@ def background_colour(capture: Capture, camera: int) -> tuple[float, float, floa
 def standing_view(
     low: np.ndarray, high: np.ndarray, up: np.ndarray, toward: np.ndarray
 ) -> CameraInfo:
-    """Where the visitor of a body starts: level with its middle, far enough to see all of it.
+    """The visitor's first camera before a body: level with its middle, with all of it in view.
 
     Args:
-        low: (3,) least coordinates of the body.
-        high: (3,) greatest coordinates.
-        up: (3,) upward, of length 1.
-        toward: (3,) from the body to the visitor, of length 1.
+        low: (3,) least coordinates of the body's bounding box, metres.
+        high: (3,) greatest coordinates of that box.
+        up: (3,) upward direction, of length 1.
+        toward: (3,) direction from the body to the visitor, of length 1.
     """
     middle = (low + high) / 2
     reach = np.linalg.norm(high - low) / 2 * _BODY_MARGIN
@@ -100,10 +106,14 @@ def standing_view(
 
 
 def provenance(about: dict, where: str) -> Provenance:
-    """Who was recorded, as a manifest says it.
+    """Provenance of a recording, in the form of the manifest.
+
+    Args:
+        about: Keys `kind`, `sources`, `consent` and `licence`.
+        where: Where `about` comes from, for the error message.
 
     Raises:
-        BundleError: If a part is missing.
+        BundleError: If a key is missing.
     """
     try:
         return Provenance(
@@ -117,7 +127,7 @@ def provenance(about: dict, where: str) -> Provenance:
 
 
 def joint_provenance(parts: Sequence[Provenance]) -> Provenance:
-    """That of somebody who was recorded more than once: everything that is said, once."""
+    """Provenance of a person made from several recordings; what they share is said once."""
 
     def said(values: Iterable[str]) -> tuple[str, ...]:
         return tuple(dict.fromkeys(values))
@@ -133,7 +143,13 @@ def joint_provenance(parts: Sequence[Provenance]) -> Provenance:
 def thumbnail(
     gaussians: Gaussians, info: CameraInfo, background: tuple[float, float, float]
 ) -> bytes:
-    """What a visitor sees first, as a PNG."""
+    """PNG file of what a visitor sees first.
+
+    Args:
+        gaussians: The person in the world.
+        info: The visitor's first camera.
+        background: RGB in [0, 1].
+    """
     camera = visitor_camera(info, _THUMBNAIL, _THUMBNAIL)
     with torch.no_grad():
         picture = render(gaussians, [camera], torch.tensor(background)).rgb[0]  # (H, W, 3)
@@ -143,13 +159,13 @@ def thumbnail(
 
 
 def triple(values: np.ndarray) -> tuple[float, float, float]:
-    """Three rounded numbers for a manifest."""
+    """A vector (3,) as three numbers rounded to 5 decimals, for a manifest."""
     x, y, z = (round(float(value), 5) for value in values)
     return x, y, z
 
 
 def _longest_run(poses: list[np.ndarray | None]) -> np.ndarray:
-    """The longest stretch of consecutive frames that all have a finite pose (F, 4, 4)."""
+    """(F, 4, 4) poses of the longest run of consecutive frames that all have a finite pose."""
     runs: list[list[np.ndarray]] = [[]]
     for pose in poses:
         if pose is not None and np.isfinite(pose).all():
@@ -164,7 +180,7 @@ def _smoothed(poses: np.ndarray) -> np.ndarray:
     reach = int(3 * _SMOOTHING)
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / _SMOOTHING) ** 2)
     padded = np.pad(poses, ((reach, reach), (0, 0), (0, 0)), mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, len(kernel), axis=0)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, len(kernel), axis=0)  # (F, 4, 4, K)
     mean = windows @ (kernel / kernel.sum())  # (F, 4, 4)
     u, _, vt = np.linalg.svd(mean[:, :3, :3])
     mean[:, :3, :3] = u @ vt
@@ -172,7 +188,10 @@ def _smoothed(poses: np.ndarray) -> np.ndarray:
 
 
 def _roughness(poses: np.ndarray) -> float:
-    """Speed at both ends plus mean acceleration, in metres per frame."""
+    """How badly poses (F, 4, 4) play back and forth: end speeds plus four mean accelerations.
+
+    Both are of points `_ARM` from the head's origin, in metres per frame and per frame².
+    """
     if len(poses) < 3:
         return 0.0
     tips = poses[:, :3, 3:] + _ARM * poses[:, :3, :3]  # (F, 3, 3): ends of the three axes
@@ -182,7 +201,10 @@ def _roughness(poses: np.ndarray) -> float:
 
 
 def _asymmetry(capture: Capture, camera: int) -> float:
-    """How far the nose's tip is from the middle between both jaw ends; 1 where unknown."""
+    """How unequal the distances from the nose's tip to both jaw ends are in a camera's pictures.
+
+    Mean over frames of |left − right| / (left + right): 0 from in front; 1 without landmarks.
+    """
     values = []
     for frame in spread(capture.num_frames, 8):
         landmarks = capture.landmarks(camera, frame)

@@ -1,4 +1,4 @@
-"""Whoever can be animated: trained bodies, avatars, and bundles, seen in one way."""
+"""One interface to all that can be animated: trained bodies, avatars, and bundles."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -27,36 +27,36 @@ from ico3d.splat.gaussians import Gaussians
 
 
 class Person(MovingBody, Protocol):
-    """A body, perhaps with a head."""
+    """A body that can be animated, with or without a head."""
 
     @property
     def animation(self) -> Animation | None:
-        """What lies beside it, or in the bundle; None where key frames are to be found."""
+        """Animation in the model's folder or in the bundle; None if key frames must be found."""
         ...
 
     @property
     def recording(self) -> Recording | None:
-        """How it moved; None of bodies without a skeleton of a person."""
+        """Recorded motion of the skeleton; None for a body without a person's skeleton."""
         ...
 
     @property
     def cuts(self) -> tuple[Cut, ...] | None:
-        """What it did there: beside it, or in the bundle; None where that is to be found."""
+        """Recorded gestures, from the folder or the bundle; None if they must be found by rule."""
         ...
 
     @property
     def facing(self) -> np.ndarray | None:
-        """(3,) where it looks, in the world; None where nobody knows."""
+        """(3,) direction in the world in which the person looks; None where it is unknown."""
         ...
 
     @property
     def seconds(self) -> float:
-        """How long the clip lasts."""
+        """Length of the clip in seconds."""
         ...
 
     @property
     def has_head(self) -> bool:
-        """Whether a head of its own kind is on the body."""
+        """Whether a separate model of the head is on the body."""
         ...
 
     @property
@@ -66,27 +66,27 @@ class Person(MovingBody, Protocol):
 
     @property
     def idle(self) -> np.ndarray:
-        """(B,) the face at rest; (0,) without a head."""
+        """(B,) expression of the face at rest; (0,) without a head."""
         ...
 
     def gaussians(self, seconds: float) -> Gaussians:
-        """All of the person in the world at a time."""
+        """The whole person in the world at a time in seconds."""
         ...
 
     def body_gaussians(self, seconds: float) -> Gaussians:
-        """The person's body in the world at a time, without the head."""
+        """The body in the world at a time in seconds, without the head."""
         ...
 
 
 @dataclass
 class TrainedPerson:
-    """A trained body, or the one of an avatar.
+    """A `Person` of a trained avatar or a trained body alone.
 
     Attributes:
-        body: What moves.
-        avatar: What is seen; None for a body alone.
-        animation: What lies in the model's folder as `animation.json`; None where nothing does.
-        cuts: What lies there as `clips.toml`; None where nothing does.
+        body: The trained body.
+        avatar: The avatar that the body belongs to; None for a body alone.
+        animation: Content of `animation.json` in the model's folder; None without that file.
+        cuts: Content of `clips.toml` in the model's folder; None without that file.
     """
 
     body: TrainedBody
@@ -95,14 +95,14 @@ class TrainedPerson:
     cuts: tuple[Cut, ...] | None
 
     def __post_init__(self):
-        """Takes over what the body says of itself."""
+        """Copies what `Person` asks for from the body."""
         self.fps, self.windows, self.summary = self.body.fps, self.body.windows, self.body.summary
         self.seconds, self.window_gaussians = self.body.seconds, self.body.window_gaussians
         self.recording = recording_of_body(self.body)
 
     @property
     def facing(self) -> np.ndarray | None:
-        """Where the face looks, if there is one."""
+        """(3,) direction in the world in which the face looks; None for a body alone."""
         return self.avatar and self.avatar.placement.facing
 
     @property
@@ -112,32 +112,32 @@ class TrainedPerson:
 
     @property
     def poseable(self) -> Poseable | None:
-        """On the skeleton that a body of --method skinned has."""
+        """The person in any pose of the skeleton; None unless trained with --method skinned."""
         frame = self.animation and self.animation.rest.end
         return poseable_of(self.avatar or self.body, frame, self.cuts)
 
     @property
     def idle(self) -> np.ndarray:
-        """The face as it was recorded in the first frame."""
+        """(B,) expression recorded in the first frame; (0,) for a body alone."""
         return np.zeros(0, np.float32) if self.avatar is None else self.avatar.expression(0.0)
 
     def gaussians(self, seconds: float) -> Gaussians:
-        """Body and, if there is one, head in the world at a time."""
+        """Body and, if there is one, head in the world at a time in seconds."""
         return (self.avatar or self.body).gaussians(seconds)
 
     @torch.no_grad()
     def body_gaussians(self, seconds: float) -> Gaussians:
-        """The body alone."""
+        """The body in the world at a time in seconds, without the head."""
         return self.body.gaussians(seconds)
 
 
 @dataclass
 class BakedPerson:
-    """A bundle with a body.
+    """A `Person` of a bundle with a body.
 
     Attributes:
         bundle: The opened bundle.
-        device: Where its Gaussians are drawn.
+        device: Device on which the Gaussians are returned.
         summary: Empty: a bundle does not say how its body was made.
     """
 
@@ -146,10 +146,10 @@ class BakedPerson:
     summary: dict = field(default_factory=dict)
 
     def __post_init__(self):
-        """Takes over what the manifest says of the body.
+        """Copies what `Person` asks for from the bundle.
 
         Raises:
-            BundleError: If there is none.
+            BundleError: If the bundle has no body.
         """
         self.body = body_of(self.bundle)
         self.fps = self.body.fps
@@ -162,23 +162,23 @@ class BakedPerson:
 
     @property
     def facing(self) -> np.ndarray:
-        """Towards the visitor."""
+        """(3,) direction from the visitor's target to the visitor."""
         camera = self.bundle.manifest.camera
         return np.subtract(camera.eye, camera.target)
 
     @property
     def poseable(self) -> Poseable | None:
-        """On the bundle's skeleton, with its gestures."""
+        """The person in any pose of the bundle's skeleton; None without a skeleton or gestures."""
         return poseable_of(self.bundle, self.animation and self.animation.rest.end)
 
     @property
     def idle(self) -> np.ndarray:
-        """What the manifest says."""
+        """(B,) idle expression of the manifest; (0,) without a head."""
         head = self.bundle.manifest.head
         return np.array(head.idle_expression if head else (), np.float32)
 
     def window_gaussians(self, index: int, tau: float) -> Gaussians:
-        """The Gaussians of a window."""
+        """The Gaussians of a window in the world at τ in [0, 1]."""
         return self.body.window_gaussians(index, tau).to(self.device)
 
     @property
@@ -187,11 +187,11 @@ class BakedPerson:
         return self.bundle.manifest.head is not None
 
     def body_gaussians(self, seconds: float) -> Gaussians:
-        """The body alone."""
+        """The body in the world at a time in seconds, without the head."""
         return body_gaussians(self.bundle, seconds).to(self.device)
 
     def gaussians(self, seconds: float) -> Gaussians:
-        """With an idle face, if there is a head."""
+        """Body and, if there is one, head with the idle face in the world at a time in seconds."""
         head = self.bundle.manifest.head
         if head is None:
             return body_gaussians(self.bundle, seconds).to(self.device)
@@ -203,13 +203,13 @@ def open_person(path: Path, device: torch.device) -> Person:
 
     Args:
         path: A folder of ico3d train body or ico3d assemble, or a bundle.
-        device: Where its Gaussians shall be.
+        device: Device on which the person is drawn.
 
     Raises:
-        ModelError: If it is none of them, or holds a damaged model.
-        BundleError: If the bundle is damaged or has no body, or if there is an animation that makes
-            no sense, or is for another body.
-        SettingsError: If there are cuts that make no sense, or are of another body.
+        ModelError: If the path is none of these, or holds a damaged model.
+        BundleError: If the bundle is damaged or has no body, or if the folder's `animation.json`
+            makes no sense or belongs to another body.
+        SettingsError: If the folder's `clips.toml` makes no sense or belongs to another body.
     """
     model = open_model(path, TrainedAvatar, TrainedBody, Bundle)
     if isinstance(model, Bundle):

@@ -1,4 +1,4 @@
-"""The part of a contact sheet that shows what somebody did in a recording."""
+"""The part of a contact sheet that shows recorded clips: gestures cut out of a recording."""
 
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
@@ -13,25 +13,26 @@ if TYPE_CHECKING:
 
 COLUMNS = 6
 MOST = 20
-"""Clips that are shown."""
+"""Most clips that are shown; the rest is left out."""
 ROW = 2.6
-"""Inches that one takes."""
+"""Height in inches of the row of one clip."""
 COLOUR = "tab:purple"
 Named = Sequence[tuple[str, Cut]]
+"""Clips with their names, in order of time."""
 
 
 def height(clips: Named) -> float:
-    """Inches that clips take."""
+    """Height in inches of the rows of these clips."""
     return ROW * min(len(clips), MOST)
 
 
 def draw_clips(place: "SubFigure", clips: Named, picture: Callable[[int], np.ndarray]) -> None:
-    """Draws a row for each clip: how it begins, its stroke, and how it ends.
+    """Draws a row of pictures for each clip, from its first to its last frame (`frames_of`).
 
     Args:
-        place: Where.
-        clips: By their names.
-        picture: The person (H, W, 3) at a frame.
+        place: Part of the figure to draw into.
+        clips: Clips with their names; `MOST` of them are drawn.
+        picture: Returns the picture (H, W, 3) of the person at a frame.
     """
     shown = clips[:MOST]
     rows = place.subplots(len(shown), COLUMNS, squeeze=False)
@@ -45,13 +46,13 @@ def draw_clips(place: "SubFigure", clips: Named, picture: Callable[[int], np.nda
 
 
 def frames_of(cut: Cut) -> list[int]:
-    """At most six frames that tell what a cut is, in the order of time."""
+    """Up to six frames that show a cut: its marks, and frames between them, in order of time."""
     before, after = (cut.first + cut.stroke) // 2, (cut.release + cut.last) // 2
     return sorted({cut.first, before, cut.stroke, cut.release, after, cut.last})
 
 
 def mark(axes: "Axes", clips: Named) -> None:
-    """Marks clips on an axis of frames."""
+    """Marks the frames of clips in a chart whose x axis counts frames."""
     for name, cut in clips:
         if cut.name == REST:
             continue

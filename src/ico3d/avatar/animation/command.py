@@ -22,30 +22,30 @@ PICTURES = (".jpg", ".jpeg", ".png")
 
 @dataclass(frozen=True)
 class Animate:
-    """Finds where a body rests and the key frames of its gestures, or shows those it has.
+    """Finds the rest loop of a body and the key frames of its gestures, or shows those it has.
 
-    A bundle has its own. Folders of models have none until somebody writes one there with --out:
-    it can be edited by hand (add or remove actions, change their scores: those with higher ones
-    are visited more often; the ends of the rest loop; the speeds), looked at with --contact-sheet,
-    and goes into the bundle.
+    A bundle contains this animation. A model folder has none until --out writes it there as
+    animation.json; then it can be edited by hand (actions and their scores: higher ones are
+    visited more often; the ends of the rest loop; the speeds), looked at with --contact-sheet, and
+    ico3d bake puts it into the bundle.
 
     A body on a skeleton also has clips: what the person did in the recording, cut and named by
-    rule. --clips writes them as text: names and frames can be corrected there, and clips deleted or
-    added; the file counts for this verb and for ico3d bake.
+    rule. --clips writes them as text, where names and frames can be corrected, and clips deleted or
+    added; this verb, ico3d bake and ico3d render read that file.
 
-    With --capture, every frame is compared with the recording, part by part of the body. Gestures
-    that cannot be reached without frames that fall far below the clip's own quality are refused,
-    here and by ico3d bake.
+    With --capture, frames are compared with the recording, part by part of the body. Gestures that
+    cannot be reached without frames that fall far below the clip's own quality are refused, here
+    and by ico3d bake.
 
     Attributes:
         model: A folder of ico3d train body or ico3d assemble, or a bundle.
         out: The file to write, usually MODEL/animation.json.
         clips: The file to write with the clips of a body on a skeleton, usually MODEL/clips.toml.
-        contact_sheet: Draw it here, NAME.jpg or NAME.png: the rest loop's ends, the actions and
+        contact_sheet: Picture to draw, NAME.jpg or NAME.png: the rest loop's ends, the actions and
             the clips from the front, and how fast the hands are.
-        capture: The body's recording: measure how the motion looks. A body is also drawn from the
-            side of its first camera; without, as someone stands before it in a world with y up.
-            Avatars and bundles know their front.
+        capture: The body's recording, to measure how the motion looks. The contact sheet then
+            shows the person from the side of its first camera; without a capture, avatars and
+            bundles are shown from their front, and bodies from +z in a world with y up.
         device: Where to compute: by default with CUDA where that works, else on the CPU.
     """
 
@@ -57,15 +57,15 @@ class Animate:
     device: DeviceName = "auto"
 
     def run(self) -> None:
-        """Finds, prints, writes and draws.
+        """Finds key frames and clips, prints them, and writes the files that were asked for.
 
         Raises:
-            ModelError: If a folder holds a damaged model.
-            BundleError: If there is no body, its animation makes no sense, or nowhere does its rest
-                look as good as its clip.
-            CaptureError: If the capture is that of another body.
-            SettingsError: If the contact sheet would be no picture, the body has no skeleton for
-                clips, or those that it has make no sense.
+            ModelError: If the path holds no model that can be animated, or a damaged one.
+            BundleError: If the bundle has no body, the animation makes no sense, or no stretch of
+                the rest loop looks nearly as good as the clip.
+            CaptureError: If the capture is the recording of another body.
+            SettingsError: If the contact sheet is not named .jpg or .png, the body has no skeleton
+                for --clips, or its clips.toml makes no sense.
         """
         from rich.console import Console
         from rich.progress import track
@@ -108,7 +108,7 @@ class Animate:
             self._draw(person, animation, motion, left_out, capture, clips)
 
     def _clips(self, person: "Person") -> "Named":
-        """What the person did, by names; written where that is asked for."""
+        """Recorded clips with their names, empty without a skeleton; writes the file of --clips."""
         from ico3d.common.files import write_atomic
         from ico3d.errors import SettingsError
         from ico3d.motion.recorded.cut import named, to_toml
@@ -147,7 +147,7 @@ class Animate:
 def _with_quality(
     animation: "Animation", person: "Person", capture: "Capture | None"
 ) -> "Animation":
-    """With what the recording says of it; without a recording, what is known already."""
+    """The animation with each frame's quality, measured where there is a recording."""
     from dataclasses import replace
 
     from rich.progress import track
@@ -173,7 +173,7 @@ def table(animation: "Animation", motion: "Motion", left_out: "Sequence[Action]"
     Args:
         animation: The rest loop and the actions that are played.
         motion: How the body moves.
-        left_out: Actions that are refused for how they look, or the way to them.
+        left_out: Actions that are refused because they, or the frames on the way, look bad.
     """
     from rich.table import Table
 
@@ -196,8 +196,8 @@ def clip_table(clips: "Named", fps: float):
     """Recorded clips as a table for the terminal.
 
     Args:
-        clips: By names.
-        fps: Frames per second.
+        clips: Clips with their names.
+        fps: Frames per second of the recording.
     """
     from rich.table import Table
 

@@ -1,8 +1,8 @@
 """Finds where a body rests and at which frames its motion may turn around.
 
 The paper picks these key frames by hand (section "Procedural Body Animation"). Here they follow
-from how fast the hands are, which are what moves most: somebody rests while they are slow for
-long, and where they slow down away from rest, motion can turn around or be held.
+from the speed of the hands, which move most: a body rests where its hands are slow for long, and
+its motion can turn around or be held where they slow down away from rest.
 """
 
 import math
@@ -19,26 +19,27 @@ from ico3d.bundle.animation import ANIMATION, Action, Animation, Rest
 from ico3d.errors import BundleError
 
 SEEN = 0.1
-"""Opacity from which a Gaussian counts."""
+"""Opacity above which a Gaussian counts."""
 FASTEST = (0.9, 0.99)
-"""The share of the Gaussians that are hands and forearms; beyond it are strays."""
+"""Quantiles of speed between which Gaussians count as hands and forearms; above are strays."""
 MOST_POINTS = 4000
-"""Gaussians of a frame that are compared with the rest pose."""
+"""Most Gaussians of a frame that are compared with the rest pose."""
 CALM = 0.05
-"""Metres per second below which hands rest in any case."""
+"""Speed in metres per second up to which hands always count as resting."""
 LEAST_REST = 0.5
-"""Seconds that a rest loop should have, if the clip allows it."""
+"""Least length in seconds of a rest loop, if the clip allows it."""
 ENDS = 0.2
-"""Part of a calm span in which the frame with the slowest hands is looked for, at either end."""
+"""Share of a calm span, at either end, that is searched for the frame with the slowest hands."""
 DIP = 1.5
-"""How many times faster the hands must be before and after an action."""
+"""Factor by which the hands must be faster before and after an action than in it."""
 AWAY = 0.98
-"""Quantile of the distances from the rest pose that tells how far the hands are from it."""
+"""Quantile of the Gaussians' distances from the rest pose that is taken as that of the hands."""
 LEAST_AWAY = 0.04
-"""Metres from the rest pose from which a pose is an action."""
+"""Distance of the hands from the rest pose, metres, from which a pose can be an action."""
 AROUND = 0.3
 """Seconds before and after an action in which its motion is judged."""
 MOST_ACTIONS = 24
+"""Most actions that are kept; those with the best scores."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +48,9 @@ class Motion:
 
     Attributes:
         fps: Frames per second.
-        speeds: (F,) metres per second of the hands, the mean of the steps before and after.
-        places: F times (N, 3) metres: where the Gaussians that are seen are.
+        speeds: (F,) speed of the hands, metres per second: mean of the steps before and after.
+        places: For each frame, (N, 3) positions of the visible Gaussians in the world, metres; N
+            differs between windows.
     """
 
     fps: float
@@ -57,11 +59,12 @@ class Motion:
 
     @staticmethod
     def of(body: MovingBody, windows: Iterable[np.ndarray] | None = None) -> "Motion":
-        """Measures a body.
+        """Measures the motion of a body.
 
         Args:
-            body: The body; within a window its Gaussians stay the same ones.
-            windows: What `window_places` yields, for callers that show how it goes.
+            body: The body; within a window its Gaussians keep their order.
+            windows: What `window_places` yields for the body, wrapped by callers that show
+                progress; by default it is called here.
         """
         speeds, places = [], []
         for window in window_places(body) if windows is None else windows:
@@ -72,7 +75,11 @@ class Motion:
         return Motion(body.fps, (padded[:-1] + padded[1:]) / 2, tuple(places))
 
     def away(self, frame: int, rest: int) -> float:
-        """Metres that the hands are from a pose of rest; Gaussians need not be the same."""
+        """Distance in metres of the hands at a frame from the pose at frame `rest`.
+
+        Each Gaussian's distance is that to the nearest Gaussian of the other frame, so both frames
+        may lie in different windows.
+        """
         one, other = (self._thinned(number) for number in (frame, rest))
         return float(np.quantile(KDTree(other).query(one)[0], AWAY))
 
@@ -82,7 +89,11 @@ class Motion:
 
 @torch.no_grad()
 def window_places(body: MovingBody) -> Iterator[np.ndarray]:
-    """Where the Gaussians of each window are that are seen: (frames, N, 3) metres."""
+    """Positions of the visible Gaussians in each window's frames.
+
+    Yields:
+        (frames, N, 3) metres in the world for each window; all Gaussians where none is visible.
+    """
     for index, span in enumerate(body.windows):
         taus = np.linspace(0, 1, span.last - span.first + 1)
         shown = [body.window_gaussians(index, float(tau)) for tau in taus]
@@ -92,10 +103,10 @@ def window_places(body: MovingBody) -> Iterator[np.ndarray]:
 
 
 def read_animation(folder: Path, body: MovingBody) -> Animation | None:
-    """The `animation.json` of a model's folder, if somebody put one there.
+    """Reads `animation.json` of a model's folder; None where there is no such file.
 
     Raises:
-        BundleError: If it makes no sense, or is for another body.
+        BundleError: If the file makes no sense, or belongs to another body.
     """
     file, frames = folder / ANIMATION, body.windows[-1].last + 1
     if not file.is_file():
@@ -113,17 +124,17 @@ def read_animation(folder: Path, body: MovingBody) -> Animation | None:
 
 
 def find_animation(motion: Motion) -> Animation:
-    """The rest loop and the actions of a clip; calm clips have no actions."""
+    """Finds the rest loop and the actions of a clip; a calm clip has no actions."""
     rest = find_rest(motion)
     actions = find_actions(motion, rest)
     return Animation(motion.fps, len(motion.speeds), rest, actions)
 
 
 def find_rest(motion: Motion) -> Rest:
-    """The longest span in which the hands are calm, from one of their slowest frames to another.
+    """The longest span in which the hands are calm, shortened to begin and end at slow frames.
 
-    Calm is what is slower than the clip's division into slow and fast frames; where that leaves
-    no span of `LEAST_REST`, the calmest one of that length is taken.
+    A frame is calm up to the speed that divides the clip into slow and fast frames best, or up to
+    `CALM`. Where no calm span lasts `LEAST_REST`, the slowest span of that length is taken.
     """
     speeds = motion.speeds
     bound = max(CALM, _division(speeds))
@@ -140,11 +151,11 @@ def find_rest(motion: Motion) -> Rest:
 
 
 def find_actions(motion: Motion, rest: Rest) -> tuple[Action, ...]:
-    """Frames at which the hands slow down away from rest, those that serve best first.
+    """Frames at which the hands slow down away from rest, best scores first.
 
-    The score is the product of how far the hands are from rest, next to the farthest; how much
-    slower they are than around; and how alike the speeds before and after are, for then motion
-    that turns back looks like motion that goes on.
+    The score, from 0 to 1, is a product of three factors: the distance of the hands from rest,
+    relative to the farthest action; how much slower they are than before and after; and how alike
+    the speeds before and after are, for then motion that turns back looks like motion that goes on.
     """
     from scipy.signal import find_peaks  # takes long to import
 
@@ -166,7 +177,7 @@ def find_actions(motion: Motion, rest: Rest) -> tuple[Action, ...]:
 
 
 def _still_span(motion: Motion, frame: int) -> tuple[int, int]:
-    """First and last frame of a pose that is held, which may be one frame only."""
+    """First and last frame of the pose that is held around a frame; both may be that frame."""
     still = motion.speeds <= max(CALM, motion.speeds[frame])
     moving = np.flatnonzero(~still)
     place = int(np.searchsorted(moving, frame))
@@ -176,14 +187,14 @@ def _still_span(motion: Motion, frame: int) -> tuple[int, int]:
 
 
 def _hands(step: np.ndarray) -> float:
-    """Metres that the hands move in a step of the Gaussians (N, 3)."""
+    """Mean distance in metres by which the hands move, from displacements (N, 3) of Gaussians."""
     moved = np.sort(np.linalg.norm(step, axis=1))  # (N,)
     first, last = (int(part * len(moved)) for part in FASTEST)
     return float(moved[first : max(last, first + 1)].mean())
 
 
 def _division(speeds: np.ndarray) -> float:
-    """The speed that divides slow from fast frames best: Otsu's threshold of the logarithms."""
+    """Speed that divides slow from fast frames: Otsu's threshold of the logarithms of (F,)."""
     values = np.sort(np.log(speeds + 1e-4))
     if len(values) < 2:
         return float(speeds.max())
@@ -196,21 +207,24 @@ def _division(speeds: np.ndarray) -> float:
 
 
 def longest_run(calm: np.ndarray) -> tuple[int, int]:
-    """First and last index of the longest stretch of True; of equal ones the first."""
+    """First and last index of the longest run of True, the first of equally long ones.
+
+    Without any True the result is (0, 0).
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], calm, [False]])))
-    runs = edges.reshape(-1, 2)  # begin, one after the end
+    runs = edges.reshape(-1, 2)  # (R, 2): first index, and one after the last
     first, after = max(runs.tolist(), key=lambda run: run[1] - run[0], default=(0, 1))
     return first, after - 1
 
 
 def _turns(motion: Motion, first: int, last: int) -> float:
-    """How well motion turns at a pose that is held from frame to frame, 0 to 1."""
+    """How well motion can turn around at a pose held from frame `first` to `last`, 0 to 1."""
     speeds = motion.speeds
     reach = max(1, round(AROUND * motion.fps))
     reach = min(reach, first, len(speeds) - 1 - last)
     before, after = speeds[first - reach : first][::-1], speeds[last + 1 : last + 1 + reach]
     if reach == 0:
-        return 0.0  # the clip begins or ends with it: nobody knows how it would go on
+        return 0.0  # the clip begins or ends with the pose: there is no motion to compare
     unlike = np.abs(before - after).sum() / (before + after).sum()
     slow = speeds[first : last + 1].min() / max(before.max(), after.max())
     return float((1 - slow) * (1 - unlike))

@@ -1,7 +1,7 @@
-"""Which motion of a body looks right: its pictures beside the recorded ones, part by part.
+"""Which motion of a body looks right: renderings are compared with recorded pictures.
 
-A forearm that dissolves in a quick gesture hardly changes the mean error of a whole person, so a
-picture is as good as its worst part.
+A forearm that dissolves in a quick gesture hardly changes the mean error of a whole person, so the
+quality of a picture is that of its worst part.
 """
 
 from collections.abc import Callable, Iterable
@@ -21,18 +21,18 @@ from ico3d.common.spread import spread
 from ico3d.errors import BundleError, CaptureError
 
 FAR_BELOW = 2.0
-"""dB below the clip's own quality from which a frame is not played."""
+"""A frame is not played if its quality is more than this many dB below the clip's median."""
 MOST_FRAMES, MOST_CAMERAS = 150, 4
-"""That are looked at; quality between frames is interpolated."""
+"""Most frames and cameras that are compared; quality between these frames is interpolated."""
 PART = 0.08
-"""Side of the square that counts as one part, over the person's height in the picture."""
+"""Side of the square that is judged as one part, relative to the person's height in the picture."""
 COVERED = 0.25
-"""Share of such a square that the person must fill: fewer pixels are an outline."""
+"""Share of a part that the person must fill to be judged: with less it shows only an outline."""
 _FACE = 1.0 / 255
-"""Difference between pictures with and without the head from which a pixel shows the head."""
+"""Difference of renderings with and without the head above which a pixel shows the head."""
 
 Watch = Callable[[Iterable[int]], Iterable[int]]
-"""Passes frames on and shows the progress."""
+"""Passes an iterable of frames on and shows the progress."""
 
 
 def measure_motion(
@@ -41,19 +41,20 @@ def measure_motion(
     """PSNR in dB of the worst part of the body in each frame, mean over cameras.
 
     Args:
-        whole: The person at τ of the whole clip.
-        body: The same without its head, which moods and words move too: what shows the head is
-            not judged. None where there is no head.
-        capture: The body's recording. Its test cameras look, where it has some.
-        clip: All frames that the person has, from 0.
+        whole: Returns the whole person at τ in [0, 1] of the clip.
+        body: Returns the person without its head; None where there is no head. Pixels that show
+            the head are not judged, as speech and moods move the face, too.
+        capture: The body's recording. Pictures of its test cameras are compared, or of all cameras
+            where it has no test cameras.
+        clip: All frames of the person, from 0.
         watch: Shows the progress.
 
     Returns:
-        One value for each frame; none at all where the recording has no picture of them that a
-        mask or a clean plate tells from what is behind.
+        One value in dB for each frame; empty where no picture could be compared, as a mask or a
+        clean background is needed.
 
     Raises:
-        CaptureError: If it is the recording of another clip.
+        CaptureError: If the recording has fewer frames than the clip.
     """
     if capture.num_frames <= clip.last:
         raise CaptureError(
@@ -73,19 +74,27 @@ def measure_motion(
 
 
 def _is_told(view: View) -> bool:
-    """Whether a mask or a clean plate tells the person from what is behind."""
+    """Whether a mask or a clean background tells the person from what is behind."""
     return view.mask is not None or view.background.ndim == 3
 
 
 def _over_cameras(values: np.ndarray, frames: list[int], count: int) -> tuple[float, ...]:
-    """Means over cameras (S, C) at some frames, for all of `count` frames; may be none.
+    """Mean quality over cameras, interpolated to all frames.
 
-    Cameras see different sides, in other light: each is compared with its own median, so that a
-    frame is no better or worse for which of them took it.
+    Cameras see different sides in different light: the deviation from each camera's own median is
+    averaged, so that a frame is not judged by which cameras have a picture of it.
+
+    Args:
+        values: (S, C) dB of S frames and C cameras; NaN where there is none.
+        frames: The S frames.
+        count: Number of all frames.
+
+    Returns:
+        `count` values in dB; empty where all are NaN.
     """
     known = ~np.isnan(values)  # (S, C)
-    values = values[:, known.any(axis=0)]  # (S, C'): cameras that took something
-    some = known.any(axis=1)  # (S,)
+    values = values[:, known.any(axis=0)]  # (S, C'): cameras with a value
+    some = known.any(axis=1)  # (S,): frames with a value
     if not some.any():
         return ()
     usual = np.nanmedian(values, axis=0)  # (C',)
@@ -95,15 +104,17 @@ def _over_cameras(values: np.ndarray, frames: list[int], count: int) -> tuple[fl
 
 
 def least_quality(animation: Animation) -> float:
-    """The dB that a frame must have to be played: not far below the clip's median."""
+    """Least quality in dB with which a frame is played: `FAR_BELOW` under the clip's median."""
     return float(np.median(animation.quality)) - FAR_BELOW
 
 
 def playable(animation: Animation) -> Animation:
-    """What can be played without passing a frame whose picture falls far below the clip's.
+    """The part of an animation that is played without passing a frame of bad quality.
 
-    Motion goes along the recorded frames, so everything must lie in one stretch of good ones: the
-    one that the rest loop is in, or the longest of those that it is cut into.
+    Playback passes through all frames between two key frames, so the rest loop and all actions must
+    lie in one run of good frames. The rest loop is shortened to its longest run of good frames;
+    actions outside the run of good frames around it are dropped. Without measured quality the
+    animation is returned as it is.
 
     Raises:
         BundleError: If no two neighbouring frames of the rest loop are good.
@@ -127,14 +138,19 @@ def playable(animation: Animation) -> Animation:
 
 
 def refused(proposed: Iterable[Action], played: Animation) -> tuple[Action, ...]:
-    """Those of the proposed actions that are not played, each once, in the order of time."""
+    """The proposed actions that are not played, one for each frame, in order of time."""
     kept = {action.frame for action in played.actions}
     left = {action.frame: action for action in proposed if action.frame not in kept}
     return tuple(left[frame] for frame in sorted(left))
 
 
 def in_words(animation: Animation, left_out: int) -> str:
-    """What was judged and what became of it, for people."""
+    """A sentence for people about an animation's quality.
+
+    Args:
+        animation: With measured quality.
+        left_out: Number of gestures that are not played.
+    """
     bound = least_quality(animation)
     bad = [frame for frame, value in enumerate(animation.quality) if value < bound]
     median = f"{bound + FAR_BELOW:.1f} dB in the worst part of a picture"
@@ -149,14 +165,14 @@ def in_words(animation: Animation, left_out: int) -> str:
 
 
 def _spans(frames: list[int]) -> str:
-    """Ascending numbers as "3, 7 to 9"."""
+    """Ascending frames in words, such as "3, 7 to 9"."""
     runs = groupby(enumerate(frames), lambda pair: pair[1] - pair[0])
     ends = [(run[0][1], run[-1][1]) for run in (list(group) for _, group in runs)]
     return ", ".join(str(a) if a == b else f"{a} to {b}" for a, b in ends)
 
 
 def _worst_part(whole: At, body: At | None, view: View) -> float:
-    """PSNR of the part that is worst; NaN where too little of the person is seen."""
+    """PSNR in dB of the worst part of a picture; NaN where too little of the person is seen."""
     picture = drawn(whole, view)[0]  # (H, W, 3)
     assert view.truth is not None
     mask = np.ones(picture.shape[:2]) if view.mask is None else view.mask.astype(float)  # (H, W)

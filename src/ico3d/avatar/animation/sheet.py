@@ -1,4 +1,4 @@
-"""An animation as a picture: its key frames, and how fast the hands are."""
+"""Contact sheet of an animation: its key frames, and the speed of the hands."""
 
 from collections.abc import Sequence
 from itertools import chain
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SIZE = 300, 500
-"""Width and height of a picture of the person."""
+"""Width and height in pixels of a picture of the person."""
 MOST = 16
-"""Actions of a kind that are shown; of more, the best."""
+"""Most played and most refused actions that are shown, those with the best scores."""
 COLUMNS = 6
 REST, ACTION, REFUSED, MADE = "tab:blue", "tab:orange", "tab:red", "tab:green"
 
@@ -43,21 +43,22 @@ def draw_sheet(
     path: Path,
     clips: clip_sheet.Named = (),
 ) -> None:
-    """Draws an animation into a file.
+    """Draws an animation into a picture file.
 
-    Above the speed of the hands, the rest loop and the actions marked, and how the frames look
-    where that was measured; below the person at these frames, in the order of time, from the front,
-    and, on a skeleton, at the strokes of all gestures; then each recorded clip in a row.
+    At the top is a chart of the hands' speed, with the rest loop and the actions marked, and one of
+    the frames' quality where it was measured. Below are pictures from the front: the person at the
+    key frames, in order of time; on a skeleton, at the strokes of all gestures; and a row for each
+    recorded clip.
 
     Args:
         person: Who is animated.
         animation: The rest loop and the actions.
         motion: How the person moves.
         left_out: Actions that are refused.
-        cameras: Those of the recording, whose first one stands in front; None for the person's own
-            front, or in a world with y up.
+        cameras: Cameras of the recording; pictures are from the side of the first one. None shows
+            the person from its own front or, where that is unknown, from +z in a world with y up.
         path: NAME.jpg or NAME.png.
-        clips: What the person did, by names.
+        clips: Recorded clips with their names.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -79,7 +80,7 @@ def draw_sheet(
     places = below.subplots(rows, COLUMNS, squeeze=False).ravel()
     camera = front(person, cameras)
     for place in places:
-        place.set(xticks=(), yticks=())  # those of hidden axes are laid out, too
+        place.set(xticks=(), yticks=())  # ticks of hidden axes would take room in the layout
         place.axis("off")
     moments = ((name, person.gaussians(at / animation.fps)) for at, name in shown.items())
     made = strokes(poseable, person.idle) if poseable else ()
@@ -96,7 +97,7 @@ def draw_sheet(
 
 
 def key_frames(animation: Animation, left_out: Sequence[Action] = ()) -> dict[int, str]:
-    """Frames that are shown with their labels, in the order of time."""
+    """The frames that are shown, in order of time, and the label of each."""
     labels: dict[int, list[str]] = {}
     for name, actions in (("action", animation.actions), ("refused", left_out)):
         for action in sorted(actions, key=lambda action: -action.score)[:MOST]:
@@ -108,14 +109,20 @@ def key_frames(animation: Animation, left_out: Sequence[Action] = ()) -> dict[in
 
 
 def _colour(label: str) -> str:
-    """Colour of a picture's title."""
+    """Colour of a picture's title, by its label: those of key frames begin with a digit."""
     if not label[0].isdigit():
         return MADE
     return REFUSED if "refused" in label else ACTION if "action" in label else REST
 
 
 def front(person: Person, cameras: Sequence[Camera] | None) -> Camera:
-    """A camera before the person that sees all of it throughout the clip, and in all gestures."""
+    """A camera before the person with all of it in view, in the whole clip and in all gestures.
+
+    Args:
+        person: Who is seen.
+        cameras: Cameras of the recording, the first of which decides the side; None takes the side
+            to which the person looks, or +z where that is unknown.
+    """
     points, poseable = extent(person), person.poseable
     if poseable:
         points = np.concatenate([points, filled(poseable, person.idle)])
@@ -126,7 +133,7 @@ def front(person: Person, cameras: Sequence[Camera] | None) -> Camera:
 
 
 def _turned(ring: Ring, facing: np.ndarray) -> Ring:
-    """A ring that begins where somebody looks."""
+    """A ring that begins in the direction (3,) in which a person looks, but for its height."""
     level = facing - (facing @ ring.up) * ring.up
     length = np.linalg.norm(level)
     if length < 1e-6:
@@ -144,7 +151,7 @@ def _picture(gaussians: Gaussians, camera: Camera) -> np.ndarray:
 
 
 def _quality(axes: "Axes", animation: Animation) -> None:
-    """How the worst part of the body looks, and what is too bad to be played."""
+    """Draws the quality of each frame, and marks frames that are too bad to be played."""
     bound = least_quality(animation)
     for frame, value in enumerate(animation.quality):
         if value < bound:
@@ -158,7 +165,7 @@ def _quality(axes: "Axes", animation: Animation) -> None:
 
 
 def _speed(axes: "Axes", animation: Animation, motion: Motion) -> None:
-    """The speed of the hands, on a scale that shows calm frames too."""
+    """Draws the hands' speed on a logarithmic scale, and marks the rest loop and the actions."""
     rest = animation.rest
     axes.axvspan(rest.start, rest.end, color=REST, alpha=0.2, lw=0, label="rest loop")
     for number, action in enumerate(animation.actions):

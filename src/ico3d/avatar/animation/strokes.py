@@ -1,4 +1,4 @@
-"""The gestures that somebody on a skeleton makes without a recording, each at its stroke."""
+"""Draws each gesture of a person on a skeleton at the moment of its stroke."""
 
 from collections.abc import Iterator
 
@@ -10,15 +10,18 @@ from ico3d.motion.composing.performer import Performer
 from ico3d.splat.gaussians import Gaussians
 
 SEEN = 0.1
-"""Opacity from which a Gaussian counts for where the person is."""
+"""Opacity above which a Gaussian counts for the space a person fills."""
 
 
 def strokes(person: Poseable, expression: np.ndarray) -> Iterator[tuple[str, Gaussians]]:
-    """Names of gestures, and the person at the moment when the stroke arrives.
+    """Draws a person at the stroke of each gesture.
 
     Args:
-        person: Who makes them.
-        expression: (B,) of the face meanwhile.
+        person: Who makes the gestures.
+        expression: (B,) expression of the face.
+
+    Yields:
+        Name of the gesture, and the person's Gaussians in the world.
     """
     for name, clip in person.clips.items():
         performer: Performer = person.performer(0)
@@ -29,7 +32,12 @@ def strokes(person: Poseable, expression: np.ndarray) -> Iterator[tuple[str, Gau
 
 
 def filled(person: Poseable, expression: np.ndarray) -> np.ndarray:
-    """(P, 3) places that somebody fills at the strokes of all gestures."""
+    """(P, 3) float64 positions of a person's visible Gaussians at the strokes of all gestures.
+
+    Args:
+        person: Who makes the gestures.
+        expression: (B,) expression of the face.
+    """
     places = []
     for _, drawn in strokes(person, expression):
         places.append(drawn.means[drawn.opacities > SEEN].cpu().numpy())

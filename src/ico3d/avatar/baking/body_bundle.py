@@ -1,4 +1,4 @@
-"""From a trained body to a bundle that browsers play."""
+"""Bakes a trained body of windows into a bundle that browsers play."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -47,18 +47,19 @@ SHAPES = (
     Shape(32, (7, 2, 2)),
     Shape(48, (7, 2, 2)),
 )
-"""Tried in this order for each window: about 73, 87, 102, 106, 109 bytes per Gaussian."""
+"""Shapes tried in this order for each window: about 73, 87, 102, 106, 109 bytes per Gaussian."""
 GOOD_DROP = 0.05
-"""dB on the person, against ground truth, that ends the search."""
+"""Loss in dB on the person, against ground truth, up to which no larger shape is tried."""
 MAX_BYTES = 110.0
-"""Bytes per Gaussian and window, all told."""
+"""Most bytes of a window's file per Gaussian."""
 _VISIBLE = 0.1
+"""Opacity above which a Gaussian counts for the body's bounding box."""
 _STRIP_ROWS = 4
-"""Of a clip of few windows."""
+"""Rows of the comparison picture, shared by the windows; each window has at least one."""
 
 
 class BodyEntries(TypedDict):
-    """The fields of a manifest that tell of a body."""
+    """The fields of a manifest that describe a body: one of them is None."""
 
     body: BodyInfo | None
     skinned: SkinnedInfo | None
@@ -70,9 +71,9 @@ class WindowResult:
 
     Attributes:
         window: The baked window.
-        data: The content of its file.
-        seconds: How long the window plays.
-        loss: Means over its pictures.
+        data: Content of the window's file.
+        seconds: Duration of the window.
+        loss: Loss of baking, means over pictures of the window.
     """
 
     window: BakedWindow
@@ -87,17 +88,17 @@ class WindowResult:
 
     @property
     def drop(self) -> float | None:
-        """What is lost against ground truth, in dB; None where there is none."""
+        """Loss against ground truth in dB; None where there is no ground truth."""
         return head_cost.drop(self.loss)
 
     @property
     def acceptable(self) -> bool:
-        """Whether it is within the bounds of loss and size."""
+        """Whether loss and size are within the bounds."""
         return self._loses_at_most(MAX_DROP)
 
     @property
     def good(self) -> bool:
-        """Whether nothing larger need be tried."""
+        """Whether the loss is so small, within the bound of size, that no larger shape is tried."""
         return self._loses_at_most(GOOD_DROP)
 
     def _loses_at_most(self, drop: float) -> bool:
@@ -120,10 +121,10 @@ class BodyParts:
     """A baked body as a bundle holds it.
 
     Attributes:
-        baked: What viewers draw.
-        files: Content by name.
-        entry: What the manifest says about it.
-        loss: Means over its pictures.
+        baked: The body as viewers draw it.
+        files: Content of each file, by its name in the bundle.
+        entry: The manifest's entry about the body.
+        loss: Loss of baking, means over pictures of the body.
     """
 
     baked: BakedBody
@@ -133,7 +134,7 @@ class BodyParts:
 
     @property
     def entries(self) -> BodyEntries:
-        """The manifest's fields."""
+        """The manifest's fields about the body."""
         entry = self.entry
         if isinstance(entry, SkinnedInfo):
             return {"body": None, "skinned": entry}
@@ -141,7 +142,7 @@ class BodyParts:
 
 
 def parts_of(results: Sequence[WindowResult], body: MovingBody) -> BodyParts:
-    """The baked windows together."""
+    """All baked windows of a body as the parts of a bundle."""
     windows = [result.window for result in results]
     return BodyParts(
         WindowedBody(windows.__getitem__, body.windows, body.fps),
@@ -154,12 +155,13 @@ def parts_of(results: Sequence[WindowResult], body: MovingBody) -> BodyParts:
 def bake(
     body: MovingBody, capture: Capture | None, head: HeadAt | None = None
 ) -> Iterator[WindowResult]:
-    """Bakes window after window, each in the smallest shape that loses little, or the best.
+    """Bakes window after window, each in the first shape that is good, else in the best shape.
 
     Args:
         body: The exact body.
-        capture: Its recording, to measure with; None to measure against the exact body only.
-        head: The exact head on it, which is in the recorded pictures.
+        capture: The body's recording, to measure with; None measures against the exact body only.
+        head: Returns the exact head on the body, which recorded pictures show as well; None where
+            there is no head.
     """
     for index in range(len(body.windows)):
         yield _best(_attempts(body, index, capture, head))
@@ -181,7 +183,7 @@ def check(results: list[WindowResult]) -> None:
 
 
 def megabits_per_second(results: list[WindowResult]) -> float:
-    """What a page loads while the body plays."""
+    """Mean data rate at which a page loads windows while the body plays."""
     size = sum(len(result.data) for result in results)
     return 8e-6 * size / sum(result.seconds for result in results)
 
@@ -194,15 +196,19 @@ def write(
     capture: Capture | None,
     notices: str,
 ) -> Manifest:
-    """Gathers everything else that a bundle holds, and writes it.
+    """Adds thumbnail, camera, background and provenance to a baked body, and writes the bundle.
 
     Args:
         out: The file to write.
-        persona: Who it is; its name is the bundle's.
+        persona: Who the avatar is; the bundle takes this name.
         parts: The baked body.
         body: The exact body, for the provenance of its recording.
-        capture: For camera, background and provenance; None where it is not at hand.
+        capture: The body's recording, for camera, background and provenance; None where it is not
+            at hand.
         notices: Text of LICENSES.txt; no such file where it is empty.
+
+    Raises:
+        BundleError: If the provenance is incomplete, or the bundle fails a check.
     """
     info = parts.entry
     camera = standing_camera(np.array(info.low), np.array(info.high), capture)
@@ -228,7 +234,11 @@ def write(
 
 
 def strip(body: MovingBody, baked: BakedBody, capture: Capture | None) -> np.ndarray:
-    """[recorded |] exact | baked of each window, one below the other: uint8."""
+    """A picture that compares exact and baked windows, one row for each view.
+
+    Returns:
+        (rows·H, 3·W, 3) uint8: recorded | exact | baked; (rows·H, 2·W, 3) without a capture.
+    """
     lines = []
     count = max(1, _STRIP_ROWS // len(body.windows))
     for index, span in enumerate(body.windows):
@@ -243,7 +253,7 @@ def strip(body: MovingBody, baked: BakedBody, capture: Capture | None) -> np.nda
 def _attempts(
     body: MovingBody, index: int, capture: Capture | None, head: HeadAt | None
 ) -> Iterator[WindowResult]:
-    """A window in one shape after the other."""
+    """Bakes and measures a window in each of `SHAPES`, one after the other."""
     span, baker = body.windows[index], WindowBaker(body, index)
     seconds = (span.last - span.first) / body.fps
     for shape in SHAPES:
@@ -255,7 +265,7 @@ def _attempts(
 
 
 def _best(attempts: Iterator[WindowResult]) -> WindowResult:
-    """The first that loses little, else that within the size that is most like the exact."""
+    """The first good result; else, of those within `MAX_BYTES` (or all), that nearest to exact."""
     tried = []
     for result in attempts:
         if result.good:
@@ -266,7 +276,7 @@ def _best(attempts: Iterator[WindowResult]) -> WindowResult:
 
 
 def body_info(windows: list[BakedWindow], body: MovingBody) -> BodyInfo:
-    """What the manifest says about a body."""
+    """The manifest's entry about a body of windows."""
     boxes = [seen_box(partial(window_gaussians, window), (0.0, 0.5, 1.0)) for window in windows]
     infos = [
         WindowInfo(
@@ -287,7 +297,15 @@ def body_info(windows: list[BakedWindow], body: MovingBody) -> BodyInfo:
 
 
 def seen_box(at: At, taus: Sequence[float] = (0.5,)) -> tuple[np.ndarray, np.ndarray]:
-    """Least and greatest coordinates of what is seen at some times, but for a few strays."""
+    """Bounding box of the visible Gaussians at some times, without a hundredth of strays.
+
+    Args:
+        at: Returns the Gaussians at τ.
+        taus: Times in [0, 1].
+
+    Returns:
+        (3,) least and (3,) greatest coordinates.
+    """
     points = []
     for gaussians in map(at, taus):
         seen = gaussians.opacities > _VISIBLE
@@ -299,14 +317,15 @@ def seen_box(at: At, taus: Sequence[float] = (0.5,)) -> tuple[np.ndarray, np.nda
 def standing_camera(
     low: np.ndarray, high: np.ndarray, capture: Capture | None, front: np.ndarray | None = None
 ) -> CameraInfo:
-    """Level with the body's middle, so far away that all of it is seen.
+    """A camera level with the body's middle, so far away that all of the body is in view.
 
     Args:
-        low: (3,) least coordinates.
-        high: (3,) greatest coordinates.
-        capture: Its cameras stand upright, more or less; without one, y is up.
-        front: (3,) where the person looks; by default toward the capture's first camera, without
-            one along +z.
+        low: (3,) least coordinates of the body's bounding box, metres.
+        high: (3,) greatest coordinates of that box.
+        capture: The body's recording; the mean upward direction of its cameras is up. Without a
+            capture +y is up.
+        front: (3,) direction in which the person looks, of any length; by default toward the
+            capture's first camera, without a capture along +z.
     """
     up, toward = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
     if capture is not None:
@@ -321,7 +340,7 @@ def standing_camera(
 
 
 def _mean_loss(losses: list[Loss]) -> Loss:
-    """Means over the windows; None where one lacks the value."""
+    """Mean of each value over the windows; None for a value that one window lacks."""
     columns = {}
     for name in ("psnr_exact", "psnr_baked", "psnr_baked_vs_exact"):
         values = [getattr(loss, name) for loss in losses]

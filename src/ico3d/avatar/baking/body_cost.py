@@ -1,4 +1,4 @@
-"""What baking costs a body: exact and baked windows beside each other and the recording."""
+"""What baking costs a body: PSNR of exact and baked windows, to each other and the recording."""
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
@@ -20,17 +20,26 @@ from ico3d.common.spread import spread
 from ico3d.splat.gaussians import Gaussians, cat
 
 HeadAt = Callable[[float], Gaussians]
-"""The head on a body, in the world, at a frame."""
+"""Returns the head's Gaussians in the world at a frame of the body."""
 MAX_DROP = 0.1
-"""dB on the person, against ground truth, that a baked body may lose."""
+"""Most dB, on the person against ground truth, that a baked body may lose."""
 MIN_LIKENESS = 42.5
-"""dB against the exact model, where there is no ground truth: a model that is 26 dB from the truth
-loses 0.1 dB by an independent error of this size."""
+"""Least PSNR in dB of the baked to the exact model where there is no ground truth.
+
+A model with a PSNR of 26 dB to the truth loses 0.1 dB by an independent error of this size.
+"""
 _PROBE_SIZE, _PROBE_FOV = 256, 40.0
+"""Side in pixels, and field of view in degrees, of rendered pictures without a recording."""
 
 
 def probe_views(cameras: Sequence[Camera], span: Span, count: int = VIEWS) -> list[View]:
-    """Times between the sampled ones, seen from these cameras in turn."""
+    """Views at times midway between those that baking samples, from the cameras in turn.
+
+    Args:
+        cameras: Cameras in the world.
+        span: The window.
+        count: Number of views at most.
+    """
     intervals = SAMPLES_PER_FRAME * (span.last - span.first)
     return [
         View(cameras[i % len(cameras)], (interval + 0.5) / intervals, torch.tensor(NEUTRAL))
@@ -39,7 +48,13 @@ def probe_views(cameras: Sequence[Camera], span: Span, count: int = VIEWS) -> li
 
 
 def ring_of_cameras(low: np.ndarray, high: np.ndarray, count: int = 4) -> list[Camera]:
-    """Cameras around a box, about the axis y."""
+    """Cameras on a level circle around a box, in a world with y up.
+
+    Args:
+        low: (3,) least coordinates of the box.
+        high: (3,) greatest coordinates of the box.
+        count: Number of cameras.
+    """
     middle = (low + high) / 2
     distance = 0.6 * np.linalg.norm(high - low) / np.tan(np.deg2rad(_PROBE_FOV) / 2)
     focal = 0.5 * _PROBE_SIZE / np.tan(np.deg2rad(_PROBE_FOV) / 2)
@@ -58,15 +73,30 @@ def measure_window(
     probes: Iterable[View],
     head: HeadAt | None = None,
 ) -> Loss:
-    """Mean PSNR on the person: against the recording, and against the exact model."""
+    """Mean PSNR of a baked window on the person: to the recording, and to the exact model.
+
+    Args:
+        body: The exact body.
+        index: Index of the window.
+        baked: The baked window.
+        recorded: Views with recorded pictures.
+        probes: Views in which baked and exact model are compared.
+        head: Returns the exact head on the body; None where there is no head.
+    """
     at = partial(window_gaussians, baked)
     return measure(*window_pair(body, index, at, head), recorded, probes)
 
 
 def window_pair(body: MovingBody, index: int, baked: At, head: HeadAt | None) -> tuple[At, At]:
-    """The exact and the baked window at τ, each with the exact head on it, if there is one.
+    """Functions of τ: the exact and the baked window, each with the exact head if there is one.
 
-    Both are where the exact body is.
+    Both return Gaussians on the device of the exact body.
+
+    Args:
+        body: The exact body.
+        index: Index of the window.
+        baked: Returns the baked window at τ.
+        head: Returns the exact head on the body; None where there is no head.
     """
     span = body.windows[index]
 
@@ -82,7 +112,15 @@ def window_pair(body: MovingBody, index: int, baked: At, head: HeadAt | None) ->
 
 
 def measure(exact: At, baked: At, recorded: Iterable[View], probes: Iterable[View]) -> Loss:
-    """Mean PSNR on the person: against the recording, and against the exact model."""
+    """Mean PSNR on the person: of both models to the recording, and of baked to exact.
+
+    Args:
+        exact: Returns the exact model at τ.
+        baked: Returns the baked model at τ.
+        recorded: Views with recorded pictures.
+        probes: Views in which baked and exact model are compared, on pixels that the exact model
+            covers.
+    """
     exact_psnr, baked_psnr, likeness = [], [], []
     for view in recorded:
         assert view.truth is not None
@@ -97,7 +135,7 @@ def measure(exact: At, baked: At, recorded: Iterable[View], probes: Iterable[Vie
 
 
 def loses_at_most(loss: Loss, most: float) -> bool:
-    """Whether so many dB are lost at most; without ground truth, whether the likeness is enough."""
+    """Whether a loss is at most `most` dB; without ground truth, whether `MIN_LIKENESS` is kept."""
     lost = drop(loss)
     if lost is None:
         return (loss.psnr_baked_vs_exact or 0.0) >= MIN_LIKENESS

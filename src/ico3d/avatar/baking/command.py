@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ico3d.motion.recorded.cut import Cut
 
 Report = Callable[[str], None]
-"""Tells people how it goes."""
+"""Prints a line about the progress."""
 
 
 @dataclass(frozen=True)
@@ -34,20 +34,22 @@ class Bake:
 
     Attributes:
         model: A model folder of ico3d train head, ico3d train body or ico3d assemble.
-        files: The recordings it was made from, and the bundle to write, NAME.ico3d. A head: CAPTURE
+        files: The recordings of the model, and the bundle to write, NAME.ico3d. A head: CAPTURE
             OUT. A body: [CAPTURE] OUT. A whole person: [HEAD_CAPTURE [BODY_CAPTURE]] OUT. Without
-            its capture, a body is measured against the exact model only; without that of its head,
-            a whole person is baked from what synthetic voices say.
+            the body's capture, a body is measured against the exact model only; without the head's
+            capture, the face's expressions come from synthetic voices.
         rank: Number of basis vectors of a head, 1 to 64; by default the smallest from 16 on that
             keeps the bounds: at most 0.3 dB lost against ground truth, at least 45 dB against the
-            exact model, at most 1.7 MB per 10,000 Gaussians. Bodies: at most 0.1 dB lost; of
-            windows at most 110 bytes per Gaussian and window. Whole persons: besides, at most
-            0.3 dB lost.
-        name: The avatar's name; by default the persona's, of bodies the bundle's.
-        persona: TOML or JSON file that says who it is; for heads, by default that of the package.
+            exact model, at most 1.7 MB per 10,000 Gaussians. Bodies have bounds of their own: at
+            most 0.1 dB lost; bodies of windows at most 110 bytes per Gaussian and window. Whole
+            persons also may lose 0.3 dB at most.
+        name: The avatar's name; by default the persona's name, of a body without a persona the
+            file name of the bundle.
+        persona: TOML or JSON file that says who the avatar is; for heads and whole persons, by
+            default that of the package.
         licences: Text files with notices that the sources ask for; they go into LICENSES.txt.
         background: Splats that stand behind the person, in the same world: .spz or .ply.
-        strip: Also write a picture here: recorded | exact | baked.
+        strip: Also write a picture to this file: recorded | exact | baked.
         force: Write the bundle although it breaks a bound, and play motion that looks bad.
         device: Where to compute: by default with CUDA where that works, else on the CPU.
     """
@@ -69,9 +71,10 @@ class Bake:
         """Bakes, measures, writes and checks the bundle.
 
         Raises:
-            BundleError: If the loss breaks a bound and `force` is not set.
+            BundleError: If loss or size break a bound and `force` is not set.
+            CaptureError: If a capture does not fit the model.
             ModelError: If the folder holds nothing that can be baked.
-            SettingsError: If what was given does not fit the model.
+            SettingsError: If the options do not fit the model.
         """
         from rich.console import Console
 
@@ -178,7 +181,7 @@ class Bake:
         person_bundle.write(self._out, avatar, result, animation, body_capture, about)
 
     def _capture(self, index: int) -> "Capture | None":
-        """Opens the capture in this place of `files`, whose last is the bundle; None without."""
+        """Opens capture `index` of `files`, the last of which is the bundle; None if not given."""
         from ico3d.capture.formats import open_capture
 
         return open_capture(self.files[index]) if index < len(self.files) - 1 else None
@@ -190,7 +193,7 @@ class Bake:
             self._refuse(f"--rank must lie between 1 and {MAX_RANK}, not {self.rank}.")
 
     def _body_persona(self) -> "Persona":
-        """The persona that was given; a body alone does not talk and needs only a name."""
+        """The persona of --persona; by default one with a name only, as bodies do not talk."""
         from dataclasses import replace
 
         from ico3d.avatar.baking.persona import load_persona
@@ -213,7 +216,7 @@ class Bake:
 
 
 def _played(animation: "Animation", report: Report) -> "Animation":
-    """Leaves out motion that looks far worse than the rest of the clip."""
+    """The animation without motion that looks far worse than the rest of the clip."""
     from ico3d.avatar.animation import motion_quality
 
     played = motion_quality.playable(animation)
@@ -232,7 +235,7 @@ def _baked(
     cuts: "tuple[Cut, ...] | None",
     report: Report,
 ) -> "tuple[BodyParts, Callable[[], None]]":
-    """The baked body, and what refuses it where it costs too much."""
+    """The parts of the baked body, and a check that raises where baking costs too much."""
     from functools import partial
 
     from ico3d.avatar.baking import body_bundle
@@ -248,7 +251,7 @@ def _baked(
 
 
 def _watched(windows: "Iterator[WindowResult]", count: int, report: Report) -> "list[WindowResult]":
-    """Bakes all windows while the progress is shown."""
+    """Collects baked windows and shows the progress."""
     from rich.progress import track
 
     from ico3d.avatar.baking.body_bundle import megabits_per_second

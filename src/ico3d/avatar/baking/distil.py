@@ -1,4 +1,4 @@
-"""The small network from expression to coefficients, fitted to what the exact model does."""
+"""Fits the small network that maps an expression to coefficients of a baked head's basis."""
 
 import contextlib
 import math
@@ -18,7 +18,14 @@ _NAMES = ("w1", "b1", "w2", "b2")
 
 @dataclass(frozen=True)
 class CoefficientNetwork:
-    """c(e) = LeakyReLU(e·w1 + b1)·w2 + b2 (docs/bundle.md); float32 arrays."""
+    """c(e) = LeakyReLU(e·w1 + b1)·w2 + b2 (docs/bundle.md), from B values to K coefficients.
+
+    Attributes:
+        w1: (B, H) float32.
+        b1: (H,) float32.
+        w2: (H, K) float32.
+        b2: (K,) float32.
+    """
 
     w1: np.ndarray
     b1: np.ndarray
@@ -30,13 +37,14 @@ def augmented(expressions: np.ndarray, count: int, rng: np.random.Generator) -> 
     """Expressions between and around recorded ones, as playback and blinking make them.
 
     Args:
-        expressions: (T, B).
-        count: How many expressions to make.
+        expressions: (T, B) recorded expressions.
+        count: Number of expressions to make.
         rng: Source of randomness.
 
     Returns:
-        (count, B): each a mixture of two recorded ones, a tenth of whose deviation is jittered;
-        half of them take the eye values (the last seven) from a third one.
+        (count, B) float32. Each is a mixture of two recorded expressions, plus noise of a tenth of
+        the standard deviation of each value; half of them take the eye values (the last seven)
+        from a third recorded expression.
     """
     first, second, third = (expressions[rng.integers(len(expressions), size=count)] for _ in "abc")
     share = rng.uniform(0, 1, (count, 1))
@@ -50,17 +58,17 @@ def augmented(expressions: np.ndarray, count: int, rng: np.random.Generator) -> 
 def distil(
     expressions: np.ndarray, scores: np.ndarray, hidden: int, steps: int, seed: int
 ) -> CoefficientNetwork:
-    """Fits the network to (expression, scores) pairs.
+    """Fits the network to pairs of expressions and scores.
 
-    The basis being orthonormal in the weighted norm, the plain squared error of the scores is
-    the weighted error of the logits: large components weigh more by themselves. Adam finds the
-    hidden layer; the output layer is then solved for exactly.
+    The basis is orthonormal in the weighted norm, so the squared error of the scores is the
+    weighted squared error of the logits, and components need no weights. Adam finds the hidden
+    layer; the output layer is then solved for by ridge regression.
 
     Args:
-        expressions: (S, B).
-        scores: (S, K).
-        hidden: H.
-        steps: Steps, of 512 pairs each.
+        expressions: (S, B) expressions.
+        scores: (S, K) scores of each expression, see `lowrank.LowRank`.
+        hidden: H, width of the hidden layer.
+        steps: Steps of Adam, with 512 pairs each.
         seed: Seed of the initial weights and of the batches.
     """
     centre, spread = expressions.mean(axis=0), np.maximum(expressions.std(axis=0), 1e-3)
@@ -81,7 +89,7 @@ def distil(
 
 @contextlib.contextmanager
 def _one_thread() -> Iterator[None]:
-    """Matrices this small are slower on more threads, which mostly wait for one another."""
+    """Limits torch to one thread: with matrices this small, more threads are slower."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -107,7 +115,7 @@ def _descend(
     )
     for weight in weights:
         weight.requires_grad_(True)
-    optimiser = Optimiser()  # torch's takes seconds to import what compiles
+    optimiser = Optimiser()  # importing torch's own optimisers takes seconds
     w1, b1, w2, b2 = weights
     for step in range(steps):
         batch = torch.randint(len(inputs), (_BATCH,), generator=generator)
@@ -120,7 +128,7 @@ def _descend(
 
 
 def _solve_output(hidden: Tensor, targets: Tensor) -> tuple[Tensor, Tensor]:
-    """Ridge regression of the targets on the hidden layer, in float64."""
+    """Ridge regression of targets (S, K) on the hidden layer (S, H), in float64: w2 and b2."""
     ones = torch.ones(len(hidden), 1, dtype=torch.float64)
     features = torch.cat([hidden.double(), ones], dim=1)  # (S, H + 1)
     gram = features.T @ features  # (H + 1, H + 1)

@@ -1,4 +1,4 @@
-"""From a trained head and its capture to a bundle."""
+"""Bakes a trained head and its capture into a bundle."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -30,19 +30,30 @@ from ico3d.speech.export import export_speech, make_servable
 from ico3d.speech.network import SpeechAdaptor
 
 RANKS = (16, 20, 24, 28, 32)
-"""Ranks that are tried where none is asked for, in this order. Not fewer: means over views would
-not notice that rare blinks are lost. Not more: with 38 + 4·K bytes per Gaussian, 32 is the largest
-that keeps `MAX_MEGABYTES`; what a bundle can hold at most says `ico3d.bundle.limits`."""
+"""Ranks K that are tried in this order where none is asked for.
+
+No smaller ones: means over views would not notice that rare blinks are lost. No larger ones: with
+38 + 4·K bytes per Gaussian, 32 is the largest that keeps `MAX_MEGABYTES`. `ico3d.bundle.limits` has
+the largest rank that a bundle can hold.
+"""
 MAX_MEGABYTES = 1.7
-"""MB of head.safetensors per 10,000 Gaussians, at most."""
+"""Most MB of head.safetensors per 10,000 Gaussians."""
 MEASURED_VIEWS = 40
+"""Most pictures that a baked head is measured with."""
 
 Report = Callable[[str], None]
+"""Prints a line about the progress."""
 
 
 @dataclass(frozen=True)
 class BakedResult:
-    """A baked head and what it costs."""
+    """A baked head and what it costs.
+
+    Attributes:
+        head: The baked head.
+        loss: Loss of baking, means over views.
+        megabytes: MB of head.safetensors per 10,000 Gaussians.
+    """
 
     head: BakedHead
     loss: Loss
@@ -50,7 +61,7 @@ class BakedResult:
 
     @property
     def acceptable(self) -> bool:
-        """Whether it is within the bounds of loss and size."""
+        """Whether loss and size are within the bounds."""
         return head_cost.acceptable(self.loss) and self.megabytes <= MAX_MEGABYTES
 
     def __str__(self) -> str:
@@ -69,15 +80,18 @@ def bake(
     report: Report,
     settings: BakeSettings | None = None,
 ) -> BakedResult:
-    """Bakes with the given rank, or with the smallest that keeps the bounds (else the best).
+    """Bakes with the given rank, or with the smallest of `RANKS` that keeps all bounds.
+
+    Where none does, the result is the one nearest to the exact head, of those within
+    `MAX_MEGABYTES` if there are any.
 
     Args:
         head: The exact head.
         views: Pictures that the baked head is compared with.
-        samples: Expressions, and how much each value of a Gaussian matters.
-        rank: K, or None to choose.
-        report: Is told each result.
-        settings: Of the fit; the usual ones where None.
+        samples: Expressions, and how much each logit of a Gaussian matters.
+        rank: Number K of basis vectors; None chooses it.
+        report: Called with a line about each result.
+        settings: Settings of the fit; the defaults where None.
     """
     report("sampling the exact head …")
     chosen = settings or BakeSettings()
@@ -119,7 +133,7 @@ def write(
     persona: Persona,
     notices: str,
 ) -> Manifest:
-    """Gathers everything else that a bundle holds, and writes it.
+    """Adds motion, camera, speech and thumbnail to a baked head, and writes the bundle.
 
     Args:
         out: The file to write.
@@ -127,9 +141,12 @@ def write(
         result: The baked head and its loss.
         samples: The samples that the head was baked from.
         head: The exact head, for its speech adaptor.
-        capture: For motion, camera, background and provenance.
+        capture: The head's recording, for motion, camera, background and provenance.
         persona: Who the avatar is.
         notices: Text of LICENSES.txt; no such file where it is empty.
+
+    Raises:
+        BundleError: If the provenance is incomplete, or the bundle fails a check.
     """
     poses = staging.idle_motion(capture)
     frontal = staging.frontal_camera(capture)
@@ -137,7 +154,7 @@ def write(
     baked = driven(result.head, head)
     seen = baked_gaussians(baked, idle)
     middle = poses[len(poses) // 2]
-    points = seen.means[seen.opacities > 0.1].numpy() @ middle[:3, :3].T + middle[:3, 3]
+    points = seen.means[seen.opacities > 0.1].numpy() @ middle[:3, :3].T + middle[:3, 3]  # (P, 3)
     camera = staging.visitor_view(capture.cameras[frontal], points)
     background = staging.background_colour(capture, frontal)
     files = {
@@ -165,13 +182,14 @@ def write(
 
 
 def idle_expression(head: TrainedHead, recorded: np.ndarray) -> np.ndarray:
-    """(B,) silence with open eyes; for blendshapes, the most neutral face that was recorded.
+    """(B,) expression of an avatar at rest: silence with open eyes.
 
-    It is what drives an avatar: eyes and brows at rest are 0 (`TrainedHead.recorded`).
+    Eyes and brows at rest are 0 in expressions that drive an avatar (`TrainedHead.recorded`). For a
+    head driven by blendshapes, it is the recorded row with the least sum of absolute values.
 
     Args:
-        head: Whose face.
-        recorded: (T, B) what it usually does.
+        head: The exact head.
+        recorded: (T, B) recorded expressions.
     """
     if head.adaptor is None:
         return recorded[np.abs(recorded).sum(axis=1).argmin()]
@@ -179,9 +197,14 @@ def idle_expression(head: TrainedHead, recorded: np.ndarray) -> np.ndarray:
 
 
 def driven(baked: BakedHead, head: TrainedHead) -> BakedHead:
-    """A head that takes what drives avatars, from one that takes what was recorded.
+    """A baked head that takes the expressions that drive avatars, instead of recorded ones.
 
-    `TrainedHead.recorded` is linear, so it goes into the coefficient network's first layer.
+    `TrainedHead.recorded` converts them, value by value and linearly, so it is merged into the
+    first layer of the coefficient network.
+
+    Args:
+        baked: Takes expressions as they were recorded.
+        head: The exact head, with the conversion.
     """
     size = baked.expression_size
     offset = head.recorded(np.zeros(size, np.float32))  # (B,)
@@ -191,10 +214,14 @@ def driven(baked: BakedHead, head: TrainedHead) -> BakedHead:
 
 
 def speech_file(adaptor: SpeechAdaptor, encoder_name: str) -> tuple[bytes, SpeechInfo]:
-    """`speech.onnx` and what the manifest says about it."""
+    """Content of `speech.onnx`, and the manifest's entry about it.
+
+    A speech encoder that is not the built-in one stays on this machine: the file then takes its
+    features instead of sound.
+    """
     encoder = load_encoder(encoder_name)
     kind = "mel"
-    if encoder.name != "builtin":  # the user's own: it stays on this machine
+    if encoder.name != "builtin":  # the user's own encoder stays on this machine
         kind = "features"
         make_servable(encoder)
     info = SpeechInfo(encoder.name, encoder.sha256, FEATURE_RATE, kind)
@@ -204,7 +231,15 @@ def speech_file(adaptor: SpeechAdaptor, encoder_name: str) -> tuple[bytes, Speec
 def head_info(
     baked: BakedHead, head: TrainedHead, idle: np.ndarray, fps: float, num_poses: int
 ) -> HeadInfo:
-    """What the manifest says about a head."""
+    """The manifest's entry about a head.
+
+    Args:
+        baked: The baked head.
+        head: The exact head.
+        idle: (B,) expression at rest.
+        fps: Head poses per second.
+        num_poses: Number of head poses.
+    """
     speech = head.adaptor is not None
     return HeadInfo(
         num_gaussians=baked.num_gaussians,

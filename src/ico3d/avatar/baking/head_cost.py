@@ -1,4 +1,4 @@
-"""What baking costs: exact and baked head beside the recorded pictures."""
+"""What baking costs a head: PSNR of exact and baked head, to recorded pictures and each other."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -20,22 +20,22 @@ from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
 MAX_DROP = 0.3
-"""dB that the baked head may lose against ground truth."""
+"""Most dB that a baked head may lose against ground truth."""
 MIN_LIKENESS = 45.0
-"""dB of the baked against the exact picture, at least."""
+"""Least PSNR in dB of baked to exact pictures."""
 _CPU = torch.device("cpu")
 
 
 @dataclass(frozen=True)
 class Reference:
-    """One picture of the exact model, and what was recorded; pictures (H, W, 3) float16.
+    """A picture of the exact head, with the recorded one where there is one.
 
     Attributes:
         camera: The camera in canonical head space.
         expression: (B,) float32.
-        background: (3,) or (H, W, 3), on the device that draws.
-        exact: What the exact model shows.
-        truth: What was recorded, None where nothing was.
+        background: (3,) or (H, W, 3) colour behind the head, on the device that draws.
+        exact: (H, W, 3) float16 picture of the exact head.
+        truth: (H, W, 3) float16 recorded picture; None where nothing was recorded.
     """
 
     camera: Camera
@@ -48,13 +48,13 @@ class Reference:
 def references(
     head: TrainedHead, capture: Capture, neutral: tuple[float, float, float], count: int
 ) -> list[Reference]:
-    """Views of test frames, evenly spread, with what the exact model makes of them.
+    """Recorded pictures of test frames, evenly spread, each with one of the exact head.
 
     Args:
         head: The exact head.
-        capture: Where the pictures come from.
-        neutral: Background where the capture has none.
-        count: How many views at most.
+        capture: The head's recording.
+        neutral: RGB background where the capture has no clean one.
+        count: Number of pictures at most.
 
     Raises:
         CaptureError: If no test frame has a picture.
@@ -73,7 +73,7 @@ def references(
 
 
 def measure(head: BakedHead, views: list[Reference]) -> Loss:
-    """Mean PSNR over views, whole pictures."""
+    """Mean PSNR over views, of whole pictures."""
     baked = [baked_picture(head, view) for view in views]
     pairs = list(zip(baked, views, strict=True))
     return Loss(
@@ -84,7 +84,7 @@ def measure(head: BakedHead, views: list[Reference]) -> Loss:
 
 
 def drop(loss: Loss) -> float | None:
-    """What is lost against ground truth, in dB; None where there is none."""
+    """Loss of baking against ground truth in dB; None where there is no ground truth."""
     exact, baked = loss.psnr_exact, loss.psnr_baked
     return None if exact is None or baked is None else exact - baked
 
@@ -106,7 +106,11 @@ def in_words(loss: Loss) -> str:
 
 
 def strip(head: BakedHead, views: list[Reference], rows: int = 4) -> np.ndarray:
-    """[Truth |] exact | baked of some views, one below the other: (rows·H, 3·W or 2·W, 3) uint8."""
+    """A picture that compares exact and baked head, one row for each of some views.
+
+    Returns:
+        (rows·H, 3·W, 3) uint8: recorded | exact | baked; (rows·H, 2·W, 3) without recorded ones.
+    """
     chosen = [views[i] for i in spread(len(views), rows)]
     lines = []
     for view in chosen:
@@ -116,7 +120,7 @@ def strip(head: BakedHead, views: list[Reference], rows: int = 4) -> np.ndarray:
 
 
 def baked_picture(head: BakedHead, view: Reference) -> np.ndarray:
-    """The baked head where the reference is: (H, W, 3) float32."""
+    """The baked head as the reference's camera sees it: (H, W, 3) float32."""
     return _picture(baked_gaussians(head, view.expression), view.camera, view.background)
 
 
@@ -127,7 +131,7 @@ def _reference(
     expression: torch.Tensor,
     neutral: tuple[float, float, float],
 ) -> Reference:
-    """Without a clean background, the person is cut out over the neutral colour."""
+    """The reference of a recorded view; `neutral` replaces a background that is not known."""
     picture = pictures.picture(view, _CPU)
     plate = pictures.background(view, _CPU)
     behind, truth = staged(picture, plate, torch.tensor(neutral))
@@ -141,7 +145,15 @@ def reference(
     background: torch.Tensor,
     truth: np.ndarray | None = None,
 ) -> Reference:
-    """What the exact head shows to a camera in canonical head space, drawn where it is."""
+    """A reference with the picture of the exact head, drawn on the device of the head.
+
+    Args:
+        head: The exact head.
+        camera: The camera in canonical head space.
+        expression: (B,) float32.
+        background: (3,) or (H, W, 3) colour behind the head.
+        truth: (H, W, 3) recorded picture, if there is one.
+    """
     background = background.to(head.model.device)
     with torch.no_grad():
         exact = _picture(head.model(expression), camera, background).astype(np.float16)
@@ -155,6 +167,6 @@ def _picture(gaussians: Gaussians, camera: Camera, background: torch.Tensor) -> 
 
 
 def mean_of(values: Iterable[float | None]) -> float | None:
-    """The mean of the values that are there; None where there is none."""
+    """Mean of the values that are not None, rounded to 4 decimals; None where all are None."""
     found = [value for value in values if value is not None]
     return round(float(np.mean(found)), 4) if found else None

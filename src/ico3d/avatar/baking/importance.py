@@ -1,4 +1,4 @@
-"""How much the picture depends on each logit, and on each Gaussian."""
+"""How much rendered pictures depend on each logit of a head, and on each Gaussian of a body."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -12,8 +12,9 @@ from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
 _FLOOR = 0.02
-"""Least importance, of the mean: what these views do not show must still look right."""
+"""Least importance, relative to the mean: what no view shows must still look right."""
 _STILL = ("means", "quats", "scales", "colors")
+"""Properties that get no gradient when opacities are probed."""
 
 
 def logit_importance(
@@ -25,18 +26,18 @@ def logit_importance(
 ) -> np.ndarray:
     """Root mean square change of the picture per unit change of each logit.
 
-    For a random-sign picture v, the gradient of <v, image> squares in expectation to the
-    diagonal of JᵀJ, J being the Jacobian of the image (Hutchinson's estimate).
+    Hutchinson's estimate: for a picture v of random signs, the squared gradient of <v, image> is in
+    expectation the diagonal of JᵀJ, where J is the Jacobian of the image.
 
     Args:
         model: The exact head.
-        expressions: (P, B), one for each probe.
+        expressions: (P, B) expression of each probe.
         cameras: P cameras in canonical head space.
         background: (3,) colour.
         seed: Seed of the signs.
 
     Returns:
-        (N, 4) float32 with mean 1, at least a small share of it.
+        (N, 4) float32, scaled to mean 1 and then raised to `_FLOOR` where less.
     """
     generator = torch.Generator().manual_seed(seed)
     total = torch.zeros(len(model), 4, device=model.device)
@@ -50,7 +51,7 @@ def logit_importance(
         image = render(gaussians, [camera], background).rgb[0]  # (H, W, 3)
         (gradient,) = torch.autograd.grad((image * _signs(image, generator)).sum(), logits)
         total += gradient.square()
-    importance = (total / len(cameras)).sqrt().cpu().numpy()
+    importance = (total / len(cameras)).sqrt().cpu().numpy()  # (N, 4)
     importance /= max(float(importance.mean()), 1e-12)
     return np.maximum(importance, _FLOOR).astype(np.float32)
 
@@ -58,12 +59,12 @@ def logit_importance(
 def gaussian_importance(
     drawn: Iterable[tuple[Gaussians, Camera]], background: torch.Tensor, seed: int
 ) -> np.ndarray:
-    """Root mean square change of the picture where a Gaussian is left out, to first order.
+    """Root mean square change of the picture if a Gaussian is left out, to first order.
 
-    Estimated as in `logit_importance`, of opacities.
+    Hutchinson's estimate as in `logit_importance`, with gradients of opacities.
 
     Args:
-        drawn: The same N Gaussians, some time posed and seen by some camera.
+        drawn: Pairs of the N Gaussians in some pose and a camera that sees them.
         background: (3,) colour.
         seed: Seed of the signs.
 
@@ -83,5 +84,5 @@ def gaussian_importance(
 
 
 def _signs(image: torch.Tensor, generator: torch.Generator) -> torch.Tensor:
-    """1 and −1 at random, of the shape of a picture."""
+    """Random 1 and −1 in the shape of a picture."""
     return (torch.randint(0, 2, image.shape, generator=generator) * 2 - 1).to(image)

@@ -5,21 +5,22 @@ from dataclasses import dataclass
 import numpy as np
 
 _CHUNK = 8192
-"""Columns handled at a time: samples stay float16 in memory, arithmetic is float32."""
+"""Columns that are converted to float32 at a time; samples stay float16 in memory."""
 
 _NOISE = 1e-6
-"""Share of the largest variance under which float32 sums are rounding only."""
+"""Share of the largest variance below which a component is only float32 rounding."""
 
 
 @dataclass(frozen=True)
 class LowRank:
-    """Y ≈ mean + scores @ basis.
+    """A low-rank approximation of samples (T, D): mean + scores @ basis.
 
     Attributes:
-        mean: (D,) float32.
-        basis: (K, D) float32; orthonormal once its columns are multiplied by `weights`.
-        weights: (D,) float32, how much an error in each column matters.
-        scores: (T, K) float32 of the samples it was made from, in falling order of size.
+        mean: (D,) float32 mean of the samples.
+        basis: (K, D) float32; its rows are orthonormal once its columns are multiplied by
+            `weights`. Components are in falling order of variance.
+        weights: (D,) how much an error in each column matters.
+        scores: (T, K) float32 scores of the samples that the basis was made from.
     """
 
     mean: np.ndarray
@@ -28,7 +29,7 @@ class LowRank:
     scores: np.ndarray
 
     def project(self, samples: np.ndarray) -> np.ndarray:
-        """Best scores (T, K), in the weighted norm, for samples (T, D)."""
+        """Scores (T, K) of samples (T, D) with the least error in the weighted norm."""
         scores = np.zeros((len(samples), len(self.basis)), np.float32)
         for part in _chunks(self.mean.size):
             centred = samples[:, part].astype(np.float32) - self.mean[part]  # (T, chunk)
@@ -37,17 +38,17 @@ class LowRank:
 
 
 def factorise(samples: np.ndarray, weights: np.ndarray, rank: int) -> LowRank:
-    """Weighted PCA by way of the T×T Gram matrix: memory beyond the samples is T² + K·D.
+    """Weighted PCA from the (T, T) Gram matrix: memory beyond the samples is T² + K·D numbers.
 
     Args:
         samples: (T, D) float16 or float32, T ≥ 2.
-        weights: (D,) positive.
-        rank: K; components beyond what the samples span are zero.
+        weights: (D,) positive weights of the columns.
+        rank: K, number of components; those beyond what the samples span are zero.
     """
     mean = _mean(samples)
     gram = np.zeros((len(samples),) * 2)
     for part in _chunks(mean.size):
-        centred = (samples[:, part].astype(np.float32) - mean[part]) * weights[part]
+        centred = (samples[:, part].astype(np.float32) - mean[part]) * weights[part]  # (T, chunk)
         gram += centred @ centred.T  # (T, T)
     values, vectors = np.linalg.eigh(gram)
     order = np.argsort(values)[::-1][:rank]
@@ -57,13 +58,13 @@ def factorise(samples: np.ndarray, weights: np.ndarray, rank: int) -> LowRank:
     mixing = vectors / np.where(spanned, sizes, np.inf)  # (T, K)
     basis = np.empty((rank, mean.size), np.float32)
     for part in _chunks(mean.size):
-        centred = samples[:, part].astype(np.float32) - mean[part]
-        basis[:, part] = mixing.T @ (centred * weights[part]) / weights[part]
+        centred = samples[:, part].astype(np.float32) - mean[part]  # (T, chunk)
+        basis[:, part] = mixing.T @ (centred * weights[part]) / weights[part]  # (K, chunk)
     return LowRank(mean, basis, weights, (vectors * sizes).astype(np.float32))
 
 
 def _padded(values: np.ndarray, vectors: np.ndarray, rank: int) -> tuple[np.ndarray, np.ndarray]:
-    """Zeros where there are fewer samples than components are wanted."""
+    """Eigenvalues and eigenvectors filled up with zeros to `rank` where there are fewer."""
     lacking = rank - len(values)
     return np.pad(values, (0, lacking)), np.pad(vectors, ((0, 0), (0, lacking)))
 

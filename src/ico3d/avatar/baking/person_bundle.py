@@ -1,4 +1,4 @@
-"""From a whole person, a trained head on a trained body, to a bundle that browsers play."""
+"""Bakes a whole person, a trained head on a trained body, into a bundle that browsers play."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -33,10 +33,11 @@ from ico3d.errors import BundleError
 from ico3d.splat.gaussians import Gaussians
 
 VIEWS = 40
-"""Pictures that a whole person is measured with."""
+"""Most pictures that a whole person is measured with."""
 MAX_DROP = head_cost.MAX_DROP
-"""dB that it may lose on the person, against ground truth."""
+"""Most dB, on the person against ground truth, that a whole person may lose."""
 _STRIP_ROWS = 4
+"""Rows of the comparison picture."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +47,8 @@ class WholeResult:
     Attributes:
         person: The baked person, as viewers draw it.
         body: The baked body, with its files.
-        idle: (B,) the expression of the face at rest.
-        loss: What baking costs, means over pictures of the whole person.
+        idle: (B,) expression of the face at rest.
+        loss: Loss of baking, means over pictures of the whole person.
     """
 
     person: BakedAvatar
@@ -59,16 +60,18 @@ class WholeResult:
 def head_samples(
     avatar: TrainedAvatar, capture: Capture | None, persona: Persona
 ) -> tuple[Samples, list[head_cost.Reference]]:
-    """What the head is baked from, and what it is measured with.
+    """Samples that the head is baked from, and pictures that it is measured with.
 
     Args:
         avatar: The exact person.
-        capture: The head's recording, whose training frames say how the face moves; without one,
-            synthetic voices read what the persona says, besides what the body's recording holds.
-        persona: Who the avatar is; its notes are read aloud where there is no recording.
+        capture: The head's recording: the head is baked from the expressions of its training
+            frames and measured with those of its test frames. Without it, the expressions are
+            those of the body's recording and, of a head driven by speech, those of synthetic
+            voices that read the answers of the persona's notes.
+        persona: Who the avatar is.
 
     Raises:
-        MissingExtraError: If there is no recording and espeak-ng is not installed.
+        MissingExtraError: If synthetic voices are needed and espeak-ng is not installed.
     """
     head, tests = avatar.head, avatar.expressions
     expressions = avatar.expressions
@@ -84,7 +87,7 @@ def head_samples(
 
 
 def head_at(avatar: TrainedAvatar) -> body_cost.HeadAt:
-    """The exact head, with which the baked body is measured."""
+    """Returns the exact head at a frame: the baked body is measured with it."""
     return lambda frame: avatar.head_gaussians(frame / avatar.fps)
 
 
@@ -95,14 +98,14 @@ def put_together(
     expressions: np.ndarray,
     capture: Capture | None,
 ) -> WholeResult:
-    """The baked parts as one person, measured with the expressions of the body's recording.
+    """Joins baked head and body, and measures them with the expressions of the body's recording.
 
     Args:
         avatar: The exact person.
-        head: Baked in the space of the exact head's model.
+        head: The baked head, in the space of the exact head's model.
         body: The baked body.
-        expressions: (T, B) what the face usually does.
-        capture: The body's recording; None to measure against the exact person only.
+        expressions: (T, B) expressions that the head was baked from.
+        capture: The body's recording; None measures against the exact person only.
     """
     place = avatar.placement
     person = BakedAvatar(
@@ -115,7 +118,7 @@ def put_together(
 
 
 def moved_head(head: BakedHead, a_from_b: np.ndarray) -> BakedHead:
-    """A baked head given in space b, in space a; (4, 4) similarity."""
+    """Converts a baked head from space b to space a by a (4, 4) similarity."""
     moved = Gaussians(
         means=torch.from_numpy(head.means.astype(np.float64)),
         quats=torch.from_numpy(head.quats.astype(np.float64)),
@@ -131,7 +134,13 @@ def moved_head(head: BakedHead, a_from_b: np.ndarray) -> BakedHead:
 
 
 def measure(avatar: TrainedAvatar, person: BakedAvatar, capture: Capture | None) -> Loss:
-    """Mean PSNR on the whole person, through all of the clip."""
+    """Mean PSNR on the whole person, of pictures from all of the clip.
+
+    Args:
+        avatar: The exact person.
+        person: The baked person.
+        capture: The body's recording; None measures against the exact person only.
+    """
     span = _span(avatar)
     recorded = clip_views.recorded_views(capture, span, VIEWS) if capture else []
     return body_cost.measure(*_pair(avatar, person), recorded, _probes(avatar, person, VIEWS))
@@ -151,7 +160,11 @@ def check(result: WholeResult) -> None:
 
 
 def strip(avatar: TrainedAvatar, person: BakedAvatar, capture: Capture | None) -> np.ndarray:
-    """[recorded |] exact | baked through the clip, one below the other: uint8."""
+    """A picture that compares exact and baked person, one row for each of some views.
+
+    Returns:
+        (rows·H, 3·W, 3) uint8: recorded | exact | baked; (rows·H, 2·W, 3) without a capture.
+    """
     views = _probes(avatar, person, _STRIP_ROWS)
     if capture is not None:
         views = clip_views.recorded_views(capture, _span(avatar), _STRIP_ROWS)
@@ -160,10 +173,10 @@ def strip(avatar: TrainedAvatar, person: BakedAvatar, capture: Capture | None) -
 
 
 def animation_of(folder: Path, avatar: TrainedAvatar) -> Animation:
-    """`animation.json` of the avatar's folder, where somebody put one, else what is found.
+    """The animation in `animation.json` of the avatar's folder, or else one that is found.
 
     Raises:
-        BundleError: If the file makes no sense, or is for another body.
+        BundleError: If the file makes no sense, or belongs to another body.
     """
     return read_animation(folder, avatar.body) or find_animation(Motion.of(avatar.body))
 
@@ -171,13 +184,16 @@ def animation_of(folder: Path, avatar: TrainedAvatar) -> Animation:
 def with_quality(
     animation: Animation, avatar: TrainedAvatar, person: BakedAvatar, capture: Capture | None
 ) -> Animation:
-    """An animation that knows how the baked body looks in each frame of its recording.
+    """The animation with each frame's quality, measured on the baked person.
 
     Args:
         animation: The rest loop and actions, as found or edited.
         avatar: The exact person, for the recorded expressions.
-        person: The baked one, which will be played.
-        capture: The body's recording; without one nothing is known.
+        person: The baked person, which will be played.
+        capture: The body's recording; without it the quality is left empty.
+
+    Raises:
+        CaptureError: If the capture is the recording of another body.
     """
     if capture is None:
         return replace(animation, quality=())
@@ -199,19 +215,20 @@ def write(
     capture: Capture | None,
     about: tuple[Persona, str, str],
 ) -> Manifest:
-    """Gathers everything else that a bundle holds, and writes it.
+    """Adds animation, camera, speech and thumbnail to a baked person, and writes the bundle.
 
     Args:
         out: The file to write.
         avatar: The exact person.
-        result: The baked one.
+        result: The baked person.
         animation: The rest loop and actions.
         capture: The body's recording, for camera and background; None where it is not at hand.
-        about: Who it is, the avatar's name, and the text of LICENSES.txt (no such file where it
-            is empty).
+        about: The persona, the avatar's name, and the text of LICENSES.txt (no such file where the
+            text is empty).
 
     Raises:
-        BundleError: If the animation is not that of this body.
+        BundleError: If the animation belongs to another body, the provenance is incomplete, or the
+            bundle fails a check.
     """
     persona, name, notices = about
     head = avatar.head
@@ -252,7 +269,7 @@ def write(
 def standing_camera(
     avatar: TrainedAvatar, person: BakedAvatar, capture: Capture | None
 ) -> CameraInfo:
-    """In front of the person, so far away that all of it is seen."""
+    """A camera in front of the person, so far away that all of the person is in view."""
     return body_bundle.standing_camera(*_box(person), capture, avatar.placement.facing)
 
 
@@ -275,7 +292,10 @@ def _probes(avatar: TrainedAvatar, person: BakedAvatar, count: int) -> list[clip
 
 
 def _box(person: BakedAvatar) -> tuple[np.ndarray, np.ndarray]:
-    """Least and greatest coordinates of what is seen, in all frames where windows begin or end."""
+    """Bounding box of what is seen: (3,) least and (3,) greatest coordinates.
+
+    The body counts at a few times of each window, the head where windows begin and end.
+    """
     boxes = []
     taus = np.linspace(0, 1, max(3, MOMENTS // len(person.body.windows))).tolist()
     for index, span in enumerate(person.body.windows):

@@ -8,9 +8,9 @@ DEFAULT = Path(__file__).parents[1] / "data" / "persona.json"
 
 
 def load_persona(path: Path | None) -> Persona:
-    """Reads a persona's file, or that of the package where none is given.
+    """Reads a persona's file; without a path, that of the package.
 
     Raises:
-        BundleError: If it cannot be read, or an entry makes no sense.
+        BundleError: If the file cannot be read, or an entry makes no sense.
     """
     return read_persona(path or DEFAULT)

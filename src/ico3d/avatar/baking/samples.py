@@ -1,4 +1,4 @@
-"""What a head is baked from: expressions, and how much each of its logits is seen."""
+"""What a head is baked from: expressions, and how much each logit matters in pictures."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,11 +21,13 @@ from ico3d.speech.encoder import load_encoder
 from ico3d.speech.eyes import EyeBehaviour
 
 _PROBES = 32
+"""Pictures from which the importance of logits is estimated."""
 _SIZE, _FOV = 192, 20.0
-"""Of the pictures that a head without recorded ones is looked at with; pixels, degrees."""
+"""Side in pixels, and field of view in degrees, of pictures drawn without a recording."""
 _SIDES = np.deg2rad([0, -35, 20, 60, -15, 40, -60, -5])
-"""Where their cameras stand; 0 is in front."""
+"""Azimuths in radians of the cameras that draw them, 0 in front, taken in turn."""
 _VOICES = ("en-us", "en-us+f3", "en-us+m3", "en-us+f5")
+"""Voices of espeak-ng that read texts in turn."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +35,8 @@ class Samples:
     """Expressions that a head is baked from.
 
     Attributes:
-        expressions: (T, B) what it shall look right in.
-        importance: (N, 4) weights of logit errors.
+        expressions: (T, B) expressions in which the baked head has to look right.
+        importance: (N, 4) how much an error in each logit matters, see `logit_importance`.
     """
 
     expressions: np.ndarray
@@ -42,12 +44,12 @@ class Samples:
 
 
 def recorded_samples(head: TrainedHead, capture: Capture) -> Samples:
-    """Those of a capture's training frames, as its cameras see them."""
+    """Samples from a capture: expressions of training frames, importance as its cameras see."""
     return Samples(training_expressions(head, capture), importance_of(head, capture))
 
 
 def samples_around(head: TrainedHead, expressions: np.ndarray) -> Samples:
-    """Given expressions (T, B), as cameras in front of the head and beside it see them."""
+    """Samples from expressions (T, B): importance is as virtual cameras around the face see."""
     rows = np.linspace(0, len(expressions) - 1, _PROBES).round().astype(int)
     probes = torch.from_numpy(np.asarray(expressions[rows], np.float32))  # (P, B)
     cameras = cameras_around(head.model, _PROBES)
@@ -57,7 +59,13 @@ def samples_around(head: TrainedHead, expressions: np.ndarray) -> Samples:
 
 
 def references_around(head: TrainedHead, expressions: np.ndarray, count: int) -> list[Reference]:
-    """What the exact head shows to the same cameras in some of these expressions (T, B)."""
+    """Pictures of the exact head by virtual cameras around the face, without ground truth.
+
+    Args:
+        head: The exact head.
+        expressions: (T, B), from which the pictures' expressions are taken evenly.
+        count: Number of pictures at most.
+    """
     rows = spread(len(expressions), count)
     cameras, colour = cameras_around(head.model, len(rows)), torch.tensor(staging.NEUTRAL)
     shown = torch.from_numpy(np.asarray(expressions[rows], np.float32))  # (V, B)
@@ -66,19 +74,26 @@ def references_around(head: TrainedHead, expressions: np.ndarray, count: int) ->
 
 
 def training_expressions(head: TrainedHead, capture: Capture) -> np.ndarray:
-    """(T, B) of the training frames."""
+    """(T, B) expressions of a capture's training frames."""
     return expressions_of(head, capture, capture.split.train)
 
 
 def expressions_of(head: TrainedHead, capture: Capture, frames) -> np.ndarray:
-    """(T, B) of some frames."""
+    """(T, B) expressions of T frames of a capture."""
     track = head.track(capture)
     with torch.no_grad():
         return np.stack([track.at(frame).numpy() for frame in frames])
 
 
 def spoken_expressions(head: TrainedHead, texts: Sequence[str], seed: int = 0) -> np.ndarray:
-    """(T, B) of synthetic voices that read texts to a head driven by speech, with blinks.
+    """(T, B) expressions, 25 per second, of a head driven by speech that reads texts aloud.
+
+    Synthetic voices read the texts; eyes blink and move by themselves.
+
+    Args:
+        head: A head driven by speech.
+        texts: At least one text.
+        seed: Seed of the eyes' movements.
 
     Raises:
         MissingExtraError: If espeak-ng is not installed.
@@ -93,7 +108,13 @@ def spoken_expressions(head: TrainedHead, texts: Sequence[str], seed: int = 0) -
 
 
 def lips_of(head: TrainedHead, samples: np.ndarray, rate: int) -> np.ndarray:
-    """(T, 32) what a sound (S,) does to a head driven by speech, 25 rows per second."""
+    """(T, 32) speech values, 25 rows per second, of a head driven by speech.
+
+    Args:
+        head: A head driven by speech.
+        samples: (S,) sound.
+        rate: Samples per second.
+    """
     assert head.adaptor is not None
     encoder = load_encoder(head.encoder)
     features = torch.from_numpy(encoder.features(samples, rate, head.model.device))  # (T, D)
@@ -102,7 +123,7 @@ def lips_of(head: TrainedHead, samples: np.ndarray, rate: int) -> np.ndarray:
 
 
 def importance_of(head: TrainedHead, capture: Capture) -> np.ndarray:
-    """(N, 4) as training frames see it, from all cameras in turn."""
+    """(N, 4) importance of each logit in training frames, seen by the capture's cameras in turn."""
     frames = capture.split.train
     frames = [frames[i] for i in np.linspace(0, len(frames) - 1, _PROBES).astype(int)]
     frames = [frame for frame in frames if capture.world_from_head(frame) is not None]
@@ -115,7 +136,7 @@ def importance_of(head: TrainedHead, capture: Capture) -> np.ndarray:
 
 
 def cameras_around(model: HeadModel, count: int) -> list[Camera]:
-    """Cameras in canonical head space, which looks along z, with all of the head in sight."""
+    """Cameras in canonical head space before and beside the face, with all of the head in view."""
     means = model.means.detach().cpu().numpy()
     low, high = np.percentile(means, (0.5, 99.5), axis=0)  # (3,), (3,)
     middle, half = (low + high) / 2, np.linalg.norm(high - low) / 2

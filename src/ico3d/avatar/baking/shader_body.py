@@ -1,4 +1,7 @@
-"""Baking: the exact moving body → windows that a shader blends (docs/bundle.md, body/0000 …)."""
+"""Bakes windows of an exact moving body into bases that a shader mixes.
+
+docs/bundle.md describes the files body/0000 … that result.
+"""
 
 from dataclasses import dataclass
 
@@ -14,11 +17,11 @@ from ico3d.splat.gaussians import Gaussians
 
 _INT16 = 32767
 SAMPLES_PER_FRAME = 2
-"""All frames, and what lies midway."""
+"""Times at which a window is sampled, per frame: all frames, and midway between them."""
 _MOST_FADING = 0.02
-"""How much an opacity may change within a window, which has but one; more would be seen."""
+"""Most change of an opacity within a window: a baked window keeps one value for all times."""
 GAUSSIANS_PER_CLUSTER = 140
-"""At least, on average: each cluster's curves take their room, too."""
+"""Least mean number of Gaussians in a cluster: each cluster's curves take memory, too."""
 
 
 @dataclass(frozen=True)
@@ -26,9 +29,9 @@ class Shape:
     """How closely a window is kept.
 
     Attributes:
-        clusters: Groups of Gaussians with components of their own; at most one per
-            `GAUSSIANS_PER_CLUSTER`.
-        ranks: Components of positions, rotations and scales.
+        clusters: Number of groups of Gaussians with components of their own; fewer where a group
+            would have less than `GAUSSIANS_PER_CLUSTER` on average.
+        ranks: Number of components of positions, of rotations and of scales.
     """
 
     clusters: int
@@ -37,7 +40,13 @@ class Shape:
 
 @dataclass(frozen=True)
 class _Motion:
-    """What moves in a window: (S, N, 3) metres, (S, N, 4) quaternions, (S, N, 3) metres."""
+    """The Gaussians of a window at S times.
+
+    Attributes:
+        means: (S, N, 3) metres.
+        quats: (S, N, 4) unit quaternions wxyz, whose signs do not jump over time.
+        scales: (S, N, 3) metres.
+    """
 
     means: np.ndarray
     quats: np.ndarray
@@ -45,14 +54,14 @@ class _Motion:
 
 
 class WindowBaker:
-    """Does what all ranks share once: samples a window densely in time."""
+    """Bakes one window in any shape; the window is sampled once, densely in time."""
 
     def __init__(self, body: MovingBody, index: int):
-        """Samples window `index`.
+        """Samples window `index` of a body.
 
         Raises:
-            BundleError: If nothing of it is ever opaque enough to be drawn, or if Gaussians come
-                and go.
+            BundleError: If no Gaussian of the window is opaque enough to be drawn, or if the
+                opacity of one changes within the window.
         """
         span = body.windows[index]
         first = body.window_gaussians(index, 0.0).detach()
@@ -64,7 +73,7 @@ class WindowBaker:
         self._motion = _sample(body, index, first, kept, count)
 
     def baked(self, shape: Shape) -> BakedWindow:
-        """The window in this shape."""
+        """The window, baked in a shape."""
         channels = self._channels(shape.ranks)
         count = max(1, min(shape.clusters, len(self._rgba) // GAUSSIANS_PER_CLUSTER))
         labels = group(channels, count)
@@ -82,10 +91,11 @@ class WindowBaker:
         )
 
     def _channels(self, ranks: tuple[int, int, int]) -> list[Channel]:
-        """What moves, weighted by how far an error moves a Gaussian's rim, times its opacity.
+        """Positions, rotations and scales, each with the weight of its errors.
 
-        A turn by the angle θ is a change of the quaternion by θ/2, and moves the rim by θ times
-        how far the Gaussian is from a sphere.
+        The weight of a Gaussian is how far an error of size 1 moves its rim, in metres, times its
+        opacity. A rotation by the angle θ changes the quaternion by θ/2 and moves the rim by about
+        θ times the eccentricity, √(largest² − smallest²) of the Gaussian's scales.
         """
         motion, opacity = self._motion, self._rgba[:, 3] / np.float32(255)
         squares = np.square(motion.scales)  # (S, N, 3)
@@ -128,7 +138,13 @@ def aligned(quats: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Components:
-    """mean + Σ_k curves_sck · basis_kn: (N, D) float32, (K, N, D) int16, (S, C, K) float32."""
+    """A property over time: mean_n + Σ_k curves_sck · basis_kn, where c is the cluster of n.
+
+    Attributes:
+        mean: (N, D) float32 mean over time.
+        basis: (K, N, D) int16.
+        curves: (S, C, K) float32, at S times for C clusters; they include the units of the basis.
+    """
 
     mean: np.ndarray
     basis: np.ndarray
@@ -136,7 +152,13 @@ class _Components:
 
 
 def _components(channel: Channel, labels: np.ndarray, count: int) -> _Components:
-    """Each cluster's principal components, 16-bit; the curves take on their units."""
+    """Principal components of each cluster, with a 16-bit basis.
+
+    Args:
+        channel: The property.
+        labels: (N,) cluster of each Gaussian.
+        count: Number of clusters.
+    """
     spans = components(channel, labels, count)  # (C, S, K)
     mean = channel.values.mean(axis=0)
     basis = np.zeros((channel.rank, *mean.shape), np.int16)
@@ -151,7 +173,7 @@ def _components(channel: Channel, labels: np.ndarray, count: int) -> _Components
 
 
 def _display_colours(gaussians: Gaussians) -> np.ndarray:
-    """(N, 4) uint8 of colours and opacities."""
+    """(N, 4) uint8: RGB and opacity of each Gaussian, from 0 to 255."""
     assert gaussians.colors is not None
     rgba = torch.cat([gaussians.colors, gaussians.opacities[:, None]], 1).float().cpu()
     return (rgba.clamp(0, 1) * 255).round().byte().numpy()

@@ -1,4 +1,4 @@
-"""Baking: the exact head model → a head that a shader blends (docs/bundle.md, head.safetensors)."""
+"""Bakes an exact head into a linear basis for a shader (docs/bundle.md, head.safetensors)."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ from ico3d.head.model import HeadModel
 from ico3d.splat.convention import MIN_ALPHA
 
 CLIP = 8.0
-"""Logits beyond ±8 differ by less than 1/2,980 in the picture."""
+"""Logits are clipped to ±8: beyond, their sigmoids differ by less than 1/2,980."""
 
 
 @dataclass(frozen=True)
@@ -23,10 +23,10 @@ class BakeSettings:
     """How a head is baked.
 
     Attributes:
-        hidden: H, width of the coefficient network.
-        max_frames: Training expressions used at most, spread evenly.
-        augmented: Further expressions made from them for the coefficient network.
-        steps: Steps of its fit.
+        hidden: H, width of the coefficient network's hidden layer.
+        max_frames: Most expressions that are used, spread evenly over the given ones.
+        augmented: Number of expressions that are made up besides, for the coefficient network.
+        steps: Optimisation steps of the coefficient network.
         seed: Seed of all randomness.
     """
 
@@ -38,7 +38,7 @@ class BakeSettings:
 
 
 class HeadBaker:
-    """Does what all ranks share once: samples, principal components, coefficient network."""
+    """Bakes one head with any rank; samples, components and network are computed once."""
 
     def __init__(
         self,
@@ -48,14 +48,14 @@ class HeadBaker:
         rank: int,
         settings: BakeSettings = BakeSettings(),
     ):
-        """Samples the model.
+        """Samples the model and fits its principal components and coefficient network.
 
         Args:
             model: The exact head.
-            expressions: (T, B) those of the training frames.
-            importance: (N, 4) weights of logit errors.
-            rank: The largest that `baked` will be asked for.
-            settings: Of the fit.
+            expressions: (T, B) expressions in which the baked head has to look right.
+            importance: (N, 4) how much an error in each logit matters.
+            rank: Largest rank that `baked` will be asked for.
+            settings: Settings of the fit.
 
         Raises:
             BundleError: If no Gaussian is ever opaque enough to be drawn.
@@ -71,10 +71,10 @@ class HeadBaker:
         self._network = self._fit(chosen, settings)
 
     def baked(self, rank: int) -> BakedHead:
-        """The head with the first `rank` components."""
+        """The baked head with the first `rank` components."""
         count = int(self._kept.sum())
-        basis = self._factors.basis[:rank].reshape(rank, count, 4)
-        sizes = np.sqrt(np.square(self._factors.scores[:, :rank]).mean(axis=0))
+        basis = self._factors.basis[:rank].reshape(rank, count, 4)  # (K, N, 4)
+        sizes = np.sqrt(np.square(self._factors.scores[:, :rank]).mean(axis=0))  # (K,)
         rounded = quantise(basis, sizes, self._weights)
         network = self._network
         return BakedHead(
@@ -89,7 +89,7 @@ class HeadBaker:
         )
 
     def _fit(self, recorded: np.ndarray, settings: BakeSettings) -> CoefficientNetwork:
-        """Distils scores of recorded and of made-up expressions into the small network."""
+        """Fits the coefficient network to scores of recorded and of made-up expressions."""
         rng = np.random.default_rng(settings.seed)
         made = augmented(recorded, settings.augmented, rng)
         scores = [self._factors.scores]
@@ -102,7 +102,7 @@ class HeadBaker:
 
 
 def sample_logits(model: HeadModel, expressions: np.ndarray) -> np.ndarray:
-    """The exact logits, clipped to ±8: (T, B) → (T, N, 4) float16."""
+    """(T, N, 4) float16 logits of the exact head for expressions (T, B), clipped to ±8."""
     samples = np.empty((len(expressions), len(model), 4), np.float16)
     with torch.no_grad():
         for row, expression in zip(samples, expressions, strict=True):

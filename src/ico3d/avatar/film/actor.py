@@ -1,4 +1,4 @@
-"""Who can be filmed: bundles as viewers draw them, and avatars as the exact models do."""
+"""People who can be filmed: baked ones as viewers draw them, and exact ones of `ico3d assemble`."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -29,34 +29,36 @@ from ico3d.speech.runtime import open_speech
 from ico3d.splat.gaussians import Gaussians
 
 Draw = Callable[[float, np.ndarray], Gaussians]
-"""A time of the body, in seconds, and an expression (B,) → the person in the world."""
+"""Returns the person in the world at a time of the body in seconds, with an expression (B,)."""
 Lips = Callable[[np.ndarray, int], np.ndarray]
-"""A sound (S,) and its rate → what the mouth does, (T, 32) at 25 rows per second."""
+"""Returns speech values (T, 32), 25 rows per second, for samples (S,) and samples per second."""
 
 
 PORTRAIT = 2.8
-"""Height of a portrait of a whole person, in heights of its head."""
+"""Height of the view in a portrait of a whole person, in heights of the head."""
 CHEST = 0.7
-"""How far the middle of a portrait is below that of the head, in heights of the head."""
+"""How far the middle of a portrait is below the middle of the head, in heights of the head."""
 
 
 @dataclass(frozen=True)
 class Actor:
-    """Somebody who can be filmed.
+    """A person who can be filmed.
 
     Attributes:
-        draw: Gaussians in the world at a time of the body (of a head alone: of its motion, which
-            goes back and forth), with an expression (B,).
-        seconds: How long the recorded motion lasts.
+        draw: Returns the person in the world at a time of the body, with an expression (B,). The
+            time of a head alone is that of its motion, which plays back and forth.
+        seconds: Length of the recorded motion.
         view: Where a visitor stands.
-        portrait: Nearer to the face, where there is one.
-        background: Colour in [0, 1].
-        idle: (B,) the face at rest; (0,) without a head.
-        eye_offset: Where the seven eye and brow values start in the expression, if it has them.
-        lips: Moves the mouth; None where no sound does.
+        portrait: A camera before head and chest; the visitor's view where head and body are not
+            both there.
+        background: RGB in [0, 1].
+        idle: (B,) expression of the face at rest; (0,) without a head.
+        eye_offset: Index of the first of the seven eye and brow values in the expression; None
+            where it has none.
+        lips: Turns sound into speech values; None where sound does not drive the face.
         animation: How the body moves while it talks; None where head and body are not both there.
-        backdrop: What stands behind the person, in the world.
-        poseable: The person in poses that nobody recorded; None without a skeleton.
+        backdrop: Splats behind the person, in the world; None where there are none.
+        poseable: The person in any pose; None without a skeleton.
     """
 
     draw: Draw
@@ -76,8 +78,8 @@ def bundle_actor(bundle: Bundle) -> Actor:
     """The baked person of a bundle.
 
     Raises:
-        MissingModelError: If it needs a speech encoder that is not on this machine.
-        ModelError: If its speech model cannot be used.
+        MissingModelError: If the bundle needs a speech encoder that is not on this machine.
+        ModelError: If the bundle's speech model cannot be used.
     """
     manifest = bundle.manifest
     head, body = manifest.head, manifest.any_body
@@ -105,7 +107,7 @@ def bundle_actor(bundle: Bundle) -> Actor:
 
 
 def _swaying_head(bundle: Bundle) -> tuple[Draw, float]:
-    """A head alone sways as it was recorded, back and forth."""
+    """Draws a head alone, which plays its recorded motion back and forth; with its length in s."""
     head, poses = bundle.require_head()
     assert bundle.manifest.head is not None
     fps = bundle.manifest.head.fps
@@ -129,8 +131,9 @@ def avatar_actor(
     Args:
         avatar: Who is filmed, on the device where it is drawn.
         animation: How the body moves while it talks.
-        capture: The body's recording, which says which way is up; without one, y is.
-        cuts: Gestures in that recording; None finds them by rule.
+        capture: The body's recording, for the upward direction and the background; without one
+            +y is up and the background grey.
+        cuts: Gestures in the body's recording; None finds them by rule.
     """
     points = extent(avatar)
     low, high = points.min(0), points.max(0)
@@ -155,7 +158,10 @@ def avatar_actor(
 
 
 def _driven(person: Poseable | None, head: TrainedHead) -> Poseable | None:
-    """A trained person whose face takes what drives it, as a bundle's does."""
+    """A trained person whose face takes expressions that drive avatars, as that of a bundle does.
+
+    Without this, it takes expressions as they were recorded (`TrainedHead.recorded` converts them).
+    """
     draw = person and person.head
     if person is None or draw is None:
         return person
@@ -163,11 +169,11 @@ def _driven(person: Poseable | None, head: TrainedHead) -> Poseable | None:
 
 
 def portrait_of(view: CameraInfo, head: np.ndarray) -> CameraInfo:
-    """A camera that looks the same way at head and chest: hands are seen where they gesture.
+    """A camera before head and chest, where gesturing hands are in view.
 
     Args:
-        view: Where a visitor stands, to see all of the person.
-        head: (P, 3) places of the head's Gaussians in the world.
+        view: Where a visitor stands; the portrait looks in the same direction.
+        head: (P, 3) positions of the head's Gaussians in the world, metres.
     """
     up = np.array(view.up) / np.linalg.norm(view.up)
     toward = np.subtract(view.eye, view.target)

@@ -19,40 +19,43 @@ if TYPE_CHECKING:
     from ico3d.common.camera import Camera
 
 ORBIT, START, PORTRAIT = "orbit", "start", "portrait"
-"""Camera paths that have names."""
+"""Camera paths that can be asked for by name."""
 GREY = (0.84, 0.855, 0.88)
+"""Background behind a body alone."""
 
 
 @dataclass(frozen=True)
 class Render:
-    """Films a person: somebody who talks, or a recorded motion from where no camera stood.
+    """Films a person who talks, or a recorded motion, from where no camera stood.
 
     With --audio, lips follow the sound, the body gestures, and the film is as long as the sound.
-    Without, time runs along with the camera; where the film is longer than the clip, back and
-    forth. Whoever has a skeleton is not bound to the clip: with --audio they gesture on the stress
-    of what they say, and --gestures names what they do.
+    Without it, the recorded motion is played; a film that is longer than the clip plays it back and
+    forth. A person on a skeleton is not bound to the clip: with --audio they gesture on the stress
+    of speech, and --gestures names gestures to make.
 
     Attributes:
-        model: A bundle (`demo` is the one of the package), as it was baked, or a model folder that
-            ico3d assemble or ico3d train body wrote, as the exact model shows it.
+        model: A bundle, which is shown as it was baked (`demo` is the one of the package), or a
+            model folder of ico3d assemble or ico3d train body, which is shown by the exact model.
         out: The video to write, NAME.mp4.
-        audio: The sound to say: WAV, FLAC or MP3.
-        text: What is said in the sound, so that somebody on a skeleton shows what words mean.
-        gestures: What somebody on a skeleton does, one after the other, as long as it takes, such
-            as `wave point open_hands`; a name that does not exist is told all that do.
-        capture: Orbit as the cameras of this capture stand around the person; without, level with
-            a person in a world with y up. Of what ico3d assemble wrote: the body's recording.
+        audio: Sound file with what the person says: WAV, FLAC or MP3.
+        text: What is said in the sound, so that a person on a skeleton can gesture what words mean.
+        gestures: Gestures that a person on a skeleton makes one after the other, such as `wave
+            point open_hands`; the film lasts as long as they take. The error about an unknown name
+            lists all names.
+        capture: Orbit at the distance and height of this capture's cameras; without it, around the
+            middle of a person in a world with y up. For a folder of ico3d assemble it is the body's
+            recording.
         path: `orbit`, once around the person; `portrait`, before head and chest for the whole film;
             `start`, where visitors stand; or a JSON file with key cameras: {"cameras": [{"eye": [x,
             y, z], "target": [x, y, z], "up": [0, 1, 0], "fov_y": 40}, ...]}, metres and degrees; up
-            and fov_y can be left out. By default `portrait` with --audio, `start` with
-            --gestures, of bodies of their own and without both `orbit`.
-        seconds: How long a film without --audio and --gestures lasts.
+            and fov_y can be left out. The default is `portrait` with --audio, `start` with
+            --gestures, and `orbit` without both or for a body alone.
+        seconds: Length of a film without --audio and --gestures.
         fps: Pictures per second.
         size: Width and height in pixels, even numbers; one number for a square.
         background: Colour behind the person, as in HTML: a name or #rrggbb; by default the
-            bundle's own, else a light grey.
-        seed: Blinks and gestures follow from it.
+            bundle's own, the mean background of the capture, or a light grey.
+        seed: Seed of blinks and gestures.
         device: Where to compute: by default with CUDA where that works, else on the CPU.
     """
 
@@ -74,10 +77,10 @@ class Render:
         """Renders and writes the video.
 
         Raises:
-            SettingsError: If the settings make no sense.
-            ModelError: If there is nobody who can be filmed.
+            SettingsError: If the options make no sense or do not fit the model.
+            ModelError: If the model is none that can be filmed.
             BundleError: If the bundle fails a check.
-            CaptureError: If the sound cannot be read.
+            CaptureError: If the sound cannot be read, or --capture does not fit the person.
         """
         from rich.console import Console
         from rich.progress import track
@@ -105,7 +108,11 @@ class Render:
         return self.size[0], self.size[-1]
 
     def _checked(self) -> tuple[float, ...] | None:
-        """The background's colour in [0, 1], if one was given, when all the rest is sound too."""
+        """Checks the options; returns RGB in [0, 1] of --background, None if not given.
+
+        Raises:
+            SettingsError: If an option makes no sense.
+        """
         from PIL import ImageColor
 
         from ico3d.errors import SettingsError
@@ -141,7 +148,7 @@ class Render:
     def _person(
         self, sound: "Sound | None", device: "torch.device"
     ) -> tuple["Moving", "Actor | None"]:
-        """Who is filmed, and, but for bodies of their own, how they talk and where they stand."""
+        """The moving person to film, and the actor that it comes from; None for a body alone."""
         from ico3d.avatar.avatar import TrainedAvatar
         from ico3d.avatar.baking.person_bundle import animation_of
         from ico3d.avatar.film import actor
@@ -171,7 +178,7 @@ class Render:
         return self._gesturing(found.poseable, found) or self._acting(found, sound), found
 
     def _gesturing(self, person: "Poseable | None", actor: "Actor | None") -> "Moving | None":
-        """Who makes the gestures that are asked for; None where none are."""
+        """The person making the gestures of --gestures; None without that option."""
         from ico3d.avatar.film.gesturing import gestures
         from ico3d.errors import SettingsError
 
@@ -185,7 +192,7 @@ class Render:
         return gestures(person, actor, self.gestures, self.seed)
 
     def _acting(self, actor: "Actor", sound: "Sound | None") -> "Moving":
-        """Who says something, or shows what was recorded."""
+        """The person saying the sound or, without sound, repeating the recorded motion."""
         from ico3d.avatar.film import gesturing, performance
 
         if sound is None:
@@ -200,7 +207,7 @@ class Render:
         return None if self.capture is None else open_capture(self.capture)
 
     def _cameras(self, person: "Moving", actor: "Actor | None", count: int) -> list["Camera"]:
-        """One for each picture."""
+        """The camera of each of `count` pictures."""
         from ico3d.avatar import camera_path
         from ico3d.avatar.moving import extent
         from ico3d.avatar.render_bundle import visitor_camera

@@ -1,4 +1,4 @@
-"""Rendering somebody who moves along a path of cameras."""
+"""Renders the pictures of a film: a moving person seen along a path of cameras."""
 
 from collections.abc import Iterator, Sequence
 
@@ -21,18 +21,18 @@ def pictures(
     backdrop: Gaussians | None = None,
     device: torch.device = CPU,
 ) -> Iterator[np.ndarray]:
-    """What the cameras see one after the other while time runs, back and forth through the clip.
+    """Renders a moving person picture by picture; the clip is played back and forth.
 
     Args:
         person: Who moves.
-        cameras: One per picture.
+        cameras: The camera of each picture.
         fps: Pictures per second.
-        background: (3,) colour in [0, 1].
-        backdrop: What stands behind the person, in the world.
-        device: Where they are drawn.
+        background: RGB in [0, 1].
+        backdrop: Splats behind the person, in the world; None for none.
+        device: Where pictures are drawn.
 
     Yields:
-        (H, W, 3) uint8.
+        (H, W, 3) uint8 RGB pictures.
     """
     behind = torch.tensor(background)
     around = [] if backdrop is None else [backdrop.to(device)]

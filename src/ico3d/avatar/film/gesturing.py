@@ -1,4 +1,4 @@
-"""Films of people on a skeleton, who do what nobody recorded."""
+"""People on a skeleton who make gestures in a film, alone or with speech."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,13 +18,13 @@ from ico3d.splat.gaussians import Gaussians
 
 @dataclass(frozen=True)
 class Gesturing:
-    """Somebody who moves (`ico3d.avatar.moving.Moving`) as they are told.
+    """A person on a skeleton performing gestures; implements `ico3d.avatar.moving.Moving`.
 
     Attributes:
-        person: Who it is.
-        performer: Knows what is to be done.
-        face: What the face does.
-        seconds: How long the film lasts.
+        person: Draws the person in a pose.
+        performer: Gives the pose at each time of the film.
+        face: Gives the expression at each time of the film.
+        seconds: Length of the film.
     """
 
     person: Poseable
@@ -33,22 +33,22 @@ class Gesturing:
     seconds: float
 
     def gaussians(self, seconds: float) -> Gaussians:
-        """In the world at a time of the film."""
+        """The whole person in the world at a time of the film."""
         by_role, root = self.performer.at(np.array([seconds]))  # (1, R, 4), (1, 3)
         return self.person.gaussians(by_role[0], root[0], self.face.at(seconds))
 
 
 def gestures(person: Poseable, actor: Actor | None, names: Sequence[str], seed: int) -> Gesturing:
-    """Somebody who makes gestures one after the other and lets the hands hang again.
+    """A person who makes gestures one after the other, and lets the hands hang in the end.
 
     Args:
-        person: Who.
-        actor: The same person, whose face blinks; None for a body alone.
-        names: Of the gestures.
-        seed: How they stand, breathe and blink meanwhile follows from it.
+        person: Draws the person in a pose.
+        actor: The same person, for the blinking face; None for a body alone.
+        names: Names of the gestures.
+        seed: Seed of how the person stands, breathes and blinks meanwhile.
 
     Raises:
-        SettingsError: If there is no gesture of a name.
+        SettingsError: If no gesture has one of the names.
     """
     directions, seconds = in_turn(person.clips, names)
     performer = person.performer(seed)
@@ -58,17 +58,17 @@ def gestures(person: Poseable, actor: Actor | None, names: Sequence[str], seed: 
 
 
 def speech(person: Poseable, actor: Actor, sound: Sound, text: str, seed: int) -> Gesturing:
-    """Somebody who says something and gestures with it, strokes on its accents.
+    """A person who talks, with the strokes of gestures on the accents of speech.
 
     Args:
-        person: Who.
-        actor: The same person.
-        sound: What is heard.
-        text: What is said in it; empty where nobody knows: then no word means a gesture.
-        seed: All that is by chance follows from it.
+        person: Draws the person in a pose.
+        actor: The same person, for the face.
+        sound: The speech.
+        text: What is said; if empty, gestures follow the loudness only, not the meaning of words.
+        seed: Seed of the choice of gestures, of small movements and of blinks.
 
     Raises:
-        SettingsError: If no sound moves this face.
+        SettingsError: If sound does not drive the person's face.
     """
     seconds, levels = len(sound.samples) / sound.rate, loudness(sound.samples, sound.rate)
     words = timed_words(text, levels, 0.0, seconds) if text else unknown_words(levels)

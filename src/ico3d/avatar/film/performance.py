@@ -1,4 +1,4 @@
-"""What an actor does in a film: it says something, or shows its recorded motion."""
+"""Performances of an actor in a film: speech with a body, or the recorded motion."""
 
 from dataclasses import dataclass
 
@@ -17,16 +17,16 @@ from ico3d.splat.gaussians import Gaussians
 
 @dataclass(frozen=True)
 class Face:
-    """What a face does in a film.
+    """The expressions of a face through a film.
 
     Attributes:
-        rows: (T, B) expressions, 25 per second.
+        rows: (T, B) expressions, 25 rows per second.
     """
 
     rows: np.ndarray
 
     def at(self, seconds: float) -> np.ndarray:
-        """(B,) at a time, linear between rows."""
+        """(B,) expression at a time in seconds, interpolated linearly between rows."""
         place = min(max(seconds * FEATURE_RATE, 0.0), len(self.rows) - 1.0)
         first = min(int(place), max(len(self.rows) - 2, 0))
         after = min(first + 1, len(self.rows) - 1)
@@ -36,14 +36,14 @@ class Face:
 
 @dataclass(frozen=True)
 class Performance:
-    """Somebody who moves (`ico3d.avatar.moving.Moving`) for so many seconds.
+    """An actor performing along the recorded motion; implements `ico3d.avatar.moving.Moving`.
 
     Attributes:
-        actor: Who it is.
-        seconds: How long the performance lasts.
-        face: What the face does.
-        times: (P,) seconds of the film.
-        body_times: (P,) seconds of the body's motion at these, straight between them.
+        actor: Who performs.
+        seconds: Length of the performance.
+        face: Gives the expression at each time of the film.
+        times: (P,) ascending times of the film, seconds.
+        body_times: (P,) time of the body's clip at each of `times`, seconds; linear in between.
     """
 
     actor: Actor
@@ -53,25 +53,25 @@ class Performance:
     body_times: np.ndarray
 
     def gaussians(self, seconds: float) -> Gaussians:
-        """In the world at a time of the film."""
+        """The whole person in the world at a time of the film."""
         body = float(np.interp(seconds, self.times, self.body_times))
         return self.actor.draw(body, self.face.at(seconds))
 
 
 def speech(actor: Actor, sound: Sound, seed: int) -> Performance:
-    """Says something: lips follow the sound, the body gestures and is back at rest in the end.
+    """An actor who talks: lips follow the sound, the body gestures and ends at rest.
 
     Args:
         actor: Who talks.
-        sound: What is heard.
-        seed: Blinks and gestures follow from it.
+        sound: The speech.
+        seed: Seed of blinks and gestures.
 
     Raises:
-        SettingsError: If no sound moves this face.
+        SettingsError: If sound does not drive the actor's face.
     """
     seconds = len(sound.samples) / sound.rate
     face = speaking_face(actor, sound, seed)
-    points = [(0.0, 0.0), (seconds, seconds)]  # a head alone sways on
+    points = [(0.0, 0.0), (seconds, seconds)]  # without an animation the recorded motion goes on
     if actor.animation is not None:
         rest = Start(actor.animation.rest.end / actor.animation.fps)
         points = plan(actor.animation, rest, seconds, np.random.default_rng(seed))
@@ -80,12 +80,12 @@ def speech(actor: Actor, sound: Sound, seed: int) -> Performance:
 
 
 def motion(actor: Actor, seconds: float, seed: int) -> Performance:
-    """Shows the recorded motion back and forth, with the face at rest but for its eyes.
+    """An actor who repeats the recorded motion back and forth, with a face that only blinks.
 
     Args:
         actor: Who moves.
-        seconds: How long the film lasts.
-        seed: Blinks follow from it.
+        seconds: Length of the film.
+        seed: Seed of the blinks.
     """
     turns = int(seconds // actor.seconds) if actor.seconds > 0 else 0
     times = np.unique([*np.arange(turns + 1) * actor.seconds, seconds])
@@ -94,10 +94,15 @@ def motion(actor: Actor, seconds: float, seed: int) -> Performance:
 
 
 def speaking_face(actor: Actor, sound: Sound, seed: int) -> Face:
-    """The face of somebody who says something; arguments as for `speech`.
+    """The face of an actor who talks.
+
+    Args:
+        actor: Who talks.
+        sound: The speech.
+        seed: Seed of the blinks.
 
     Raises:
-        SettingsError: If no sound moves this face.
+        SettingsError: If sound does not drive the actor's face.
     """
     if actor.lips is None:
         raise SettingsError(
@@ -108,7 +113,13 @@ def speaking_face(actor: Actor, sound: Sound, seed: int) -> Face:
 
 
 def still_face(actor: Actor, seconds: float, seed: int) -> Face:
-    """A face that does nothing but blink; arguments as for `motion`."""
+    """The face of an actor that does nothing but blink.
+
+    Args:
+        actor: Whose face.
+        seconds: Length of the film.
+        seed: Seed of the blinks.
+    """
     return _face(actor, np.zeros((int(seconds * FEATURE_RATE) + 1, 0), np.float32), seed)
 
 

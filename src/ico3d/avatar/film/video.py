@@ -1,4 +1,4 @@
-"""Writing a video file."""
+"""Writes video files: H.264 pictures and AAC sound in MP4."""
 
 from collections.abc import Iterable
 from fractions import Fraction
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from av.video.stream import VideoStream
 
 QUALITY = "18"
-"""x264's constant rate factor: no difference to be seen."""
+"""x264's constant rate factor, at which the loss is not visible."""
 SOUND_RATE = 48_000
 """Samples per second of a film's sound: what players expect."""
 SOUND_BITS = 128_000
-"""Per second."""
+"""Bits per second of the coded sound."""
 BT709 = 1
-"""Of H.264's tables: how colours are coded in video of today."""
+"""Number of the colour space BT.709 in H.264's tables, which is that of high-definition video."""
 
 
 def write_video(
@@ -36,10 +36,10 @@ def write_video(
 
     Args:
         path: The .mp4 file; it appears when all pictures are in it.
-        pictures: (H, W, 3) uint8 RGB.
-        size: Their width and height, even numbers.
+        pictures: (H, W, 3) uint8 RGB pictures.
+        size: Width and height of the pictures in pixels, even numbers.
         fps: Pictures per second.
-        sound: What is heard from the first picture on.
+        sound: Sound that begins with the first picture; None for a silent video.
 
     Raises:
         MissingExtraError: If PyAV is not installed.
@@ -86,7 +86,7 @@ def _video_stream(container: "OutputContainer", size: tuple[int, int], fps: floa
 
 
 class _SoundTrack:
-    """Sound that is written along with the pictures, so that players need not look far ahead."""
+    """Writes sound in step with the pictures, so that players find both close together."""
 
     def __init__(self, container: "OutputContainer", sound: Sound):
         self._container, self._sound = container, sound
@@ -109,6 +109,6 @@ class _SoundTrack:
         self._written = end
 
     def finish(self) -> None:
-        """Writes what is left."""
+        """Writes the rest of the sound and closes the stream."""
         self.write_until(len(self._sound.samples) / self._sound.rate)
         self._container.mux(self._stream.encode(None))

@@ -1,4 +1,4 @@
-"""From a trained head and a capture of the whole person to an avatar, in one go."""
+"""Makes an avatar from a trained head and a capture of the whole person."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
@@ -38,23 +38,23 @@ from ico3d.training.checkpoint import save_tensors
 from ico3d.training.run import RunFolder
 
 SEAM_REACH = 0.012
-"""Metres to either side of the border in which the head's Gaussians show where it runs."""
+"""Distance in metres to either side of the head's border; Gaussians within it mark the border."""
 MEASURED = 60
-"""Pictures by test cameras."""
+"""Most pictures of test cameras in which the seam is measured."""
 
 
 @dataclass(frozen=True)
 class Assembly:
-    """What to assemble.
+    """What an avatar is made from, and with which settings.
 
     Attributes:
         head: Folder of the trained head.
         joining: How the head is put on.
         body: How the body is trained.
-        seed: All randomness follows from it.
-        method: What moves the body.
-        continued: Folder of a body that was trained without the head, to go on from.
-        device: Where to compute; a run may go on elsewhere.
+        seed: Seed of all randomness.
+        method: How the body's Gaussians are moved.
+        continued: Folder of a body, trained without the head, from which training goes on.
+        device: Where to compute; an interrupted run may go on with another one.
     """
 
     head: Path
@@ -66,7 +66,7 @@ class Assembly:
     device: DeviceName = "auto"
 
     def about(self, capture: Path) -> dict:
-        """What an interrupted run must agree with to be gone on with."""
+        """Settings that a run must share with an interrupted one to continue it."""
         paths = {"head": str(self.head.resolve()), "capture": str(capture.resolve())}
         if self.continued:
             paths["continued"] = str(self.continued.resolve())
@@ -79,10 +79,23 @@ class Assembly:
 
 
 Say = Callable[[str], None]
+"""Prints a sentence about what was found."""
 
 
 def prepare(capture: Capture, folder: Path, assembly: Assembly, say: Say) -> RunFolder:
-    """Opens the avatar's folder and places the head, where that is not done yet."""
+    """Opens the avatar's folder and, if that is not done yet, places the head in it.
+
+    Args:
+        capture: Recording of the whole person, with head poses.
+        folder: The avatar's folder.
+        assembly: Head, body and settings.
+        say: Called with what was found.
+
+    Raises:
+        CaptureError: If the capture lacks something that is needed.
+        ModelError: If the head does not fit.
+        SettingsError: If the folder holds a run with other settings.
+    """
     run = RunFolder(folder, assembly.about(capture.path))
     if not (folder / SEAM).is_file():  # written last of the head's files
         place_head(capture, folder, assembly, say)
@@ -95,11 +108,11 @@ def assemble(
     """Makes an avatar, or goes on with an interrupted run of the same settings.
 
     Args:
-        capture: Of the whole person, with head poses.
+        capture: Recording of the whole person, with head poses.
         folder: The avatar's folder.
-        assembly: Head, captures and settings.
-        say: Told what was found.
-        runner: Trains the windows; one after another in this process by default.
+        assembly: Head, body and settings.
+        say: Called with what was found.
+        runner: Trains the windows; by default one after another in this process.
 
     Raises:
         CaptureError: If the capture lacks something that is needed.
@@ -125,13 +138,24 @@ def assemble(
     avatar.to(computing_device(assembly.device))
     found = swaying(avatar, placement, say) | measured(avatar, capture, say)
     avatar = replace(avatar, summary=summary | found)
-    avatar.save_summary(folder)  # its parts lie there
+    avatar.save_summary(folder)  # head, placement and body are written already
     run.finish(avatar.summary)
     return avatar
 
 
 def place_head(capture: Capture, folder: Path, assembly: Assembly, say: Say) -> None:
-    """Aligns the head, crops it and matches its colours; writes its part of the folder."""
+    """Aligns the head, crops it, matches its colours, and writes head, placement and seam.
+
+    Args:
+        capture: Recording of the whole person, with head poses.
+        folder: The avatar's folder.
+        assembly: Head and settings.
+        say: Called with what was found.
+
+    Raises:
+        CaptureError: If the capture lacks something that is needed.
+        ModelError: If the head does not fit.
+    """
     device = computing_device(assembly.device)
     head, placement = TrainedHead.load(assembly.head), None
     if head.landmarks is None:
@@ -153,15 +177,16 @@ def place_head(capture: Capture, folder: Path, assembly: Assembly, say: Say) -> 
 
 
 def align(capture: Capture, landmarks: np.ndarray, say: Say) -> Placement:
-    """Where the head is in the world of the body's capture.
+    """Places a head in the world of the body's capture, by landmarks that both have.
 
     Args:
         capture: The body's recording.
-        landmarks: (68, 3) in the space of the head's model.
-        say: Told how well they fit.
+        landmarks: (68, 3) landmarks of the head in the space of its model.
+        say: Called with how well the landmarks fit.
 
     Raises:
-        CaptureError: If the capture has no head poses, or no landmarks to compare.
+        CaptureError: If the capture lacks head poses or landmarks of the face.
+        ModelError: If the landmarks are no face.
     """
     poses = head_poses(capture)
     there = canonical_landmarks(capture)
@@ -175,7 +200,18 @@ def align(capture: Capture, landmarks: np.ndarray, say: Say) -> Placement:
 
 
 def swaying(avatar: TrainedAvatar, recorded: Placement, say: Say) -> dict:
-    """How far a head on its joint is from where it was recorded, in figures for `avatar.json`."""
+    """How far a head fixed to its joint is from where it was recorded.
+
+    Args:
+        avatar: The avatar, whose placement is that of the joint.
+        recorded: The placement that was recorded.
+        say: Called with the distances in words.
+
+    Returns:
+        `sway_mm` and `sway_most_mm` for `avatar.json`: distance of the face's landmarks in
+        millimetres, root mean square over the clip and in the worst frame; nothing where the head
+        is not on a joint.
+    """
     if avatar.placement.world_from_canonical is recorded.world_from_canonical:
         return {}
     face = moved(recorded.canonical_from_head, _landmarks(avatar.head, Path(HEAD)))  # (68, 3)
@@ -191,7 +227,18 @@ def swaying(avatar: TrainedAvatar, recorded: Placement, say: Say) -> dict:
 
 
 def measured(avatar: TrainedAvatar, capture: Capture, say: Say) -> dict:
-    """How well head and body fit, in figures for `avatar.json`."""
+    """How well head and body fit together.
+
+    Args:
+        avatar: The avatar.
+        capture: The body's recording; its test cameras measure, or its training cameras where it
+            has none.
+        say: Called with the figures in words.
+
+    Returns:
+        Figures for `avatar.json`: `gap_mm` (`largest_gap` in millimetres) and the fields of
+        `SeamScores`; what cannot be measured is missing.
+    """
     landmarks = _landmarks(avatar.head, Path(HEAD))
     region = HeadRegion.around(landmarks)
     found: dict = {}
@@ -205,7 +252,7 @@ def measured(avatar: TrainedAvatar, capture: Capture, say: Say) -> dict:
     try:
         views = face_views(capture, avatar.placement, region, landmarks, held_out, MEASURED)
         scores = seam_scores(avatar, views)
-    except CaptureError as error:  # no test camera in front: the gap is all that can be said
+    except CaptureError as error:  # no camera in front: only the gap can be measured
         say(f"the seam in pictures is not measured: {error}")
         return found
     say(

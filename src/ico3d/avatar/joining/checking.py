@@ -1,4 +1,4 @@
-"""Pictures by which people see whether a head is where it belongs."""
+"""Pictures with which people check that a head is where it belongs."""
 
 from pathlib import Path
 
@@ -17,22 +17,25 @@ from ico3d.splat.device import CPU
 from ico3d.splat.render import render
 
 PICTURES = 12
+"""Most pictures that are written."""
 LEAST_HEIGHT = 256
-"""Pixels that a face is enlarged to."""
+"""Height in pixels to which smaller pictures are enlarged at least."""
 MARK = (0.1, 1.0, 0.3)
+"""RGB of the pixels at landmarks."""
 
 
 def write_checks(folder: Path, capture: Capture, out: Path, device: torch.device = CPU) -> None:
-    """Writes `FRAME_CAMERA.png`: recorded | the head drawn over it | landmarks over it.
+    """Writes pictures `FRAME_CAMERA.png`: recorded | with the head drawn over | with landmarks.
 
     Args:
-        folder: The avatar's folder; its head is placed already.
+        folder: The avatar's folder, with its head and placement.
         capture: The body's recording.
-        out: Where to write.
+        out: Folder to write into.
         device: Where to draw.
 
     Raises:
         CaptureError: If no camera sees the face.
+        ModelError: If the folder lacks the head, its landmarks or the placement.
     """
     head = TrainedHead.load(folder / HEAD).to(device)
     placement, expressions = load_placement(folder / PLACEMENT)
@@ -53,7 +56,7 @@ def write_checks(folder: Path, capture: Capture, out: Path, device: torch.device
 
 
 def _marked(view: FaceView, points: np.ndarray) -> np.ndarray:
-    """The picture with points (P, 3) of the world on it."""
+    """(H, W, 3) picture of a view with points (P, 3) of the world marked in it."""
     picture = view.image.numpy().copy()
     pixels = np.floor(view.camera.project(points)[0]).astype(int)  # (P, 2)
     inside = ((pixels >= 0) & (pixels < (view.camera.width, view.camera.height))).all(1)

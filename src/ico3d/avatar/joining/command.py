@@ -18,15 +18,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class AssembleChoice:
-    """What the defaults of all other settings follow from.
+    """Options that decide the defaults of all other options.
 
     Attributes:
-        preset: The paper's settings of the body, or those sized for two CPU cores;
-            the defaults shown here are those of the preset that is chosen.
-        method: How the body is moved: SWinGS++ repeats what was recorded; skinned hangs it on the
-            skeleton of ico3d capture pose, so that the person can gesture as nobody recorded; the
-            others are what ico3d train body compares these with.
-        body: A folder of ico3d train body on that capture, to go on from: a third of the steps.
+        preset: The paper's settings of the body, or settings sized for two CPU cores. The defaults
+            shown here are those of the chosen preset.
+        method: How the body is moved. SWinGS++ repeats what was recorded; skinned binds it to the
+            skeleton of ico3d capture pose, so that the person can make gestures that were not
+            recorded; the others are for comparison, as in ico3d train body.
+        body: A folder of ico3d train body on the same capture, from which training goes on with a
+            third of the steps.
     """
 
     preset: PresetName = "cpu"
@@ -40,18 +41,18 @@ class Assemble(AssembleChoice):
 
     Aligns the head with every frame, matches its colours to the light in which the body was
     recorded, trains the body's windows with the head in the picture, and measures the seam. The
-    same command goes on where it was interrupted.
+    same command continues an interrupted run.
 
     Attributes:
         head: A model folder of ico3d train head.
         capture: A capture of the same person's whole body, with head poses and masks.
         out: The avatar's folder to write.
-        check: Write pictures here that show the head drawn over the body's recordings.
-        seed: All randomness follows from it.
-        device: Where to compute: by default with CUDA where that works, else on the CPU; machines
-            of a Ray cluster decide for themselves.
-        jobs: Windows that train at once, each in a process of its own.
-        ray: Address of a Ray cluster that trains the windows, host:port or auto.
+        check: Folder for pictures that show the head drawn over the body's recording.
+        seed: Seed of all randomness.
+        device: Where to compute: by default with CUDA where that works, else on the CPU; each
+            machine of a Ray cluster decides for itself.
+        jobs: Number of windows that train at once, each in a process of its own.
+        ray: Address of a Ray cluster that trains the windows: host:port, or auto.
         joining: How the head is put on the body.
         settings: How the body is trained.
     """
@@ -69,7 +70,7 @@ class Assemble(AssembleChoice):
 
     @classmethod
     def defaults(cls, words: Sequence[str]) -> "Assemble":
-        """The verb with the settings of the preset that words choose, or a third of its steps."""
+        """The verb with the defaults that follow from --preset, --method and --body in `words`."""
         choice = chosen(AssembleChoice, words)
         settings = settings_for(choice.preset, choice.method)
         if choice.body is not None:
@@ -78,10 +79,10 @@ class Assemble(AssembleChoice):
         return cls(tyro.MISSING, tyro.MISSING, tyro.MISSING, settings=settings)
 
     def run(self) -> None:
-        """Assembles, or goes on with that.
+        """Assembles the avatar, or continues an interrupted run.
 
         Raises:
-            Ico3dError: If head and capture lack something or do not fit.
+            Ico3dError: If head or capture lack something, or do not fit together.
         """
         import torch
         from rich.console import Console
@@ -107,7 +108,7 @@ class Assemble(AssembleChoice):
         )
 
     def assembly(self) -> "Assembly":
-        """What is asked for."""
+        """The options as an `Assembly`."""
         from ico3d.avatar.joining.assemble import Assembly
 
         return Assembly(

@@ -1,4 +1,4 @@
-"""The head as the companion of a body's training."""
+"""The head as a companion of the body's training: it is in the picture, and stays unchanged."""
 
 import hashlib
 from dataclasses import dataclass
@@ -17,19 +17,19 @@ from ico3d.splat.gaussians import Gaussians
 from ico3d.training.checkpoint import load_tensors
 
 SEAM = "seam.safetensors"
-"""Places about the head's border, in the space of its model."""
+"""File with positions (P, 3) near the head's border, in the space of the head's model."""
 JITTER = 0.004
-"""Metres, standard deviation about such a place."""
+"""Standard deviation in metres of first points about a position near the border."""
 
 
 @dataclass(frozen=True)
 class HeadSource:
-    """An avatar's folder that holds its head, placement and seam already.
+    """An avatar's folder from which processes that train the body load the head.
 
     Attributes:
-        folder: Where they lie.
-        border_points: Gaussians to begin with about the border, in each window; 0 for none.
-        pruning: Whether the body keeps clear of the face.
+        folder: The folder, with head, placement and seam.
+        border_points: Number of first points near the head's border in each window; 0 for none.
+        pruning: Whether Gaussians of the body are removed from the face.
     """
 
     folder: Path
@@ -49,7 +49,7 @@ class HeadSource:
         return HeadCompanion(head, placement, expressions, seam, self)
 
     def about(self) -> dict:
-        """Settings, and a hash of the files that decide what is drawn."""
+        """Settings, and a hash of head, placement and seam: what the training depends on."""
         digest = hashlib.sha256()
         head = self.folder / HEAD
         for file in (
@@ -74,14 +74,14 @@ class HeadCompanion:
         seam: np.ndarray,
         source: HeadSource,
     ):
-        """Places a head.
+        """Places a head in every frame of the body's recording.
 
         Args:
-            head: With the Gaussians that are drawn.
-            placement: Where it is in every frame.
-            expressions: (F, B).
-            seam: (P, 3) places about its border, in the space of its model.
-            source: Where the head lies, and what the body's training does about its border.
+            head: The head, cropped to the Gaussians that are drawn.
+            placement: Where the head is in every frame.
+            expressions: (F, B) expression in every frame.
+            seam: (P, 3) positions near the head's border, in the space of the head's model.
+            source: Settings of what the body's training does at the border and in the face.
 
         Raises:
             ModelError: If the head has no landmarks.
@@ -104,7 +104,7 @@ class HeadCompanion:
         return self._drawn[frame]
 
     def trespassing(self, means: Tensor, frame: float) -> Tensor:
-        """(N,) bool: which places (N, 3) are inside the face or along the jaw."""
+        """(N,) bool: which positions (N, 3) in the world are inside the face or along the jaw."""
         if not self._source.pruning:
             return torch.zeros(len(means), dtype=torch.bool, device=means.device)
         head_from_world = np.linalg.inv(self._placement.world_from_head(frame))
@@ -112,7 +112,7 @@ class HeadCompanion:
         return torch.from_numpy(self._region.trespassing(local)).to(means.device)
 
     def border(self, frame: int, rng: np.random.Generator) -> np.ndarray:
-        """(P, 3) random places about the border, in the world."""
+        """(P, 3) random positions near the head's border, in the world at a frame."""
         count = self._source.border_points if len(self._seam) else 0
         chosen = self._seam[rng.integers(max(len(self._seam), 1), size=count)]
         places = chosen + JITTER * rng.standard_normal((count, 3))

@@ -1,4 +1,4 @@
-"""Gaussians of a head model that are drawn on a body."""
+"""Crops a head model to the Gaussians that are drawn on a body."""
 
 from dataclasses import replace
 
@@ -12,10 +12,10 @@ from ico3d.head.model_folder import TrainedHead
 
 
 def cropped(head: TrainedHead, region: HeadRegion) -> TrainedHead:
-    """The head with those Gaussians only that lie in a region of its canonical space.
+    """The head with only those Gaussians whose centres lie in a region of its space.
 
     Raises:
-        ModelError: If none do.
+        ModelError: If no Gaussian lies in the region.
     """
     means = head.model.means.detach().cpu().numpy().astype(np.float64)  # (N, 3)
     inside = (region.depth(means) > 0) & ~region.floating(means)  # (N,)
@@ -26,7 +26,7 @@ def cropped(head: TrainedHead, region: HeadRegion) -> TrainedHead:
 
 
 def _selected(model: HeadModel, keep: torch.Tensor) -> HeadModel:
-    """A model of its own with some of the Gaussians."""
+    """A copy of the model with the Gaussians of some indices (K,)."""
     chosen = HeadModel(model.shape, len(keep))
     values = dict(model.state_dict())
     for name, axis in GAUSSIAN_AXES.items():
@@ -36,12 +36,12 @@ def _selected(model: HeadModel, keep: torch.Tensor) -> HeadModel:
 
 
 def near_border(head: TrainedHead, region: HeadRegion, reach: float) -> np.ndarray:
-    """(P, 3) float64 places of a head's Gaussians that lie about the border of a region.
+    """(P, 3) float64 positions of a head's Gaussians that lie near the border of a region.
 
     Args:
-        head: As it was trained, on both sides of the border.
-        region: Which part of the head is drawn.
-        reach: Metres to either side.
+        head: The head before it is cropped, with Gaussians on both sides of the border.
+        region: The part of the head that is drawn.
+        reach: Largest distance to the border in metres, on either side.
     """
     means = head.model.means.detach().cpu().numpy().astype(np.float64)  # (N, 3)
     return means[np.abs(region.depth(means)) < reach]

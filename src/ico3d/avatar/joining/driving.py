@@ -1,4 +1,4 @@
-"""What a head needs to know of every frame of a body's capture: its place and its expression."""
+"""Head pose and expression in every frame of a body's capture."""
 
 import logging
 
@@ -12,14 +12,14 @@ from ico3d.head.model_folder import TrainedHead
 log = logging.getLogger(__name__)
 
 RIGID = 1e-3
-"""How far a rotation times its transpose may be from 1."""
+"""Largest entry by which a rotation times its transpose may differ from the identity."""
 
 
 def head_poses(capture: Capture) -> np.ndarray:
-    """W_i of all frames, (F, 4, 4) float64 rigid.
+    """(F, 4, 4) float64 rigid head poses W_i of all frames.
 
     Raises:
-        CaptureError: If a frame has none, or one that is not rigid.
+        CaptureError: If a frame has no head pose, or one that is not rigid.
     """
     poses = [capture.world_from_head(frame) for frame in range(capture.num_frames)]
     lacking = [i for i, p in enumerate(poses) if p is None or not np.isfinite(p).all()]
@@ -41,12 +41,13 @@ def head_poses(capture: Capture) -> np.ndarray:
 
 
 def recorded_expressions(head: TrainedHead, capture: Capture, neutral: np.ndarray) -> np.ndarray:
-    """(F, B) float32: what drives the head as the person looked while the body was recorded.
+    """(F, B) float32 expressions of the head in every frame of the body's recording.
 
     Args:
         head: The head to drive.
         capture: The recording of the whole person.
-        neutral: (B,) for captures that tell nothing about the face.
+        neutral: (B,) expression that is used, with a warning, if the capture lacks what drives the
+            head.
     """
     try:
         track = head.track(capture)

@@ -1,4 +1,4 @@
-"""Pictures of a body's capture in which the face is seen."""
+"""Pictures of a body's capture that show the face, cropped to it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,29 +17,31 @@ from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 
 WIDEST = np.cos(np.radians(65.0))
-"""Of the angle between where the face looks and the camera: farther aside it is seen askew."""
+"""Cosine of the largest angle, 65°, between the face's direction and that to the camera."""
 MARGIN = 0.35
-"""About the face, as a part of its size in the picture."""
+"""Margin around the landmarks in a crop, relative to the larger side of their bounding box."""
 MOST = 120
-"""Pictures."""
+"""Default of the largest number of pictures."""
 CHANGING = ((slice(48, 68), 0.3), (slice(36, 42), 0.14), (slice(42, 48), 0.14))
-"""Landmarks of mouth and eyes, and how far about their middle they change the face, as a part of
-its height."""
+"""Landmarks of mouth and eyes, each with the radius of the disc that expressions change.
+
+Radii are relative to the height of the face in the picture, from chin to brows.
+"""
 LEAST = 4
-"""Pixels that a crop is wide and high."""
+"""Least width and height of a crop in pixels."""
 
 
 @dataclass(frozen=True)
 class FaceView:
-    """A picture cropped to the head.
+    """A recorded picture cropped to the face.
 
     Attributes:
-        frame: When.
-        camera_index: Whose.
+        frame: Frame of the recording.
+        camera_index: Index of the camera in the recording.
         camera: The camera of the cropped picture, in the world.
-        image: (H, W, 3).
-        mask: (H, W) the person.
-        steady: (H, W) 1 but for mouth and eyes, which look otherwise with every expression.
+        image: (H, W, 3) float32 RGB.
+        mask: (H, W) mask of the person.
+        steady: (H, W) 0 about mouth and eyes, which change with the expression, else 1.
     """
 
     frame: int
@@ -63,18 +65,19 @@ def face_views(
     cameras: Sequence[int] | None = None,
     most: int = MOST,
 ) -> list[FaceView]:
-    """Views of the face from in front, evenly spread over frames and cameras.
+    """Views of the face by cameras in front of it, evenly spread over frames and cameras.
 
     Args:
         capture: The recording of the whole person.
-        placement: Where the head is.
-        region: Of the head's model, for where the face looks.
-        landmarks: (68, 3) in the space of the head's model.
-        cameras: Which cameras; the training ones by default.
-        most: Views at most.
+        placement: Where the head is in each frame.
+        region: Region of the head's model, for the direction in which the face looks.
+        landmarks: (68, 3) landmarks in the space of the head's model.
+        cameras: Indices of the cameras; the training cameras by default.
+        most: Number of views at most.
 
     Raises:
-        CaptureError: If no camera sees the face.
+        CaptureError: If no camera is in front of the face, or none that is has a picture of the
+            face with a mask.
     """
     chosen_cameras = train_cameras(capture) if cameras is None else cameras
     seen = [
@@ -99,7 +102,14 @@ def face_views(
 def faces(
     camera: Camera, world_from_head: np.ndarray, region: HeadRegion, landmarks: np.ndarray
 ) -> bool:
-    """Whether a camera is in front of a face."""
+    """Whether a camera is in front of a face, by no more than 65° aside.
+
+    Args:
+        camera: The camera in the world.
+        world_from_head: (4, 4) similarity that places the head.
+        region: Region of the head's model, for the direction in which the face looks.
+        landmarks: (68, 3) landmarks in the space of the head's model.
+    """
     centre = moved(world_from_head, landmarks.mean(0))
     towards = camera.camera_to_world[:3, 3] - centre
     forward = world_from_head[:3, :3] @ region.forward
@@ -110,7 +120,7 @@ def faces(
 def _view(
     capture: Capture, placement: Placement, landmarks: np.ndarray, frame: int, index: int
 ) -> FaceView | None:
-    """The picture of a camera; None where it shows no face, or there is none."""
+    """One cropped picture; None where the face is not in it, or picture or mask is missing."""
     camera = capture.cameras[index]
     points = moved(placement.world_from_head(frame), landmarks)  # (68, 3)
     if (moved(camera.world_to_camera, points)[:, 2] <= 0).any():
@@ -134,7 +144,7 @@ def _view(
 
 
 def _steady(pixels: np.ndarray, size: tuple[int, ...]) -> np.ndarray:
-    """(H, W) float32: 0 in discs about mouth and eyes, whose landmarks are at pixels (68, 2)."""
+    """(H, W) float32: 0 in discs about mouth and eyes, else 1; landmarks are at pixels (68, 2)."""
     rows, columns = np.indices(size) + 0.5  # (H, W) each
     height = np.linalg.norm(pixels[BROWS].mean(0) - pixels[CHIN])
     steady = np.ones(size, np.float32)

@@ -1,9 +1,9 @@
-"""The head's colours under the light of the body's studio (paper, head–body integration).
+"""Fits the head's colours to the light of the body's studio (paper, head–body integration).
 
-Only the last layer of the head's network that makes colours is learnt: a hundred numbers or two,
-so that a few small pictures of the face suffice and nothing of what drives the face is forgotten.
-The change may tint everything at will, but differs little between neighbours, as light does. It
-happens once, before the windows are trained in parallel with the head as it then is.
+Only the last colour layer of the head's network is learnt, a hundred numbers or two: a few small
+pictures of the face suffice, and how expressions move the face is not forgotten. The change may
+tint the whole head freely, but is kept alike between neighbouring Gaussians, as light is. It is
+done once, before the body's windows are trained with this head.
 """
 
 from collections.abc import Sequence
@@ -24,15 +24,15 @@ from ico3d.splat.render import render
 from ico3d.training.optimiser import Optimiser
 
 CERTAIN = 0.5
-"""Part of a pixel that the head and the person must fill, to count."""
+"""Share of a pixel that both head and person must cover for the pixel to count."""
 ROUGHNESS = 0.02
-"""Weight of the squared difference of neighbours' light, in logits, beside the L1 of pictures."""
+"""Weight of the squared change of light, in logits, between neighbours; pictures' L1 has 1."""
 NEIGHBOURS, FRAMES = 6, 8
-"""Of each Gaussian, in so many frames, that are compared."""
+"""Number of neighbours of a Gaussian, and of frames, in which light is compared."""
 MEMORY = 2**30
-"""Bytes for what is made once per frame."""
+"""Bytes of the cache of what is computed once per frame."""
 FLOATS = 14
-"""Numbers that describe a Gaussian."""
+"""Numbers of a Gaussian in that cache: mean, rotation, scale, opacity and colour."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,9 @@ class RecolourSettings:
     """How the colours are learnt.
 
     Attributes:
-        steps: Optimisation steps, one picture each.
-        rate: Learning rate of Adam; decays to a tenth.
-        seed: Decides the order of the pictures.
+        steps: Optimisation steps, with one picture each.
+        rate: Learning rate of Adam, which decays to a tenth.
+        seed: Seed of the order of the pictures.
     """
 
     steps: int = 800
@@ -60,11 +60,11 @@ def recolour(
     """Fits the head's colours to pictures of the body's capture, in place.
 
     Args:
-        model: Of the head, of a variant with a network; only its last colour layer changes.
-        placement: Where the head is.
-        expressions: (F, B) of the body's frames.
-        views: Pictures of the body's recording, with which the head's colours shall agree.
-        settings: Steps and learning rates.
+        model: The head, of a variant with a network; only its last colour layer changes.
+        placement: Where the head is in each frame.
+        expressions: (F, B) expression in each frame of the body's recording.
+        views: Pictures of the face in the body's recording.
+        settings: Steps and learning rate.
     """
     frozen = _Frozen(model, placement, expressions)
     layer = _Relit(model.color_branch)
@@ -90,14 +90,25 @@ def recolour(
 def color_difference(
     model: HeadModel, placement: Placement, expressions: np.ndarray, views: Sequence[FaceView]
 ) -> float:
-    """Mean absolute difference of head and pictures where the head covers them."""
+    """Mean absolute RGB difference, in [0, 1], between head and pictures where both show the head.
+
+    Args:
+        model: The head, of a variant with a network.
+        placement: Where the head is in each frame.
+        expressions: (F, B) expression in each frame of the body's recording.
+        views: Pictures of the face in the body's recording.
+    """
     frozen = _Frozen(model, placement, expressions)
     moved = (view.to(model.device) for view in views)
     return float(np.mean([float(_difference(model.color_branch, frozen, v)) for v in moved]))
 
 
 class _Relit(nn.Module):
-    """The colour layer (W, b) as (1 + M)·W + D, b + c: M and c tint, D is light from somewhere."""
+    """A colour layer (W, b) changed to ((1 + M)·W + D, b + c).
+
+    M (`tint`) and c (`offset`) tint all Gaussians alike; D (`local`) varies between Gaussians, as
+    light from one side does.
+    """
 
     def __init__(self, layer: nn.Linear):
         super().__init__()
@@ -107,12 +118,12 @@ class _Relit(nn.Module):
         self.offset = nn.Parameter(self._weight.new_zeros(3))
 
     def forward(self, hidden: Tensor) -> Tensor:
-        """(N, 3) logits of colours."""
+        """(N, 3) logits of colours from the layer's inputs (N, hidden)."""
         return nn.functional.linear(hidden, *self._values())
 
     @torch.no_grad()
     def write(self, layer: nn.Linear) -> None:
-        """Makes it the layer's weights."""
+        """Copies the changed weights into a layer."""
         for parameter, value in zip((layer.weight, layer.bias), self._values(), strict=True):
             parameter.copy_(value)
 
@@ -122,14 +133,18 @@ class _Relit(nn.Module):
 
 @torch.no_grad()
 def _roughness(model: HeadModel, hidden: Sequence[Tensor]) -> Tensor:
-    """(hidden, hidden) R: D·R·Dᵀ is how much D·h differs between neighbours, squared, per channel.
+    """A matrix that measures how much a change of the colour layer differs between neighbours.
 
-    Light changes slowly over a face. Without this, small pictures leave the layer free to paint
-    blotches that only larger ones would show.
+    Light changes slowly over a face. Without this penalty the layer could paint blotches that are
+    too small to be seen in small pictures.
 
     Args:
-        model: Where the Gaussians are.
-        hidden: (N, hidden) what the layer takes in, by frame.
+        model: The head, for the positions of its Gaussians.
+        hidden: (N, hidden) inputs of the layer in each of some frames.
+
+    Returns:
+        (hidden, hidden) R: the diagonal of D·R·Dᵀ is the mean squared difference of D·h between
+        neighbouring Gaussians, in each colour channel.
     """
     means = model.means.detach().cpu().numpy()
     _, nearest = KDTree(means).query(means, k=min(1 + NEIGHBOURS, len(means)))  # (N, 1 + K)
@@ -143,13 +158,13 @@ def _roughness(model: HeadModel, hidden: Sequence[Tensor]) -> Tensor:
 
 
 def _some(views: Sequence[FaceView]) -> list[int]:
-    """A few frames of views, evenly spread."""
+    """Up to `FRAMES` frames of the views, evenly spread."""
     frames = sorted({view.frame for view in views})
     return [frames[index] for index in spread(len(frames), FRAMES)]
 
 
 class _Frozen:
-    """What of the head does not change: made once per frame, as far as that fits into memory."""
+    """Caches, for each frame, what of the head does not change while colours are learnt."""
 
     def __init__(self, model: HeadModel, placement: Placement, expressions: np.ndarray):
         self._model, self._placement, self._expressions = model, placement, expressions
@@ -159,7 +174,7 @@ class _Frozen:
 
     @torch.no_grad()
     def at(self, frame: int) -> tuple[Tensor, Gaussians]:
-        """What the layer takes in (N, hidden), and the head's Gaussians in the world."""
+        """Inputs (N, hidden) of the colour layer, and the head's Gaussians in the world."""
         if frame not in self._made:
             values = torch.from_numpy(self._expressions[frame])  # (B,)
             hidden = self._model.hidden(self._model.blended(values), values)  # (N, hidden)
@@ -172,7 +187,7 @@ class _Frozen:
 
 
 def _difference(layer: nn.Module, frozen: _Frozen, view: FaceView) -> Tensor:
-    """L1 over the pixels that head and person fill, but for mouth and eyes."""
+    """Mean absolute difference over pixels that head and person cover, but for mouth and eyes."""
     hidden, drawn = frozen.at(view.frame)
     rendering = render(replace(drawn, colors=layer(hidden).sigmoid()), [view.camera], view.image)
     weight = ((rendering.alpha[0] > CERTAIN) & (view.mask > CERTAIN)) * view.steady  # (H, W)

@@ -1,4 +1,4 @@
-"""Which part of a head model is drawn on a body, and what the body must keep clear of."""
+"""The region of a head model that is drawn on a body, and where the body may not be."""
 
 from dataclasses import dataclass
 
@@ -8,16 +8,20 @@ from ico3d.errors import ModelError
 
 CHIN, JAW_CORNERS, JAW_ENDS, BROWS, BRIDGE = 8, (4, 12), (0, 16), slice(17, 27), 27
 JAW = slice(2, 15)
-"""Multi-PIE landmarks."""
+"""Indices of Multi-PIE landmarks along the jaw; the names above are such indices, too."""
 BELOW_JAW = 0.2
-"""How far under the jaw line the head ends: an open mouth reaches there. All lengths here are
-relative to the height of the face, from chin to brows."""
+"""How far below the jaw line the head's region ends: a chin goes down as a mouth opens.
+
+This length and those below are relative to the height of the face, from chin to brows.
+"""
 BEHIND_EARS = 0.3
-"""How far behind the ends of the jaw line it ends; beyond, cameras in front see nothing."""
+"""How far behind the ends of the jaw line the region ends: cameras in front see nothing there."""
 BEFORE_NOSE = 0.2
-"""How far before the foremost landmark the head's Gaussians may be."""
+"""How far before the foremost landmark Gaussians can belong to the head."""
 FACE_RADIUS = 0.6
+"""Radius of the sphere about the landmarks' centre in which no body may be."""
 JAW_RADIUS = 0.13
+"""Radius of the spheres about landmarks of the jaw in which no body may be."""
 
 
 @dataclass(frozen=True)
@@ -25,13 +29,13 @@ class HeadRegion:
     """The part of canonical head space that belongs to the head model.
 
     Attributes:
-        forward: (3,) where the face looks, of length 1.
-        under: (3,) of length 1, and `under_at`: the head lies where x · under > under_at; that
-            plane follows the lower jaw.
-        under_at: Metres.
-        behind_at: Metres; the head lies where x · forward > behind_at.
-        front_at: Metres; farther along `forward` nothing is a part of a face.
-        spheres: (S, 4) centre and radius: the face, and along the jaw; the body keeps clear.
+        forward: (3,) direction in which the face looks, of length 1.
+        under: (3,) normal, of length 1, of a plane below the lower jaw; it points into the head.
+        under_at: Offset of this plane: the region is where x · under > under_at, metres.
+        behind_at: The region is where x · forward > behind_at, metres.
+        front_at: Where x · forward > front_at, metres, nothing belongs to the face.
+        spheres: (S, 4) centres and radii in metres of spheres about the face and along the jaw, in
+            which no body may be.
     """
 
     forward: np.ndarray
@@ -49,7 +53,7 @@ class HeadRegion:
             landmarks: (68, 3) Multi-PIE landmarks in canonical head space.
 
         Raises:
-            ModelError: If they are no face.
+            ModelError: If the landmarks do not span a face.
         """
         chin, brows = landmarks[CHIN], landmarks[BROWS].mean(0)
         height = float(np.linalg.norm(brows - chin))
@@ -72,7 +76,7 @@ class HeadRegion:
         )
 
     def depth(self, points: np.ndarray) -> np.ndarray:
-        """(P,) how far points (P, 3) are inside, metres; outside it is negative."""
+        """(P,) distance in metres of points (P, 3) from the border; negative outside the region."""
         return np.minimum(
             points @ self.under - self.under_at, points @ self.forward - self.behind_at
         )
@@ -80,18 +84,19 @@ class HeadRegion:
     def floating(self, points: np.ndarray) -> np.ndarray:
         """(P,) bool: whether points (P, 3) hover before the face.
 
-        Where all cameras are in front, some do: pictures do not tell that nothing is there.
+        Some Gaussians do so if all recording cameras were in front: no picture shows that there is
+        nothing at their place.
         """
         return points @ self.forward > self.front_at
 
     def trespassing(self, points: np.ndarray) -> np.ndarray:
-        """(P,) bool: whether points (P, 3) are where the body keeps clear."""
+        """(P,) bool: whether points (P, 3) are where no body may be."""
         away = np.linalg.norm(points[:, None] - self.spheres[:, :3], axis=2)  # (P, S)
         return (away < self.spheres[:, 3]).any(1)
 
 
 def _across(direction: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
-    """What of a direction (3,) is orthogonal to others."""
+    """The part (3,) of a direction that is orthogonal to two other directions (3,)."""
     basis, _ = np.linalg.qr(np.stack(others, 1))  # (3, 2)
     return direction - basis @ (basis.T @ direction)
 

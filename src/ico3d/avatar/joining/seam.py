@@ -20,30 +20,37 @@ from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.render import render
 
 RIM = 0.008
-"""Metres inside the border in which the head's Gaussians are its rim."""
+"""Depth in metres inside the border up to which the head's Gaussians count as its rim."""
 OPAQUE = 0.3
-"""Opacity, and pixels of a picture, from which a Gaussian counts."""
+"""Opacity above which a Gaussian of the body counts.
+
+Also the summed contribution to one picture, in pixels, above which one of the head is visible.
+"""
 AROUND, DISTANCE, PIXELS, WIDE = 8, 1.2, 160, 0.4
-"""Cameras around a head, metres to them, the size of their pictures, and metres these show."""
+"""Cameras around a head: number, distance in metres, side in pixels, and metres that it shows."""
 BAND = 0.12
-"""Width of the band to either side of the border in pictures, as a part of the face's width."""
+"""Width of the band on either side of the border in pictures, relative to the head's width."""
 CERTAIN = 0.5
+"""Share of a pixel above which it counts as head, or as person."""
 
 
 def gap(
     head: Gaussians, body: Gaussians, world_from_head: np.ndarray, region: HeadRegion
 ) -> float | None:
-    """The widest opening between a head's rim and a body, metres; None where one is not opaque.
+    """The widest opening between a head's rim and a body, in metres.
 
-    Of every Gaussian of the rim that somebody outside can see, the distance to the nearest opaque
-    one of the body, less the larger standard deviations of both; the median of the widest
-    hundredth, as single Gaussians are no hole.
+    The opening at a visible Gaussian of the rim is the distance to the nearest opaque Gaussian of
+    the body, less the largest standard deviation of each. The result is the median of the widest
+    hundredth of these openings, as a single Gaussian makes no hole.
 
     Args:
         head: Gaussians of the head in the world.
         body: Gaussians of the body in the world.
-        world_from_head: (4, 4) where the head is.
-        region: Which part of the head's model is drawn.
+        world_from_head: (4, 4) similarity that places the head.
+        region: The part of the head's model that is drawn.
+
+    Returns:
+        Metres; None where the rim has no visible Gaussian, or the body no opaque one.
     """
     drawn, (head, body) = (head, body), (head.to("cpu"), body.to("cpu"))
     local = moved(np.linalg.inv(world_from_head), head.means.double().numpy())  # (N, 3)
@@ -60,7 +67,7 @@ def gap(
 
 
 def _seen_from_outside(head: Gaussians, body: Gaussians) -> np.ndarray:
-    """(N,) bool: which Gaussians of a head are seen by cameras around it."""
+    """(N,) bool: which Gaussians of a head are visible to cameras around it, body included."""
     middle = head.means.mean(0).double().cpu().numpy()
     cameras = [_looking_at(middle, angle) for angle in np.arange(AROUND) * 2 * np.pi / AROUND]
     given = contributions(cat([head, body]), cameras)[:, : len(head)]  # (C, N)
@@ -68,7 +75,7 @@ def _seen_from_outside(head: Gaussians, body: Gaussians) -> np.ndarray:
 
 
 def _looking_at(middle: np.ndarray, angle: float) -> Camera:
-    """A camera level with a head, in a world with y up."""
+    """A camera level with a head at `middle` (3,), at an azimuth in radians, with +y up."""
     eye = middle + DISTANCE * np.array([np.sin(angle), 0.0, np.cos(angle)])
     focal = PIXELS * DISTANCE / WIDE
     intrinsics = np.array([[focal, 0, PIXELS / 2], [0, focal, PIXELS / 2], [0, 0, 1]])
@@ -76,7 +83,7 @@ def _looking_at(middle: np.ndarray, angle: float) -> Camera:
 
 
 def largest_gap(avatar: TrainedAvatar, region: HeadRegion) -> float | None:
-    """The widest opening in any frame of the clip, metres; None if there is no border at all."""
+    """The widest `gap` in any frame of the clip, metres; None if no frame has one to measure."""
     gaps = []
     for frame in range(len(avatar.placement.world_from_canonical)):
         seconds = frame / avatar.fps
@@ -89,13 +96,13 @@ def largest_gap(avatar: TrainedAvatar, region: HeadRegion) -> float | None:
 
 @dataclass(frozen=True)
 class SeamScores:
-    """How pictures look about the face's border; means over views.
+    """How rendered pictures differ from recorded ones near the border of head and body.
 
     Attributes:
-        psnr_face: dB where the head is, but for the border.
-        psnr_border: dB in the band about the border.
-        color_step: How much the mean colour changes across the border beyond what it does in the
-            recorded pictures, length of the RGB difference.
+        psnr_face: PSNR in dB of the head without the band along the border.
+        psnr_border: PSNR in dB of the band along the border.
+        color_step: Change of the mean colour across the border, less that in the recorded picture:
+            length of the RGB vector, mean over views.
     """
 
     psnr_face: float
@@ -107,7 +114,7 @@ def seam_scores(avatar: TrainedAvatar, views: Sequence[FaceView]) -> SeamScores:
     """Compares an avatar with recorded pictures of its face.
 
     Args:
-        avatar: With the expressions that were recorded.
+        avatar: The avatar; it is drawn with the recorded expressions.
         views: Recorded pictures of the face.
 
     Raises:
@@ -123,7 +130,7 @@ def seam_scores(avatar: TrainedAvatar, views: Sequence[FaceView]) -> SeamScores:
 
 @torch.no_grad()
 def _scores_of(avatar: TrainedAvatar, view: FaceView) -> tuple[float, float, float] | None:
-    """Squared errors of the face and the border, and the step of colour; None without a border."""
+    """Mean squared errors of face and border, and the colour step; None without a border."""
     seconds = view.frame / avatar.fps
     head, body = avatar.head_gaussians(seconds), avatar.body.gaussians(seconds)
     drawn = render(cat([body, head]), [view.camera], view.image).rgb[0].cpu().numpy()  # (H, W, 3)
@@ -138,14 +145,23 @@ def _scores_of(avatar: TrainedAvatar, view: FaceView) -> tuple[float, float, flo
 
 
 def _share(head: Gaussians, body: Gaussians, view: FaceView) -> np.ndarray:
-    """(H, W) how much of each pixel is head."""
+    """(H, W) share of each pixel, 0 to 1, that the head covers in front of the body."""
     white, black = torch.ones_like(head.means), torch.zeros_like(body.means)
     marked = cat([replace(body, colors=black), replace(head, colors=white)])
     return render(marked, [view.camera]).rgb[0, :, :, 0].cpu().numpy()
 
 
 def _bands(share: np.ndarray, person: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(H, W) bool each: head next to the border, body next to it, and the rest of the head."""
+    """Divides a picture near the border of head and body.
+
+    Args:
+        share: (H, W) share of each pixel that the head covers.
+        person: (H, W) bool mask of the person.
+
+    Returns:
+        (H, W) bool each: the head's side of the band along the border, the body's side of it, and
+        the rest of the head.
+    """
     head = (share > CERTAIN) & person
     body = (share < 1 - CERTAIN) & person
     columns = np.flatnonzero(head.any(0))

@@ -10,11 +10,12 @@ class JoiningSettings:
     """How a head is put on a body.
 
     Attributes:
-        match_colors: Let the head take on the light of the studio where the body was recorded.
-        color_steps: Optimisation steps of matching the colours, one picture each.
+        match_colors: Match the head's colours to the light in which the body was recorded.
+        color_steps: Optimisation steps of matching the colours, with one picture each.
         color_rate: Learning rate of matching the colours.
-        pruning: Keep the body's Gaussians out of the face.
-        border_points: Gaussians about the border of head and body that each window begins with.
+        pruning: Remove the body's Gaussians from the face.
+        border_points: Number of Gaussians near the border of head and body with which each window
+            begins.
     """
 
     match_colors: bool = True
@@ -27,7 +28,7 @@ class JoiningSettings:
         """Checks the numbers.
 
         Raises:
-            SettingsError: If one is impossible.
+            SettingsError: If a number is out of range.
         """
         if self.color_steps < 1 or not self.color_rate > 0 or self.border_points < 0:
             raise SettingsError(

@@ -5,17 +5,21 @@ import numpy as np
 from ico3d.errors import ModelError
 
 STEADY = tuple(range(27, 68))
-"""Multi-PIE landmarks that count: nose, eyes, and lips, whose mean is about the same wherever
-somebody talks. Not jaw line and brows: sources differ by centimetres about where those run."""
+"""Indices of the Multi-PIE landmarks that count: nose, eyes, and lips.
+
+The mean of talking lips is about the same in all recordings. Jaw line and brows do not count, as
+sources differ by centimetres about where they are.
+"""
 KEPT = 0.8
-"""Part of the landmarks that count in the end: the rest may be badly tracked."""
+"""Share of the landmarks that count in the end; the rest may be badly tracked."""
 TRIPLES = 60
-"""Of landmarks, from which fits begin: one without a bad landmark is among them."""
+"""Number of random triples of landmarks from which fits begin, so that one has no bad landmark."""
 ROUNDS = 20
+"""Most rounds of fitting and choosing the landmarks that agree best."""
 
 
 def similarity(target: np.ndarray, source: np.ndarray) -> np.ndarray:
-    """The similarity that takes points to others with the least squares (Umeyama, 1991).
+    """The similarity from source to target points with the least squared error (Umeyama, 1991).
 
     Args:
         target: (P, 3), P ≥ 3, not on one line.
@@ -42,19 +46,20 @@ def similarity(target: np.ndarray, source: np.ndarray) -> np.ndarray:
 
 
 def canonical_from_head(body: np.ndarray, head: np.ndarray) -> tuple[np.ndarray, float]:
-    """G: from the head model's canonical space to that of the body's head poses.
+    """G, the similarity from the head model's space to canonical head space of the body's capture.
 
-    Least trimmed squares: the four fifths of the steady landmarks that agree best count.
+    It is fitted by least trimmed squares: the four fifths of the landmarks in `STEADY` that agree
+    best count.
 
     Args:
-        body: (68, 3) landmarks in the space of the body's head poses, metres.
+        body: (68, 3) landmarks in canonical head space of the body's capture, metres.
         head: (68, 3) the same landmarks in the space of the head's model.
 
     Returns:
         (4, 4) similarity, and the root mean square distance of the landmarks that count, metres.
 
     Raises:
-        ModelError: If they are no face.
+        ModelError: If the landmarks lie on one line.
     """
     target, source = body[list(STEADY)], head[list(STEADY)]  # (P, 3)
     rng = np.random.default_rng(0)
@@ -69,7 +74,12 @@ def canonical_from_head(body: np.ndarray, head: np.ndarray) -> tuple[np.ndarray,
 def _trimmed(
     target: np.ndarray, source: np.ndarray, chosen: np.ndarray
 ) -> tuple[np.ndarray, float] | None:
-    """Fits to some points (P, 3), then again and again to those that agree best; None if flat."""
+    """Least trimmed squares of points (P, 3), beginning with a fit to the chosen indices.
+
+    Returns:
+        (4, 4) similarity, and the root mean square distance of the points that count; None where
+        the points of a fit lie on one line.
+    """
     for _ in range(ROUNDS):
         before = chosen
         try:
@@ -84,7 +94,7 @@ def _trimmed(
 
 
 def moved(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Points (…, 3) taken by a (4, 4) affine map."""
+    """Points (…, 3) transformed by a (4, 4) affine matrix."""
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
@@ -94,7 +104,7 @@ def scale_of(matrix: np.ndarray) -> float:
 
 
 def fit_in_words(matrix: np.ndarray, rest: float) -> str:
-    """What `canonical_from_head` found, as the log says it."""
+    """The results of `canonical_from_head` as a sentence for people."""
     size = scale_of(matrix)
     return f"head on body: landmarks agree within {1e3 * rest:.1f} mm, scale {size:.4f}."
 

@@ -1,4 +1,4 @@
-"""A trained body on a skeleton in the numbers that a bundle keeps."""
+"""Rounds a trained body on a skeleton to the number formats of a bundle."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,20 +18,21 @@ from ico3d.bundle.skinned.posing import kernel_width
 from ico3d.common.spread import spread
 
 STILL = 0.05
-"""Degrees that a joint may turn in the recording and yet be held."""
+"""A joint that turns by no more than this many degrees in the recording is stored as held."""
 _LEAST = 1e-6
+"""Least standard deviation of a shape's coefficients that they are divided by."""
 _CLEAR = 0.5 / 255
-"""Opacity that rounds to 0: such Gaussians are never drawn."""
+"""Gaussians up to this opacity, which 8 bits round to 0, are left out."""
 
 
 @dataclass(frozen=True)
 class Clip:
-    """What the manifest says besides of a body on a skeleton.
+    """Facts about the recorded clip for the manifest of a body on a skeleton.
 
     Attributes:
         fps: Frames per second.
-        low: Least coordinates that its Gaussians' centres reach, metres.
-        high: Greatest coordinates.
+        low: Least x, y, z of the visible Gaussians' centres in the clip, metres.
+        high: Greatest x, y, z of these centres.
     """
 
     fps: float
@@ -40,19 +41,19 @@ class Clip:
 
 
 def quantised(model: WindowModel, clip: Clip, importance: np.ndarray) -> BakedSkinned:
-    """Rounds a body, its most important Gaussians first.
+    """Rounds a trained body on a skeleton, and sorts its Gaussians by importance.
 
     Args:
-        model: Its motion is `Skinned`.
-        clip: Rate and bounds.
-        importance: (N,) of each Gaussian.
+        model: The trained body; its motion must be `Skinned`.
+        clip: Frame rate and bounds of the recorded clip.
+        importance: (N,) importance of each Gaussian; the most important ones come first.
     """
     motion = model.motion
     assert isinstance(motion, Skinned)
     shared = {name: value.detach().cpu() for name, value in model.shared.items()}
     opacities = model.gaussians["opacity_logits"].detach().cpu().sigmoid().numpy()  # (N,)
     order = np.argsort(-importance, kind="stable")
-    order = order[opacities[order] > _CLEAR]  # (N,) of those that are seen
+    order = order[opacities[order] > _CLEAR]  # (N',) indices of the Gaussians that are kept
     values = {n: v.detach().cpu()[torch.from_numpy(order)] for n, v in model.gaussians.items()}
     arrays = {name: value.numpy() for name, value in values.items()}
     shapes = _shapes(motion, values, shared)
@@ -94,14 +95,14 @@ def quantised(model: WindowModel, clip: Clip, importance: np.ndarray) -> BakedSk
 
 @dataclass(frozen=True, eq=False)
 class _Shapes:
-    """Residual shapes in eight bits.
+    """Residual shapes in eight bits: offsets of positions and colour logits that a pose mixes.
 
     Attributes:
-        means: (N, 3) with the mean of the residual.
-        colors: (N, 3) likewise.
-        basis: (N, K, 6) int8.
-        scales: (N, 2) float16.
-        coefficients: (F, K) of the recorded frames.
+        means: (N, 3) positions at rest, plus the mean residual of the recorded frames.
+        colors: (N, 3) colour logits, plus the mean residual of the recorded frames.
+        basis: (N, K, 6) int8: three numbers of position and three of colour for each shape.
+        scales: (N, 2) float16 scale of positions and of colours, in `SCALE_UNITS`.
+        coefficients: (F, K) coefficients of the recorded frames, with mean 0 and deviation 1.
     """
 
     means: np.ndarray
@@ -112,14 +113,15 @@ class _Shapes:
 
 
 def _shapes(motion: Skinned, values: Mapping[str, Tensor], shared: Mapping[str, Tensor]) -> _Shapes:
-    """Shapes with coefficients about 0, whose lengths are comparable.
+    """Moves the mean residual into the Gaussians, and rounds the shapes to eight bits.
 
-    Weights of a mean sum to 1, so what all frames have in common may lie in the Gaussians
-    themselves, in poses that were never recorded as well. All shapes of a Gaussian share a scale:
-    each is as long as it is used.
+    Coefficients of any pose are a weighted mean of recorded ones. As the weights sum to 1, the
+    residual that all frames share can be added to the Gaussians, also for poses that were never
+    recorded. All shapes of a Gaussian share one scale, so each shape is multiplied by the standard
+    deviation of its coefficients before it is rounded.
     """
     means, colors = values["means"].numpy(), values["color_logits"].numpy()  # (N, 3)
-    if not motion.shapes:  # one that does nothing: a bundle has one at least
+    if not motion.shapes:  # a bundle has at least one shape: here one that is 0
         count, frames = len(means), motion.frames
         empty = np.zeros((count, 1, 6), np.int8), np.zeros((count, 2), np.float16)
         return _Shapes(means, colors, *empty, np.zeros((frames, 1)))
@@ -133,7 +135,7 @@ def _shapes(motion: Skinned, values: Mapping[str, Tensor], shared: Mapping[str, 
     basis = basis * sizes[:, None, None]
     units = np.array(SCALE_UNITS)
     scales = np.abs(basis).max(axis=(1, 3)) / 127 / units  # (N, 2)
-    # Rounded upwards: a shape may not exceed 127 units.
+    # Scales are rounded upwards, so that no value of a shape exceeds 127.
     scales = np.nextafter(scales.astype(np.float16), np.float16(np.inf))
     whole = np.rint(basis / (scales * units)[:, None, :, None]).clip(-127, 127)
     return _Shapes(
@@ -146,7 +148,7 @@ def _shapes(motion: Skinned, values: Mapping[str, Tensor], shared: Mapping[str, 
 
 
 def _poses(shared: Mapping[str, Tensor], motion: Skinned) -> dict[str, np.ndarray]:
-    """The tensors of the recorded motion by name."""
+    """Tensors of the recorded motion, by their names in the bundle's file."""
     turns = shared["pose_rotations"].double().numpy()  # (F, J, 4)
     held, moving, rotations = packed_rotations(turns, STILL)
     known = np.array(spread(motion.frames, MAX_KNOWN_POSES), np.int16)

@@ -1,4 +1,4 @@
-"""From a trained body on a skeleton to the parts of a bundle that browsers play."""
+"""Bakes a trained body on a skeleton into the parts of a bundle that browsers play."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ from ico3d.errors import BundleError
 from ico3d.motion.recorded.cut import Cut
 
 PROBES = 24
-"""Pictures by which the importance of Gaussians is told."""
+"""Pictures from which the importance of Gaussians is estimated."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,9 @@ class SkinnedResult:
 
     Attributes:
         baked: The baked body.
-        data: The content of its file.
-        loss: Means over pictures.
-        cuts: Gestures in its recording; None finds them by rule.
+        data: Content of the body's file.
+        loss: Loss of baking, means over pictures.
+        cuts: Gestures in the body's recording; None finds them by rule.
     """
 
     baked: BakedSkinned
@@ -47,7 +47,7 @@ class SkinnedResult:
 
     @property
     def parts(self) -> BodyParts:
-        """What a bundle holds of it."""
+        """The parts of a bundle: the body's file, its gestures, and the manifest's entry."""
         files = {SKINNED: self.data, **gesture_files(self.baked, self.cuts)}
         return BodyParts(SkinnedBody(self.baked), files, self.baked.info, self.loss)
 
@@ -63,7 +63,7 @@ class SkinnedResult:
 
 
 def is_skinned(body: TrainedBody) -> bool:
-    """Whether a body is one on a skeleton."""
+    """Whether a trained body is on a skeleton, not of windows."""
     return isinstance(body.models[0].motion, Skinned)
 
 
@@ -76,9 +76,10 @@ def bake(
     """Bakes a body on a skeleton.
 
     Args:
-        body: The exact body, of one window.
-        capture: Its recording, to measure with; None to measure against the exact body only.
-        head: The exact head on it, which is in the recorded pictures.
+        body: The exact body, which is one window.
+        capture: The body's recording, to measure with; None measures against the exact body only.
+        head: Returns the exact head on the body, which recorded pictures show as well; None where
+            there is no head.
         cuts: Gestures in the recording; None finds them by rule.
     """
     exact = partial(body.window_gaussians, 0)
@@ -99,7 +100,7 @@ def bake(
 
 
 def check(result: SkinnedResult) -> None:
-    """Refuses a result that breaks a bound.
+    """Refuses a result that loses too much.
 
     Raises:
         BundleError: If the loss breaks a bound; the sentence says what was measured.

@@ -1,1 +1,1 @@
-"""Where the face of a head is, and where the head is in a body's recording, by looking."""
+"""Finds the face of a head, and the head in a body's recording, by tracking faces in pictures."""

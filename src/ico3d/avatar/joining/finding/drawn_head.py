@@ -1,4 +1,4 @@
-"""A head of Gaussians in a studio of virtual cameras, as a capture of one frame."""
+"""A capture of one frame with pictures that virtual cameras take of a head of Gaussians."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,11 +13,11 @@ from ico3d.splat.render import render
 from ico3d.splat.rendering import Rendering
 
 BEHIND = 0.5
-"""Grey of the studio's walls."""
+"""Value of R, G and B in the grey behind the head."""
 
 
 class DrawnHead(Capture):
-    """Pictures that are drawn when they are asked for."""
+    """A head of Gaussians as a capture: each picture is drawn when it is asked for."""
 
     kind = "drawn head"
     path = Path("drawn")
@@ -26,7 +26,7 @@ class DrawnHead(Capture):
     split = Split((0,), ())
 
     def __init__(self, gaussians: Gaussians, cameras: Sequence[Camera]):
-        """Puts a head before cameras.
+        """Places cameras around a head.
 
         Args:
             gaussians: The head in the world of the cameras.
@@ -35,11 +35,11 @@ class DrawnHead(Capture):
         self.gaussians, self.cameras = gaussians, tuple(cameras)
 
     def drawn(self, camera: int) -> Rendering:
-        """The picture (1, H, W) of a camera with its depth."""
+        """The rendering of camera number `camera`: a batch of one picture, with alpha and depth."""
         wall = self.gaussians.means.new_full((3,), BEHIND)
         with torch.no_grad():
             return render(self.gaussians, [self.cameras[camera]], wall)
 
     def image(self, camera: int, frame: int) -> np.ndarray:
-        """The picture (H, W, 3)."""
+        """The picture (H, W, 3) float32 RGB of a camera; `frame` is 0, the only one."""
         return self.drawn(camera).rgb[0].clamp(0, 1).cpu().numpy()

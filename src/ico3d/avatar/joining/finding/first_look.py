@@ -1,4 +1,4 @@
-"""Roughly where the face of a head model is, whichever way the head is turned."""
+"""Finds roughly where the face of a head model is, whichever way the head is turned."""
 
 from collections.abc import Iterator
 
@@ -14,19 +14,26 @@ from ico3d.common.camera import Camera, look_at
 from ico3d.splat.gaussians import Gaussians
 
 DIRECTIONS, ROLLS = 40, (0, 90, -90, 180)
-"""Of looks: evenly over a sphere, and degrees about each; faces are found up to 45° off."""
+"""Cameras around the head: number of directions, and rotations in degrees about each of them.
+
+MediaPipe finds faces that are rotated by up to 45° from these.
+"""
 PIXELS, AWAY, WIDE = 512, 5.0, 2.4
-"""Of a look: size of its picture, and distance and width in radii of the head."""
+"""Side of a picture in pixels; distance of its camera and width shown, in radii of the head."""
 OPAQUE, MOST = 0.3, 0.9
-"""Opacity from which a Gaussian counts, and which part of those the radius holds."""
+"""Opacity above which a Gaussian counts, and the share of such Gaussians within the head's radius.
+"""
 CERTAIN = 0.5
+"""Alpha above which a pixel shows something opaque."""
 SHAPED = 0.008
-"""Metres, on a face of the usual size, by which what is drawn may stray from a face's shape. Wrong
-faces, such as one upside down, stray by 12 mm and more."""
+"""Mean distance in metres, on a face of usual size, up to which a found shape is surely a face.
+
+Wrong faces, such as one upside down, deviate by 12 mm and more.
+"""
 LEAST_HELD = 1e-3
-"""Weight of landmarks that MediaPipe does not align heads by."""
+"""Least weight in fits, given to landmarks by which MediaPipe does not align heads."""
 LEAST_SEEN = 0.8
-"""Part of the landmarks that must lie on something opaque."""
+"""Share of the landmarks that must lie on something opaque."""
 
 
 def first_looks(
@@ -35,8 +42,8 @@ def first_looks(
     """Places where something looks like a face, likely ones first.
 
     Args:
-        gaussians: The head; the face may look anywhere, and the unit is not known.
-        canonical: MediaPipe's face.
+        gaussians: The head, in any orientation and unit.
+        canonical: MediaPipe's canonical face model.
         reader: Finds faces in pictures.
 
     Yields:
@@ -64,7 +71,12 @@ def first_looks(
 def _look(
     studio: DrawnHead, number: int, canonical: CanonicalFace, reader: FaceReader
 ) -> tuple[float, np.ndarray] | None:
-    """The face that one picture shows: how far it strays from a face's shape, and its place."""
+    """The face in the picture of camera `number`; None where none is found.
+
+    Returns:
+        Mean distance in metres from a face's shape, at the usual size of a face, and the (4, 4)
+        similarity from the canonical face to the head.
+    """
     drawn = studio.drawn(number)
     image, alpha = drawn.rgb[0].clamp(0, 1).cpu().numpy(), drawn.alpha[0].cpu().numpy()
     for part in _large(search(PIXELS, PIXELS, alpha)):
@@ -77,7 +89,7 @@ def _look(
 
 
 def _cameras(middle: np.ndarray, radius: float) -> list[Camera]:
-    """All around; first those that see the face where a canonical head space has it."""
+    """Cameras all around a head; the first see a face that looks along +z with +y up."""
     focal = PIXELS * AWAY / WIDE
     intrinsics = np.array([[focal, 0, PIXELS / 2], [0, focal, PIXELS / 2], [0, 0, 1]])
     cameras = []
@@ -90,7 +102,7 @@ def _cameras(middle: np.ndarray, radius: float) -> list[Camera]:
 
 
 def _sphere(count: int) -> np.ndarray:
-    """(count, 3) unit vectors, evenly spread (Fibonacci's spiral) about z, which is the first."""
+    """(count, 3) unit vectors evenly over a sphere (Fibonacci's spiral), beginning with +z."""
     along = 1 - 2 * np.arange(count) / (count - 1)
     angle = np.arange(count) * np.pi * (3 - np.sqrt(5))
     across = np.sqrt(1 - along**2)
@@ -98,7 +110,7 @@ def _sphere(count: int) -> np.ndarray:
 
 
 def _large(parts: list[Part]) -> list[Part]:
-    """Those parts of a picture that are half of the largest at least: a head is mostly face."""
+    """The parts at least half as wide as the widest: the face is a large part of a head."""
     largest = max((part.side for part in parts), default=0)
     return [part for part in parts if part.side >= largest // 2]
 
@@ -110,13 +122,24 @@ def _placed(
     alpha: np.ndarray,
     canonical: CanonicalFace,
 ) -> tuple[float, np.ndarray] | None:
-    """The canonical face on what is drawn at pixels (468, 2); None where there is too little."""
+    """Fits the canonical face to what is drawn at pixels of landmarks.
+
+    Args:
+        camera: The camera of the picture.
+        pixels: (468, 2) landmarks in the picture.
+        depth: (H, W) depth along the camera's z axis.
+        alpha: (H, W) how opaque the picture is.
+        canonical: MediaPipe's canonical face model.
+
+    Returns:
+        As from `_look`; None where less than `LEAST_SEEN` of the landmarks lie on the head.
+    """
     columns, rows = np.floor(pixels).astype(int).clip(0, PIXELS - 1).T
     seen = alpha[rows, columns] > CERTAIN  # (468,)
     if seen.mean() < LEAST_SEEN:
         return None
     ends = np.append(pixels, np.ones((len(pixels), 1)), 1)  # (468, 3)
-    local = ends @ np.linalg.inv(camera.intrinsics).T * depth[rows, columns, None]
+    local = ends @ np.linalg.inv(camera.intrinsics).T * depth[rows, columns, None]  # (468, 3)
     points = moved(camera.camera_to_world, local)
     weights = np.maximum(canonical.rigidity, LEAST_HELD) * seen
     place = similarity_fit(canonical.vertices, points[None], weights)[0]

@@ -1,8 +1,8 @@
-"""The face of a head model, and that of a recorded person, as one and the same tracker sees them.
+"""Finds the face of a head model and that of a recorded person with the same tracker.
 
-What MediaPipe calls the corner of an eye is not quite what a data set's own landmarks or a face
-model call so. Where a head's face has to be looked for, the body's is looked for alike: what the
-tracker errs by is then in both, and does not move the head.
+MediaPipe places the corner of an eye a little differently than the landmarks of a data set or a
+face model do. So if a head's face has to be found by MediaPipe, the body's face is found by it,
+too: the tracker's errors are then in both and cancel.
 """
 
 from collections.abc import Iterator
@@ -31,33 +31,36 @@ from ico3d.splat.gaussians import Gaussians
 
 PURPOSE = "finding the face of a head whose capture had no landmarks"
 AZIMUTHS, ELEVATIONS = (-36, -18, 0, 18, 36), (-15, 0, 15)
-"""Degrees from where the face looks to the cameras that look at it."""
+"""Directions in degrees, relative to that of the face, from which cameras look at it."""
 DISTANCE, WIDE, PIXELS = 1.35, 0.5, 448
-"""Metres from such a camera to the head, metres that its picture shows, and its size."""
+"""Such a camera: metres to the head, metres that its picture shows, and side in pixels."""
 ROUNDS = 3
-"""Of pictures: each shows where the cameras of the next have to stand."""
+"""Rounds of pictures; the face found in one round places the cameras of the next."""
 CANDIDATES = 6
-"""First looks that are followed up."""
+"""Most results of `first_looks` that are examined."""
 LEAST_VIEWS = 0.6
-"""Part of the views that must show one face."""
+"""Share of the views that must show the same face."""
 MOST_APART = 0.004
-"""Metres, of a face of the usual size, that these may disagree by."""
+"""Most metres, on a face of usual size, by which these views may disagree."""
 FRAMES = 10
-"""Of a body's recording that are looked at."""
+"""Most frames of a body's recording in which the face is looked for."""
 STRAYING = 0.012
-"""Metres by which half of the landmarks may stray from moment to moment: lips and noise do less."""
+"""Most metres of the landmarks' median deviation between frames; lips and noise cause less."""
 COUNTED = np.array([MULTI_PIE[mark] for mark in STEADY])
+"""Indices of MediaPipe's landmarks at the Multi-PIE landmarks of `STEADY`."""
 
 
 @dataclass(frozen=True)
 class FoundFace:
-    """Landmarks, and how sure they are.
+    """Landmarks of a face, and how certain they are.
 
     Attributes:
-        marks: Moment to its (68, 3) Multi-PIE landmarks in canonical head space.
-        apart: Root mean square distance by which rays of the views pass by nose, eyes and lips.
-        views: Pictures that agree.
-        looks: Pictures that were looked at.
+        marks: (68, 3) Multi-PIE landmarks for each frame: of a head in the space of its model, of a
+            recorded person in canonical head space, metres.
+        apart: Root mean square distance between the views' rays and the landmarks of nose, eyes and
+            lips, metres.
+        views: Number of pictures in which the face was found.
+        looks: Number of pictures in which it was looked for.
     """
 
     marks: dict[int, np.ndarray]
@@ -67,23 +70,28 @@ class FoundFace:
 
     @property
     def landmarks(self) -> np.ndarray:
-        """(68, 3) of all moments: medians."""
+        """(68, 3) landmarks: medians over the frames."""
         return np.median(list(self.marks.values()), axis=0)
 
 
 class FaceSeeker:
-    """Looks for faces with one tracker."""
+    """Finds faces of heads and of recorded people with one tracker."""
 
     def __init__(self, reader: FaceReader, canonical: CanonicalFace):
-        """Takes the tracker and its canonical face."""
+        """Makes a seeker.
+
+        Args:
+            reader: Tracks faces in pictures.
+            canonical: The canonical face model of the tracker.
+        """
         self._reader, self._canonical = reader, canonical
 
     def of_head(self, gaussians: Gaussians, folder: Path) -> FoundFace:
-        """The face of a head, drawn from several sides.
+        """Finds the face of a head in pictures drawn of it.
 
         Args:
-            gaussians: The head with a neutral face; its axes and unit need not be the usual ones.
-            folder: Where the head comes from, for errors.
+            gaussians: The head with a neutral face, in any orientation and unit.
+            folder: Where the head comes from, for error messages.
 
         Raises:
             ModelError: If no view shows a face, or views do not agree on one.
@@ -101,7 +109,15 @@ class FaceSeeker:
         raise ModelError(_doubt(folder, best))
 
     def _from_around(self, gaussians: Gaussians, place: np.ndarray) -> FoundFace | None:
-        """The face that is roughly at a place (4, 4), in views around it; None if none is there."""
+        """Finds the face in views around a rough place.
+
+        Args:
+            gaussians: The head.
+            place: (4, 4) similarity from the canonical face to the head.
+
+        Returns:
+            The face in the space of the head; None if the views show none.
+        """
         cameras, ahead = _cameras(), Head(np.zeros(0), np.zeros(3), np.array([0.0, 0, 1]), {})
         marks, apart, head = np.zeros(0), 0.0, ahead
         for _ in range(ROUNDS):
@@ -118,14 +134,14 @@ class FaceSeeker:
         return FoundFace({0: marks}, apart, len(head.faces), len(cameras))
 
     def of_body(self, capture: Capture, poses: np.ndarray) -> FoundFace | None:
-        """The face of a recorded person, in the space of the head poses.
+        """Finds the face of a recorded person in some frames.
 
         Args:
             capture: The recording of the person.
-            poses: (F, 4, 4) head poses.
+            poses: (F, 4, 4) head pose in each frame.
 
         Returns:
-            The face; None where no moment shows it to two cameras.
+            The face in canonical head space; None where it is found in no frame.
 
         Raises:
             CaptureError: If the face does not move as the head poses do.
@@ -156,11 +172,11 @@ class FaceSeeker:
 
 @contextmanager
 def face_seeker() -> Iterator[FaceSeeker]:
-    """A seeker whose model is closed in the end.
+    """A context with a seeker that uses MediaPipe's face landmarker; closes it in the end.
 
     Raises:
         MissingExtraError: If MediaPipe is not installed.
-        MissingModelError: If the face model is not there.
+        MissingModelError: If the face landmarker's file is not there.
     """
     model = model_file("face_landmarker.task", PURPOSE)
     with FaceReader(model) as reader:
@@ -168,10 +184,10 @@ def face_seeker() -> Iterator[FaceSeeker]:
 
 
 def _check_motion(capture: Capture, found: FoundFace) -> None:
-    """Whether a face moves as the head poses do.
+    """Checks that a face moves as the head poses do.
 
     Raises:
-        CaptureError: If not.
+        CaptureError: If its landmarks deviate by more than `STRAYING` in canonical head space.
     """
     away = np.linalg.norm(np.stack([*found.marks.values()]) - found.landmarks, axis=-1)  # (F, 68)
     stray = float(np.median(away[:, list(STEADY)]))
@@ -183,7 +199,7 @@ def _check_motion(capture: Capture, found: FoundFace) -> None:
 
 
 def _doubt(folder: Path, best: FoundFace | None) -> str:
-    """Why no face was found, and what to do."""
+    """Error message: why no face was found, and what to do."""
     mend = "train it on a recording that shows the face from in front, or one that has landmarks"
     if best is None:
         return f"{folder}: no view drawn of this head, from all sides, shows a face: {mend}."
@@ -194,7 +210,7 @@ def _doubt(folder: Path, best: FoundFace | None) -> str:
 
 
 def _cameras() -> list[Camera]:
-    """On a cap before a head at 0 that looks along +z."""
+    """Cameras in front of a head at the origin that looks along +z."""
     focal = PIXELS * DISTANCE / WIDE
     intrinsics = np.array([[focal, 0, PIXELS / 2], [0, focal, PIXELS / 2], [0, 0, 1]])
     turns = [Rotation.from_euler("YX", (a, -e), degrees=True) for e in ELEVATIONS for a in AZIMUTHS]
@@ -203,13 +219,13 @@ def _cameras() -> list[Camera]:
 
 
 def _carried(head: Head, motion: np.ndarray) -> Head:
-    """A head where a rigid motion (4, 4) takes it."""
+    """A head moved by a rigid motion (4, 4), without its faces in pictures."""
     turn = motion[:3, :3]
     return Head(moved(motion, head.points), moved(motion, head.center), turn @ head.forward, {})
 
 
 def _apart(capture: Capture, head: Head) -> float:
-    """Metres, root mean square, by which the views' rays pass by the steady landmarks."""
+    """Root mean square distance in metres between the views' rays and the landmarks that count."""
     cameras = [capture.cameras[camera] for camera in head.faces]
     pixels = np.stack([face.landmarks[COUNTED] for face in head.faces.values()])  # (C, P, 2)
     away = misses(sightings(cameras, pixels), head.points[COUNTED])  # (C, P)

@@ -1,4 +1,4 @@
-"""Where a head without landmarks belongs on a body: by pictures of both."""
+"""Places a head that has no landmarks on a body, by finding the face in pictures of both."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,7 +20,7 @@ from ico3d.splat.render import render
 
 
 class OverRecording(Capture):
-    """A recording in which a head is drawn over that of the person."""
+    """A recording of a person with a head model drawn over the person's head."""
 
     kind = "drawn over"
 
@@ -29,15 +29,15 @@ class OverRecording(Capture):
 
         Args:
             capture: The recording of the whole person.
-            gaussians: The head in its own space.
-            placement: Where it is.
+            gaussians: The head in the space of its model.
+            placement: Where the head is in each frame.
         """
         self.path, self.cameras, self.split = capture.path, capture.cameras, capture.split
         self.fps, self.num_frames = capture.fps, capture.num_frames
         self._capture, self._gaussians, self._placement = capture, gaussians, placement
 
     def image(self, camera: int, frame: int) -> np.ndarray | None:
-        """The picture (H, W, 3) with the head in it, or None where there is none."""
+        """The recorded picture (H, W, 3) with the head drawn over it; None where none exists."""
         image = self._capture.image(camera, frame)
         if image is None:
             return None
@@ -48,7 +48,7 @@ class OverRecording(Capture):
         return drawn.rgb[0].clamp(0, 1).cpu().numpy()
 
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """The recorded person."""
+        """The recorded mask (H, W) of the person; None where there is none."""
         return self._capture.mask(camera, frame)
 
 
@@ -59,23 +59,23 @@ def found_in_pictures(
     say: Callable[[str], None],
     device: torch.device,
 ) -> tuple[TrainedHead, Placement | None]:
-    """Finds the face of a head in pictures drawn of it, and puts it where the body's is found.
+    """Finds the faces of a head and of a body in pictures, and places the head accordingly.
 
     Args:
-        head: Whose capture had no landmarks.
+        head: A head without landmarks.
         capture: The body's recording.
-        folder: The head's, for messages.
-        say: Told how well the pictures agree.
+        folder: Folder of the head, for messages.
+        say: Called with how well the pictures agree.
         device: Where the head is drawn.
 
     Returns:
-        The head with landmarks, and where it is; None where no pictures of the body show its face
-        well enough.
+        The head with landmarks, and its placement; None as placement if the body's pictures do not
+        show the face well enough.
 
     Raises:
-        CaptureError: If the capture has no head poses, or the face does not follow them.
+        CaptureError: If the capture has no head poses, or the face does not move as they do.
         MissingExtraError: If MediaPipe is not installed.
-        MissingModelError: If the face model is not there.
+        MissingModelError: If the face landmarker's file is not there.
         ModelError: If the head shows no face, or views of it do not agree.
     """
     poses = head_poses(capture)
@@ -98,14 +98,22 @@ def found_in_pictures(
 def _compared(
     seeker: FaceSeeker, capture: Capture, recorded: FoundFace, head: Gaussians, first: Placement
 ) -> tuple[np.ndarray, float] | None:
-    """A better placement: what the tracker errs by in these very pictures, small or askew, cancels.
+    """Corrects a placement by finding the face of the placed head in the recorded pictures.
 
-    The head is drawn into the recorded pictures and its face found there as the person's was. What
-    lies between the two corrects the placement.
+    The head is drawn over the person in these pictures and its face is found as the person's was:
+    the difference corrects the placement. The tracker's errors in pictures that are small or not
+    from in front are in both, and cancel.
+
+    Args:
+        seeker: Finds faces.
+        capture: The body's recording.
+        recorded: The person's face in this recording.
+        head: The cropped head in the space of its model.
+        first: The placement to correct.
 
     Returns:
-        G and how well landmarks agree, as of `canonical_from_head`; None where the drawn head's
-        face is not found at the same moments.
+        The corrected G and how well landmarks agree, as from `canonical_from_head`; None where the
+        drawn head's face is not found in frames in which the person's was.
     """
     over = OverRecording(capture, head, first)
     again = seeker.of_body(over, first.world_from_canonical)
@@ -119,7 +127,7 @@ def _compared(
 
 
 def _in_words(drawn: FoundFace, recorded: FoundFace | None) -> str:
-    """Where the face comes from, and how well views agree."""
+    """A sentence for people: where faces were found, and how well views agree."""
     theirs = (
         "the pictures of the body do not show it well enough: its recording's landmarks stand in"
         if recorded is None
