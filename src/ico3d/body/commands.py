@@ -19,15 +19,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class BodyChoice:
-    """What the defaults of all other settings follow from.
+    """Options that decide the defaults of all other options.
 
     Attributes:
-        preset: The paper's settings, or those sized for two CPU cores;
-            the defaults shown here are those of the preset that is chosen.
-        method: SWinGS++, or what it is compared with: a positional encoding in the place of its
-            encoder, one window without tuning, Gaussians that come and go by formulas (spacetime,
-            freetime), Gaussians that do not move within a window, Gaussians on the skeleton of
-            ico3d capture pose, with residual shapes and light (skinned) or without (hugs).
+        preset: The paper's settings, or settings sized for two CPU cores. The defaults shown here
+            are those of the chosen preset.
+        method: SWinGS++, or a method that it is compared with: a positional encoding instead of its
+            encoder (swings), one window without tuning (4dgs), Gaussians that appear, move and
+            vanish by formulas (spacetime, freetime), Gaussians that do not move within a window
+            (static), Gaussians on the skeleton of ico3d capture pose, with residual shapes and
+            light (skinned) or without (hugs).
     """
 
     preset: PresetName = "cpu"
@@ -38,19 +39,19 @@ class BodyChoice:
 class TrainBody(BodyChoice):
     """Trains SWinGS++, or another method, on a capture of a whole person in motion.
 
-    The same command goes on where it was interrupted.
+    The same command continues an interrupted run.
 
     Attributes:
         capture: A capture by calibrated, synchronised cameras, with masks.
         out: The model folder to write.
-        seed: All randomness follows from it.
-        device: Where to compute: by default with CUDA where that works, else on the CPU; machines
-            of a Ray cluster decide for themselves.
-        jobs: Windows that train at once, each in a process of its own; with CUDA, as many as there
-            are GPUs, at most.
-        ray: Address of a Ray cluster that trains the windows, host:port or auto; the capture and
-            the model folder must lie under the same path on all its machines.
-        plan: Only measures motion and shows the windows.
+        seed: Seed of all randomness.
+        device: Where to compute: by default with CUDA where that works, else on the CPU; each
+            machine of a Ray cluster decides for itself.
+        jobs: Number of windows that train at once, each in a process of its own; with CUDA, at most
+            the number of GPUs.
+        ray: Address of a Ray cluster that trains the windows: host:port, or auto. The capture and
+            the model folder must have the same path on all its machines.
+        plan: Only measure motion and show the windows.
         settings: How the body is trained.
     """
 
@@ -65,13 +66,17 @@ class TrainBody(BodyChoice):
 
     @classmethod
     def defaults(cls, words: Sequence[str]) -> "TrainBody":
-        """The verb with the settings of the preset and the method that words choose."""
+        """The verb with the defaults that follow from --preset and --method in `words`."""
         choice = chosen(BodyChoice, words)
         settings = settings_for(choice.preset, choice.method)
         return cls(tyro.MISSING, tyro.MISSING, settings=settings)
 
     def run(self) -> None:
-        """Trains, or goes on training; writes the model folder."""
+        """Trains the body, or continues an interrupted run, and writes the model folder.
+
+        Raises:
+            Ico3dError: If the capture lacks something, or the options make no sense.
+        """
         from rich.console import Console
 
         from ico3d.body.training.train_clip import BodyJob, plan_windows, train_body
@@ -94,15 +99,17 @@ class TrainBody(BodyChoice):
 
 
 def runner_of(jobs: int, ray: str | None, device: str) -> "Runner | None":
-    """Who trains the windows; None for this process.
+    """A function that trains windows in parallel; None to train them one by one in this process.
 
     Args:
-        jobs: Processes of this machine.
-        ray: Address of a Ray cluster.
-        device: Where they compute: `cpu`, `cuda`, or `auto` for a cluster.
+        jobs: Number of processes on this machine.
+        ray: Address of a Ray cluster; None for none.
+        device: Where to compute: `cpu`, `cuda`, or `auto` for a cluster.
 
     Raises:
-        SettingsError: If it cannot be.
+        MissingExtraError: If Ray is wanted and not installed.
+        SettingsError: If `jobs` is below 1, is combined with `ray`, or exceeds the number of GPUs,
+            or if no cluster answers.
     """
     from ico3d.body.workers.cluster import RayCluster
     from ico3d.body.workers.jobs import train_windows

@@ -1,7 +1,7 @@
-"""Other Gaussians that a body is trained with, in one rendering pass: a head, for example.
+"""Companions: other Gaussians, such as a head, that are rendered together with a body in training.
 
-The body learns to be what the companion is not (paper, head–body integration); the companion does
-not change meanwhile, so that windows stay independent of one another.
+The body learns only what the companion does not show (paper, head–body integration). The companion
+is not changed by training, so that windows stay independent of one another.
 """
 
 from typing import Protocol
@@ -17,75 +17,79 @@ from ico3d.splat.density import Plan, Population
 from ico3d.splat.gaussians import Gaussians
 
 PRUNE_EVERY = 100
-"""Steps between two removals of what trespasses (paper, same section)."""
+"""Steps between two removals of trespassing Gaussians (paper, head–body integration)."""
 MOMENTS = 5
-"""Of a window, at which is looked who trespasses: its ends, its middle and between them."""
+"""Number of evenly spread times of a window, ends included, at which trespassing is tested."""
 MOST = MOMENTS // 2 + 1
-"""Of these, at which a Gaussian on a skeleton trespasses that belongs to the companion's place; a
-hand passes the face now and then, and is a hand all the same."""
+"""Number of these times from which on a trespassing Gaussian on a skeleton is removed.
+
+One time does not suffice, as a hand may pass the face now and then.
+"""
 
 
 class Companion(Protocol):
-    """Somebody who stands where the body must not be."""
+    """Gaussians that a body is trained with, and the space that the body may not fill."""
 
     def gaussians(self, frame: int) -> Gaussians:
         """Activated Gaussians in the world at a frame, without gradient."""
         ...
 
     def trespassing(self, means: Tensor, frame: float) -> Tensor:
-        """Which places the body must not fill.
+        """Which positions the body may not fill.
 
         Args:
-            means: (N, 3) in the world, on any device.
-            frame: When; may lie between two frames.
+            means: (N, 3) in the world, metres, on any device.
+            frame: Frame of the clip; need not be whole.
 
         Returns:
-            (N,) bool.
+            (N,) bool, on the device of `means`.
         """
         ...
 
     def border(self, frame: int, rng: np.random.Generator) -> np.ndarray:
-        """(P, 3) places in the world about the seam, for Gaussians that shall close it."""
+        """(P, 3) positions near the seam, in the world at a frame, for first Gaussians there."""
         ...
 
 
 class CompanionSource(Protocol):
-    """Where a companion comes from; small, and can be sent to another process."""
+    """Describes where a companion is loaded from; small enough to be sent to another process."""
 
     def open(self, device: torch.device) -> Companion:
-        """Makes the companion."""
+        """Loads the companion onto a device."""
         ...
 
     def about(self) -> dict:
-        """What runs are known by: other content, other dict; JSON-serialisable."""
+        """JSON-serialisable values that differ whenever the companion's content differs."""
         ...
 
 
 class Pruning:
-    """Removes the Gaussians of a window that trespass at any time of it.
+    """Removes Gaussians of a window that are where the companion is.
 
-    Where they are while they move counts, not where they are stored. On a skeleton one window is
-    the whole clip, so what trespasses for most of the time is removed, elsewhere what ever does.
+    Their moved positions are tested at `MOMENTS` times of the window. A Gaussian is removed if it
+    trespasses at one of these times; on a skeleton, where one window is the whole clip, if it does
+    at most of them.
     """
 
     def __init__(self, companion: Companion, window: Window):
-        """Looks at `MOMENTS` of the window."""
+        """Prunes the Gaussians of a window beside a companion."""
         self._companion, self._window = companion, window
 
     def due(self, step: int, steps: int) -> bool:
-        """Whether to remove after a step of so many: every now and then, and after the last."""
+        """Whether to prune after a step: each `PRUNE_EVERY` steps, and after the last of `steps`."""
         return (step > 0 and step % PRUNE_EVERY == 0) or step == steps - 1
 
     @torch.no_grad()
     def carry_out(self, model: WindowModel, population: Population) -> int:
-        """Removes the Gaussians that trespass, with their moments.
+        """Removes the trespassing Gaussians, unless all of them trespass.
 
         Args:
-            model: The window's Gaussians.
-            population: The body's Gaussians, as density control sees them.
+            model: The window's model.
+            population: The same Gaussians with the optimiser's moments, as density control changes
+                them.
 
         Returns:
-            How many Gaussians were removed.
+            Number of Gaussians that were removed.
         """
         trespass = self.trespassing(model)
         keep = torch.nonzero(~trespass)[:, 0]  # (K,)
@@ -97,7 +101,7 @@ class Pruning:
 
     @torch.no_grad()
     def trespassing(self, model: WindowModel) -> Tensor:
-        """(N,) bool: those that are where they must not be, at one of the moments or at most."""
+        """(N,) bool: which Gaussians trespass often enough to be removed."""
         window = self._window
         times = torch.zeros(len(model), dtype=torch.int32, device=model.device)
         for tau in np.linspace(0, 1, MOMENTS):

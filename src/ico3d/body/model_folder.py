@@ -1,4 +1,4 @@
-"""A trained body: what a model folder holds."""
+"""A trained body, and the model folder that holds it."""
 
 import json
 from collections.abc import Sequence
@@ -17,22 +17,22 @@ from ico3d.splat.gaussians import Gaussians
 from ico3d.training.checkpoint import load_tensors, save_tensors
 
 ABOUT = "body.json"
-"""The file by which a folder is known to hold a body."""
+"""Name of the file that marks a folder as a body's."""
 UNTUNED = "untuned.json"
-"""The file that names the windows as they were before temporal fine-tuning, where there was one."""
+"""Name of the file that lists the windows before temporal fine-tuning, if there was one."""
 ROUNDING = 1e-6
-"""Frames by which a time may miss its frame: 31 / 15 s is, in floats, after frame 31."""
+"""Tolerance in frames for times that stand for whole frames: (31 / 15 s) · 15 may exceed 31."""
 
 
 def save_window(file: Path, model: WindowModel) -> None:
-    """Writes one window's model."""
+    """Writes the model of one window."""
     named = {f"gaussians.{name}": tensor for name, tensor in model.gaussians.items()}
     named |= {f"shared.{name}": tensor for name, tensor in model.shared.items()}
     save_tensors(file, named, model.motion.about())
 
 
 def load_window(file: Path) -> WindowModel:
-    """Reads what `save_window` wrote, onto the CPU.
+    """Reads the model of one window, as `save_window` wrote it, onto the CPU.
 
     Raises:
         ModelError: If the file is missing or damaged.
@@ -50,14 +50,14 @@ def load_window(file: Path) -> WindowModel:
 
 @dataclass
 class TrainedBody:
-    """A body through all of its clip.
+    """A trained body that can be drawn at any time of its clip.
 
     Attributes:
-        models: One per window.
-        windows: Which frames they show; neighbours share one.
+        models: The model of each window.
+        windows: The frames of each window; neighbours share one frame.
         fps: Frames per second.
         method: The method that moves the Gaussians.
-        summary: How it was made: provenance of the capture, seconds of training, settings.
+        summary: How the body was made: provenance of the capture, seconds of training, settings.
     """
 
     models: Sequence[WindowModel]
@@ -68,11 +68,11 @@ class TrainedBody:
 
     @property
     def seconds(self) -> float:
-        """How long the clip lasts."""
+        """Length of the clip in seconds."""
         return self.windows[-1].last / self.fps
 
     def window_at(self, seconds: float) -> int:
-        """The window that shows a time; at a shared frame the earlier one."""
+        """Index of the window that shows a time; at a shared frame that of the earlier window."""
         frame = seconds * self.fps - ROUNDING
         inside = (i for i, window in enumerate(self.windows) if frame <= window.last)
         return next(inside, len(self.windows) - 1)
@@ -89,17 +89,23 @@ class TrainedBody:
 
     @property
     def device(self) -> torch.device:
-        """Where its windows are."""
+        """Device of the windows' tensors."""
         return self.models[0].device
 
     def to(self, device: torch.device) -> "TrainedBody":
-        """Moves all windows, and gives itself back."""
+        """Moves all windows to a device; returns this body."""
         for model in self.models:
             model.to(device)
         return self
 
     def save(self, folder: Path, files: Sequence[str], about: str = ABOUT) -> None:
-        """Writes `body.json` (or a file of another name), which names the windows' files."""
+        """Writes the list of windows; their models have to be written by `save_window`.
+
+        Args:
+            folder: The model folder.
+            files: File of each window, relative to the folder.
+            about: Name of the file to write, `ABOUT` or `UNTUNED`.
+        """
         content = {
             "fps": self.fps,
             "method": self.method,
@@ -117,10 +123,10 @@ class TrainedBody:
 
         Args:
             folder: The model folder.
-            about: `ABOUT` or `UNTUNED`.
+            about: Name of the file that lists the windows, `ABOUT` or `UNTUNED`.
 
         Raises:
-            ModelError: If the folder holds none, or a damaged one.
+            ModelError: If the folder holds no body, or a damaged one.
         """
         folder = Path(folder)
         try:

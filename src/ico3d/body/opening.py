@@ -1,4 +1,4 @@
-"""Motions from what files say about them."""
+"""Makes motions from their descriptions in model files."""
 
 from ico3d.body.motion.deformation import Deformation
 from ico3d.body.motion.encoder import EncoderShape
@@ -9,12 +9,12 @@ from ico3d.body.skinning.skinned import Skinned
 
 
 def motion_from(about: dict) -> Motion:
-    """Makes again what `Motion.about` described.
+    """Makes the motion that `Motion.about` described.
 
     Raises:
-        ValueError: If there is no such kind.
-        KeyError: If something is missing.
-        TypeError: If something is superfluous or of a wrong type.
+        ValueError: If its kind is unknown.
+        KeyError: If a field that is read here is missing.
+        TypeError: If another field is missing, unknown, or of a wrong type.
     """
     fields = dict(about)
     kind = fields.pop("kind")

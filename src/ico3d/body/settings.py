@@ -1,4 +1,4 @@
-"""Settings of body training: the paper's, and those sized for two CPU cores."""
+"""Settings of body training: the paper's, and settings sized for two CPU cores."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -7,17 +7,27 @@ from ico3d.common.presets import PresetName
 from ico3d.training.rate import Rate
 
 Method = Literal["swings++", "swings", "4dgs", "spacetime", "freetime", "static", "skinned", "hugs"]
-"""SWinGS++; SWinGS: a positional encoding in the place of the encoder; 4DGS: one window for the
-whole clip, the encoder, no tuning; Spacetime Gaussians and FreeTime: one window whose Gaussians
-come, move and go by formulas; static: Gaussians that do not move within a window; skinned: one
-window whose Gaussians hang on a skeleton, with residual shapes and light; hugs: without these."""
+"""How a body's Gaussians are moved.
+
+- swings++: SWinGS++;
+- swings: with a positional encoding instead of the encoder;
+- 4dgs: one window for the whole clip, with the encoder, without tuning;
+- spacetime, freetime (Spacetime Gaussians, FreeTime): one window whose Gaussians appear, move and
+  vanish by formulas;
+- static: Gaussians do not move within a window;
+- skinned: one window whose Gaussians are bound to a skeleton, with residual shapes and light;
+- hugs: as skinned, without residual shapes and light.
+"""
 
 Source = Literal["best", "hull"]
-"""Where the Gaussians of a window begin: on the best surface that the capture can give (its own
-points, else the visual hull), or on the visual hull in any case."""
+"""Surface on which the Gaussians of a window begin.
+
+best: the capture's own points, where it has some, else the visual hull; hull: always the visual
+hull.
+"""
 
 SKINNED: tuple[Method, ...] = ("skinned", "hugs")
-"""Methods whose Gaussians hang on a skeleton; they need a body track."""
+"""Methods whose Gaussians are bound to a skeleton; they need a body track."""
 
 ONE_WINDOW: tuple[Method, ...] = ("4dgs", "spacetime", "freetime", *SKINNED)
 """Methods that take the whole clip as one window."""
@@ -28,10 +38,10 @@ class Windows:
     """Where the clip is cut into windows.
 
     Attributes:
-        threshold: Motion that the frames of a window may add up to, cm² (how it is measured:
+        threshold: Largest sum of the motion of a window's frames, cm² (how it is measured:
             docs/bodies.md).
-        shortest: Frames that a window has at least.
-        longest: Frames that a window has at most.
+        shortest: Least number of frames of a window.
+        longest: Largest number of frames of a window.
     """
 
     threshold: float = 100.0
@@ -44,10 +54,10 @@ class Encoder:
     """The encoding of place and time that the MLP reads.
 
     Attributes:
-        space: Resolution of the encoder's coarsest planes along space, cells.
-        scales: Scales of the encoder, each of twice the resolution of the one before.
+        space: Resolution of the encoder's coarsest planes along each axis of space, in nodes.
+        scales: Number of scales of the encoder; the resolution doubles from scale to scale.
         channels: Features per plane and scale.
-        bands: Octaves of the positional encoding that method swings has in the encoder's place.
+        bands: Octaves of the positional encoding that method swings has instead of the encoder.
     """
 
     space: int = 64
@@ -61,7 +71,8 @@ class Mlp:
     """The tunable MLP, which moves the Gaussians.
 
     Attributes:
-        sets: Sets M of weights, which every Gaussian mixes for itself; 1 is a plain MLP.
+        sets: Number M of sets of weights, which each Gaussian mixes in its own proportions; 1 is a
+            plain MLP.
         width: Width of the hidden layers.
         depth: Number of hidden layers.
     """
@@ -73,15 +84,15 @@ class Mlp:
 
 @dataclass(frozen=True)
 class Skinning:
-    """What Gaussians on a skeleton have besides (methods skinned and hugs).
+    """Additional parameters of Gaussians on a skeleton (methods skinned and hugs).
 
     Attributes:
-        shapes: Residual shapes K, which move and colour each Gaussian as far as the pose asks for
-            them; 0 for none.
-        hidden: Width of the hidden layer of the network that tells how far.
-        dropout: Part of the steps, 0 to 1, that learn without the residual shapes, so that what
-            they do not know looks right, too.
-        light: Let colours depend on where the posed surface faces.
+        shapes: Number K of residual shapes: changes of positions and colours that are added in
+            proportions that depend on the pose; 0 for none.
+        hidden: Width of the hidden layer of the network that computes these proportions.
+        dropout: Share of the steps, 0 to 1, that learn without the residual shapes, so that the
+            body looks right without them, too.
+        light: Let colours depend on the direction in which the posed surface faces.
     """
 
     shapes: int = 8
@@ -97,11 +108,12 @@ class Loss:
     Attributes:
         ssim: Weight λ_s of 1 − SSIM; the L1 difference has the weight λ_1 = 1 − λ_s.
         mask: Weight λ_m of the L1 difference of rendered alpha and mask.
-        smoothness: Weight of the second differences of the encoder's planes. Not in the paper.
-        stillness: Weight of how far the encoder's planes along time are from 1, where nothing
-            moves. Not in the paper.
-        joints: Weight of the squares of the metres that a skinned body's joints are moved at rest,
-            so that those that hardly turn stay where they were tracked.
+        smoothness: Weight of the squared second differences of the encoder's planes. Not in the
+            paper.
+        stillness: Weight of how far the encoder's planes along time are from 1, the value at which
+            nothing moves. Not in the paper.
+        joints: Weight of the squared displacements, in m², of a skinned body's joints at rest, so
+            that joints that hardly turn stay where they were tracked.
     """
 
     ssim: float = 0.2
@@ -132,14 +144,14 @@ class Rates:
         motion_decay: Factor to which the rates of MLP, planes, α and formulas have decayed at the
             last step.
         pose: Learning rate of a skinned body's poses, as quaternions.
-        root: Learning rate of where its root is, metres.
-        joints: Learning rate of where its joints are at rest, metres.
+        root: Learning rate of a skinned body's root positions, metres.
+        joints: Learning rate of the positions of a skinned body's joints at rest, metres.
         pose_decay: Factor to which the rates of poses, roots and joints have decayed at the last
             step.
-        shape_means: Learning rate of its residual shapes' places, metres.
-        shape_colors: Learning rate of its residual shapes' colours, logits.
-        light: Learning rate of its light.
-        coefficients: Learning rate of the network that tells how much of each shape a pose has.
+        shape_means: Learning rate of the positions of residual shapes, metres.
+        shape_colors: Learning rate of the colours of residual shapes, logits.
+        light: Learning rate of a skinned body's light.
+        coefficients: Learning rate of the network that mixes residual shapes by the pose.
         skin_decay: Factor to which the rates of residual shapes, their network and light have
             decayed at the last step.
     """
@@ -167,7 +179,7 @@ class Rates:
     skin_decay: float = 0.2
 
     def by_parameter(self) -> dict[str, Rate]:
-        """Learning rates by the name of the parameter; that of the means is per metre of extent."""
+        """Learning rates by name of the parameter; that of `means` is per metre of extent."""
         return {
             "means": Rate(self.position, self.position_decay),
             "quats": Rate(self.rotation, self.shape_decay),
@@ -193,12 +205,12 @@ class Initial:
     """The Gaussians that a window's training begins with.
 
     Attributes:
-        source: Where they begin: on the best surface that the capture allows, or on the visual
+        source: Where Gaussians begin: on the best surface that the capture has, or on the visual
             hull of the masks.
-        gaussians: How many.
-        opacity: Opacity of each, 0 to 1.
-        scale: Size of each, as a factor of its distance to its neighbours.
-        duration: How long Gaussians of methods spacetime and freetime last, as a part of the
+        gaussians: Number of Gaussians.
+        opacity: Opacity of each Gaussian, 0 to 1.
+        scale: Size of each Gaussian, relative to its distance to its neighbours.
+        duration: Duration of Gaussians of methods spacetime and freetime, relative to that of the
             window.
     """
 
@@ -211,21 +223,21 @@ class Initial:
 
 @dataclass(frozen=True)
 class Density:
-    """Density control: when Gaussians multiply and die (3DGS, Kerbl et al. 2023, section 5).
+    """Density control: when Gaussians are added and removed (3DGS, Kerbl et al. 2023, section 5).
 
     Attributes:
-        max_gaussians: There are never more Gaussians than this in a window.
-        begin: First step at which Gaussians may multiply or die.
-        until: Part of a window's steps, 0 to 1, after which Gaussians neither multiply nor die.
-        every: Steps between two rounds of multiplying and dying.
-        gradient: Mean screen-space gradient (normalised device units) above which a Gaussian
-            multiplies: a small one is cloned, a large one split.
-        growth: Part of the Gaussians, 0 to 1, that multiplies in one round at most: those of the
-            strongest gradient.
+        max_gaussians: Most Gaussians of a window.
+        begin: First step at which Gaussians may be added or removed.
+        until: Share of a window's steps, 0 to 1, after which none is added or removed.
+        every: Steps between two rounds of adding and removing.
+        gradient: Mean screen-space gradient (normalised device units) above which a small Gaussian
+            is cloned and a large one split.
+        growth: Largest share of the Gaussians, 0 to 1, that is cloned or split in one round: those
+            with the strongest gradients.
         absgrad: Sum screen-space gradients over a picture's pixels without their signs; four times
             the threshold is usual then.
-        min_opacity: Gaussians whose opacity, 0 to 1, is below this die; those of method freetime
-            move to where they are needed.
+        min_opacity: Gaussians whose opacity, 0 to 1, is below this are removed; those of method
+            freetime are moved to where Gaussians are needed.
     """
 
     max_gaussians: int = 200_000
@@ -240,16 +252,16 @@ class Density:
 
 @dataclass(frozen=True)
 class Finetune:
-    """Temporal fine-tuning, which makes each window agree with the one before.
+    """Temporal fine-tuning, which makes each window agree with the window before it.
 
     Attributes:
         steps: Optimisation steps per window; 0 for no fine-tuning.
-        consistency: Part of the steps, 0 to 1, that compare with the window before; the others
+        consistency: Share of the steps, 0 to 1, that compare with the window before; the others
             learn from recorded pictures.
-        begin: Where on the decay of the learning rates fine-tuning begins: 0 where training of the
-            window did, 1 where it ended.
-        mean: Part of the steps, 0 to 1, the last ones, whose mean Gaussians are the result; 0 for
-            the Gaussians of the last step.
+        begin: Point of the decay of learning rates at which fine-tuning begins: 0 for the rates at
+            the beginning of the window's training, 1 for those at its end.
+        mean: Share of the steps, 0 to 1, counted from the end, over which Gaussians are averaged
+            for the result; 0 takes the Gaussians of the last step.
     """
 
     steps: int = 20_000
@@ -260,26 +272,27 @@ class Finetune:
 
 @dataclass(frozen=True)
 class BodySettings:
-    """How a body is trained; defaults are the paper's and, where it is silent, 3DGS's.
+    """How a body is trained; defaults are the paper's and, where the paper gives none, 3DGS's.
 
     Attributes:
-        steps: Optimisation steps of a window, one picture each.
-        steps_per_frame: Optimisation steps per frame of a window, in the place of --steps; 0 for
-            as many in each window.
-        warmup_steps: First steps of a window, on its middle frame alone: nothing moves yet.
-        color_correction: Let every camera learn an affine correction of colours, so that cameras
-            need not agree about them.
+        steps: Optimisation steps of a window, with one picture each.
+        steps_per_frame: Optimisation steps per frame of a window, instead of --steps; 0 gives each
+            window the same number, --steps.
+        warmup_steps: Number of first steps of a window that learn from its middle frame alone,
+            without motion.
+        color_correction: Let each camera learn an affine correction of colours, for cameras whose
+            colours differ.
         checkpoint_every: Steps from one checkpoint to the next.
         cache_gib: Memory for recorded pictures, GiB; what does not fit is read again at each use.
         windows: Where the clip is cut into windows.
         encoder: The encoding of place and time that the MLP reads.
         mlp: The tunable MLP, which moves the Gaussians.
-        skinning: What Gaussians on a skeleton have besides (methods skinned and hugs).
+        skinning: Additional parameters of Gaussians on a skeleton (methods skinned and hugs).
         loss: Weights of the terms of the loss.
         rates: Learning rates, and the factors to which they decay.
         initial: The Gaussians that a window's training begins with.
-        density: When Gaussians multiply and die (3DGS, Kerbl et al. 2023, section 5).
-        finetune: Temporal fine-tuning, which makes each window agree with the one before.
+        density: When Gaussians are added and removed (3DGS, Kerbl et al. 2023, section 5).
+        finetune: Temporal fine-tuning, which makes each window agree with the window before it.
     """
 
     steps: int = 30_000
@@ -303,7 +316,7 @@ class BodySettings:
         return self.steps_per_frame * frames if self.steps_per_frame else self.steps
 
     def without_finetuning(self) -> "BodySettings":
-        """The same, but that windows stay as they were trained."""
+        """These settings without temporal fine-tuning."""
         return replace(self, finetune=replace(self.finetune, steps=0))
 
 
@@ -332,11 +345,11 @@ PRESETS: dict[PresetName, BodySettings] = {
 
 
 STEPS_PER_FRAME = 150
-"""Of a skinned body on two CPU cores, whose clip is one window of any length."""
+"""Steps per frame of skinned bodies in the preset `cpu`: their one window may have any length."""
 
 
 def settings_for(preset: PresetName, method: Method) -> BodySettings:
-    """The settings of a preset for a method: a baseline differs where its own paper does."""
+    """The settings of a preset for a method; other methods differ as their own papers do."""
     settings = PRESETS[preset]
     if method == "swings":
         return replace(settings, mlp=replace(settings.mlp, depth=4))

@@ -18,18 +18,19 @@ from ico3d.body.motion.window_model import activated
 from ico3d.splat.gaussians import Gaussians
 
 GRID, MLP = "grid.", "mlp."
-"""What the names of the shared tensors begin with."""
+"""Prefixes of the names of shared tensors: planes of the encoder, and weights of the MLP."""
 
 
 @dataclass(frozen=True)
 class Deformation:
-    """A `Motion`: Δμ, Δr, Δs = φ_dyn(f_v, α), with f_v from the space-time encoder or γ(μ), γ(t).
+    """A `Motion` by a tunable MLP: Δμ, Δr, Δs = φ_dyn(f_v, α).
 
-    Differences are added to what is stored, before activation.
+    The features f_v come from the space-time encoder, or from the positional encodings γ(μ) and
+    γ(t). The differences are added to stored means, rotations and log scales, before activation.
 
     Attributes:
-        middle: (3,) of the box that holds the window's motion, metres.
-        half: (3,) half its edges.
+        middle: (3,) centre of the box that holds the window's motion, metres.
+        half: (3,) half the edges of that box, metres.
         mlp: Shape of the tunable MLP.
         encoder: Shape of the space-time encoder; None for the positional encoding.
         bands: Octaves of the positional encoding.
@@ -43,12 +44,12 @@ class Deformation:
 
     @property
     def per_gaussian(self) -> tuple[str, ...]:
-        """`alpha` (N, M), where there is more than one set of weights."""
+        """`alpha` (N, M), shares of the M sets of weights, if there is more than one set."""
         return ("alpha",) if self.mlp.sets > 1 else ()
 
     @property
     def shared(self) -> tuple[str, ...]:
-        """Weights of the MLP, and the planes."""
+        """Weights of the MLP and planes of the encoder, by their prefixed names."""
         layers = range(self.mlp.depth + 1)
         names = [f"{MLP}{kind}{layer}" for layer in layers for kind in ("weight", "bias")]
         scales = () if self.encoder is None else range(len(self.encoder.space))
@@ -56,7 +57,7 @@ class Deformation:
         return (*names, *(f"{GRID}{plane}{scale}" for scale in scales for plane in planes))
 
     def initial(self, generator: torch.Generator) -> dict[str, Tensor]:
-        """The shared tensors at the beginning: next to nothing moves."""
+        """Random shared tensors, with which Gaussians hardly move."""
         tensors = {MLP + n: value for n, value in initial_weights(self.mlp, generator).items()}
         if self.encoder is not None:
             planes = initial_planes(self.encoder, generator)
@@ -64,7 +65,7 @@ class Deformation:
         return tensors
 
     def at(self, values: Mapping[str, Tensor], tau: float) -> Gaussians:
-        """Activated Gaussians at τ."""
+        """Activated Gaussians in the world at τ in [0, 1] of the window."""
         delta = self.deltas(values, tau)  # (N, 10)
         return activated(
             values,
@@ -74,14 +75,14 @@ class Deformation:
         )
 
     def deltas(self, values: Mapping[str, Tensor], tau: float) -> Tensor:
-        """(N, 10): Δμ in metres, Δr, Δs (paper eq. of φ_dyn)."""
+        """(N, 10): Δμ (3) in metres, Δr (4), Δs (3) at τ (paper, equation of φ_dyn)."""
         means = values["means"]
         alpha = values["alpha"] if self.mlp.sets > 1 else means.new_ones(len(means), 1)
         features = self._features(values, tau)  # (N, inputs)
         return tunable_mlp(_below(MLP, values), self.mlp, features, alpha)
 
     def _features(self, values: Mapping[str, Tensor], tau: float) -> Tensor:
-        """(N, mlp.inputs) what the MLP sees."""
+        """(N, mlp.inputs) features that the MLP reads."""
         means = values["means"]
         middle, half = means.new_tensor(self.middle), means.new_tensor(self.half)  # (3,) each
         inside = (means - middle) / half  # (N, 3) in [−1, 1]
@@ -91,10 +92,10 @@ class Deformation:
         return positional_encoding(torch.cat([inside, times], 1), self.bands)  # (N, inputs)
 
     def about(self) -> dict:
-        """Its kind and fields."""
+        """Kind and fields of this motion, for `motion_from`."""
         return {"kind": "deformation", **asdict(self)}
 
 
 def _below(prefix: str, values: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The tensors whose names begin with the prefix, without it."""
+    """Tensors whose names begin with a prefix, by their names without it."""
     return {n.removeprefix(prefix): value for n, value in values.items() if n.startswith(prefix)}

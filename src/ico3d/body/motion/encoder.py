@@ -1,7 +1,8 @@
-"""The space-time encoder: features of a place and a time from six planes (paper, eq. of φ(f_v)).
+"""The space-time encoder: features of a position and a time (paper, equation of φ(f_v)).
 
-Of the HexPlane family, as the paper: a plane per pair of axes, sampled bilinearly and multiplied,
-at one or more resolutions of space.
+As in the paper it is a HexPlane: for each pair of axes of space and time there is a plane of
+features. The six planes are sampled bilinearly and their samples multiplied, at one or more
+resolutions of space.
 """
 
 from dataclasses import dataclass
@@ -16,22 +17,22 @@ from ico3d.body.motion import encoder_kernels as kernels
 from ico3d.errors import SettingsError
 
 SPACE_PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
-"""The planes of space, and the axes of their columns and rows."""
+"""The planes of space, each with the axes of its columns and its rows."""
 TIME_PLANES = ("xt", "yt", "zt")
-"""The planes of time in the order of the axes of their columns; rows are times."""
+"""The planes of time: columns are positions along x, y or z, rows are times."""
 SPACE_RANGE = (0.1, 0.5)
-"""Where the planes of space begin; those of time begin at 1, so that nothing moves."""
+"""Range of the initial random values of space planes; time planes begin at 1: nothing moves."""
 SUMS = 4
-"""Parts of the points whose gradients are summed apart, by as many threads at most."""
+"""Number of parts of the points; gradients are summed within each part, by one thread."""
 
 
 @dataclass(frozen=True)
 class EncoderShape:
-    """What decides the sizes of the planes.
+    """Sizes of the encoder's planes.
 
     Attributes:
-        space: Places along x, y and z at each scale.
-        time: Times, at every scale; as many as frames lets each frame have its own.
+        space: Number of nodes along each of x, y and z, for each scale.
+        time: Number of nodes along time, at every scale; one for each frame is usual.
         channels: Features per scale.
     """
 
@@ -40,7 +41,11 @@ class EncoderShape:
     channels: int = 16
 
     def __post_init__(self):
-        """Raises SettingsError where planes would be empty."""
+        """Checks the sizes.
+
+        Raises:
+            SettingsError: If a plane would be empty.
+        """
         if not self.space or min(self.space) < 2 or self.time < 1 or self.channels < 1:
             raise SettingsError(
                 f"An encoder of {self.space} places, {self.time} times and {self.channels} "
@@ -49,7 +54,7 @@ class EncoderShape:
 
     @property
     def outputs(self) -> int:
-        """The number of features of a place."""
+        """Number of features of a position, over all scales."""
         return len(self.space) * self.channels
 
     def planes(self, scale: int) -> dict[str, tuple[int, int, int]]:
@@ -61,14 +66,14 @@ class EncoderShape:
 
 
 def initial_planes(shape: EncoderShape, generator: torch.Generator) -> dict[str, Tensor]:
-    """Planes to begin with, by name: the axes of columns and rows, then the scale ("xt0").
+    """Initial planes by name: the axes of columns and rows, then the scale, such as "xt0".
 
     Args:
-        shape: Sizes.
-        generator: Of the planes of space, which are random.
+        shape: Sizes of the planes.
+        generator: Draws the values of space planes.
 
     Returns:
-        Per scale of S places: xy, xz, yz (S, S, channels) and xt, yt, zt (time, S, channels).
+        For each scale of S nodes: xy, xz, yz (S, S, channels) and xt, yt, zt (time, S, channels).
     """
     planes = {}
     for scale in range(len(shape.space)):
@@ -82,22 +87,22 @@ def initial_planes(shape: EncoderShape, generator: torch.Generator) -> dict[str,
 def encode(
     planes: dict[str, Tensor], shape: EncoderShape, positions: Tensor, time: float
 ) -> Tensor:
-    """Features of places at one time.
+    """Features of positions at one time.
 
-    Samples are bilinear between the nodes of a plane, the first and last of which lie at −1 and 1
-    in space and at 0 and 1 in time. What lies outside has the features of the border.
+    Planes are interpolated bilinearly between their nodes, the first and last of which are at −1
+    and 1 in space and at 0 and 1 in time. Positions outside have the features of the border.
 
     Args:
-        planes: The encoder's planes, in the layout that `initial_planes` makes.
-        shape: Their sizes.
-        positions: (N, 3), −1 … 1 inside the box.
-        time: 0 … 1 within the window.
+        planes: The encoder's planes, in the layout of `initial_planes`.
+        shape: Sizes of the planes.
+        positions: (N, 3), from −1 to 1 inside the box that the planes cover.
+        time: Time in the window, 0 to 1.
 
     Returns:
         (N, outputs), differentiable in planes and positions.
 
     Raises:
-        ValueError: If the planes or positions are of other sizes.
+        ValueError: If planes or positions do not have these sizes.
     """
     if positions.shape[1:] != (3,):
         raise ValueError(f"positions must be (N, 3), not {tuple(positions.shape)}")
@@ -119,7 +124,7 @@ def _has_kernel(tensor: Tensor) -> bool:
 
 
 def _product(positions: Tensor, planes: list[Tensor], lines: list[Tensor]) -> Tensor:
-    """(N, C) product of the samples of planes (S, S, C) and lines (S, C)."""
+    """(N, C) products of samples of three planes (S, S, C) and three lines (S, C)."""
     product = torch.ones_like(positions[:, :1])
     for plane, axes in zip(planes, SPACE_PLANES.values(), strict=True):
         product = product * _sample(plane, positions[:, axes])
@@ -141,21 +146,21 @@ def _sample(plane: Tensor, places: Tensor) -> Tensor:
 
 
 def _line(plane: Tensor, row: int, part: float) -> Tensor:
-    """(S, C): a plane of time (T, S, C) between a row and the next."""
+    """(S, C): a time plane (T, S, C) interpolated between a row (part 0) and the next (part 1)."""
     return plane[row] if part == 0 else torch.lerp(plane[row], plane[row + 1], part)
 
 
 def _row(times: int, time: float) -> tuple[int, float]:
-    """The node at or before a time, and how far the time is from it to the next."""
+    """The row at or before a time of 0 to 1, and the share of the way to the next row."""
     place = min(max(time, 0.0), 1.0) * (times - 1)
     return int(place), place - int(place)
 
 
 class _Product(torch.autograd.Function):
-    """`_product` of planes and the lines of one time, by kernels.
+    """`_product` for the lines of one time, computed by numba kernels.
 
-    Threads share the points in parts that do not depend on how many threads there are, so that the
-    sums do not, either.
+    Gradients are summed over a fixed number of parts of the points, so that they do not depend on
+    the number of threads.
     """
 
     @staticmethod
@@ -189,7 +194,7 @@ class _Product(torch.autograd.Function):
 
 
 def _on_rows(line: Tensor, size: torch.Size, row: int, part: float) -> Tensor:
-    """Gradient of a plane of time (T, S, C) from that of its `_line`."""
+    """Gradient (T, S, C) of a time plane from the gradient (S, C) of its `_line`."""
     gradient = line.new_zeros(size)
     gradient[row] = line * (1 - part)
     if part > 0:
@@ -198,14 +203,14 @@ def _on_rows(line: Tensor, size: torch.Size, row: int, part: float) -> Tensor:
 
 
 def _grouped(tensor: Tensor) -> Tensor:
-    """(…, C) to (…, groups, LANES), as the kernels take channels; zeros fill the last group."""
+    """Channels (…, C) as groups (…, groups, LANES) for the kernels, the last filled with zeros."""
     missing = -tensor.shape[-1] % kernels.LANES
     padded = pad(tensor, (0, missing)) if missing else tensor
     return padded.unflatten(-1, (-1, kernels.LANES)).contiguous()
 
 
 def _channels(grouped: Tensor, channels: int) -> Tensor:
-    """(…, C) of what `_grouped` gives."""
+    """Channels (…, C) from groups (…, groups, LANES); inverse of `_grouped`."""
     return grouped.flatten(-2)[..., :channels]
 
 
@@ -214,18 +219,18 @@ def _arrays(*tensors: Tensor) -> list[np.ndarray]:
 
 
 def space_smoothness(planes: dict[str, Tensor]) -> Tensor:
-    """Mean square of the second differences along both axes, over the planes of space."""
+    """Mean squared second difference along both axes of the space planes."""
     chosen = [plane for name, plane in planes.items() if name[:2] in SPACE_PLANES]
     return _mean_square([plane.diff(2, axis) for plane in chosen for axis in (0, 1)])
 
 
 def time_smoothness(planes: dict[str, Tensor]) -> Tensor:
-    """Mean square of the second differences along time, over the planes of time."""
+    """Mean squared second difference along time of the time planes."""
     return _mean_square([plane.diff(2, 0) for plane in _of_time(planes)])
 
 
 def time_change(planes: dict[str, Tensor]) -> Tensor:
-    """Mean of |1 − P| over the planes of time: 0 where the features do not depend on time."""
+    """Mean of |1 − P| over the time planes P; where it is 0, features do not depend on time."""
     return torch.cat([(1 - plane).abs().flatten() for plane in _of_time(planes)]).mean()
 
 
@@ -234,6 +239,6 @@ def _of_time(planes: dict[str, Tensor]) -> list[Tensor]:
 
 
 def _mean_square(differences: list[Tensor]) -> Tensor:
-    """The mean over all; 0 where there are none, as with two times."""
+    """Mean square of all values; 0 without any, as for second differences of two times."""
     values = torch.cat([difference.flatten() for difference in differences])
     return values.square().sum() / max(len(values), 1)

@@ -1,8 +1,8 @@
 """Numba kernels of the space-time encoder at one scale and one time, forward and backward.
 
-The planes of time are lines by then, so that three planes and three lines are sampled, multiplied,
-and their gradients scattered. Channels are innermost, in groups of `LANES`: loops of a fixed
-length, which LLVM unrolls.
+At one time the three time planes are lines (see `encoder._line`), so samples of three planes and
+three lines are multiplied. Channels are the innermost axis, in groups of `LANES`: loops over them
+have a fixed length, which LLVM unrolls.
 """
 
 import numba
@@ -11,27 +11,31 @@ import numpy as np
 from ico3d.splat.cpu.compile import kernel
 
 LANES = 16
-"""Channels of a group."""
+"""Channels in a group."""
 ZERO, HALF, ONE = np.float32(0), np.float32(0.5), np.float32(1)
 
 
 @kernel(inline=True)
 def _place(position, places):
-    """The node before a position of −1 … 1, how far it is to the next, and the latter's slope.
+    """Where a position in −1 … 1 lies among nodes.
 
-    Outside, and on the border, nothing depends on the position: the slope is 0 (as in torch).
+    Returns the node before the position, the share of the way to the next node, and the derivative
+    of that share by the position, which is 0 on the border and outside (as in torch).
     """
     scale = HALF * np.float32(places - 1)
     place = (position + ONE) * scale
     slope = scale if ZERO < place < np.float32(places - 1) else ZERO
     place = min(max(place, ZERO), np.float32(places - 1))
-    node = min(max(int(place), 0), places - 2)  # also where the position is not a number
+    node = min(max(int(place), 0), places - 2)  # clamped as well, for a NaN position
     return node, place - np.float32(node), slope
 
 
 @kernel(inline=True)
 def _corners(plane, row, column, group):
-    """A group of channels at four nodes: (row, column), the next column, both a row below."""
+    """Views of a group of channels at the four nodes about a place.
+
+    They are (row, column), (row, column + 1), (row + 1, column) and (row + 1, column + 1).
+    """
     return (
         plane[row, column, group],
         plane[row, column + 1, group],
@@ -42,7 +46,7 @@ def _corners(plane, row, column, group):
 
 @kernel(inline=True)
 def _sample(corners, x, y, out):
-    """Writes the bilinear sample."""
+    """Writes the bilinear sample of four nodes: `x` is the share of columns, `y` that of rows."""
     a, b, c, d = corners
     wa, wb, wc, wd = (ONE - y) * (ONE - x), (ONE - y) * x, y * (ONE - x), y * x
     for k in range(LANES):
@@ -51,7 +55,7 @@ def _sample(corners, x, y, out):
 
 @kernel(inline=True)
 def _sample_line(line, node, part, group, out):
-    """Writes the linear sample."""
+    """Writes the linear sample between a node and the next."""
     a, b = line[node, group], line[node + 1, group]
     for k in range(LANES):
         out[k] = (ONE - part) * a[k] + part * b[k]
@@ -59,7 +63,7 @@ def _sample_line(line, node, part, group, out):
 
 @kernel(inline=True)
 def _sample_all(planes, lines, x, y, z, group, samples):
-    """Writes the samples of xy, xz, yz, xt, yt, zt, one after the other."""
+    """Writes the samples of xy, xz, yz, xt, yt and zt, in this order, `LANES` numbers each."""
     _sample(_corners(planes[0], y[0], x[0], group), x[1], y[1], samples)
     _sample(_corners(planes[1], z[0], x[0], group), x[1], z[1], samples[LANES:])
     _sample(_corners(planes[2], z[0], y[0], group), y[1], z[1], samples[2 * LANES :])
@@ -77,7 +81,7 @@ def _product(s, out):
 
 @kernel(inline=True)
 def _product_backward(s, gradient):
-    """Writes the gradients of the six samples after the samples."""
+    """Writes the gradients of the six samples behind the six samples."""
     for k in range(LANES):
         a, b, c = s[k], s[LANES + k], s[2 * LANES + k]
         d, e, f = s[3 * LANES + k], s[4 * LANES + k], s[5 * LANES + k]
@@ -100,7 +104,7 @@ def _add(out, weight, gradient):
 
 @kernel(inline=True)
 def _scatter(corners, sums, x, y, gradient):
-    """Adds to the gradients of four nodes; returns the gradient by x and y."""
+    """Adds to the gradients of four nodes; returns the derivatives by the shares x and y."""
     a, b, c, d = corners
     ga, gb, gc, gd = ZERO, ZERO, ZERO, ZERO
     for k in range(LANES):
@@ -118,7 +122,7 @@ def _scatter(corners, sums, x, y, gradient):
 
 @kernel(inline=True)
 def _scatter_line(line, sums, node, part, group, gradient):
-    """Adds to the gradients of two nodes; returns the gradient by the position."""
+    """Adds to the gradients of two nodes; returns the derivative by the share `part`."""
     a, b = line[node, group], line[node + 1, group]
     total = ZERO
     for k in range(LANES):
@@ -133,15 +137,15 @@ def forward(hands, xy, xz, yz, xt, yt, zt, positions, out):
     """Writes the features of all points.
 
     Args:
-        hands: Threads to share the points.
-        xy: (S, S, groups, LANES), as are xz and yz: rows are the second axis.
-        xz: See xy.
-        yz: See xy.
-        xt: (S, groups, LANES) at the time asked for, as are yt and zt.
-        yt: See xt.
-        zt: See xt.
-        positions: (N, 3).
-        out: (N, groups, LANES), written.
+        hands: Number of threads that share the points.
+        xy: (S, S, groups, LANES) plane; rows are y, columns x.
+        xz: (S, S, groups, LANES) plane; rows are z, columns x.
+        yz: (S, S, groups, LANES) plane; rows are z, columns y.
+        xt: (S, groups, LANES) line along x at the time.
+        yt: (S, groups, LANES) line along y.
+        zt: (S, groups, LANES) line along z.
+        positions: (N, 3), −1 … 1 inside the box.
+        out: (N, groups, LANES) features, written.
     """
     places, count = xy.shape[0], len(positions)
     planes, lines = (xy, xz, yz), (xt, yt, zt)
@@ -161,16 +165,17 @@ def backward(xy, xz, yz, xt, yt, zt, positions, gradient, g_planes, g_lines, g_p
     """Gradients of `forward`.
 
     Args:
-        xy: As given to `forward`, as are those up to `positions`.
-        xz: See xy.
-        yz: See xy.
-        xt: See xy.
-        yt: See xy.
-        zt: See xy.
-        positions: (N, 3).
-        gradient: (N, groups, LANES) with respect to the features.
-        g_planes: (hands, 3, S, S, groups, LANES) zeros; the sum over hands is the gradient.
-        g_lines: (hands, 3, S, groups, LANES) zeros; gradients are added to them.
+        xy: (S, S, groups, LANES) plane, as given to `forward`.
+        xz: (S, S, groups, LANES) plane.
+        yz: (S, S, groups, LANES) plane.
+        xt: (S, groups, LANES) line.
+        yt: (S, groups, LANES) line.
+        zt: (S, groups, LANES) line.
+        positions: (N, 3), as given to `forward`.
+        gradient: (N, groups, LANES) gradient of the features.
+        g_planes: (hands, 3, S, S, groups, LANES), added to; its sum over the parts of the points
+            (`hands`) is the gradient of the planes.
+        g_lines: (hands, 3, S, groups, LANES), added to; likewise of the lines.
         g_positions: (N, 3), added to.
     """
     places, count, hands = xy.shape[0], len(positions), len(g_planes)

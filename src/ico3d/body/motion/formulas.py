@@ -1,4 +1,5 @@
-"""Gaussians that come, move and go by formulas: Spacetime Gaussians, FreeTime, and still ones."""
+"""Motions without networks: still Gaussians, and the formulas of Spacetime Gaussians and FreeTime.
+"""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -11,38 +12,40 @@ from ico3d.splat.gaussians import Gaussians
 
 @dataclass(frozen=True)
 class Still:
-    """A `Motion` without motion."""
+    """A `Motion` of Gaussians that do not move."""
 
     @property
     def per_gaussian(self) -> tuple[str, ...]:
-        """Nothing."""
+        """No tensors."""
         return ()
 
     @property
     def shared(self) -> tuple[str, ...]:
-        """Nothing."""
+        """No tensors."""
         return ()
 
     def at(self, values: Mapping[str, Tensor], tau: float) -> Gaussians:
-        """The canonical Gaussians."""
+        """The canonical Gaussians, activated, at any τ."""
         del tau
         return activated(values)
 
     def about(self) -> dict:
-        """Its kind."""
+        """Kind of this motion, for `motion_from`."""
         return {"kind": "still"}
 
 
 @dataclass(frozen=True)
 class Polynomial:
-    """A `Motion` by a polynomial about each Gaussian's own time, at which it is most opaque.
+    """A `Motion` by polynomials: each Gaussian has a time at which it is most opaque.
 
-    With dt = τ − `center`: μ + Σ_k `path`_k·dt^k, q + dt·`turn`, o·exp(−(dt / e^`log_duration`)²).
+    With dt = τ − `center`, means are μ + Σ_k `path`_k·dt^k, quaternions q + dt·`turn`, and opacities
+    o·exp(−(dt / e^`log_duration`)²).
 
     Attributes:
-        degree: Of the polynomial: 3 for Spacetime Gaussians, 1 for FreeTime.
-        turning: Whether Gaussians turn, at constant speed.
-        detached: Whether motion teaches nothing about `center`, as in Spacetime Gaussians.
+        degree: Degree of the polynomial of the means: 3 for Spacetime Gaussians, 1 for FreeTime.
+        turning: Whether Gaussians turn, linearly in time.
+        detached: Whether means and rotations give no gradient to `center`, as in Spacetime
+            Gaussians.
     """
 
     degree: int
@@ -51,17 +54,17 @@ class Polynomial:
 
     @property
     def per_gaussian(self) -> tuple[str, ...]:
-        """`center` (N,), `log_duration` (N,), `path` (N, degree, 3); turning ones `turn` (N, 4)."""
+        """`center` (N,), `log_duration` (N,), `path` (N, degree, 3); `turn` (N, 4) if turning."""
         names = ("center", "log_duration", "path")
         return (*names, "turn") if self.turning else names
 
     @property
     def shared(self) -> tuple[str, ...]:
-        """Nothing."""
+        """No tensors."""
         return ()
 
     def at(self, values: Mapping[str, Tensor], tau: float) -> Gaussians:
-        """Activated Gaussians; most of them are all but transparent at any one time."""
+        """Activated Gaussians at τ in [0, 1]; most of them are nearly transparent at any time."""
         since = tau - values["center"]  # (N,)
         visibility = (-(since * (-values["log_duration"]).exp()).square()).exp()  # (N,)
         if self.detached:
@@ -73,7 +76,7 @@ class Polynomial:
         return activated(values, means, turned, visibility=visibility)
 
     def about(self) -> dict:
-        """Its kind and fields."""
+        """Kind and fields of this motion, for `motion_from`."""
         return {"kind": "polynomial", **asdict(self)}
 
 

@@ -1,7 +1,7 @@
-"""The tunable MLP: sets of weights that each Gaussian blends its own way (paper, eq. of y).
+"""The tunable MLP: each Gaussian mixes sets of weights in its own proportions (paper, eq. of y).
 
-All layers are tunable, the last one too (there ψ is the identity): the paper's MLP as a whole
-consists of M sets.
+All layers are tunable, the last one too, where ψ is the identity: in the paper the MLP as a whole
+has M sets of weights.
 """
 
 import math
@@ -18,19 +18,19 @@ from ico3d.errors import SettingsError
 from ico3d.splat.cpu.compile import PARTS
 
 OUTPUT_GAIN = 0.1
-"""Factor of the last layer at the beginning, so that nothing moves far before it must."""
+"""Factor of the last layer's initial weights, so that Gaussians hardly move at first."""
 
 
 @dataclass(frozen=True)
 class MlpShape:
-    """What decides the sizes of the weights.
+    """Sizes of a tunable MLP.
 
     Attributes:
-        inputs: Values that enter.
-        width: Values of each hidden layer.
-        depth: Hidden layers; the output layer comes on top.
-        outputs: Values that come out: Δμ 3, Δr 4, Δs 3.
-        sets: M, sets of weights, the modes of motion.
+        inputs: Number of input values.
+        width: Number of values of each hidden layer.
+        depth: Number of hidden layers, without the output layer.
+        outputs: Number of output values: 3 of Δμ, 4 of Δr and 3 of Δs.
+        sets: Number M of sets of weights.
     """
 
     inputs: int
@@ -40,19 +40,23 @@ class MlpShape:
     sets: int = 2
 
     def __post_init__(self):
-        """Raises SettingsError where a layer would be empty."""
+        """Checks the sizes.
+
+        Raises:
+            SettingsError: If a size is below 1.
+        """
         if min(self.inputs, self.width, self.depth, self.outputs, self.sets) < 1:
             raise SettingsError(f"Every size of a tunable MLP must be at least 1: {self}.")
 
     @property
     def layers(self) -> list[tuple[int, int]]:
-        """Inputs and outputs of each layer, the output layer last."""
+        """Numbers of inputs and of outputs of each layer, the output layer last."""
         sizes = [self.inputs, *[self.width] * self.depth, self.outputs]
         return list(pairwise(sizes))
 
     @property
     def weights(self) -> dict[str, tuple[int, ...]]:
-        """Names and sizes of the tensors, layer by layer."""
+        """Names and shapes of the tensors, layer by layer."""
         sizes = {}
         for layer, (inputs, outputs) in enumerate(self.layers):
             sizes[f"weight{layer}"] = (self.sets, inputs, outputs)
@@ -61,14 +65,14 @@ class MlpShape:
 
 
 def initial_weights(shape: MlpShape, generator: torch.Generator) -> dict[str, Tensor]:
-    """Random weights: those of a linear layer in torch, each set its own.
+    """Random weights, distributed as those of torch's linear layers, the last layer scaled down.
 
     Args:
-        shape: Sizes.
+        shape: Sizes of the MLP.
         generator: Draws the weights.
 
     Returns:
-        Per layer k of I inputs and O outputs: "weight{k}" (sets, I, O) and "bias{k}" (sets, O).
+        For each layer k of I inputs and O outputs: "weight{k}" (sets, I, O) and "bias{k}" (sets, O).
     """
     weights = {name: torch.empty(size) for name, size in shape.weights.items()}
     for layer, (inputs, _) in enumerate(shape.layers):
@@ -79,19 +83,19 @@ def initial_weights(shape: MlpShape, generator: torch.Generator) -> dict[str, Te
 
 
 def tunable_mlp(weights: dict[str, Tensor], shape: MlpShape, x: Tensor, alpha: Tensor) -> Tensor:
-    """Layers y = ψ(Σ_m α_m (w_mᵀx + b_m)); ψ is ReLU, and the identity at the last.
+    """Applies layers y = ψ(Σ_m α_m (w_mᵀx + b_m)); ψ is ReLU, and the identity in the last layer.
 
     Args:
-        weights: As `initial_weights` makes them.
-        shape: Their sizes.
+        weights: Tensors in the layout of `initial_weights`.
+        shape: Sizes of the MLP.
         x: (N, inputs).
-        alpha: (N, sets) how much each Gaussian has of each set; any numbers.
+        alpha: (N, sets) factors α_m of each Gaussian, any numbers.
 
     Returns:
         (N, outputs), differentiable in weights, x and alpha.
 
     Raises:
-        ValueError: If weights, x or alpha are of other sizes.
+        ValueError: If weights, x or alpha do not have these sizes.
     """
     tensors = [weights[name] for name in shape.weights]
     if [tensor.shape for tensor in tensors] != list(shape.weights.values()):
@@ -103,7 +107,7 @@ def tunable_mlp(weights: dict[str, Tensor], shape: MlpShape, x: Tensor, alpha: T
     for layer in range(shape.depth + 1):
         blended = (alpha[:, :, None] * x[:, None]).flatten(1)  # (N, M·I)
         joined = torch.cat([blended, alpha], 1)  # (N, M·I + M)
-        x = joined @ _joined(*tensors[2 * layer : 2 * layer + 2])
+        x = joined @ _joined(*tensors[2 * layer : 2 * layer + 2])  # (N, O)
         x = x if layer == shape.depth else torch.relu(x)
     return x
 
@@ -113,12 +117,12 @@ def _has_kernel(tensor: Tensor) -> bool:
 
 
 def _joined(weight: Tensor, bias: Tensor) -> Tensor:
-    """(M·I + M, O): the matrix of a layer, whose inputs are each α times x, then the α."""
+    """(M·I + M, O) matrix of a layer for inputs α_1·x, …, α_M·x, α_1, …, α_M."""
     return torch.cat([weight.flatten(0, 1), bias])
 
 
 class _Mlp(torch.autograd.Function):
-    """The kernels as a differentiable function; results do not depend on the number of threads."""
+    """The numba kernels as a differentiable function; threads do not change its results."""
 
     @staticmethod
     def forward(ctx, shape: MlpShape, x: Tensor, alpha: Tensor, *tensors: Tensor) -> Tensor:
@@ -146,7 +150,7 @@ class _Mlp(torch.autograd.Function):
 
 
 def _padded_matrices(tensors: tuple[Tensor, ...]) -> list[Tensor]:
-    """Each layer's matrix with zeros where rows or columns are no whole fours."""
+    """The matrix of each layer, with zeros appended up to multiples of four rows and columns."""
     matrices = []
     for weight, bias in zip(tensors[::2], tensors[1::2], strict=True):
         matrix = _joined(weight, bias)
@@ -157,7 +161,7 @@ def _padded_matrices(tensors: tuple[Tensor, ...]) -> list[Tensor]:
 
 
 def _layer_table(shape: MlpShape) -> Tensor:
-    """(layers, 4) what the kernels want to know of each layer."""
+    """(layers, 4) for the kernels: first weight, inputs, padded rows and padded columns."""
     table, first = [], 0
     for inputs, outputs in shape.layers:
         rows, columns = padded(shape.sets * (inputs + 1)), padded(outputs)
@@ -167,7 +171,7 @@ def _layer_table(shape: MlpShape) -> Tensor:
 
 
 def _taken_apart(shape: MlpShape, matrices: list[Tensor], flat: Tensor) -> list[Tensor]:
-    """Weights and biases of each layer out of the padded matrices."""
+    """Weights and biases of each layer from the padded matrices, flattened one after the other."""
     parts = []
     pieces = flat.split([matrix.numel() for matrix in matrices])
     for (inputs, outputs), matrix, piece in zip(shape.layers, matrices, pieces, strict=True):
@@ -182,14 +186,14 @@ def _arrays(*tensors: Tensor) -> list[np.ndarray]:
 
 
 def positional_encoding(x: Tensor, bands: int) -> Tensor:
-    """γ(x): the values with their sines and cosines at octaves of π.
+    """γ(x): the values, and sines and cosines of the values times π, 2·π, 4·π, ….
 
     Args:
         x: (N, D), about −1 … 1.
-        bands: Octaves.
+        bands: Number of octaves.
 
     Returns:
-        (N, D·(1 + 2·bands)): x, then sines, then cosines, each by octave.
+        (N, D·(1 + 2·bands)): x, then all sines by octave, then all cosines by octave.
     """
     octaves = math.pi * 2.0 ** torch.arange(bands).to(x)  # (bands,)
     angles = (x[:, None] * octaves[:, None]).flatten(1)  # (N, bands·D)

@@ -1,10 +1,10 @@
 """Numba kernels of the tunable MLP: all layers over a block of points, forward and backward.
 
-A block's values are rows of `BLOCK` numbers, one row per feature: loops run over the points of a
-row, with the weights as factors that stay in registers, and a block's rows stay in the cache from
-layer to layer. A layer of M sets is one matrix product: its input rows are the features times
-α_1, …, the features times α_M and the α themselves (for the biases), "blended" below.
-Rows are counted in fours (`padded`): what is missing is zero.
+A block has one row of `BLOCK` numbers per feature, one number per point. Loops run over the points
+of a row, with the weights as factors that stay in registers, and the rows of a block stay in the
+cache from layer to layer. A layer of M sets is one matrix product of its "blended" rows: the
+features times α_1, …, the features times α_M, and α_1 … α_M themselves (for the biases). Numbers of
+rows are rounded up to multiples of four (`padded`), with rows of zeros.
 """
 
 import numba
@@ -13,18 +13,20 @@ import numpy as np
 from ico3d.splat.cpu.compile import PARTS, kernel
 
 BLOCK = 128
+"""Points in a block."""
 FOUR = 4
+"""Rows that are multiplied at once."""
 ZERO = np.float32(0)
 
 
 def padded(rows: int) -> int:
-    """Rows in whole fours."""
+    """A number of rows, rounded up to a multiple of four."""
     return -(-rows // FOUR) * FOUR
 
 
 @kernel()
 def _read(values, first, rows):
-    """Rows of the points from `first` on; zero past the last one."""
+    """Writes the rows of the block of points from `first` on; zeros past the last point."""
     count = min(BLOCK, values.shape[0] - first)
     for k in range(values.shape[1]):
         row = rows[k * BLOCK : (k + 1) * BLOCK]
@@ -36,7 +38,7 @@ def _read(values, first, rows):
 
 @kernel()
 def _write(rows, first, values):
-    """Writes a block of rows where `_read` reads them."""
+    """Copies the rows of a block into the values of its points; inverse of `_read`."""
     for p in range(min(BLOCK, values.shape[0] - first)):
         for k in range(values.shape[1]):
             values[first + p, k] = rows[k * BLOCK + p]
@@ -58,7 +60,7 @@ def _blend(x, inputs, alpha, sets, out):
 
 @kernel()
 def _unblend(x, inputs, alpha, sets, gradient, g_x, g_alpha):
-    """Takes the gradient of blended rows apart: writes that of the features, adds that of α."""
+    """From the gradient of blended rows: writes that of the features, adds to that of α."""
     g_x[:] = ZERO
     for m in range(sets):
         factor = alpha[m * BLOCK : (m + 1) * BLOCK]
@@ -77,9 +79,9 @@ def _unblend(x, inputs, alpha, sets, gradient, g_x, g_alpha):
 
 @kernel()
 def _multiply(x, rows, weights, columns, out):
-    """Writes `columns` rows: sums of the `rows` rows of x times weights[row·columns + column].
+    """Writes `columns` rows, each a sum of the `rows` rows of x times weights[row·columns + column].
 
-    Sixteen weights at a time.
+    Rows and columns are taken in fours, so with sixteen weights at a time.
     """
     for j in range(0, columns, FOUR):
         o = out[j * BLOCK : (j + FOUR) * BLOCK]
@@ -104,7 +106,10 @@ def _multiply(x, rows, weights, columns, out):
 
 @kernel()
 def _products(x, y, out, columns):
-    """Adds the products of four rows of x with four of y to four rows of out."""
+    """Adds the 16 inner products of four rows of x and four of y to a 4 × 4 part of a matrix.
+
+    `out` begins at that part; the matrix has `columns` columns.
+    """
     a0 = a1 = a2 = a3 = b0 = b1 = b2 = b3 = ZERO
     c0 = c1 = c2 = c3 = d0 = d1 = d2 = d3 = ZERO
     for p in range(BLOCK):
@@ -142,7 +147,7 @@ def _add(out, a, b, c, d):
 
 @kernel()
 def _weight_gradients(x, rows, gradient, columns, out):
-    """Adds the products of each row of x with each of the gradient to out (rows·columns,)."""
+    """Adds inner products of each row of x and each of the gradient to out (rows·columns,)."""
     for r in range(0, rows, FOUR):
         for j in range(0, columns, FOUR):
             _products(x[r * BLOCK :], gradient[j * BLOCK :], out[r * columns + j :], columns)
@@ -165,12 +170,13 @@ def forward(x, alpha, weights, layers, hidden, out):
     """Writes the outputs of all points, and the hidden rows, which `backward` needs.
 
     Args:
-        x: (N, inputs).
-        alpha: (N, sets).
-        weights: Those of all layers, one after the other: (blended rows, columns), padded.
-        layers: (layers, 4) per layer: first weight, inputs, blended rows, columns; the last two
-            padded.
-        hidden: (blocks, layers − 1, columns·BLOCK), written.
+        x: (N, inputs) features.
+        alpha: (N, sets) factors of the sets.
+        weights: Matrices (blended rows, columns) of all layers, padded, flattened one after the
+            other.
+        layers: (layers, 4): for each layer the index of its first weight, its number of inputs, of
+            padded blended rows, and of padded columns.
+        hidden: (blocks, layers − 1, columns·BLOCK) hidden rows, written.
         out: (N, outputs), written.
     """
     blocks, sets, last = hidden.shape[0], alpha.shape[1], len(layers) - 1
@@ -199,15 +205,16 @@ def backward(x, alpha, weights, layers, hidden, gradient, g_x, g_alpha, g_weight
     """Gradients of `forward`.
 
     Args:
-        x: As given to `forward`.
-        alpha: As given to `forward`.
-        weights: Those of `forward`, each layer transposed: (columns, blended rows).
-        layers: As given to `forward`.
-        hidden: As `forward` wrote it.
-        gradient: (N, outputs) with respect to the outputs.
+        x: (N, inputs), as given to `forward`.
+        alpha: (N, sets), as given to `forward`.
+        weights: The matrices of `forward`, each transposed: (columns, blended rows).
+        layers: (layers, 4), as given to `forward`.
+        hidden: Hidden rows, as `forward` wrote them.
+        gradient: (N, outputs) gradient of the outputs.
         g_x: (N, inputs), written.
         g_alpha: (N, sets), written.
-        g_weights: (PARTS, weights), zeros; their sum is the gradient, laid out as in `forward`.
+        g_weights: (PARTS, weights), added to; its sum over PARTS is the gradient of the weights, in
+            the layout of `forward`.
     """
     blocks, sets, last = hidden.shape[0], alpha.shape[1], len(layers) - 1
     for part in numba.prange(PARTS):

@@ -1,4 +1,4 @@
-"""Bodies in motion: the Gaussians of one window, and what moves them."""
+"""The Gaussians of one window of a body, and the protocol of motions that move them."""
 
 from collections.abc import Mapping
 from typing import Protocol
@@ -9,19 +9,19 @@ from torch import Tensor
 from ico3d.splat.gaussians import Gaussians
 
 CANONICAL = ("means", "quats", "log_scales", "opacity_logits", "color_logits")
-"""What every Gaussian has, as training stores it."""
+"""Names of the tensors that all Gaussians have, as they are trained and stored."""
 
 
 class Motion(Protocol):
     """How Gaussians get from their canonical state to a time τ in [0, 1] of their window.
 
-    A motion holds no tensors: per-Gaussian ones follow density control, and all of them are
-    trained, saved and frozen by name.
+    A motion itself holds no tensors, only their names: tensors are trained, saved and frozen by
+    name, and density control changes those of the Gaussians.
     """
 
     @property
     def per_gaussian(self) -> tuple[str, ...]:
-        """Names of the tensors (N, …) that it hangs on the Gaussians."""
+        """Names of the tensors (N, …) that Gaussians have for this motion."""
         ...
 
     @property
@@ -30,35 +30,36 @@ class Motion(Protocol):
         ...
 
     def at(self, values: Mapping[str, Tensor], tau: float) -> Gaussians:
-        """Activated Gaussians.
+        """Activated Gaussians in the world at a time.
 
         Args:
-            values: `CANONICAL` and the motion's own tensors.
+            values: The tensors of `CANONICAL` and of this motion, by name.
             tau: Time in the window, 0 to 1.
         """
         ...
 
     def about(self) -> dict:
-        """What `ico3d.body.opening.motion_from` makes it again from, JSON-serialisable."""
+        """JSON-serialisable description, from which `ico3d.body.opening.motion_from` remakes it."""
         ...
 
 
 class WindowModel:
-    """The Gaussians of one window.
+    """The Gaussians of one window, with their motion.
 
     Attributes:
         motion: What moves the Gaussians.
-        gaussians: Per-Gaussian tensors by name, as stored: `means` (N, 3) metres, `quats` (N, 4)
+        gaussians: Tensors of the Gaussians by name, as stored: `means` (N, 3) metres, `quats` (N, 4)
             wxyz not normalised, `log_scales` (N, 3), `opacity_logits` (N,), `color_logits` (N, 3),
-            and the motion's. Density control replaces them.
-        shared: The motion's other tensors.
+            and those of `motion.per_gaussian`. Density control replaces them.
+        shared: Tensors of `motion.shared` by name.
     """
 
     def __init__(self, motion: Motion, gaussians: dict[str, Tensor], shared: dict[str, Tensor]):
-        """Takes tensors of these names.
+        """Makes a model of tensors, which are not copied.
 
         Raises:
-            ValueError: If names or lengths do not fit one another.
+            ValueError: If names are not those that the motion asks for, or tensors of the Gaussians
+                differ in length.
         """
         for kind, tensors, names in (
             ("per-Gaussian", gaussians, {*CANONICAL, *motion.per_gaussian}),
@@ -71,16 +72,16 @@ class WindowModel:
         self.motion, self.gaussians, self.shared = motion, gaussians, shared
 
     def __len__(self) -> int:
-        """The number of Gaussians."""
+        """Number of Gaussians."""
         return len(self.gaussians["means"])
 
     @property
     def device(self) -> torch.device:
-        """Where its tensors lie."""
+        """Device of the tensors."""
         return self.gaussians["means"].device
 
     def to(self, device: torch.device) -> None:
-        """Moves the tensors."""
+        """Moves all tensors to a device."""
         self.gaussians = {name: value.to(device) for name, value in self.gaussians.items()}
         self.shared = {name: value.to(device) for name, value in self.shared.items()}
 
@@ -89,7 +90,7 @@ class WindowModel:
         return self.motion.at({**self.gaussians, **self.shared}, tau)
 
     def canonical(self) -> Gaussians:
-        """Activated Gaussians as they are before anything moves them."""
+        """The canonical Gaussians, activated, without motion."""
         return activated(self.gaussians)
 
 
@@ -100,14 +101,14 @@ def activated(
     log_scales: Tensor | None = None,
     visibility: Tensor | None = None,
 ) -> Gaussians:
-    """Renderable Gaussians from stored tensors.
+    """Gaussians that can be rendered, from stored tensors.
 
     Args:
-        values: `CANONICAL`.
-        means: (N, 3) in the place of the stored ones.
-        quats: (N, 4) in the place of the stored ones.
-        log_scales: (N, 3) in the place of the stored ones.
-        visibility: (N,) factors of the opacities.
+        values: The tensors of `CANONICAL` by name.
+        means: (N, 3) instead of the stored means.
+        quats: (N, 4) instead of the stored rotations.
+        log_scales: (N, 3) instead of the stored log scales.
+        visibility: (N,) factors of the opacities; None for 1.
     """
     opacities = values["opacity_logits"].sigmoid()  # (N,)
     return Gaussians(
