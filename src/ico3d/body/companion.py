@@ -76,7 +76,7 @@ class Pruning:
         self._companion, self._window = companion, window
 
     def due(self, step: int, steps: int) -> bool:
-        """Whether to prune after a step: each `PRUNE_EVERY` steps, and after the last of `steps`."""
+        """Whether to prune after step `step` of `steps`: regularly, and after the last one."""
         return (step > 0 and step % PRUNE_EVERY == 0) or step == steps - 1
 
     @torch.no_grad()

@@ -1,5 +1,4 @@
-"""Motions without networks: still Gaussians, and the formulas of Spacetime Gaussians and FreeTime.
-"""
+"""Motions without networks: still Gaussians, Spacetime Gaussians, and FreeTime."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -38,8 +37,8 @@ class Still:
 class Polynomial:
     """A `Motion` by polynomials: each Gaussian has a time at which it is most opaque.
 
-    With dt = τ − `center`, means are μ + Σ_k `path`_k·dt^k, quaternions q + dt·`turn`, and opacities
-    o·exp(−(dt / e^`log_duration`)²).
+    With dt = τ − `center`, means are μ + Σ_k `path`_k·dt^k, quaternions q + dt·`turn`, and
+    opacities o·exp(−(dt / e^`log_duration`)²).
 
     Attributes:
         degree: Degree of the polynomial of the means: 3 for Spacetime Gaussians, 1 for FreeTime.

@@ -72,7 +72,7 @@ def initial_weights(shape: MlpShape, generator: torch.Generator) -> dict[str, Te
         generator: Draws the weights.
 
     Returns:
-        For each layer k of I inputs and O outputs: "weight{k}" (sets, I, O) and "bias{k}" (sets, O).
+        For layer k of I inputs and O outputs: "weight{k}" (sets, I, O) and "bias{k}" (sets, O).
     """
     weights = {name: torch.empty(size) for name, size in shape.weights.items()}
     for layer, (inputs, _) in enumerate(shape.layers):

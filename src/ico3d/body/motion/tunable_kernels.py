@@ -79,7 +79,7 @@ def _unblend(x, inputs, alpha, sets, gradient, g_x, g_alpha):
 
 @kernel()
 def _multiply(x, rows, weights, columns, out):
-    """Writes `columns` rows, each a sum of the `rows` rows of x times weights[row·columns + column].
+    """Writes `columns` rows: sums of the `rows` rows of x times weights[row·columns + column].
 
     Rows and columns are taken in fours, so with sixteen weights at a time.
     """

@@ -48,9 +48,9 @@ class WindowModel:
 
     Attributes:
         motion: What moves the Gaussians.
-        gaussians: Tensors of the Gaussians by name, as stored: `means` (N, 3) metres, `quats` (N, 4)
-            wxyz not normalised, `log_scales` (N, 3), `opacity_logits` (N,), `color_logits` (N, 3),
-            and those of `motion.per_gaussian`. Density control replaces them.
+        gaussians: Tensors of the Gaussians by name, as stored: `means` (N, 3) metres, `quats`
+            (N, 4) wxyz not normalised, `log_scales` (N, 3), `opacity_logits` (N,), `color_logits`
+            (N, 3), and those of `motion.per_gaussian`. Density control replaces them.
         shared: Tensors of `motion.shared` by name.
     """
 

@@ -1,4 +1,4 @@
-"""How much moves from frame to frame, and where: optical flow in the pictures of a clip."""
+"""Measures how much moves from frame to frame, and where, by optical flow in a clip's pictures."""
 
 import hashlib
 import json
@@ -27,31 +27,31 @@ if TYPE_CHECKING:
     import torch
 
 HEIGHT = 320
-"""Rows of the pictures that flow is estimated in; larger ones are made smaller."""
+"""Height in rows to which larger pictures are scaled down before flow is estimated."""
 MOST_CAMERAS = 16
-"""Cameras that are looked at, evenly spread by azimuth: more tell nothing new."""
+"""Most cameras whose pictures are used, evenly spread by azimuth; more would tell nothing new."""
 MOVING = 1.0
-"""Centimetres per step from which on a pixel moves."""
+"""Flow in centimetres per step above which a pixel counts as moving."""
 DYNAMIC_SHARES = 0.3, 0.7
-"""Shares of the views seeing a point move at which it counts as still and as dynamic."""
+"""Shares of views in which a point moves, up to and from which it is fully still or dynamic."""
 PERSON = 200.0
-"""Centimetres that a picture is taken to be high, where its cameras do not tell."""
+"""Assumed height of a picture in centimetres, where cameras do not tell the distance."""
 VERSION = 1
-"""Of what is cached; counted up when the numbers change."""
+"""Version of cached results, to be counted up when the measurement changes."""
 
 logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class CameraFlow:
-    """What moved in the pictures of one camera.
+    """What moved in the pictures of one camera, in S steps from frame to frame.
 
     Attributes:
-        index: Number of the camera in the capture.
-        camera: The camera, of the size of the pictures that were looked at.
+        index: Index of the camera in the capture.
+        camera: The camera, scaled to the size of the pictures in which flow was estimated.
         energy: (S,) Σ_mask |f|² / Σ mask of each step, cm²; NaN where a picture is missing or
             shows nobody.
-        moving: (S, H, ⌈W/8⌉) uint8, packed bits: foreground pixels that move in a step.
+        moving: (S, H, ⌈W/8⌉) uint8, packed bits: foreground pixels that move in each step.
     """
 
     index: int
@@ -65,7 +65,7 @@ class ClipFlow:
     """What moved in a span of a clip.
 
     Attributes:
-        span: Frames that were looked at; step i goes from frame span.first + i to the next.
+        span: The frames that were measured; step i goes from frame span.first + i to the next.
         method: Name of the flow method.
         cameras: What moved in the pictures of each camera.
     """
@@ -80,14 +80,14 @@ class ClipFlow:
 
         f_i is the flow of a foreground pixel of frame i towards frame i + 1, measured in
         centimetres at the distance of what the cameras look at, so that a threshold means the
-        same at any resolution and framing. Steps that no camera saw lie between their neighbours.
+        same at any resolution and framing. Steps that no camera saw are interpolated.
         """
         energy = np.stack([flow.energy for flow in self.cameras])  # (C, S)
         known = np.isfinite(energy)
         seen = np.flatnonzero(known.any(0))
         if len(seen) == 0:
             return np.zeros(energy.shape[1])
-        mean = np.nansum(energy[:, seen], 0) / known[:, seen].sum(0)
+        mean = np.nansum(energy[:, seen], 0) / known[:, seen].sum(0)  # (S',) of the seen steps
         return np.interp(np.arange(energy.shape[1]), seen, mean)
 
     def moving(self, flow: CameraFlow, window: Window) -> np.ndarray:
@@ -104,17 +104,17 @@ def clip_flow(
     method: FlowMethod | None = None,
     device: "torch.device | str" = "cpu",
 ) -> ClipFlow:
-    """Measures what moves, in the pictures of up to 16 cameras that train.
+    """Measures what moves, in the pictures of up to 16 training cameras.
 
     Args:
         capture: The recording; where it has no masks, all pixels count.
-        folder: Where results are kept, one file per camera, and found again.
+        folder: Folder in which results are cached, one file per camera; None for no cache.
         span: Frames to measure; the whole clip by default.
-        method: Estimates flow; else the best that is installed.
-        device: Where that computes, if it can.
+        method: Flow method; by default the best one that is installed.
+        device: Where the default method computes, if it can.
 
     Raises:
-        CaptureError: If no camera has two pictures on end.
+        CaptureError: If no camera shows the person in two successive frames.
         MissingExtraError: If no flow method is installed.
     """
     span = span or Window(0, capture.num_frames - 1)
@@ -141,19 +141,20 @@ def clip_flow(
 def dynamic_weights(
     points: np.ndarray, capture: Capture, window: Window, flow: ClipFlow | None = None
 ) -> np.ndarray:
-    """Which surface points move within a window: what α of the tunable MLP begins with.
+    """How much surface points move within a window; initial values of α of the tunable MLP.
 
-    A point moves if, in enough of the views in which nothing hides it, it lies on a pixel of the
-    person that moves at any step of the window.
+    A point is dynamic if, in enough of the views in which nothing hides it, it lies on a pixel of
+    the person that moves in any step of the window.
 
     Args:
         points: (P, 3) metres, in the world, on the surface at the window's centre frame.
         capture: The recording.
         window: The window's frames.
-        flow: What is known of the clip; else the window's frames are looked at.
+        flow: Measured motion of the clip; by default that of the window's frames is measured.
 
     Returns:
-        (P,) float64: 0 still, 1 dynamic, between where views disagree; 0 where none sees a point.
+        (P,) float64: 0 still, 1 dynamic, in between where views disagree; 0 where no view sees the
+        point.
     """
     flow = flow or clip_flow(capture, span=window)
     gap = HIDING * float(np.quantile(spacing(points), 0.9))
@@ -168,7 +169,7 @@ def dynamic_weights(
 
 
 def _spread(capture: Capture) -> list[int]:
-    """Training cameras, evenly spread by azimuth about their middle."""
+    """Indices of up to `MOST_CAMERAS` training cameras, evenly spread by azimuth."""
     indices = np.array(train_cameras(capture))
     centers = np.stack([capture.cameras[index].camera_to_world[:3, 3] for index in indices])
     across = centers - centers.mean(0)  # (C, 3)
@@ -178,22 +179,25 @@ def _spread(capture: Capture) -> list[int]:
 
 
 def _centimetres(camera: Camera, middle: np.ndarray | None) -> float:
-    """Centimetres that a pixel of full size is wide at what the cameras look at (3,)."""
+    """Size in centimetres of a pixel at the point (3,) that all cameras look at.
+
+    Where there is no such point, or it is behind the camera, `PERSON` gives the size.
+    """
     depth = 0.0 if middle is None else float(camera.project(middle)[1])
     return 100 * depth / float(camera.intrinsics[1, 1]) if depth > 0 else PERSON / camera.height
 
 
 @dataclass(frozen=True)
 class _Work:
-    """What is to be done for one camera.
+    """The measurement of one camera's pictures.
 
     Attributes:
-        capture: Where pictures come from.
-        index: The camera's number.
+        capture: The recording.
+        index: Index of the camera.
         span: Frames to measure.
-        method: Estimates flow.
-        pixel: Centimetres that a pixel of full size is wide.
-        advance: Called after each step.
+        method: Flow method.
+        pixel: Size of a pixel of the recorded picture in centimetres.
+        advance: Called after each step, to show progress.
     """
 
     capture: Capture
@@ -205,13 +209,16 @@ class _Work:
 
     @property
     def camera(self) -> Camera:
-        """The camera, of the size of the pictures that are looked at."""
+        """The camera, scaled to the size of the pictures in which flow is estimated."""
         camera = self.capture.cameras[self.index]
         scale = min(1.0, HEIGHT / camera.height)
         return camera.resized(max(1, round(scale * camera.width)), round(scale * camera.height))
 
     def picture(self, frame: int) -> tuple[np.ndarray, np.ndarray] | None:
-        """The person before black (h, w, 3) uint8, and where it is (h, w) bool."""
+        """The person before black (h, w, 3) uint8, and the person's mask (h, w) bool.
+
+        None where the frame has no picture.
+        """
         image = self.capture.image(self.index, frame)
         if image is None:
             return None
@@ -223,7 +230,7 @@ class _Work:
         return (small[..., :3] * 255 + 0.5).astype(np.uint8), small[..., 3] > 0.5
 
     def key(self) -> str:
-        """A name for all that the result depends on; a few pictures stand for all."""
+        """A hash of all that the result depends on; of the pictures, three stand for all."""
         camera, frames = self.camera, {self.span.first, self.span.center, self.span.last}
         digest = hashlib.sha256()
         about = [VERSION, self.method.name, HEIGHT, MOVING, self.pixel, camera.width, camera.height]
@@ -255,7 +262,7 @@ class _Work:
 
 
 def _cached(work: _Work, folder: Path | None) -> CameraFlow:
-    """A camera's flow, from its file where there is one."""
+    """What moved in a camera's pictures, from the cache in a folder where it is there."""
     if folder is None:
         return CameraFlow(work.index, work.camera, *work.measure())
     file = folder / f"{work.key()}.npz"
@@ -268,7 +275,7 @@ def _cached(work: _Work, folder: Path | None) -> CameraFlow:
 
 
 def _load(file: Path) -> tuple[np.ndarray, np.ndarray] | None:
-    """What a file holds; None where there is none, or it is damaged."""
+    """Energy and moving pixels in a cached file; None where it is missing or damaged."""
     try:
         with np.load(file, allow_pickle=False) as arrays:
             return arrays["energy"], arrays["moving"]

@@ -18,16 +18,19 @@ RAFT_CHECKPOINTS = {
     "raft_large": "raft_large_C_T_SKHT_V2-ff5fadd5.pth",
     "raft_small": "raft_small_C_T_V2-01064c6d.pth",
 }
-"""torchvision's weights, best first: builder and file among ours or in the cache of torch.hub."""
+"""torchvision's builders of RAFT, best first, and the files of their weights.
+
+The files are looked for in the folders of ico3d's models and in the cache of torch.hub.
+"""
 RAFT_SMALLEST = 128
-"""Pixels of a side that RAFT wants at least."""
+"""Least side of a picture in pixels that RAFT takes."""
 
 
 class FlowMethod(Protocol):
-    """Estimates where pixels go.
+    """A method of optical flow.
 
     Attributes:
-        name: Method and version, so that cached results of others are not taken for its own.
+        name: Method and version, so that cached results of other methods are told apart.
     """
 
     name: str
@@ -43,16 +46,16 @@ class DisFlow:
     name = "dis"
 
     def __init__(self):
-        """Prepares it.
+        """Sets the method up.
 
         Raises:
             MissingExtraError: If OpenCV is not installed.
         """
         cv2 = opencv()
         self._dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
-        # People before black: with normalised patches fast limbs lose against their surroundings.
-        # Synthetic body, hands of up to 27 cm per step: 80 instead of 67 % of the true squared
-        # motion, and 42 % before the background.
+        # Pictures show people before black, and normalised patches miss fast limbs. On a synthetic
+        # body whose hands move by up to 27 cm per step, 80 % of the true squared motion is found,
+        # instead of 67 % with normalisation, and 42 % with the background in the picture.
         self._dis.setUseMeanNormalization(False)
 
     def __call__(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -65,7 +68,7 @@ class DisFlow:
 
 @contextmanager
 def _one_thread(cv2: Any) -> Iterator[None]:
-    """Keeps OpenCV on one thread: on busy cores, those of small pictures wait for one another."""
+    """Limits OpenCV to one thread: with small pictures on busy cores, threads only wait."""
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
@@ -75,14 +78,14 @@ def _one_thread(cv2: Any) -> Iterator[None]:
 
 
 class RaftFlow:
-    """RAFT (Teed and Deng 2020) as torchvision has it."""
+    """RAFT (Teed and Deng 2020), torchvision's implementation."""
 
     def __init__(self, builder: str, checkpoint: Path, device: "torch.device | str"):
         """Loads the weights.
 
         Args:
-            builder: Name of torchvision's builder.
-            checkpoint: Its state dictionary.
+            builder: Name of torchvision's builder, a key of `RAFT_CHECKPOINTS`.
+            checkpoint: File of the network's state dictionary.
             device: Where to compute.
         """
         import torch
@@ -99,7 +102,7 @@ class RaftFlow:
         import torch
 
         height, width = before.shape[:2]
-        # Sides that are multiples of 8, by repeating the border.
+        # RAFT takes sides that are multiples of 8: the border is repeated up to these.
         rows, columns = (max(-(-side // 8) * 8, RAFT_SMALLEST) - side for side in (height, width))
         padded = [
             np.pad(picture, ((0, rows), (0, columns), (0, 0)), mode="edge")
@@ -113,20 +116,20 @@ class RaftFlow:
 
 
 def best_method(device: "torch.device | str" = "cpu") -> FlowMethod:
-    """RAFT where torchvision and its weights are there (nothing is downloaded), else DIS.
+    """RAFT where torchvision and weights are installed (nothing is downloaded), else DIS.
 
     Args:
-        device: Where RAFT computes; DIS knows the CPU only.
+        device: Where RAFT computes; DIS always computes on the CPU.
 
     Raises:
-        MissingExtraError: If OpenCV is not installed either.
+        MissingExtraError: If neither RAFT nor OpenCV is installed.
     """
     found = _raft()
     return DisFlow() if found is None else RaftFlow(*found, device)
 
 
 def _raft() -> tuple[str, Path] | None:
-    """RAFT's builder and checkpoint, None where either is missing."""
+    """Name of RAFT's builder and file of its weights; None where torchvision or weights lack."""
     import torch
 
     try:
@@ -143,6 +146,6 @@ def opencv() -> Any:
     """The module cv2.
 
     Raises:
-        MissingExtraError: If it is not installed.
+        MissingExtraError: If OpenCV is not installed.
     """
     return extras.opencv("optical flow")

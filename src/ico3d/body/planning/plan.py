@@ -1,4 +1,4 @@
-"""Which windows a clip is trained in, decided and shown before any training."""
+"""The plan of windows in which a clip is trained, made and shown before any training."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -16,6 +16,7 @@ from ico3d.capture.capture import Capture
 from ico3d.common.files import write_atomic
 
 BLOCKS = "▁▂▃▄▅▆▇█"
+"""Characters of the motion curve in the terminal, from least to most."""
 
 if TYPE_CHECKING:
     import torch
@@ -23,15 +24,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Plan:
-    """The windows of a clip and why they are so.
+    """The windows of a clip, and the motion by which it was cut.
 
     Attributes:
-        windows: From the first to the last frame; neighbours share one.
-        motion: Of each step from one frame to the next, cm² (`ClipFlow.motion`).
-        method: Name of the flow method that measured it.
+        windows: Windows from the first to the last frame; neighbours share one frame.
+        motion: Motion of each step from one frame to the next, cm² (`ClipFlow.motion`).
+        method: Name of the flow method that measured the motion.
         fps: Frames per second.
-        busiest: Number of the camera that saw most motion.
-        settings: The bounds by which the clip was cut.
+        busiest: Index of the camera that saw most motion.
+        settings: Settings by which the clip was cut.
     """
 
     windows: tuple[Window, ...]
@@ -42,7 +43,7 @@ class Plan:
     settings: Windows
 
     def moved(self, window: Window) -> float:
-        """What moves in a window altogether, cm²."""
+        """Sum of the motion of a window's steps, cm²."""
         return float(sum(self.motion[window.first : window.last]))
 
 
@@ -52,13 +53,13 @@ def make_plan(
     folder: Path,
     device: "torch.device | str" = "cpu",
 ) -> Plan:
-    """Measures how much moves and cuts the clip.
+    """Measures the motion of a clip and cuts the clip into windows.
 
     Args:
         capture: The recording.
-        settings: Where to cut.
-        folder: Model folder; flow is kept in `flow/` below it, and found again.
-        device: Where motion is estimated, if the method can.
+        settings: Bounds of the windows.
+        folder: Model folder; measured flow is cached in `flow/` below it.
+        device: Where flow is estimated, if the method can.
 
     Raises:
         CaptureError: If motion cannot be measured.
@@ -88,7 +89,7 @@ def _written(plan: Plan) -> bytes:
 
 
 def print_plan(plan: Plan, console: Console) -> None:
-    """Shows windows in a table, with the motion curve in letters."""
+    """Prints a table of the windows, with the motion curve in block characters."""
     settings = plan.settings
     table = Table(
         "",
@@ -115,6 +116,6 @@ def print_plan(plan: Plan, console: Console) -> None:
 
 
 def _block(motion: float, peak: float) -> str:
-    """A letter as high as the motion; the root is shown, that slow motion is seen beside fast."""
+    """A block as high as the square root of motion over peak, which makes slow motion visible."""
     share = np.sqrt(motion / peak) if peak > 0 else 0.0
     return BLOCKS[min(int(share * len(BLOCKS)), len(BLOCKS) - 1)]

@@ -1,4 +1,4 @@
-"""A plan of windows as a picture: the motion curve, its cuts, and what is seen there."""
+"""A plan of windows as a picture: the motion curve, the windows, and frames of the recording."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -18,24 +18,24 @@ if TYPE_CHECKING:
 
 COLORS = "tab10"
 MOST_PICTURES = 14
-"""Frames that are shown."""
+"""Most frames that are shown."""
 MARGIN = 0.05
-"""Around the person, as a part of the picture."""
+"""Margin around the person, relative to the height of the recorded picture."""
 TITLE = 1.0
-"""Where titles begin, in heights of their axes; matplotlib measures all ticks to find a place."""
+"""Height of titles in heights of their axes; given, as matplotlib is slow to find a free place."""
 
 
 def draw_plan(plan: Plan, capture: Capture, path: Path) -> None:
     """Draws a plan into a PNG file.
 
-    Above the motion of every step, coloured by window, and within each window its sum, which the
-    threshold bounds; below the frames at which the clip is cut and those in the middle of
-    windows, seen by the busiest camera.
+    A chart shows the motion of each step, coloured by window, and its sum within each window, which
+    the threshold bounds. Below are pictures of the busiest camera, of frames at which the clip is
+    cut and in the middle of windows.
 
     Args:
         plan: The windows and the motion.
-        capture: Where its pictures come from.
-        path: The file.
+        capture: The recording.
+        path: The file to write.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -54,7 +54,7 @@ def draw_plan(plan: Plan, capture: Capture, path: Path) -> None:
 
 
 def _curve(axes: "Axes", plan: Plan) -> None:
-    """Motion as bars, its sum within each window as a line."""
+    """Draws motion as bars, and its sum within each window as a line."""
     from matplotlib import colormaps
 
     colors = colormaps[COLORS].colors  # type: ignore (its stub knows the base class alone)
@@ -88,7 +88,7 @@ def _curve(axes: "Axes", plan: Plan) -> None:
 
 
 def _shown(windows: Sequence[Window]) -> list[int]:
-    """Frames at which windows end, and those in their middle; of many, some evenly spread."""
+    """The frames to show: ends and middles of windows; of too many, some evenly spread ends."""
     ends = [windows[0].first, *(window.last for window in windows)]
     frames = sorted({*ends, *(window.center for window in windows)})
     frames = frames if len(frames) <= MOST_PICTURES else ends
@@ -116,7 +116,7 @@ def _person(capture: Capture, camera: int, frames: list[int]) -> tuple[slice, sl
 def _picture(
     axes: "Axes", capture: Capture, camera: int, frame: int, box: tuple[slice, slice]
 ) -> None:
-    """One frame, cut to rows and columns that hold the person."""
+    """Draws one frame of a camera, cropped to rows and columns `box`."""
     image = capture.image(camera, frame)
     if image is not None:
         axes.imshow(np.clip(image[box], 0, 1))

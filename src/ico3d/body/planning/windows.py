@@ -1,4 +1,4 @@
-"""Sliding windows: a clip is cut where much has moved (SWinGS, section on adaptive windows)."""
+"""Cuts a clip into windows where much has moved (SWinGS, section on adaptive windows)."""
 
 import math
 from collections.abc import Sequence
@@ -14,8 +14,8 @@ class Window:
     """A span of frames with its own Gaussians.
 
     Attributes:
-        first: First frame, inside.
-        last: Last frame, inside; the next window begins with it.
+        first: First frame.
+        last: Last frame, included; the next window begins with this frame.
     """
 
     first: int
@@ -31,11 +31,11 @@ class Window:
 
     @property
     def center(self) -> int:
-        """The frame in the middle, to which the canonical Gaussians belong."""
+        """The frame in the middle, on whose surface the canonical Gaussians begin."""
         return (self.first + self.last) // 2
 
     def tau(self, frame: float) -> float:
-        """Time within the window: 0 at its first frame, 1 at its last."""
+        """Time τ within the window: 0 at its first frame, 1 at its last."""
         return (frame - self.first) / max(self.last - self.first, 1)
 
 
@@ -44,21 +44,21 @@ def cut(
 ) -> tuple[Window, ...]:
     """Cuts a clip into windows that share one frame with their neighbours.
 
-    Greedy: a window takes step after step and ends before the one that would take its summed
-    motion above the threshold, so that a fast jump begins the next window. One that would end
-    amid a burst of motion ends before the burst. Where what is left then could not be divided
-    within the bounds, the window ends earlier, else later, by as few frames as make it possible.
-    If the whole clip cannot be divided within the bounds, windows may be longer than `longest`,
-    by as little as possible; a clip shorter than `shortest` is one window.
+    The cut is greedy: a window takes step after step, and ends before the step that would raise its
+    summed motion above the threshold, so that a fast jump begins the next window. A window that
+    would end within a burst of motion ends before the burst. If the remaining steps could then not
+    be divided within the bounds, the window is made shorter, else longer, by as few steps as
+    possible. If the whole clip cannot be divided within the bounds, windows may be longer than
+    `longest`, by as little as possible; a clip shorter than `shortest` is one window.
 
-    Steps belong to a burst if a window of the longest length would pass half of the threshold
-    with such steps alone.
+    A burst is a run of steps so large that a window of `longest` frames of them would exceed half
+    the threshold.
 
     Args:
-        motion: (F − 1,) how much moves from frame i to frame i + 1; not negative.
-        threshold: Motion that a window may add up to, unless it is of the shortest length.
-        shortest: Frames a window has at least, 2 or more.
-        longest: Frames a window has at most.
+        motion: (F − 1,) motion from frame i to frame i + 1; not negative.
+        threshold: Largest summed motion of a window, unless it has the shortest length.
+        shortest: Least number of frames of a window, 2 or more.
+        longest: Largest number of frames of a window.
 
     Returns:
         Windows from frame 0 to frame F − 1.
@@ -90,19 +90,19 @@ def cut(
 
 
 def _bounds(steps: int, fewest: int, most: int) -> tuple[int, int]:
-    """Steps of the shortest and of the longest window, such that `steps` can be divided."""
+    """Least and largest number of steps of a window, widened until `steps` can be divided."""
     if steps < fewest:
         return steps, steps
     return fewest, max(most, math.ceil(steps / (steps // fewest)))
 
 
 def _divisible(steps: int, fewest: int, most: int) -> bool:
-    """Whether so many steps are a sum of windows of `fewest` to `most` steps."""
+    """Whether `steps` can be divided into windows of `fewest` to `most` steps each."""
     return steps == 0 or steps <= (steps // fewest) * most
 
 
 def _before_burst(bursting: np.ndarray, steps: int, fewest: int) -> int:
-    """Steps of a window such that it ends with a calm one, where it would end amid a burst."""
+    """Steps of a window that ends before a burst, if `steps` steps would end within the burst."""
     if not bursting[steps - 1 : steps + 1].all() or steps >= len(bursting):
         return steps
     calm = np.flatnonzero(~bursting[fewest - 1 : steps])
@@ -110,7 +110,7 @@ def _before_burst(bursting: np.ndarray, steps: int, fewest: int) -> int:
 
 
 def _possible(wanted: int, left: int, fewest: int, most: int) -> int:
-    """Steps nearest to the wanted that leave something divisible; fewer rather than more."""
+    """The number of steps nearest to `wanted` that leaves a divisible rest; fewer before more."""
     shorter = range(min(wanted, left), fewest - 1, -1)
     longer = range(wanted + 1, min(most, left) + 1)
     fitting = (s for s in (*shorter, *longer) if _divisible(left - s, fewest, most))

@@ -1,4 +1,4 @@
-"""Linear blend skinning of Gaussians: by kernels on the CPU, in plain torch elsewhere."""
+"""Linear blend skinning of Gaussians: by numba kernels on the CPU, by torch on other devices."""
 
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ class Posed(NamedTuple):
     Attributes:
         means: (N, 3) metres in the world.
         quats: (N, 4) wxyz, not normalised.
-        normals: (N, 3) where the surface faces, not normalised.
+        normals: (N, 3) directions in which the surface faces, not normalised.
     """
 
     means: Tensor
@@ -31,14 +31,14 @@ def blended(
 ) -> Posed:
     """Moves Gaussians with their joints.
 
-    Places and normals follow the blended matrices, rotations the blended quaternions.
+    Means and normals are transformed by the blended matrices, rotations by the blended quaternions.
 
     Args:
-        table: (J, 16) of `ico3d.body.skinning.kinematics.transforms`.
-        joints: (N, 4) int32, which joints carry a Gaussian.
-        logits: (N, 4), whose softmax are the weights.
-        means: (N, 3) at rest.
-        quats: (N, 4) at rest.
+        table: (J, 16) transforms of the joints, from `ico3d.body.skinning.kinematics.transforms`.
+        joints: (N, 4) int32 indices of the joints that carry each Gaussian.
+        logits: (N, 4), whose softmax gives the weights of these joints.
+        means: (N, 3) at rest, metres.
+        quats: (N, 4) wxyz at rest.
         normals: (N, 3) at rest; they get no gradient.
     """
     parts = (table, logits, means, quats, normals)
@@ -60,7 +60,7 @@ def _applied(matrices: Tensor, vectors: Tensor) -> Tensor:
 
 
 class _Blend(torch.autograd.Function):
-    """The kernels as a differentiable function; results do not depend on the number of threads."""
+    """The numba kernels as a differentiable function; threads do not change its results."""
 
     @staticmethod
     def forward(ctx, *tensors: Tensor):

@@ -1,4 +1,4 @@
-"""How much of each residual shape a pose has: a small network, and poses it never saw."""
+"""Coefficients of the residual shapes in a pose: by a small network, or interpolated from poses."""
 
 import math
 
@@ -8,19 +8,21 @@ from torch import Tensor
 from ico3d.body.skinning.kinematics import unit
 
 LAYERS = ("weight0", "bias0", "weight1", "bias1")
-"""Tensors of the network: (3·J, H), (H,), (H, K), (K,)."""
+"""Names of the network's tensors: (3·J, H), (H,), (H, K) and (K,)."""
 NEAREST = 2.0
-"""Width of the kernel, in distances from a pose to the nearest trained one, their median."""
+"""Width of the kernel, over the median distance of trained poses to their nearest neighbours."""
 FARTHER = 0.5
-"""Of the distance to the nearest trained pose, by which the kernel is wider: a pose unlike all of
-them has a mean of several, not the cast shadows of the nearest one alone."""
+"""Share of the distance to the nearest trained pose that is added, in squares, to the width.
+
+So a pose unlike all trained ones takes a mean of several, not the cast shadows of a single one.
+"""
 
 
 def features(rotations: Tensor) -> Tensor:
-    """(..., 3·J) what the network knows of a pose: sin(angle / 2) times each joint's axis.
+    """(..., 3·J) features of a pose: sin(angle / 2) times the axis of each joint's rotation.
 
     Args:
-        rotations: (..., J, 4) wxyz of each joint about itself, need not be normalised.
+        rotations: (..., J, 4) local rotation of each joint, wxyz, not necessarily normalised.
     """
     return unit(rotations)[..., 1:].flatten(-2)
 
@@ -28,7 +30,14 @@ def features(rotations: Tensor) -> Tensor:
 def initial_network(
     rotations: Tensor, hidden: int, shapes: int, generator: torch.Generator
 ) -> dict[str, Tensor]:
-    """Random weights by which the poses of a clip (F, J, 4) give coefficients about 0."""
+    """Random weights for which the coefficients of a clip's poses have a mean near 0.
+
+    Args:
+        rotations: (F, J, 4) poses of the clip, wxyz.
+        hidden: H, width of the hidden layer.
+        shapes: K, number of residual shapes.
+        generator: Draws the weights.
+    """
     seen = features(rotations)  # (F, 3·J)
     spread = float(seen.var(0, unbiased=False).sum().sqrt())
     first = torch.randn(seen.shape[1], hidden, generator=generator) / max(spread, 1e-3)
@@ -42,24 +51,24 @@ def initial_network(
 
 
 def network(weights: dict[str, Tensor], rotations: Tensor) -> Tensor:
-    """(..., K) coefficients of poses (..., J, 4): affine, tanh, affine."""
+    """(..., K) coefficients of poses (..., J, 4): an affine layer, tanh, and an affine layer."""
     hidden = torch.tanh(features(rotations) @ weights["weight0"] + weights["bias0"])  # (..., H)
     return hidden @ weights["weight1"] + weights["bias1"]
 
 
 def interpolated(known: Tensor, coefficients: Tensor, rotations: Tensor) -> Tensor:
-    """Coefficients of a pose that was not trained, as a mean of those of poses like it.
+    """Coefficients of a pose that was not trained: a weighted mean of those of trained poses.
 
-    The network would leave the range in which it was trained; a weighted mean (Nadaraya-Watson,
-    Gaussian kernel) cannot.
+    The network could give values outside of the range that it was trained for; the weighted mean
+    (Nadaraya-Watson with a Gaussian kernel) cannot.
 
     Args:
-        known: (F, J, 4) trained poses.
-        coefficients: (F, K) theirs.
-        rotations: (J, 4) the new pose.
+        known: (F, J, 4) trained poses, wxyz.
+        coefficients: (F, K) coefficients of the trained poses.
+        rotations: (J, 4) the new pose, wxyz.
 
     Returns:
-        (K,).
+        (K,) coefficients of the new pose.
     """
     places, place = features(known), features(rotations)  # (F, 3·J), (3·J,)
     between = torch.cdist(places, places)  # (F, F)

@@ -1,6 +1,7 @@
 """Numba kernels of linear blend skinning, forward and backward.
 
-A joint's row holds its rotation matrix (9), its shift (3) and its quaternion (4).
+A joint's row of the table holds its rotation matrix (9), its translation (3) and its quaternion
+(4), see `kinematics.transforms`.
 """
 
 import numba
@@ -9,12 +10,14 @@ import numpy as np
 from ico3d.splat.cpu.compile import PARTS, kernel
 
 ROW = 16
+"""Numbers in the row of a joint."""
 INFLUENCES = 4
+"""Joints that carry a Gaussian."""
 
 
 @kernel(inline=True)
 def _blend(table, joints, logits, weights, mixed):
-    """Writes the softmax of four logits, and the joints' rows mixed by it."""
+    """Writes the softmax of four logits as weights, and the joints' rows mixed by these weights."""
     most = max(max(logits[0], logits[1]), max(logits[2], logits[3]))
     total = np.float32(0)
     for k in range(INFLUENCES):
@@ -31,7 +34,19 @@ def _blend(table, joints, logits, weights, mixed):
 
 @kernel(parallel=True)
 def forward(table, joints, logits, means, quats, normals, out_means, out_quats, out_normals):
-    """Writes the Gaussians' places, rotations, and where their normals point."""
+    """Writes means, rotations and normals of the posed Gaussians.
+
+    Args:
+        table: (J, 16) rows of the joints.
+        joints: (N, 4) joints that carry each Gaussian.
+        logits: (N, 4), whose softmax gives the weights of these joints.
+        means: (N, 3) at rest.
+        quats: (N, 4) wxyz at rest.
+        normals: (N, 3) at rest.
+        out_means: (N, 3), written.
+        out_quats: (N, 4), written.
+        out_normals: (N, 3), written.
+    """
     count = len(means)
     size = (count + PARTS - 1) // PARTS
     for part in numba.prange(PARTS):
@@ -52,7 +67,11 @@ def forward(table, joints, logits, means, quats, normals, out_means, out_quats, 
 
 @kernel(inline=True)
 def _blend_backward(m, x, n, a, g, gn, h, row):
-    """Writes the gradient of the mixed row from those of place, normal and rotation."""
+    """Writes the gradient of the mixed row (16,) of one Gaussian.
+
+    It follows from the Gaussian at rest (mean x, normal n, quaternion a) and from the gradients of
+    its posed mean g, normal gn and quaternion h.
+    """
     for r in range(3):
         for c in range(3):
             row[3 * r + c] = g[r] * x[c] + gn[r] * n[c]
@@ -68,7 +87,23 @@ def backward(
     table, joints, logits, means, quats, normals, g_places, g_turns, g_facing,
     g_table, g_logits, g_means, g_quats,
 ):  # fmt: skip
-    """Writes gradients; that of the table (PARTS, J, 16) is added to, part by part."""
+    """Gradients of `forward`; those before `g_places` are as given to `forward`.
+
+    Args:
+        table: (J, 16).
+        joints: (N, 4).
+        logits: (N, 4).
+        means: (N, 3).
+        quats: (N, 4).
+        normals: (N, 3).
+        g_places: (N, 3) gradient of the posed means.
+        g_turns: (N, 4) gradient of the posed quaternions.
+        g_facing: (N, 3) gradient of the posed normals.
+        g_table: (PARTS, J, 16), added to; its sum over PARTS is the gradient of the table.
+        g_logits: (N, 4), written.
+        g_means: (N, 3), written.
+        g_quats: (N, 4), written.
+    """
     count = len(means)
     size = (count + PARTS - 1) // PARTS
     for part in numba.prange(PARTS):

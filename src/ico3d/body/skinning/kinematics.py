@@ -1,4 +1,4 @@
-"""Forward kinematics in torch: `ico3d.rig.rig.Rig.posed` with gradients."""
+"""Forward kinematics in torch, with gradients; as `ico3d.rig.rig.Rig` does it in numpy."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -17,38 +17,38 @@ LEFT = torch.tensor(
         [[0, 0, 0, 1], [0, 0, -1, 0], [0, 1, 0, 0], [1, 0, 0, 0]],
     ]
 ).float()
-"""(4, 4, 4): contracted with a quaternion a along its last axis it is the matrix of b ↦ a·b."""
+"""(4, 4, 4): contracted along its last axis with a quaternion a, it is the matrix of b ↦ a·b."""
 
 
 def unit(quats: Tensor) -> Tensor:
-    """Quaternions (..., 4) of length 1 with w ≥ 0.
+    """Quaternions (..., 4), scaled to length 1, with signs such that w ≥ 0.
 
-    Multiplied from the root outwards such quaternions have signs that agree with the parent's, so
-    that neighbouring joints' can be blended.
+    Products of such quaternions from the root outwards have the same sign as their parents'
+    products, so that those of neighbouring joints can be blended.
     """
     signed = torch.where(quats[..., :1] < 0, -quats, quats)
     return torch.nn.functional.normalize(signed, dim=-1)
 
 
 def left_matrices(quats: Tensor) -> Tensor:
-    """(..., 4, 4) matrices L(a) with L(a)·b the Hamilton product a·b; quats (..., 4)."""
+    """(..., 4, 4) matrices L(a) of quaternions a (..., 4): L(a)·b is the Hamilton product a·b."""
     return torch.einsum("rck,...k->...rc", LEFT.to(quats), quats)
 
 
 def posed_joints(
     parents: Sequence[int], joints: Tensor, rotations: Tensor, root: Tensor
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """Where each joint is and how it is turned, all joints of one depth at a time.
+    """Rotations and positions of posed joints; joints of one depth are computed together.
 
     Args:
-        parents: J numbers, −1 for joint 0.
-        joints: (J, 3) at rest.
-        rotations: (J, 4) wxyz of each joint about itself, need not be normalised.
-        root: (3,) metres that the root moves.
+        parents: Index of each joint's parent, −1 for joint 0.
+        joints: (J, 3) positions at rest, metres.
+        rotations: (J, 4) local rotation of each joint, wxyz, not necessarily normalised.
+        root: (3,) translation of the root from rest, metres.
 
     Returns:
-        Rotations from rest space to the world as matrices (J, 3, 3) and as quaternions (J, 4)
-        whose signs agree with their parents'; places (J, 3) in the world.
+        Rotations from rest space to the world, as matrices (J, 3, 3) and as quaternions (J, 4)
+        whose signs agree with their parents'; positions (J, 3) in the world, metres.
     """
     depths, order, above = _levels(tuple(parents))
     local = unit(rotations)  # (J, 4)
@@ -64,10 +64,16 @@ def posed_joints(
 
 
 def transforms(parents: Sequence[int], joints: Tensor, rotations: Tensor, root: Tensor) -> Tensor:
-    """(J, 16) what takes each joint's points from rest to the world.
+    """(J, 16) rigid transforms x ↦ R·x + t of each joint, from rest space to the world.
 
-    A row holds the rotation matrix R (9), the shift t (3) of x ↦ R·x + t, and the rotation's
-    quaternion (4), whose sign agrees with its parent's. Arguments as for `posed_joints`.
+    A row holds the rotation matrix R (9), the translation t (3), and the quaternion of the rotation
+    (4), whose sign agrees with that of its parent.
+
+    Args:
+        parents: Index of each joint's parent, −1 for joint 0.
+        joints: (J, 3) positions at rest, metres.
+        rotations: (J, 4) local rotation of each joint, wxyz, not necessarily normalised.
+        root: (3,) translation of the root from rest, metres.
     """
     turned, quats, places = posed_joints(parents, joints, rotations, root)
     shift = places - (turned @ joints[:, :, None])[..., 0]  # (J, 3)
@@ -76,7 +82,12 @@ def transforms(parents: Sequence[int], joints: Tensor, rotations: Tensor, root: 
 
 @lru_cache(16)
 def _levels(parents: tuple[int, ...]) -> tuple[list[list[int]], list[int], list[list[int]]]:
-    """Joints by depth, where each joint is among all of them, and parents' places in the level."""
+    """Groups joints by their depth in the skeleton.
+
+    Returns:
+        The joints of each depth; for each joint its place in these lists, joined; and for each
+        joint of a depth the place of its parent among the joints of the depth above.
+    """
     depth = [0] * len(parents)
     for joint, parent in enumerate(parents):
         depth[joint] = depth[parent] + 1 if parent >= 0 else 0

@@ -1,4 +1,4 @@
-"""How large a Gaussian on a skeleton may be: one that is longer than its bone does not bend."""
+"""How large Gaussians on a skeleton may be: one longer than its bone would not bend with it."""
 
 from collections.abc import Sequence
 
@@ -6,16 +6,21 @@ import torch
 from torch import Tensor
 
 PART = 0.25
-"""Of the bone that carries a Gaussian, its largest standard deviation. A finger's Gaussian that
-recorded pictures do not mind sticks out of the finger in the next pose."""
+"""Largest standard deviation of a Gaussian, relative to the length of the bone that carries it.
+
+Without a limit, a Gaussian that fits a finger in all recorded poses sticks out of it in others.
+"""
 
 
 def bone_lengths(parents: Sequence[int], joints: Tensor) -> Tensor:
-    """(J,) metres from each joint to its farthest child; of a tip, to its parent; inf of neither.
+    """(J,) length in metres of the bone at each joint.
+
+    It is the distance to the farthest child; for a joint without children, to the parent; inf for
+    a joint without either, or where these distances are 0.
 
     Args:
-        parents: J numbers, −1 for joint 0.
-        joints: (J, 3) at rest.
+        parents: Index of each joint's parent, −1 for joint 0.
+        joints: (J, 3) positions at rest, metres.
     """
     lengths = joints.new_zeros(len(joints))
     above = [max(parent, 0) for parent in parents]
@@ -27,12 +32,12 @@ def bone_lengths(parents: Sequence[int], joints: Tensor) -> Tensor:
 
 
 def largest_log_scales(lengths: Tensor, joints: Tensor, logits: Tensor) -> Tensor:
-    """(N, 1) log of metres that Gaussians may have as standard deviation.
+    """(N, 1) logarithm of the largest standard deviation in metres that each Gaussian may have.
 
     Args:
-        lengths: (J,) metres of the bones.
-        joints: (N, 4) which joints carry a Gaussian.
-        logits: (N, 4) of how much.
+        lengths: (J,) lengths of the bones, metres.
+        joints: (N, 4) joints that carry each Gaussian.
+        logits: (N, 4) logits of these joints' weights; the strongest joint gives the bone.
     """
     carrier = joints.gather(1, logits.argmax(1, keepdim=True))  # (N, 1)
     return (PART * lengths[carrier.long()]).log()

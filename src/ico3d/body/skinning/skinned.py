@@ -1,4 +1,4 @@
-"""Gaussians on a skeleton: one set for the whole clip, posed frame by frame."""
+"""Gaussians on a skeleton: one set of Gaussians for the whole clip, posed in each frame."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -16,21 +16,21 @@ from ico3d.rig import quaternions
 from ico3d.splat.gaussians import Gaussians
 
 NETWORK = "coefficients."
-"""What the names of the network's tensors begin with."""
+"""Prefix of the names of the tensors of the network that gives coefficients."""
 PER_FRAME = ("pose_rotations", "pose_roots")
-"""Tensors of which a picture teaches one row."""
+"""Tensors with one row per frame: a picture gives a gradient to one row only."""
 ON_FRAME = 1e-3
-"""Part of a frame by which a time may miss it."""
+"""Tolerance in frames within which a time counts as a whole frame."""
 
 
 @dataclass(frozen=True)
 class Pose:
-    """A pose as it is drawn.
+    """A pose of the skeleton, with coefficients of the residual shapes.
 
     Attributes:
-        rotations: (J, 4) wxyz of each joint about itself.
-        root: (3,) metres that the root moves from rest.
-        residual: (K,) coefficients of the residual shapes; None without them.
+        rotations: (J, 4) local rotation of each joint, wxyz.
+        root: (3,) translation of the root from rest, metres.
+        residual: (K,) coefficients of the residual shapes; None to draw without them.
     """
 
     rotations: Tensor
@@ -42,17 +42,19 @@ class Pose:
 class Skinned:
     """A `Motion`: linear blend skinning of canonical Gaussians, with residual shapes and light.
 
-    x = Σ_j w_j (R_j (μ + Σ_k κ_k Δμ_k − joint_j) + place_j); the rotation is the blended
-    quaternion of the joints times the Gaussian's own; colour logits get Σ_k κ_k Δc_k and the
-    light's spherical harmonics at the posed normal.
+    The mean of a posed Gaussian is x = Σ_j w_j (R_j (μ + Σ_k κ_k Δμ_k − joint_j) + place_j), with
+    the weight w_j, rotation R_j, rest position joint_j and posed position place_j of joint j, and
+    the pose's coefficient κ_k of residual shape k. Its rotation is the blended quaternion of the
+    joints times the Gaussian's own. Its colour logits are those of the canonical Gaussian, plus
+    Σ_k κ_k Δc_k, plus the light's spherical harmonics at the posed normal.
 
     Attributes:
-        names: J joints.
-        parents: J numbers, −1 for joint 0.
-        frames: Frames of the window, which have a trained pose each.
-        shapes: K residual shapes; 0 for none.
-        hidden: Width of the network that gives their coefficients.
-        light: Whether colour depends on where the posed surface faces.
+        names: Names of the J joints.
+        parents: Index of each joint's parent, −1 for joint 0.
+        frames: Number of frames of the window; each has a trained pose.
+        shapes: Number K of residual shapes; 0 for none.
+        hidden: Width of the hidden layer of the network that gives their coefficients.
+        light: Whether colours depend on the direction in which the posed surface faces.
     """
 
     names: tuple[str, ...]
@@ -64,10 +66,11 @@ class Skinned:
 
     @property
     def per_gaussian(self) -> tuple[str, ...]:
-        """Joints and weights; where there is light or a residual, what these need.
+        """Names of the tensors of the Gaussians beside `CANONICAL`.
 
-        `skin_joints` (N, 4) int32 and `skin_logits` (N, 4), whose softmax is the weights; `normals`
-        (N, 3) at rest; `shape_means` (N, 3, K) metres in rest space and `shape_colors` (N, 3, K).
+        They are `skin_joints` (N, 4) int32 and `skin_logits` (N, 4), whose softmax gives weights;
+        with light `normals` (N, 3) at rest; with residual shapes `shape_means` (N, 3, K), metres in
+        rest space, and `shape_colors` (N, 3, K), logits.
         """
         names = ("skin_joints", "skin_logits")
         names += ("normals",) if self.light else ()
@@ -75,7 +78,12 @@ class Skinned:
 
     @property
     def shared(self) -> tuple[str, ...]:
-        """`rig_joints` (J, 3), `pose_rotations` (F, J, 4), `pose_roots` (F, 3), `light` (8, 3)."""
+        """Names of the tensors that all Gaussians share.
+
+        They are `rig_joints` (J, 3) metres at rest; `pose_rotations` (F, J, 4) wxyz and
+        `pose_roots` (F, 3) metres of the frames; with light `light` (8, 3); with residual shapes
+        the tensors of the network that gives their coefficients.
+        """
         names = ("rig_joints", "pose_rotations", "pose_roots")
         names += ("light",) if self.light else ()
         layers = coefficients.LAYERS if self.shapes else ()
@@ -83,18 +91,18 @@ class Skinned:
 
     @property
     def fixed(self) -> tuple[str, ...]:
-        """Names of the tensors that training leaves as they are.
+        """Names of the tensors that are not trained.
 
-        Weights that are learnt gain nothing where the template's are good (docs/choices.md).
+        Learning the weights gains nothing where those of the template are good (docs/choices.md).
         """
         return ("skin_joints", "skin_logits", "normals")
 
     def at(self, values: Mapping[str, Tensor], tau: float) -> Gaussians:
-        """Activated Gaussians at τ; between two frames in a pose between theirs."""
+        """Activated Gaussians in the world at τ; between two frames in an interpolated pose."""
         return self.drawn(values, self.pose_at(values, tau))
 
     def pose_at(self, values: Mapping[str, Tensor], tau: float) -> Pose:
-        """The trained pose at τ; only that of a frame has gradients."""
+        """The trained pose at τ; an interpolated pose between two frames has no gradients."""
         at = tau * (self.frames - 1)
         frame = min(max(round(at), 0), self.frames - 1)
         if abs(at - frame) < ON_FRAME or self.frames == 1:
@@ -104,12 +112,12 @@ class Skinned:
             return _between(self._frame(values, first), self._frame(values, first + 1), at - first)
 
     def posed(self, values: Mapping[str, Tensor], rotations: Tensor, root: Tensor) -> Gaussians:
-        """Activated Gaussians in any pose.
+        """Activated Gaussians in the world, in any pose.
 
         Args:
-            values: As for `at`.
-            rotations: (J, 4) wxyz of each joint about itself.
-            root: (3,) metres that the root moves from rest.
+            values: The tensors of `CANONICAL` and of this motion, by name.
+            rotations: (J, 4) local rotation of each joint, wxyz.
+            root: (3,) translation of the root from rest, metres.
         """
         residual = None
         if self.shapes:
@@ -119,7 +127,7 @@ class Skinned:
         return self.drawn(values, Pose(rotations, root, residual))
 
     def drawn(self, values: Mapping[str, Tensor], pose: Pose) -> Gaussians:
-        """Activated Gaussians in a pose with the coefficients that it says."""
+        """Activated Gaussians in the world, in a pose with given coefficients of the shapes."""
         table = transforms(self.parents, values["rig_joints"], pose.rotations, pose.root)
         means = values["means"]
         if pose.residual is not None:
@@ -131,14 +139,14 @@ class Skinned:
         return activated({**values, **colors}, posed.means, posed.quats)
 
     def about(self) -> dict:
-        """Its kind and fields."""
+        """Kind and fields of this motion, for `motion_from`."""
         return {"kind": "skinned", **asdict(self)}
 
     def _frame(self, values: Mapping[str, Tensor], frame: int) -> Pose:
         rotations = values["pose_rotations"][frame]  # (J, 4)
         residual = None
         if self.shapes:
-            # The pose shall follow what is seen where, not what the network could use.
+            # Detached: poses are to be learnt from where the body is seen, not from its colours.
             residual = coefficients.network(self._network(values), rotations.detach())  # (K,)
         return Pose(rotations, values["pose_roots"][frame], residual)
 
@@ -146,7 +154,7 @@ class Skinned:
         return {layer: values[NETWORK + layer] for layer in coefficients.LAYERS}
 
     def _colors(self, values: Mapping[str, Tensor], normals: Tensor, pose: Pose) -> Tensor:
-        """(N, 3) logits of a surface that faces along normals (N, 3) of any length."""
+        """(N, 3) colour logits of surfaces with posed normals (N, 3) of any length."""
         colors = values["color_logits"]
         if self.light:
             colors = colors + lit(normalize(normals, dim=1), values["light"])
@@ -156,12 +164,12 @@ class Skinned:
 
 
 def without_residual(pose: Pose) -> Pose:
-    """The same pose with all coefficients 0; it does not learn to make up for them."""
+    """The same pose without residual shapes, and detached: it does not learn to replace them."""
     return replace(pose, rotations=pose.rotations.detach(), root=pose.root.detach(), residual=None)
 
 
 def _between(a: Pose, b: Pose, part: float) -> Pose:
-    """A pose between two, part 0 to 1: joints turn on the shorter way."""
+    """A pose between a (part 0) and b (part 1): slerp of rotations on the shorter way."""
     one, other = (quaternions.normalized(p.rotations.double().cpu().numpy()) for p in (a, b))
     turned = torch.from_numpy(quaternions.slerp(one, other, part)).to(a.rotations)  # (J, 4)
     residual = None

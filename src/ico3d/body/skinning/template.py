@@ -1,4 +1,4 @@
-"""Points on the template's surface at rest, and how they hang on the skeleton."""
+"""Points on the template's surface at rest, bound to the skeleton."""
 
 from dataclasses import dataclass
 
@@ -11,17 +11,17 @@ from ico3d.rig.binding import Binding
 from ico3d.rig.body_track import BodyTrack
 
 LEAST_WEIGHT = 1e-3
-"""Of a joint, before the logarithm: what does not carry a Gaussian may learn to."""
+"""Least weight of a joint, so that its logarithm is finite."""
 
 
 @dataclass(frozen=True, eq=False)
 class Skin:
-    """P points of a person at rest.
+    """P points of a person's surface at rest, bound to joints.
 
     Attributes:
-        points: (P, 3) metres in rest space.
-        normals: (P, 3) unit vectors out of the surface.
-        binding: Which joints carry the points.
+        points: (P, 3) positions in rest space, metres.
+        normals: (P, 3) outward normals of the surface, of length 1.
+        binding: Joints that carry each point, with weights.
     """
 
     points: np.ndarray
@@ -29,17 +29,17 @@ class Skin:
     binding: Binding
 
     def __len__(self) -> int:
-        """P."""
+        """Number P of points."""
         return len(self.points)
 
     def __getitem__(self, index: np.ndarray) -> "Skin":
-        """Those that a mask or an array of numbers selects."""
+        """The points that a mask (P,) or an array of indices selects."""
         binding = Binding(self.binding.joints[index], self.binding.weights[index])
         return Skin(self.points[index], self.normals[index], binding)
 
     @staticmethod
     def joined(*parts: "Skin") -> "Skin":
-        """The points of several, one after the other."""
+        """The points of several skins, one after the other."""
         return Skin(
             np.concatenate([part.points for part in parts]),
             np.concatenate([part.normals for part in parts]),
@@ -50,17 +50,23 @@ class Skin:
         )
 
     def posed(self, track: BodyTrack, frame: int) -> np.ndarray:
-        """(P, 3) where the points are in the world at a frame."""
+        """(P, 3) positions of the points in the world at a frame of a track, metres."""
         matrices = track.rig.matrices(track.rotations[frame], track.roots[frame])
         return self.binding.skinned(self.points, matrices)
 
     def pulled_back(self, places: np.ndarray, track: BodyTrack, frame: int) -> "Skin":
-        """Places in the world as points at rest that hang on the nearest of these points' joints.
+        """Positions in the world at a frame, as points at rest.
+
+        Each position takes binding and normal of the point of this skin that is nearest to it at
+        that frame.
 
         Args:
-            places: (Q, 3) metres, about the person at the frame.
+            places: (Q, 3) positions in the world, metres.
             track: How the person moves.
-            frame: When the places are seen.
+            frame: Frame at which the positions were seen.
+
+        Returns:
+            Q points at rest.
         """
         near = self[np.asarray(KDTree(self.posed(track, frame)).query(places)[1])]
         matrices = track.rig.matrices(track.rotations[frame], track.roots[frame])  # (J, 4, 4)
@@ -72,12 +78,12 @@ class Skin:
 
 
 def sampled(track: BodyTrack, count: int, rng: np.random.Generator) -> Skin:
-    """Points that are spread evenly over the template's surface.
+    """Random points, spread evenly over the template's surface at rest.
 
     Args:
-        track: The template.
-        count: How many.
-        rng: Draws them.
+        track: The body track, whose template is sampled.
+        count: Number of points.
+        rng: Draws the points.
     """
     corners = track.vertices[track.faces].astype(np.float64)  # (T, 3, 3)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # (T, 3)
@@ -85,12 +91,12 @@ def sampled(track: BodyTrack, count: int, rng: np.random.Generator) -> Skin:
     chosen = rng.choice(len(areas), count, p=areas / areas.sum())  # (P,)
     parts = rng.dirichlet(np.ones(3), count)  # (P, 3)
     points = np.einsum("pc,pcd->pd", parts, corners[chosen])  # (P, 3)
-    normals = across[chosen] / np.maximum(areas[chosen, None], 1e-12)
+    normals = across[chosen] / np.maximum(areas[chosen, None], 1e-12)  # (P, 3)
     dense = track.binding.dense(len(track.rig))[track.faces[chosen]]  # (P, 3, J)
     binding = Binding.strongest(np.einsum("pc,pcj->pj", parts, dense))
     return Skin(points, normals, binding)
 
 
 def hung_logits(binding: Binding) -> Tensor:
-    """(P, 4) logarithms of weights, whose softmax is what they were."""
+    """(P, 4) logarithms of a binding's weights, whose softmax gives these weights."""
     return torch.from_numpy(binding.weights).float().clamp_min(LEAST_WEIGHT).log()

@@ -1,4 +1,4 @@
-"""What every training of a window begins with: round Gaussians on points."""
+"""The state in which the training of a window begins: round Gaussians on points."""
 
 import math
 from collections.abc import Sequence
@@ -18,12 +18,12 @@ from ico3d.splat.initial import spacing
 
 @dataclass(frozen=True)
 class Begin:
-    """What the training of a window begins with.
+    """The state in which the training of a window begins.
 
     Attributes:
-        model: The Gaussians.
-        extent: Half the longest edge of the person's box, metres.
-        source: Where the points come from, for people.
+        model: The window's model.
+        extent: Half the longest edge of the person's bounding box, metres.
+        source: Where the first points come from, in words.
     """
 
     model: WindowModel
@@ -32,20 +32,20 @@ class Begin:
 
 
 def trespassing(companion: Companion, points: np.ndarray, frame: int) -> np.ndarray:
-    """(P,) bool: which places (P, 3) in the world a companion takes at a frame."""
+    """(P,) bool: which positions (P, 3) in the world the body may not fill at a frame."""
     return companion.trespassing(torch.from_numpy(points).float(), frame).cpu().numpy()
 
 
 def round_gaussians(
     capture: Capture, frames: Sequence[int], clouds: list[np.ndarray], settings: BodySettings
 ) -> dict[str, Tensor]:
-    """The canonical tensors of round Gaussians on points.
+    """Tensors of `CANONICAL` for round Gaussians on points, coloured by recorded pictures.
 
     Args:
-        capture: Where their colours come from.
-        frames: When each cloud is to be seen.
-        clouds: (P, 3) places in the world by frame.
-        settings: Sizes and opacity.
+        capture: The recording.
+        frames: The frame of each cloud, whose pictures give the colours.
+        clouds: For each frame, (P, 3) positions in the world, metres.
+        settings: Sizes, relative to the distance between points, and opacity.
     """
     colors = [point_colors(p, capture, f) for p, f in zip(clouds, frames, strict=True)]
     sizes = np.concatenate([spacing(cloud) for cloud in clouds]) * settings.initial.scale  # (P,)

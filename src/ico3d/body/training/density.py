@@ -16,28 +16,41 @@ from ico3d.splat.rendering import RenderInfo
 
 CLONE_BELOW = 0.01
 PRUNE_ABOVE = 0.1
-"""Sizes relative to the extent, as in 3DGS."""
+"""Sizes of Gaussians, relative to the extent, below which they are cloned and above which pruned.
+
+Both are those of 3DGS.
+"""
 FADING = 1e-3
-"""FreeTime's weight of the mean opacity: what is not needed fades."""
+"""Weight of the mean opacity in FreeTime's loss, by which unneeded Gaussians fade."""
 
 
 class RelocationStrategy(McmcStrategy):
-    """FreeTime: the faint move to where gradients and opacities are high; nothing shakes."""
+    """FreeTime's density control: faint Gaussians move to where gradient and opacity are high.
+
+    It is the Markov chain strategy without its noise.
+    """
 
     def __init__(self, schedule: Schedule, settings: McmcSettings, seed: int, extent: float):
-        """Gathers nothing yet; arguments as for the Markov chain."""
+        """Makes a strategy that has gathered no gradients yet.
+
+        Args:
+            schedule: Steps at which Gaussians move.
+            settings: Settings of the Markov chain strategy.
+            seed: Seed of the choice of Gaussians.
+            extent: Half the longest edge of the person's bounding box, metres.
+        """
         super().__init__(schedule, settings, seed, extent)
         self._stats = DensityStats.zeros(0)
 
     def observe(self, info: RenderInfo, step: int) -> None:
-        """Gathers screen gradients."""
+        """Gathers the screen-space gradients of a rendering."""
         del step
         if len(self._stats.views) != info.radii.shape[1]:
             self._stats = DensityStats.zeros(info.radii.shape[1], info.radii.device)
         self._stats.add(info)
 
     def _weights(self, opacities: Tensor) -> Tensor:
-        """Half gradient, half opacity, each relative to its mean; the gathered is used up."""
+        """(N,) gradient plus opacity, each relative to its mean; empties the gathered gradients."""
         gradient = self._stats.mean_gradient()
         self._stats = DensityStats.zeros(0)
         if len(gradient) != len(opacities):
@@ -45,18 +58,26 @@ class RelocationStrategy(McmcStrategy):
         return gradient / gradient.mean().clamp_min(1e-12) + opacities / opacities.mean()
 
     def tensors(self) -> dict[str, Tensor]:
-        """Screen gradients gathered so far."""
+        """Gradients gathered so far, for a checkpoint."""
         return {"gradient_sum": self._stats.gradient_sum, "views": self._stats.views}
 
     def restore(self, tensors: dict[str, Tensor]) -> None:
-        """Takes back what `tensors` gave."""
+        """Restores the state that `tensors` returned."""
         self._stats = DensityStats(tensors["gradient_sum"], tensors["views"])
 
 
 def density_control(
     method: Method, settings: BodySettings, steps: int, seed: int, extent: float
 ) -> Strategy:
-    """The strategy of a method, for a window of this extent in metres."""
+    """The density control of a method.
+
+    Args:
+        method: How Gaussians are moved.
+        settings: Settings of the body.
+        steps: Steps of the window's training.
+        seed: Seed of its random choices.
+        extent: Half the longest edge of the person's bounding box, metres.
+    """
     density = settings.density
     schedule = Schedule(density.begin, round(density.until * steps), density.every)
     if method == "freetime":

@@ -1,4 +1,7 @@
-"""Temporal fine-tuning: a window learns to agree with the one before (paper, same section)."""
+"""Temporal fine-tuning: a window learns to agree with the window before it.
+
+It is described in the paper's section on dynamic 3D body Gaussians.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -18,14 +21,14 @@ from ico3d.splat.losses import l1, tensor_psnr
 from ico3d.splat.render import render
 
 STILL_SEEN = 0.05
-"""Opacity from which a Gaussian counts for where the person is in a picture."""
+"""Opacity above which a Gaussian counts for where the person is in a picture."""
 
 
 class FineTuner(WindowTrainee):
-    """A `Trainee`: the canonical Gaussians of a window; all that moves them is frozen.
+    """A `Trainee` of the canonical Gaussians of a window; the tensors of its motion are frozen.
 
-    Most steps compare the window's first moment with the previous window's last, which is the same
-    frame, as cameras between the recording ones would see it; the others are ordinary ones.
+    Some steps compare the first frame of the window with the same frame of the previous window,
+    rendered by novel cameras between the recording ones. The others learn from recorded pictures.
     """
 
     def __init__(
@@ -40,18 +43,18 @@ class FineTuner(WindowTrainee):
         seed: int,
         companion: Companion | None = None,
     ):
-        """Gets ready for the first step.
+        """Makes a trainee before its first step.
 
         Args:
-            model: Changed in place.
-            previous: The window before; not changed.
-            window: The frames of `model`.
-            pictures: Pictures of the window's frames.
-            cameras: The training cameras, between which novel ones lie.
-            settings: Rates and weights.
-            extent: Size of the person in metres.
-            seed: All randomness follows from it.
-            companion: Who is in the pictures, too.
+            model: The window's model, which is changed in place.
+            previous: The model of the window before, which is not changed.
+            window: Frames of `model`.
+            pictures: Recorded pictures of these frames.
+            cameras: The training cameras, between which novel ones are drawn.
+            settings: Learning rates and weights of the loss.
+            extent: Half the longest edge of the person's bounding box, metres.
+            seed: Seed of all randomness.
+            companion: Other Gaussians that are in the pictures; None for none.
         """
         for name, tensor in {**model.gaussians, **model.shared}.items():
             tensor.requires_grad_(name in CANONICAL)
@@ -62,7 +65,7 @@ class FineTuner(WindowTrainee):
             self._goal = self._learner.accompanied(previous.at(1.0), self._shared)
 
     def step(self, index: int) -> Mapping[str, float]:
-        """Learns from the window before, or from a picture."""
+        """Learns from the window before or, by chance, from a recorded picture."""
         if self._learner.random(index, 2).random() < self._settings.consistency:
             values = self._agree(index)
         else:
@@ -74,7 +77,7 @@ class FineTuner(WindowTrainee):
         return values
 
     def _average(self, index: int) -> None:
-        """Ends with a mean over many steps: single ones look at one moment, from one side."""
+        """Averages the Gaussians over the last steps, as each step sees only one view."""
         steps = self._settings.steps
         first = round((1 - self._settings.mean) * steps)
         if index >= first:
@@ -83,7 +86,7 @@ class FineTuner(WindowTrainee):
                 self._learner.take_mean()
 
     def _agree(self, index: int) -> Mapping[str, float]:
-        """A step on L_consistency."""
+        """Gradients of L_consistency: L1 between this and the previous window at their frame."""
         rng = self._learner.random(index, 3)
         camera = around(novel_camera(self._cameras, rng), self._goal)
         color = torch.from_numpy(rng.random(3)).to(self._goal.means)
@@ -95,7 +98,7 @@ class FineTuner(WindowTrainee):
         return {"loss": loss.item(), "difference": loss.item()}
 
     def _remember(self, index: int) -> Mapping[str, float]:
-        """An ordinary step, so that the rest of the window does not suffer."""
+        """Gradients of the loss of a recorded picture, so that the window keeps its quality."""
         learner = self._learner
         view = learner.view(learner.views, index)
         example = learner.example(view, index)
@@ -109,7 +112,7 @@ class FineTuner(WindowTrainee):
 
 
 def around(camera: Camera, person: Gaussians) -> Camera:
-    """The camera cropped to what it sees of a person, with the margin of training pictures."""
+    """A camera cropped to a person, with the margin of training pictures; uncropped if unseen."""
     seen = person.means[person.opacities > STILL_SEEN].detach().cpu().numpy()
     pixels, depths = camera.project(seen)  # (N, 2), (N,)
     pixels = pixels[depths > 0]

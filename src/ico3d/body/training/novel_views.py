@@ -1,4 +1,4 @@
-"""Cameras between the recorded ones, for temporal fine-tuning."""
+"""Random cameras between the recording ones, for temporal fine-tuning."""
 
 from collections.abc import Sequence
 
@@ -8,22 +8,28 @@ from scipy.spatial.transform import RigidTransform
 from ico3d.common.camera import Camera
 
 MOST_APART = np.radians(150)
-"""Cameras that look in directions further apart have no sensible mean."""
+"""Largest rotation in radians between cameras that are mixed; beyond, means make no sense."""
 NEIGHBOURS = 2, 3
-"""Fewest and most cameras that the drawn one is mixed with."""
+"""Least and largest number of cameras that a drawn camera is mixed with."""
 ITERATIONS = 100
+"""Most iterations of `mean_pose`."""
 CONVERGED = 1e-12
+"""Step of `mean_pose`, in radians and metres, below which it ends."""
 
 
 def se3_exp(twists: np.ndarray) -> np.ndarray:
-    """Rigid transforms (..., 4, 4) of twists (..., 6): rotation vector first, then translation."""
+    """Rigid transforms (..., 4, 4), the exponentials of twists (..., 6).
+
+    The first three numbers of a twist are the rotational part in radians, the others the
+    translational part.
+    """
     twists = np.asarray(twists, np.float64)
     flat = RigidTransform.from_exp_coords(twists.reshape(-1, 6)).as_matrix()  # (P, 4, 4)
     return flat.reshape(*twists.shape[:-1], 4, 4)
 
 
 def se3_log(transforms: np.ndarray) -> np.ndarray:
-    """Twists (..., 6) of rigid transforms (..., 4, 4), whose turn is less than half of one."""
+    """Twists (..., 6) of rigid transforms (..., 4, 4) that rotate by less than π; see `se3_exp`."""
     transforms = np.asarray(transforms, np.float64)
     flat = RigidTransform.from_matrix(transforms.reshape(-1, 4, 4)).as_exp_coords()  # (P, 6)
     return flat.reshape(*transforms.shape[:-2], 6)
@@ -32,11 +38,11 @@ def se3_log(transforms: np.ndarray) -> np.ndarray:
 def mean_pose(poses: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """The weighted intrinsic mean M of poses P_j: the one with Σ w_j · log(M⁻¹·P_j) = 0.
 
-    Found by M ← M · exp(Σ w_j · log(M⁻¹·P_j)), from the pose of the largest weight. Unlike the
-    mean of log(P_j) it does not depend on where the world's origin lies.
+    It is found by iterating M ← M · exp(Σ w_j · log(M⁻¹·P_j)) from the pose of the largest weight.
+    Unlike the mean of log(P_j) it does not depend on the world's origin.
 
     Args:
-        poses: (J, 4, 4) camera to world; no two turned by half a turn or more.
+        poses: (J, 4, 4) camera to world; any two are rotated by less than π.
         weights: (J,) not negative, with sum 1.
 
     Returns:
@@ -54,14 +60,14 @@ def mean_pose(poses: np.ndarray, weights: np.ndarray) -> np.ndarray:
 def novel_camera(cameras: Sequence[Camera], rng: np.random.Generator) -> Camera:
     """A random camera between a recorded one and its neighbours in viewing angle.
 
-    The weights of the recorded cameras are Dirichlet(1). Poses are mixed by `mean_pose`, focal
+    Weights of the mixed cameras are drawn from Dirichlet(1). Poses are mixed by `mean_pose`, focal
     lengths geometrically and principal points linearly, both relative to the picture's size,
-    which is that of the drawn camera. (The paper's Σ β_c · log(P_c) with free β leaves the ring
-    of cameras altogether.)
+    which is that of the drawn camera. (The paper's Σ β_c · log(P_c) with free β would leave the
+    ring of cameras.)
 
     Args:
-        cameras: The recorded ones; a single one, or one that looks away from all others, is
-            given back as it is.
+        cameras: The recording cameras. A camera without neighbours within `MOST_APART` is returned
+            with its own pose.
         rng: Draws the cameras and their weights.
     """
     poses = np.stack([camera.camera_to_world for camera in cameras])  # (C, 4, 4)
@@ -80,7 +86,7 @@ def novel_camera(cameras: Sequence[Camera], rng: np.random.Generator) -> Camera:
 
 
 def _neighbourhood(poses: np.ndarray, drawn: int, count: int) -> list[int]:
-    """The drawn camera and up to `count` that are turned least against it, all within bounds."""
+    """Indices of the drawn camera and up to `count` neighbours, any two within `MOST_APART`."""
     angles = _angles(poses)  # (C, C)
     chosen = [drawn]
     for other in np.argsort(angles[drawn], kind="stable").tolist():
@@ -92,7 +98,7 @@ def _neighbourhood(poses: np.ndarray, drawn: int, count: int) -> list[int]:
 
 
 def _angles(poses: np.ndarray) -> np.ndarray:
-    """(C, C) angles in radians by which cameras are turned against one another."""
+    """(C, C) angles in radians of the rotations between cameras of poses (C, 4, 4)."""
     rotations = poses[:, :3, :3]
     cosines = (np.einsum("aij,bij->ab", rotations, rotations) - 1) / 2  # (C, C)
     return np.arccos(np.clip(cosines, -1, 1))

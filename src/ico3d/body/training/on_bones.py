@@ -1,4 +1,4 @@
-"""What keeps Gaussians on a skeleton where they belong: short, and on the limb that they show."""
+"""Keeps Gaussians on a skeleton smaller than their bones, and bound to the limb that they show."""
 
 import numpy as np
 import torch
@@ -15,24 +15,24 @@ from ico3d.rig.body_track import BodyTrack
 from ico3d.rig.quaternions import conjugate, multiply, normalized
 
 EVERY = 150
-"""Steps from one look at who hangs where to the next."""
+"""Steps between two tests of which Gaussians are bound to a wrong limb."""
 POINTS = 20_000
-"""On the template."""
+"""Points of the template's skin to which distances are measured."""
 OFF = 0.01
-"""Metres from the skin at rest below which a Gaussian belongs where it hangs."""
+"""Gaussians within this distance of the skin at rest, in metres, keep their joints."""
 NEARER = 0.75
-"""Part of that distance within which another limb's skin must come."""
+"""A Gaussian is bound anew if posed skin is nearer than this share of its distance at rest."""
 
 
 class OnBones:
-    """Looks after the Gaussians of a body on a skeleton while they are trained."""
+    """Limits sizes and corrects bindings of Gaussians on a skeleton during their training."""
 
     def __init__(self, model: WindowModel, track: BodyTrack | None):
-        """Gets ready.
+        """Measures bones and samples the template's skin.
 
         Args:
-            model: Its motion is `Skinned`.
-            track: Whose template says where limbs are; None to look at sizes alone.
+            model: The model; its motion must be `Skinned`.
+            track: The body track, with the template; None to limit sizes only.
         """
         assert isinstance(model.motion, Skinned)
         self._motion = model.motion
@@ -43,31 +43,31 @@ class OnBones:
 
     @torch.no_grad()
     def limit_sizes(self, model: WindowModel) -> None:
-        """No Gaussian gets longer than its bone allows."""
+        """Clamps the sizes of Gaussians to what their bones allow (`largest_log_scales`)."""
         values = model.gaussians
         most = largest_log_scales(self._bones, values["skin_joints"], values["skin_logits"])
         values["log_scales"].clamp_(max=most)
 
     @torch.no_grad()
     def rehang(self, model: WindowModel, index: int) -> int:
-        """What has come to lie on another limb hangs on that limb from now on.
+        """Binds Gaussians that have moved onto another limb to the joints of that limb.
 
-        Pictures of an arm that hangs all the time do not tell it from the hip beside it: parts of
-        the hip move over to show it, and stay behind when the arm is raised. At rest limbs are far
-        apart, so what is near to some skin in most recorded poses and far from all skin at rest
-        hangs on the wrong joints. It stays where it is in the middle of the clip.
+        If an arm hangs beside the hip in all pictures, Gaussians of the hip may move over to show
+        the arm; they would stay behind when the arm is raised. At rest limbs are far apart, so a
+        Gaussian that is near some skin in most recorded poses, but far from all skin at rest, is
+        bound to the wrong joints. Its pose in the middle of the clip stays as it is.
 
         Args:
-            model: Changed in place.
-            index: The step that was done.
+            model: The model, which is changed in place.
+            index: The step that was done; nothing happens but after each `EVERY` steps.
 
         Returns:
-            How many Gaussians were hung anew.
+            Number of Gaussians that were bound anew.
         """
         if self._skin is None or index == 0 or index % EVERY:
             return 0
         values = model.gaussians
-        away = KDTree(self._skin.points).query(_array(values["means"]))[0]  # (N,)
+        away = KDTree(self._skin.points).query(_array(values["means"]))[0]  # (N,) metres at rest
         chosen = np.flatnonzero(away > OFF)
         times = np.zeros(len(chosen), int)
         for tau in np.linspace(0, 1, MOMENTS):
@@ -81,32 +81,35 @@ class OnBones:
     def _nearest(
         self, model: WindowModel, tau: float, chosen: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """How far some Gaussians (C,) are from the nearest skin at τ, and which point that is."""
+        """Distance (C,) in metres of C chosen Gaussians to the nearest skin at τ.
+
+        Also (C,), the index of that point of the skin.
+        """
         assert self._skin is not None
         table = self._table(model, tau).double().numpy()  # (J, 16)
         binding = self._skin.binding
         mixed = np.einsum("pk,pkc->pc", binding.weights, table[binding.joints])  # (P, 16)
         places = np.einsum("pab,pb->pa", mixed[:, :9].reshape(-1, 3, 3), self._skin.points)
-        places += mixed[:, 9:12]
+        places += mixed[:, 9:12]  # (P, 3)
         near, which = KDTree(places).query(_array(model.at(tau).means)[chosen])
         return np.asarray(near), np.asarray(which)
 
     def _table(self, model: WindowModel, tau: float) -> Tensor:
-        """(J, 16) of `transforms` in the pose at τ."""
+        """(J, 16) transforms of the joints in the pose at τ, see `kinematics.transforms`."""
         values = {**model.gaussians, **model.shared}
         pose = self._motion.pose_at(values, tau)
         joints = model.shared["rig_joints"]
         return transforms(self._motion.parents, joints, pose.rotations, pose.root).cpu()
 
     def _hang(self, model: WindowModel, chosen: np.ndarray) -> None:
-        """Hangs some Gaussians (C,) on the nearest skin's joints, seen as before at τ = ½."""
+        """Binds C chosen Gaussians to the joints of the nearest skin; at τ = ½ they do not move."""
         assert self._skin is not None
         near: Skin = self._skin[self._nearest(model, 0.5, chosen)[1]]
         table = self._table(model, 0.5).double().numpy()  # (J, 16)
         mixed = np.einsum("ck,ckm->cm", near.binding.weights, table[near.binding.joints])  # (C, 16)
         drawn = model.at(0.5)
         shifted = _array(drawn.means)[chosen] - mixed[:, 9:12]  # (C, 3)
-        rest = np.linalg.solve(mixed[:, :9].reshape(-1, 3, 3), shifted[..., None])[..., 0]
+        rest = np.linalg.solve(mixed[:, :9].reshape(-1, 3, 3), shifted[..., None])[..., 0]  # (C, 3)
         quats = multiply(conjugate(normalized(mixed[:, 12:])), _array(drawn.quats)[chosen])
         found = {
             "means": rest,
@@ -114,7 +117,7 @@ class OnBones:
             "skin_joints": near.binding.joints.astype(np.int32),
             "skin_logits": hung_logits(near.binding),
             "normals": near.normals,
-            # Shapes were those of another limb's pose.
+            # The residual shapes were learnt on another limb.
             "shape_means": 0.0,
             "shape_colors": 0.0,
         }

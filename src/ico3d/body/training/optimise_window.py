@@ -1,4 +1,4 @@
-"""Optimising one window: one picture per step (paper, dynamic 3D body Gaussians)."""
+"""Optimises one window, with one picture per step (paper, dynamic 3D body Gaussians)."""
 
 from collections.abc import Mapping
 
@@ -21,7 +21,7 @@ from ico3d.splat.losses import tensor_psnr
 
 
 class BodyTrainer(WindowTrainee):
-    """A `Trainee`: a window's model, density control, and the pictures."""
+    """A `Trainee` of all of a window's model, with density control."""
 
     def __init__(
         self,
@@ -34,7 +34,18 @@ class BodyTrainer(WindowTrainee):
         seed: int,
         companion: Companion | None = None,
     ):
-        """Gets ready for the first step; arguments as for `Learner`."""
+        """Makes a trainee before its first step.
+
+        Args:
+            model: The window's model, which is changed in place.
+            window: Frames of the window.
+            pictures: Recorded pictures of these frames.
+            method: How Gaussians are moved, which decides the density control.
+            settings: Settings of the body.
+            extent: Half the longest edge of the person's bounding box, metres.
+            seed: Seed of all randomness.
+            companion: Other Gaussians that are in the pictures; None for none.
+        """
         fixed: tuple[str, ...] = ()
         self._bones: OnBones | None = None
         if isinstance(model.motion, Skinned):
@@ -44,7 +55,7 @@ class BodyTrainer(WindowTrainee):
             tensor.requires_grad_(name not in fixed)
         super().__init__(Learner(model, window, pictures, settings, extent, seed, companion))
         self._settings = settings
-        # Copied, because training changes it in place.
+        # A copy, as training changes the joints in place.
         self._joints = model.shared["rig_joints"].detach().clone() if fixed else None  # (J, 3)
         self._steps = settings.steps_of(len(window))
         self._strategy = density_control(method, settings, self._steps, seed, extent)
@@ -53,7 +64,7 @@ class BodyTrainer(WindowTrainee):
         self._center = [v for v in self._learner.views if v.frame == window.center]
 
     def step(self, index: int) -> Mapping[str, float]:
-        """Renders one picture and learns from the difference."""
+        """Renders one recorded view, learns from the difference, and controls density."""
         learner = self._learner
         still = index < self._warmup and bool(self._center)
         view = learner.view(self._center if still else learner.views, index)
@@ -79,7 +90,7 @@ class BodyTrainer(WindowTrainee):
         }
 
     def _moved(self, view: View, index: int) -> Gaussians:
-        """The Gaussians when a view was taken; at times without what a pose adds to a body."""
+        """Gaussians at the time of a view; on a skeleton at random without residual shapes."""
         tau, motion = self._learner.tau(view), self.model.motion
         if not isinstance(motion, Skinned):
             return self.model.at(tau)
@@ -89,12 +100,12 @@ class BodyTrainer(WindowTrainee):
         return motion.drawn(values, without_residual(pose) if dropped else pose)
 
     def tensors(self) -> dict[str, Tensor]:
-        """Parameters, moments, and what density control has gathered."""
+        """Parameters, moments of the optimiser, and the state of density control."""
         gathered = {f"density.{name}": t for name, t in self._strategy.tensors().items()}
         return self._learner.tensors() | gathered
 
     def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
-        """Takes back what `tensors` gave."""
+        """Restores the state that `tensors` returned; `state` is not used."""
         del state
         self._learner.restore(tensors)
         prefix = "density."
@@ -102,7 +113,7 @@ class BodyTrainer(WindowTrainee):
         self._strategy.restore(gathered)
 
     def _penalties(self) -> Tensor:
-        """What density control and the regularisers of planes and joints add to the loss."""
+        """Terms of density control and of the regularisers of planes and joints in the loss."""
         weights, model = self._settings.loss, self.model
         total = self._strategy.penalty(self._learner.population)
         planes = {n.removeprefix(GRID): p for n, p in model.shared.items() if n.startswith(GRID)}

@@ -1,4 +1,4 @@
-"""What training and fine-tuning of a window share: a picture's loss, and learning from it."""
+"""What training and fine-tuning of a window share: the loss of a picture, and learning from it."""
 
 import math
 from collections.abc import Sequence
@@ -25,14 +25,14 @@ from ico3d.training.optimiser import Optimiser
 
 
 class Learner:
-    """A window's model, its optimiser, and the pictures.
+    """A window's model with its optimiser and pictures.
 
     Attributes:
-        model: The Gaussians.
-        optimiser: Its moments.
+        model: The window's model.
+        optimiser: The optimiser, with its moments.
         views: All recorded views of the window's frames.
-        affine: (C, 3, 4) corrections of colours by camera: they begin as none.
-        companion: Whose Gaussians are drawn after the model's, or None.
+        affine: (C, 3, 4) affine correction of colours for each camera, the identity at first.
+        companion: Other Gaussians, which are drawn after those of the model; None for none.
     """
 
     def __init__(
@@ -45,16 +45,17 @@ class Learner:
         seed: int,
         companion: Companion | None = None,
     ):
-        """Has learnt nothing yet.
+        """Makes a learner before its first step.
 
         Args:
-            model: Changed in place.
-            window: The window's frames.
-            pictures: Pictures of the window's frames.
-            settings: Rates and weights.
-            extent: Size of the person in metres; the means' rate refers to it.
-            seed: All randomness follows from it and from the step's number.
-            companion: Who is in the pictures, too.
+            model: The window's model, which is changed in place.
+            window: Frames of the window.
+            pictures: Recorded pictures of these frames.
+            settings: Learning rates and weights of the loss.
+            extent: Half the longest edge of the person's bounding box, metres; the learning rate of
+                means is relative to it.
+            seed: All randomness follows from this seed and the number of the step.
+            companion: Other Gaussians that are in the pictures; None for none.
         """
         self.companion = companion
         self._pruning = Pruning(companion, window) if companion else None
@@ -69,15 +70,15 @@ class Learner:
 
     @property
     def population(self) -> Population:
-        """The Gaussians as density control sees them."""
+        """The Gaussians and their moments, as density control changes them."""
         return Population(self.model.gaussians, self.optimiser.moments)
 
     def tau(self, view: View) -> float:
-        """When a view was taken, in the window."""
+        """Time τ in the window at which a view was taken."""
         return self._window.tau(view.frame)
 
     def view(self, views: Sequence[View], index: int) -> View:
-        """Every view once per epoch, in an order of its own."""
+        """The view of step `index`: each of `views` once per epoch, in a new random order."""
         epoch, place = divmod(index, len(views))
         key = (len(views), epoch)
         if key not in self._orders:
@@ -86,31 +87,31 @@ class Learner:
         return views[self._orders[key][place]]
 
     def random(self, index: int, purpose: int) -> np.random.Generator:
-        """Random numbers of one step."""
+        """A generator of random numbers for one purpose in one step."""
         return np.random.default_rng([self._seed, index, purpose])
 
     def example(self, view: View, index: int) -> Example:
-        """What a view asks for; the person stands before a random colour."""
+        """The recorded picture of a view, before a random colour that step `index` decides."""
         return self._pictures.example(view, self.random(index, 1).random(3), self.model.device)
 
     def draw(self, gaussians: Gaussians, view: View, example: Example) -> Rendering:
-        """The picture that a view's camera would take, with the companion in it."""
+        """Renders Gaussians and the companion for a view, before the example's colour."""
         seen = self._corrected(self.accompanied(gaussians, view.frame), view.camera_index)
         absgrad = self._settings.density.absgrad
         return render(seen, [view.camera], example.color, absgrad=absgrad)
 
     def accompanied(self, gaussians: Gaussians, frame: int) -> Gaussians:
-        """The Gaussians, and after them the companion's of a frame."""
+        """The Gaussians, followed by those of the companion at a frame."""
         if self.companion is None:
             return gaussians
         return cat([gaussians, self.companion.gaussians(frame)])
 
     def prune(self, index: int, steps: int) -> None:
-        """Removes what stands where the companion is, if it is time for that.
+        """Removes Gaussians that are where the companion is, if `Pruning.due` says so.
 
         Args:
-            index: Step just done.
-            steps: Steps of the whole training.
+            index: The step that was done.
+            steps: Number of steps of the whole training.
         """
         if self._pruning is not None and self._pruning.due(index, steps):
             self._pruning.carry_out(self.model, self.population)
@@ -125,7 +126,7 @@ class Learner:
         """One optimiser step on every tensor that has a gradient.
 
         Args:
-            progress: Part of the steps that are done, 0 to 1.
+            progress: Share of the steps that are done, 0 to 1, for the decay of learning rates.
         """
         tensors = {**self.model.gaussians, **self.model.shared, "affine": self.affine}
         for name, tensor in tensors.items():
@@ -135,15 +136,15 @@ class Learner:
             if name == "means":
                 rate *= self._extent
             if name in PER_FRAME:
-                # A row has a gradient in one of F steps; Adam divides by the root of its mean
-                # square over all of them, and so makes steps that are √F times as large.
+                # Each row has a gradient in one of F steps only. Adam divides by the root mean
+                # square over all steps, which makes its steps √F times as large.
                 rate /= math.sqrt(len(tensor))
             self.optimiser.update(name, tensor, tensor.grad, rate)
             tensor.grad = None
 
     @torch.no_grad()
     def keep_mean(self, count: int) -> None:
-        """Keeps the mean of the canonical Gaussians, `count` of which are in it already."""
+        """Adds the canonical Gaussians to their running mean, so far one of `count` steps."""
         moments = self.optimiser.moments
         for name in CANONICAL:
             value = self.model.gaussians[name].detach()
@@ -152,19 +153,19 @@ class Learner:
 
     @torch.no_grad()
     def take_mean(self) -> None:
-        """Puts that mean in the place of the Gaussians."""
+        """Replaces the canonical Gaussians by their running mean (`keep_mean`)."""
         for name in CANONICAL:
             self.model.gaussians[name].copy_(self.optimiser.moments[f"{name}.mean"])
 
     def tensors(self) -> dict[str, Tensor]:
-        """Parameters and moments."""
+        """Parameters, and moments of the optimiser."""
         named = {f"gaussians.{n}": value for n, value in self.model.gaussians.items()}
         named |= {f"shared.{n}": value for n, value in self.model.shared.items()}
         named |= {f"moments.{n}": value for n, value in self.optimiser.moments.items()}
         return named | {"affine": self.affine}
 
     def restore(self, tensors: dict[str, Tensor]) -> None:
-        """Takes back what `tensors` gave; what learned before learns again."""
+        """Restores the state that `tensors` returned; the same tensors require gradients."""
         for name, tensor in tensors.items():
             part, _, rest = name.partition(".")
             if part == "moments":
@@ -176,7 +177,7 @@ class Learner:
                 held[rest] = tensor.requires_grad_(held[rest].requires_grad)
 
     def _corrected(self, gaussians: Gaussians, camera: int) -> Gaussians:
-        """The Gaussians in the colours of one camera."""
+        """The Gaussians with the colour correction of one camera."""
         if not self._settings.color_correction:
             return gaussians
         assert gaussians.colors is not None
@@ -185,10 +186,10 @@ class Learner:
 
 
 class WindowTrainee:
-    """What training and fine-tuning of a window have in common as a `Trainee`."""
+    """Base class of the `Trainee`s that train and fine-tune a window."""
 
     def __init__(self, learner: Learner):
-        """Takes over the window's model with its optimiser."""
+        """Makes a trainee of a window's model with its optimiser."""
         self._learner = learner
 
     @property
@@ -197,26 +198,26 @@ class WindowTrainee:
         return self._learner.model
 
     def tensors(self) -> dict[str, Tensor]:
-        """Parameters and moments."""
+        """Parameters, and moments of the optimiser."""
         return self._learner.tensors()
 
     def place(self, name: str) -> torch.device:
-        """Every tensor of a checkpoint belongs on the model's device."""
+        """The device for a tensor of a checkpoint: always that of the model."""
         del name
         return self.model.device
 
     def state(self) -> dict:
-        """Nothing beside the tensors: randomness follows from the step's number."""
+        """Empty: all state is in tensors, and randomness follows from the number of the step."""
         return {}
 
     def restore(self, tensors: dict[str, Tensor], state: dict) -> None:
-        """Takes back what `tensors` gave."""
+        """Restores the state that `tensors` returned; `state` is not used."""
         del state
         self._learner.restore(tensors)
 
 
 def _group(name: str) -> str:
-    """Name of the learning rate that a tensor has."""
+    """Key of `Rates.by_parameter` for the tensor of a name."""
     if name.startswith(MLP):
         return "mlp"
     if name.startswith(GRID):

@@ -1,4 +1,4 @@
-"""What the training of a skinned body begins with: the template's surface at rest."""
+"""The beginning of a skinned body's training: Gaussians on the template's surface at rest."""
 
 import numpy as np
 import torch
@@ -23,9 +23,9 @@ from ico3d.rig.body_track import BodyTrack
 from ico3d.splat.initial import spacing
 
 SPARE = 3
-"""Times as many points as are wanted are drawn: those that nobody sees are left out."""
+"""Factor by which more points are drawn than wanted, as those that no camera sees are left out."""
 SURFACE = 10_000
-"""Points of the recorded surface among which what stands off the skin is sought."""
+"""Points of the recorded surface, among which those off the skin are looked for."""
 
 
 def begin_skinned(
@@ -35,17 +35,18 @@ def begin_skinned(
     rng: np.random.Generator,
     companion: Companion | None = None,
 ) -> Begin:
-    """Round Gaussians on the skin, as far as cameras see it at some moment of the window.
+    """Round Gaussians on the skin that cameras see, and on clothes and hair that stand off it.
 
     Args:
         capture: The recording, with a body track.
-        window: The frames whose poses are trained.
-        settings: How many Gaussians, and what they have besides.
-        rng: Draws them.
-        companion: Where nothing begins; about its border more does.
+        window: Frames whose poses are trained.
+        settings: Number of Gaussians, residual shapes and light.
+        rng: Draws the points.
+        companion: Other Gaussians, whose space stays empty and near whose border more points begin;
+            None for none.
 
     Raises:
-        CaptureError: If there is no body track, or it misses all pictures.
+        CaptureError: If there is no body track, or it lies outside of all pictures.
     """
     track = tracked(capture)
     count = min(settings.initial.gaussians, settings.density.max_gaussians)
@@ -64,10 +65,10 @@ def begin_skinned(
 
 
 def tracked(capture: Capture) -> BodyTrack:
-    """How the person moved.
+    """The body track of a capture.
 
     Raises:
-        CaptureError: If that is not known.
+        CaptureError: If the capture has none.
     """
     track = capture.body_track()
     if track is None:
@@ -79,7 +80,13 @@ def tracked(capture: Capture) -> BodyTrack:
 
 
 def _seen(skin: Skin, track: BodyTrack, capture: Capture, window: Window) -> Skin:
-    """The points that some training camera sees at one of the moments: arms hide what is under."""
+    """The points that some training camera sees at one of several frames.
+
+    Several frames are tested, as arms hide what is under them.
+
+    Raises:
+        CaptureError: If no point is seen.
+    """
     cameras = [capture.cameras[index] for index in train_cameras(capture)]
     seen = np.zeros(len(skin), bool)
     for frame in _moments(window):
@@ -95,14 +102,14 @@ def _seen(skin: Skin, track: BodyTrack, capture: Capture, window: Window) -> Ski
 
 
 def _moments(window: Window) -> list[int]:
-    """A few frames of a window, its ends and its centre among them."""
+    """Up to `MOMENTS` frames of a window, evenly spread, its ends among them."""
     return sorted({round(frame) for frame in np.linspace(window.first, window.last, MOMENTS)})
 
 
 def _beside(
     companion: Companion, skin: Skin, track: BodyTrack, window: Window, rng: np.random.Generator
 ) -> Skin:
-    """The points that do not trespass most of the time, and those of the companion's border."""
+    """The points, and points near the companion's border, without those that trespass mostly."""
     frame = window.center
     border = skin.pulled_back(companion.border(frame, rng), track, frame)
     both, frames = Skin.joined(skin, border), _moments(window)
@@ -119,7 +126,7 @@ def _dressed(
     settings: BodySettings,
     rng: np.random.Generator,
 ) -> Skin:
-    """As many points as wanted: of the skin, and of what stands off it, by how much that is."""
+    """`count` points of the skin and of what stands off it, in proportion to their surfaces."""
     frame, others = window.center, sorted({window.first, window.last})
     start = initial_points(capture, frame, SURFACE, rng, settings.initial.source)
     off = standing_off(skin, track, capture, start.points, frame, others)
@@ -128,7 +135,7 @@ def _dressed(
 
 
 def _some(skin: Skin, count: int, rng: np.random.Generator) -> Skin:
-    """At most so many of the points."""
+    """At most `count` of the points, chosen at random."""
     if len(skin) <= count:
         return skin
     return skin[np.sort(rng.choice(len(skin), count, replace=False))]
@@ -137,7 +144,7 @@ def _some(skin: Skin, count: int, rng: np.random.Generator) -> Skin:
 def _motion(
     track: BodyTrack, window: Window, settings: BodySettings, generator: torch.Generator
 ) -> tuple[Skinned, dict[str, Tensor]]:
-    """The motion, and its shared tensors: poses as they were tracked."""
+    """The motion, and its shared tensors with the poses of the body track."""
     sizes, rig, frames = settings.skinning, track.rig, slice(window.first, window.last + 1)
     motion = Skinned(rig.names, rig.parents, len(window), sizes.shapes, sizes.hidden, sizes.light)
     shared = {
@@ -154,7 +161,7 @@ def _motion(
 
 
 def _hung(skin: Skin, motion: Skinned) -> dict[str, Tensor]:
-    """What the motion hangs on the Gaussians; no residual yet."""
+    """The motion's tensors of the Gaussians, with residual shapes that are 0."""
     binding = skin.binding
     tensors = {
         "skin_joints": torch.from_numpy(binding.joints.astype(np.int32)),

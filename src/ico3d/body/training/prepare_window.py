@@ -1,4 +1,4 @@
-"""What the training of a window begins with."""
+"""The state in which the training of a window begins, for each method."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -24,13 +24,16 @@ from ico3d.splat.density import Population
 from ico3d.splat.initial import resampled
 
 PADDING = 0.15
-"""Of the box, as a part of its edge: what moves out of it would not be told apart any more."""
+"""Margin of the deformation's box on each side of the person's points, relative to their extent.
+
+Positions outside of the box all have the encoder's features at its border.
+"""
 POSITIONS = 4
-"""Values that the positional encoding encodes: place and time."""
+"""Number of values that the positional encoding takes: x, y, z and time."""
 
 
 Dynamic = Callable[[np.ndarray], np.ndarray]
-"""(P, 3) points → (P,) how much each moves, 0 to 1."""
+"""Returns for points (P, 3) in the world how much each moves in a window: (P,) from 0 to 1."""
 
 
 def begin_window(
@@ -42,19 +45,22 @@ def begin_window(
     seed: int,
     companion: Companion | None = None,
 ) -> Begin:
-    """Round Gaussians on the person, at the window's centre frame or throughout it.
+    """Round Gaussians on the person's surface.
+
+    They begin at the window's centre frame; those of methods spacetime and freetime at all frames.
 
     Args:
-        capture: Where surface points or masks come from.
-        window: The window's frames.
-        method: The method that moves the Gaussians.
-        settings: How many, and the sizes of the deformation.
+        capture: The recording.
+        window: Frames of the window.
+        method: How Gaussians are moved.
+        settings: Number of Gaussians, and sizes of the deformation.
         dynamic: Tells which points move in this window.
-        seed: Decides which points.
-        companion: Where nothing begins; about its border more does.
+        seed: Seed of the choice of points.
+        companion: Other Gaussians, whose space stays empty and near whose border more points begin;
+            None for none.
 
     Raises:
-        CaptureError: If the masks of the cameras agree on no place, or a skinned body has no track.
+        CaptureError: If the cameras look at no common place, or a skinned body has no body track.
     """
     rng = np.random.default_rng([seed, window.first])
     if method in SKINNED:
@@ -78,12 +84,12 @@ def begin_window(
 
 
 def continued_window(model: WindowModel, window: Window, companion: Companion | None) -> Begin:
-    """A trained window as the begin of another training.
+    """A trained window as the beginning of another training.
 
     Args:
-        model: Changed in place: what trespasses is removed.
-        window: Its frames.
-        companion: Where nothing begins.
+        model: The trained model; Gaussians that trespass are removed in place.
+        window: Frames of the window.
+        companion: Other Gaussians, whose space stays empty; None for none.
     """
     if companion is not None:
         Pruning(companion, window).carry_out(model, Population(model.gaussians, {}))
@@ -98,7 +104,7 @@ def _clouds(
     settings: BodySettings,
     rng: np.random.Generator,
 ) -> tuple[list[np.ndarray], str]:
-    """Points (each, 3) of every frame, and where they come from."""
+    """For each frame points (each, 3) of its surface, and in words where they come from."""
     starts = [
         initial_points(capture, frame, each, rng, settings.initial.source) for frame in frames
     ]
@@ -108,7 +114,7 @@ def _clouds(
 def _beside(
     companion: Companion, points: np.ndarray, frame: int, rng: np.random.Generator
 ) -> np.ndarray:
-    """(Q, 3) points of a frame that do not trespass, and those of the companion's border."""
+    """(Q, 3) points of a frame and near the companion's border, without those that trespass."""
     places = np.concatenate([points, companion.border(frame, rng)])
     return places[~trespassing(companion, places, frame)]
 
@@ -122,7 +128,7 @@ def _motion(
     dynamic: Dynamic,
     rng: np.random.Generator,
 ) -> tuple[Motion, dict[str, Tensor]]:
-    """The motion of a method, and what it hangs on the Gaussians."""
+    """The motion of a method, and its initial tensors of the Gaussians."""
     if method == "static":
         return Still(), {}
     if method in ("spacetime", "freetime"):
@@ -139,14 +145,21 @@ def _motion(
 
 
 def _some(window: Window) -> list[int]:
-    """A few frames of a window, its ends among them."""
+    """Every third frame of a window, and its last one."""
     return sorted({*range(window.first, window.last, 3), window.last})
 
 
 def deformation(
     method: Method, settings: BodySettings, window: Window, points: np.ndarray
 ) -> Deformation:
-    """The deformation of a window whose motion stays about points (P, 3)."""
+    """The deformation of a window.
+
+    Args:
+        method: swings++, swings or 4dgs.
+        settings: Sizes of encoder and MLP.
+        window: Frames of the window.
+        points: (P, 3) points of the person at several frames, which decide the deformation's box.
+    """
     low, high = points.min(0), points.max(0)
     middle, half = (low + high) / 2, (high - low) / 2 * (1 + 2 * PADDING)
     encoder, sizes = None, settings.encoder
@@ -163,7 +176,7 @@ def deformation(
 def _formula_tensors(
     formula: Polynomial, settings: BodySettings, clouds: list[np.ndarray]
 ) -> dict[str, Tensor]:
-    """Gaussians that live about their cloud's frame and move on to the next frame's cloud."""
+    """Tensors of Gaussians that are opaque about their cloud's frame and move to the next cloud."""
     steps = max(len(clouds) - 1, 1)
     sizes = [len(cloud) for cloud in clouds]
     center = torch.repeat_interleave(torch.arange(len(clouds)) / steps, torch.tensor(sizes))
@@ -179,7 +192,11 @@ def _formula_tensors(
 
 
 def _speed(clouds: list[np.ndarray], index: int) -> np.ndarray:
-    """(P, 3) metres per window from a cloud to the nearest points of its neighbour in time."""
+    """(P, 3) velocity of a cloud's points, in metres per window.
+
+    Each point moves to the nearest point of the next cloud; those of the last cloud come from the
+    nearest point of the cloud before.
+    """
     steps = max(len(clouds) - 1, 1)
     after = index < len(clouds) - 1
     if steps == 1 and not after and index == 0:

@@ -1,4 +1,4 @@
-"""What stands off the skin: clothes and hair, pulled back to rest from a frame's surface."""
+"""Finds clothes and hair: points of a frame's surface that stand off the skin, moved to rest."""
 
 from collections.abc import Sequence
 
@@ -12,11 +12,11 @@ from ico3d.rig.body_track import BodyTrack
 from ico3d.splat.initial import in_pictures
 
 OFF = 0.02
-"""Metres from the skin, at which a hull of 2 cm voxels is told from it."""
+"""Least distance from the skin in metres; a visual hull of 2 cm voxels is not more exact."""
 FARTHEST = 0.25
-"""Metres; what is farther from the skin is nobody's coat."""
+"""Largest distance from the skin in metres of anything that somebody wears."""
 INSIDE = 0.95
-"""Part of the pictures of a place that must show the person there, at every frame looked at."""
+"""Share of the pictures that hold a point in which the mask must show the person at the point."""
 
 
 def standing_off(
@@ -29,15 +29,16 @@ def standing_off(
 ) -> Skin:
     """The points of a frame's surface that stand off the skin, at rest.
 
-    They hang on the joints of the nearest point of the skin. A hull fills what no camera can look
-    into, under the arms and between the legs; elsewhere in other poses, that is found empty.
+    Each is bound to the joints of the nearest point of the skin. A visual hull also fills space
+    that no camera can look into, such as under the arms; masks of frames with other poses show that
+    such points are not the person's.
 
     Args:
-        skin: Points on the template.
-        track: How it moves.
-        capture: Where masks come from.
-        surface: (S, 3) the person's surface in the world, a visual hull for example.
-        frame: When the surface was seen.
+        skin: Points on the template's skin.
+        track: How the person moves.
+        capture: The recording, with masks.
+        surface: (S, 3) points of the person's surface in the world, such as a visual hull, metres.
+        frame: Frame of the surface.
         others: Frames at which the points must lie on the person, too.
     """
     distance, _ = KDTree(skin.posed(track, frame)).query(surface)  # (S,)
@@ -48,7 +49,7 @@ def standing_off(
 
 
 def _on_person(points: np.ndarray, capture: Capture, frame: int) -> np.ndarray:
-    """(P,) bool: which places (P, 3) the masks of a frame show to be the person's."""
+    """(P,) bool: which points (P, 3) in the world are the person's by the masks of a frame."""
     held, shown = np.zeros(len(points)), np.zeros(len(points))
     for index in train_cameras(capture):
         mask = capture.mask(index, frame)

@@ -1,4 +1,4 @@
-"""Where the Gaussians of a window begin: on the best surface that the capture can give."""
+"""First points of a window's Gaussians: on the best surface that the capture can give."""
 
 import logging
 from dataclasses import dataclass
@@ -16,20 +16,20 @@ from ico3d.errors import CaptureError
 from ico3d.splat.initial import in_pictures, resampled, spacing
 
 HULL_EDGE = 0.02
-"""Metres of a voxel's edge."""
+"""Edge of the visual hull's voxels, metres."""
 FEWEST = 4
-"""Points that make a surface."""
+"""Least number of points of a surface."""
 
 logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class Start:
-    """Where Gaussians begin.
+    """Points on which Gaussians begin.
 
     Attributes:
-        points: (P, 3) metres, in the world.
-        source: What the points come from, for the log.
+        points: (P, 3) positions in the world, metres.
+        source: Where the points come from, in words.
     """
 
     points: np.ndarray
@@ -43,20 +43,20 @@ def initial_points(
     rng: np.random.Generator,
     source: Source = "best",
 ) -> Start:
-    """Points on the person's surface at one frame, best source first.
+    """Points on the person's surface at one frame, from the best source that the capture has.
 
-    These are the capture's own points (a body model's vertices), the visual hull of the masks of
-    the cameras that train, and anywhere within what these cameras look at.
+    Sources are, best first: the capture's own points (such as a body model's vertices), the visual
+    hull of the training cameras' masks, and random places that these cameras look at.
 
     Args:
         capture: A recording of a body.
-        frame: Frame number.
-        count: Points wanted.
-        rng: Chooses among them.
-        source: The best there is, or the hull even where the capture has points of its own.
+        frame: Index of the frame.
+        count: Number of points.
+        rng: Chooses the points.
+        source: "best", or "hull" to leave out the capture's own points.
 
     Raises:
-        CaptureError: If the cameras do not even look at one place from different sides.
+        CaptureError: If there is no other source and the cameras look at no common place.
     """
     known = _surface(capture, frame) if source == "best" else None
     start = known or _hull(capture, frame) or _anywhere(capture, count, rng)
@@ -65,7 +65,7 @@ def initial_points(
 
 
 def _surface(capture: Capture, frame: int) -> Start | None:
-    """The capture's points that some training camera's picture holds."""
+    """The capture's own points in view of some training camera; None if there are too few."""
     points = capture.points(frame)
     if points is None or not np.isfinite(points).all():
         return None
@@ -76,7 +76,7 @@ def _surface(capture: Capture, frame: int) -> Start | None:
 
 
 def _hull(capture: Capture, frame: int) -> Start | None:
-    """The visual hull of the masks."""
+    """Points of the visual hull of the training cameras' masks; None if there is none."""
     indices, seen = [], []
     for index in train_cameras(capture):
         mask = capture.mask(index, frame)
@@ -94,7 +94,11 @@ def _hull(capture: Capture, frame: int) -> Start | None:
 
 
 def _anywhere(capture: Capture, count: int, rng: np.random.Generator) -> Start:
-    """Random places in the ball that the cameras look at."""
+    """Random points in the ball that all training cameras look at.
+
+    Raises:
+        CaptureError: If there is no such ball.
+    """
     box = looked_at([capture.cameras[index] for index in train_cameras(capture)])
     if box is None:
         raise CaptureError(
@@ -111,12 +115,12 @@ def point_colors(points: np.ndarray, capture: Capture, frame: int) -> np.ndarray
     """Colours of surface points: median over the training pictures in which they are seen.
 
     A point is seen where it projects onto the person and no other point lies clearly in front of
-    it; one that is never seen is coloured like the nearest that is.
+    it; a point that is never seen takes the colour of the nearest seen point.
 
     Args:
         points: (P, 3) metres, in the world, spread over the surface at this frame.
         capture: The recording.
-        frame: Frame number.
+        frame: Index of the frame.
 
     Returns:
         (P, 3) float32 RGB in [0, 1]; grey where nothing is seen.
@@ -143,7 +147,10 @@ def point_colors(points: np.ndarray, capture: Capture, frame: int) -> np.ndarray
 def _on_person(
     points: np.ndarray, camera: Camera, mask: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pixels (P, 2) int of points (P, 3), and (P,) bool whether these are the person's."""
+    """Pixels (P, 2) int of points (P, 3) in the world, and (P,) bool whether they show the person.
+
+    Without a mask all pixels in the picture count as the person's.
+    """
     inside = in_pictures(points, [camera])[0]  # (P,)
     pixels = np.zeros((len(points), 2), int)
     pixels[inside] = camera.project(points[inside])[0].astype(int)

@@ -1,4 +1,4 @@
-"""From a capture to a model folder: plans windows, trains them, fine-tunes, saves."""
+"""Trains a body from a capture: plans windows, trains them, fine-tunes, saves a model folder."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -34,15 +34,17 @@ WINDOW_FILE = "window.safetensors"
 
 @dataclass(frozen=True)
 class BodyJob:
-    """What to train.
+    """How a body is to be trained.
 
     Attributes:
-        method: SWinGS++ or what it is compared with.
-        seed: All randomness follows from it.
-        settings: How to train.
-        companion: Where the Gaussians come from that the body is trained with, if any.
-        continued: Folder of a body with the same windows to go on from, instead of from points.
-        device: Where to compute; decided by each process that trains. A run may go on elsewhere.
+        method: How Gaussians are moved.
+        seed: Seed of all randomness.
+        settings: Settings of the training.
+        companion: Source of other Gaussians that are in the pictures; None for none.
+        continued: Folder of a trained body on the same clip, whose windows training goes on from;
+            None begins with points on the surface.
+        device: Where to compute, decided by each process that trains. An interrupted run may go on
+            with another device.
     """
 
     method: Method
@@ -53,7 +55,7 @@ class BodyJob:
     device: DeviceName = "auto"
 
     def about(self, capture: Path) -> dict:
-        """What a run of this job on a capture is known by, but for its settings."""
+        """Values, beside the settings, that a run must share with an interrupted one."""
         about = {"capture": str(capture.resolve()), "method": self.method, "seed": self.seed}
         if self.continued is not None:
             about["continued"] = str(self.continued.resolve())
@@ -62,15 +64,15 @@ class BodyJob:
 
 @dataclass(frozen=True)
 class WindowTask:
-    """One window's training, which depends on no other.
+    """The training of one window, which is independent of other windows.
 
     Attributes:
         capture: Path of the capture.
-        folder: Where the window's run lies.
-        flow: Folder of the optical flow, shared by all windows.
-        window: The window's frames.
-        index: Its number.
-        job: Method, seed, settings and what to go on from.
+        folder: Run folder of the window.
+        flow: Folder with cached optical flow, shared by all windows.
+        window: Frames of the window.
+        index: Index of the window.
+        job: How the body is to be trained.
     """
 
     capture: Path
@@ -82,12 +84,12 @@ class WindowTask:
 
     @property
     def file(self) -> Path:
-        """The trained window."""
+        """File of the trained window."""
         return self.folder / WINDOW_FILE
 
     @property
     def steps(self) -> int:
-        """Optimisation steps."""
+        """Number of optimisation steps."""
         return self.job.settings.steps_of(len(self.window))
 
     @property
@@ -97,18 +99,18 @@ class WindowTask:
 
 
 Runner = Callable[[Sequence[WindowTask]], Sequence[float]]
-"""Trains windows; gives the seconds spent in steps by window."""
+"""Trains windows; returns the seconds spent in optimisation steps for each of them."""
 
 
 def train_window(task: WindowTask, capture: Capture | None = None) -> float:
-    """Trains a window, or goes on with an interrupted run of the same settings.
+    """Trains a window and writes its file, or continues an interrupted run of the same settings.
 
     Args:
         task: The window and how it is trained.
-        capture: The opened capture, where the caller has it open already.
+        capture: The opened capture; None opens it here.
 
     Returns:
-        Seconds spent in steps.
+        Seconds spent in optimisation steps.
 
     Raises:
         CaptureError: If the capture lacks something that is needed.
@@ -145,7 +147,7 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
 def _begin(
     task: WindowTask, capture: Capture, companion: Companion | None, device: torch.device
 ) -> Begin:
-    """What a window's training begins with."""
+    """The state in which a window's training begins."""
     job, window = task.job, task.window
     if job.continued is not None:
         body = TrainedBody.load(job.continued)
@@ -161,16 +163,20 @@ def _begin(
 def finetune_window(
     task: WindowTask, capture: Capture, trained: Path, previous: WindowModel
 ) -> float:
-    """Fine-tunes a window to agree with the one before, or goes on with an interrupted run.
+    """Fine-tunes a window to agree with the window before, or continues an interrupted run.
 
     Args:
-        task: Which; its folder is where the fine-tuning's run lies.
+        task: The window; its folder is the run folder of the fine-tuning.
         capture: The opened capture.
-        trained: Folder of the window's training.
-        previous: The window before, fine-tuned itself.
+        trained: Run folder of the window's training.
+        previous: Model of the window before, after its own fine-tuning.
 
     Returns:
-        Seconds spent in steps.
+        Seconds spent in optimisation steps.
+
+    Raises:
+        SettingsError: If the folder holds a run with other settings, or CUDA does not work.
+        ModelError: If training diverges.
     """
     job, window = task.job, task.window
     about = _about(task.capture, window, job)
@@ -205,13 +211,13 @@ def finetune_window(
 def train_body(
     capture: Capture, folder: Path, job: BodyJob, runner: Runner | None = None
 ) -> TrainedBody:
-    """Trains a body, or goes on with an interrupted run of the same settings.
+    """Trains a body, or continues an interrupted run of the same settings.
 
     Args:
-        capture: Calibrated, synchronised cameras with masks.
-        folder: Model folder; also holds the plan, and the run of every window.
-        job: Method, seed, settings and what to go on from.
-        runner: Trains the windows; one after another in this process by default.
+        capture: Recording by calibrated, synchronised cameras, with masks.
+        folder: Model folder, which also holds the plan and the run of each window.
+        job: How the body is to be trained.
+        runner: Trains the windows; by default one after another in this process.
 
     Returns:
         The trained body, as the folder now holds it.
@@ -219,10 +225,10 @@ def train_body(
     Raises:
         CaptureError: If the capture lacks something that is needed.
         SettingsError: If the folder holds a run with other settings.
-        ModelError: If training diverges.
+        ModelError: If training diverges, or `job.continued` is of another method or clip.
     """
     if job.method in SKINNED:
-        tracked(capture)  # before a folder is made, and the clip is cut into windows
+        tracked(capture)  # raises before a folder is made and motion is measured
     run = RunFolder(folder, job.about(capture.path) | {"settings": asdict(job.settings)})
     if run.finished() is not None:
         return TrainedBody.load(folder)
@@ -250,10 +256,10 @@ def train_body(
 
 
 def _fitting(body: TrainedBody, capture: Capture, job: BodyJob) -> TrainedBody:
-    """A body that a job goes on from.
+    """Checks that training can go on from a body; returns this body.
 
     Raises:
-        ModelError: If it is of another method or another clip.
+        ModelError: If the body is of another method or another clip.
     """
     if body.method != job.method:
         raise ModelError(
@@ -270,13 +276,24 @@ def _fitting(body: TrainedBody, capture: Capture, job: BodyJob) -> TrainedBody:
 
 
 def plan_windows(capture: Capture, job: BodyJob, folder: Path) -> Plan:
-    """The windows of a clip, shown and drawn; methods of one window take all of it."""
+    """Plans the windows of a clip, prints them, and writes plan.json and plan.png.
+
+    Args:
+        capture: The recording.
+        job: Method and settings; some methods take the whole clip as one window.
+        folder: The model folder.
+
+    Raises:
+        CaptureError: If motion cannot be measured.
+        MissingExtraError: If no flow method is installed.
+        SettingsError: If the settings of windows contradict one another.
+    """
     plan = make_plan(capture, job.settings.windows, folder, computing_device(job.device))
     if job.method in ONE_WINDOW:
         plan = replace(plan, windows=(Window(0, capture.num_frames - 1),))
     print_plan(plan, Console())
     told, picture = folder / "plan.json", folder / "plan.png"
-    if not (picture.is_file() and is_saved(plan, told)):  # a run that goes on has both
+    if not (picture.is_file() and is_saved(plan, told)):  # a continued run has both already
         draw_plan(plan, capture, picture)
         save_plan(plan, told)
     return plan
@@ -290,7 +307,7 @@ def _save(
     seconds: float,
     about: str = ABOUT,
 ) -> TrainedBody:
-    """Names the windows' files in the model folder."""
+    """Writes the file `about`, which lists the windows' files; returns the body."""
     summary = {
         "train_seconds": seconds,
         "capture": capture.provenance,
@@ -304,7 +321,10 @@ def _save(
 
 
 def _about(capture: Path, window: Window, job: BodyJob) -> dict:
-    """What a window's run is known by: fine-tuning can be done anew without training anew."""
+    """Values that a window's run must share with an interrupted one.
+
+    Settings of fine-tuning are not among them: it can be repeated without training again.
+    """
     settings = asdict(job.settings)
     del settings["finetune"]
     return job.about(capture) | asdict(window) | {"settings": settings}

@@ -1,4 +1,4 @@
-"""The pictures that a body is trained on: the person cut out, and little around them."""
+"""The pictures that a body is trained on: the person cut out, with a small margin."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from ico3d.errors import CaptureError
 from ico3d.rig.body_track import BodyTrack
 
 MARGIN = 8
-"""Pixels around the person that are kept: what lies outside of the mask must learn to be empty."""
+"""Margin in pixels around the person, in which the body learns that there is nothing."""
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,9 @@ class Example:
     """A recorded picture as a body learns from it.
 
     Attributes:
-        target: (H, W, 3) the person before `color`.
-        mask: (H, W) in [0, 1].
-        color: (3,) what they stand before.
+        target: (H, W, 3) RGB picture of the person before `color`.
+        mask: (H, W) mask of the person, in [0, 1].
+        color: (3,) RGB background.
     """
 
     target: Tensor
@@ -34,8 +34,8 @@ class Example:
 class BodyViews:
     """Pictures of some frames by a capture's training cameras, cropped to the person.
 
-    All pictures of a camera have one crop, which holds the person in every frame: a Gaussian that
-    stays where a hand was in another frame must be seen to be wrong.
+    All pictures of a camera have the same crop, which holds the person in every frame, so that a
+    Gaussian that stays where a hand was in another frame is seen to be wrong.
 
     Attributes:
         views: The recorded views in which the person is seen, frame by frame.
@@ -45,9 +45,9 @@ class BodyViews:
         """Reads masks, and pictures as far as they fit into memory.
 
         Args:
-            capture: Where pictures and masks come from.
-            frames: Frames whose pictures train.
-            cache_gib: Memory for pictures.
+            capture: The recording.
+            frames: Frames to train on.
+            cache_gib: Memory for pictures in GiB.
 
         Raises:
             CaptureError: If there is no picture of the person, or a view has no mask.
@@ -71,11 +71,11 @@ class BodyViews:
             raise CaptureError(f"{capture.path} has no picture of the person to train on.")
 
     def body_track(self) -> BodyTrack | None:
-        """How the person moved, where the recording knows it."""
+        """The body track of the recording; None where it has none."""
         return self._capture.body_track()
 
     def example(self, view: View, color: np.ndarray, device: torch.device) -> Example:
-        """What a view asks for, before a colour (3,)."""
+        """The recorded picture of a view, with the person before a colour (3,)."""
         layers = self._cache.layers(view.camera_index, view.frame)
         assert layers is not None and layers[0] is not None and layers[1] is not None
         person, mask = (torch.from_numpy(part).to(device).float() / 255 for part in layers)  # type: ignore[arg-type]
@@ -83,7 +83,7 @@ class BodyViews:
         return Example(person + (1 - mask[..., None]) * behind, mask, behind)
 
     def _common_box(self, camera: int, frames: Iterable[int]) -> "_Box | None":
-        """What holds the person in all frames of a camera; None where nobody is seen."""
+        """The crop that holds the person in all frames of a camera; None where nobody is seen."""
         seen = self._capture.cameras[camera]
         inside = np.zeros((seen.height, seen.width), bool)
         for frame in frames:
@@ -93,7 +93,11 @@ class BodyViews:
         return _Box.around(inside) if inside.any() else None
 
     def _mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """(H, W); None where there is no picture either."""
+        """(H, W) mask of the person; None where there is no picture either.
+
+        Raises:
+            CaptureError: If there is a picture without a mask.
+        """
         mask = self._capture.mask(camera, frame)
         if mask is None and self._capture.image(camera, frame) is not None:
             name = self._capture.cameras[camera].name
@@ -117,7 +121,7 @@ class BodyViews:
         return person.clip(0, 1), mask[cut]
 
     def _plate(self, camera: int) -> np.ndarray | None:
-        """(H, W, 3) what a camera sees without the person, where that is known."""
+        """(H, W, 3) clean background of a camera; None where it is not known."""
         if camera not in self._plates:
             self._plates[camera] = self._capture.background(camera)
         return self._plates[camera]
@@ -125,17 +129,17 @@ class BodyViews:
 
 @dataclass(frozen=True)
 class _Box:
-    """A part of a picture.
+    """A rectangle of pixels in a picture.
 
     Attributes:
-        place: Left, top, width, height in pixels.
+        place: Left, top, width and height in pixels.
     """
 
     place: tuple[int, int, int, int]
 
     @staticmethod
     def around(inside: np.ndarray) -> "_Box":
-        """What holds the pixels (H, W) that are marked, with a margin."""
+        """The rectangle that holds all marked pixels of `inside` (H, W) bool, with `MARGIN`."""
         rows, columns = np.flatnonzero(inside.any(1)), np.flatnonzero(inside.any(0))
         top, left = max(rows[0] - MARGIN, 0), max(columns[0] - MARGIN, 0)
         bottom = min(rows[-1] + 1 + MARGIN, inside.shape[0])
@@ -144,6 +148,6 @@ class _Box:
 
     @property
     def cut(self) -> tuple[slice, slice]:
-        """Rows and columns."""
+        """The rectangle as slices of rows and of columns."""
         left, top, width, height = self.place
         return slice(top, top + height), slice(left, left + width)

@@ -1,7 +1,7 @@
-"""Windows trained by a Ray cluster.
+"""Trains windows on a Ray cluster.
 
-Captures and model folders lie where all nodes find them under the same path (a shared folder), and
-ico3d is installed on each. Workers answer through Ray; how far they are is read from the folder.
+Capture and model folder must have the same path on all nodes (a shared folder), and ico3d must be
+installed on each. Workers return results through Ray; their progress is read from the model folder.
 """
 
 import logging
@@ -15,24 +15,24 @@ from ico3d.body.workers.jobs import Lost, work
 from ico3d.errors import Ico3dError, MissingExtraError, SettingsError
 
 ANSWER = 10.0
-"""Seconds within which a cluster must answer."""
+"""Seconds within which a cluster must accept a connection."""
 
 
 class RayCluster:
-    """A `Crew` of Ray workers; Ray keeps the queue."""
+    """A `Crew` of Ray workers; Ray itself queues windows that cannot start yet."""
 
     capacity = None
 
     def __init__(self, address: str, with_gpus: bool = True):
-        """Connects.
+        """Connects to a cluster.
 
         Args:
-            address: Of the cluster: host:port, or "auto" on one of its machines.
-            with_gpus: Whether each window gets a GPU, where there are any.
+            address: Address of the cluster: host:port, or "auto" on one of its machines.
+            with_gpus: Whether each window gets a GPU, if the cluster has GPUs.
 
         Raises:
             MissingExtraError: If Ray is not installed.
-            SettingsError: If there is no cluster at this address.
+            SettingsError: If no cluster answers at this address.
         """
         try:
             import ray
@@ -51,27 +51,31 @@ class RayCluster:
         self._running: dict[Any, WindowTask] = {}
 
     def expect(self, windows: int) -> None:
-        """Shares out what the machines have.
+        """Divides the machines' cores and GPUs among this number of windows.
 
         Raises:
-            SettingsError: If none can work.
+            SettingsError: If no machine has cores to give.
         """
         self._needs = share(self._ray.nodes(), windows, self._with_gpus)
 
     def start(self, task: WindowTask) -> None:
-        """Gives Ray a window to train."""
+        """Submits a window to Ray."""
         places = {name: getattr(task, name).resolve() for name in ("capture", "folder", "flow")}
-        # Not Ray's own retries: those would be neither counted by checkpoint nor seen.
+        # No retries by Ray: they would be neither counted per checkpoint nor shown.
         remote = self._ray.remote(max_retries=0, **self._needs)(work)
         self._running[remote.remote(replace(task, **places), self._needs["num_cpus"])] = task
 
     def ended(self, timeout: float) -> Sequence[tuple[WindowTask, float | Lost]]:
-        """Waits until Ray has a result, or has lost a worker or its machine."""
+        """Waits at most `timeout` seconds until a window ends or its worker is lost.
+
+        Raises:
+            Ico3dError: The error that ended a worker.
+        """
         ready, _ = self._ray.wait(list(self._running), timeout=timeout)
         return [(self._running.pop(reference), self._outcome(reference)) for reference in ready]
 
     def _outcome(self, reference: Any) -> float | Lost:
-        """How a worker ended.
+        """Seconds of training of a worker that ended, or why it was lost.
 
         Raises:
             Ico3dError: The error that ended the worker.
@@ -94,26 +98,27 @@ class RayCluster:
 
 
 def _reach(address: str) -> None:
-    """Connects to an address and hangs up: where nobody answers, Ray would wait for minutes.
+    """Tests whether an address accepts connections; without this test Ray would wait for minutes.
 
     Raises:
-        OSError: If nobody answers.
+        OSError: If the address does not accept a connection.
     """
     host, _, port = address.removeprefix("ray://").rpartition(":")
-    if port.isdigit():  # others are words like "auto"
+    if port.isdigit():  # not so for words such as "auto"
         socket.create_connection((host, int(port)), ANSWER).close()
 
 
 def share(nodes: Sequence[Mapping], windows: int, with_gpus: bool = True) -> dict[str, int]:
-    """What each window gets of a cluster: a GPU where there are any, and its part of the cores.
+    """Resources of a cluster for each window: a GPU if there are any, and its share of the cores.
 
     Args:
-        nodes: As Ray describes them: whether "Alive", and their "Resources".
-        windows: How many windows are to be trained.
+        nodes: Nodes as Ray describes them, with keys "Alive" and "Resources".
+        windows: Number of windows to train.
         with_gpus: Whether GPUs are wanted.
 
     Returns:
-        `num_cpus` and `num_gpus` for each, such that every node can take one.
+        `num_cpus` and `num_gpus` of each window, such that every node (every node with GPUs, if
+        they are used) can train one.
 
     Raises:
         SettingsError: If no node has cores to give.

@@ -1,8 +1,8 @@
-"""Windows trained beside one another by workers, which may be lost and are replaced.
+"""Trains windows in parallel by workers; workers that are lost are replaced.
 
-No window depends on another, and each goes on from its own checkpoint. So a worker that is lost
-costs the steps since then, and how many workers there are changes nothing about the result: what a
-step computes on the CPU does not depend on the number of threads.
+Windows are independent, and each continues from its own checkpoint: a lost worker costs only the
+steps since the last checkpoint. The number of workers does not change the result, as a step on the
+CPU computes the same with any number of threads.
 """
 
 from collections import Counter, deque
@@ -19,17 +19,17 @@ from ico3d.errors import Ico3dError, ModelError
 from ico3d.training.loop import saved_steps
 
 RETRIES = 3
-"""Workers that a window may lose after one and the same checkpoint and still get another."""
+"""Number of workers of a window that may be lost after the same checkpoint and are replaced."""
 PERIOD = 1.0
-"""Seconds between two looks at what the workers do."""
+"""Seconds between two updates of the progress."""
 
 
 @dataclass(frozen=True)
 class Lost:
-    """A worker has ended without a word.
+    """The outcome of a worker that ended without a result.
 
     Attributes:
-        reason: What is known of why, to follow "its worker".
+        reason: How it ended, in words that continue a sentence after "its worker".
     """
 
     reason: str
@@ -40,22 +40,22 @@ class Crew(Protocol):
 
     @property
     def capacity(self) -> int | None:
-        """How many windows they take at once; None if they keep a queue themselves."""
+        """Number of windows that can be trained at once; None if the crew queues windows itself."""
         ...
 
     def expect(self, windows: int) -> None:
-        """Told how many windows there will be, before the first: the cores are shared out."""
+        """Called before the first window with the number of windows, to divide the cores."""
         ...
 
     def start(self, task: WindowTask) -> None:
-        """Has a worker train a window."""
+        """Starts the training of a window by a worker."""
         ...
 
     def ended(self, timeout: float) -> Sequence[tuple[WindowTask, float | Lost]]:
-        """Waits until a worker ends, so many seconds at most.
+        """Waits at most `timeout` seconds until a worker ends.
 
         Returns:
-            The windows that have ended, with their seconds of training.
+            Windows whose workers have ended, with seconds of training, or why the worker was lost.
 
         Raises:
             Ico3dError: The error that ended a worker.
@@ -63,23 +63,23 @@ class Crew(Protocol):
         ...
 
     def stop(self) -> None:
-        """Ends all workers at once."""
+        """Ends all workers immediately."""
         ...
 
 
 def train_windows(tasks: Sequence[WindowTask], crew: Crew) -> list[float]:
-    """Trains windows, and shows how far they are.
+    """Trains windows by a crew of workers, and shows their progress.
 
     Args:
         tasks: The windows to train.
-        crew: Who does it; is stopped at the end, however that comes.
+        crew: Workers, which are stopped in the end, also after an error.
 
     Returns:
-        Seconds spent in steps, by window.
+        Seconds spent in optimisation steps, for each window.
 
     Raises:
-        Ico3dError: The first that a worker meets; the others' checkpoints stay.
-        ModelError: Also if workers are lost again and again.
+        Ico3dError: The first error of a worker; the checkpoints of all windows are kept.
+        ModelError: If a window loses more than `RETRIES` workers after the same checkpoint.
     """
     waiting, running, losses = deque(tasks), 0, Counter()
     seconds: dict[int, float] = {}
@@ -104,10 +104,10 @@ def train_windows(tasks: Sequence[WindowTask], crew: Crew) -> list[float]:
 
 
 def _count(task: WindowTask, lost: Lost, losses: Counter, overview: Overview) -> None:
-    """Counts a loss and says so.
+    """Counts a lost worker of a window and prints a line about it.
 
     Raises:
-        ModelError: If there were too many since the window's latest checkpoint.
+        ModelError: If more than `RETRIES` were lost since the window's latest checkpoint.
     """
     step = saved_steps(task.folder)
     losses[task.index, step] += 1
@@ -120,11 +120,14 @@ def _count(task: WindowTask, lost: Lost, losses: Counter, overview: Overview) ->
 
 
 def work(task: WindowTask, threads: int) -> float | Ico3dError:
-    """What a worker does; what a user can mend is a result, too.
+    """Trains a window in a worker.
 
     Args:
         task: The window to train.
-        threads: Threads of its kernels.
+        threads: Number of threads for torch and numba.
+
+    Returns:
+        Seconds spent in optimisation steps; an error of ico3d is returned instead of raised.
     """
     torch.set_num_threads(threads)
     numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore (set at run time)

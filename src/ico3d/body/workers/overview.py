@@ -1,7 +1,7 @@
-"""How far windows are that train elsewhere, in one view.
+"""Shows the progress of windows that are trained by other processes or machines.
 
-It reads the metrics that each leaves in its folder: whoever trains need not be asked, on whatever
-machine they are.
+Progress is read from the metrics that each window's training writes into its folder, so workers
+need not be asked.
 """
 
 from collections.abc import Sequence
@@ -11,10 +11,10 @@ from ico3d.training.log import latest_entry, progress_bar, readable
 
 
 class Overview:
-    """A bar for all windows and one for each that is not done; drawn while entered."""
+    """A context that draws a progress bar for all windows, and one for each unfinished window."""
 
     def __init__(self, tasks: Sequence[WindowTask]):
-        """Looks how far the windows are."""
+        """Makes the bars, with the progress that the windows' folders show."""
         self._tasks, self._bars = tasks, progress_bar()
         self._done = {task.index: _standing(task)[0] for task in tasks}
         steps = sum(task.steps for task in tasks)
@@ -33,20 +33,20 @@ class Overview:
         }
 
     def __enter__(self) -> "Overview":
-        """Begins to draw."""
+        """Begins to draw the bars."""
         self._bars.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Ends drawing."""
+        """Ends drawing the bars."""
         self._bars.stop()
 
     def say(self, sentence: str) -> None:
-        """Prints above the bars."""
+        """Prints a sentence above the bars."""
         self._bars.console.print(sentence, markup=False, highlight=False, soft_wrap=True)
 
     def refresh(self) -> None:
-        """Looks again."""
+        """Reads the windows' progress again and moves the bars."""
         for task in self._tasks:
             done, numbers = _standing(task)
             if done != self._done[task.index]:
@@ -54,9 +54,9 @@ class Overview:
         self._bars.update(self._all, completed=sum(self._done.values()))
 
     def _move(self, task: WindowTask, done: int, numbers: str) -> None:
-        """Moves a window's bar; one that is done becomes a line."""
+        """Moves a window's bar; the bar of a finished window is replaced by a printed line."""
         row = self._rows[task.index]
-        if done < self._done[task.index]:  # from a checkpoint: its speed is measured anew
+        if done < self._done[task.index]:  # back to a checkpoint: measure its speed anew
             self._bars.reset(row)
         self._done[task.index] = done
         self._bars.update(row, completed=done, numbers=numbers, visible=done < task.steps)
@@ -65,7 +65,7 @@ class Overview:
 
 
 def _standing(task: WindowTask) -> tuple[int, str]:
-    """Steps that a window has done, and its numbers."""
+    """Number of steps that a window has done, and its latest metrics in words."""
     entry = latest_entry(task.folder)
     if entry is None:
         return 0, ""

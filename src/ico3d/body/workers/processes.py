@@ -1,4 +1,4 @@
-"""Windows trained by processes of this machine."""
+"""Trains windows in processes on this machine."""
 
 import multiprocessing
 import os
@@ -18,6 +18,7 @@ from ico3d.errors import Ico3dError, ModelError, SettingsError
 from ico3d.training.processes import fork_server
 
 GPUS = "CUDA_VISIBLE_DEVICES"
+"""Environment variable that tells CUDA which GPUs a process may use."""
 
 
 @dataclass(frozen=True)
@@ -26,9 +27,9 @@ class Worker:
 
     Attributes:
         task: The window.
-        place: Its number among those that work at once.
+        place: Slot of the worker, from 0 to one less than the number of processes at once.
         process: The process.
-        results: Where it says how it ended.
+        results: Connection over which the process sends its result.
     """
 
     task: WindowTask
@@ -37,11 +38,11 @@ class Worker:
     results: Connection
 
     def outcome(self) -> float | Lost:
-        """How the worker ended; call it only after its end.
+        """Seconds of training, or why the worker was lost; waits until the worker has ended.
 
         Raises:
             Ico3dError: The error that ended the worker.
-            ModelError: If the program has an error.
+            ModelError: If the process ended with an unexpected error.
         """
         try:
             result = self.results.recv()
@@ -62,17 +63,17 @@ class Worker:
 
 
 class Processes:
-    """A `Crew` of processes: each has its share of the cores, and on CUDA a GPU of its own."""
+    """A `Crew` of processes, each with its share of the cores and, with CUDA, its own GPU."""
 
     def __init__(self, jobs: int, with_gpus: bool = True):
-        """Starts nothing yet.
+        """Makes a crew that has started no process yet.
 
         Args:
-            jobs: How many processes work at once.
-            with_gpus: Whether each gets a GPU.
+            jobs: Number of processes at once.
+            with_gpus: Whether each process gets a GPU, if the machine has GPUs.
 
         Raises:
-            SettingsError: If there are fewer GPUs than that, but some.
+            SettingsError: If there are GPUs, but fewer than `jobs`.
         """
         self._gpus = _gpus() if with_gpus else []
         if self._gpus and jobs > len(self._gpus):
@@ -86,7 +87,7 @@ class Processes:
         self._workers: list[Worker] = []
 
     def expect(self, windows: int) -> None:
-        """Shares out the cores among those that work at once."""
+        """Divides the cores among the processes that work at once."""
         self._threads = max(torch.get_num_threads() // min(self.capacity, windows), 1)
 
     def start(self, task: WindowTask) -> None:
@@ -99,11 +100,15 @@ class Processes:
             target=_main, args=(sender, task, self._threads, gpu), name=task.label, daemon=True
         )
         process.start()
-        sender.close()  # the worker's end closes when it ends, whatever ends it
+        sender.close()  # so only the worker holds this end, which closes however the worker ends
         self._workers.append(Worker(task, place, process, results))
 
     def ended(self, timeout: float) -> Sequence[tuple[WindowTask, float | Lost]]:
-        """Waits until a process has a result, or has none to give any more."""
+        """Waits at most `timeout` seconds until a process has sent a result or has ended.
+
+        Raises:
+            Ico3dError: The error that ended a worker.
+        """
         ready = wait([worker.results for worker in self._workers], timeout)
         ended = [worker for worker in self._workers if worker.results in ready]
         outcomes = [(worker.task, worker.outcome()) for worker in ended]
@@ -111,7 +116,7 @@ class Processes:
         return outcomes
 
     def stop(self) -> None:
-        """Kills all processes; files are written as a whole or not at all."""
+        """Kills all processes; this leaves no broken files, as they are written atomically."""
         for worker in self._workers:
             worker.process.kill()
         for worker in self._workers:
@@ -120,24 +125,24 @@ class Processes:
 
 
 def _gpus() -> list[str]:
-    """The GPUs that this process may use, by the names that CUDA takes; none without CUDA."""
+    """Names of the GPUs that this process may use, as in `GPUS`; none without CUDA."""
     named = os.environ.get(GPUS, "")
     names = [name for name in named.split(",") if name] or list(map(str, range(64)))
     return names[: torch.cuda.device_count()]
 
 
 def _main(sender: Connection, task: WindowTask, threads: int, gpu: str | None) -> None:
-    """The main function of a worker's process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all: the parent decides
-    sys.stdout = open(os.devnull, "w")  # noqa: SIM115 (to the end); the parent draws for all
+    """Main function of a worker's process: trains a window and sends the result."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes; parent decides
+    sys.stdout = open(os.devnull, "w")  # noqa: SIM115 (open to the end); the parent shows progress
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if gpu is not None:
-        os.environ[GPUS] = gpu  # read at the first use of CUDA, which is later
+        os.environ[GPUS] = gpu  # CUDA reads it at its first use, which is later
     sender.send(work(task, threads))
 
 
 def _end_with_parent() -> None:
-    """Ends this process when the one that started it is gone: nobody waits for the result."""
+    """Ends this process when its parent process is gone, as nobody waits for the result then."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     parent.join()
