@@ -1,4 +1,4 @@
-"""A gesture as rotation curves by role, and the file of several of them."""
+"""Gestures as rotation curves by role, and the files that hold them."""
 
 import base64
 import json
@@ -20,30 +20,34 @@ from ico3d.motion.turning import mirrored
 from ico3d.rig.quaternions import Array, continuous
 
 VERSION = 1
+"""Version of the files."""
 
 
 def meaning(name: str) -> str:
-    """What a clip means: its name without the number that tells several alike apart."""
+    """Meaning of a clip: its name without the number that tells clips of one meaning apart."""
     return re.sub(r"_\d+$", "", name)
 
 
 def other_hand(meant: str) -> str:
-    """The meaning of the same gesture made with the other hand: `beat_left` of `beat_right`."""
+    """Meaning of the same gesture with the other hand, such as `beat_left` for `beat_right`.
+
+    A meaning that names no hand is returned as it is.
+    """
     gesture, _, side = meant.rpartition("_")
     return f"{gesture}_{SIDES[1 - SIDES.index(side)]}" if side in SIDES else meant
 
 
 @dataclass(frozen=True)
 class Marks:
-    """The phases of a gesture; seconds.
+    """Times of the phases of a gesture, in seconds from its beginning.
 
     Attributes:
-        ready: When the preparation is over and the stroke begins.
-        stroke: When the stroke arrives: what is to fall on an accent.
+        ready: When the preparation ends and the stroke begins.
+        stroke: When the stroke arrives, which is to fall on an accent of speech.
         hold: When the hold begins.
-        release: When the hold is over and the retraction begins; between `hold` and here it may
-            be gone round again. Equal to `hold` where there is none.
-        end: When all is over.
+        release: When the hold ends and the retraction begins; equal to `hold` without a hold.
+            Motion between `hold` and `release` may be repeated.
+        end: When the gesture is over.
     """
 
     ready: float
@@ -65,12 +69,12 @@ class Marks:
 
 @dataclass(frozen=True, eq=False)
 class Clip:
-    """A gesture.
+    """A gesture as rotation curves.
 
     Attributes:
-        name: What it means.
-        marks: Its phases.
-        curves: Of the roles that it moves, from the standard pose.
+        name: Name of the gesture.
+        marks: Times of its phases.
+        curves: For each role that it moves, the local rotation from the standard pose over time.
     """
 
     name: str
@@ -78,10 +82,10 @@ class Clip:
     curves: dict[str, Curve]
 
     def __post_init__(self):
-        """Checks the roles.
+        """Checks the names of the roles.
 
         Raises:
-            ValueError: If there is none of a name.
+            ValueError: If a role does not exist.
         """
         unknown = sorted(set(self.curves) - set(ROLES))
         if unknown:
@@ -89,15 +93,15 @@ class Clip:
 
     @property
     def roles(self) -> NDArray[np.integer]:
-        """(M,) numbers of the roles that it moves."""
+        """(M,) indices, in `ROLES`, of the roles that the gesture moves."""
         return np.array([INDEX[role] for role in self.curves], int)
 
     def at(self, times: Array | float) -> Array:
-        """(..., M, 4) of its roles at seconds (...)."""
+        """(..., M, 4) rotations wxyz of the moved roles at times (...) in seconds."""
         return np.stack([curve.at(times) for curve in self.curves.values()], -2)
 
     def mirrored(self) -> "Clip":
-        """The same with the other hand."""
+        """The mirror image of the gesture: left and right are exchanged."""
         curves = {
             mirrored_role(role): Curve(curve.times, mirrored(curve.rotations))
             for role, curve in self.curves.items()
@@ -113,15 +117,15 @@ def clip_of(
     roles: tuple[str, ...],
     tolerance: float = TOLERANCE,
 ) -> Clip:
-    """A clip of poses.
+    """Makes a clip from sampled poses.
 
     Args:
-        name: What it means.
-        marks: Its phases.
+        name: Name of the gesture.
+        marks: Times of its phases.
         times: (F,) seconds, ascending from 0.
-        poses: (F, R, 4) by role.
-        roles: Those that it moves.
-        tolerance: Degrees that a curve may be off.
+        poses: (F, R, 4) local rotations by role, wxyz.
+        roles: Roles that the gesture moves.
+        tolerance: Largest error of the curves at these times, degrees.
     """
     ticks = np.round(times, 3)
     curves = {role: reduced(ticks, continuous(poses[:, INDEX[role]]), tolerance) for role in roles}
@@ -129,12 +133,16 @@ def clip_of(
 
 
 def to_bytes(clips: dict[str, Clip]) -> bytes:
-    """A safetensors file: `CLIP/ROLE/times` uint16 ms and `CLIP/ROLE/rotations` int16."""
+    """Clips by name as a safetensors file, see `tensors_of` and `header_of`."""
     return save(tensors_of(clips), {"clips": header_of(clips)})
 
 
 def tensors_of(clips: dict[str, Clip]) -> dict[str, np.ndarray]:
-    """The arrays of such a file."""
+    """Arrays of a file of clips.
+
+    Returns:
+        `CLIP/ROLE/times` (K,) uint16 milliseconds and `CLIP/ROLE/rotations` (K, 4) int16.
+    """
     arrays: dict[str, np.ndarray] = {}
     for name, clip in clips.items():
         for role, curve in clip.curves.items():
@@ -144,16 +152,16 @@ def tensors_of(clips: dict[str, Clip]) -> dict[str, np.ndarray]:
 
 
 def header_of(clips: dict[str, Clip]) -> str:
-    """JSON in the header of such a file."""
+    """JSON text with version and marks of clips, for the header of their file."""
     marks = {name: vars(clip.marks) for name, clip in clips.items()}
     return json.dumps({"version": VERSION, "marks": marks})
 
 
 def from_bytes(content: bytes) -> dict[str, Clip]:
-    """The clips of a file.
+    """Clips by name from the content of a file of clips.
 
     Raises:
-        SettingsError: If it is damaged or holds what is no gesture.
+        SettingsError: If the file is damaged or does not hold gestures.
     """
     try:
         size = int.from_bytes(content[:8], "little")
@@ -180,12 +188,12 @@ def _clips(about: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[str, Cl
 
 
 def _ordered(curves: dict[str, Curve]) -> dict[str, Curve]:
-    """The curves in the order of the roles; those of no role last, to be refused."""
+    """Curves in the order of `ROLES`; those of unknown roles last, which `Clip` refuses."""
     return dict(sorted(curves.items(), key=lambda item: INDEX.get(item[0], len(ROLES))))
 
 
 def to_json(clip: Clip) -> str:
-    """A clip as text: times in milliseconds, int16 rotations in base64, little end first."""
+    """A clip as JSON: times in milliseconds, rotations as base64 of little-endian int16."""
     curves: dict[str, dict[str, Any]] = {}
     for role, curve in clip.curves.items():
         ticks, rotations = packed(curve)
@@ -196,10 +204,10 @@ def to_json(clip: Clip) -> str:
 
 
 def from_json(text: str) -> Clip:
-    """The clip of a text.
+    """The clip of a text that `to_json` wrote.
 
     Raises:
-        SettingsError: If it is damaged or holds what is no gesture.
+        SettingsError: If the text is damaged or does not describe a gesture.
     """
     try:
         about = cast(dict[str, Any], parse_json(text.encode(), "the clip", ValueError))

@@ -1,9 +1,10 @@
-"""Rotations over time as few keys: cubic between them, 16 bits a number.
+"""Rotations over time as curves with few keys, stored with 16 bits per number.
 
-Between keys i and i + 1, h seconds apart, with v = log(q_i⁻¹ q_{i+1}) (a rotation vector), the
-rotation a part s of the way is q_i · exp(p(s)), p the cubic Hermite curve from 0 to v with slopes
-h·ω_i and h·ω_{i+1}. ω_i is the mean of the angular velocities before and after key i, each weighted
-with the time of the other; 0 at the ends, outside of which a curve stays.
+Let keys i and i + 1 be h seconds apart, and v = log(q_i⁻¹ q_{i+1}) the rotation vector between
+them. At a share s of the time between them the rotation is q_i · exp(p(s)), where p is the cubic
+Hermite curve from 0 to v with slopes h·ω_i and h·ω_{i+1}. The angular velocity ω_i is the mean of
+those before and after key i, each weighted by the duration of the other; it is 0 at the first and
+last key. Before the first and after the last key a curve is constant.
 """
 
 from dataclasses import dataclass
@@ -22,34 +23,34 @@ from ico3d.rig.quaternions import (
 )
 
 TOLERANCE = 0.5
-"""Degrees that a stored curve may be off, at most, at any sample that it was made of."""
+"""Default of the largest error of a stored curve at the samples it was made from, degrees."""
 SCALE = 32767
-"""int16 of 1."""
+"""The int16 that stands for 1."""
 TICKS = 1000.0
-"""Key times are whole milliseconds."""
+"""Ticks per second of stored key times, which are whole milliseconds."""
 LONGEST = 60.0
-"""Seconds; no clip is longer."""
+"""Longest duration of a curve, seconds."""
 _SPARE = 0.01
-"""Degrees that rounding to 16 bits takes of the tolerance, at most."""
+"""Part of the tolerance, in degrees, that is reserved for rounding to 16 bits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One role's rotation over time.
+    """A rotation over time, given by K ≥ 1 keys.
 
     Attributes:
-        times: (K,) seconds, ascending from 0, K ≥ 1.
-        rotations: (K, 4) wxyz.
+        times: (K,) seconds, ascending from 0.
+        rotations: (K, 4) unit quaternions wxyz.
     """
 
     times: Array
     rotations: Array
 
     def __post_init__(self):
-        """Checks what a file may hold.
+        """Checks shapes and values, which may come from a file.
 
         Raises:
-            ValueError: In one sentence, where it is no curve.
+            ValueError: If they do not make a curve.
         """
         times, rotations = self.times, self.rotations
         if times.ndim != 1 or not len(times) or rotations.shape != (len(times), 4):
@@ -62,7 +63,7 @@ class Curve:
             raise ValueError("a curve holds a rotation that is not of length 1")
 
     def at(self, times: Array | float) -> Array:
-        """(..., 4) at seconds (...)."""
+        """(..., 4) rotations wxyz at times (...) in seconds."""
         times = np.asarray(times, float)
         if len(self.times) == 1:
             return np.broadcast_to(self.rotations[0], (*times.shape, 4)).copy()
@@ -71,8 +72,8 @@ class Curve:
         )
         span = self.times[index + 1] - self.times[index]
         part = np.clip((times - self.times[index]) / span, 0, 1)
-        steps, slopes = _steps(self.times, self.rotations)
-        s, h = part[..., None], span[..., None]
+        steps, slopes = _steps(self.times, self.rotations)  # (K − 1, 3), (K, 3)
+        s, h = part[..., None], span[..., None]  # (..., 1)
         turn = s * s * (3 - 2 * s) * steps[index]
         turn = turn + h * s * (1 - s) * ((1 - s) * slopes[index] - s * slopes[index + 1])
         return multiply(self.rotations[index], from_rotvec(turn))
@@ -89,17 +90,19 @@ def _steps(times: Array, rotations: Array) -> tuple[Array, Array]:
 
 
 def angles(a: Array, b: Array) -> Array:
-    """(...) degrees between rotations (..., 4)."""
+    """(...) angles in degrees between rotations (..., 4)."""
     return np.degrees(np.linalg.norm(to_rotvec(multiply(conjugate(a), b)), axis=-1))
 
 
 def reduced(times: Array, rotations: Array, tolerance: float = TOLERANCE) -> Curve:
-    """A curve with few keys: where it is off most, between two keys, it gets another.
+    """A curve with few keys through sampled rotations.
+
+    Between two keys another key is added where the error is largest, until it is small enough.
 
     Args:
-        times: (F,) seconds, whole milliseconds, ascending from 0.
-        rotations: (F, 4), neighbours of like sign.
-        tolerance: Degrees that it may be off at these times.
+        times: (F,) seconds in whole milliseconds, ascending from 0.
+        rotations: (F, 4) wxyz, with signs that do not jump between neighbours.
+        tolerance: Largest error at these times, degrees.
     """
     if angles(rotations[:1], rotations).max() <= tolerance - _SPARE:
         return Curve(times[:1], rotations[:1])
@@ -118,16 +121,16 @@ def reduced(times: Array, rotations: Array, tolerance: float = TOLERANCE) -> Cur
 
 
 def packed(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
-    """(K,) uint16 milliseconds and (K, 4) int16 of a curve."""
+    """A curve as it is stored: times (K,) uint16 in milliseconds, rotations (K, 4) int16."""
     ticks = np.round(curve.times * TICKS).astype(np.uint16)
     return ticks, np.round(curve.rotations * SCALE).astype(np.int16)
 
 
 def unpacked(ticks: np.ndarray, rotations: np.ndarray) -> Curve:
-    """The curve that was packed.
+    """The curve of stored times (K,) in milliseconds and rotations (K, 4) of whole numbers.
 
     Raises:
-        ValueError: If it is none.
+        ValueError: If they do not make a curve.
     """
     if rotations.dtype.kind not in "iu" or ticks.dtype.kind not in "iu":
         raise ValueError("a curve's numbers are no whole ones")

@@ -1,7 +1,7 @@
-"""What a page must know of somebody to move their rig by role: measured here, once.
+"""A person's figure: measures that a page needs to pose the person's rig by role.
 
-A page has the rig's joints; what follows from them by measuring (`retarget`, `hanging`,
-`stance_of`) travels as numbers, so that only the arithmetic of every moment is written twice.
+A page knows the rig's joints. What `retarget`, `hanging` and `stance_of` measure on them is sent as
+numbers, so that only the computation of poses has to be written twice, in Python and TypeScript.
 """
 
 import math
@@ -13,19 +13,23 @@ from ico3d.motion.roles import INDEX, ROLES, SIDES
 from ico3d.motion.standing import Stance
 
 NEAR = 1e-6
-"""Metres, and parts of a quaternion, that figures of one rig may differ by between machines."""
+"""Largest difference of numbers, such as metres, between figures of one rig on two machines."""
 
 
 def figure_of(living: Living) -> dict[str, Any]:
-    """A person's figure, for JSON.
+    """A person's figure as values for JSON.
 
     Returns:
-        `height` metres; `eyes` (3,) metres at rest; `hung` (R, 4); `sink` metres; `parts`: for each
-        role that the rig has its `role`, `joints`, `standard` (4,), `turn` radians, `shares` of the
-        twist (null where joints share the whole rotation evenly) and, for all joints but the first,
-        the `axes` (3,) that they twist about; `hips` (3,) metres at rest; `legs` by side: `hip` at
-        rest and `ankle` as it stands (3,), `lengths` (2,) metres, unit directions `upper`, `lower`
-        and `hinge` (3,) at rest.
+        - `height`: `Person.height`, metres;
+        - `eyes`: (3,) point between the eyes at rest, metres;
+        - `hung`: (R, 4) pose by role with hanging arms;
+        - `sink`: `Stance.sink`, metres;
+        - `parts`: for each role of the rig its name `role`, the indices of its `joints`, `standard`
+          (4,), `turn` in radians, `shares` of the twist (null where joints share the whole rotation
+          evenly), and `axes` (3,) about which joints after the first one twist;
+        - `hips`: (3,) joint of the hips at rest, metres;
+        - `legs`: by side, `hip` (3,) at rest and `ankle` (3,) where the person stands, metres,
+          `lengths` (2,) of the bones, and unit vectors `upper`, `lower` and `hinge` (3,) at rest.
     """
     person, stance = living.person, living.stance
     return {
@@ -65,7 +69,7 @@ def _leg(stance: Stance, side: str) -> dict[str, Any]:
 
 
 def alike(one: Any, other: Any) -> bool:
-    """Whether two figures are of one rig."""
+    """Whether two figures are of the same rig: equal but for rounding (`NEAR`)."""
     if isinstance(one, dict) and isinstance(other, dict):
         mine, theirs = cast(dict[str, Any], one), cast(dict[str, Any], other)
         return mine.keys() == theirs.keys() and all(alike(mine[key], theirs[key]) for key in mine)

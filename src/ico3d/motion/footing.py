@@ -1,4 +1,4 @@
-"""Where somebody stands in the world, who in rest space stands at its origin and faces +z."""
+"""Moves poses from rest space, where a person faces +z, to where the person was recorded."""
 
 from dataclasses import dataclass
 
@@ -14,12 +14,12 @@ UP = np.array([0.0, 1.0, 0.0])
 
 @dataclass(frozen=True, eq=False)
 class Footing:
-    """Takes poses of rest space to where somebody was recorded.
+    """The rigid motion from rest space to where a person was recorded.
 
     Attributes:
-        turn: (4,) wxyz about the vertical.
-        origin: (3,) metres in the world, of rest space.
-        pivot: (3,) metres, joint 0 at rest.
+        turn: (4,) rotation about the vertical, wxyz.
+        origin: (3,) position of rest space's origin in the world, metres.
+        pivot: (3,) position of joint 0 at rest, metres.
     """
 
     turn: Array
@@ -27,11 +27,15 @@ class Footing:
     pivot: Array
 
     def place(self, rotations: Array, root: Array) -> tuple[Array, Array]:
-        """Poses in the world.
+        """Moves poses from rest space to the world.
 
         Args:
-            rotations: (..., J, 4) wxyz of each joint about itself, in rest space.
-            root: (..., 3) metres that the root moves there.
+            rotations: (..., J, 4) local rotation of each joint, wxyz.
+            root: (..., 3) translation of the root in rest space, metres.
+
+        Returns:
+            (..., J, 4) and (..., 3): the same poses, with the root's rotation and translation in
+            the world.
         """
         turned = np.array(rotations, np.float64)  # (..., J, 4)
         turned[..., 0, :] = multiply(self.turn, turned[..., 0, :])
@@ -39,12 +43,12 @@ class Footing:
 
 
 def footing(living: Living, rotations: Array, root: Array) -> Footing:
-    """Feet where they are in a recorded pose, the person turned as the hips are about the vertical.
+    """Footing that keeps the feet, and the direction of the hips, of a recorded pose.
 
     Args:
-        living: How somebody stands in rest space.
-        rotations: (J, 4) wxyz of each joint about itself, recorded.
-        root: (3,) metres that the root moves.
+        living: How the person stands in rest space.
+        rotations: (J, 4) local rotations of the recorded pose, wxyz.
+        root: (3,) translation of the root in the recorded pose, metres.
     """
     person = living.person
     joints = person.cast.joints

@@ -1,4 +1,4 @@
-"""The living rest: somebody who stands breathes, shifts their weight and is never quite still."""
+"""The living rest: a standing person breathes, shifts their weight and is never quite still."""
 
 from dataclasses import dataclass
 
@@ -15,29 +15,30 @@ from ico3d.rig.quaternions import Array, from_rotvec, multiply
 from ico3d.rig.rig import Rig
 
 Turn = tuple[float, float, float]
+"""Degrees about x, y and z."""
 BREATH = 4.1
-"""Seconds of a breath: 15 a minute, as people at rest."""
+"""Duration of a breath in seconds: 15 per minute, as of people at rest."""
 WEIGHT = 9.7
-"""Seconds of the quickest of the sines that shift the weight."""
+"""Period in seconds of the quickest of the sines that shift the weight."""
 SHIFT = 0.011
-"""Heights that the hips go to each side."""
+"""Displacement of the hips to each side, relative to `Person.height`."""
 DROP = 0.0035
-"""Heights that the hips sink when the weight is on one leg."""
+"""How far the hips sink when the weight is on one leg, relative to height."""
 SWAY = 0.003
-"""Heights that they go forwards and back."""
+"""Displacement of the hips forwards and back, relative to height."""
 _BREATHING = np.radians((-1.1, 0.9, 1.0))
-"""How far a breath turns chest, head and collarbones."""
+"""Angles in radians by which a breath turns chest, head and collarbones."""
 
 
 @dataclass(frozen=True, eq=False)
 class Living:
-    """Somebody at rest.
+    """A person at rest.
 
     Attributes:
-        person: Who.
-        stance: Where the feet are.
-        hung: (R, 4) by role with hanging arms.
-        seed: Decides all that is by chance.
+        person: Who it is.
+        stance: Where the feet stand.
+        hung: (R, 4) pose by role with hanging arms, wxyz.
+        seed: Seed of all random movements.
     """
 
     person: Person
@@ -46,16 +47,17 @@ class Living:
     seed: int
 
     def at(self, times: Array | float) -> tuple[Array, Array]:
-        """How the person stands at any seconds (...).
+        """Poses of the person at rest at times (...) in seconds.
 
         Returns:
-            (..., R, 4) by role, and (..., 3) metres that the root moves from rest.
+            (..., R, 4) local rotations by role, wxyz, and (..., 3) translation of the root from
+            rest, metres.
         """
         times = np.asarray(times, float)
         pose = np.broadcast_to(self.hung, (*times.shape, *self.hung.shape)).copy()
         breath = self.breath(times)
         weight = self._wander(times, WEIGHT, 1)
-        weight = 1.6 * weight / np.sqrt(1 + 1.6 * weight * weight)  # lingers on one leg
+        weight = 1.6 * weight / np.sqrt(1 + 1.6 * weight * weight)  # stays longer on one leg
         self._turn_torso(times, breath, weight, pose)
         self._swing_arms(times, breath, pose)
         height = self.person.height
@@ -71,15 +73,15 @@ class Living:
         return pose, root
 
     def breath(self, times: Array) -> Array:
-        """(...) −1 (out) to 1 (in)."""
+        """(...) state of the breath at times (...) in seconds, from −1 (out) to 1 (in)."""
         phase = 2 * np.pi * times / BREATH + 0.9 * self._wander(times, 13.1, 0)
-        return np.sin(phase + 0.35 * np.sin(phase))  # in faster than out
+        return np.sin(phase + 0.35 * np.sin(phase))  # breathing in is faster than out
 
     def _wander(self, times: Array, period: float, channel: int) -> Array:
         return wander(times, period, self.seed, channel)
 
     def _vector(self, times: Array, period: float, channel: int, degrees: Turn) -> Array:
-        """(..., 3) rotation vectors of so many degrees, each coordinate by itself."""
+        """(..., 3) random rotation vectors, with coordinates of up to these degrees."""
         rows = [self._wander(times, period, channel + i) for i in range(3)]
         return np.stack(rows, -1) * np.radians(degrees)
 
@@ -114,15 +116,16 @@ class Living:
 
 
 def living(rig: Rig, seed: int, hung: Array | None = None) -> Living:
-    """Somebody at rest.
+    """Makes a person at rest from a rig.
 
     Args:
-        rig: Whose body.
-        seed: Decides all that is by chance.
-        hung: (R, 4) by role, how their arms hang; by default as near as the body allows.
+        rig: The person's skeleton.
+        seed: Seed of all random movements.
+        hung: (R, 4) pose by role with hanging arms; by default they hang as near to the body as its
+            width allows (`hanging`).
 
     Raises:
-        SettingsError: If the rig lacks a role without which nobody stands.
+        SettingsError: If the rig lacks a role that is needed to stand or gesture.
     """
     person = person_of(rig)
     hung = hanging(person) if hung is None else hung

@@ -1,7 +1,7 @@
-"""Chance that is a function: the same for the same numbers, in every language.
+"""Random numbers that are functions of whole numbers, equal in Python and TypeScript.
 
-Everything random comes from a hash of 32-bit integers; what varies over time is a sum of sines
-whose periods have no common multiple within hours, so that it never repeats.
+All of them come from a hash of 32-bit integers. Values that vary over time are sums of sines whose
+periods have no common multiple within hours, so that they never repeat.
 """
 
 import math
@@ -12,12 +12,13 @@ from ico3d.rig.quaternions import Array
 
 _WORD = 0xFFFFFFFF
 RATIOS = (1.0, 0.618034, 0.414214)
-"""Frequencies of the sines, next to the first: no two are multiples."""
+"""Frequencies of the sines, relative to the first; none is a multiple of another."""
 WEIGHTS = (0.5, 0.3, 0.2)
+"""Amplitudes of the sines, with sum 1."""
 
 
 def scrambled(*numbers: int) -> int:
-    """A hash, 0 to 2³² − 1, of whole numbers below 2³², in their order."""
+    """A hash from 0 to 2³² − 1 of whole numbers below 2³²; their order matters."""
     state = 0x9E3779B9
     for number in numbers:
         state = (state ^ (number & _WORD)) & _WORD
@@ -28,18 +29,18 @@ def scrambled(*numbers: int) -> int:
 
 
 def chance(*numbers: int) -> float:
-    """0 ≤ x < 1 by the hash of whole numbers."""
+    """A random number 0 ≤ x < 1 from the hash of whole numbers."""
     return scrambled(*numbers) / 4294967296.0
 
 
 def wander(times: Array | float, period: float, seed: int, channel: int) -> Array:
-    """(...) in −1 … 1 at seconds (...): slow, smooth, never the same twice.
+    """(...) slow, smooth values between −1 and 1 that do not repeat.
 
     Args:
-        times: Seconds.
-        period: Of the quickest of its sines, seconds.
-        seed: Whose.
-        channel: Tells apart what one person does.
+        times: (...) seconds.
+        period: Period of the quickest sine, seconds; it varies by a tenth with seed and channel.
+        seed: Seed of the person.
+        channel: Number of the movement; different movements of a person are independent.
     """
     times = np.asarray(times, float)
     found = np.zeros_like(times)

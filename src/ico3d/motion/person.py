@@ -1,4 +1,4 @@
-"""A rig's own proportions: where its chin and chest are, how long its arms, how thick its body."""
+"""Measures a rig's proportions: positions of chin and chest, lengths of arms, thickness."""
 
 from dataclasses import dataclass
 
@@ -10,22 +10,22 @@ from ico3d.rig.quaternions import Array, rotate
 from ico3d.rig.rig import Rig
 
 CHIN = np.array([0.0, -0.073, 0.006])
-"""From between the eyes to the tip of the chin, in heights."""
+"""(3,) from between the eyes to the tip of the chin, relative to `Person.height`."""
 EYES = np.array([0.0, 0.023, 0.046])
-"""From the head's joint to between the eyes, in heights, where a rig has no eyes."""
+"""(3,) from the head's joint to between the eyes, relative to height; for rigs without eyes."""
 CHEST = np.array([0.0, -0.08, 0.10])
-"""From between the shoulders to the skin of the breastbone, in heights."""
+"""(3,) from between the shoulders to the skin of the breastbone, relative to height."""
 HAND = 0.075
-"""From the wrist to the knuckles, in heights, where a rig has no fingers."""
+"""Distance from wrist to knuckles, relative to height; for rigs without fingers."""
 
 
 @dataclass(frozen=True)
 class Thickness:
-    """Half extents in heights of what hands must not go through.
+    """Sizes of body parts that hands must not go through, relative to `Person.height`.
 
     Attributes:
         torso: Half width and half depth of trunk and thighs.
-        head: Half width, half height, half depth.
+        head: Half width, half height and half depth of the head.
         arm: Radius of forearm and hand.
     """
 
@@ -36,14 +36,14 @@ class Thickness:
 
 @dataclass(frozen=True, eq=False)
 class Person:
-    """A rig and what is measured on it, at rest, in metres of rest space.
+    """A rig with its measures, in metres of rest space.
 
     Attributes:
         retarget: Poses the rig by role.
-        height: Of the head's joint above the ankles.
-        chin: (3,) its tip.
-        chest: (3,) the skin of the breastbone.
-        thickness: Of its parts.
+        height: Height of the head's joint above the ankles; other lengths are relative to it.
+        chin: (3,) tip of the chin at rest.
+        chest: (3,) skin of the breastbone at rest.
+        thickness: Sizes of body parts.
     """
 
     retarget: Retarget
@@ -54,52 +54,60 @@ class Person:
 
     @property
     def rig(self) -> Rig:
-        """Whose."""
+        """The person's skeleton."""
         return self.retarget.rig
 
     @property
     def cast(self) -> Cast:
-        """Which joint plays which role."""
+        """Which joints of the rig play which role."""
         return self.retarget.cast
 
     @property
     def eyes(self) -> Array:
-        """(3,) between the eyes."""
+        """(3,) point between the eyes at rest, metres."""
         return self.chin - self.height * CHIN
 
     def place(self, role: str) -> Array:
-        """(3,) where a role's first joint is at rest."""
+        """(3,) position of a role's first joint at rest, metres."""
         return self.cast.place(role)
 
     def lengths(self, limb: tuple[str, str, str]) -> tuple[float, float]:
-        """Metres between the three joints of a limb, by role."""
+        """Lengths in metres of the two bones between the three roles of a limb."""
         a, b, c = (self.place(role) for role in limb)
         return float(np.linalg.norm(b - a)), float(np.linalg.norm(c - b))
 
     def arm(self, side: str) -> float:
-        """Metres from shoulder to wrist of a straight arm."""
+        """Length of the straight arm from shoulder to wrist, metres."""
         return sum(self.lengths((f"{side}_shoulder", f"{side}_elbow", f"{side}_wrist")))
 
     def hand(self, side: str) -> float:
-        """Metres from the wrist to the middle finger's knuckle."""
+        """Distance from the wrist to the middle finger's knuckle, metres."""
         if not self.cast.has_fingers(side):
             return HAND * self.height
         knuckle = self.place(f"{side}_middle1") - self.place(f"{side}_wrist")
         return float(np.linalg.norm(knuckle))
 
     def posed(self, by_role: Array, root: Array) -> dict[str, Array]:
-        """(..., 3) metres in the world where the first joint of each role is."""
+        """Positions of each role's first joint in a pose, without footing.
+
+        Args:
+            by_role: (..., R, 4) local rotations by role, wxyz.
+            root: (..., 3) translation of the root from rest, metres.
+
+        Returns:
+            For each role of the rig, (..., 3) metres.
+        """
         places = self.rig.posed(self.retarget.pose(by_role), root)[1]
         return {role: places[..., j[0], :] for role, j in self.cast.joints.items()}
 
     def carried(self, role: str, point: Array, rotations: Array, root: Array) -> Array:
-        """(..., 3) where a point (..., 3) of rest space goes that hangs on a role's last joint.
+        """(..., 3) position in a pose of a point that is fixed to a role's last joint, metres.
 
         Args:
-            role: Who carries it.
-            point: At rest.
-            rotations: (..., J, 4) of the rig.
-            root: (..., 3) metres that the root moves.
+            role: Role whose last joint carries the point.
+            point: (..., 3) position at rest, metres.
+            rotations: (..., J, 4) local rotations of the rig's joints, wxyz.
+            root: (..., 3) translation of the root from rest, metres.
         """
         turned, places = self.rig.posed(rotations, root)
         joint = self.cast.joints[role][-1]
@@ -111,7 +119,7 @@ def person_of(rig: Rig) -> Person:
     """Measures a rig.
 
     Raises:
-        SettingsError: If it lacks a role without which nobody stands or gestures.
+        SettingsError: If the rig lacks a role that is needed to stand or gesture.
     """
     fitted = retarget(rig)
     cast = fitted.cast

@@ -1,4 +1,4 @@
-"""What a page needs to move somebody, as one file: their figure and their gestures."""
+"""The file with which a page moves a person: the person's figure and gestures."""
 
 import json
 from typing import Any, cast
@@ -17,10 +17,13 @@ from ico3d.rig.rig import Rig
 
 
 def preferring(recorded: dict[str, Clip], others: dict[str, Clip]) -> dict[str, Clip]:
-    """All that somebody recorded, and of other clips those that mean something else.
+    """Recorded clips, and those other clips whose meaning no recorded clip has.
 
-    A beat that was recorded with one hand stands for that of the other hand, too: composers mirror
-    it.
+    A gesture recorded with one hand replaces that of the other hand, too: composers mirror it.
+
+    Args:
+        recorded: Clips by name, which are all kept.
+        others: Clips by name.
     """
     meant = {meaning(name) for name in recorded}
     meant |= {other_hand(name) for name in meant}
@@ -28,34 +31,38 @@ def preferring(recorded: dict[str, Clip], others: dict[str, Clip]) -> dict[str, 
 
 
 def repertoire_bytes(somebody: Living, clips: dict[str, Clip], cuts: str = "") -> bytes:
-    """A safetensors file: clips as `clip.to_bytes` has them, the figure as JSON in the header.
+    """A safetensors file of clips (as by `clip.to_bytes`), with the figure as JSON in its header.
 
     Args:
-        somebody: Of the rig as the page has it, whose joints may have been rounded.
-        clips: By name.
-        cuts: Which frames of the recording they are of (`recorded.cut.to_toml`), for people.
+        somebody: The person, with the rig as the page has it: its joints may have been rounded.
+        clips: Clips by name.
+        cuts: Text of `recorded.cut.to_toml`, which says from which frames clips were made.
     """
     figure = json.dumps(figure_of(somebody))
     return save(tensors_of(clips), {"clips": header_of(clips), "figure": figure, "cuts": cuts})
 
 
 def clips_for(content: bytes, rig: Rig) -> dict[str, Clip]:
-    """The clips of a file that was written for a rig.
+    """The clips, by name, of a file that was written for a rig.
+
+    Args:
+        content: Content of the file.
+        rig: The rig, whose figure the file must have.
 
     Raises:
         SettingsError: If the file is damaged, or its figure is not that of the rig.
     """
-    clips = from_bytes(content)  # it is sound from here on, but for the figure
+    clips = from_bytes(content)  # raises for a damaged file; the figure is checked below
     if not alike(figure_of(living(rig, 0, hung_of(content))), _figure(content)):
         raise SettingsError("the file of gestures was made for another rig.")
     return clips
 
 
 def hung_of(content: bytes) -> Array:
-    """(R, 4) by role: how arms hang, of a sound file but for its figure.
+    """(R, 4) pose by role with hanging arms, from the figure in a file of `repertoire_bytes`.
 
     Raises:
-        SettingsError: If its figure does not say so in rotations.
+        SettingsError: If the file has no figure with such rotations.
     """
     figure = _figure(content)
     try:
@@ -76,12 +83,12 @@ def _figure(content: bytes) -> Any:
 
 
 def cuts_text(content: bytes) -> str:
-    """Which frames of a recording the clips of a sound file are of; empty where nobody says."""
+    """The text of cuts in a file of `repertoire_bytes`; empty where it has none."""
     return _metadata(content, "cuts")
 
 
 def _metadata(content: bytes, name: str) -> str:
-    """A text in the header of a safetensors file; empty where there is none."""
+    """A text in the header of a valid safetensors file; empty where there is none."""
     size = int.from_bytes(content[:8], "little")
     header = cast(dict[str, Any], json.loads(content[8 : 8 + size]))
     return header["__metadata__"].get(name, "")

@@ -1,10 +1,10 @@
-"""Takes poses by role to a rig, whatever its rest pose, and back.
+"""Converts poses by role to rotations of a rig's joints, whatever the rig's rest pose, and back.
 
-A pose by role is (..., R, 4): each role's rotation about itself, from the *standard pose*, in which
-somebody stands with hanging arms, palms to the thighs, fingers straight. In the world a role is
-turned by C_r = C_parent · c_r; the bone that points along d in the standard pose points along
-C_r d, in every rig. A rig's rest differs: S_r is the rotation that takes what hangs on the role's
-joint from the rig's rest to the standard pose, so that its joint turns by C_r · S_r from rest.
+A pose by role is (..., R, 4): the local rotation c_r of each role from the *standard pose*, in
+which a person stands with hanging arms, palms to the thighs and straight fingers. In the world a
+role is rotated by C_r = C_parent · c_r: a bone with direction d in the standard pose has direction
+C_r d, in every rig. As a rig's rest pose differs from the standard pose, S_r is the rotation of the
+role's joint from rest to the standard pose; so the joint is rotated by C_r · S_r from rest.
 """
 
 from dataclasses import dataclass
@@ -17,15 +17,15 @@ from ico3d.rig.quaternions import IDENTITY, Array, conjugate, multiply, rotate
 from ico3d.rig.rig import Rig
 
 DOWN = np.array([0.0, -1.0, 0.0])
-"""Where arms, hands and fingers point in the standard pose."""
+"""(3,) direction of arms, hands and fingers in the standard pose."""
 HINGE = np.array([-1.0, 0.0, 0.0])
-"""About which elbows bend in the standard pose, both of them."""
+"""(3,) axis about which both elbows bend in the standard pose."""
 PALM = {"left": np.array([-1.0, 0.0, 0.0]), "right": np.array([1.0, 0.0, 0.0])}
-"""Where palms look in the standard pose."""
+"""(3,) directions in which palms look in the standard pose."""
 STRAIGHT = 0.1
-"""Sine of the bend of an elbow at rest below which its hinge cannot be seen."""
+"""Sine of an elbow's bend at rest, below which its hinge axis cannot be measured."""
 GIRDLE = 0.13
-"""Part of an arm's lifting, in the frontal plane, that its collarbone goes along with."""
+"""Share of the angle by which an arm is lifted at rest that its collarbone has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +33,12 @@ class Retarget:
     """A rig that can be posed by role.
 
     Attributes:
-        cast: Who plays what.
-        standard: (R, 4) S of each role.
-        turn: (R,) radians that forearms are turned at the wrist, from their rest with S at the
-            elbow, to bring the palm to the thigh.
-        chains: For each role its joints with their part of the twist, or None where joints share
-            the whole rotation evenly.
+        cast: Which joints of the rig play which role.
+        standard: (R, 4) S_r of each role, wxyz.
+        turn: (R,) angle in radians, not 0 for the roles of elbows: the twist of the forearm, beyond
+            S_r, that brings the palm to the thigh in the standard pose.
+        chains: For each role of the rig, the share of the twist that each of its joints takes, or
+            None where joints share the whole rotation evenly.
     """
 
     cast: Cast
@@ -48,17 +48,18 @@ class Retarget:
 
     @property
     def rig(self) -> Rig:
-        """Whose."""
+        """The rig that is posed."""
         return self.cast.rig
 
     def pose(self, by_role: Array) -> Array:
-        """Rotations of all joints.
+        """Rotations of all joints for a pose by role.
 
         Args:
-            by_role: (..., R, 4).
+            by_role: (..., R, 4) local rotations by role, wxyz.
 
         Returns:
-            (..., J, 4) for `Rig.posed`. A role that the rig lacks moves what its child plays.
+            (..., J, 4) local rotations of joints for `Rig.posed`. The rotation of a role that the
+            rig lacks is added to that of the roles below it.
         """
         wanted = self.world(by_role)
         plan = {joints[0]: role for role, joints in self.cast.joints.items()}
@@ -72,7 +73,7 @@ class Retarget:
         return local
 
     def world(self, by_role: Array) -> Array:
-        """(..., R, 4) C: how each role is turned in the world from the standard pose."""
+        """(..., R, 4) rotations C_r in the world, from the standard pose, of poses by role."""
         found = np.array(by_role, np.float64)  # (..., R, 4)
         for number, parent in enumerate(PARENTS):
             if parent >= 0:
@@ -80,10 +81,10 @@ class Retarget:
         return found
 
     def by_role(self, rotations: Array) -> Array:
-        """(..., R, 4) of rotations (..., J, 4): what `pose` undoes.
+        """(..., R, 4) pose by role of local rotations (..., J, 4); inverse of `pose`.
 
-        What joints without a role do is laid upon those below; a role that the rig lacks, and
-        legs' twist joints, turn with their parents.
+        Rotations of joints without a role are added to roles below them. A role that the rig
+        lacks has no rotation of its own.
         """
         turned = self.rig.posed(rotations, np.zeros(3))[0]  # (..., J, 4)
         world = np.zeros((*rotations.shape[:-2], len(ROLES), 4))  # (..., R, 4)
@@ -100,7 +101,10 @@ class Retarget:
         return local
 
     def _read_twists(self, turned: Array, world: Array) -> None:
-        """Twists of arms, which joints share: upper arms tell theirs, hands that of forearms."""
+        """Sets shoulder and elbow in `world`, as their joints share the twists of arms.
+
+        An upper arm's twist follows from that of its first joint, a forearm's from the hand.
+        """
         for side in SIDES:
             shoulder, elbow, wrist = (INDEX[f"{side}_{n}"] for n in ("shoulder", "elbow", "wrist"))
             bare = self._first(turned, shoulder)
@@ -113,12 +117,20 @@ class Retarget:
             world[..., elbow, :] = multiply(bare, about(DOWN, angle))
 
     def _first(self, turned: Array, number: int) -> Array:
-        """(..., 4) how a role's first joint is turned from the standard pose."""
+        """(..., 4) rotation in the world of a role's first joint, from the standard pose."""
         joint = self.cast.joints[ROLES[number]][0]
         return multiply(turned[..., joint, :], conjugate(self.standard[number]))
 
     def _turn(self, role: str, by_role: Array, wanted: Array, before: Array, local: Array) -> None:
-        """Sets the rotations of a role's joints; the first one's parent is turned by `before`."""
+        """Sets the local rotations of a role's joints.
+
+        Args:
+            role: The role.
+            by_role: (..., R, 4) pose by role.
+            wanted: (..., R, 4) rotations C_r in the world.
+            before: (..., 4) rotation in the world of the parent of the role's first joint.
+            local: (..., J, 4), changed in place.
+        """
         number, joints = INDEX[role], self.cast.joints[role]
         shares = self.chains[role]
         if shares is None:
@@ -137,7 +149,7 @@ class Retarget:
             local[..., joint, :] = about(self.bone(role, joint), share * angle)
 
     def bone(self, role: str, joint: int) -> Array:
-        """(3,) direction at rest from a joint to where the role below begins."""
+        """(3,) unit direction at rest from a joint of a role to the next role's first joint."""
         child = ROLES[PARENTS.index(INDEX[role])]
         return unit(self.cast.place(child) - self.rig.joints[joint])
 
@@ -146,7 +158,7 @@ def retarget(rig: Rig) -> Retarget:
     """Prepares a rig to be posed by role.
 
     Raises:
-        SettingsError: If the rig lacks a role without which nobody stands or gestures.
+        SettingsError: If the rig lacks a role that is needed to stand or gesture.
     """
     found = cast(rig)
     standard = np.tile(IDENTITY, (len(ROLES), 1))  # (R, 4)
@@ -162,7 +174,7 @@ def retarget(rig: Rig) -> Retarget:
 
 
 def _arm(found: Cast, side: str, standard: Array, turn: Array) -> None:
-    """S of an arm, from its bones."""
+    """Sets S_r of the roles of an arm, and the twist of its forearm, from the bones at rest."""
     clavicle, shoulder, elbow, wrist = (
         INDEX[f"{side}_{part}"] for part in ("clavicle", "shoulder", "elbow", "wrist")
     )
@@ -187,7 +199,7 @@ def _arm(found: Cast, side: str, standard: Array, turn: Array) -> None:
 
 
 def _palm(found: Cast, side: str) -> tuple[Array, Array]:
-    """(3,) direction of a hand at rest, and (3,) where its palm looks."""
+    """(3,) direction of a hand at rest, and (3,) direction in which its palm looks."""
     index, middle, little = (
         found.place(f"{side}_{finger}1") for finger in ("index", "middle", "little")
     )
@@ -197,7 +209,10 @@ def _palm(found: Cast, side: str) -> tuple[Array, Array]:
 
 
 def _hand(found: Cast, side: str, standard: Array) -> None:
-    """S of the fingers: straight beside one another; thumbs stay as they are on the hand."""
+    """Sets S_r of the fingers, so that they are straight and parallel.
+
+    Thumbs keep their rest pose relative to the hand.
+    """
     wrist = standard[INDEX[f"{side}_wrist"]]
     palm = PALM[side]
     for finger in ("thumb", "index", "middle", "ring", "little"):
@@ -210,4 +225,4 @@ def _hand(found: Cast, side: str, standard: Array) -> None:
         for first, second, number in zip(places, places[1:], numbers, strict=False):
             along = rotate(wrist, unit(second - first))
             standard[number] = multiply(aligned((along, across(palm, along)), (DOWN, palm)), wrist)
-        standard[numbers[2]] = standard[numbers[1]]  # where its tip is no joint tells
+        standard[numbers[2]] = standard[numbers[1]]  # no joint tells where the fingertip is

@@ -1,4 +1,4 @@
-"""Which joint of a rig plays which role: what gestures are written for, whatever rig they meet."""
+"""Roles: names of joints that are the same for all rigs, for which gestures are written."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -19,7 +19,7 @@ LEG = ("hip", "knee", "ankle")
 
 
 def _tree() -> dict[str, str | None]:
-    """Each role's parent, parents first."""
+    """The parent of each role, None for the hips; parents come before their children."""
     tree: dict[str, str | None] = dict(zip(TORSO, (None, *TORSO), strict=False))
     for side in SIDES:
         chain = ("chest", *(f"{side}_{part}" for part in ARM))
@@ -37,13 +37,14 @@ _PARENT_OF = _tree()
 ROLES = tuple(_PARENT_OF)
 """Names of the R roles, parents before children."""
 INDEX = {role: number for number, role in enumerate(ROLES)}
+"""Index of each role in `ROLES`."""
 PARENTS = tuple(-1 if parent is None else INDEX[parent] for parent in _PARENT_OF.values())
-"""Number of each role's parent; −1 for the hips."""
+"""Index of each role's parent; −1 for the hips."""
 NEEDED = (
     *("hips", "chest", "head"),
     *(f"{side}_{part}" for side in SIDES for part in ("shoulder", "elbow", "wrist", *LEG)),
 )
-"""Roles without which nobody stands or gestures."""
+"""Roles that a rig must have to stand and gesture."""
 
 
 def arm_roles(side: str) -> tuple[str, ...]:
@@ -53,17 +54,17 @@ def arm_roles(side: str) -> tuple[str, ...]:
 
 
 def mirrored_role(role: str) -> str:
-    """The same role on the other side."""
+    """The same role on the other side; roles in the middle are their own mirror images."""
     side, _, part = role.partition("_")
     return f"{SIDES[1 - SIDES.index(side)]}_{part}" if side in SIDES else role
 
 
 MIRROR = np.array([INDEX[mirrored_role(role)] for role in ROLES])
-"""(R,) number of the same role on the other side."""
+"""(R,) index of each role's mirror image."""
 
 
 def _makehuman() -> dict[str, tuple[str, ...]]:
-    """Names of MakeHuman's default rig, which Anny's rig has too."""
+    """Joints of each role in MakeHuman's default rig, and in Anny's."""
     found: dict[str, tuple[str, ...]] = {
         "hips": ("root",),
         "spine": ("spine05", "spine04", "spine03"),
@@ -88,7 +89,7 @@ def _makehuman() -> dict[str, tuple[str, ...]]:
 
 
 def _smplx() -> dict[str, tuple[str, ...]]:
-    """Names of SMPL-X."""
+    """Joints of each role in SMPL-X."""
     found: dict[str, tuple[str, ...]] = {
         "hips": ("pelvis",),
         "spine": ("spine1",),
@@ -108,25 +109,25 @@ def _smplx() -> dict[str, tuple[str, ...]]:
 
 
 NAMINGS = {"MakeHuman": _makehuman(), "SMPL-X": _smplx()}
-"""For each known way to name joints: which joints, from the root outwards, share a role."""
+"""For each known naming of joints, the joints of each role, from the root outwards."""
 EYES = {"MakeHuman": ("eye.L", "eye.R"), "SMPL-X": ("left_eye_smplhf", "right_eye_smplhf")}
-"""Joints at the centres of the eyes, where a rig has them."""
+"""Names of the joints at the centres of the eyes, which a rig may lack."""
 TWIST = {
     "MakeHuman": {"shoulder": (0.5, 0.5), "elbow": (0.0, 0.6)},
     "SMPL-X": {"shoulder": (1.0,), "elbow": (0.4,)},
 }
-"""Part of a bone's twist that each joint of the role takes; the next role takes what is left."""
+"""Share of a bone's twist that each joint of its role takes; the next role takes the rest."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cast:
-    """Who plays what in a rig.
+    """Which joints of a rig play which role.
 
     Attributes:
-        rig: Whose.
-        naming: A key of `NAMINGS`.
-        joints: Numbers of the joints that share a role, from the root outwards; a role that the
-            rig lacks is not in it.
+        rig: The rig.
+        naming: How its joints are named, a key of `NAMINGS`.
+        joints: For each role the indices of its joints, from the root outwards; roles that the rig
+            lacks are missing.
     """
 
     rig: Rig
@@ -134,29 +135,29 @@ class Cast:
     joints: dict[str, tuple[int, ...]]
 
     def place(self, role: str) -> np.ndarray:
-        """(3,) metres where the role's first joint is at rest."""
+        """(3,) position of a role's first joint at rest, metres."""
         return self.rig.joints[self.joints[role][0]]
 
     def eyes(self) -> np.ndarray | None:
-        """(3,) metres between the eyes at rest; None where the rig has none."""
+        """(3,) point between the eyes at rest, metres; None where the rig has no eyes."""
         names = EYES[self.naming]
         if not set(names) <= set(self.rig.names):
             return None
         return self.rig.joints[[self.rig.index(name) for name in names]].mean(0)
 
     def has_fingers(self, side: str) -> bool:
-        """Whether a hand has the knuckles that tell where its palm looks."""
+        """Whether a hand has the knuckles from which the direction of its palm is measured."""
         return all(f"{side}_{finger}1" in self.joints for finger in ("index", "middle", "little"))
 
 
 def cast(rig: Rig) -> Cast:
-    """Finds the roles in a rig.
+    """Finds the joints of each role in a rig by their names.
 
     Args:
-        rig: With the joints' names of MakeHuman's default rig, as Anny's has them, or of SMPL-X.
+        rig: Joints must be named as in MakeHuman's default rig, as Anny's are, or as in SMPL-X.
 
     Raises:
-        SettingsError: If a role lacks without which nobody stands or gestures.
+        SettingsError: If the rig lacks a role of `NEEDED`.
     """
     naming = max(NAMINGS, key=lambda name: len(_found(rig.names, name)))
     numbers = {name: number for number, name in enumerate(rig.names)}
@@ -175,7 +176,7 @@ def cast(rig: Rig) -> Cast:
 
 @cache
 def _found(names: tuple[str, ...], naming: str) -> dict[str, tuple[str, ...]]:
-    """The joints of each role that are there; roles without any left out."""
+    """The joints of each role that are among `names`; roles without joints are left out."""
     there = set(names)
     found = {
         role: tuple(name for name in wanted if name in there)

@@ -1,4 +1,4 @@
-"""Legs that stand: feet stay where they are, whatever the hips do."""
+"""Poses legs so that feet stay in place, whatever the hips do."""
 
 from dataclasses import dataclass
 
@@ -11,11 +11,11 @@ from ico3d.motion.turning import across, aligned, unit
 from ico3d.rig.quaternions import Array, conjugate, multiply, rotate
 
 APART = 1.3
-"""Metres between the ankles of somebody who stands, next to those between the hips, at most."""
+"""Largest distance between the ankles of a standing person, relative to that between the hips."""
 SOFT = 0.995
-"""Part of a leg's length between hip and ankle of somebody who stands: knees are not locked."""
+"""Distance from hip to ankle of a standing person, relative to the leg's length; knees are soft."""
 KNEE = 0.03
-"""Sine of the bend of a knee at rest below which it tells no hinge."""
+"""Sine of a knee's bend at rest, below which its hinge axis cannot be measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,8 +24,8 @@ class Leg:
 
     Attributes:
         limb: Roles of hip, knee and ankle.
-        lengths: Metres of its two bones.
-        rest: How they lie.
+        lengths: Lengths of the two bones, metres.
+        rest: Directions of the two bones.
     """
 
     limb: tuple[str, str, str]
@@ -35,12 +35,12 @@ class Leg:
 
 @dataclass(frozen=True, eq=False)
 class Stance:
-    """Where somebody's feet stand.
+    """Where a person's feet stand.
 
     Attributes:
-        person: Who.
-        ankles: By side, (3,) metres.
-        sink: Metres that the hips are lower than at rest, so that knees are soft.
+        person: Who stands.
+        ankles: (3,) position of each side's ankle, metres in rest space.
+        sink: How far the hips are lowered from rest, metres, so that knees are soft.
     """
 
     person: Person
@@ -48,11 +48,12 @@ class Stance:
     sink: float
 
     def place(self, root: Array, by_role: Array) -> None:
-        """Sets the legs so that the ankles are in their places and the feet flat.
+        """Poses the legs so that ankles are in their places and feet are flat on the ground.
 
         Args:
-            root: (..., 3) metres that the root moves from rest.
-            by_role: (..., R, 4) whose hips are set; the legs are changed in place.
+            root: (..., 3) translation of the root from rest, metres.
+            by_role: (..., R, 4) pose by role with the rotation of the hips; the roles of the legs
+                are set in place.
         """
         hips = by_role[..., INDEX["hips"], :]  # (..., 4)
         middle = self.person.place("hips")
@@ -69,7 +70,7 @@ class Stance:
             by_role[..., INDEX[limb[2]], :] = conjugate(lower)
 
     def leg(self, side: str) -> Leg:
-        """What is measured on a leg."""
+        """Measures of the leg on a side."""
         limb = (f"{side}_hip", f"{side}_knee", f"{side}_ankle")
         return Leg(limb, self.person.lengths(limb), _at_rest(self.person, limb))
 
@@ -79,7 +80,7 @@ LEFTWARDS = np.array([1.0, 0.0, 0.0])
 
 
 def _at_rest(person: Person, limb: tuple[str, str, str]) -> Bend:
-    """How a leg's bones lie at rest; a straight one would bend forwards."""
+    """Directions of a leg's bones at rest; the hinge of a straight leg bends the knee forwards."""
     hip, knee, ankle = (person.place(role) for role in limb)
     upper, lower = unit(knee - hip), unit(ankle - knee)
     hinge = np.cross(upper, lower)
@@ -89,7 +90,7 @@ def _at_rest(person: Person, limb: tuple[str, str, str]) -> Bend:
 
 
 def stance_of(person: Person) -> Stance:
-    """Feet under the hips, or as near as the rig's rest has them."""
+    """A stance with feet at their rest positions, moved together if they are too far apart."""
     hips = {side: person.place(f"{side}_hip") for side in SIDES}
     ankles = {side: person.place(f"{side}_ankle").copy() for side in SIDES}
     width = APART * abs(hips["left"][0] - hips["right"][0])

@@ -1,4 +1,4 @@
-"""Rotations as gestures need them: between directions, about bones, and parts of them."""
+"""Rotations between directions, about axes, and parts of rotations; arrays as in `quaternions`."""
 
 import numpy as np
 
@@ -6,43 +6,43 @@ from ico3d.rig.quaternions import Array, from_rotvec, multiply, normalized, rota
 
 
 def unit(vectors: Array) -> Array:
-    """(..., 3) of length 1; zeros stay zeros."""
+    """(..., 3) vectors scaled to length 1; zero vectors stay zero."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
 
 
 def dot(a: Array, b: Array) -> Array:
-    """(...) of (..., 3)."""
+    """(...) inner products of vectors (..., 3)."""
     return (a * b).sum(-1)
 
 
 def across(vectors: Array, axis: Array) -> Array:
-    """(..., 3) unit vectors: what stands at right angles to a unit axis."""
+    """(..., 3) components of vectors (..., 3) orthogonal to a unit axis, scaled to length 1."""
     return unit(vectors - dot(vectors, axis)[..., None] * axis)
 
 
 def about(axis: Array, angle: Array | float) -> Array:
-    """(..., 4) about unit axes (..., 3) by radians (...)."""
+    """(..., 4) rotations about unit axes (..., 3) by angles (...) in radians."""
     return from_rotvec(np.asarray(axis) * np.asarray(angle)[..., None])
 
 
 def arc(start: Array, end: Array) -> Array:
-    """(..., 4) the shortest rotation between unit vectors (..., 3) that are not opposite."""
+    """(..., 4) shortest rotation from `start` to `end`, unit vectors (..., 3), not opposite."""
     start, end = np.broadcast_arrays(start, end)
     real = 1 + dot(start, end)[..., None]
     return normalized(np.concatenate([real, np.cross(start, end)], -1))
 
 
 def angle_about(axis: Array, start: Array, end: Array) -> Array:
-    """(...) radians about a unit axis from one vector at right angles to it to another."""
+    """(...) angle in radians about a unit axis from `start` to `end`, both orthogonal to it."""
     return np.arctan2(dot(np.cross(start, end), axis), dot(start, end))
 
 
 def aligned(start: tuple[Array, Array], end: tuple[Array, Array]) -> Array:
-    """(..., 4) that takes a direction to another, and what stands across it as well.
+    """(..., 4) rotation that takes a pair of orthogonal directions to another pair.
 
     Args:
-        start: Unit vectors (..., 3), the second at right angles to the first.
-        end: Where they go.
+        start: Two unit vectors (..., 3), orthogonal to each other.
+        end: The two unit vectors (..., 3) that they are taken to.
     """
     swing = arc(start[0], end[0])
     angle = angle_about(end[0], rotate(swing, start[1]), end[1])
@@ -50,17 +50,20 @@ def aligned(start: tuple[Array, Array], end: tuple[Array, Array]) -> Array:
 
 
 def twist_angle(quats: Array, axis: Array) -> Array:
-    """(...) radians, −π to π, that rotations turn about a unit axis (3,) before they swing it."""
+    """(...) twist of rotations about a unit axis (3,), in radians from −π to π.
+
+    A rotation is a twist about the axis, followed by a swing of the axis.
+    """
     along = dot(quats[..., 1:], axis)
     angle = 2 * np.arctan2(along, quats[..., 0])
     return angle - 2 * np.pi * np.round(angle / (2 * np.pi))
 
 
 def power(quats: Array, part: Array | float) -> Array:
-    """(..., 4) a part (...) of each rotation, on the shorter way."""
+    """(..., 4) rotations about the same axes by a share (...) of their angles."""
     return from_rotvec(to_rotvec(quats) * np.asarray(part)[..., None])
 
 
 def mirrored(quats: Array) -> Array:
-    """(..., 4) seen in the mirror that swaps left and right."""
+    """(..., 4) rotations mirrored in the plane x = 0, which exchanges left and right."""
     return quats * np.array([1.0, 1.0, -1.0, -1.0])

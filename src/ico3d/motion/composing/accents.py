@@ -1,4 +1,4 @@
-"""Where speech is stressed: peaks of loudness, and when its words are spoken."""
+"""Finds the stresses of speech, at peaks of loudness, and estimates when words are spoken."""
 
 import re
 from dataclasses import dataclass
@@ -10,37 +10,38 @@ from ico3d.rig.quaternions import Array
 FRAME = 0.01
 """Seconds between two values of loudness."""
 _WINDOW = 0.025
-"""Seconds of sound that each value is of, around its time."""
+"""Duration in seconds of the sound around its time that a value of loudness measures."""
 _FLOOR = -80.0
+"""Least value of loudness, dB."""
 _SMOOTH = 0.03
-"""Standard deviation, in seconds, of the smoothing that leaves one peak to a syllable."""
+"""Standard deviation, in seconds, of the smoothing that leaves one peak per syllable."""
 SPOKEN = 25.0
-"""Decibels below the loudest of the last seconds down to which somebody speaks."""
+"""Sound counts as speech down to this many dB below the loudest value."""
 _MEMORY = 4.0
-"""Seconds in which the loudest is looked for."""
+"""Seconds before a moment in which the loudest value is looked for."""
 SETTLED = 0.12
-"""Seconds of sound that must be known behind a peak before it counts."""
+"""Seconds of sound after a peak that must be known before the peak counts."""
 _LEANING = 0.06
-"""Seconds by which a word's time may be wrong: a peak so near it still is its own."""
+"""Error in seconds of a word's estimated time: a peak within it still belongs to the word."""
 _PAUSE = 0.1
-"""Seconds of silence that no stop between two vowels is."""
+"""Least duration of a pause in seconds; stop consonants are shorter silences."""
 _COMMA, _ASTRAY = 0.4, 0.3
-"""Seconds of speech by which a comma attracts a pause, and words may be estimated amiss."""
+"""Seconds by which a pause may be farther from an end with a comma, and from any end of a word."""
 _WORD = 0.35
-"""Seconds of a word."""
+"""Mean duration of a word in seconds."""
 UNKNOWN = "(unknown)"
-"""A word that means no gesture."""
+"""Text of a word that is not known; it means no gesture."""
 _VOWELS = re.compile(r"[aeiouyäöüáéíóúàèùâêîôû]+")
 
 
 @dataclass(frozen=True)
 class Word:
-    """A word and when it is spoken.
+    """A word with the time at which it is spoken.
 
     Attributes:
-        text: As it is written.
-        begin: Seconds.
-        end: Seconds.
+        text: The word as it is written, with punctuation.
+        begin: Seconds from the beginning of the utterance.
+        end: Seconds from the beginning of the utterance.
     """
 
     text: str
@@ -53,9 +54,9 @@ class Accent:
     """A stressed syllable.
 
     Attributes:
-        time: Seconds of its loudest moment.
-        strength: Decibels next to the loudest of the seconds before it; ≤ 0 but for its smoothing.
-        word: Index of the word it belongs to.
+        time: Time of the loudest moment of the syllable, seconds.
+        strength: Loudness in dB relative to the loudest of the last seconds; not above 0.
+        word: Index of the word that the syllable belongs to.
     """
 
     time: float
@@ -64,23 +65,28 @@ class Accent:
 
 
 def loudness(samples: np.ndarray, rate: int) -> Array:
-    """(n,) decibels of sound (S,) in −1 … 1, every `FRAME` seconds; value i is at i · FRAME."""
+    """(n,) loudness in dB every `FRAME` seconds; value i is that at i · FRAME seconds.
+
+    Args:
+        samples: (S,) sound in −1 … 1.
+        rate: Samples per second.
+    """
     count = int(len(samples) / rate / FRAME)
     return _decibels(samples, _middles(0, count, rate), _half(rate))
 
 
 def _half(rate: int) -> int:
-    """Samples of half a window."""
+    """Number of samples in half a window."""
     return max(1, round(0.5 * _WINDOW * rate))
 
 
 def _middles(first: int, last: int, rate: int) -> Array:
-    """(last − first,) samples in the middle of the windows of these values."""
+    """(last − first,) indices of the samples at the middle of windows number `first` to `last`."""
     return np.round(np.arange(first, last) * FRAME * rate).astype(int)
 
 
 def _decibels(samples: np.ndarray, middles: Array, half: int) -> Array:
-    """(n,) of the windows about (n,) samples."""
+    """(n,) mean power in dB of windows of ±`half` samples about the samples `middles` (n,)."""
     power = np.concatenate([[0.0], np.cumsum(np.asarray(samples, float) ** 2)])
     first, last = np.maximum(middles - half, 0), np.minimum(middles + half, len(samples))
     mean = (power[last] - power[first]) / np.maximum(last - first, 1)
@@ -88,16 +94,20 @@ def _decibels(samples: np.ndarray, middles: Array, half: int) -> Array:
 
 
 class GrowingLoudness:
-    """Loudness of sound that comes piece by piece."""
+    """Loudness of sound that arrives piece by piece.
+
+    Attributes:
+        levels: (n,) values known so far, equal to those of `loudness`.
+    """
 
     def __init__(self, rate: int):
-        """No sound yet, of a rate in Hz."""
+        """Makes an empty one for sound of `rate` samples per second."""
         self.levels: Array = np.zeros(0)
         self._rate, self._half = rate, _half(rate)
-        self._kept, self._first = np.zeros(0), 0  # the last samples, and the first one's number
+        self._kept, self._first = np.zeros(0), 0  # the last samples, and the index of their first
 
     def push(self, samples: np.ndarray) -> None:
-        """Takes sound (S,) in −1 … 1; `levels` gets all values whose windows are known now."""
+        """Appends sound (S,) in −1 … 1, and to `levels` all values whose windows are complete."""
         self._kept = np.concatenate([self._kept, samples])
         count, known = len(self.levels), self._first + len(self._kept)
         middles = _middles(count, int(known / self._rate / FRAME) + 1, self._rate)
@@ -110,7 +120,7 @@ class GrowingLoudness:
 
 
 def smoothed(levels: Array) -> Array:
-    """(n,) with one peak to a syllable; looks three standard deviations ahead."""
+    """(n,) loudness smoothed so that each syllable has one peak; looks 3 `_SMOOTH` ahead."""
     reach = round(3 * _SMOOTH / FRAME)
     window = np.exp(-0.5 * (np.arange(-reach, reach + 1) * FRAME / _SMOOTH) ** 2)
     padded = np.pad(levels, reach, constant_values=_FLOOR)
@@ -119,30 +129,34 @@ def smoothed(levels: Array) -> Array:
 
 
 def _recent_loudest(levels: Array) -> Array:
-    """(n,) the loudest of the last seconds, up to and with each."""
+    """(n,) for each value the loudest of the last `_MEMORY` seconds, itself included."""
     span = round(_MEMORY / FRAME)
     padded = np.pad(levels, (span - 1, 0), constant_values=_FLOOR)
     return np.lib.stride_tricks.sliding_window_view(padded, span).max(-1)
 
 
 def timed_words(text: str, levels: Array, begin: float, end: float) -> tuple[Word, ...]:
-    """When the words of a sentence are spoken, as far as its sound tells.
+    """Estimates when the words of a sentence are spoken, from text and loudness.
 
-    The time in which there is sound is shared among them by their syllables and letters; each pause
-    of the sound is taken for that end of a word which is nearest to it, rather one with a comma.
+    The time with sound is divided among the words by their numbers of syllables and letters. Each
+    pause in the sound is then taken as the nearest end of a word, with preference for ends with a
+    comma or other punctuation.
 
     Args:
         text: The sentence.
-        levels: Loudness of the whole utterance from its beginning.
-        begin: Seconds where the sentence begins.
-        end: Seconds where it ends.
+        levels: (n,) loudness of the whole utterance from its beginning, dB.
+        begin: Time in the utterance at which the sentence begins, seconds.
+        end: Time at which the sentence ends, seconds.
+
+    Returns:
+        The words in order of time; none where there is no sound.
     """
     texts = [word for word in text.split() if re.search(r"\w", word)]
     first, last = round(begin / FRAME), min(round(end / FRAME), len(levels))
     if not texts or last <= first:
         return ()
     spoken = levels[first:last] > levels[first:last].max() - SPOKEN
-    voiced = np.concatenate([[0], np.cumsum(spoken)])  # frames with sound before each
+    voiced = np.concatenate([[0], np.cumsum(spoken)])  # (n + 1,) frames with sound before each
     sizes = np.cumsum([0.0, *(_size(word) for word in texts)])
     shares = _at_pauses(texts, sizes / sizes[-1] * voiced[-1], spoken, voiced)
     starts = np.searchsorted(voiced, np.floor(shares[:-1] + 1e-9), side="right") - 1
@@ -154,10 +168,10 @@ def timed_words(text: str, levels: Array, begin: float, end: float) -> tuple[Wor
 
 
 def unknown_words(levels: Array) -> tuple[Word, ...]:
-    """Words that nobody wrote down: stretches of sound, each about as long as a word.
+    """Words of speech whose text is unknown: stretches of sound of about a word's duration.
 
     Args:
-        levels: Loudness of the whole utterance.
+        levels: (n,) loudness of the whole utterance, dB.
     """
     voiced = int((levels > levels.max(initial=_FLOOR) - SPOKEN).sum()) * FRAME
     count = round(voiced / _WORD)
@@ -165,7 +179,17 @@ def unknown_words(levels: Array) -> tuple[Word, ...]:
 
 
 def _at_pauses(texts: list[str], shares: Array, spoken: np.ndarray, voiced: np.ndarray) -> Array:
-    """(N + 1,) ends of words in frames with sound, moved to where the pauses are."""
+    """Moves ends of words to pauses.
+
+    Args:
+        texts: The N words.
+        shares: (N + 1,) estimated ends of the words, counted in frames with sound.
+        spoken: (n,) bool: frames with sound.
+        voiced: (n + 1,) number of frames with sound before each frame.
+
+    Returns:
+        (N + 1,) ends, of which those near a pause are at the pause.
+    """
     commas = np.array([word[-1] in ",.;:!?" for word in texts[:-1]])
     distance_of = np.where(commas, -_COMMA, 0.0) / FRAME
     fixed = {0: shares[0], len(texts): shares[-1]}
@@ -181,7 +205,7 @@ def _at_pauses(texts: list[str], shares: Array, spoken: np.ndarray, voiced: np.n
 
 
 def _pauses(spoken: np.ndarray, voiced: np.ndarray) -> list[float]:
-    """Frames with sound before each pause between the first and the last of them."""
+    """For each pause within the speech, the number of frames with sound before it."""
     ends = np.flatnonzero(np.diff(np.concatenate([[1], spoken, [1]]).astype(int)))
     runs = ends.reshape(-1, 2)
     return [
@@ -192,7 +216,7 @@ def _pauses(spoken: np.ndarray, voiced: np.ndarray) -> list[float]:
 
 
 def _size(word: str) -> float:
-    """How long a word takes, next to others: by syllables and letters."""
+    """Duration of a word relative to other words, estimated from syllables and letters."""
     if word.strip(".,;:!?").isdigit():
         return 2.0 * len(word)
     return 1.0 * max(1, len(_VOWELS.findall(word.lower()))) + 0.25 * len(word)
@@ -201,13 +225,13 @@ def _size(word: str) -> float:
 def accents(words: tuple[Word, ...], levels: Array, ended: bool) -> tuple[Accent, ...]:
     """The stressed syllable of each word whose sound is known.
 
-    It is the highest peak of the smoothed loudness within the word; a word without a peak has
-    none. More sound behind does not change what was found.
+    It is at the highest peak of the smoothed loudness within the word; a word without a peak has
+    none. Further sound does not change what was found before.
 
     Args:
-        words: In the order of time.
-        levels: Loudness known so far.
-        ended: Whether no more comes.
+        words: Words in order of time.
+        levels: (n,) loudness known so far, dB.
+        ended: Whether the utterance has ended, so that no more sound follows.
     """
     if not len(levels):
         return ()

@@ -1,7 +1,8 @@
-"""Chooses gestures for what is said, and puts their strokes on its accents.
+"""Chooses gestures for speech, and places their strokes on its accents.
 
-For a speech that still grows: what was handed out stays as it was. Every stroke that begins arrives
-and stays for a moment; a gesture is held until the phrase ends or the next one takes the hands.
+The speech may still be growing: directions that were handed out are never changed. Every stroke
+that begins also arrives, and its end is held for a moment; a gesture is held until the phrase ends
+or the next gesture needs the hands.
 """
 
 import numpy as np
@@ -24,25 +25,25 @@ from ico3d.motion.noise import chance
 from ico3d.rig.quaternions import Array
 
 HURRY = 1.4
-"""How much faster than it was made a preparation may be."""
+"""Largest factor by which a preparation is played faster than in its clip."""
 APART = (0.9, 2.0)
-"""Seconds from one beat to the next, by chance, at least."""
+"""Range of the random least time in seconds from a stroke to a beat."""
 MEANT = 0.75
-"""Seconds from a stroke to one that means something, at least."""
+"""Least time in seconds from a stroke to the stroke of a gesture with a meaning."""
 LATE = 0.8
-"""Seconds by which a meaning may come after its word, where there was no time for it before."""
+"""Seconds after its word at which a meaning may still be shown, if there was no time before."""
 AGAIN = 5.0
-"""Seconds until the same meaning is shown again, at least."""
+"""Least time in seconds until the same meaning is shown again."""
 FAINT = -9.0
-"""Decibels; fainter accents get no beat."""
+"""Accents below this strength, in dB, get no beat."""
 STRONGER, NEAR = 2.0, 0.5
-"""Decibels and seconds: an accent with one so much stronger so soon after it gets no beat."""
+"""An accent gets no beat if one is stronger by this many dB within this many seconds after it."""
 LONGEST_HOLD = 1.3
-"""Seconds that a gesture is held beyond its own hold, at most."""
+"""Longest time in seconds for which a gesture is held beyond the hold of its clip."""
 PAUSE = 0.2
 """Seconds of silence that end a phrase."""
 ROUNDS = 2
-"""How often a repeated gesture goes round, at least."""
+"""Number of times that the hold of a gesture is repeated at least, if it is a motion."""
 BEATS = (
     (0.50, "beat_right", False),
     (0.14, "beat_right", True),
@@ -50,19 +51,19 @@ BEATS = (
     (0.10, "open_hand", False),
     (0.08, "open_hands", False),
 )
-"""Chances of what goes with an accent that means nothing by itself; mirrored, the other hand."""
+"""Gestures for accents without a meaning: probability, name, and whether mirrored."""
 
 
 class Composer:
-    """The gestures of one utterance."""
+    """Composes the gestures of one utterance; all times are seconds from its beginning."""
 
     def __init__(self, clips: dict[str, Clip], seed: int, start: float = 0.0):
-        """Nothing is said yet.
+        """Makes a composer that knows nothing of the speech yet.
 
         Args:
-            clips: By name; at least those of `BEATS`, with either hand.
-            seed: Decides all that is by chance.
-            start: Seconds before which no gesture begins.
+            clips: Clips by name, among them those of `BEATS` with one or the other hand.
+            seed: Seed of all random choices.
+            start: Time before which no gesture begins.
         """
         self._clips, self._seed = clips, seed
         self._takes = Takes(clips)
@@ -70,43 +71,46 @@ class Composer:
         self._words: tuple[Word, ...] = ()
         self._levels: Array = np.zeros(0)
         self._end: float | None = None
-        self._handed = start  # s up to which all is decided
-        self._next = 0  # the first accent's word that is not decided
+        self._handed = start  # time up to which all is decided
+        self._next = 0  # index of the first word whose accent is not decided
         self._cues: list[Cue] = []
-        self._held: dict[int, Cue] = {}  # not released yet
-        self._over: dict[str, float] = {}  # by limb, s when its last gesture is over
-        self._struck: dict[str, float] = {}  # by limb, s of its last stroke
-        self._shown: dict[str, float] = {}  # by name, s of its last stroke
+        self._held: dict[int, Cue] = {}  # cues that are not released yet, by number
+        self._over: dict[str, float] = {}  # by limb, end of its last gesture
+        self._struck: dict[str, float] = {}  # by limb, time of its last stroke
+        self._shown: dict[str, float] = {}  # by meaning, time of its last stroke
         self._wanted: list[str] = []
         self._new: list[Direction] = []
 
     def know(self, words: tuple[Word, ...], levels: Array) -> None:
-        """More is known of the speech.
+        """Updates what is known of the speech.
 
         Args:
-            words: All words so far, in the order of time.
-            levels: Loudness so far, from the beginning.
+            words: All words known so far, in order of time.
+            levels: (n,) loudness known so far, from the beginning, dB (`accents.loudness`).
         """
         self._words, self._levels = words, levels
 
     def end(self, seconds: float) -> None:
-        """The speech is known as a whole; it is so long."""
+        """Says that all of the speech is known, and how long it is."""
         self._end = seconds
 
     def request(self, name: str) -> None:
-        """A gesture to make next.
+        """Asks for a gesture to be made next.
 
         Args:
-            name: What it means.
+            name: Meaning of the gesture.
 
         Raises:
-            KeyError: If there is none that means it.
+            KeyError: If no clip has this meaning.
         """
         self._takes.one(name, False, 0.0)
         self._wanted.append(name)
 
     def directions(self, until: float) -> list[Direction]:
-        """What is new before a time; nothing that begins before it is decided later."""
+        """New cues and releases before the time `until`, in order of time.
+
+        Later calls return nothing that begins before `until`.
+        """
         self._new = []
         ended = self._end is not None
         stresses = accents(self._words, self._levels, ended)
@@ -120,10 +124,14 @@ class Composer:
         return sorted(self._new, key=_moment)
 
     def stop(self, now: float) -> list[Direction]:
-        """Falls silent: nothing new begins, and what is held is let go once its stroke has arrived.
+        """Ends the speech: no gesture begins, and held ones are released after their strokes.
 
         Args:
-            now: Seconds; gestures that begin later than this are for `Performer.drop`.
+            now: Time at which the speech stops; gestures that begin later have to be removed by
+                `Performer.drop`.
+
+        Returns:
+            The releases.
         """
         self._new = []
         self._words, self._wanted = (), []
@@ -132,7 +140,7 @@ class Composer:
         return sorted(self._new, key=_moment)
 
     def _make_wanted(self, until: float, stresses: tuple[Accent, ...]) -> None:
-        """What was asked for comes first: its stroke on the next accent, where one is near."""
+        """Cues requested gestures, with their strokes on the next accent if one is near."""
         while self._wanted:
             draw = chance(self._seed, len(self._cues), 4)
             name, mirror = self._takes.one(self._wanted[0], False, draw)
@@ -150,7 +158,7 @@ class Composer:
     def _decide(
         self, index: int, stresses: tuple[Accent, ...], meant: dict[int, str], until: float
     ) -> bool:
-        """Gives an accent a gesture, or none; False if there is still time for that."""
+        """Decides on the gesture of an accent; False if it would begin at `until` or later."""
         accent = stresses[index]
         name, mirror = self._choice(index, stresses, meant)
         if name is not None:
@@ -169,7 +177,7 @@ class Composer:
     def _choice(
         self, index: int, stresses: tuple[Accent, ...], meant: dict[int, str]
     ) -> tuple[str | None, bool]:
-        """The gesture of an accent and whether it is mirrored; None for none."""
+        """Name of the gesture of an accent, None for none, and whether it is mirrored."""
         accent = stresses[index]
         draw = chance(self._seed, accent.word, 3)
         name = meant.get(accent.word)
@@ -186,7 +194,11 @@ class Composer:
         return time - last >= MEANT and time - self._shown.get(name, -np.inf) >= AGAIN
 
     def _may_beat(self, index: int, stresses: tuple[Accent, ...], meant: dict[int, str]) -> bool:
-        """Whether an accent is strong enough, long enough after a stroke, and before no other."""
+        """Whether an accent may get a beat.
+
+        It must be strong enough and long enough after the last stroke, and neither a stronger
+        accent nor a gesture with a meaning may follow soon.
+        """
         accent = stresses[index]
         if accent.strength < FAINT or not stressed(self._words[accent.word]):
             return False
@@ -207,9 +219,11 @@ class Composer:
         return True
 
     def _beginning(self, name: str, mirror: bool, stroke: float) -> tuple[float | None, float]:
-        """When a gesture begins whose stroke is to arrive then, and what it leaves out.
+        """When a gesture has to begin so that its stroke arrives at a time.
 
-        None as the first where there is no time for it.
+        Returns:
+            Time of the beginning, None if there is no time for the gesture; and how many seconds of
+            the clip's beginning are skipped.
         """
         marks = self._clips[name].marks
         used = self._used(name, mirror)
@@ -218,7 +232,7 @@ class Composer:
         if begin >= max(over, self._handed):
             return begin, 0.0
         settled = max((self._struck.get(limb, -np.inf) + SETTLE for limb in used), default=-np.inf)
-        if over > begin:  # hands are up: they go to where the stroke begins
+        if over > begin:  # hands are still up: the clip begins later, near its stroke
             lead = self._taking_up(self._clips[name])
             if stroke - lead >= max(settled, self._handed):
                 return stroke - lead, marks.stroke - lead
@@ -229,18 +243,18 @@ class Composer:
         return None, 0.0
 
     def _taking_up(self, clip: Clip) -> float:
-        """Seconds before its stroke from which hands that are up go on with a gesture."""
+        """Seconds before its stroke at which a gesture begins if hands are still up."""
         marks = clip.marks
         return min(marks.stroke, max(TAKE_UP, marks.stroke - marks.ready + 0.1))
 
     def _used(self, name: str, mirror: bool) -> frozenset[str]:
-        """The limbs of a gesture, mirrored or not."""
+        """The limbs that a gesture moves, mirrored or not."""
         other = {"left": "right", "right": "left"}
         used = self._limbs[name]
         return frozenset(other.get(limb, limb) for limb in used) if mirror else used
 
     def _free(self, used: frozenset[str]) -> float:
-        """Seconds from which a gesture may take limbs without cutting a stroke off."""
+        """Earliest time at which a gesture may take limbs without cutting off a stroke."""
         return max((self._struck.get(limb, -np.inf) + SETTLE for limb in used), default=0.0)
 
     def _cue(self, name: str, mirror: bool, begin: float, stroke: float, skip: float = 0.0) -> None:
@@ -261,14 +275,14 @@ class Composer:
         return rounded_release(self._clips[cue.name], cue, cue.stroke)
 
     def _let_go(self, until: float) -> None:
-        """Releases what is held long enough before `until`."""
+        """Releases held gestures whose natural release is before `until`."""
         for cue in list(self._held.values()):
             time = self._natural(cue)
             if time < until:
                 self._release(cue, time)
 
     def _natural(self, cue: Cue) -> float:
-        """Seconds at which a gesture is released that no other one takes over from."""
+        """Time at which a gesture is released if no other gesture needs its limbs."""
         clip = self._clips[cue.name]
         marks = clip.marks
         hold = marks.release - marks.hold
@@ -281,7 +295,7 @@ class Composer:
         return max(rounded_release(clip, cue, wanted), self._handed)
 
     def _phrase_end(self, time: float) -> float:
-        """Seconds of the next pause after a time, as far as it is known."""
+        """Time of the next pause after a time; the end of the known sound if there is none."""
         first = round(time / FRAME)
         if first >= len(self._levels):
             return time
@@ -301,7 +315,7 @@ class Composer:
 
 
 def _beat(draw: float) -> tuple[str, bool]:
-    """A gesture without a meaning of its own, and whether it is mirrored, by chance."""
+    """A gesture of `BEATS`, and whether it is mirrored, chosen by a random number 0 ≤ draw < 1."""
     for part, name, mirror in BEATS[:-1]:
         if draw < part:
             return name, mirror
@@ -310,7 +324,7 @@ def _beat(draw: float) -> tuple[str, bool]:
 
 
 def _soon(index: int, stresses: tuple[Accent, ...], meant: dict[int, str]) -> list[Accent]:
-    """Accents shortly after one, before any that means something itself."""
+    """Accents up to `LATE` seconds after an accent, before the next one with a meaning."""
     found: list[Accent] = []
     for later in stresses[index + 1 :]:
         if later.time - stresses[index].time > LATE or later.word in meant:

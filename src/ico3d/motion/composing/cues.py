@@ -1,4 +1,4 @@
-"""When a gesture is made: cues, their releases, and which moment of the clip belongs to a time."""
+"""Cues: which gesture is made when, until when it is held, and how speech time maps to its clip."""
 
 from dataclasses import dataclass
 
@@ -8,26 +8,26 @@ from ico3d.motion.clip import Clip
 from ico3d.rig.quaternions import Array
 
 BLEND_IN = 0.3
-"""Seconds in which a gesture takes over."""
+"""Seconds in which a gesture blends in at its beginning."""
 BLEND_OUT = 0.4
-"""Seconds before its end in which it gives way."""
+"""Seconds in which a gesture blends out before its end."""
 SETTLE = 0.15
-"""Seconds that the end of a stroke stays at least: no stroke is cut off."""
+"""Least time in seconds for which the end of a stroke is held, so that no stroke is cut off."""
 TAKE_UP = 0.42
-"""Seconds before the stroke from which a gesture is made when hands are up already."""
+"""Least time in seconds before its stroke at which a gesture begins if hands are up already."""
 
 
 @dataclass(frozen=True)
 class Cue:
-    """A gesture to make; never changed once handed out.
+    """A direction to make a gesture; it is not changed once it is handed out.
 
     Attributes:
-        number: Counts the cues.
-        name: The clip's name.
-        mirror: Whether with the other hand.
-        begin: Seconds at which it begins.
-        stroke: Seconds at which the stroke arrives.
-        skip: Seconds of the clip's beginning that are left out.
+        number: Number of the cue, counted from 0.
+        name: Name of the clip.
+        mirror: Whether the clip is mirrored.
+        begin: Time at which the gesture begins, seconds.
+        stroke: Time at which its stroke arrives, seconds.
+        skip: Seconds of the clip's beginning that are skipped.
     """
 
     number: int
@@ -40,11 +40,11 @@ class Cue:
 
 @dataclass(frozen=True)
 class Release:
-    """A gesture that is held is let go; never changed once handed out.
+    """A direction to release a held gesture; it is not changed once it is handed out.
 
     Attributes:
-        number: Of the cue.
-        time: Seconds at which the retraction begins.
+        number: Number of the cue.
+        time: Time at which the retraction begins, seconds.
     """
 
     number: int
@@ -55,7 +55,7 @@ Direction = Cue | Release
 
 
 def cycle(clip: Clip) -> float:
-    """Seconds of what is gone round again while a gesture is held; 0 where nothing is."""
+    """Duration in seconds of the motion that is repeated in a hold; 0 if the hold is still."""
     marks = clip.marks
     moving = any(
         np.ptp(curve.at(np.linspace(marks.hold, marks.release, 9)), axis=0).max() > 1e-2
@@ -65,17 +65,19 @@ def cycle(clip: Clip) -> float:
 
 
 def hold_end(clip: Clip, cue: Cue) -> float:
-    """Seconds at which the hold begins: the earliest release."""
+    """Time in seconds at which the hold of a cue begins, which is the earliest release."""
     return cue.stroke + (clip.marks.hold - clip.marks.stroke)
 
 
 def rounded_release(clip: Clip, cue: Cue, wanted: float) -> float:
-    """Seconds not before `wanted` at which a cue may be released: repetition ends where it began.
+    """Earliest time, not before `wanted`, at which a cue may be released, seconds.
+
+    A motion that is repeated in the hold is completed first.
 
     Args:
-        clip: Of the cue.
-        cue: Which.
-        wanted: Seconds.
+        clip: The clip of the cue.
+        cue: The cue.
+        wanted: Time in seconds.
     """
     first = hold_end(clip, cue)
     stays = SETTLE if clip.marks.release > clip.marks.hold else 0.0  # a nod has no hold
@@ -87,7 +89,14 @@ def rounded_release(clip: Clip, cue: Cue, wanted: float) -> float:
 
 
 def clip_time(clip: Clip, cue: Cue, release: float | None, time: Array) -> Array:
-    """(...) seconds of the clip at seconds (...) of the speech."""
+    """(...) times of the clip that are shown at times (...) of the speech, seconds.
+
+    Args:
+        clip: The clip of the cue.
+        cue: The cue.
+        release: Time of the cue's release; None while it is held.
+        time: (...) times of the speech.
+    """
     marks = clip.marks
     rate = (marks.stroke - cue.skip) / (cue.stroke - cue.begin)
     before = cue.skip + (time - cue.begin) * rate
@@ -104,12 +113,12 @@ def clip_time(clip: Clip, cue: Cue, release: float | None, time: Array) -> Array
 
 
 def end_of(clip: Clip, release: float | None) -> float:
-    """Seconds at which a cue is over; infinite while it is held."""
+    """Time in seconds at which a cue is over; infinite while it is not released."""
     return float("inf") if release is None else release + clip.marks.end - clip.marks.release
 
 
 def weight(clip: Clip, cue: Cue, release: float | None, time: Array) -> Array:
-    """(...) how far a gesture prevails over what is beneath, 0 to 1, at seconds (...)."""
+    """(...) weight of a gesture over the pose beneath it, 0 to 1, at times (...) in seconds."""
     rising = _smooth((time - cue.begin) / min(BLEND_IN, cue.stroke - cue.begin))
     if release is None:
         return rising
@@ -117,6 +126,6 @@ def weight(clip: Clip, cue: Cue, release: float | None, time: Array) -> Array:
 
 
 def _smooth(x: Array) -> Array:
-    """0 … 1 with zero slope at both ends."""
+    """Smoothstep: 0 up to x = 0, 1 from x = 1, with slope 0 at both."""
     x = np.clip(x, 0.0, 1.0)
     return x * x * (3 - 2 * x)

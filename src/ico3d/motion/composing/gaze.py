@@ -1,4 +1,4 @@
-"""Turning to the visitor: the head first, then the chest, as far and as fast as people do."""
+"""Turns a person to the visitor: the head first, then the chest, as far and fast as people do."""
 
 import math
 from dataclasses import dataclass
@@ -9,24 +9,34 @@ from ico3d.motion.turning import about
 from ico3d.rig.quaternions import Array, multiply
 
 TICK = 0.01
-"""Seconds of a step: whatever asks, motion is the same."""
+"""Seconds of a simulation step; steps are fixed, so motion does not depend on the caller's rate."""
 HEAD_YAW, HEAD_PITCH = math.radians(50.0), math.radians(22.0)
-"""How far neck and head turn against the chest, and nod."""
+"""Largest angles in radians by which neck and head together turn and nod against the chest."""
 CHEST_YAW = math.radians(24.0)
-"""How far the chest turns."""
+"""Largest angle in radians by which the chest turns."""
 CHEST_FROM, CHEST_PART = math.radians(15.0), 0.4
-"""From which angle on the chest turns too, and what part of what is beyond."""
+"""Angle of the visitor in radians above which the chest turns, and its share of the rest."""
 HEAD_SPEED, CHEST_SPEED = math.radians(140.0), math.radians(45.0)
-"""Radians a second, at most."""
+"""Largest angular speeds, radians per second."""
 HEAD_STIFF, CHEST_STIFF = 7.0, 3.0
-"""1/s: how soon they follow (critically damped)."""
+"""Natural frequencies, in 1/s, with which head and chest follow, critically damped."""
 BEHIND = math.radians(120.0)
-"""From which angle on a visitor is behind, who is looked after on the side where they went."""
+"""Angle in radians above which a visitor is behind the person.
+
+The person then keeps looking to the side on which the visitor went out of sight.
+"""
 
 
 @dataclass
 class _Hinge:
-    """An angle that follows a target, critically damped, no faster than a limit."""
+    """An angle that follows a target, critically damped and with limited speed.
+
+    Attributes:
+        stiff: Natural frequency, 1/s.
+        fastest: Largest speed, radians per second.
+        angle: Radians.
+        speed: Radians per second.
+    """
 
     stiff: float
     fastest: float
@@ -42,10 +52,10 @@ class _Hinge:
 
 
 class Gaze:
-    """Where chest and head are turned; goes on in steps of `TICK`."""
+    """Rotations of chest, neck and head towards a visitor, simulated in steps of `TICK`."""
 
     def __init__(self):
-        """Looks straight ahead at 0 s."""
+        """Begins at 0 s, looking straight ahead."""
         self._steps = 0
         self._yaw, self._pitch = 0.0, 0.0
         self._chest = _Hinge(CHEST_STIFF, CHEST_SPEED)
@@ -53,11 +63,11 @@ class Gaze:
         self._nod = _Hinge(HEAD_STIFF, HEAD_SPEED)
 
     def look(self, yaw: float, pitch: float) -> None:
-        """The visitor is there.
+        """Sets the direction of the visitor, see `direction_to`.
 
         Args:
-            yaw: Radians to the person's left from straight ahead.
-            pitch: Radians downwards.
+            yaw: Angle to the person's left from straight ahead, radians.
+            pitch: Angle downwards, radians.
         """
         if abs(yaw) <= BEHIND:
             self._yaw = yaw
@@ -66,7 +76,10 @@ class Gaze:
         self._pitch = pitch
 
     def at(self, time: float) -> Array:
-        """(3, 4) turns of chest, neck and head at a time, not before the last one asked for."""
+        """(3, 4) local rotations of chest, neck and head at a time in seconds.
+
+        Times must not descend from call to call.
+        """
         while self._steps * TICK < time - 1e-9:
             self._step()
             self._steps += 1
@@ -85,6 +98,11 @@ class Gaze:
 
 
 def direction_to(eyes: Array, visitor: Array) -> tuple[float, float]:
-    """Yaw to the person's left and pitch downwards, radians, from eyes (3,) to a visitor (3,)."""
+    """Yaw to the left and pitch downwards, radians, of a visitor as seen by a person facing +z.
+
+    Args:
+        eyes: (3,) point between the person's eyes, metres.
+        visitor: (3,) position of the visitor in the same space, metres.
+    """
     x, y, z = visitor - eyes
     return math.atan2(x, z), -math.atan2(y, math.sqrt(x * x + z * z))

@@ -1,4 +1,4 @@
-"""Gestures that somebody names, one after the other."""
+"""Directions to make given gestures one after the other."""
 
 from collections.abc import Mapping, Sequence
 
@@ -9,23 +9,23 @@ from ico3d.motion.composing.cues import Cue, Direction, Release, end_of, rounded
 BEGIN = 0.6
 """Seconds before the first gesture."""
 PAUSE = 0.5
-"""Seconds between two, in which hands hang."""
+"""Seconds between two gestures, in which hands hang."""
 HELD = 2
-"""How often what may be repeated is gone round; a pose is held for so many of its own holds."""
+"""Number of holds of its clip for which each gesture is held or repeated."""
 
 
 def in_turn(clips: Mapping[str, Clip], names: Sequence[str]) -> tuple[list[Direction], float]:
-    """Directions for gestures as they were made, each with its own time.
+    """Directions to make gestures one after the other, each at the pace of its clip.
 
     Args:
-        clips: By name.
-        names: Which, in their order; a name may come again.
+        clips: Clips by name.
+        names: Names of the gestures in order; a name may occur again.
 
     Returns:
-        Cues and releases, and the seconds at which hands hang again.
+        Cues and releases, and the time in seconds at which hands hang again.
 
     Raises:
-        SettingsError: If there is no gesture of a name.
+        SettingsError: If a name is not among the clips.
     """
     found: list[Direction] = []
     begin = BEGIN

@@ -1,4 +1,4 @@
-"""Which words call for which gesture."""
+"""The lexicon: which words call for which gesture."""
 
 import json
 import re
@@ -14,16 +14,16 @@ _FILE = Path(__file__).parents[1] / "data" / "lexicon.json"
 
 @dataclass(frozen=True)
 class Lexicon:
-    """What `motion/data/lexicon.json` holds.
+    """Content of `motion/data/lexicon.json`.
 
     Attributes:
-        gestures: Those that it knows.
-        words: The gesture of a word.
-        phrases: Gestures of several words, as tuples of them; the longest first.
-        light: Words that bear no stress of their own.
-        requests: The gesture of what a visitor may ask for, the longest first.
-        asking: How requests begin.
-        refusing: What makes them none.
+        gestures: Names of all gestures in the lexicon.
+        words: The gesture of each word.
+        phrases: Phrases, as tuples of words, with their gestures; the longest phrases first.
+        light: Words that are not stressed, such as articles.
+        requests: Texts by which a visitor asks for a gesture, with the gesture; longest first.
+        asking: Texts with which requests begin, such as "can you".
+        refusing: Texts that turn a request into none, such as "don't".
     """
 
     gestures: frozenset[str]
@@ -37,7 +37,7 @@ class Lexicon:
 
 @cache
 def lexicon() -> Lexicon:
-    """The package's own."""
+    """The lexicon of the package."""
     content = json.loads(_FILE.read_text("utf-8"))
     words: dict[str, str] = {}
     phrases: list[tuple[tuple[str, ...], str]] = []
@@ -57,12 +57,12 @@ def lexicon() -> Lexicon:
 
 
 def plain(text: str) -> list[str]:
-    """The words of a text in small letters, without punctuation."""
+    """The words of a text in lower case, without punctuation."""
     return re.findall(r"[\w']+", text.lower().replace("’", "'"))
 
 
 def meanings(words: tuple[Word, ...]) -> dict[int, str]:
-    """Gestures by the index of the word that calls for them; of phrases, the last word."""
+    """The gestures that words call for, by index of the word; for a phrase, of its last word."""
     known = lexicon()
     texts = [" ".join(plain(word.text)) for word in words]
     found = {i: known.words[text] for i, text in enumerate(texts) if text in known.words}
@@ -76,20 +76,20 @@ def meanings(words: tuple[Word, ...]) -> dict[int, str]:
 
 
 def stressed(word: Word) -> bool:
-    """Whether a word bears stress of its own: no article, no auxiliary."""
+    """Whether a word can be stressed, unlike the light words of the lexicon."""
     return not set(plain(word.text)) <= lexicon().light
 
 
 def requested(text: str, names: Iterable[str] = ()) -> str | None:
-    """The gesture that a visitor asks for: "can you wave at me?" is a wave.
+    """The gesture that a visitor asks for: "can you wave at me?" asks for a wave.
 
     Args:
         text: What the visitor says.
-        names: Gestures that somebody can make; those that the lexicon does not know are asked for
-            by their name.
+        names: Gestures that the person can make; those that are not in the lexicon are asked for by
+            their names.
 
     Returns:
-        Its name; None where none is asked for.
+        Name of the gesture; None if the visitor asks for none.
     """
     known = lexicon()
     others = [name for name in names if name not in known.gestures]

@@ -1,38 +1,38 @@
-"""Nods of somebody who listens: after the visitor's phrases, now and then."""
+"""Nods of a person who listens, at random after the visitor's phrases."""
 
 from ico3d.motion.composing.accents import FRAME, SPOKEN
 from ico3d.motion.noise import chance
 from ico3d.rig.quaternions import Array
 
 PHRASE = 1.2
-"""Seconds that the visitor must have spoken since the last nod."""
+"""Seconds that the visitor must have spoken since the last nod, before another one."""
 PAUSE = 0.25
-"""Seconds of silence after which a nod may come."""
+"""Seconds of silence after which a nod may follow."""
 APART = 3.0
-"""Seconds from nod to nod, at least."""
+"""Least time in seconds between two nods."""
 OFTEN = 0.65
-"""How likely a pause gets a nod."""
+"""Probability of a nod in a pause."""
 AUDIBLE = -50.0
-"""Decibels below which nobody speaks."""
+"""Loudness in dB below which sound is never speech."""
 
 
 class Listener:
-    """Nods to a visitor whose sound comes frame by frame."""
+    """Decides on nods while a visitor's loudness arrives frame by frame."""
 
     def __init__(self, seed: int):
-        """Nobody has spoken yet."""
+        """Makes a listener that has heard nothing yet; `seed` decides on the nods."""
         self._seed = seed
         self._frames, self._spoken, self._silent = 0, 0, 0
         self._loudest, self._pauses, self._last = AUDIBLE, 0, -APART
 
     def hear(self, levels: Array) -> list[tuple[float, str]]:
-        """More of the visitor's loudness.
+        """Takes more of the visitor's loudness.
 
         Args:
-            levels: Decibels of the frames (`accents.FRAME`) since the last call.
+            levels: (n,) dB of the frames since the last call, `accents.FRAME` seconds each.
 
         Returns:
-            Nods to begin: (seconds since the listener began, name of the gesture).
+            Nods to begin: seconds since the listener began, and name of the gesture.
         """
         found: list[tuple[float, str]] = []
         for level in levels:
@@ -47,7 +47,7 @@ class Listener:
         return found
 
     def _pause(self) -> list[tuple[float, str]]:
-        """The visitor paused after a phrase."""
+        """A nod, or none, for a pause of the visitor after a phrase."""
         now = self._frames * FRAME
         self._pauses += 1
         if now - self._last < APART or chance(self._seed, self._pauses) >= OFTEN:

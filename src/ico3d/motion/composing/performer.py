@@ -1,4 +1,4 @@
-"""The whole body at a moment: the living rest, turned to the visitor, with gestures upon it."""
+"""Poses of the whole body: the living rest, turned to the visitor, with gestures blended in."""
 
 from dataclasses import dataclass
 
@@ -14,12 +14,18 @@ from ico3d.rig.quaternions import Array, multiply, slerp
 ADDED = np.array(
     [role in ("hips", "spine", "chest", "neck", "head") or "clavicle" in role for role in ROLES]
 )
-"""(R,) roles whose gestures come upon what the rest does; those of the others replace it."""
+"""(R,) bool: roles whose rotations in gestures are added to the rest; others replace the rest."""
 
 
 @dataclass(frozen=True)
 class _Part:
-    """A gesture in T moments: roles (M,), their rotations (T, M, 4), and its weight (T,)."""
+    """A gesture at T times.
+
+    Attributes:
+        roles: (M,) indices of the roles that it moves.
+        poses: (T, M, 4) rotations of these roles, wxyz.
+        weight: (T,) weight of the gesture, 0 to 1.
+    """
 
     roles: np.ndarray
     poses: Array
@@ -27,14 +33,18 @@ class _Part:
 
 
 class Performer:
-    """Somebody who follows directions."""
+    """A person who follows directions.
+
+    Attributes:
+        living: The person at rest.
+    """
 
     def __init__(self, living: Living, clips: dict[str, Clip]):
-        """Somebody at rest.
+        """Makes a performer without directions.
 
         Args:
-            living: The rest.
-            clips: By name.
+            living: The person at rest.
+            clips: Clips by name.
         """
         self.living = living
         self._clips = {(name, False): clip for name, clip in clips.items()}
@@ -43,7 +53,7 @@ class Performer:
         self._releases: dict[int, float] = {}
 
     def follow(self, directions: list[Direction]) -> None:
-        """Takes on more directions."""
+        """Adds directions; the clips of their cues must be known."""
         for direction in directions:
             if isinstance(direction, Release):
                 self._releases[direction.number] = direction.time
@@ -51,25 +61,26 @@ class Performer:
                 self._cues.append(direction)
 
     def drop(self, now: float) -> None:
-        """Forgets gestures that have not begun: what they belonged to was interrupted."""
+        """Removes gestures that begin at a time or later, after their speech was interrupted."""
         self._cues = [cue for cue in self._cues if cue.begin < now]
 
     def at(self, times: Array, turn: Array | None = None) -> tuple[Array, Array]:
-        """How the body is at seconds (T,).
+        """Poses of the body at some times.
 
         Args:
-            times: Seconds.
-            turn: (T, 3, 4) what chest, neck and head turn to the visitor (`gaze.turns`).
+            times: (T,) seconds.
+            turn: (T, 3, 4) rotations of chest, neck and head to the visitor, as by `Gaze.at`.
 
         Returns:
-            (T, R, 4) by role and (T, 3) metres that the root moves.
+            (T, R, 4) local rotations by role, wxyz, and (T, 3) translation of the root from rest,
+            metres.
         """
         times = np.atleast_1d(np.asarray(times, float))
         pose, root = self.living.at(times)
         if turn is not None:
             rows = [INDEX[role] for role in ("chest", "neck", "head")]
             pose[:, rows] = multiply(turn, pose[:, rows])
-        left = np.ones((len(times), len(ROLES)))  # (T, R) what later gestures leave of earlier ones
+        left = np.ones((len(times), len(ROLES)))  # (T, R) share that later gestures leave over
         parts = [part for cue in self._cues if (part := self._part(cue, times)) is not None]
         for part in reversed(parts):
             added = part.roles[ADDED[part.roles]]
@@ -85,7 +96,7 @@ class Performer:
         return pose, root
 
     def _part(self, cue: Cue, times: Array) -> _Part | None:
-        """What a gesture does then; None where it does nothing."""
+        """The gesture of a cue at times (T,); None if it is not made at these times."""
         clip = self._clips[cue.name, cue.mirror]
         release = self._releases.get(cue.number)
         if times.max() < cue.begin or times.min() > end_of(clip, release):

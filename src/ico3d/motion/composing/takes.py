@@ -1,49 +1,49 @@
-"""Which clip shows a meaning: several may, and either hand."""
+"""Chooses clips by their meaning: several clips may have one, made with either hand."""
 
 from collections.abc import Mapping
 
 from ico3d.motion.clip import Clip, meaning, other_hand
 
 Take = tuple[str, bool]
-"""A clip's name, and whether it is mirrored."""
+"""Name of a clip, and whether it is mirrored."""
 
 
 def limbs(clip: Clip) -> frozenset[str]:
-    """What a gesture moves: `left`, `right` (arms), `head`."""
+    """The limbs that a gesture moves: `left` and `right` for arms; `head` if it moves no arm."""
     sides = {role.partition("_")[0] for role in clip.curves if role.endswith("_wrist")}
     return frozenset(sides or {"head"})
 
 
 class Takes:
-    """Clips by what they mean: somebody may have been recorded waving twice."""
+    """Clips by meaning; a recording may have several of one meaning, such as two waves."""
 
     def __init__(self, clips: Mapping[str, Clip]):
-        """Sorts clips, which are given by name."""
+        """Sorts clips, given by name, by meaning."""
         self._clips = clips
         self._names: dict[str, list[str]] = {}
         for name in clips:
             self._names.setdefault(meaning(name), []).append(name)
 
     def __contains__(self, meant: str) -> bool:
-        """Whether there is a clip that means this, with either hand."""
+        """Whether a clip has this meaning, with the same or the other hand."""
         return meant in self._names or other_hand(meant) in self._names
 
     @property
     def meanings(self) -> list[str]:
-        """All that the clips mean, in their order."""
+        """All meanings, in the order of the clips."""
         return list(self._names)
 
     def one(self, meant: str, mirror: bool, draw: float) -> Take:
-        """A clip that means something.
+        """Chooses a clip with a meaning.
 
         Args:
-            meant: What.
-            mirror: Whether with the other hand: a clip that was made with it comes before one that
-                is mirrored.
-            draw: 0 ≤ x < 1 decides among several.
+            meant: The meaning.
+            mirror: Whether the gesture is to be made with the other hand. A clip that was made with
+                that hand is preferred to one that has to be mirrored.
+            draw: Random number 0 ≤ x < 1 that chooses among several clips.
 
         Raises:
-            KeyError: If there is none.
+            KeyError: If no clip has the meaning.
         """
         other = other_hand(meant)
         if other == meant:
@@ -55,6 +55,6 @@ class Takes:
         return names[int(draw * len(names))], flipped
 
     def of_hands(self, meant: str) -> bool:
-        """Whether hands make it."""
+        """Whether gestures of a meaning are made with hands."""
         name, _ = self.one(meant, False, 0.0)
         return "head" not in limbs(self._clips[name])

@@ -1,4 +1,4 @@
-"""The gestures of the package, made for one person."""
+"""Makes the gestures of the package for one person."""
 
 import numpy as np
 
@@ -15,14 +15,14 @@ from ico3d.rig.quaternions import Array
 def gesture(
     person: Person, name: str, script: Script, hung: Array, tolerance: float = TOLERANCE
 ) -> Clip:
-    """A clip of a script, for one person.
+    """Makes a clip from a script, for one person.
 
     Args:
-        person: Who makes it.
-        name: What it is called.
-        script: What is to be done.
-        hung: (R, 4) by role, of the person with hanging arms (`hanging`).
-        tolerance: Degrees that a curve may be off.
+        person: Who makes the gesture.
+        name: Name of the gesture.
+        script: The gesture.
+        hung: (R, 4) pose by role with hanging arms (`hanging`).
+        tolerance: Largest error of the curves, degrees.
     """
     poses, roles = solve(person, script, hung)
     marks = Marks(script.ready, script.stroke, *script.hold, script.end)
@@ -32,12 +32,15 @@ def gesture(
 def library(
     person: Person, names: tuple[str, ...] = tuple(SCRIPTS), hung: Array | None = None
 ) -> dict[str, Clip]:
-    """The gestures of the package by name; those of one hand are made with the right one.
+    """Makes gestures of the package; where a name says no hand, one hand means the right one.
 
     Args:
-        person: Who makes them.
-        names: Which.
-        hung: (R, 4) by role, how arms hang before and after; by default as `hanging` has them.
+        person: Who makes the gestures.
+        names: Names of the gestures, keys of `SCRIPTS`.
+        hung: (R, 4) pose by role with hanging arms, before and after; by default that of `hanging`.
+
+    Returns:
+        Clips by name.
     """
     hung = hanging(person) if hung is None else hung
     return {name: gesture(person, name, SCRIPTS[name], hung) for name in names}

@@ -1,23 +1,24 @@
-"""What a gesture is written in: where hands go, in the person's own proportions, and when."""
+"""The form in which gestures are written: where hands are when, in a person's own proportions."""
 
 from dataclasses import dataclass, field
 
 Vector = tuple[float, float, float]
-"""Outwards (away from the other hand), upwards, forwards."""
+"""Three coordinates; for hands: outwards (away from the other hand), upwards, forwards."""
 
 
 @dataclass(frozen=True)
 class Reach:
-    """Where a hand is.
+    """Position, orientation and shape of a hand.
 
     Attributes:
-        place: Where the hand goes from the anchor, in arm lengths (shoulder to wrist).
-        elbow: Where the elbow points.
-        fingers: Where straight fingers would point.
-        palm: Where the palm looks.
-        shape: What fingers do: a key of `SHAPES`.
+        place: Position relative to the anchor, in arm lengths (shoulder to wrist).
+        elbow: Direction in which the elbow points.
+        fingers: Direction in which straight fingers would point.
+        palm: Direction in which the palm looks.
+        shape: Shape of the fingers, a key of `SHAPES`.
         anchor: `shoulder` (of the same side), `chest` (the breastbone) or `chin`.
-        part: What of the hand is there: 0 the wrist, 1 the knuckles, 2 the tips of its fingers.
+        part: The part of the hand that is at `place`: 0 the wrist, 1 the knuckles, 2 the
+            fingertips, and points between.
     """
 
     place: Vector
@@ -30,17 +31,17 @@ class Reach:
 
 
 HANG = None
-"""Instead of a `Reach`: the arm hangs."""
+"""Stands for a hanging arm in the place of a `Reach`."""
 
 
 @dataclass(frozen=True)
 class Lean:
-    """How torso and head are turned.
+    """Rotation of torso and head.
 
     Attributes:
         chest: Degrees forwards, to the person's left, and towards the right shoulder.
-        head: The same of the head against the chest.
-        shrug: Degrees that collarbones lift beyond what the arms ask for.
+        head: Degrees of the head relative to the chest, likewise.
+        shrug: Degrees by which collarbones are lifted, in addition to what lifted arms need.
     """
 
     chest: Vector = (0.0, 0.0, 0.0)
@@ -53,14 +54,14 @@ class Script:
     """A gesture of the right hand, of both, or of the head.
 
     Attributes:
-        ready: Seconds when the preparation is over and the stroke begins.
-        stroke: The stroke's moment: when it arrives.
-        hold: Seconds from and to which the end of the stroke is held, or repeated where what is
-            between moves.
-        end: Seconds when everything is back.
-        right: (seconds, where) of the right hand, minimum-jerk movements between them.
-        left: Of the left hand.
-        lean: Of torso and head.
+        ready: Time at which the preparation ends and the stroke begins, seconds.
+        stroke: Time at which the stroke arrives, seconds.
+        hold: Beginning and end of the hold, seconds; motion in between is repeated.
+        end: Time at which arms hang again, seconds.
+        right: Keys of the right hand: times in seconds, and where the hand is. Movements between
+            keys have minimum jerk.
+        left: Keys of the left hand.
+        lean: Keys of torso and head.
     """
 
     ready: float

@@ -5,12 +5,17 @@ from dataclasses import replace
 from ico3d.motion.gestures.script import HANG, Lean, Reach, Script
 
 Key = tuple[float, Reach | None]
+"""A time in seconds, and where a hand is; None where the arm hangs."""
 
 
 def _once(
     ready: Reach, stroke: Reach, up: float, swing: float, hold: float, down: float
 ) -> tuple[Key, ...]:
-    """Up to where the stroke begins, the stroke, a hold, and down again; each so many seconds."""
+    """Keys of a hand with one stroke from `ready` to `stroke`.
+
+    The hand is raised in `up` seconds; the stroke takes `swing` seconds, the hold `hold` seconds;
+    and the hand is lowered in `down` seconds.
+    """
     ends = [0.0, up, up + swing, up + swing + hold, up + swing + hold + down]
     return tuple(zip(ends, (HANG, ready, stroke, stroke, HANG), strict=True))
 
@@ -24,7 +29,17 @@ def _script(
     left: tuple[Reach, Reach] | None = None,
     lean: Lean | None = None,
 ) -> Script:
-    """A gesture with one stroke."""
+    """A gesture with one stroke.
+
+    Args:
+        up: Duration of the preparation, seconds.
+        swing: Duration of the stroke, seconds.
+        hold: Duration of the hold, seconds.
+        down: Duration of the retraction, seconds.
+        right: Where the right hand begins and ends the stroke; None leaves it hanging.
+        left: Likewise of the left hand.
+        lean: Torso and head at the end of the stroke; None leaves them as they are.
+    """
     hands = [_once(*pair, up, swing, hold, down) if pair else () for pair in (right, left)]
     stroke = up + swing
     leaning: tuple[tuple[float, Lean], ...] = ()
@@ -105,7 +120,13 @@ def _wave() -> Script:
 
 
 def _turning(angles: tuple[tuple[float, float], ...], column: int, stroke: int) -> Script:
-    """Turns of the head: (seconds, degrees) about one axis; the stroke arrives with one of them."""
+    """Rotations of the head about one axis.
+
+    Args:
+        angles: Times in seconds, and degrees.
+        column: Axis, an index of `Lean.head`.
+        stroke: Index of the angle with which the stroke arrives.
+    """
     keys: list[tuple[float, Lean]] = []
     for seconds, degrees in angles:
         turn = [0.0, 0.0, 0.0]
@@ -171,4 +192,4 @@ SCRIPTS = {
         *(0.5, 0.3, 0.4, 0.8), right=(_BEFORE_SMALL, _SMALL), left=(_BEFORE_SMALL, _SMALL)
     ),
 }
-"""By name; those of one hand are made with the right one, and mirrored on demand."""
+"""Scripts by name; gestures of one hand that names no hand are made with the right one."""

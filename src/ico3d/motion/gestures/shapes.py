@@ -1,4 +1,4 @@
-"""What fingers do: shapes of the hand."""
+"""Shapes of the hand: how its fingers are bent."""
 
 import numpy as np
 
@@ -8,12 +8,13 @@ from ico3d.motion.turning import about, unit
 from ico3d.rig.quaternions import Array, multiply
 
 CURL = np.array([0.0, 0.0, -1.0])
-"""About which the left hand's fingers bend to the palm, in the standard pose."""
+"""(3,) axis about which the left hand's fingers bend to the palm, in the standard pose."""
 SPREAD = PALM["left"]
-"""About which they spread towards the thumb."""
+"""(3,) axis about which the left hand's fingers turn towards the thumb, in the standard pose."""
 THUMB = unit(np.array([0.745, -0.66, -0.10]))
-"""About which the left thumb bends across the palm."""
+"""(3,) axis about which the left thumb bends across the palm, in the standard pose."""
 Finger = tuple[float, float, float, float]
+"""Degrees by which a finger bends at its three joints, and turns towards the thumb at the first."""
 
 _BENT = (78.0, 92.0, 55.0, 0.0)
 _OUT = (4.0, 5.0, 3.0, 0.0)
@@ -34,12 +35,11 @@ SHAPES: dict[str, tuple[Finger, Finger, Finger, Finger, Finger]] = {
     "chin": ((-2, 8, 14, 0), (12, 20, 12, 4), _BENT, _BENT, _BENT),
     "loose": ((2, 8, 12, 0), (10, 16, 11, 4), (15, 20, 13, 0), (19, 22, 14, -3), (22, 24, 15, -7)),
 }  # fmt: skip
-"""Degrees that thumb, index, middle, ring and little finger bend at their three joints, and that
-the finger turns towards the thumb at its first."""
+"""Shapes by name: thumb, index, middle, ring and little finger."""
 
 
 def shape(name: str) -> Array:
-    """(5, 4) radians of a shape."""
+    """(5, 4) angles of a shape in radians: for each finger, those of `Finger`."""
     return np.radians(np.array(SHAPES[name], float))
 
 
@@ -47,8 +47,8 @@ def fingers(shapes: Array, by_role: Array) -> None:
     """Bends the fingers of the left hand.
 
     Args:
-        shapes: (..., 5, 4) radians.
-        by_role: (..., R, 4), changed in place.
+        shapes: (..., 5, 4) angles in radians, as from `shape`.
+        by_role: (..., R, 4) pose by role, changed in place.
     """
     for row, finger in enumerate(FINGERS):
         axis = THUMB if finger == "thumb" else CURL

@@ -1,4 +1,4 @@
-"""From a script to rotations by role, for one person: inverse kinematics of torso and arms."""
+"""Turns a script into poses by role for one person, by inverse kinematics of torso and arms."""
 
 from dataclasses import dataclass
 
@@ -26,25 +26,34 @@ from ico3d.rig.quaternions import (
 
 Index = NDArray[np.integer]
 RATE = 60.0
-"""Samples per second."""
+"""Samples of a gesture per second."""
 LIFT = np.radians(24.0)
-"""How far a collarbone lifts with the hand above the head."""
+"""Largest angle in radians by which a collarbone is lifted, with the hand above the head."""
 TIPS = 1.9
-"""Length of a hand with straight fingers, next to that from the wrist to the knuckles."""
+"""Length of a hand with straight fingers, relative to the distance from wrist to knuckles."""
 PUSHES = 4
-"""How often hands are pushed out of the body: each time by what is left."""
+"""Number of iterations in which hands are pushed out of the body."""
 SHARED = {"spine": 0.4, "chest": 0.6, "neck": 0.5, "head": 0.5}
-"""Part that a role takes of the turn of torso, or head."""
+"""Share of a role in the rotation of the torso (spine, chest) or of the head (neck, head)."""
 
 
 def eased(part: Array) -> Array:
-    """Minimum jerk: 0 … 1 without speed or acceleration at either end."""
+    """Minimum-jerk interpolation: from 0 to 1, with speed and acceleration 0 at both ends."""
     part = np.clip(part, 0.0, 1.0)
     return part**3 * (10 - 15 * part + 6 * part**2)
 
 
 def between(keys: Array, times: Array) -> tuple[Index, Index, Array]:
-    """The keys (K,) before and after (F,) seconds, and (F,) how far it is between them."""
+    """Finds the keys about some times.
+
+    Args:
+        keys: (K,) times of the keys, ascending, seconds.
+        times: (F,) seconds.
+
+    Returns:
+        (F,) index of the key before and (F,) of the key after each time, and (F,) minimum-jerk
+        weight of the key after.
+    """
     after = np.clip(np.searchsorted(keys, times, side="right"), 1, len(keys) - 1)
     span = np.maximum(keys[after] - keys[after - 1], 1e-9)
     return after - 1, after, eased((times - keys[after - 1]) / span)
@@ -52,13 +61,13 @@ def between(keys: Array, times: Array) -> tuple[Index, Index, Array]:
 
 @dataclass(frozen=True, eq=False)
 class _Arm:
-    """What an arm is to do in F samples; directions in the chest's axes.
+    """Goals of an arm in F samples, in rest space as it moves with the chest.
 
     Attributes:
-        wrist: (F, 3) metres in rest space, as the chest carries it.
-        elbow: (F, 3) where it points.
-        hand: (F, 4) from the standard pose.
-        shapes: (F, 5, 4) of the left hand, or of the right one seen in a mirror.
+        wrist: (F, 3) positions of the wrist, metres.
+        elbow: (F, 3) directions in which the elbow points.
+        hand: (F, 4) rotations of the hand from the standard pose, wxyz.
+        shapes: (F, 5, 4) angles of the fingers, as from `shape`; for either hand.
     """
 
     wrist: Array
@@ -71,13 +80,13 @@ def solve(person: Person, script: Script, hung: Array) -> tuple[Array, tuple[str
     """Poses of a gesture.
 
     Args:
-        person: Who makes it.
-        script: What is to be done.
-        hung: (R, 4) by role, of the person with hanging arms (`hanging`).
+        person: Who makes the gesture.
+        script: The gesture.
+        hung: (R, 4) pose by role with hanging arms (`hanging`).
 
     Returns:
-        (F, R, 4) by role at `RATE` from 0 to the script's end, and the names of the roles that it
-        moves; the others are as in the standard pose with hanging arms.
+        (F, R, 4) poses by role, `RATE` per second from 0 to the script's end, and the names of the
+        roles that the gesture moves; other roles are as in `hung`.
     """
     times = np.arange(round(script.end * RATE) + 1) / RATE
     poses = np.tile(hung, (len(times), 1, 1))  # (F, R, 4)
@@ -92,7 +101,7 @@ def solve(person: Person, script: Script, hung: Array) -> tuple[Array, tuple[str
 
 
 def _lean(keys: tuple[tuple[float, Lean], ...], times: Array, poses: Array) -> list[str]:
-    """Turns torso and head, and lifts collarbones."""
+    """Rotates torso and head and lifts collarbones in `poses` (F, R, 4); returns moved roles."""
     rows = np.array([[*lean.chest, *lean.head, lean.shrug] for _, lean in keys])  # (K, 7)
     before, after, part = between(np.array([seconds for seconds, _ in keys]), times)
     now = np.radians(rows[before] + part[:, None] * (rows[after] - rows[before]))  # (F, 7)
@@ -119,7 +128,7 @@ def _gesture(
     poses: Array,
     hung: Array,
 ) -> list[str]:
-    """Moves an arm as its keys say."""
+    """Moves an arm by its keys in `poses` (F, R, 4), in place; returns the moved roles."""
     arm = _interpolated(person, side, keys, times, poses, hung)
     chest = person.retarget.world(poses)[:, INDEX["chest"]]  # (F, 4)
     lift = _lift(person, side, arm.wrist)
@@ -132,7 +141,7 @@ def _gesture(
     limb = (f"{side}_shoulder", f"{side}_elbow", f"{side}_wrist")
     bend = reach(shoulder, target, person.lengths(limb), rotate(chest, arm.elbow))
     upper = aligned((DOWN, HINGE), (bend.upper, bend.hinge))  # (F, 4) in the world
-    bare = aligned((DOWN, HINGE), (bend.lower, bend.hinge))
+    bare = aligned((DOWN, HINGE), (bend.lower, bend.hinge))  # (F, 4) the forearm without twist
     hand = multiply(chest, arm.hand)
     angle = np.unwrap(twist_angle(multiply(conjugate(bare), hand), DOWN))
     lower = multiply(bare, about(DOWN, angle))
@@ -161,7 +170,7 @@ def _interpolated(
     poses: Array,
     hung: Array,
 ) -> _Arm:
-    """Minimum-jerk movements between the keys of one hand."""
+    """Goals of an arm at times (F,), by minimum-jerk movements between its keys."""
     seconds = np.array([time for time, _ in keys])
     before, after, part = between(seconds, times)
     chins = _chins(person, poses[np.searchsorted(times, seconds - 0.5 / RATE)])  # (K, 3)
@@ -180,7 +189,7 @@ def _interpolated(
 
 
 def _chins(person: Person, poses: Array) -> Array:
-    """(..., 3) where the head has its chin, in rest space as the chest carries it."""
+    """(..., 3) tip of the chin in poses (..., R, 4), in rest space as it moves with the chest."""
     rotations = person.retarget.pose(poses)
     chin = person.carried("head", person.chin, rotations, np.zeros(3))
     origin = person.carried("chest", np.zeros(3), rotations, np.zeros(3))
@@ -189,7 +198,7 @@ def _chins(person: Person, poses: Array) -> Array:
 
 
 def _at(person: Person, side: str, at: Reach, chin: Array) -> tuple[Array, Array, Array, Array]:
-    """Wrist, elbow, hand and fingers of a place, in the chest's axes."""
+    """Goals of an arm for a `Reach`: a row each of wrist, elbow, hand and shapes of `_Arm`."""
     outwards = np.array([1.0 if side == "left" else -1.0, 1.0, 1.0])
     along = unit(outwards * at.fingers)
     palm = across(outwards * at.palm, along)
@@ -204,7 +213,7 @@ def _at(person: Person, side: str, at: Reach, chin: Array) -> tuple[Array, Array
 
 
 def _hung(person: Person, side: str, hung: Array) -> tuple[Array, Array, Array, Array]:
-    """The same of an arm that hangs."""
+    """Goals of a hanging arm: a row each of wrist, elbow, hand and shapes of `_Arm`."""
     places = person.posed(hung, np.zeros(3))
     start, middle, end = (places[f"{side}_{part}"] for part in ("shoulder", "elbow", "wrist"))
     elbow = across(middle - start, unit(end - start))
@@ -213,14 +222,14 @@ def _hung(person: Person, side: str, hung: Array) -> tuple[Array, Array, Array, 
 
 
 def _lift(person: Person, side: str, wrist: Array) -> Array:
-    """(F, 4) of the collarbone, which rises with the hand."""
+    """(F, 4) rotation of the collarbone, which is lifted with the wrist (F, 3)."""
     above = (wrist - person.place(f"{side}_shoulder"))[:, 1] / person.arm(side)
     sign = 1.0 if side == "left" else -1.0
     return about(np.array([0.0, 0.0, 1.0]), sign * LIFT * eased((above + 0.75) / 1.5))
 
 
 def _pushed(person: Person, side: str, arm: _Arm, rotations: Array) -> Array:
-    """(F, 3) wrists such that neither hand nor forearm is inside trunk or head."""
+    """(F, 3) positions of the wrist, moved so that hand and forearm are outside trunk and head."""
     wrist = arm.wrist.copy()
     along = rotate(arm.hand, DOWN)  # (F, 3) in the chest's axes
     length, radius = person.hand(side), person.thickness.arm * person.height

@@ -1,6 +1,6 @@
-"""Cuts: from which frame to which somebody made a gesture, and what it is called.
+"""Cuts: the frames of a recording in which gestures were made, with the gestures' names.
 
-They can be edited by hand, as a text file (TOML).
+They are stored in a text file (TOML) that can be edited by hand.
 """
 
 import json
@@ -16,12 +16,13 @@ from ico3d.common.typed import Rules, fill
 from ico3d.errors import SettingsError
 
 CUTS = "clips.toml"
-"""The file, beside the model of a body."""
+"""Name of the file in the model folder of a body."""
 REST = "rest"
-"""The cut of somebody who stands with calm hands."""
+"""Name of a cut in which the person stands with calm hands."""
 MOST = 200
-"""Cuts of a recording."""
+"""Most cuts of a recording."""
 VERSION = 1
+"""Version of the file."""
 Hands = Literal["right", "left", "both", "none"]
 _NAME = re.compile(r"[a-z]+(_[a-z]+)*")
 _LONGEST_NAME = 40
@@ -39,15 +40,15 @@ num_frames = {num_frames}
 
 @dataclass(frozen=True)
 class Cut:
-    """A span of recorded frames.
+    """The frames of one recorded gesture.
 
     Attributes:
-        name: What it means; several may have the same.
-        hands: Whose gesture it is: `none` of them is the head's.
-        first: The frame at which it begins.
-        stroke: The frame at which its stroke arrives.
-        release: The frame until which the end of the stroke is held, or repeated.
-        last: The frame at which it is over.
+        name: Meaning of the gesture; several cuts may have the same name.
+        hands: The hands that make the gesture; `none` for gestures of the head.
+        first: Frame at which the gesture begins.
+        stroke: Frame at which its stroke arrives.
+        release: Frame until which the end of the stroke is held or repeated.
+        last: Frame at which the gesture is over.
     """
 
     name: str
@@ -59,22 +60,22 @@ class Cut:
 
     @property
     def sides(self) -> tuple[str, ...]:
-        """The hands by side."""
+        """Sides of the hands that make the gesture; none for gestures of the head."""
         return {"both": ("left", "right"), "none": ()}.get(self.hands, (self.hands,))
 
     def overlaps(self, other: "Cut") -> bool:
-        """Whether they share a frame."""
+        """Whether this cut and another one share a frame."""
         return self.first <= other.last and self.last >= other.first
 
 
 @dataclass(frozen=True)
 class Cuts:
-    """All cuts of a recording.
+    """Content of the file of a recording's cuts.
 
     Attributes:
-        version: Of the file.
+        version: Version of the file.
         fps: Frames per second of the recording.
-        num_frames: Of the recording.
+        num_frames: Number of frames of the recording.
         clip: The cuts, in any order.
     """
 
@@ -85,7 +86,7 @@ class Cuts:
 
 
 def named(cuts: Iterable[Cut]) -> list[tuple[str, Cut]]:
-    """The cuts under names of their own: of several alike, further ones are numbered from 2 on."""
+    """Cuts with unique names: the second cut of a name gets `_2` appended, and so on."""
     counted: Counter[str] = Counter()
     found: list[tuple[str, Cut]] = []
     for cut in cuts:
@@ -96,7 +97,13 @@ def named(cuts: Iterable[Cut]) -> list[tuple[str, Cut]]:
 
 
 def to_toml(cuts: Iterable[Cut], fps: float, num_frames: int) -> str:
-    """The text of a file."""
+    """Text of the file of a recording's cuts.
+
+    Args:
+        cuts: The cuts.
+        fps: Frames per second of the recording.
+        num_frames: Number of frames of the recording.
+    """
     blocks = [_HEAD.format(version=VERSION, fps=float(fps), num_frames=num_frames)]
     for cut in cuts:
         lines = [f"{key} = {json.dumps(value)}" for key, value in vars(cut).items()]
@@ -105,16 +112,16 @@ def to_toml(cuts: Iterable[Cut], fps: float, num_frames: int) -> str:
 
 
 def from_toml(content: bytes, where: str, fps: float, num_frames: int) -> tuple[Cut, ...]:
-    """The cuts of a file.
+    """The cuts in a file.
 
     Args:
-        content: Of the file.
-        where: Its name, for sentences.
+        content: Content of the file.
+        where: Name of the file, for error messages.
         fps: Frames per second of the recording.
-        num_frames: Of the recording.
+        num_frames: Number of frames of the recording.
 
     Raises:
-        SettingsError: In one sentence, if it is damaged, makes no sense or is of another one.
+        SettingsError: If the file is damaged, makes no sense or belongs to another recording.
     """
     try:
         values: dict[str, Any] = tomllib.loads(content.decode())

@@ -1,4 +1,7 @@
-"""Finds gestures in a recording: spans of frames, with names."""
+"""Finds gestures in a recording by rule: their frames and names.
+
+Lengths are in arm lengths, from shoulder to wrist; frames count from 0.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -13,51 +16,53 @@ from ico3d.motion.roles import SIDES, Side
 from ico3d.rig.quaternions import Array
 
 AWAY, BACK = 0.22, 0.04
-"""Arm lengths from where a hand rests from which it gestures, and at which it is back."""
+"""Distances of a hand from its rest above which it gestures, and up to which it is back."""
 LEAST, GAP = 0.3, 0.2
-"""Seconds that a gesture lasts at least, and that two of them are apart."""
+"""Least duration of a gesture, and of a rest between two gestures, seconds."""
 CALM = 0.3
-"""Arm lengths a second below which a hand is calm."""
+"""Speed per second below which a hand is calm."""
 HANGS = -0.55
-"""Arm lengths above the shoulder below which a wrist may rest."""
+"""Height of a wrist relative to the shoulder below which it may be at rest."""
 LEAST_REST = 0.5
-"""Seconds that somebody rests at least."""
+"""Least duration of a rest, seconds."""
 SLOWER = 1.8
-"""How many times slower than before and after a hand is where a stroke arrives."""
+"""Factor by which a hand must be slower where a stroke arrives than before and after."""
 HELD = 1.7
-"""How many times faster than where it is slowest a hand may be that is held."""
+"""A hand counts as held up to this multiple of its lowest speed."""
 ARRIVED = 0.1
-"""Part of its fastest to which a hand has slowed down where the stroke arrives."""
+"""A stroke arrives where the hand has slowed down to this share of its highest speed."""
 JITTER = 2.0, (0.1, 0.3)
-"""How many times faster than a resting hand, whose pose jitters, and between which arm lengths a
-second, a hand may be that is held."""
+"""A hand counts as held up to this multiple of a resting hand's apparent speed.
+
+That speed, caused by jitter of tracked poses, is clamped to the range per second given second.
+"""
 PREPARED, SOON = 0.22, 0.8
-"""Seconds: the hand that stops for less than the first, and is elsewhere within the second, was
-brought to where the stroke begins."""
+"""A first stop is a preparation if it is shorter than the first of these times in seconds, and if
+the next stop follows within the second."""
 TAKES_PART = 0.35
-"""How far a hand goes in a gesture that is its own, next to the other one, at least."""
+"""Least distance that a hand moves in a gesture, relative to the other hand, to take part in it."""
 SWING = 0.15
-"""Arm lengths that the tip of a waving hand goes to a side, at least."""
+"""Least distance to a side that the tip of a waving hand moves."""
 SWINGS = 3
-"""How often a waving hand goes from side to side, at least."""
+"""Least number of swings from side to side in a wave."""
 AFTERWARDS = 0.35
-"""Seconds after a wave in which a stop is its end."""
+"""Seconds after a wave in which a stop still belongs to the wave."""
 UPRIGHT, SHOULDER = 0.3, -0.25
-"""How much a waving hand points up, and arm lengths that it is above the shoulder, at least."""
+"""Least upward component of a waving hand's direction, and least height above the shoulder."""
 ALIKE = 4
-"""Cuts of one name that are kept, at most: those that go farthest."""
+"""Most cuts of one name that are kept: those in which hands are farthest from rest."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Watched:
-    """What is told of the hands before anything is cut.
+    """Measurements of the hands in a recording of F frames; rows are the left and the right hand.
 
     Attributes:
-        recording: Whose.
-        rest: First and last frame of the longest rest; None where nobody rests.
-        away: (2, F) arm lengths of the left and the right hand from where they rest.
-        speed: (2, F) arm lengths a second.
-        jitter: Arm lengths a second up to which a hand that is held seems to move.
+        recording: The recording.
+        rest: First and last frame of the longest rest; None where there is no rest.
+        away: (2, F) distance of each hand from its rest, arm lengths.
+        speed: (2, F) speed of each hand, arm lengths per second.
+        jitter: Speed up to which a hand counts as held, arm lengths per second.
     """
 
     recording: Recording
@@ -68,18 +73,19 @@ class _Watched:
 
     @property
     def resting(self) -> int:
-        """A frame of rest; where there is none, that with the hands the nearest to hanging."""
+        """A frame of rest; without a rest, the frame in which hands are nearest to hanging."""
         if self.rest is not None:
             return sum(self.rest) // 2
         return int(self.away.max(0).argmin())
 
 
 def find_cuts(recording: Recording) -> list[Cut]:
-    """What somebody did, by rule, in the order of time.
+    """Finds the gestures in a recording by rule, in order of time.
 
-    Gestures of the hands last from when they leave their rest until they are back; there each place
-    at which they slow down is a stroke of its own, and a hand that goes from side to side waves.
-    Names follow from what hands do where the stroke arrives; nods and shakes are the head's.
+    The time from when the hands leave their rest until they are back is cut into gestures: each
+    slowing down is the end of a stroke, and a hand that swings from side to side waves. Names
+    follow from the hands where the stroke arrives (`naming.name_of`). Nods and shakes of the head
+    are found as well, and the longest rest is a cut of its own.
     """
     seen = _watched(recording)
     found = [cut for span in _spans(seen) for cut in _of_span(seen, *span)]
@@ -110,7 +116,7 @@ def _watched(recording: Recording) -> _Watched:
 
 
 def _spans(seen: _Watched) -> list[tuple[int, int]]:
-    """First and last frame of what hands do between one rest and the next."""
+    """First and last frame of each span in which the hands are away from their rest."""
     frames = seen.recording.frames
     active = np.any(seen.away > AWAY, axis=0)  # (F,)
     for first, last in runs(~active):
@@ -129,7 +135,7 @@ def _spans(seen: _Watched) -> list[tuple[int, int]]:
 
 
 def _of_span(seen: _Watched, first: int, last: int) -> list[Cut]:
-    """The gestures of a span, each from where the one before is let go."""
+    """The gestures of hands in a span; each begins where the one before is released."""
     waves = [wave for side in SIDES for wave in _waves(seen, side, first, last)]
     after = seen.recording.frames(AFTERWARDS)
     strokes = [
@@ -145,9 +151,9 @@ def _of_span(seen: _Watched, first: int, last: int) -> list[Cut]:
 
 
 def _stops(seen: _Watched, first: int, last: int) -> list[Cut]:
-    """Strokes: where the hands slow down, each from where the one before ends."""
+    """A cut for each stroke of a span, which arrives where the hands slow down."""
     away = np.any(seen.away > AWAY, axis=0)  # (F,)
-    speed = np.where(seen.away > BACK, seen.speed, 0).max(0)  # (F,) of what gestures
+    speed = np.where(seen.away > BACK, seen.speed, 0).max(0)  # (F,) of hands away from rest
     part = np.log(speed[first : last + 1] + 0.1 * CALM)
     turns = turning_points(part, np.log(SLOWER))
     lows = [first + i for i, j in zip(turns, _others(turns), strict=True) if part[i] < part[j]]
@@ -166,7 +172,7 @@ def _stops(seen: _Watched, first: int, last: int) -> list[Cut]:
 
 
 def _stroke(seen: _Watched, first: int, stroke: int, release: int) -> Cut:
-    """A stroke that begins where the hands were before."""
+    """A cut with one stroke, with its name, from frame `first` to frame `release`."""
     sides = _taking_part(seen, first, stroke)
     name = name_of(seen.recording, sides, stroke, seen.resting)
     hands: Hands = "both" if len(sides) == 2 else sides[0]
@@ -174,7 +180,12 @@ def _stroke(seen: _Watched, first: int, stroke: int, release: int) -> Cut:
 
 
 def _prepares(stops: list[tuple[int, int]], fps: float) -> bool:
-    """Whether the first stop only brings the hands to where the stroke begins."""
+    """Whether the first stop is only a preparation of the next stroke.
+
+    Args:
+        stops: First and last frame of each stop.
+        fps: Frames per second.
+    """
     if len(stops) < 2:
         return False
     (begin, end), (after, _) = stops[:2]
@@ -182,17 +193,20 @@ def _prepares(stops: list[tuple[int, int]], fps: float) -> bool:
 
 
 def _run(there: np.ndarray) -> int:
-    """How many are True before the first that is not."""
+    """Number of leading True values."""
     return int(np.argmin(np.append(there, False)))
 
 
 def _others(turns: list[int]) -> list[int]:
-    """For each turning point one beside it."""
+    """For each turning point a neighbouring one: the one before it, for the first the second."""
     return [turns[i - 1] if i else turns[1] for i in range(len(turns))]
 
 
 def _taking_part(seen: _Watched, first: int, stroke: int) -> tuple[Side, ...]:
-    """The hands that are away from rest and go about as far; of none, the one farther away."""
+    """Sides of the hands that take part in a stroke: those away from rest that move far enough.
+
+    If none does, it is the hand that is farther from rest.
+    """
     hands = [seen.recording.hands[side].knuckles[first : stroke + 1] for side in SIDES]
     gone = [np.ptp(knuckles, axis=0).max() for knuckles in hands]
     found: list[Side] = [
@@ -204,7 +218,7 @@ def _taking_part(seen: _Watched, first: int, stroke: int) -> tuple[Side, ...]:
 
 
 def _waves(seen: _Watched, side: Side, first: int, last: int) -> list[Cut]:
-    """Where a hand that points up goes from side to side; from its first turn to its last."""
+    """Waves of a hand in a span: it points up and swings from side to side."""
     recording, hand = seen.recording, seen.recording.hands[side]
     up = (hand.fingers[:, 1] > UPRIGHT) & (hand.place[:, 1] > SHOULDER)
     found: list[Cut] = []
@@ -215,13 +229,13 @@ def _waves(seen: _Watched, side: Side, first: int, last: int) -> list[Cut]:
             if len(volley) < SWINGS:
                 continue
             turns = [begin + swing.end for swing in volley]
-            back = turns[::2][-1]  # on the side of the stroke again
+            back = turns[::2][-1]  # the last turn on the same side as the stroke
             found.append(Cut("wave", side, begin + volley[0].begin, turns[0], back, turns[-1]))
     return found
 
 
 def _rank(seen: _Watched, cut: Cut, found: list[Cut]) -> int:
-    """How many cuts of the same name go farther."""
+    """Number of cuts of the same name in which hands are farther from rest at the stroke."""
 
     def size(one: Cut) -> float:
         return float(seen.away[:, one.stroke].max())

@@ -1,4 +1,4 @@
-"""Finds nods and shakes of a head."""
+"""Finds nods and shakes of the head in a recording."""
 
 import numpy as np
 
@@ -7,15 +7,15 @@ from ico3d.motion.recorded.recording import Recording
 from ico3d.motion.recorded.turning_points import Swing, swings, volleys
 
 NOD, SHAKE = 4.0, 7.0
-"""Degrees that a head goes down or to the side, at least."""
+"""Least degrees by which a head turns down in a nod, and to the side in a shake."""
 LARGE = 7.0
-"""Degrees from which one nod is no small one."""
+"""Degrees from which a single nod is not a small one."""
 SHAKES = 3
-"""How often a shaken head goes from side to side, at least."""
+"""Least number of swings from side to side in a shake."""
 
 
 def head_cuts(recording: Recording) -> list[Cut]:
-    """Nods and shakes, in the order of time within each kind."""
+    """Nods and shakes of a recording: all nods in order of time, then all shakes."""
     degrees = np.degrees(recording.head)  # (F, 3)
     down, aside = (degrees[:, axis] for axis in (0, 1))
     shakes = [
@@ -33,13 +33,13 @@ def head_cuts(recording: Recording) -> list[Cut]:
 
 
 def _cut(name: str, volley: list[Swing]) -> Cut:
-    """The stroke arrives with the first swing; a head does not hold."""
+    """A cut of the head: its stroke arrives with the end of the first swing, without a hold."""
     stroke = volley[0].end
     return Cut(name, "none", volley[0].begin, stroke, stroke, volley[-1].end)
 
 
 def _down_and_up(volley: list[Swing]) -> list[list[Swing]]:
-    """The part of a volley that begins downwards and ends upwards, where there is one."""
+    """A list of the part of a volley that begins downwards and ends upwards; empty if none does."""
     begin = 0 if volley[0].change > 0 else 1
     part = volley[begin : begin + 2 * ((len(volley) - begin) // 2)]
     return [part] if part else []

@@ -1,4 +1,4 @@
-"""Makes clips of cuts: rotation curves by role that begin and end with hanging arms."""
+"""Makes clips from cuts of a recording: rotation curves that begin and end with hanging arms."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -25,29 +25,33 @@ from ico3d.rig.quaternions import (
 )
 
 STROKE = 0.3
-"""Seconds before a stroke arrives at which it begins."""
+"""Duration of a stroke in seconds."""
 HOLD = 0.4
-"""Seconds that the end of a stroke stays."""
+"""Duration in seconds of the hold of gestures that do not repeat a motion."""
 ARRIVING, LEAVING = 0.15, 0.3
-"""Seconds in which motion comes to rest for the hold, and goes on after it."""
+"""Seconds in which motion comes to rest before the hold, and resumes after it."""
 HANGING = 0.12
-"""Arm lengths from where a hanging hand is up to which a clip may begin and end as recorded."""
+"""Arm lengths from where hands hang, up to which a clip begins and ends with recorded motion."""
 PACE = 1.6
-"""Arm lengths a second of hands that are brought there and back where the recording lacks it."""
+"""Speed, in arm lengths per second, of added motion from and to hanging arms."""
 LEAST = 0.35
-"""Seconds that it takes at least."""
+"""Least duration of such added motion, seconds."""
 BACK = 0.5
-"""Part of their way that repeating hands may be away from where they began."""
+"""A motion is repeated if it returns to within this share of its size of its beginning."""
 MOVED = 0.12
-"""Arm lengths that hands go which repeat something."""
+"""Least size of a repeated motion, arm lengths."""
 FAINT = 0.5
-"""Degrees that a part of torso or head turns at least, where a clip moves it."""
+"""Degrees above which the rotation of a role of torso or head is kept in a clip."""
 FARTHEST = np.radians(20.0), np.radians(25.0)
-"""How far a clip turns the torso, and the head."""
+"""Largest rotation of the torso, and of the head, in a clip, radians."""
 
 
 def recorded_clips(recording: Recording, cuts: Iterable[Cut]) -> dict[str, Clip]:
-    """Clips by name; further ones of a name are numbered from 2 on. What is rest is no clip."""
+    """Makes clips from the cuts of a recording, except from those of rest.
+
+    Returns:
+        Clips by name; the second clip of a name gets `_2` appended, and so on.
+    """
     cuts = list(cuts)
     still, hung = _still(recording, cuts), hung_in(recording, cuts)
     gestures = named(cut for cut in cuts if cut.name != REST)
@@ -55,9 +59,9 @@ def recorded_clips(recording: Recording, cuts: Iterable[Cut]) -> dict[str, Clip]
 
 
 def hung_in(recording: Recording, cuts: Iterable[Cut]) -> Array:
-    """(R, 4) by role: arms as they hang where somebody rests, all else as in the standard pose.
+    """(R, 4) pose by role with arms as they hang in the recorded rest, else the standard pose.
 
-    Where nobody rests, arms hang as near as the body allows.
+    Without a cut of rest, arms hang as near to the body as its width allows (`hanging`).
     """
     hung = hanging(recording.person)
     if not any(cut.name == REST for cut in cuts):
@@ -73,7 +77,7 @@ def hung_in(recording: Recording, cuts: Iterable[Cut]) -> Array:
 
 
 def _still(recording: Recording, cuts: list[Cut]) -> Array:
-    """(R, 4) by role: how somebody rests; where nobody does, how they are at first."""
+    """(R, 4) mean pose by role of the recorded rest; without one, the pose of the first frame."""
     spans = [range(cut.first, cut.last + 1) for cut in cuts if cut.name == REST]
     poses = recording.poses[list(spans[0]) if spans else [0]]
     return normalized(poses.mean(0))
@@ -81,13 +85,13 @@ def _still(recording: Recording, cuts: list[Cut]) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Take:
-    """One cut of a recording.
+    """Makes the clip of one cut.
 
     Attributes:
-        recording: Of whom.
-        cut: Which frames.
-        still: (R, 4) by role, at rest.
-        hung: (R, 4) by role, with hanging arms.
+        recording: The recording.
+        cut: The frames.
+        still: (R, 4) pose by role at rest, as recorded.
+        hung: (R, 4) pose by role with hanging arms, else the standard pose.
     """
 
     recording: Recording
@@ -96,7 +100,7 @@ class _Take:
     hung: Array
 
     def clip(self, name: str) -> Clip:
-        """The clip under a name."""
+        """The clip of the cut, with a name."""
         frames = self._frames()
         hold = self._hold()
         lead, tail = (self._way(frame) for frame in (self.cut.first, self.cut.last))
@@ -119,7 +123,10 @@ class _Take:
         return frames / self.recording.fps
 
     def _roles(self, frames: Array) -> tuple[str, ...]:
-        """Those that move: of the hands that take part, of head and torso where they do."""
+        """Roles that the clip moves: of hands that take part, and of torso and head if they turn.
+
+        `frames` (F, R, 4) are those of `_frames`.
+        """
         there = self.recording.person.cast.joints
         torso = ("spine", "chest", "neck", "head") if self.cut.sides else ("neck", "head")
         turned = angles(IDENTITY, frames).max(0)  # (R,) degrees
@@ -128,14 +135,14 @@ class _Take:
         return tuple(role for role in ROLES if role in own and role in there)
 
     def _hold(self) -> float:
-        """Seconds of the hold: of a head none, of hands that repeat something one time round."""
+        """Duration of the hold in seconds: 0 for the head; one repetition for repeated motion."""
         if not self.cut.sides:
             return 0.0
         return self._seconds(self.cut.release - self.cut.stroke) if self.repeats else HOLD
 
     @property
     def repeats(self) -> bool:
-        """Whether hands go somewhere and come back between stroke and release."""
+        """Whether a hand moves and returns between stroke and release, which can be repeated."""
         first, last = self.cut.stroke, self.cut.release
         for side in self.cut.sides:
             tips = self.recording.hands[side].tip[first : last + 1]
@@ -145,7 +152,7 @@ class _Take:
         return False
 
     def _way(self, frame: int) -> float:
-        """Seconds that hands need between a frame and hanging; 0 where they hang."""
+        """Seconds for moving hands between their place at a frame and hanging; 0 if they hang."""
         person = self.recording
         far = [
             np.linalg.norm(person.hands[side].knuckles[frame] - person.hanging[side].knuckles[0])
@@ -155,11 +162,12 @@ class _Take:
         return max(farthest / PACE, LEAST) if farthest > HANGING else 0.0
 
     def _frames(self) -> Array:
-        """(F, R, 4) from first to last frame as a performer uses them.
+        """(F, R, 4) poses by role of the cut's frames, as a `Performer` needs them.
 
-        Torso and head come upon what the rest does: from how they are at the first frame to how
-        they are at the last one, as far as a person standing in place turns them. Hips stay. Arms
-        keep their places on the chest.
+        A performer adds rotations of torso, head and collarbones to those of the rest. So torso and
+        head get their deviation from an even motion between first and last frame, up to `FARTHEST`,
+        with the rotation of hips included in that of the torso; collarbones get theirs from the
+        recorded rest. Arms keep their rotations relative to the chest.
         """
         poses = self.recording.poses[self.cut.first : self.cut.last + 1].copy()
         part = np.linspace(0, 1, len(poses))
@@ -179,7 +187,14 @@ class _Take:
         return poses
 
     def _within(self, times: Array, frames: Array, before: float, hold: float) -> Array:
-        """(T, R, 4) at seconds (T,) from the first frame on, with a hold after `before` seconds."""
+        """(T, R, 4) poses at times after the first frame, with a hold.
+
+        Args:
+            times: (T,) seconds from the first frame.
+            frames: (F, R, 4) poses of the cut.
+            before: Seconds from the first frame to the stroke's arrival, where the hold begins.
+            hold: Duration of the hold in seconds.
+        """
         stroke = self.cut.stroke - self.cut.first
         release = self.cut.release - self.cut.first
         fps = self.recording.fps
@@ -199,9 +214,16 @@ class _Take:
         return np.where((after > 0)[:, None, None], going, coming)
 
     def _brought(self, times: Array, own: Array, lead: float, end: float) -> Array:
-        """Lets arms hang at second 0 and at the last one, where they do not."""
+        """(T, R, 4) poses `own`, blended with hanging arms at the beginning and at the end.
+
+        Args:
+            times: (T,) seconds of the clip.
+            own: (T, R, 4) poses of the gesture.
+            lead: Duration of the blend at the beginning, seconds; 0 for none.
+            end: Time at which the blend at the end begins, seconds.
+        """
         hung = np.broadcast_to(self.hung, own.shape)
-        down = np.zeros_like(times)  # (T,) how far arms hang
+        down = np.zeros_like(times)  # (T,) weight of hanging arms
         if lead:
             down = 1 - eased(times / lead)
         if end < times[-1]:
@@ -210,7 +232,13 @@ class _Take:
 
 
 def _beyond(turned: Array, part: Array, farthest: float) -> Array:
-    """(F, 4) rotations beyond the even way from the first to the last one, up to an angle."""
+    """(F, 4) deviations of rotations from an even motion between the first and the last.
+
+    Args:
+        turned: (F, 4) rotations.
+        part: (F,) share of the way, from 0 to 1.
+        farthest: Largest angle of a deviation, radians.
+    """
     even = slerp(turned[:1], turned[-1:], part)
     vector = to_rotvec(multiply(conjugate(even), turned))
     angle = np.linalg.norm(vector, axis=-1, keepdims=True)
@@ -218,7 +246,7 @@ def _beyond(turned: Array, part: Array, farthest: float) -> Array:
 
 
 def _at(frames: Array, places: Array) -> Array:
-    """(T, R, 4) between frames (F, R, 4); before the first and after the last they stay."""
+    """(T, R, 4) poses at places (T,) among frames (F, R, 4), interpolated and clamped."""
     places = np.clip(places, 0, len(frames) - 1)
     index = np.minimum(places.astype(int), max(len(frames) - 2, 0))
     after = np.minimum(index + 1, len(frames) - 1)
@@ -226,6 +254,6 @@ def _at(frames: Array, places: Array) -> Array:
 
 
 def _smooth(x: Array) -> Array:
-    """0 … 1 with zero slope at both ends."""
+    """Smoothstep: 0 up to x = 0, 1 from x = 1, with slope 0 at both."""
     x = np.clip(x, 0.0, 1.0)
     return x * x * (3 - 2 * x)

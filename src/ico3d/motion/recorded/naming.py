@@ -1,47 +1,50 @@
-"""Names of gestures by what hands do at the moment of the stroke."""
+"""Names recorded gestures by the hands at the moment when the stroke arrives.
+
+Lengths are in arm lengths, from shoulder to wrist; directions are unit vectors.
+"""
 
 import numpy as np
 
 from ico3d.motion.recorded.recording import Hand, Recording
 
 RAISE = "raise"
-"""A hand above the head: a name of which the package has no gesture."""
+"""Name of gestures with a hand above the head; the package has no gesture of this name."""
 NEAR_CHIN, NEAR_HEART = 0.3, 0.3
-"""Arm lengths from fingertips to chin, and from knuckles to breastbone."""
+"""Largest distances from fingertips to chin (think), and from knuckles to breastbone (heart)."""
 STRAIGHT, BENT = 50.0, 85.0
-"""Degrees that a straight finger is bent at most, and a bent one at least."""
+"""Largest angle in degrees of a straight finger, and least angle of a bent one."""
 POINTED, STRETCHED = 0.75, 0.92
-"""Arm lengths from shoulder to wrist of who points with the index alone, or with the hand."""
+"""Least distance from shoulder to wrist when pointing with the index alone, or with the hand."""
 NOT_DOWN = -0.5
-"""Arm lengths that a pointing wrist is above the shoulder at least."""
+"""Least height of a pointing wrist above the shoulder."""
 ABOVE = 0.45
-"""Arm lengths above the shoulder from which a hand is raised."""
+"""Height above the shoulder from which a hand is raised."""
 FACING = 0.6
-"""How much a palm looks up, to the other hand or at the body: the coordinate of its direction."""
+"""Least upward (or backward, at the body) component of a palm's direction to count as such."""
 INWARDS = 0.8
-"""The same of palms that look at each other."""
+"""Least inward component of the directions of palms that face each other."""
 UPWARDS = 0.6
-"""The same of fingers that count."""
+"""Least upward component of the direction of counting fingers."""
 AHEAD = 0.3
-"""Arm lengths that an offering hand is before the shoulder at least."""
+"""Least distance of an offering hand in front of the shoulder."""
 SHRUGGED = 8.0
-"""Degrees by which collarbones are lifted more than at rest."""
+"""Degrees by which collarbones are lifted in a shrug, more than at rest."""
 WIDE = 0.4
-"""Arm lengths outside of the shoulder of hands that welcome or show a size."""
+"""Least distance outside of the shoulders of hands that welcome or show something big."""
 CLOSE = -0.02
-"""The same of hands between which something small is, at most."""
+"""Largest distance outside of the shoulders of hands that show something small."""
 LOW = -0.4
-"""Arm lengths above the shoulder of hands that welcome, at least."""
+"""Least height above the shoulders of hands that welcome."""
 
 
 def name_of(recording: Recording, hands: tuple[str, ...], frame: int, rest: int) -> str:
-    """What a gesture with one stroke is called.
+    """Name of a recorded gesture with one stroke.
 
     Args:
-        recording: Of whom.
-        hands: Which take part: one, or both.
-        frame: Where the stroke arrives.
-        rest: A frame of rest, that tells how collarbones lie.
+        recording: The recording.
+        hands: Sides of the hands that take part: one or both.
+        frame: Frame in which the stroke arrives.
+        rest: A frame of rest, for the angle of resting collarbones.
     """
     made = {side: recording.hands[side] for side in hands}
     if len(made) == 2:
@@ -52,7 +55,7 @@ def name_of(recording: Recording, hands: tuple[str, ...], frame: int, rest: int)
 
 
 def _of_one(hand: Hand, i: int) -> str | None:
-    """The name of what one hand does; None for a beat."""
+    """Name of a gesture of one hand at frame `i`; None for a beat."""
     _, up, ahead = hand.place[i]
     if hand.to_chin[i] < NEAR_CHIN:
         return "think"
@@ -72,13 +75,13 @@ def _of_one(hand: Hand, i: int) -> str | None:
 
 
 def _counts(straight: np.ndarray, bent: np.ndarray) -> bool:
-    """Whether one to three fingers are straight, the index first, and all others bent."""
+    """Whether one to three fingers, from the index on, are straight and all others bent."""
     count = int(straight.sum())
     return bool(1 <= count <= 3 and straight[:count].all() and bent[count:].all())
 
 
 def _of_both(hands: list[Hand], i: int, lifted: float) -> str:
-    """The name of what both hands do, with collarbones lifted by so many degrees."""
+    """Name of a gesture of both hands at frame `i`, with collarbones lifted by `lifted` degrees."""
     places = np.stack([hand.place[i] for hand in hands])  # (2, 3) outwards, upwards, ahead
     palms = np.stack([hand.palm[i] for hand in hands])
     out, up, ahead = places.min(0)

@@ -1,4 +1,4 @@
-"""What somebody did in a recording, by role, and what their hands and head did there."""
+"""A recorded motion as poses by role, with measures of the hands and the head."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,24 +24,28 @@ from ico3d.rig.rig import Rig
 SMOOTH = 0.1
 """Seconds over which a speed is averaged."""
 STEADY = 0.1
-"""Seconds before and after a frame that tell how somebody stood in it."""
+"""Seconds before and after a frame whose poses are used to smooth the pose of the frame."""
 FOUR = ("index", "middle", "ring", "little")
+"""The fingers without the thumb."""
 
 
 @dataclass(frozen=True, eq=False)
 class Hand:
-    """A hand in F frames; vectors in the chest's axes: outwards, upwards, forwards.
+    """Measures of a hand in F frames.
+
+    Vectors are in the chest's axes: outwards (away from the other hand), upwards, forwards. Lengths
+    are in arm lengths, from shoulder to wrist.
 
     Attributes:
-        place: (F, 3) of the wrist from where the shoulder is at rest, in arm lengths.
-        knuckles: (F, 3) the same of the middle finger's knuckle.
-        tip: (F, 3) the same of where straight fingers end.
-        palm: (F, 3) where it looks.
-        fingers: (F, 3) where straight fingers point.
-        bends: (F, 4) degrees by which index to little finger are bent; none where a rig lacks them.
-        lifted: (F,) degrees by which the collarbone is lifted.
-        to_chin: (F,) from the tip to the chin, in arm lengths.
-        to_heart: (F,) from the knuckles to the breastbone, in arm lengths.
+        place: (F, 3) position of the wrist relative to the shoulder at rest.
+        knuckles: (F, 3) position of the middle finger's knuckle relative to the shoulder at rest.
+        tip: (F, 3) position of the tips of straight fingers relative to the shoulder at rest.
+        palm: (F, 3) unit direction in which the palm looks.
+        fingers: (F, 3) unit direction in which straight fingers point.
+        bends: (F, 4) angles of index to little finger in degrees; (F, 0) for a rig without them.
+        lifted: (F,) angle by which the collarbone is lifted, degrees.
+        to_chin: (F,) distance from `tip` to the chin.
+        to_heart: (F,) distance from `knuckles` to the breastbone.
     """
 
     place: Array
@@ -56,18 +60,18 @@ class Hand:
 
     @property
     def reach(self) -> Array:
-        """(F,) how far the wrist is from the shoulder, in arm lengths."""
+        """(F,) distance of the wrist from the shoulder at rest, arm lengths."""
         return np.linalg.norm(self.place, axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """F frames of somebody.
+    """The motion of a person in F frames.
 
     Attributes:
-        person: Who.
+        person: Who was recorded.
         fps: Frames per second.
-        poses: (F, R, 4) by role.
+        poses: (F, R, 4) poses by role, wxyz.
     """
 
     person: Person
@@ -76,31 +80,34 @@ class Recording:
 
     @property
     def num_frames(self) -> int:
-        """F."""
+        """Number F of frames."""
         return len(self.poses)
 
     def frames(self, seconds: float) -> int:
-        """The whole number of frames that so many seconds have; one at least."""
+        """Number of frames in a duration, rounded; at least one."""
         return max(1, round(seconds * self.fps))
 
     @cached_property
     def hands(self) -> dict[str, Hand]:
-        """Both hands by side."""
+        """Measures of both hands, by side."""
         return hands_of(self.person, self.poses)
 
     @cached_property
     def hanging(self) -> dict[str, Hand]:
-        """The same of hanging arms: one frame."""
+        """Measures of both hands with hanging arms (`hanging`), by side, as of one frame."""
         return hands_of(self.person, hanging(self.person)[None])
 
     @cached_property
     def head(self) -> Array:
-        """(F, 3) rotation vectors of the head against the chest: down, to the left, aside."""
+        """(F, 3) rotation vectors of the head relative to the chest, radians.
+
+        Positive coordinates turn the head down, to the left, and towards the right shoulder.
+        """
         neck, head = self.poses[:, INDEX["neck"]], self.poses[:, INDEX["head"]]
         return to_rotvec(continuous(multiply(neck, head)))
 
     def speed(self, side: str) -> Array:
-        """(F,) arm lengths a second of a hand's knuckles, against the chest."""
+        """(F,) speed of a hand's knuckles relative to the chest, arm lengths per second."""
         return self.smoothed(speeds(self.hands[side].knuckles, self.fps))
 
     def smoothed(self, values: Array) -> Array:
@@ -111,15 +118,15 @@ class Recording:
 
 
 def recording_of(rig: Rig, fps: float, rotations: np.ndarray) -> Recording:
-    """What a body track or a trained body tells.
+    """Makes a recording of the poses of a body track or a trained body; poses are smoothed.
 
     Args:
-        rig: J joints at rest.
+        rig: The skeleton.
         fps: Frames per second.
-        rotations: (F, J, 4) wxyz of each joint about itself.
+        rotations: (F, J, 4) local rotations of the joints, wxyz.
 
     Raises:
-        SettingsError: If the rig lacks a role without which nobody stands or gestures.
+        SettingsError: If the rig lacks a role that is needed to stand or gesture.
     """
     person = person_of(rig)
     poses = person.retarget.by_role(np.asarray(rotations, np.float64))
@@ -127,10 +134,10 @@ def recording_of(rig: Rig, fps: float, rotations: np.ndarray) -> Recording:
 
 
 def steadied(poses: Array, fps: float) -> Array:
-    """Rotations (F, ..., 4) without the jitter of poses that were found frame by frame.
+    """Smooths rotations (F, ..., 4) that jitter because each frame was fitted on its own.
 
-    A parabola through the frames around each one (Savitzky and Golay) keeps the height of quick
-    strokes.
+    A parabola is fitted to the frames around each frame (Savitzky and Golay), which keeps the size
+    of quick strokes.
     """
     half = min(max(1, round(STEADY * fps)), (len(poses) - 1) // 2)
     if half < 2:  # a parabola goes through three frames
@@ -141,11 +148,11 @@ def steadied(poses: Array, fps: float) -> Array:
     after = 2 * poses[-1:] - poses[-2 : -half - 2 : -1]
     padded = np.concatenate([before, poses, after])  # (F + 2 half, ..., 4)
     windows = np.lib.stride_tricks.sliding_window_view(padded, len(around), axis=0)
-    return normalized(windows @ weights)
+    return normalized(windows @ weights)  # windows: (F, ..., 4, 2 half + 1)
 
 
 def speeds(places: Array, fps: float) -> Array:
-    """(F,) lengths a second of a point (F, 3): the mean of the steps before and after."""
+    """(F,) speed per second of a point (F, 3): mean of the steps before and after each frame."""
     if len(places) < 2:
         return np.zeros(len(places))
     steps = np.linalg.norm(np.diff(places, axis=0), axis=-1) * fps  # (F - 1,)
@@ -154,14 +161,14 @@ def speeds(places: Array, fps: float) -> Array:
 
 
 def hands_of(person: Person, poses: Array) -> dict[str, Hand]:
-    """Hands by side in poses (F, R, 4) by role."""
+    """Measures of both hands, by side, in poses (F, R, 4) by role."""
     world = person.retarget.world(poses)
     places = person.posed(poses, np.zeros(3))
     rotations = person.retarget.pose(poses)
     chin = person.carried("head", person.chin, rotations, np.zeros(3))
     chest = conjugate(world[:, INDEX["chest"]])
 
-    def carried(point: Array) -> Array:  # in rest space, as the chest carries it
+    def carried(point: Array) -> Array:  # from the world to rest space as it moves with the chest
         return person.place("chest") + rotate(chest, point - places["chest"])
 
     found: dict[str, Hand] = {}
@@ -189,7 +196,10 @@ def hands_of(person: Person, poses: Array) -> dict[str, Hand]:
 
 
 def _bends(person: Person, side: str, world: Array) -> Array:
-    """(F, 4) degrees between the hand's direction and the last bone of each finger."""
+    """(F, 4) angles in degrees between the hand's direction and the last bone of each finger.
+
+    (F, 0) for a rig without fingers; `world` (F, R, 4) are rotations by `Retarget.world`.
+    """
     if not all(f"{side}_{finger}3" in person.cast.joints for finger in FOUR):
         return np.zeros((len(world), 0))
     hand = rotate(world[:, INDEX[f"{side}_wrist"]], DOWN)[:, None]  # (F, 1, 3)

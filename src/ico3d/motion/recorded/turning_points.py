@@ -1,4 +1,4 @@
-"""Where values that go up and down turn around, and where conditions hold."""
+"""Turning points of values over time, swings between them, and runs of True."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -9,20 +9,21 @@ from ico3d.motion.recorded.recording import Recording
 from ico3d.rig.quaternions import Array
 
 STILL = 0.15
-"""Part of the fastest step down to which a change has begun or goes on."""
+"""A swing extends over steps that are larger than this share of its fastest step."""
 QUICK = (0.06, 0.45)
-"""Seconds that a hand or a head takes from one side to the other."""
+"""Least and longest duration in seconds of a swing of a hand or the head."""
 PAUSE = 0.2
-"""Seconds that it stays on a side, at most."""
+"""Longest pause in seconds between two swings of a volley."""
 
 
 def turning_points(values: Array, least: float) -> list[int]:
-    """Numbers of the highs and lows, in turn, between which values (F,) change by `least` or more.
+    """Indices of alternating maxima and minima of values (F,).
 
-    The first one and the last one need such a change on one side only; without any there are none.
+    Between successive ones, values change by `least` or more. The first and the last need such a
+    change on one side only; without any such change there are no turning points.
     """
     found: list[int] = []
-    low = high = direction = 0  # up is 1; nobody knows before the first change
+    low = high = direction = 0  # direction: 1 up, −1 down, 0 before the first large change
     for i, value in enumerate(values):
         if direction >= 0 and value > values[high]:
             high = i
@@ -38,19 +39,19 @@ def turning_points(values: Array, least: float) -> list[int]:
 
 
 def runs(there: np.ndarray) -> list[tuple[int, int]]:
-    """First and last number of each stretch of True in (F,)."""
+    """First and last index of each run of True in (F,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]])))
     return [(first, after - 1) for first, after in edges.reshape(-1, 2).tolist()]
 
 
 @dataclass(frozen=True)
 class Swing:
-    """A change from one turning point towards the next.
+    """A change of values from one turning point towards the next.
 
     Attributes:
-        begin: The frame at which it begins to change.
-        end: The frame at which it stays again.
-        change: By how much.
+        begin: Frame at which the change begins.
+        end: Frame at which the change ends.
+        change: Value at the end less value at the beginning.
     """
 
     begin: int
@@ -59,9 +60,10 @@ class Swing:
 
 
 def swings(values: Array, least: float) -> list[Swing]:
-    """Changes of values (F,) by `least` or more, around the fastest step between two turns.
+    """Swings of values (F,) by `least` or more.
 
-    What drifts before and after does not belong to them.
+    A swing is the run of quick steps around the fastest step between two turning points; slow drift
+    before and after does not belong to it.
     """
     found = [_swing(values, *pair) for pair in pairwise(turning_points(values, least))]
     return [swing for swing in found if abs(swing.change) >= least]
@@ -80,7 +82,10 @@ def _swing(values: Array, first: int, last: int) -> Swing:
 
 
 def volleys(found: list[Swing], recording: Recording) -> list[list[Swing]]:
-    """Swings as quick as people's that follow one another at once."""
+    """Groups of swings that follow each other without long pauses.
+
+    Swings that are too short or too long for people (`QUICK`) are left out, and end a group.
+    """
     least, most, pause = map(recording.frames, (*QUICK, PAUSE))
     groups: list[list[Swing]] = [[]]
     for swing in found:
