@@ -1,4 +1,4 @@
-"""Which joints carry a vertex: linear blend skinning with four joints each."""
+"""Binds vertices to joints: linear blend skinning with up to four joints per vertex."""
 
 from dataclasses import dataclass
 
@@ -7,15 +7,16 @@ import numpy as np
 from ico3d.rig.quaternions import Array
 
 INFLUENCES = 4
+"""Most joints that carry a vertex."""
 
 
 @dataclass(frozen=True, eq=False)
 class Binding:
-    """V vertices that hang on at most four joints each.
+    """Joints that carry V vertices, at most four each, with weights.
 
     Attributes:
-        joints: (V, 4) uint8 numbers of joints.
-        weights: (V, 4) float32 ≥ 0; rows sum to 1.
+        joints: (V, 4) uint8 indices of joints.
+        weights: (V, 4) float32 weights of these joints, not negative; rows sum to 1.
     """
 
     joints: np.ndarray
@@ -23,7 +24,7 @@ class Binding:
 
     @staticmethod
     def strongest(dense: Array) -> "Binding":
-        """The four strongest of dense weights (V, J), made to sum to 1."""
+        """A binding of the four largest of dense weights (V, J) per vertex, scaled to sum 1."""
         count = min(INFLUENCES, dense.shape[1])
         order = np.argsort(-dense, axis=1, kind="stable")[:, :count]  # (V, ≤4)
         joints = np.zeros((len(dense), INFLUENCES), np.uint8)
@@ -33,17 +34,17 @@ class Binding:
         return Binding(joints, weights / np.maximum(weights.sum(1, keepdims=True), 1e-12))
 
     def dense(self, joints: int) -> Array:
-        """(V, joints) float32, zero where a joint does not carry a vertex."""
+        """(V, joints) float32 weights of all joints; 0 where a joint does not carry a vertex."""
         found = np.zeros((len(self.joints), joints), np.float32)
         np.add.at(found, (np.arange(len(found))[:, None], self.joints), self.weights)
         return found
 
     def skinned(self, vertices: Array, matrices: Array) -> Array:
-        """Vertices that follow their joints.
+        """Moves vertices with their joints.
 
         Args:
-            vertices: (V, 3) metres at rest.
-            matrices: (J, 4, 4) from rest to the world (`Rig.matrices`).
+            vertices: (V, 3) positions at rest, metres.
+            matrices: (J, 4, 4) transforms of the joints from rest to the world (`Rig.matrices`).
 
         Returns:
             (V, 3) metres in the world.

@@ -1,4 +1,4 @@
-"""How a recorded person moved: a rig, its pose in every frame, and a mesh that hangs on it."""
+"""Body tracks: a recorded person's rig, its pose in every frame, and a mesh bound to it."""
 
 import json
 from dataclasses import dataclass, replace
@@ -17,25 +17,27 @@ from ico3d.rig.quaternions import Array
 from ico3d.rig.rig import Rig
 
 NAME = "body_track.safetensors"
+"""Name of the file in a recording's folder."""
 VERSION = 1
+"""Version of the file."""
 LONGEST = 1e3
-"""Metres; no root moves farther, and no vertex lies farther."""
+"""Largest coordinate of roots and vertices in metres that a file may hold."""
 
 
 @dataclass(frozen=True, eq=False)
 class BodyTrack:
-    """A body through F frames.
+    """The motion of a recorded person in F frames.
 
     Attributes:
-        rig: J joints at rest, in the person's own proportions.
+        rig: The skeleton of J joints, in the person's own proportions.
         fps: Frames per second; frame i is at i / fps seconds.
-        rotations: (F, J, 4) float32 wxyz of each joint about itself (`Rig.posed`).
-        roots: (F, 3) float32 metres that the root moves from rest to the world.
-        fitted: (F,) bool; the other frames are interpolated.
-        vertices: (V, 3) float32 metres, the template's surface in the person's shape at rest.
-        faces: (T, 3) int32 corners of its triangles, counter-clockwise seen from outside.
-        binding: Which joints carry the vertices.
-        source: What the template is and how it was fitted, for people.
+        rotations: (F, J, 4) float32 local rotation of each joint, wxyz (`Rig.posed`).
+        roots: (F, 3) float32 translation of the root from rest to the world, metres.
+        fitted: (F,) bool: frames that were fitted; poses of other frames are interpolated.
+        vertices: (V, 3) float32 surface of the template in the person's shape at rest, metres.
+        faces: (T, 3) int32 corners of the surface's triangles, counter-clockwise from outside.
+        binding: Joints that carry the vertices.
+        source: What the template is and to what it was fitted, in words.
     """
 
     rig: Rig
@@ -50,25 +52,25 @@ class BodyTrack:
 
     @property
     def num_frames(self) -> int:
-        """F."""
+        """Number F of frames."""
         return len(self.rotations)
 
     def until(self, frames: int) -> "BodyTrack":
-        """The track of the first frames alone."""
+        """The track of the first `frames` frames."""
         parts = (self.rotations[:frames], self.roots[:frames], self.fitted[:frames])
         return replace(self, rotations=parts[0], roots=parts[1], fitted=parts[2])
 
     def joints(self) -> Array:
-        """(F, J, 3) places of the joints in the world, metres."""
+        """(F, J, 3) positions of the joints in the world, metres."""
         return self.rig.posed(self.rotations, self.roots)[1]
 
     def surface(self, frame: int) -> Array:
-        """(V, 3) the template's vertices in the world at a frame, metres."""
+        """(V, 3) positions of the vertices in the world at a frame, metres."""
         matrices = self.rig.matrices(self.rotations[frame], self.roots[frame])
         return self.binding.skinned(self.vertices, matrices)
 
     def to_bytes(self) -> bytes:
-        """The content of the file."""
+        """Content of the file of this track."""
         about = {
             "version": VERSION,
             "fps": self.fps,
@@ -91,15 +93,15 @@ class BodyTrack:
 
 
 def track_file(recording: Path) -> Path:
-    """Where the body track of a recording lies: in its folder, or beside it where it is a file."""
+    """File of a recording's body track: in its folder, or beside a recording that is a file."""
     return recording / NAME if recording.is_dir() else recording.with_suffix(f".{NAME}")
 
 
 def write_body_track(track: BodyTrack, recording: Path) -> Path:
-    """Writes the track of a recording, whole or not at all.
+    """Writes the body track of a recording atomically; returns the file.
 
     Raises:
-        CaptureError: If nothing can be written where the recording lies.
+        CaptureError: If the file cannot be written.
     """
     file = track_file(recording)
     try:
@@ -116,12 +118,12 @@ def read_body_track(recording: Path, num_frames: int, fps: float) -> BodyTrack |
     """Reads the body track of a recording.
 
     Args:
-        recording: The `path` of its capture.
-        num_frames: Its frames.
-        fps: Its frames per second.
+        recording: Path of the recording, `Capture.path`.
+        num_frames: Number of frames of the recording.
+        fps: Frames per second of the recording.
 
     Returns:
-        The track, or None where there is none.
+        The track; None where there is no file.
 
     Raises:
         CaptureError: If the file is damaged or belongs to another recording.
@@ -144,7 +146,11 @@ def read_body_track(recording: Path, num_frames: int, fps: float) -> BodyTrack |
 
 
 def _read(file: Path) -> BodyTrack:
-    """The content of a file; any of several exceptions says that it is damaged."""
+    """Reads a file of a body track.
+
+    Raises:
+        OSError, SafetensorError, ValueError, KeyError or TypeError: If the file is damaged.
+    """
     with cast(Any, safe_open(file, "numpy")) as content:  # untyped
         text = cast(dict[str, str], content.metadata() or {}).get("body_track", "{}")
         names = cast(list[str], content.keys())
@@ -184,7 +190,11 @@ def _read(file: Path) -> BodyTrack:
 
 
 def _check_values(arrays: dict[str, np.ndarray], joints: int, vertices: int) -> None:
-    """Refuses what is no pose: rotations that are none, corners and joints that are not there."""
+    """Checks rotations, lengths, indices and weights.
+
+    Raises:
+        ValueError: If one of them is invalid.
+    """
     if np.abs(np.linalg.norm(arrays["rotations"], axis=-1) - 1).max(initial=0) > 1e-3:
         raise ValueError("'rotations' holds one that is not of length 1")
     for name in ("roots", "vertices"):

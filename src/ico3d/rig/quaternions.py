@@ -1,4 +1,4 @@
-"""Rotations as numpy quaternions wxyz: (..., 4), of length 1 unless stated otherwise."""
+"""Rotations as numpy arrays of quaternions wxyz (..., 4), of length 1 unless stated otherwise."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,7 @@ IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def normalized(quats: Array) -> Array:
-    """(..., 4) of length 1; zeros become the identity."""
+    """(..., 4) quaternions scaled to length 1; zero quaternions become the identity."""
     length = np.linalg.norm(quats, axis=-1, keepdims=True)  # (..., 1)
     return np.where(length > 1e-12, quats / np.maximum(length, 1e-12), IDENTITY)
 
@@ -33,7 +33,7 @@ def conjugate(quats: Array) -> Array:
 
 
 def rotate(quats: Array, vectors: Array) -> Array:
-    """(..., 3) vectors turned by quaternions (..., 4); both are broadcast."""
+    """(..., 3) vectors rotated by quaternions (..., 4); both are broadcast."""
     axis, w = quats[..., 1:], quats[..., :1]  # (..., 3), (..., 1)
     twice = 2 * np.cross(axis, vectors)
     return vectors + w * twice + np.cross(axis, twice)
@@ -53,8 +53,8 @@ def to_matrix(quats: Array) -> Array:
 def from_matrix(matrices: Array) -> Array:
     """Quaternions (..., 4) with w ≥ 0 of rotation matrices (..., 3, 3).
 
-    Each is the eigenvector of the largest eigenvalue of a symmetric 4×4 matrix, which has no
-    special cases (Bar-Itzhack).
+    Each quaternion is the eigenvector of the largest eigenvalue of a symmetric 4×4 matrix
+    (Bar-Itzhack, 2000), which needs no case distinctions.
     """
     m = matrices
     trace = np.trace(m, axis1=-2, axis2=-1)  # (...)
@@ -70,13 +70,13 @@ def from_matrix(matrices: Array) -> Array:
 
 
 def from_rotvec(vectors: Array) -> Array:
-    """Quaternions (..., 4) of rotation vectors (..., 3): axis times radians."""
+    """Quaternions (..., 4) of rotation vectors (..., 3): axis times angle in radians."""
     angle = np.linalg.norm(vectors, axis=-1, keepdims=True)  # (..., 1)
     return np.concatenate([np.cos(angle / 2), np.sinc(angle / (2 * np.pi)) / 2 * vectors], -1)
 
 
 def to_rotvec(quats: Array) -> Array:
-    """Rotation vectors (..., 3) of quaternions (..., 4), at most π radians long."""
+    """Rotation vectors (..., 3) of quaternions (..., 4): axis times angle, at most π radians."""
     quats = np.where(quats[..., :1] < 0, -quats, quats)
     sine = np.linalg.norm(quats[..., 1:], axis=-1, keepdims=True)  # (..., 1)
     angle = 2 * np.arctan2(sine, quats[..., :1])  # (..., 1)
@@ -85,13 +85,16 @@ def to_rotvec(quats: Array) -> Array:
 
 
 def slerp(a: Array, b: Array, part: Array | float) -> Array:
-    """(..., 4) on the shorter great arc from a (part 0) to b (part 1); part (...) is broadcast."""
+    """(..., 4) interpolation on the shorter arc from a (part 0) to b (part 1).
+
+    `part` (...) is broadcast against a and b without their last axis.
+    """
     vector = to_rotvec(multiply(conjugate(a), b))  # (..., 3)
     return multiply(a, from_rotvec(vector * np.asarray(part)[..., None]))
 
 
 def continuous(quats: Array) -> Array:
-    """(F, ..., 4) the same rotations with signs such that neighbours in time are near."""
+    """(F, ..., 4) the same rotations, with signs that do not jump between successive rows."""
     dots = (quats[1:] * quats[:-1]).sum(-1)  # (F - 1, ...)
     signs = np.cumprod(np.where(dots < 0, -1.0, 1.0), axis=0)
     return np.concatenate([quats[:1], quats[1:] * signs[..., None]])

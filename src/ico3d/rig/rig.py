@@ -1,4 +1,4 @@
-"""Bones: which joint hangs on which, and where they take what is bound to them."""
+"""Rigs: the joints of a skeleton as a tree, and forward kinematics."""
 
 from dataclasses import dataclass
 
@@ -7,23 +7,24 @@ import numpy as np
 from ico3d.rig.quaternions import Array, multiply, rotate, to_matrix
 
 MOST_JOINTS = 256
-"""What one byte can number."""
+"""Most joints of a rig, so that one byte holds the index of a joint."""
 REACH = 10.0
-"""Metres; no joint of a person at rest lies farther from the origin."""
+"""Largest coordinate of a joint at rest, metres."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """J joints of a person at rest.
+    """A skeleton of J joints at rest.
 
-    In the rest pose no joint is turned: rotations are given about the joint in the axes of rest
-    space (metres, +y up, the person faces +z, +x is the person's left) and carry all that hangs
-    on the joint.
+    Rest space is in metres, with +y up; the person faces +z, and +x is the person's left. In the
+    rest pose all rotations are the identity. The local rotation of a joint is about the joint, in
+    the axes of rest space, and moves all joints below it in the tree.
 
     Attributes:
-        names: J names, each once.
-        parents: J numbers, each smaller than its own; −1 for joint 0, the only root.
-        joints: (J, 3) float64 at rest.
+        names: Unique names of the joints.
+        parents: Index of each joint's parent, which is smaller than the joint's own; −1 for joint
+            0, the only root.
+        joints: (J, 3) float64 positions of the joints at rest.
     """
 
     names: tuple[str, ...]
@@ -31,10 +32,10 @@ class Rig:
     joints: Array
 
     def __post_init__(self):
-        """Checks that it is a tree.
+        """Checks names, positions, and that the joints are a tree.
 
         Raises:
-            ValueError: In one sentence, if it is none.
+            ValueError: If they do not make a rig.
         """
         count = len(self.names)
         if not 1 <= count <= MOST_JOINTS or len(set(self.names)) != count:
@@ -50,23 +51,28 @@ class Rig:
             raise ValueError(f"a joint of the rig lies more than {REACH:g} m from the origin")
 
     def __len__(self) -> int:
-        """J."""
+        """Number J of joints."""
         return len(self.names)
 
     def index(self, name: str) -> int:
-        """Number of a joint; ValueError if there is none of that name."""
+        """Index of a joint.
+
+        Raises:
+            ValueError: If no joint has this name.
+        """
         return self.names.index(name)
 
     def posed(self, rotations: Array, root: Array) -> tuple[Array, Array]:
-        """Where each joint is and how it is turned.
+        """Rotations and positions of the joints in a pose.
 
         Args:
-            rotations: (..., J, 4) wxyz of each joint about itself.
-            root: (..., 3) metres that the root moves.
+            rotations: (..., J, 4) local rotation of each joint, wxyz.
+            root: (..., 3) translation of the root from rest, metres.
 
         Returns:
-            Rotations (..., J, 4) wxyz from rest space to the world, and places (..., J, 3) of the
-            joints in the world. A point x bound to joint j goes to R_j (x − joints_j) + place_j.
+            Rotations (..., J, 4) wxyz from rest space to the world, and positions (..., J, 3) of
+            the joints in the world. A point x bound to joint j moves to
+            R_j (x − joints_j) + position_j.
         """
         turned = np.array(rotations, np.float64)  # (..., J, 4)
         places = np.broadcast_to(self.joints, (*turned.shape[:-1], 3)).copy()  # (..., J, 3)
@@ -78,7 +84,12 @@ class Rig:
         return turned, places
 
     def matrices(self, rotations: Array, root: Array) -> Array:
-        """(..., J, 4, 4) that take what is bound to each joint from rest to the world."""
+        """(..., J, 4, 4) rigid transforms of points bound to each joint, from rest to the world.
+
+        Args:
+            rotations: (..., J, 4) local rotation of each joint, wxyz.
+            root: (..., 3) translation of the root from rest, metres.
+        """
         turned, places = self.posed(rotations, root)
         found = np.zeros((*places.shape[:-1], 4, 4))  # (..., J, 4, 4)
         found[..., :3, :3] = to_matrix(turned)
@@ -88,7 +99,7 @@ class Rig:
         return found
 
     def rest(self, *shape: int) -> Array:
-        """(*shape, J, 4) rotations of the rest pose."""
+        """(*shape, J, 4) local rotations of the rest pose, which are identities."""
         found = np.zeros((*shape, len(self), 4))  # (..., J, 4)
         found[..., 0] = 1
         return found
