@@ -1,1 +1,1 @@
-"""Bodies on a skeleton in bundles: their manifest entry, their file and its evaluation."""
+"""Bodies on a skeleton in bundles: manifest entry, file, gestures, and evaluation in numpy."""

@@ -11,15 +11,15 @@ from ico3d.errors import BundleError
 from ico3d.rig.rig import Rig
 
 QUAT_UNIT = 32767
-"""What stands for 1 in quaternions."""
+"""The int16 that stands for 1 in quaternions."""
 WEIGHT_UNIT = 255
-"""The sum of a Gaussian's weights."""
+"""Sum of a Gaussian's four weights."""
 SCALE_UNITS = (1e-3, 1.0)
-"""Of `shape_scales`: millimetres, logits."""
+"""Units of `shape_scales`: those of positions in metres (1 mm), and of colours in logits."""
 _UNEVEN = 1e-2
-"""By which the length of a quaternion may differ from 1."""
+"""Largest difference of a quaternion's length from 1."""
 _MAX_LENGTH = 1e4
-"""Metres; anything farther is no person, and overflows when it is squared in a shader."""
+"""Largest length in metres; longer ones are no person, and overflow when a shader squares them."""
 _MAX_LOG_SCALE = 10.0
 _MAX_LOGIT = 1e4
 _MAX_COEFFICIENT = 1e4
@@ -27,32 +27,35 @@ _MAX_COEFFICIENT = 1e4
 
 @dataclass(frozen=True, eq=False)
 class BakedSkinned:
-    """N Gaussians at rest that hang on J joints, and the poses in which they were recorded.
+    """N Gaussians at rest, bound to J joints, with the poses of the F recorded frames.
 
-    Gaussians come in the order of importance: the first n of them are the body for a device that
-    draws n.
+    Gaussians are sorted by importance: a device that draws n Gaussians takes the first n.
 
     Attributes:
-        means: (N, 3) float32 metres at rest.
-        quats: (N, 4) int16 wxyz in units of 1/32767, of length 1.
-        log_scales: (N, 3) float16, logarithms of metres.
-        color_logits: (N, 3) float16.
+        means: (N, 3) float32 positions at rest, metres.
+        quats: (N, 4) int16 unit quaternions wxyz at rest, in units of 1/32767.
+        log_scales: (N, 3) float16 logarithms of scales in metres.
+        color_logits: (N, 3) float16 logits of r, g, b.
         opacities: (N,) uint8 in units of 1/255.
-        normals: (N, 3) int8, where the surface faces at rest, of any length.
-        joints: (N, 4) uint8, which joints carry a Gaussian.
-        weights: (N, 4) uint8 in units of 1/255, with the sum 255.
-        shapes: (N, K, 6) int8 residual shapes: of position x, y, z at rest, of logits r, g, b.
-        shape_scales: (N, 2) float16, millimetres and logits per unit of the shapes.
-        light: (8, 3) float32, what spherical harmonics of degrees 1 and 2 of the posed normal add
-            to the logits r, g, b.
-        rig_joints: (J, 3) float32 metres at rest.
-        held: (J, 4) int16 wxyz: how joints are turned about themselves that never turn.
-        moving: (M,) uint8 ascending, the joints that turn.
-        rotations: (F, M, 4) int16 wxyz of these joints about themselves, in each recorded frame.
-        roots: (F, 3) float32 metres that the root moves from rest.
-        coefficients: (F, K) float32, how much of each residual shape a recorded frame has.
-        known: (P,) int16 ascending, the frames that tell the coefficients of any other pose.
-        kernel_width: (1,) float32 > 0, how far a pose reaches, in units of its features.
+        normals: (N, 3) int8 directions in which the surface faces at rest, of any length.
+        joints: (N, 4) uint8 indices of the joints that carry each Gaussian.
+        weights: (N, 4) uint8 weights of these joints in units of 1/255; rows sum to 255.
+        shapes: (N, K, 6) int8 residual shapes: changes of position x, y, z at rest and of the
+            logits of r, g, b.
+        shape_scales: (N, 2) float16 millimetres and logits per unit of the shapes.
+        light: (8, 3) float32 coefficients of the spherical harmonics of degrees 1 and 2, which are
+            evaluated at the posed normal and added to the logits of r, g, b.
+        rig_joints: (J, 3) float32 positions of the joints at rest, metres.
+        held: (J, 4) int16 local rotations wxyz of the joints that do not turn in the recording.
+        moving: (M,) uint8 indices of the joints that turn, ascending.
+        rotations: (F, M, 4) int16 local rotations wxyz of the joints `moving` in each frame.
+        roots: (F, 3) float32 translation of the root from rest in each frame, metres.
+        coefficients: (F, K) float32 coefficients of the residual shapes in each frame.
+        known: (P,) int16 frames, ascending, from which coefficients of other poses are
+            interpolated.
+        kernel_width: (1,) float32 > 0, width of the kernel of that interpolation, in the units of
+            a pose's features (`posing.any_pose`).
+        info: The manifest's entry about the body.
     """
 
     means: np.ndarray
@@ -78,11 +81,11 @@ class BakedSkinned:
 
     @cached_property
     def rig(self) -> Rig:
-        """Its J joints at rest."""
+        """The rig with its J joints at rest."""
         return self.info.rig(self.rig_joints)
 
     def to_bytes(self) -> bytes:
-        """The content of `body/skinned.safetensors`.
+        """Content of the file `body/skinned.safetensors`.
 
         Raises:
             BundleError: If shapes or dtypes disagree with the manifest's entry, or a value is out
@@ -94,10 +97,15 @@ class BakedSkinned:
 
     @staticmethod
     def from_bytes(data: bytes, info: SkinnedInfo) -> "BakedSkinned":
-        """Reads the file; the counts must be those of the manifest.
+        """Reads a body from the content of its file.
+
+        Args:
+            data: Content of `body/skinned.safetensors`.
+            info: The manifest's entry, with whose counts the tensors must agree.
 
         Raises:
-            BundleError: If anything does not fit.
+            BundleError: If the file is damaged, shapes or dtypes disagree with the manifest's
+                entry, or a value is out of range.
         """
         baked = BakedSkinned(**decode_tensors(data, _spec(info), SKINNED), info=info)
         _check_values(baked)
@@ -105,7 +113,7 @@ class BakedSkinned:
 
     @property
     def tensors(self) -> dict[str, np.ndarray]:
-        """What the file holds, by name."""
+        """The tensors of the file by name."""
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "info"}
 
 
@@ -135,7 +143,11 @@ def _spec(info: SkinnedInfo) -> Spec:
 
 
 def _check_values(baked: BakedSkinned) -> None:
-    """Bounds what can come out in any pose, without evaluating."""
+    """Checks all values, so that Gaussians stay within bounds in any pose.
+
+    Raises:
+        BundleError: If a value is out of range.
+    """
     info = baked.info
     _require(baked.joints.max() < info.num_joints, "'joints' names one that is not there")
     sums = baked.weights.sum(axis=1, dtype=np.int32)
@@ -164,11 +176,11 @@ def _check_values(baked: BakedSkinned) -> None:
     reach = reach * np.abs(baked.shape_scales.astype(np.float64)) * SCALE_UNITS
     moved = reach[:, 0].max() <= _MAX_LENGTH and reach[:, 1].max() <= _MAX_LOGIT
     _require(bool(moved), "its residual shapes are out of range")
-    assert baked.rig  # whose joints are checked as it is made
+    assert baked.rig  # making the rig checks its joints
 
 
 def _ascends(numbers: np.ndarray, end: int) -> bool:
-    """Whether numbers are from 0 to `end` − 1, each once, in order."""
+    """Whether numbers are strictly ascending, from 0 to `end` − 1."""
     values = numbers.astype(np.int64)
     return bool(values[0] >= 0 and values[-1] < end and (np.diff(values) > 0).all())
 

@@ -1,4 +1,4 @@
-"""The gestures of a body on a skeleton, and its figure, as a file of the bundle."""
+"""The bundle's file with the gestures and the figure of a body on a skeleton."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,18 +17,18 @@ from ico3d.motion.repertoire import clips_for, cuts_text, hung_of, preferring, r
 from ico3d.rig.quaternions import Array
 
 GESTURES = "body/gestures.safetensors"
-"""The file; a body whose rig lacks roles has none, and repeats what was recorded."""
+"""Name of the file. A body whose rig lacks a person's roles has none, and cannot gesture."""
 
 
 def gesture_files(baked: BakedSkinned, cuts: Sequence[Cut] | None = None) -> dict[str, bytes]:
-    """The file of a body: what it did in its recording, and gestures of the package besides.
+    """Makes the file of gestures: recorded ones, and the package's where none was recorded.
 
     Args:
         baked: The body, as the bundle holds it.
         cuts: Gestures in the recording; None finds them by rule.
 
     Returns:
-        The file by its name; none where the rig lacks roles.
+        Content of the file by its name; empty where the rig lacks a person's roles.
     """
     recording = recording_in(baked)
     if recording is None:
@@ -42,7 +42,7 @@ def gesture_files(baked: BakedSkinned, cuts: Sequence[Cut] | None = None) -> dic
 
 
 def recording_in(baked: BakedSkinned) -> Recording | None:
-    """How a body moved in its recording; None where its rig lacks the roles of a person."""
+    """The recorded motion of a body; None where its rig lacks a person's roles."""
     try:
         return recording_of(baked.rig, baked.info.fps, recorded_rotations(baked))
     except SettingsError:
@@ -51,12 +51,12 @@ def recording_in(baked: BakedSkinned) -> Recording | None:
 
 @dataclass(frozen=True, eq=False)
 class Repertoire:
-    """What somebody can do.
+    """Content of a file of gestures.
 
     Attributes:
         clips: Gestures by name.
-        cuts: Which frames of the recording some of them are.
-        hung: (R, 4) by role, how arms hang.
+        cuts: Frames of the recording from which recorded gestures were made.
+        hung: (R, 4) pose by role with hanging arms.
     """
 
     clips: dict[str, Clip]
@@ -65,10 +65,14 @@ class Repertoire:
 
 
 def gestures_from(data: bytes, baked: BakedSkinned) -> Repertoire:
-    """What a file of gestures holds.
+    """Reads a file of gestures.
+
+    Args:
+        data: Content of the file.
+        baked: The body that the file must belong to.
 
     Raises:
-        BundleError: If the file is damaged, or not of this body.
+        BundleError: If the file is damaged, or belongs to another body.
     """
     info = baked.info
     try:

@@ -1,4 +1,4 @@
-"""What the manifest says about a body on a skeleton."""
+"""The manifest's entry about a body on a skeleton."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,29 +10,30 @@ from ico3d.errors import BundleError
 from ico3d.rig.rig import MOST_JOINTS, Rig
 
 SKINNED = "body/skinned.safetensors"
-"""The file of a body on a skeleton."""
+"""Name of the file of a body on a skeleton."""
 LONGEST_NAME = 64
-"""Characters of a joint's name."""
+"""Most characters of a joint's name."""
 
 Require = Callable[[bool, str, str], None]
-"""Refuses what does not hold: whether it holds, the field, and what the field must do."""
+"""Raises an error unless a condition holds: the condition, the field, and what it must do."""
 
 
 @dataclass(frozen=True)
 class SkinnedInfo:
-    """The counts that the tensors of `body/skinned.safetensors` must agree with, and the rig.
+    """Counts of the tensors of `body/skinned.safetensors`, and the tree of the rig.
 
     Attributes:
         fps: Recorded frames per second; frame i is at i / fps seconds.
-        num_frames: F, recorded poses.
-        num_gaussians: N.
-        num_shapes: K, residual shapes.
-        num_moving: M, joints that turn in the recording.
-        num_known: P, recorded poses that tell the coefficients of any other pose.
-        names: J names of joints.
-        parents: J numbers, each smaller than its own; −1 for joint 0, the only root.
-        low: Least coordinates that its Gaussians' centres reach, metres.
-        high: Greatest coordinates.
+        num_frames: Number F of recorded frames.
+        num_gaussians: Number N of Gaussians.
+        num_shapes: Number K of residual shapes.
+        num_moving: Number M of joints that turn in the recording.
+        num_known: Number P of recorded poses from which coefficients of others are interpolated.
+        names: Names of the J joints.
+        parents: Index of each joint's parent, which is smaller than the joint's own; −1 for joint
+            0, the only root.
+        low: Least x, y, z of the Gaussians' centres in the recording, metres.
+        high: Greatest x, y, z of the Gaussians' centres in the recording, metres.
     """
 
     fps: float
@@ -48,14 +49,14 @@ class SkinnedInfo:
 
     @property
     def num_joints(self) -> int:
-        """J."""
+        """Number J of joints."""
         return len(self.names)
 
     def rig(self, joints: np.ndarray) -> Rig:
-        """The rig with joints (J, 3) at rest.
+        """The rig with joints at positions (J, 3) at rest, metres.
 
         Raises:
-            BundleError: If it is none.
+            BundleError: If names, parents and positions do not make a rig.
         """
         try:
             return Rig(self.names, self.parents, joints.astype(np.float64))
@@ -66,8 +67,12 @@ class SkinnedInfo:
 def check_skinned(info: SkinnedInfo, require: Require) -> None:
     """Checks ranges, and that the rig is a tree.
 
+    Args:
+        info: The entry.
+        require: Called for each check; it raises the error.
+
     Raises:
-        BundleError: By `require`, naming the first field that is wrong.
+        BundleError: If a check fails; the error names the field.
     """
     ranges = {
         "num_frames": (2, limits.MAX_POSED_FRAMES),

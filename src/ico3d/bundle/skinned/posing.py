@@ -9,18 +9,19 @@ from ico3d.rig.quaternions import Array, multiply, normalized, slerp
 
 _FIRST = 0.4886025119029199
 _SECOND = (1.0925484305920792, 0.31539156525252005, 0.5462742152960396)
-"""Of real spherical harmonics of degrees 1 and 2."""
+"""Factors of the real spherical harmonics of degree 1 (`_FIRST`) and 2."""
 FARTHER = 0.5
-"""Of the distance to the nearest known pose, by which the kernel is wider."""
+"""Share of the distance to the nearest known pose that is added, in squares, to the kernel's width.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class SkinnedPose:
-    """A pose as it is drawn.
+    """A pose of the skeleton, with coefficients of the residual shapes.
 
     Attributes:
-        rotations: (J, 4) wxyz of each joint about itself, of length 1.
-        root: (3,) metres that the root moves from rest.
+        rotations: (J, 4) local rotation of each joint, unit quaternions wxyz.
+        root: (3,) translation of the root from rest, metres.
         residual: (K,) coefficients of the residual shapes.
     """
 
@@ -31,14 +32,14 @@ class SkinnedPose:
 
 @dataclass(frozen=True, eq=False)
 class PosedGaussians:
-    """Gaussians in the world; float32.
+    """Posed Gaussians in the world; float32 arrays.
 
     Attributes:
         means: (N, 3) metres.
-        quats: (N, 4) wxyz normalised.
+        quats: (N, 4) unit quaternions wxyz.
         scales: (N, 3) metres.
-        rgb: (N, 3) display colours.
-        opacities: (N,).
+        rgb: (N, 3) display RGB in [0, 1].
+        opacities: (N,) in [0, 1].
     """
 
     means: np.ndarray
@@ -49,9 +50,9 @@ class PosedGaussians:
 
 
 def recorded_pose(baked: BakedSkinned, frame: float) -> SkinnedPose:
-    """The recorded pose at a frame, which is clamped to the clip.
+    """The recorded pose at a frame, which need not be whole and is clamped to the clip.
 
-    Between frames joints turn on the shorter arc; the root and the coefficients go straight.
+    Between frames rotations are interpolated by slerp, root and coefficients linearly.
     """
     place = min(max(frame, 0.0), baked.info.num_frames - 1.0)
     first = min(int(place), baked.info.num_frames - 2)
@@ -68,7 +69,7 @@ def recorded_pose(baked: BakedSkinned, frame: float) -> SkinnedPose:
 
 
 def recorded_rotations(baked: BakedSkinned) -> Array:
-    """(F, J, 4) of all joints about themselves, in all recorded frames."""
+    """(F, J, 4) local rotations wxyz of all joints in all recorded frames."""
     shape = (baked.info.num_frames, *baked.held.shape)
     rotations = np.broadcast_to(normalized(baked.held / QUAT_UNIT), shape).copy()
     rotations[:, baked.moving] = normalized(baked.rotations / QUAT_UNIT)
@@ -78,13 +79,13 @@ def recorded_rotations(baked: BakedSkinned) -> Array:
 def any_pose(baked: BakedSkinned, rotations: Array, root: Array) -> SkinnedPose:
     """A pose that need not have been recorded.
 
-    Its coefficients are a mean of those of the known poses, weighted by a Gaussian kernel
-    (`ico3d.body.skinning.coefficients.interpolated`).
+    Its coefficients are a mean of those of the known poses, weighted by a Gaussian kernel of the
+    distance between features of poses (as in `ico3d.body.skinning.coefficients.interpolated`).
 
     Args:
         baked: The body.
-        rotations: (J, 4) wxyz of each joint about itself.
-        root: (3,) metres that the root moves from rest.
+        rotations: (J, 4) local rotation of each joint, wxyz.
+        root: (3,) translation of the root from rest, metres.
     """
     rotations = normalized(np.asarray(rotations, np.float64))
     known = np.repeat(baked.held[None] / QUAT_UNIT, len(baked.known), 0)  # (P, J, 4)
@@ -97,10 +98,10 @@ def any_pose(baked: BakedSkinned, rotations: Array, root: Array) -> SkinnedPose:
 
 
 def joint_table(baked: BakedSkinned, pose: SkinnedPose) -> Array:
-    """(J, 16) what takes each joint's points from rest to the world.
+    """(J, 16) rigid transforms x ↦ R·x + t of each joint, from rest space to the world.
 
-    A row holds the rows of the matrix (R | t) of x ↦ R·x + t (12), and the quaternion wxyz of R
-    (4), whose sign agrees with its parent's.
+    A row holds the three rows of the matrix (R | t) (12 numbers), and the quaternion wxyz of R (4),
+    whose sign agrees with that of the parent's quaternion.
     """
     signed = np.where(pose.rotations[:, :1] < 0, -1.0, 1.0) * pose.rotations  # (J, 4)
     matrices = baked.rig.matrices(signed, pose.root)[:, :3]  # (J, 3, 4)
@@ -111,12 +112,12 @@ def joint_table(baked: BakedSkinned, pose: SkinnedPose) -> Array:
 
 
 def posed(baked: BakedSkinned, pose: SkinnedPose, count: int | None = None) -> PosedGaussians:
-    """The Gaussians in a pose.
+    """The Gaussians of a body in a pose.
 
     Args:
         baked: The body.
-        pose: How it stands.
-        count: Draws so many, the most important ones; by default all.
+        pose: The pose.
+        count: Number of Gaussians, the most important ones; by default all.
     """
     some = slice(count)
     table = joint_table(baked, pose).astype(np.float32)
@@ -152,20 +153,23 @@ def harmonics(normals: Array) -> Array:
 
 
 def kernel_width(rotations: Array) -> float:
-    """How far known poses (P, M, 4) reach: twice the median distance to the nearest other one."""
+    """Width of the interpolation's kernel for known poses (P, M, 4), in units of their features.
+
+    It is twice the median of the poses' distances to their nearest neighbours.
+    """
     places = _features(rotations)  # (P, 3·M)
     if len(places) < 2:
         return 1.0
-    squares = np.square(places).sum(1)
+    squares = np.square(places).sum(1)  # (P,)
     between = squares[:, None] + squares - 2 * places @ places.T  # (P, P)
     np.fill_diagonal(between, np.inf)
     nearest = np.sqrt(np.maximum(between.min(1), 0))  # (P,)
-    # As torch.median, which takes the lower of two in the middle.
+    # As torch.median does, the lower one of two values in the middle is taken.
     return max(2.0 * float(np.sort(nearest)[(len(nearest) - 1) // 2]), 1e-6)
 
 
 def _features(rotations: Array) -> Array:
-    """(..., 3·M) sin(angle / 2) times each joint's axis, of rotations (..., M, 4)."""
+    """(..., 3·M) features of poses (..., M, 4): sin(angle / 2) times the axis of each rotation."""
     quats = normalized(rotations)
     signed = np.where(quats[..., :1] < 0, -quats, quats)[..., 1:]  # (..., M, 3)
     return signed.reshape(*signed.shape[:-2], -1)
