@@ -1,1 +1,1 @@
-"""How a recorded person moved: a skeleton fitted to what several cameras, or one, show."""
+"""Fits a skeleton to a recorded person, from the pictures of several cameras or of one."""

@@ -8,33 +8,33 @@ from typing import Annotated
 import tyro
 
 MOST_WORKERS = 8
-"""Each holds a large picture and two models."""
+"""Most threads by default: each needs memory for a large picture and two models."""
 
 
 @dataclass(frozen=True)
 class Pose:
     """Fit a skeleton and a body's surface to the person in a recording.
 
-    MediaPipe reads body and hands in the cameras that train; what cameras agree on, or the
-    recording's own key points where it has some, places the joints of an open body model (Anny),
-    and the masks correct it. Writes body_track.safetensors into the folder, or beside the file,
-    that holds the recording, anew at each run.
+    MediaPipe finds body and hands in the pictures of the training cameras. The points on which
+    cameras agree, or the recording's own key points where it has some, place the joints of an open
+    body model (Anny); the masks correct its surface. The result is body_track.safetensors, in the
+    recording's folder or beside the recording's file; each run writes it anew.
 
     Attributes:
-        capture: A recording of any format; one camera alone tells little about depth.
-        workers: Threads that look at pictures.
+        capture: A recording of any format; a single camera tells little about depth.
+        workers: Number of threads that read pictures.
     """
 
     capture: Annotated[Path, tyro.conf.Positional]
     workers: int = field(default_factory=lambda: min(os.cpu_count() or 1, MOST_WORKERS))
 
     def run(self) -> None:
-        """Runs it.
+        """Fits the skeleton, writes the body track, and prints how well it fits.
 
         Raises:
-            CaptureError: If no skeleton can be fitted, or nothing can be written there.
+            CaptureError: If no skeleton can be fitted, or the track cannot be written.
             MissingExtraError: If anny, MediaPipe or SciPy is not installed.
-            MissingModelError: If a model of MediaPipe's is not there.
+            MissingModelError: If a model file of MediaPipe is missing.
         """
         from ico3d.errors import MissingExtraError
 

@@ -1,4 +1,4 @@
-"""Says how a skeleton was fitted."""
+"""Prints how well a skeleton was fitted."""
 
 from itertools import groupby, pairwise
 from pathlib import Path
@@ -9,11 +9,16 @@ from rich.console import Console
 from ico3d.capture.posing.tracking import Fitted
 
 MOST_LINES = 12
-"""Rows of the table: runs of frames that are alike in length."""
+"""Most lines, each about one of several runs of frames of about the same length."""
 
 
 def say(found: Fitted, written: Path) -> None:
-    """Prints a row for each run of frames, and where the track lies."""
+    """Prints a line for each run of frames, frames that were interpolated, and the track's file.
+
+    Args:
+        found: The fitted track.
+        written: File of the track.
+    """
     show = Console(stderr=True).print
     fitted = found.track.fitted
     for first, last in runs(len(fitted)):
@@ -33,13 +38,17 @@ def say(found: Fitted, written: Path) -> None:
 
 
 def runs(count: int) -> list[tuple[int, int]]:
-    """First and last frame of `MOST_LINES` runs at most, of about one length."""
+    """Divides `count` frames into up to `MOST_LINES` runs of about the same length.
+
+    Returns:
+        First and last frame of each run.
+    """
     edges = np.linspace(0, count, min(count, MOST_LINES) + 1).round().astype(int)
     return [(a, b - 1) for a, b in pairwise(edges.tolist())]
 
 
 def gaps(fitted: np.ndarray) -> list[tuple[int, int]]:
-    """First and last frame of each run of frames that were not fitted."""
+    """First and last frame of each run of frames that were not fitted, from `fitted` (F,) bool."""
     found, place = [], 0
     for good, group in groupby(fitted.tolist()):
         length = len(list(group))

@@ -1,4 +1,4 @@
-"""A recording's body track: from pictures to a skeleton's pose in every frame."""
+"""Makes the body track of a recording: from pictures to a skeleton's pose in every frame."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,23 +25,26 @@ from ico3d.rig.quaternions import continuous, from_matrix, from_rotvec, slerp
 from ico3d.rig.rig import Rig
 
 PLANS = (Plan(25, 6, outlines=False), Plan(20, 0, outlines=True))
-"""Points alone first; then outlines, too."""
+"""The runs of a fit: first by landmarks alone, then with outlines."""
 
 
 ANNOTATORS_OFFSET = 0.3
-"""Part of `Landmark.sigma` by which annotated points may lie beside: they are about joints."""
+"""Standard deviation of annotated points from landmarks, relative to `Landmark.sigma`.
+
+It is below 1, as annotators mark joints rather exactly.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A track and how well it was fitted.
+    """A body track, and how well it fits.
 
     Attributes:
         track: The track.
-        off: (F,) median metres between a frame's landmarks and where they were seen; NaN where a
-            frame is interpolated.
-        outside: (F,) metres by which the surface leaves the masks, 95 % of its points less; NaN
-            without masks.
+        off: (F,) median distance in metres between fitted and seen landmarks of each frame; NaN for
+            interpolated frames.
+        outside: (F,) 95 % quantile of the distance in metres by which points of the surface are
+            outside of the masks; NaN without masks.
     """
 
     track: BodyTrack
@@ -53,13 +56,13 @@ def track_body(source: Path, workers: int) -> Fitted:
     """Fits the template to one person in a recording.
 
     Args:
-        source: A capture of any format whose cameras are calibrated.
-        workers: Threads that look at pictures.
+        source: Path of a capture of any format, with calibrated cameras.
+        workers: Number of threads that read pictures.
 
     Raises:
-        CaptureError: If no skeleton can be fitted; the sentence says what lacks.
+        CaptureError: If no skeleton can be fitted; the message says what is missing.
         MissingExtraError: If anny or MediaPipe is not installed.
-        MissingModelError: If a model of MediaPipe's is not there.
+        MissingModelError: If a model file of MediaPipe is missing.
     """
     template = load_template()
     capture = open_capture(source)
@@ -74,7 +77,7 @@ def track_body(source: Path, workers: int) -> Fitted:
 
 
 def _too_little(evidence: Evidence) -> str:
-    """Which joints are known too seldom for a pose, in words."""
+    """Error message: which joints are never seen, so that no frame can be fitted."""
     known = evidence.roots.any((2, 3)).mean(0)  # (P,)
     rare = [
         name for name, share in zip(LANDMARKS, known[: len(LANDMARKS)], strict=True) if not share
@@ -88,13 +91,13 @@ def _too_little(evidence: Evidence) -> str:
 def fit(
     capture: Capture, template: Template, evidence: Evidence, done: Callable[[], None]
 ) -> Fitted:
-    """Fits the template to what is known.
+    """Fits the template to evidence about a person.
 
     Args:
         capture: The recording.
         template: The template.
-        evidence: At least one frame can be fitted.
-        done: Called after each step.
+        evidence: Landmarks and outlines; at least one frame must be `Evidence.fitted`.
+        done: Called after each step, to show progress.
     """
     frames = np.flatnonzero(evidence.fitted)
     template, spread = _seen(template, evidence.detected)
@@ -118,7 +121,11 @@ def fit(
 
 
 def _seen(template: Template, detected: bool) -> tuple[Template, np.ndarray]:
-    """The template with landmarks as they are seen, and metres (P, 3) that they may be beside."""
+    """The template with landmarks where they are seen or annotated.
+
+    Returns:
+        The template, and (P, 3) standard deviations in metres of a person's landmarks from it.
+    """
     if detected:
         detector = mediapipe_detector(template.num_shapes)
         return detector.seen(template), detector.spread
@@ -127,10 +134,18 @@ def _seen(template: Template, detected: bool) -> tuple[Template, np.ndarray]:
 
 
 def placed(template: Template, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Turns (F, 3, 3) and moves (F, 3) of the root that bring torso to torso (Kabsch)."""
+    """Rotations and translations of the root that fit the torso's landmarks (Kabsch).
+
+    Args:
+        template: The template.
+        points: (F, P, 3) landmarks in the world, metres.
+
+    Returns:
+        (F, 3, 3) rotations, and (F, 3) translations from rest in metres.
+    """
     rest, there = template.places[0, TORSO], points[:, TORSO]  # (4, 3), (F, 4, 3)
     middle, center = rest.mean(0), there.mean(1)  # (3,), (F, 3)
-    matrix = np.einsum("fpa,pb->fab", there - center[:, None], rest - middle)
+    matrix = np.einsum("fpa,pb->fab", there - center[:, None], rest - middle)  # (F, 3, 3)
     left, _, right = np.linalg.svd(matrix)
     sign = np.ones((len(there), 3))
     sign[:, 2] = np.linalg.det(left @ right)
@@ -147,7 +162,7 @@ def _track(
     frames: np.ndarray,
     source: str,
 ) -> BodyTrack:
-    """The track of a fitted body; frames that were not fitted lie between their neighbours."""
+    """The body track of a fitted body; poses of frames that were not fitted are interpolated."""
     template = kinematics.template
     vectors = np.einsum("jab,fjb->fja", kinematics.anatomy.axes, body.angles)
     rotations = from_rotvec(vectors)  # (F', J, 4)
@@ -174,13 +189,17 @@ def _track(
 def between(
     rotations: np.ndarray, roots: np.ndarray, frames: np.ndarray, count: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rotations (count, J, 4) and roots (count, 3) of all frames from those of some.
+    """Interpolates poses of all frames from those of some frames.
 
     Args:
-        rotations: (F', J, 4).
-        roots: (F', 3).
-        frames: (F',) their numbers, ascending.
-        count: Frames in all; before the first and after the last one poses stand still.
+        rotations: (F', J, 4) local rotations of the joints in the known frames, wxyz.
+        roots: (F', 3) translations of the root in the known frames, metres.
+        frames: (F',) indices of the known frames, ascending.
+        count: Number of all frames; before the first and after the last known one poses are
+            constant.
+
+    Returns:
+        (count, J, 4) rotations and (count, 3) translations.
     """
     numbers = np.arange(count)
     after = np.clip(np.searchsorted(frames, numbers), 0, len(frames) - 1)

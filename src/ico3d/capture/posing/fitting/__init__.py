@@ -1,1 +1,1 @@
-"""The body model brought to what was seen."""
+"""Fits the body model to landmarks and outlines that were seen."""

@@ -1,4 +1,4 @@
-"""The template in a shape and in poses, and how it moves when one of its numbers changes."""
+"""The template with a shape and poses, and derivatives of its points by these parameters."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,15 +12,16 @@ from ico3d.rig.quaternions import from_rotvec, to_matrix
 
 @dataclass(eq=False)
 class Body:
-    """What a fit seeks, for F frames.
+    """The parameters of a fit, for F frames.
 
     Attributes:
-        shape: (K,) coefficients of the template.
-        offsets: (P, 3) metres by which landmarks are elsewhere than on the template, at rest.
-        off_skin: (M,) metres by which clothes and hair stand off the template, at nodes.
-        angles: (F, J, 3) radians of the joints about bend, side and twist.
-        root_turns: (F, 3, 3) that come after the root's own angles; they stay.
-        roots: (F, 3) metres that the root moves.
+        shape: (K,) shape coefficients of the template.
+        offsets: (P, 3) offsets of the person's landmarks from the template's, at rest, metres.
+        off_skin: (M,) distance by which clothes and hair stand off the template at M nodes, metres.
+        angles: (F, J, 3) rotation vectors of the joints along their axes of bend, side and twist
+            (`Anatomy.axes`), radians.
+        root_turns: (F, 3, 3) rotations that are applied after the root's own; they are not fitted.
+        roots: (F, 3) translations of the root from rest, metres.
     """
 
     shape: np.ndarray
@@ -34,7 +35,14 @@ class Body:
     def at_rest(
         template: Template, off_skin: np.ndarray, root_turns: np.ndarray, roots: np.ndarray
     ) -> "Body":
-        """The mean shape at rest, turned and placed."""
+        """The mean shape in the rest pose, with given positions of F frames.
+
+        Args:
+            template: The template.
+            off_skin: (M,) distance off the template at nodes, metres.
+            root_turns: (F, 3, 3) rotations of the root.
+            roots: (F, 3) translations of the root, metres.
+        """
         joints, marks = len(template.names), len(template.landmarks)
         return Body(
             np.zeros(template.num_shapes),
@@ -48,14 +56,14 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Posed:
-    """A body in one frame.
+    """The joints of a body in one frame.
 
     Attributes:
-        turns: (J, 3, 3) from rest space to the world.
-        places: (J, 3) joints in the world.
-        axes: (J, 3, 3) columns: the world's axes about which what a joint carries turns, by radian
-            of its angles.
-        joints: (J, 3) at rest.
+        turns: (J, 3, 3) rotations from rest space to the world.
+        places: (J, 3) positions in the world, metres.
+        axes: (J, 3, 3) derivatives of each joint's rotation: column i is the rotation vector in
+            the world, per radian of the joint's angle i, of all that the joint carries.
+        joints: (J, 3) positions at rest, metres.
     """
 
     turns: np.ndarray
@@ -65,18 +73,18 @@ class Posed:
 
     @cached_property
     def screws(self) -> np.ndarray:
-        """(6, 3 J) of each angle: its axis, and how the world's origin would move about it."""
+        """(6, 3 J) of each angle: its axis, and the velocity of the world's origin about it."""
         moves = np.cross(self.places[:, None], self.axes.swapaxes(-1, -2))  # (J, 3, 3) rows
         turned = self.axes.swapaxes(-1, -2)  # (J, 3, 3) rows
         return np.concatenate([turned, moves], -1).reshape(-1, 6).T
 
     def changes(self, points: np.ndarray, ways: np.ndarray, carried: np.ndarray) -> np.ndarray:
-        """How far points go along given ways, by angle and by move of the root.
+        """Derivatives of points along given directions by all angles and the root's translation.
 
         Args:
-            points: (N, 3) in the world.
-            ways: (N, 3).
-            carried: (N, J) part of each point that hangs on each joint or below it.
+            points: (N, 3) positions in the world, metres.
+            ways: (N, 3) direction for each point.
+            carried: (N, J) share of each point that is carried by each joint or a joint below it.
 
         Returns:
             (N, 3 J + 3).
@@ -88,10 +96,16 @@ class Posed:
 
 
 class Kinematics:
-    """The template's chains of joints."""
+    """Forward kinematics of the template.
+
+    Attributes:
+        template: The template.
+        anatomy: Axes and ranges of its joints.
+        below: (J, J) bool: whether the joint of the row is that of the column, or below it.
+    """
 
     def __init__(self, template: Template, anatomy: Anatomy):
-        """Takes over what does not change."""
+        """Prepares the tree of joints."""
         self.template, self.anatomy = template, anatomy
         below = np.eye(len(template.parents), dtype=bool)  # (J, J): column carries row
         for joint, parent in enumerate(template.parents[1:], 1):
@@ -99,7 +113,7 @@ class Kinematics:
         self.below = below
 
     def posed(self, body: Body, frame: int) -> Posed:
-        """The body in one of its frames."""
+        """The joints of a body in frame number `frame` of the fit."""
         vectors = np.einsum("jab,jb->ja", self.anatomy.axes, body.angles[frame])
         turns = to_matrix(from_rotvec(vectors))  # (J, 3, 3)
         turns[0] = body.root_turns[frame] @ turns[0]
@@ -112,7 +126,7 @@ class Kinematics:
         return Posed(turns, places, turns @ _right_jacobian(vectors) @ self.anatomy.axes, joints)
 
     def reshaped(self, posed: Posed) -> np.ndarray:
-        """(K, J, 3) metres that the joints move by one of each shape coefficient."""
+        """(K, J, 3) derivatives of the joints' positions in the world by shape coefficients."""
         basis = self.template.joints[1:]  # (K, J, 3)
         places = basis.copy()
         for joint, parent in enumerate(self.template.parents[1:], 1):
@@ -122,12 +136,20 @@ class Kinematics:
 
 
 def mixed(table: np.ndarray, shape: np.ndarray) -> np.ndarray:
-    """(N, 3) of a shape, from mean and basis (1 + K, N, 3)."""
+    """(N, 3) points of a shape: table[0] + Σ_k shape_k · table[1 + k].
+
+    Args:
+        table: (1 + K, N, 3) mean and basis.
+        shape: (K,) coefficients.
+    """
     return table[0] + np.tensordot(shape, table[1:], 1)
 
 
 def _right_jacobian(vectors: np.ndarray) -> np.ndarray:
-    """(..., 3, 3): how a rotation turns in its own axes when its rotation vector changes."""
+    """(..., 3, 3) right Jacobians of SO(3) at rotation vectors (..., 3).
+
+    They map a change of the rotation vector to the rotation's change, in its own rotated axes.
+    """
     x, y, z = np.moveaxis(vectors, -1, 0)
     zero = np.zeros_like(x)
     cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1)

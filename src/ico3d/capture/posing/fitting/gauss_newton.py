@@ -1,8 +1,8 @@
-"""The template brought to what was seen by Gauss-Newton steps: from rest to any pose in thirty.
+"""Fits the template by Gauss-Newton steps, some thirty of which lead from rest to any pose.
 
-Poses of single frames, held together by their neighbours in time, and what all frames share take
-turns. First-order methods need thousands of steps here, because a hip moves a whole leg and the
-end of a finger nothing but itself; the normal equations know that.
+Each step first improves the pose of each frame, with priors from its neighbours in time, then the
+parameters that all frames share. First-order methods would need thousands of steps, as a hip moves
+a whole leg and the end of a finger only itself; the normal equations take this into account.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,23 +16,23 @@ from ico3d.capture.posing.fitting.surface import Surface
 from ico3d.rig.quaternions import from_matrix, from_rotvec, slerp, to_matrix, to_rotvec
 
 LARGEST_STEP = 0.4
-"""Radians by which a step turns a joint at most."""
+"""Largest rotation of a joint in one step, radians."""
 FIRST_DAMPING, DAMPED = 0.05, 0.75
-"""Damping of the first step, by what priors weigh with a spread of 1 rad; its part step by step."""
+"""Damping of the first step, relative to priors and normal matrix; its factor from step to step."""
 LIMIT = 0.05
-"""Radians beyond where bending stops that cost as much as one standard deviation."""
+"""Standard deviation in radians by which a joint may bend beyond its stop."""
 PLACE_PACE = 0.008
-"""Metres by which the root's step in a tenth of a second usually differs from that before."""
+"""Usual change in metres of the root's displacement from one tenth of a second to the next."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What a run of steps takes into account.
+    """What a run of steps fits, and to what.
 
     Attributes:
-        steps: How many.
-        shape_from: The step from which on shape joins in.
-        outlines: Whether outlines are looked at.
+        steps: Number of steps.
+        shape_from: First step in which parameters that all frames share are fitted, too.
+        outlines: Whether outlines count, beside landmarks.
     """
 
     steps: int
@@ -52,15 +52,15 @@ class Solver:
         frames: np.ndarray,
         fps: float,
     ):
-        """Takes over what does not change.
+        """Makes a solver for one recording.
 
         Args:
-            kinematics: Of the template.
-            landmarks: Evidence by points.
-            surface: Evidence by outlines.
-            spread: (P, 3) metres that landmarks usually lie elsewhere than on the template.
-            frames: (F,) numbers in the recording of the frames that are fitted.
-            fps: The recording's frames per second.
+            kinematics: Forward kinematics of the template.
+            landmarks: Term of the landmarks.
+            surface: Term of the outlines.
+            spread: (P, 3) standard deviation in metres of a person's landmarks from the template's.
+            frames: (F,) indices in the recording of the frames that are fitted, ascending.
+            fps: Frames per second of the recording.
         """
         self._kinematics, self._anatomy = kinematics, kinematics.anatomy
         self._landmarks, self._surface = landmarks, surface
@@ -74,9 +74,9 @@ class Solver:
         """Improves a body in place.
 
         Args:
-            body: What is sought.
-            plan: How.
-            done: Called after each step.
+            body: The parameters of the fit.
+            plan: Number of steps, and what they take into account.
+            done: Called after each step, to show progress.
         """
         terms: list[Term] = [self._landmarks, *([self._surface] if plan.outlines else [])]
         for step in range(plan.steps):
@@ -93,11 +93,11 @@ class Solver:
             done()
 
     def _pose(self, body: Body, frame: int, seen: Sequence["_Seen"], damping: float) -> np.ndarray:
-        """One step of a frame's angles and root.
+        """One step of a frame's angles and root translation.
 
         Returns:
-            (3 J + 3, 3 J + 3) normal matrix without the neighbours in time: of what the pose
-            resists where all frames turn alike.
+            (3 J + 3, 3 J + 3) normal matrix without the priors from neighbours in time, which do
+            not resist changes that all frames share.
         """
         normal = np.sum([one.turning.T @ one.weighted for one in seen], 0, dtype=float)
         pull = np.sum([one.weighted.T @ one.missing for one in seen], 0)
@@ -113,7 +113,7 @@ class Solver:
         return normal
 
     def _prior(self, body: Body, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """1 / variance (3 J + 3,) of angles and root before anything is seen, and their means."""
+        """Priors of angles and root translation: (3 J + 3,) 1 / variances and (3 J + 3,) means."""
         anatomy, angles = self._anatomy, body.angles[frame]
         strength, pull = 1 / anatomy.spread**2, np.zeros(angles.shape)  # (J, 3)
         bend = angles[:, 0]
@@ -124,7 +124,10 @@ class Solver:
         return np.append(strength, [1e-6] * 3), np.append(pull / strength, body.roots[frame])
 
     def _neighbours(self, body: Body, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """The same that the frames before and after say; 0 where one of them is missing."""
+        """Priors from the frames before and after: (3 J + 3,) 1 / variances and (3 J + 3,) means.
+
+        Both are 0 where one of these frames is not fitted.
+        """
         if not self._between[frame]:
             nothing = np.zeros(body.angles[frame].size + 3)
             return nothing, nothing
@@ -137,7 +140,16 @@ class Solver:
 
 
 def turn(body: Body, frame: int, step: np.ndarray) -> np.ndarray:
-    """Turns and moves a frame's body by (3 J + 3,), by no more than `LARGEST_STEP`; by what."""
+    """Changes angles and root translation of a frame, in place.
+
+    Args:
+        body: The parameters of the fit.
+        frame: Number of the frame in the fit.
+        step: (3 J + 3,) wanted change; that of each joint is limited to `LARGEST_STEP`.
+
+    Returns:
+        (3 J + 3,) the change that was made.
+    """
     angles = step[:-3].reshape(-1, 3)
     size = np.linalg.norm(angles, axis=-1, keepdims=True)
     angles = angles * np.minimum(1, LARGEST_STEP / np.maximum(size, 1e-9))
@@ -148,14 +160,14 @@ def turn(body: Body, frame: int, step: np.ndarray) -> np.ndarray:
 
 @dataclass(eq=False)
 class _Seen:
-    """What a term says about a frame.
+    """The equations of a term about a frame.
 
     Attributes:
         term: The term.
-        rows: Its equations.
-        turning: (N, 3 J + 3) float32: how points go along their ways, by angles and root.
-        weighted: The same times the rows' weights.
-        missing: (N,) metres that are missed.
+        rows: The N equations.
+        turning: (N, 3 J + 3) float32 derivatives of the equations by angles and root translation.
+        weighted: (N, 3 J + 3) float32 `turning` times the weights of the equations.
+        missing: (N,) residuals, which are updated when the pose changes.
     """
 
     term: Term
@@ -166,7 +178,7 @@ class _Seen:
 
     @staticmethod
     def of(term: Term, body: Body, posed: Posed, frame: int) -> "_Seen":
-        """Asks a term."""
+        """Evaluates a term in a frame."""
         rows = term.rows(body, posed, frame)
         turning = posed.changes(rows.points, rows.ways, term.carried[rows.numbers])
         turning = turning.astype(np.float32)
@@ -175,12 +187,12 @@ class _Seen:
 
 
 def _calm(off: np.ndarray, pace: np.ndarray | float) -> np.ndarray:
-    """1 / variance of a value whose neighbours' mean is so far off (pseudo-Huber)."""
+    """1 / variance of a value that differs from its neighbours' mean by `off` (pseudo-Huber)."""
     return 4 / pace**2 / np.sqrt(1 + (2 * off / pace) ** 2)
 
 
 def _root_angles(body: Body, frame: int) -> np.ndarray:
-    """(3,) the root's own angles that turn it half-way between its neighbours."""
+    """(3,) angles of the root with which its rotation is half-way between its neighbours'."""
     before, after = (
         from_matrix(body.root_turns[f] @ to_matrix(from_rotvec(body.angles[f, 0])))
         for f in (frame - 1, frame + 1)
@@ -190,17 +202,17 @@ def _root_angles(body: Body, frame: int) -> np.ndarray:
 
 
 class _Shared:
-    """Normal equations of what all frames share: shape, offsets of landmarks, stand-off.
+    """Normal equations of the parameters that all frames share.
 
-    Poses give way to it as far as they like (Schur's complement): shoulders that grow broad move
-    arms along.
+    These are shape, offsets of landmarks, and distances off the skin. Poses are eliminated (Schur
+    complement), so they adapt to a change of shape: broader shoulders move the arms along.
     """
 
     def __init__(self, kinematics: Kinematics, body: Body, spread: np.ndarray, surface: Surface):
         """Begins with priors.
 
-        Detectors err alike in neighbouring frames, so that frames are not as many witnesses:
-        priors count as often as the root of their number.
+        Detectors make similar errors in neighbouring frames, so frames are not independent: to
+        account for this, the priors' weight is the square root of the number of frames.
         """
         self._kinematics = kinematics
         shapes, marks, nodes = len(body.shape), body.offsets.size, len(body.off_skin)
@@ -219,12 +231,12 @@ class _Shared:
         self._following: list[np.ndarray] = []
 
     def add(self, posed: Posed, seen: Sequence[_Seen], normal: np.ndarray) -> None:
-        """Adds what a frame says.
+        """Adds the equations of a frame.
 
         Args:
-            posed: The body in it.
-            seen: By each term.
-            normal: (3 J + 3, 3 J + 3) of its pose.
+            posed: The joints in this frame.
+            seen: Equations of each term.
+            normal: (3 J + 3, 3 J + 3) normal matrix of the frame's pose.
         """
         moved = self._kinematics.reshaped(posed)
         mixed = np.zeros((len(normal), len(self._pull)))
@@ -245,7 +257,7 @@ class _Shared:
         self._following.append(following.astype(np.float32))
 
     def solve(self, body: Body) -> None:
-        """One step of what is shared; poses follow."""
+        """One step of the shared parameters, and of all poses with them."""
         step = np.linalg.solve(self._normal, self._pull)
         shape, offsets, off_skin = np.split(step, [self._shapes, self._shapes + self._marks])
         body.shape += shape

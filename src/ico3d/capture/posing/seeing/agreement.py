@@ -1,7 +1,8 @@
-"""Which cameras see the same person, and where that puts each point.
+"""Finds the cameras that see the same person, and triangulates each point from them.
 
-Detectors take left for right, above all from behind, and see people where none are. Every camera
-counts twice, as it is and with sides exchanged; cameras that agree with most others are right.
+Detectors confuse left and right, above all from behind, and see people where there are none. So
+every camera takes part twice, as detected and with sides exchanged; those that agree with most
+others are right.
 """
 
 from dataclasses import dataclass
@@ -27,28 +28,32 @@ CORE = np.array(
         for side in ("L", "R")
     ]
 )
-"""Points by which cameras agree or do not."""
+"""Indices of the landmarks by which it is decided whether cameras agree."""
 HANDS = [np.array([NAMES.index(name) for name in hand(side)[1:]]) for side in ("L", "R")]
+"""Indices of the landmarks of each hand, without the wrist."""
 OTHER = np.array([NAMES.index(opposite(name)) for name in NAMES])
+"""(P,) index of the same landmark on the other side."""
 TOLERANCE = 0.06
-"""Metres by which half of a camera's core points may miss those of others."""
+"""Largest median distance in metres of a camera's core points from those of others."""
 HAND_TOLERANCE = 0.02
-"""Metres by which half of a camera's points of a hand may miss those of others."""
+"""Largest median distance in metres of a camera's points of a hand from those of others."""
 STRAY, HAND_STRAY = 0.015, 0.006
-"""Metres by which points of a body, and of a hand, usually stray from where they are."""
+"""Standard deviation in metres of detected points of a body, and of a hand."""
 WRONG = 0.08
-"""Metres by which a sighting misses the others' point when it is of something else."""
+"""Distance in metres from the triangulated point from which a sighting is of something else."""
 LEAST_WEIGHT = 1e-4
+"""Weight above which a camera counts as seeing a point."""
 
 
 @dataclass(frozen=True)
 class Placed:
-    """What the cameras agree on in one frame.
+    """Landmarks in one frame, as C cameras agree on them.
 
     Attributes:
-        pixels: (C, P, 2) of the cameras, sides put right.
-        weights: (C, P); 0 where a camera is wrong or sees nothing.
-        points: (P, 3) metres; NaN where fewer than two cameras tell.
+        pixels: (C, P, 2) pixels of the landmarks, with sides corrected.
+        weights: (C, P) weights; 0 where a camera is wrong or does not see the landmark.
+        points: (P, 3) triangulated positions in the world, metres; NaN where fewer than two cameras
+            see the landmark.
     """
 
     pixels: np.ndarray
@@ -57,15 +62,15 @@ class Placed:
 
 
 def agreed_body(cameras: list[Camera], pixels: np.ndarray, weights: np.ndarray) -> Placed | None:
-    """The body that most cameras agree on.
+    """Finds the body on which most cameras agree.
 
     Args:
         cameras: C cameras.
-        pixels: (C, P, 2) of the landmarks.
-        weights: (C, P); 0 where nothing is seen.
+        pixels: (C, P, 2) detected pixels of the landmarks.
+        weights: (C, P) weights of the detections; 0 where nothing is seen.
 
     Returns:
-        What they agree on, or None where no two do.
+        The landmarks; None where no two cameras agree.
     """
     able = np.flatnonzero((weights[:, CORE] > 0).all(1))
     if len(able) < 2:
@@ -78,7 +83,7 @@ def agreed_body(cameras: list[Camera], pixels: np.ndarray, weights: np.ndarray) 
     if not right.any():
         return None
     sure = weights[able][:, CORE].mean(1)
-    if (sure * exchanged).sum() > (sure * as_is).sum():  # the whole person the wrong way round
+    if (sure * exchanged).sum() > (sure * as_is).sum():  # the found person has sides exchanged
         as_is, exchanged = exchanged, as_is
     fixed, say = pixels.copy(), np.zeros_like(weights)
     for place, camera in enumerate(able):
@@ -90,7 +95,12 @@ def agreed_body(cameras: list[Camera], pixels: np.ndarray, weights: np.ndarray) 
 
 
 def agreed_hands(cameras: list[Camera], body: Placed) -> Placed:
-    """The same with only those sightings of hands on which several cameras agree."""
+    """Landmarks of a body, with hands triangulated only from cameras that agree on them.
+
+    Args:
+        cameras: C cameras.
+        body: Landmarks of the body, with detections of hands.
+    """
     weights, points = body.weights.copy(), body.points.copy()
     for numbers in HANDS:
         able = np.flatnonzero((weights[:, numbers] > 0).all(1))
@@ -106,7 +116,14 @@ def agreed_hands(cameras: list[Camera], body: Placed) -> Placed:
 
 
 def placed(cameras: list[Camera], pixels: np.ndarray, weights: np.ndarray, stray: float) -> Placed:
-    """Points (N, 3) from pixels (C, N, 2) and weights (C, N); what is far off loses its weight."""
+    """Triangulates points robustly; sightings that are far off get weight 0.
+
+    Args:
+        cameras: C cameras.
+        pixels: (C, N, 2) pixels of N points.
+        weights: (C, N) weights of these sightings.
+        stray: Standard deviation of sightings in metres.
+    """
     seen = sightings(cameras, pixels)
     some = np.maximum(weights, LEAST_WEIGHT * 1e-3)
     points, _ = robust(seen, some, stray)

@@ -1,4 +1,4 @@
-"""Where the landmarks of a person are in space, frame by frame, and how surely."""
+"""Positions of a person's landmarks in space in each frame, with their uncertainty."""
 
 from dataclasses import dataclass
 
@@ -20,27 +20,30 @@ from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
 
 TORSO = np.array([NAMES.index(f"{name}.{side}") for name in ("shoulder", "hip") for side in "LR"])
+"""Indices of the landmarks of shoulders and hips."""
 LEAST_CORE = 8
-"""Of the twelve joints of arms and legs those that must be known to fit a frame."""
+"""Least number of the twelve joints of arms and legs that must be known to fit a frame."""
 BODY_STRAY, HAND_STRAY = 0.012, 0.006
-"""Metres by which triangulated points usually err."""
+"""Standard deviation in metres of triangulated points of the body, and of hands."""
 ANNOTATED_STRAY = 0.006
-"""Metres by which annotated points usually err."""
+"""Standard deviation in metres of annotated points."""
 DEPTH_STRAY = 0.08
-"""Metres by which one camera errs about depths."""
+"""Standard deviation in metres of depths that a single camera tells."""
 IN_HANDS = np.isin(np.arange(len(NAMES)), np.concatenate(HANDS))
+"""(P,) bool: landmarks of hands."""
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What a recording says about a person's landmarks.
+    """Evidence of a recording of F frames about a person.
 
     Attributes:
-        points: (F, P, 3) metres; 0 where unknown.
-        roots: (F, P, 3, 3) square roots of their information; 0 where unknown.
-        outlines: Of the person.
-        source: Where the points come from, for people.
-        detected: Whether the points are a detector's, not annotated.
+        points: (F, P, 3) positions of the landmarks in the world, metres; 0 where unknown.
+        roots: (F, P, 3, 3) square roots of the positions' information matrices (1 / metres); 0
+            where unknown.
+        outlines: Outlines of the person.
+        source: Where the points come from, in words.
+        detected: Whether the points are from a detector; else they are annotated.
     """
 
     points: np.ndarray
@@ -51,13 +54,18 @@ class Evidence:
 
     @property
     def fitted(self) -> np.ndarray:
-        """(F,) bool: frames that say enough for a pose."""
+        """(F,) bool: frames in which enough landmarks are known to fit a pose."""
         known = np.asarray(self.roots.any((2, 3)))  # (F, P)
         return known[:, TORSO].all(1) & (known[:, CORE].sum(1) >= LEAST_CORE)
 
 
 def annotated(capture: Capture, watcher: Watcher) -> Evidence | None:
-    """What annotators of the recording say; None where they say nothing."""
+    """Evidence from the recording's own key points; None where it has none.
+
+    Args:
+        capture: The recording.
+        watcher: Reads the outlines.
+    """
     points = np.full((capture.num_frames, len(NAMES), 3), np.nan)
     numbers = [NAMES.index(name) for name in COCO_WHOLE_BODY.values()]
     for frame in range(capture.num_frames):
@@ -72,10 +80,13 @@ def annotated(capture: Capture, watcher: Watcher) -> Evidence | None:
 
 
 def detected(watcher: Watcher) -> Evidence:
-    """What MediaPipe sees in the pictures.
+    """Evidence from MediaPipe's detections in the pictures.
+
+    Args:
+        watcher: Reads pictures and outlines.
 
     Raises:
-        CaptureError: If it sees nobody, or no two cameras agree in any frame.
+        CaptureError: If MediaPipe finds nobody, or no two cameras agree in any frame.
     """
     watcher.look(bodies=True)
     seen = watcher.seen
@@ -105,10 +116,11 @@ def detected(watcher: Watcher) -> Evidence:
 
 
 INSTEAD = "ico3d train body --method swings++ needs no skeleton."
+"""Advice at the end of error messages."""
 
 
 def _nobody(seen: Seen) -> str:
-    """Why no frame has a body, in words."""
+    """Part of an error message: why no frame has a body."""
     views = np.asarray((seen.weights[..., CORE] > 0).all(-1))  # (F, C)
     looked = seen.weights.shape[0] * seen.weights.shape[1]
     if not views.any():
@@ -131,7 +143,11 @@ def _nobody(seen: Seen) -> str:
 
 
 def _by_one(watcher: Watcher) -> Evidence:
-    """What a single camera says: much across its view, little about depth."""
+    """Evidence of a single camera: certain across the lines of sight, uncertain along them.
+
+    Raises:
+        CaptureError: If MediaPipe finds nobody.
+    """
     seen = watcher.seen
     camera = seen.cameras[0]
     found = np.asarray((seen.weights[:, 0][:, CORE] > 0).all(1))  # (F,)
@@ -162,7 +178,14 @@ def _by_one(watcher: Watcher) -> Evidence:
 def _place(
     camera: Camera, relative: np.ndarray, pixels: np.ndarray, weights: np.ndarray
 ) -> np.ndarray:
-    """(3,) where points (N, 3) must be moved to be seen at pixels (N, 2) (least squares)."""
+    """(3,) translation of points with which they project to given pixels, by least squares.
+
+    Args:
+        camera: The camera.
+        relative: (N, 3) points in the axes of the world, up to a translation, metres.
+        pixels: (N, 2) pixels of the points.
+        weights: (N,) weights of the points.
+    """
     rays = _rays(camera, pixels)
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     across = np.eye(3) - rays[:, :, None] * rays[:, None]  # (N, 3, 3) off the ray
@@ -172,14 +195,17 @@ def _place(
 
 
 def _rays(camera: Camera, pixels: np.ndarray) -> np.ndarray:
-    """(N, 3) ways in the world that lead 1 m deep."""
+    """(N, 3) vectors in the world from the camera to points of pixels (N, 2) at depth 1 m."""
     flat = (pixels - camera.intrinsics[:2, 2]) / camera.intrinsics[[0, 1], [0, 1]]
     local = np.append(flat, np.ones((len(flat), 1)), 1)
     return local @ camera.world_to_camera[:3, :3]
 
 
 def _flat(rays: np.ndarray, stray: np.ndarray) -> np.ndarray:
-    """(N, 3, 3) square roots of information: sure across rays, unsure along them."""
+    """(N, 3, 3) square roots of information matrices of points that a single camera sees.
+
+    The standard deviation is `stray` (N,) across the rays (N, 3) and `DEPTH_STRAY` along them.
+    """
     along = rays / np.linalg.norm(rays, axis=1, keepdims=True)
     outer = along[:, :, None] * along[:, None]
     return (np.eye(3) - outer) / stray[:, None, None] + outer / DEPTH_STRAY
@@ -188,7 +214,15 @@ def _flat(rays: np.ndarray, stray: np.ndarray) -> np.ndarray:
 def _evidence(
     points: np.ndarray, stray: np.ndarray, seen: Seen, source: str, by_detector: bool
 ) -> Evidence:
-    """Evidence of points (F, P, 3), NaN where unknown, that err alike in all directions."""
+    """Evidence of points with the same standard deviation in all directions.
+
+    Args:
+        points: (F, P, 3) metres; NaN where unknown.
+        stray: (P,) standard deviations in metres.
+        seen: What the cameras saw, for the outlines.
+        source: Where the points come from, in words.
+        by_detector: Whether the points are from a detector.
+    """
     known = np.isfinite(points).all(-1)
     roots = np.where(known, 1 / stray, 0.0)[..., None, None] * np.eye(3)
     return Evidence(np.nan_to_num(points), roots, seen.outlines, source, by_detector)

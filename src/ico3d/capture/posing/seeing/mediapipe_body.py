@@ -1,4 +1,4 @@
-"""MediaPipe's body and hand models: points of a person in a part of a picture."""
+"""Reads points of a body and of a hand in pictures with MediaPipe."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,18 +11,20 @@ from ico3d.common.native_messages import held_back
 from ico3d.errors import CaptureError, MissingExtraError
 
 PURPOSE = "fitting a skeleton"
+"""What the models are needed for, in error messages."""
 LEAST_CONFIDENCE = 0.3
-"""Below it MediaPipe reports nothing; wrong detections are sorted out by the other cameras."""
+"""Least confidence of detections. It is low, as comparing cameras sorts out wrong detections."""
 
 
 @dataclass(frozen=True)
 class Body:
-    """A person in a picture.
+    """The 33 points of a person in a picture.
 
     Attributes:
-        pixels: (33, 2) pixel centres at +0.5.
-        visibility: (33,) in [0, 1].
-        relative: (33, 3) metres from between the hips, in axes of the camera (OpenCV).
+        pixels: (33, 2) pixels; centres are at +0.5.
+        visibility: (33,) visibility of the points in [0, 1].
+        relative: (33, 3) positions relative to the middle of the hips, in axes of the camera
+            (OpenCV), metres.
     """
 
     pixels: np.ndarray
@@ -32,12 +34,12 @@ class Body:
 
 @dataclass(frozen=True)
 class Hand:
-    """A hand in a picture.
+    """The 21 points of a hand in a picture.
 
     Attributes:
-        pixels: (21, 2) pixel centres at +0.5.
+        pixels: (21, 2) pixels; centres are at +0.5.
         left: Whether it looks like a left hand.
-        score: How sure that is, in [0.5, 1].
+        score: Certainty of the side, in [0.5, 1].
     """
 
     pixels: np.ndarray
@@ -46,7 +48,7 @@ class Hand:
 
 
 class BodyReader:
-    """Finds one person, and one hand, in pictures, each one for itself."""
+    """Finds one person or one hand in a picture, independently of other pictures."""
 
     def __init__(self, body_model: Path, hand_model: Path):
         """Loads the models.
@@ -91,7 +93,7 @@ class BodyReader:
         )
 
     def close(self) -> None:
-        """Lets go of the models."""
+        """Closes the models."""
         self._bodies.close()
         self._hands.close()
 
@@ -130,6 +132,6 @@ def _opened(model: Path, load: Callable[[], Any]) -> Any:
 
 
 def _pixels(points: Any, picture: np.ndarray) -> np.ndarray:
-    """(N, 2) pixels of points given in parts of the picture."""
+    """(N, 2) pixels of points that are given relative to the picture's width and height."""
     height, width = picture.shape[:2]
     return np.array([(point.x * width, point.y * height) for point in points])

@@ -1,4 +1,4 @@
-"""How far pixels lie within or without the person, in all pictures of a capture."""
+"""Signed distances of pixels from the person's outline, in all pictures of a capture."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -10,19 +10,19 @@ from scipy.ndimage import binary_dilation, distance_transform_edt
 from ico3d.common.camera import Camera
 
 LARGEST = 320
-"""Pixels of an outline's longer side; larger masks are made smaller."""
+"""Longer side in pixels to which larger masks are scaled down."""
 STEPS = 8
-"""Steps of a stored distance in a pixel: int8 reaches 16 pixels."""
+"""Stored distances are in units of 1/8 pixel, so that int8 reaches 16 pixels."""
 
 
 @dataclass(eq=False)
 class Outlines:
-    """Signed distances to the person's border, positive within.
+    """Maps of signed distances from the person's outline, positive inside.
 
     Attributes:
-        cameras: C cameras of the maps' sizes.
-        maps: C arrays (F, H, W) int8, in `STEPS` parts of a pixel.
-        known: (F, C) bool: whether there is a mask.
+        cameras: The C cameras, scaled to the sizes of their maps.
+        maps: For each camera, (F, H, W) int8 distances in units of 1 / `STEPS` pixel of the map.
+        known: (F, C) bool: whether a frame of a camera has a mask.
     """
 
     cameras: list[Camera]
@@ -31,18 +31,24 @@ class Outlines:
 
     @staticmethod
     def empty(frames: int, cameras: list[Camera]) -> "Outlines":
-        """No masks yet."""
+        """Outlines of `frames` frames without any masks."""
         small = []
         for camera in cameras:
             scale = min(1.0, LARGEST / max(camera.height, camera.width))
             size = (max(1, round(camera.width * scale)), max(1, round(camera.height * scale)))
             small.append(camera.resized(*size))
-        # Pages that nobody writes to take no memory: a camera without masks costs nothing.
+        # Memory pages that are never written take no memory: cameras without masks cost nothing.
         maps = [np.zeros((frames, camera.height, camera.width), np.int8) for camera in small]
         return Outlines(small, maps, np.zeros((frames, len(cameras)), bool))
 
     def add(self, frame: int, place: int, mask: np.ndarray) -> None:
-        """Takes down a mask (H, W) in [0, 1] of the picture's size; an empty one counts as none."""
+        """Adds a mask; one that shows nobody is left out.
+
+        Args:
+            frame: Index of the frame.
+            place: Index of the camera.
+            mask: (H, W) in [0, 1], of the size of the recorded picture.
+        """
         camera = self.cameras[place]
         picture = Image.fromarray(np.asarray(mask, np.float32))
         small = np.asarray(picture.resize((camera.width, camera.height), Image.Resampling.BOX))
@@ -53,15 +59,16 @@ class Outlines:
         self.known[frame, place] = True
 
     def at(self, place: int, frame: int, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Distances in pixels of the map, bilinear, positive within the person.
+        """Signed distances at pixels, interpolated bilinearly.
 
         Args:
-            place: Which camera.
-            frame: Which frame.
-            pixels: (N, 2) of the map's camera; beyond its border nothing is known: NaN.
+            place: Index of the camera.
+            frame: Index of the frame.
+            pixels: (N, 2) pixels of the map's camera.
 
         Returns:
-            Distances (N,) and how they grow with pixels, (N, 2).
+            (N,) distances in pixels of the map, positive inside the person, NaN outside of the
+            picture; and (N, 2) their derivatives by the pixels.
         """
         stored = self.maps[place][frame]  # (H, W)
         height, width = stored.shape
@@ -82,9 +89,14 @@ class Outlines:
 
 
 def _signed(coverage: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """(H, W) pixels to the border, positive within.
+    """(H, W) signed distances from the border in pixels, positive inside.
 
-    The border's own pixels know it by their coverage, all others by the nearest of these.
+    Pixels of the border take their distance from their coverage; all others take the distance to
+    the nearest of these, plus its own.
+
+    Args:
+        coverage: (H, W) share of each pixel that the person covers.
+        inside: (H, W) bool: pixels that count as the person.
     """
     rim = np.zeros_like(inside)
     down, right = inside[1:] != inside[:-1], inside[:, 1:] != inside[:, :-1]
@@ -92,12 +104,12 @@ def _signed(coverage: np.ndarray, inside: np.ndarray) -> np.ndarray:
     rim[:-1] |= down
     rim[:, 1:] |= right
     rim[:, :-1] |= right
-    # A full pixel beside a partly covered one leaves it to that to say where the border is.
+    # Beside a partly covered pixel, a full or empty one is no border: the former tells it better.
     partly = (coverage > 0.02) & (coverage < 0.98)
     rim &= partly | ~np.asarray(binary_dilation(partly), bool)
     if not rim.any():
         return np.full(inside.shape, 1.0 * max(inside.shape))  # the person fills the picture
     found: Any = distance_transform_edt(~rim, return_indices=True)
     away, (row, column) = found
-    near = coverage[row, column] - 0.5  # of the nearest pixel of the border
+    near = coverage[row, column] - 0.5  # signed distance of the nearest pixel of the border
     return np.where(inside, away, -away) + near

@@ -1,4 +1,4 @@
-"""What a capture's cameras see of a person: points and outlines, read picture by picture."""
+"""Reads a person's points and outlines in all pictures of a capture."""
 
 import queue
 from collections.abc import Iterator
@@ -20,31 +20,36 @@ from ico3d.common.spread import spread
 from ico3d.common.weights import model_file
 
 MOST_CAMERAS = 16
-"""Cameras that are looked at; more add work, and hardly anything to a pose."""
+"""Most cameras whose pictures are read; more would hardly improve poses."""
 MARGIN = 1.25
-"""Side of the part that the body model is shown, by the person's height or width."""
+"""Side of the square that the body model sees, relative to the person's larger extent."""
 HAND_SHOWN = 0.30
-"""Metres that the part around a hand shows."""
+"""Side in metres of the square around a hand that the hand model sees."""
 HAND_OFF = 0.08
-"""Metres by which a hand's wrist may miss the arm's: else it is another hand."""
+"""Largest distance in metres between the wrists of a hand and of its arm; else the hand is another.
+"""
 COARSE_HAND = 0.25
-"""Weight of the points of a hand that the body model sees."""
+"""Factor of the weights of hand points that the body model finds."""
 NUMBER = {name: number for number, name in enumerate(LANDMARKS)}
+"""Index of each landmark."""
 POSE = np.array([NUMBER[name] for name in MEDIAPIPE_POSE])
+"""(33,) index of the landmark of each point of MediaPipe's body model."""
 COARSE = np.array([name.startswith(("little", "index", "thumb")) for name in MEDIAPIPE_POSE])
+"""(33,) bool: points of hands in MediaPipe's body model."""
 
 
 @dataclass(eq=False)
 class Seen:
-    """What C cameras see of P landmarks in F frames.
+    """P landmarks and outlines of a person, as C cameras see them in F frames.
 
     Attributes:
         capture: The recording.
-        chosen: C numbers of cameras.
-        pixels: (F, C, P, 2) float32 pixels; 0 where a point is not seen.
-        weights: (F, C, P) float32 in [0, 1]; 0 where a point is not seen.
-        relative: (F, C, 33, 3) float32 metres about the hips, in axes of the world.
-        outlines: Of the person.
+        chosen: Indices of the C cameras in the recording.
+        pixels: (F, C, P, 2) float32 pixels of the landmarks; 0 where one is not seen.
+        weights: (F, C, P) float32 weights in [0, 1]; 0 where a landmark is not seen.
+        relative: (F, C, 33, 3) float32 points of MediaPipe's body model relative to the middle of
+            the hips, in axes of the world, metres.
+        outlines: Outlines of the person.
     """
 
     capture: Capture
@@ -63,15 +68,26 @@ class Seen:
 
     @property
     def cameras(self) -> list[Camera]:
-        """C cameras."""
+        """The C cameras."""
         return [self.capture.cameras[camera] for camera in self.chosen]
 
 
 class Watcher:
-    """Reads the pictures of a capture with MediaPipe, several at a time."""
+    """Reads the pictures of a capture with MediaPipe, in several threads.
+
+    Attributes:
+        seen: What was read so far.
+    """
 
     def __init__(self, capture: Capture, readers: list[BodyReader], workers: int):
-        """Chooses among the cameras that train; without readers, only outlines can be read."""
+        """Chooses up to `MOST_CAMERAS` cameras that are not test cameras.
+
+        Args:
+            capture: The recording.
+            readers: MediaPipe's models, one for each thread; without any, only outlines can be
+                read.
+            workers: Number of threads.
+        """
         able = [c for c in range(len(capture.cameras)) if c not in capture.split.test_cameras]
         self.seen = Seen(capture, [able[i] for i in spread(len(able), MOST_CAMERAS)])
         self._readers: queue.SimpleQueue[BodyReader] = queue.SimpleQueue()
@@ -80,7 +96,7 @@ class Watcher:
         self._workers = workers
 
     def look(self, bodies: bool) -> None:
-        """Takes down outlines, and what the body model sees if `bodies`."""
+        """Reads outlines, and points of the body as well if `bodies`."""
 
         def start(place: int) -> View:
             camera, capture = self.seen.chosen[place], open_capture(self.seen.capture.path)
@@ -103,10 +119,11 @@ class Watcher:
         )
 
     def look_at_hands(self, points: np.ndarray) -> None:
-        """Takes down what the hand model sees around hands.
+        """Reads points of hands.
 
         Args:
-            points: (F, P, 3) metres where landmarks are about; NaN where nobody knows.
+            points: (F, P, 3) approximate positions of the landmarks in the world, metres, which say
+                where hands are; NaN where unknown.
         """
 
         def start(place: int) -> View:
@@ -141,7 +158,7 @@ class Watcher:
             self._readers.put(reader)
 
     def _body(self, frame: int, place: int, image: np.ndarray, mask: np.ndarray | None) -> int:
-        """Takes down the body in a picture; 1 if there is one."""
+        """Reads the body in a picture; returns 1 if there is one, else 0."""
         part = person_part(image.shape[:2], mask)
         if part is None:
             return 0
@@ -158,7 +175,7 @@ class Watcher:
     def _hand(
         self, frame: int, place: int, image: np.ndarray, points: np.ndarray, side: str
     ) -> int:
-        """Takes down a hand in a picture; 1 if there is one."""
+        """Reads the hand of a side in a picture; returns 1 if there is one, else 0."""
         numbers = np.array([NUMBER[name] for name in hand(side)])
         wrist, knuckles = points[numbers[0]], points[numbers[[5, 17]]].mean(0)
         center = wrist + 1.1 * (knuckles - wrist)
@@ -175,14 +192,19 @@ class Watcher:
         if off > HAND_OFF:
             return 0
         sure = found.score if found.left == (side == "L") else 1 - found.score
-        # The wrist stays the arm's: the hand's own lies deeper in the hand.
+        # The wrist of the body model is kept: that of the hand model lies deeper in the hand.
         self.seen.pixels[frame, place, numbers[1:]] = pixels[1:]
         self.seen.weights[frame, place, numbers[1:]] = max(sure, 0.1)
         return 1
 
 
 def person_part(size: tuple[int, int], mask: np.ndarray | None) -> Part | None:
-    """The square part of a picture (H, W) that holds the person; None where the mask is empty."""
+    """The square part of a picture that holds the person; None where the mask shows nobody.
+
+    Args:
+        size: Height and width of the picture in pixels.
+        mask: (H, W) mask of the person; None takes the whole picture.
+    """
     rows, columns = np.arange(size[0]), np.arange(size[1])
     if mask is not None:
         person = mask > 0.5
@@ -196,12 +218,16 @@ def person_part(size: tuple[int, int], mask: np.ndarray | None) -> Part | None:
 
 @contextmanager
 def watcher(capture: Capture, workers: int) -> Iterator[Watcher]:
-    """A watcher whose models are closed in the end.
+    """A context with a watcher, whose models are closed in the end.
+
+    Args:
+        capture: The recording.
+        workers: Number of threads, each with its own models.
 
     Raises:
         MissingExtraError: If MediaPipe is not installed.
-        MissingModelError: If a model file is not there.
-        CaptureError: If one cannot be used.
+        MissingModelError: If a model file is missing.
+        CaptureError: If a model file cannot be used.
     """
     models = [model_file(f"{name}_landmarker.task", PURPOSE) for name in ("pose", "hand")]
     readers: list[BodyReader] = []
