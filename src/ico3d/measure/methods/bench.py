@@ -1,4 +1,4 @@
-"""SWinGS++ and what it is compared with: the same recording, as many Gaussians, as many steps."""
+"""Compares SWinGS++ with other methods: on one recording, with equally many Gaussians and steps."""
 
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -26,8 +26,9 @@ from ico3d.studio.recording import Recording, record
 from ico3d.training.processes import fork_server
 
 SCORES = ("psnr_mask", "psnr_moving", "psnr", "ssim", "flicker", "num_gaussians", "train_seconds")
-"""Metrics that a trial keeps."""
+"""Metrics of a trial that are kept; docs/architecture.md defines them."""
 PER_WINDOW = ("psnr_mask", "psnr_moving")
+"""Metrics that are also kept for each window."""
 
 
 @dataclass(frozen=True)
@@ -36,13 +37,13 @@ class Terms:
 
     Attributes:
         capture: Path of the recording.
-        frames: Only so many of its first frames, or None for all.
-        folder: Where trainings lie; a finished one is not repeated.
-        windows: As SWinGS++ is trained in, and as all are reported on.
-        ours: How SWinGS++ is trained; what is not as in its preset holds for every method.
+        frames: Number of first frames that are used; None for all.
+        folder: Folder of the trainings; finished ones are not repeated.
+        windows: Windows in which SWinGS++ is trained, and for which all methods are measured.
+        ours: Settings of SWinGS++; where they differ from its preset, those of all methods do.
         finetune: Whether SWinGS++ is fine-tuned in the end.
         device: Where to compute.
-        unseen: Whether to measure the frames after these, too.
+        unseen: Whether frames after the trained ones are measured, too.
     """
 
     capture: Path
@@ -57,8 +58,8 @@ class Terms:
     def settings(self, method: Method) -> BodySettings:
         """The settings of a method.
 
-        Where that takes the clip as one window, it has the Gaussians and steps of all windows;
-        on a skeleton those of one window are enough Gaussians.
+        A method that takes the clip as one window gets the steps of all windows together and the
+        Gaussians of all windows together; on a skeleton it gets those of one window.
         """
         settings = changed_alike(method, self.ours)
         if not (self.finetune and method == OURS):
@@ -78,7 +79,13 @@ class Terms:
 
 @dataclass(frozen=True)
 class Trial:
-    """One training and its measurement."""
+    """One training and its measurement.
+
+    Attributes:
+        method: How Gaussians are moved.
+        seed: Seed of the training.
+        terms: What all trials have in common.
+    """
 
     method: Method
     seed: int
@@ -86,22 +93,23 @@ class Trial:
 
     @property
     def folder(self) -> Path:
-        """Where it is trained."""
+        """Model folder of this training."""
         tuned = "-tuned" if self.terms.settings(self.method).finetune.steps else ""
         return self.terms.folder / f"{self.method}{tuned}-seed{self.seed}"
 
     def run(self) -> dict:
-        """Trains, or goes on with that, and measures.
+        """Trains, or continues an interrupted training, and measures.
 
         Returns:
-            `seed`, `SCORES`, each of `PER_WINDOW` as a list `…_per_window`; `tuned`: the same
-            after fine-tuning, where there was one; `unseen_psnr_mask` and `unseen_psnr_moving` of
-            frames after those that were trained, where that is asked for.
+            `seed`; the metrics of `SCORES`; each of `PER_WINDOW` as a list `…_per_window`; if
+            `Terms.unseen`, `unseen_psnr_mask` and `unseen_psnr_moving` of frames after the trained
+            ones; with fine-tuning, `tuned`, which holds these metrics after it, while the others
+            are from before.
         """
         capture = open_clip(self.terms.capture, self.terms.frames)
         settings, device = self.terms.settings(self.method), self.terms.device
         job = BodyJob(self.method, self.seed, settings, device=device)
-        # Optical flow is the same for all, and was measured to cut the windows.
+        # Optical flow is the same for all trials, and was measured when the windows were cut.
         copytree(self.terms.folder / "flow", self.folder / "flow", dirs_exist_ok=True)
         body = train_body(capture, self.folder, job)
         if not (self.folder / UNTUNED).is_file():
@@ -124,19 +132,19 @@ class Trial:
 
 
 def record_standard(subject: Path, folder: Path, workers: int, garment: str = "none") -> Path:
-    """Records the clip that figures are quoted for, or goes on with that.
+    """Records the synthetic clip for which figures are quoted, or continues recording it.
 
-    20 cameras, 41 frames at 15 per second, 288 pixels high: calm, gestures, and fast gestures; with
-    a garment, the hips turn, too.
+    It has 20 cameras, and 41 frames at 15 per second, 288 pixels high. The person is calm, then
+    gestures, then gestures fast; with a garment the hips turn as well (motion `sway`).
 
     Args:
-        subject: The person, an `.npz` file.
-        folder: Where the capture shall lie.
-        workers: Threads that draw.
-        garment: What the person wears over the clothes, or none.
+        subject: File `.npz` of the person.
+        folder: Folder of the capture.
+        workers: Number of threads that draw.
+        garment: What the person wears over the clothes; "none" for nothing.
 
     Returns:
-        The capture's path.
+        Path of the capture.
     """
     if not (folder / "capture.json").is_file():
         recording = Recording(
@@ -159,7 +167,7 @@ def record_standard(subject: Path, folder: Path, workers: int, garment: str = "n
 
 
 def open_clip(path: Path, frames: int | None) -> Capture:
-    """A capture, or its first frames only."""
+    """Opens a capture, limited to its first `frames` frames unless that is None."""
     capture = open_capture(path)
     if frames is not None and frames < capture.num_frames:
         track = capture.body_track()
@@ -178,7 +186,16 @@ def terms_for(
     device: DeviceName = "auto",
     unseen: bool = False,
 ) -> Terms:
-    """Cuts the clip into windows, once for all trials.
+    """Cuts the clip into windows, once for all trials, and makes the terms.
+
+    Args:
+        capture: Path of the recording.
+        frames: Number of first frames that are used; None for all.
+        folder: Folder under which trainings lie.
+        settings: Settings of SWinGS++.
+        finetune: Whether SWinGS++ is fine-tuned in the end.
+        device: Where to compute.
+        unseen: Whether frames after the trained ones are measured, too.
 
     Raises:
         SettingsError: If unseen frames are asked for and there are none.
@@ -195,15 +212,16 @@ def terms_for(
 def run_trials(
     trials: Sequence[Trial], jobs: int, done: Callable[[Trial, dict], None]
 ) -> dict[Method, list[dict]]:
-    """Runs trials, in so many processes.
+    """Runs trials, one after another or in several processes.
 
     Args:
-        trials: The trainings to run.
-        jobs: Processes; with several, each writes what it says to `log.txt` in its folder.
-        done: Called with every result when it comes.
+        trials: The trials to run.
+        jobs: Number of processes; with more than one, each trial's output goes to `log.txt` in its
+            folder.
+        done: Called with each trial and its result as soon as it ends.
 
     Returns:
-        Results by method, by seed ascending.
+        Results for each method, by ascending seed.
     """
     found: dict[Method, list[dict]] = {}
     for trial, result in _one_by_one(trials) if jobs == 1 else _at_a_time(trials, jobs):
@@ -218,7 +236,7 @@ def _one_by_one(trials: Sequence[Trial]) -> Iterator[tuple[Trial, dict]]:
 
 
 def _at_a_time(trials: Sequence[Trial], jobs: int) -> Iterator[tuple[Trial, dict]]:
-    """Several processes that share the cores; one that fails stops what has not begun."""
+    """Runs trials in several processes; after an error, no further trial is started."""
     threads = max(1, (os.cpu_count() or 1) // jobs)
     with ProcessPoolExecutor(jobs, fork_server(__name__), _share, (threads,)) as pool:
         futures = {pool.submit(_logged, trial): trial for trial in trials}
@@ -230,7 +248,7 @@ def _at_a_time(trials: Sequence[Trial], jobs: int) -> Iterator[tuple[Trial, dict
 
 
 def _share(threads: int) -> None:
-    """Makes a process use so many threads only."""
+    """Limits torch and numba in this process to a number of threads."""
     import numba
     import torch
 
@@ -245,15 +263,16 @@ def _logged(trial: Trial) -> dict:
 
 
 def summary(found: dict[Method, list[dict]]) -> dict:
-    """Figures of a bench.
+    """Figures of a comparison of methods.
 
     Args:
-        found: What `run_trials` gave.
+        found: Results by method, from `run_trials`.
 
     Returns:
-        By method: `seeds` (the results) and `mean` (over seeds; of lists, value by value).
-        `margins`: how far SWinGS++ is above each other method, likewise. `finetune`: means of
-        `before` and `after`, where it was fine-tuned. What was not measured is None.
+        For each method, `seeds` (its results) and `mean` (means over seeds; of lists, value by
+        value). `margins`: for each other method the difference of means, SWinGS++ less that method.
+        `finetune`: means `before` and `after`, if SWinGS++ was fine-tuned. Values that were not
+        measured are None.
     """
     means = {method: mean(results) for method, results in found.items()}
     figures: dict = {
@@ -273,7 +292,7 @@ def summary(found: dict[Method, list[dict]]) -> dict:
 
 
 def mean(results: Sequence[dict]) -> dict:
-    """Means of the metrics of results, of lists value by value; None counts for nothing."""
+    """Means of the metrics over results; of lists, value by value; None values are left out."""
     names = [name for name in results[0] if name not in ("seed", "tuned")]
     found = {}
     for name in names:
@@ -291,7 +310,7 @@ def _mean(values: Sequence[float | None]) -> float | None:
 
 
 def _above(ours, theirs):
-    """The difference of two numbers or lists of them."""
+    """Difference of two numbers, or of two lists value by value; None where one is None."""
     if isinstance(ours, list):
         return [_above(a, b) for a, b in zip(ours, theirs, strict=True)]
     return None if ours is None or theirs is None else ours - theirs

@@ -1,4 +1,4 @@
-"""Pictures of how good a body is: over its frames, and by its cameras."""
+"""Charts of a body's PSNR: over frames, and by camera."""
 
 from pathlib import Path
 
@@ -8,18 +8,19 @@ INK, PALE, BORDER = "#2255aa", "#dd8833", "#999999"
 
 
 def plot_body(result: dict, folder: Path) -> None:
-    """Draws what `evaluate_body` gave.
+    """Draws charts of the metrics of a body.
 
     Args:
-        result: Its metrics.
-        folder: Where `frames.png` (PSNR over time, window borders dashed) and `cameras.png` go.
+        result: Metrics from `evaluate_body`.
+        folder: Folder for `frames.png` (PSNR over frames, window borders dashed) and `cameras.png`
+            (PSNR of each camera).
     """
     _save(_frames(result), folder / "frames.png")
     _save(_cameras(result), folder / "cameras.png")
 
 
 def _frames(result: dict):
-    """PSNR on the person and on what moves, over the frames."""
+    """Chart of the PSNR on the person and on moving pixels over frames."""
     figure, axes = _figure(9)
     numbers = [entry["frame"] for entry in result["per_frame"]]
     for key, label, color in (
@@ -36,13 +37,13 @@ def _frames(result: dict):
 
 
 def _cameras(result: dict):
-    """PSNR on the person as a bar per camera."""
+    """Chart of the PSNR on the person, with a bar for each camera."""
     entries = result["per_camera"]
     figure, axes = _figure(max(4.0, 0.5 * len(entries) + 2))
     values = [_or_gap(entry["psnr_mask"]) for entry in entries]
     axes.bar([entry["camera"] for entry in entries], values, color=INK)
     seen = [value for value in values if value == value]
-    if seen:  # from 0 on, all would look alike
+    if seen:  # on an axis from 0 on, all bars would look alike
         axes.set_ylim(min(seen) - 3, max(seen) + 1)
     axes.set_xlabel("camera")
     axes.tick_params(axis="x", rotation=60)

@@ -1,4 +1,4 @@
-"""Settings of methods that are compared: what is changed for one is changed for all."""
+"""Settings of methods that are compared: a change of SWinGS++'s settings applies to all methods."""
 
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, TypeVar
@@ -6,23 +6,30 @@ from typing import Any, TypeVar
 from ico3d.body.settings import BodySettings, Method, settings_for
 
 OURS: Method = "swings++"
+"""The method that others are compared with."""
 
 Settings = TypeVar("Settings")
 
 
 def preset(method: Method) -> BodySettings:
-    """The cpu preset of a method, but that nobody begins on true surface points."""
+    """The preset `cpu` of a method, with first points on the visual hull, not on true surfaces."""
     settings = settings_for("cpu", method)
     return replace(settings, initial=replace(settings.initial, source="hull"))
 
 
 def changed_alike(method: Method, settings: BodySettings) -> BodySettings:
-    """The preset of a method, changed as settings of SWinGS++ differ from the preset of that."""
+    """The preset of a method, with the same changes as settings of SWinGS++.
+
+    Args:
+        method: The method.
+        settings: Settings of SWinGS++; values that differ from its preset replace those of
+            `method`.
+    """
     return _changed(preset(method), preset(OURS), settings)
 
 
 def _changed(target: Settings, before: Settings, after: Settings) -> Settings:
-    """A target with those values replaced in which `after` differs from `before`."""
+    """`target` with those values of `after` in which `after` differs from `before`."""
     known: Any = before
     values: dict[str, Any] = {}
     for field in fields(known):

@@ -1,4 +1,4 @@
-"""What `ico3d bench body` prints."""
+"""Tables and lines that `ico3d bench body` prints."""
 
 from collections.abc import Iterator, Sequence
 from typing import get_args
@@ -18,7 +18,12 @@ def line(trial: Trial, result: dict) -> str:
 
 
 def tables(figures: dict) -> Iterator[Table]:
-    """The figures of `ico3d.measure.methods.bench.summary` with `windows`."""
+    """Tables of a comparison of methods.
+
+    Args:
+        figures: Result of `ico3d.measure.methods.bench.summary`, with key `windows`: first and last
+            frame of each window.
+    """
     spans = [f"{first}–{last}" for first, last in figures["windows"]]
     methods = [method for method in get_args(Method) if method in figures]
     yield _qualities(figures, methods, spans)

@@ -1,4 +1,4 @@
-"""Bodies in frames that they were not trained on."""
+"""Measures bodies in frames on which they were not trained."""
 
 import torch
 
@@ -13,17 +13,22 @@ SCORES = ("psnr_mask", "psnr_moving")
 
 
 class Reposed:
-    """A body in the poses of a track that goes on where its own clip ends.
+    """A body on a skeleton in the poses of a body track, also after the end of the body's clip.
 
-    A body without a skeleton stays as it was in its last frame.
+    A body without a skeleton, or without a track, stays as it is in its last frame.
     """
 
     def __init__(self, body: TrainedBody, track: BodyTrack | None):
-        """Binds a body to a track of the whole recording."""
+        """Makes a body that follows a track.
+
+        Args:
+            body: The trained body.
+            track: Body track of the whole recording; None where it has none.
+        """
         self._body, self._track = body, track
 
     def gaussians(self, seconds: float) -> Gaussians:
-        """Activated Gaussians in the world at a time."""
+        """Activated Gaussians in the world at a time in seconds."""
         model = self._body.models[-1]
         if self._track is None or not isinstance(model.motion, Skinned):
             return self._body.gaussians(seconds)
@@ -34,12 +39,15 @@ class Reposed:
 
 
 def unseen_scores(body: TrainedBody, capture: Capture, first: int) -> dict[str, float | None]:
-    """`SCORES` of the frames from `first` on, in the poses that were tracked there.
+    """Metrics of the frames from `first` on, with the body in the poses that were tracked there.
 
     Args:
-        body: Trained on the frames before.
+        body: Body that was trained on the frames before.
         capture: The whole recording.
-        first: Number of the first frame that was not trained on.
+        first: Index of the first frame on which the body was not trained.
+
+    Returns:
+        The metrics of `SCORES`, each with the prefix `unseen_`.
     """
     frames = range(first, capture.num_frames)
     reposed = Reposed(body, capture.body_track())
