@@ -10,22 +10,22 @@ import type { BakedWindow } from './window.ts';
 
 const SLOTS = [0, 1] as const;
 const POLL = 10; // ms
-const WAKE = 0.25; // s at least before a window may be seen
-const MARGIN = 3; // sorts for which there is time then: a busy device takes longer now and then
+const WAKE = 0.25; // least time before a window may be seen from which on it takes part in sorting, s
+const MARGIN = 3; // number of sorts for which that time must suffice: a busy device sometimes takes longer
 
-/** What the body needs of the page around it. */
+/** Functions of the page that the body calls. */
 export interface BodyPorts {
   /** Fetches a window. */
   load(window: number): Promise<BakedWindow>;
-  /** A window could not be fetched. */
+  /** Called when a window could not be fetched. */
   failed(error: unknown): void;
 }
 
-/** The body on stage: its windows come and go in two slots while it moves. */
+/** A body of windows on stage: while it moves, its windows are loaded into two slots in turn. */
 export class Body implements Actor {
   readonly objects: [WindowGenerator, WindowGenerator];
   readonly motion: Motion;
-  /** What the next picture shows of the body; null until its first window is there. */
+  /** What the next picture shows of the body; null until its first window is loaded and sorted. */
   shown: Shown | null = null;
   private failure: unknown = null;
   private readonly timeline: Timeline;
@@ -56,7 +56,7 @@ export class Body implements Actor {
     return SLOTS.map((slot) => this.pose(slot)).includes(true);
   }
 
-  /** The body time that is seen, s. */
+  /** Time of the body that the picture shows, s. */
   get time(): number {
     return this.shown?.time ?? this.motion.time;
   }
@@ -66,9 +66,9 @@ export class Body implements Actor {
   }
 
   /**
-   * Resolves when what was asked for is on stage.
+   * Resolves when the picture shows the time of the motion.
    *
-   * @throws whatever kept the first window from being fetched
+   * @throws the error with which the first window could not be fetched
    */
   async ready(): Promise<void> {
     while (this.shown?.time !== this.motion.time) {
@@ -77,13 +77,13 @@ export class Body implements Actor {
     }
   }
 
-  /** Goes to a time and stays there; resolves when it is on stage, which must have been started. */
+  /** Goes to a time and stays there; resolves when the picture shows it. The stage must be running. */
   async show(seconds: number): Promise<void> {
     this.motion.hold(seconds);
     await this.ready();
   }
 
-  /** A window takes part in sorting from so many seconds before it may be seen. */
+  /** Seconds before a window may be seen from which on it takes part in sorting. */
   private get soon(): number {
     const sorts = Math.max(...this.watches.map(({ took }) => took));
     return Math.max(WAKE, (MARGIN * sorts) / 1000);
@@ -93,7 +93,11 @@ export class Body implements Actor {
     this.objects[slot].hold(content);
   }
 
-  /** Poses the window in a slot: the seen one as it is now, the other one as it will be when it appears. */
+  /**
+   * Poses the window in a slot: a seen one at the shown time, a hidden one as it will be when it appears.
+   *
+   * @returns whether anything changed
+   */
   private pose(slot: Slot): boolean {
     const window = this.slots.windowIn(slot);
     if (window === null) return false;

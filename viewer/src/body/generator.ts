@@ -7,19 +7,19 @@ import { coefficientsAt } from './window.ts';
 const LEAST_SCALE = '1e-6'; // metres
 
 /**
- * One slot as a Spark generator: a shader that moves the Gaussians of the window it holds.
+ * One slot as a Spark generator: a shader that moves the Gaussians of the window in the slot.
  *
- * Its capacity never changes. A window that will be seen soon is awake: it is drawn with opacity 0
- * and takes part in sorting, so that it can appear from one picture to the next. One that will not
- * is asleep and costs next to nothing.
+ * The slot's capacity never changes. A window that will be seen soon is awake: it is drawn with
+ * opacity 0 and takes part in sorting, so that it can appear from one picture to the next. Other
+ * windows are asleep and cost next to nothing.
  */
 export class WindowGenerator extends SplatGenerator {
   private readonly capacity: Capacity;
   private readonly uniforms: Uniforms;
-  private readonly found: Float32Array; // coefficients of the window
+  private readonly found: Float32Array; // coefficients of the window at the posed time
   private content: PackedWindow | null = null;
   private active = false;
-  private places: number[] = [];
+  private places: number[] = []; // where each of the window's coefficients is in the texture
 
   constructor(capacity: Capacity) {
     const uniforms = makeUniforms(capacity);
@@ -27,7 +27,7 @@ export class WindowGenerator extends SplatGenerator {
     super({
       numSplats: capacity.count,
       generator: makeGenerator(capacity, uniforms, transformer),
-      // Without this the program would place the body at infinity.
+      // Without this update, Spark's transformer would place the body at infinity.
       update: () => {
         if (transformer.update(this)) this.updateVersion();
       },
@@ -42,7 +42,7 @@ export class WindowGenerator extends SplatGenerator {
     return this.active;
   }
 
-  /** Takes a window in; it is asleep. */
+  /** Puts a window into the slot, asleep. */
   hold(content: PackedWindow): void {
     this.content = content;
     this.places = coefficientPlaces(content.window, this.capacity);
@@ -56,8 +56,9 @@ export class WindowGenerator extends SplatGenerator {
   }
 
   /**
-   * Shows the window it holds, if any, at τ in [0, 1].
+   * Poses the window in the slot, if there is one, at τ in [0, 1], and wakes it.
    *
+   * @param visible whether it is seen; else it is drawn with opacity 0
    * @returns whether anything changed
    */
   pose(tau: number, visible: boolean): boolean {
@@ -102,9 +103,9 @@ interface Uniforms {
   bodyRest: { value: THREE.DataArrayTexture };
   bodyColours: { value: THREE.DataArrayTexture };
   bodyBasis: { value: THREE.DataArrayTexture };
-  bodyCoefficients: { value: THREE.DataTexture }; // a row for each cluster
-  bodyCount: { value: number };
-  bodyGate: { value: number };
+  bodyCoefficients: { value: THREE.DataTexture }; // one row per cluster
+  bodyCount: { value: number }; // Gaussians that are drawn; 0 while asleep
+  bodyGate: { value: number }; // factor of opacities: 1 if visible, else 0
 }
 
 function makeUniforms({ width, rows, clusters, ranks }: Capacity): Uniforms {
@@ -155,7 +156,7 @@ const DECLARATIONS = dyno.unindent(`
   uniform float bodyGate;
 `);
 
-/** Σ c·basis over some of the layers. */
+/** Shader expression of Σ c·basis over coefficients `begin` to `end` - 1. */
 function blend(begin: number, end: number): string {
   const terms = Array.from({ length: end - begin }, (_, i) => {
     const k = begin + i;
@@ -164,7 +165,7 @@ function blend(begin: number, end: number): string {
   return terms.join(' + ') || 'vec4(0.0)';
 }
 
-/** Everything is its mean plus Σ c·basis; quaternions are kept as wxyz and Spark wants xyzw. */
+/** Shader code: each property is its mean plus Σ c·basis; quaternions are stored as wxyz, Spark takes xyzw. */
 function statements({ width, ranks }: Capacity, index: string, gsplat: string): string[] {
   const [p, r, l] = ranks;
   const coefficients = Array.from(

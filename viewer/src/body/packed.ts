@@ -3,25 +3,25 @@ import type { BakedWindow, Curve } from './window.ts';
 
 const WIDTH = 1024; // texels per row: one texel is one Gaussian
 
-/** The size of a slot's textures: every window of the body fits. */
+/** The size of a slot's textures, in which every window of the body fits. */
 export interface Capacity {
   count: number; // Gaussians
-  width: number; // texels
+  width: number; // texels per row
   rows: number;
   clusters: number;
-  ranks: [number, number, number]; // of positions, rotations, scales
+  ranks: [number, number, number]; // numbers of basis vectors of positions, rotations, scales
 }
 
-/** A window as its textures hold it. */
+/** A window in the layout of a slot's textures. */
 export interface PackedWindow {
   window: BakedWindow['info'];
   curve: Curve;
-  rest: Float32Array; // 2 layers of texels: centre and cluster, scales
-  colours: Uint8Array; // texels
-  basis: Int16Array; // 1 + P + R + L layers of texels: quaternion, positions, rotations, scales
+  rest: Float32Array; // 2 layers of texels: centre with cluster, and scales
+  colours: Uint8Array; // 1 layer of texels: red, green, blue, opacity
+  basis: Int16Array; // 1 + P + R + L layers of texels: quaternion, basis of positions, of rotations, of scales
 }
 
-/** What the largest window needs. */
+/** The capacity that suffices for all windows of a body. */
 export function capacityOf({ windows }: BodyInfo): Capacity {
   const most = (value: (window: BodyInfo['windows'][number]) => number) => Math.max(...windows.map(value));
   const count = most((window) => window.num_gaussians);
@@ -30,7 +30,7 @@ export function capacityOf({ windows }: BodyInfo): Capacity {
   return { count, width: WIDTH, rows: Math.ceil(count / WIDTH), clusters, ranks: ranks as Capacity['ranks'] };
 }
 
-/** Lays a window out for textures; what a smaller one leaves free is 0. */
+/** Lays a window out for the textures of a capacity; what it does not fill is 0. */
 export function pack(window: BakedWindow, capacity: Capacity): PackedWindow {
   const { width, rows, ranks } = capacity;
   const layer = 4 * width * rows;
@@ -68,12 +68,12 @@ function spread<T extends Float32Array | Int16Array>(values: T, size: number, te
   }
 }
 
-/** Texels that a cluster's coefficients take, four in each. */
+/** Number of texels that the coefficients of a cluster take, four in each. */
 export function coefficientTexels(ranks: Capacity['ranks']): number {
   return Math.ceil((ranks[0] + ranks[1] + ranks[2]) / 4);
 }
 
-/** Where each of a window's (C, P + R + L) coefficients goes among those of the capacity. */
+/** For each of a window's (C, P + R + L) coefficients, its index in the texture of a capacity's coefficients. */
 export function coefficientPlaces(window: BakedWindow['info'], { ranks }: Capacity): number[] {
   const begins = [0, ranks[0], ranks[0] + ranks[1]];
   const row = window.ranks.flatMap((rank, part) => Array.from({ length: rank }, (_, k) => begins[part]! + k));

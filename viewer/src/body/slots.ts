@@ -1,21 +1,21 @@
 import type { Timeline } from './timeline.ts';
 
-const AHEAD = 2; // windows on the way that are fetched before they are needed
-const MOST_AT_ONCE = 3; // fetches, however fast somebody scrubs
-const RETRY = 2; // s after a window could not be fetched
+const AHEAD = 2; // number of next windows that are fetched before they are needed
+const MOST_AT_ONCE = 3; // most fetches at the same time, however fast a visitor scrubs
+const RETRY = 2; // s after a failed fetch before the window is fetched again
 
 /** One of the two places on the GPU that hold a window. */
 export type Slot = 0 | 1;
 
 /** What is drawn of the body. */
 export interface Shown {
-  time: number; // s: of what is seen
-  window: number;
-  slot: Slot;
-  waiting: boolean; // for the window of the time that was asked for
+  time: number; // time of the body that is seen, s
+  window: number; // index of the window that is seen
+  slot: Slot; // slot that holds this window
+  waiting: boolean; // whether the window of the wanted time is not there yet
 }
 
-/** What the slots need of the world. */
+/** Functions that the slots call. */
 export interface SlotPorts<T> {
   /** Fetches and unpacks a window. */
   load(window: number): Promise<T>;
@@ -23,20 +23,20 @@ export interface SlotPorts<T> {
   put(slot: Slot, content: T): void;
   /** Whether everything that was put into a slot has been sorted, so that it may be seen. */
   settled(slot: Slot): boolean;
-  /** A window could not be fetched; it will be tried again. */
+  /** Called when a window could not be fetched; it will be tried again. */
   failed(error: unknown): void;
 }
 
 /**
- * Which window is where: one slot is seen while the other one gets the window that is played next.
+ * Decides which window is in which of two slots: one is seen while the other gets the next window.
  *
- * A slot is seen only once its window is there and sorted. Until then the other one stays, at the
- * moment of its window that is nearest to the time asked for.
+ * A slot is seen only when its window is loaded and sorted. Until then the seen slot stays, at the time
+ * of its window that is nearest to the wanted time.
  */
 export class Slots<T> {
   private readonly timeline: Timeline;
   private readonly ports: SlotPorts<T>;
-  private readonly held: [number | null, number | null] = [null, null]; // window in each slot
+  private readonly held: [number | null, number | null] = [null, null]; // index of the window in each slot
   private readonly ready = new Map<number, T>();
   private readonly pending = new Set<number>();
   private readonly retryAt = new Map<number, number>();
@@ -48,19 +48,19 @@ export class Slots<T> {
   }
 
   /**
-   * Decides what is seen of the body at a time, and gets what comes next.
+   * Decides what is seen of the body at a time, and fetches the windows that come next.
    *
-   * @param time s, of the body
-   * @param stops s: the times at which the body will turn around or stand (`Motion.stops`)
-   * @param now s, of a clock that only runs forward
-   * @returns null until the first window is there
+   * @param time wanted time of the body, s
+   * @param stops times at which the body will turn around or stand (`Motion.stops`), s
+   * @param now time of a clock that only runs forward, s
+   * @returns null until the first window is loaded and sorted
    */
   update(time: number, stops: readonly number[], now: number): Shown | null {
     const before = this.seen;
     const shown = this.show(time);
     const wanted = shown && !shown.waiting ? shown.window : this.timeline.windowAt(time);
     const order = this.order(wanted, stops);
-    // What was seen until now goes one picture later, so that no picture has both to pay for.
+    // After a change of slots the freed one is filled with the next picture: one picture never pays for both.
     if (this.seen === before) this.fill(shown && !shown.waiting ? order[1] : wanted);
     this.fetch(order, now);
     this.forget(order);
@@ -72,7 +72,7 @@ export class Slots<T> {
     return this.held[slot];
   }
 
-  /** Windows in the order in which to fetch them: the wanted one, those on the body's way, those beside the wanted one. */
+  /** Windows in the order of fetching: the wanted one, the next ones on the body's way, neighbours of the wanted one. */
   private order(wanted: number, stops: readonly number[]): number[] {
     const { timeline } = this;
     return [...new Set([wanted, ...timeline.route(wanted, stops, AHEAD), ...timeline.beside(wanted)])];
@@ -109,7 +109,7 @@ export class Slots<T> {
   }
 
   private fetch(order: number[], now: number): void {
-    const urgent = this.ready.has(order[0]!) ? order : order.slice(0, 1); // all of the line for it
+    const urgent = this.ready.has(order[0]!) ? order : order.slice(0, 1); // the wanted window gets all bandwidth
     for (const window of urgent) {
       const known = this.ready.has(window) || this.pending.has(window);
       if (known || this.pending.size >= MOST_AT_ONCE || now < (this.retryAt.get(window) ?? -Infinity)) continue;

@@ -1,17 +1,17 @@
-/** What a watch asks Spark: whether a sort runs now, and when the last one began (ms, performance clock). */
+/** What a watch reads of Spark. */
 export interface Sorter {
-  readonly sorting: boolean;
-  readonly lastSortTime: number;
+  readonly sorting: boolean; // whether a sort runs now
+  readonly lastSortTime: number; // when the last sort began, ms of the performance clock
 }
 
-const FORGETS = 0.8; // of how long a sort took, with every later one
+const FORGETS = 0.8; // factor by which a long time of sorting is forgotten with each later sort
 
 /**
- * Tells when what was changed has been sorted: a sort must begin with or after the first picture
- * that is drawn since, and end.
+ * Tells when Spark has sorted a change: a sort that began with or after the first picture drawn since
+ * the change must have ended.
  */
 export class SortWatch {
-  /** How long it took lately from the first picture after a change until the sort of it had ended, ms. */
+  /** Recent time from the first picture after a change to the end of its sort, ms. */
   took = Infinity;
   private readonly sorter: Sorter;
   private readonly now: () => number;
@@ -24,16 +24,16 @@ export class SortWatch {
     this.now = now;
   }
 
-  /** Something was changed. */
+  /** Must be called when Gaussians have changed. */
   changed(): void {
     this.drawnAt = this.sortedFrom = null;
     this.done = false;
   }
 
-  /** A picture is about to be drawn; `now` in ms, performance clock. */
+  /** Must be called before each picture is drawn; `now` in ms of the performance clock. */
   drawing(now: number): void {
     this.drawnAt ??= now;
-    this.settled(); // looks at each sort, or one that has ended would be taken for the next one
+    this.settled(); // called for each picture, so that no sort is missed and taken for a later one
   }
 
   /** Whether the last change has been sorted. */

@@ -1,9 +1,9 @@
 import type { BodyInfo } from '../bundle/manifest.ts';
 
-/** The body's windows in seconds; neighbours share the moment at which one follows the other. */
+/** The body's windows in seconds; a window begins at the time at which the one before ends. */
 export class Timeline {
   readonly duration: number; // s
-  private readonly borders: number[]; // s: window i lies from border i to border i + 1
+  private readonly borders: number[]; // s; window i is from border i to border i + 1
 
   constructor({ fps, windows }: Pick<BodyInfo, 'fps' | 'windows'>) {
     this.borders = [0, ...windows.map(({ last }) => last / fps)];
@@ -14,7 +14,7 @@ export class Timeline {
     return this.borders.length - 1;
   }
 
-  /** The window of a time; where two meet, the earlier one. */
+  /** Index of the window that shows a time; at a border that of the earlier window. */
   windowAt(seconds: number): number {
     const index = this.borders.findIndex((border, i) => i > 0 && seconds <= border) - 1;
     return index < 0 ? this.count - 1 : index;
@@ -24,21 +24,21 @@ export class Timeline {
     return seconds >= this.borders[window]! && seconds <= this.borders[window + 1]!;
   }
 
-  /** The nearest time of a window. */
+  /** The time of a window that is nearest to a time. */
   clamp(window: number, seconds: number): number {
     return Math.min(Math.max(seconds, this.borders[window]!), this.borders[window + 1]!);
   }
 
-  /** 0 at the window's begin, 1 at its end. */
+  /** Time τ within a window: 0 at its beginning, 1 at its end. */
   tau(window: number, seconds: number): number {
     const begin = this.borders[window]!;
     return (seconds - begin) / (this.borders[window + 1]! - begin);
   }
 
   /**
-   * The windows that follow a window, at most `most`, on the way from stop to stop.
+   * The next windows, at most `most`, that the body passes after a window.
    *
-   * @param stops s: times at which the body turns around or stands; from one to the next it goes straight
+   * @param stops times at which the body turns around or stands, s; between two stops time runs in one direction
    */
   route(window: number, stops: readonly number[], most: number): number[] {
     const route: number[] = [];

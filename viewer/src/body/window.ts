@@ -2,14 +2,14 @@ import type { BodyInfo, WindowInfo } from '../bundle/manifest.ts';
 import { takeTensor, type Tensor } from '../bundle/safetensors.ts';
 import { PageError } from '../errors.ts';
 
-/** A baked window of the body (`docs/bundle.md`): N Gaussians; each cluster moves in P + R + L ways. */
+/** A baked window of the body (`docs/bundle.md`): N Gaussians in C clusters, with P + R + L basis vectors each. */
 export interface BakedWindow {
   info: WindowInfo;
   means: Float32Array; // (N,3) metres
   quats: Int16Array; // (N,4) wxyz · 32767
   scales: Float32Array; // (N,3) metres
   rgba: Uint8Array; // (N,4)
-  clusters: Uint8Array; // (N,)
+  clusters: Uint8Array; // (N,) index of each Gaussian's cluster
   positionBasis: Int16Array; // (P,N,3)
   rotationBasis: Int16Array; // (R,N,4)
   scaleBasis: Int16Array; // (L,N,3)
@@ -18,12 +18,16 @@ export interface BakedWindow {
 
 /** Coefficients over the window's time. */
 export interface Curve {
-  samples: number; // S
-  size: number; // C·(P + R + L)
-  rows: Float32Array; // (S + 2, C, P + R + L): one more row before the first and after the last
+  samples: number; // number S of sampled times
+  size: number; // number C·(P + R + L) of coefficients at a time
+  rows: Float32Array; // (S + 2, C, P + R + L): with an extrapolated row before the first and after the last
 }
 
-/** Takes a window's tensors out of its file, checked against the manifest's counts. */
+/**
+ * Takes a window's tensors out of its file.
+ *
+ * @throws PageError if they do not agree with the manifest's counts
+ */
 export function readBakedWindow(tensors: Map<string, Tensor>, body: BodyInfo, info: WindowInfo): BakedWindow {
   const { num_gaussians: n, num_clusters: c, ranks: [p, r, l], first, last, file } = info;
   const samples = body.samples_per_frame * (last - first) + 1;
@@ -45,7 +49,7 @@ export function readBakedWindow(tensors: Map<string, Tensor>, body: BodyInfo, in
   };
 }
 
-/** Goes on with the parabola through the last three rows at either end. */
+/** Adds a row at either end, on the parabola through the three rows there. */
 function continued(given: Float32Array, samples: number, size: number): Curve {
   const rows = new Float32Array((samples + 2) * size);
   rows.set(given, size);
@@ -59,10 +63,10 @@ function continued(given: Float32Array, samples: number, size: number): Curve {
 }
 
 /**
- * The coefficients at a time of the window: Catmull–Rom between the sampled times.
+ * Writes the coefficients at a time of the window, by Catmull–Rom interpolation between sampled times.
  *
- * @param tau 0 at the window's first frame, 1 at its last
- * @param out (C, P + R + L) receives them
+ * @param tau time, 0 at the window's first frame and 1 at its last
+ * @param out (C, P + R + L) coefficients, written
  */
 export function coefficientsAt({ samples, size, rows }: Curve, tau: number, out: Float32Array): void {
   const place = Math.min(Math.max(tau, 0), 1) * (samples - 1);

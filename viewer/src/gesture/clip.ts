@@ -3,23 +3,23 @@ import { Curve } from './curves.ts';
 import { mirroredRole } from './roles.ts';
 import { mirrored } from './turning.ts';
 
-/** The phases of a gesture, s. */
+/** Times of the phases of a gesture, s from its beginning. */
 export interface Marks {
-  ready: number; // the stroke begins
-  stroke: number; // it arrives: this falls on an accent
-  hold: number;
-  release: number; // the hold is over; from `hold` to here may be gone round again
-  end: number;
+  ready: number; // the preparation ends and the stroke begins
+  stroke: number; // the stroke arrives, which is to fall on an accent of speech
+  hold: number; // the hold begins
+  release: number; // the hold ends; motion between `hold` and `release` may be repeated
+  end: number; // the gesture is over
 }
 
-const MOVES = 1e-2; // of a quaternion's coordinate: a hold in which nothing changes as much stays
+const MOVES = 1e-2; // a hold in which no coordinate of a quaternion changes by more is still
 
 /** A gesture as rotation curves by role. */
 export class Clip {
   readonly name: string;
   readonly marks: Marks;
-  readonly curves: ReadonlyMap<number, Curve>; // by the role's number, ascending
-  /** Seconds of what is gone round again while it is held; 0 where nothing is. */
+  readonly curves: ReadonlyMap<number, Curve>; // by index of the role, ascending
+  /** Duration of the motion that is repeated in the hold, s; 0 if the hold is still. */
   readonly cycle: number;
 
   constructor(name: string, marks: Marks, curves: ReadonlyMap<number, Curve>) {
@@ -31,12 +31,12 @@ export class Clip {
     this.cycle = [...curves.values()].some((curve) => curve.range(moments) > MOVES) ? length : 0;
   }
 
-  /** Its roles at a time, by number. */
+  /** Indices of the moved roles with their rotations at a time, s. */
   at(time: number): [number, Quat][] {
     return [...this.curves].map(([role, curve]) => [role, curve.at(time)]);
   }
 
-  /** The same with the other hand. */
+  /** The mirror image of the gesture: left and right are exchanged. */
   mirrored(): Clip {
     const swapped = [...this.curves].map(([role, { times, rotations }]): [number, Curve] => {
       return [mirroredRole(role), new Curve(times, rotations.map(mirrored))];

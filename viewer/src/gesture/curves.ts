@@ -1,11 +1,11 @@
 import { add, conjugate, fromRotvec, multiply, scaled, subtract, toRotvec, type Quat, type Vector } from '../rig/quaternions.ts';
 
-/** A rotation over time, cubic between keys; `docs/motion.md` defines it. */
+/** A rotation over time, interpolated cubically between keys; `docs/motion.md` defines it. */
 export class Curve {
   readonly times: readonly number[]; // s, ascending from 0
   readonly rotations: readonly Quat[];
   private readonly steps: Vector[]; // rotation vectors from key to key
-  private readonly slopes: Vector[]; // angular velocities at the keys
+  private readonly slopes: Vector[]; // angular velocities at the keys, radians per second
 
   constructor(times: readonly number[], rotations: readonly Quat[]) {
     this.times = times;
@@ -20,7 +20,7 @@ export class Curve {
     });
   }
 
-  /** At a time; it stays before the first key and after the last one. */
+  /** The rotation at a time, s; constant before the first key and after the last one. */
   at(time: number): Quat {
     const index = this.keyBefore(time);
     const first = this.rotations[index]!;
@@ -31,13 +31,13 @@ export class Curve {
     return multiply(first, fromRotvec(add(scaled(this.steps[index]!, s * s * (3 - 2 * s)), scaled(bend, span * s * (1 - s)))));
   }
 
-  /** Its largest change of any coordinate at some times. */
+  /** Largest range of a coordinate of the quaternion over some times, s. */
   range(times: readonly number[]): number {
     const values = times.map((time) => this.at(time));
     return Math.max(...[0, 1, 2, 3].map((i) => Math.max(...values.map((q) => q[i]!)) - Math.min(...values.map((q) => q[i]!))));
   }
 
-  /** Number of the last key that is not after a time, but not the last of all where there are two. */
+  /** Index of the last key that is not after a time, limited to the last key but one if there are several. */
   private keyBefore(time: number): number {
     let [low, high] = [0, Math.max(this.times.length - 2, 0)];
     while (low < high) {

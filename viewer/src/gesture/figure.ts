@@ -6,39 +6,39 @@ import { findRole, SIDES, type Side } from './roles.ts';
 /** The joints of a rig that play a role together. */
 export interface Part {
   role: string;
-  joints: number[]; // from the root outwards
-  standard: Quat; // takes what hangs on the joint from the rig's rest to the standard pose
-  turn: number; // radians that the twist has at rest
-  shares: number[] | null; // of the twist; null where joints share the whole rotation evenly
-  axes: Vector[]; // about which all joints but the first one twist
+  joints: number[]; // indices, from the root outwards
+  standard: Quat; // rotation of the role's joint from the rig's rest to the standard pose
+  turn: number; // twist that is added to that of the pose, radians
+  shares: number[] | null; // share of the twist of each joint; null where joints share the whole rotation evenly
+  axes: Vector[]; // unit axes about which the joints after the first one twist
 }
 
-/** A leg, m. */
+/** Measures of a leg; positions and lengths in m. */
 export interface Leg {
-  hip: Vector; // at rest
-  ankle: Vector; // where it stands
-  lengths: [number, number];
-  upper: Vector; // unit directions of its bones at rest
-  lower: Vector;
-  hinge: Vector;
+  hip: Vector; // position at rest
+  ankle: Vector; // position where the person stands
+  lengths: [number, number]; // of upper and lower bone
+  upper: Vector; // unit direction of the upper bone at rest
+  lower: Vector; // unit direction of the lower bone at rest
+  hinge: Vector; // unit axis of the knee at rest
 }
 
-/** What was measured on a person when the avatar was made (`ico3d/motion/figure.py`). */
+/** Measures of a person, made when the avatar was baked (`ico3d/motion/figure.py`). */
 export interface Figure {
-  height: number; // m
-  eyes: Vector; // m, at rest
-  hung: Quat[]; // (R,4) by role, with hanging arms
-  sink: number; // m that the hips are lower than at rest
-  parts: Part[]; // of the roles that the rig has
-  hips: Vector; // m, at rest
+  height: number; // height of the head's joint above the ankles, m
+  eyes: Vector; // point between the eyes at rest, m
+  hung: Quat[]; // (R,4) pose by role with hanging arms
+  sink: number; // how far the hips are lowered from rest, m
+  parts: Part[]; // one for each role that the rig has
+  hips: Vector; // joint of the hips at rest, m
   legs: Record<Side, Leg>;
 }
 
 /**
  * Checks a figure that was read from JSON.
  *
- * @param joints of the rig
- * @throws PageError naming the field that is wrong
+ * @param joints number of the rig's joints
+ * @throws PageError which names the field that is wrong
  */
 export function checkFigure(value: unknown, joints: number): Figure {
   const figure = value as Figure;

@@ -6,38 +6,39 @@ import { stand } from './standing.ts';
 import { about } from './turning.ts';
 
 const RADIANS = Math.PI / 180;
-const BREATH = 4.1; // s
-const WEIGHT = 9.7; // s, of the quickest of the sines that shift the weight
-const SHIFT = 0.011; // heights that the hips go to each side
-const DROP = 0.0035; // heights that they sink with the weight on one leg
-const SWAY = 0.003; // heights that they go forwards and back
+const BREATH = 4.1; // duration of a breath, s
+const WEIGHT = 9.7; // period of the quickest of the sines that shift the weight, s
+const SHIFT = 0.011; // displacement of the hips to each side, relative to the person's height
+const DROP = 0.0035; // how far the hips sink with the weight on one leg, relative to height
+const SWAY = 0.003; // displacement of the hips forwards and back, relative to height
+/** Angles by which a breath turns chest, head and collarbones. */
 const BREATHING = { chest: -1.1 * RADIANS, head: 0.9 * RADIANS, clavicles: 1.0 * RADIANS };
 const [LEFTWARDS, DOWN, FORWARD, HINGE]: Vector[] = [[1, 0, 0], [0, -1, 0], [0, 0, 1], [-1, 0, 0]];
 
-/** A whole body at a moment. */
+/** The pose of a whole body at a moment. */
 export interface Moment {
-  pose: Quat[]; // by role, from the standard pose
-  root: Vector; // m that the root moves from rest
+  pose: Quat[]; // local rotations by role, from the standard pose
+  root: Vector; // translation of the root from rest, m
 }
 
-/** The living rest: breath and weight over feet that stay; `docs/motion.md` defines it. */
+/** The living rest: a person breathes and shifts the weight while the feet stay; `docs/motion.md` defines it. */
 export class Living {
   readonly figure: Figure;
   private readonly seed: number;
 
-  /** @param seed a whole number that decides all that is by chance */
+  /** @param seed whole number, seed of all random movements */
   constructor(figure: Figure, seed: number) {
     this.figure = figure;
     this.seed = seed;
   }
 
-  /** How the person stands at any time, s. */
+  /** Pose of the person at rest at a time, s. */
   at(time: number): Moment {
     const { height, sink } = this.figure;
     const pose = [...this.figure.hung];
     const breath = this.breath(time);
     const shifted = this.wander(time, WEIGHT, 1);
-    const weight = (1.6 * shifted) / Math.sqrt(1 + 1.6 * shifted * shifted); // lingers on one leg
+    const weight = (1.6 * shifted) / Math.sqrt(1 + 1.6 * shifted * shifted); // stays longer on one leg
     this.turnTorso(time, breath, weight, pose);
     this.swingArms(time, breath, pose);
     const root: Vector = [
@@ -49,7 +50,7 @@ export class Living {
     return { pose, root };
   }
 
-  /** -1 (out) to 1 (in). */
+  /** State of the breath at a time, from -1 (out) to 1 (in). */
   private breath(time: number): number {
     const phase = (2 * Math.PI * time) / BREATH + 0.9 * this.wander(time, 13.1, 0);
     return Math.sin(phase + 0.35 * Math.sin(phase));
@@ -59,7 +60,7 @@ export class Living {
     return wander(time, period, this.seed, channel);
   }
 
-  /** A rotation vector; each coordinate wanders by so many degrees about where it is. */
+  /** The rotation vector `from`, in radians, plus random coordinates of up to `degrees`. */
   private about(from: Vector, time: number, period: number, channel: number, degrees: Vector): Vector {
     const along = (i: number) => from[i]! + this.wander(time, period, channel + i) * degrees[i]! * RADIANS;
     return [along(0), along(1), along(2)];

@@ -1,7 +1,7 @@
-const RATIOS = [1, 0.618034, 0.414214]; // frequencies of the sines, next to the first
-const WEIGHTS = [0.5, 0.3, 0.2];
+const RATIOS = [1, 0.618034, 0.414214]; // frequencies of the sines, relative to the first
+const WEIGHTS = [0.5, 0.3, 0.2]; // amplitudes of the sines
 
-/** A hash, 0 to 2³² - 1, of whole numbers below 2³², in their order; as in `ico3d/motion/noise.py`. */
+/** A hash from 0 to 2³² - 1 of whole numbers below 2³², whose order matters; as in `ico3d/motion/noise.py`. */
 export function scrambled(...numbers: number[]): number {
   let state = 0x9e3779b9;
   for (const number of numbers) {
@@ -13,18 +13,18 @@ export function scrambled(...numbers: number[]): number {
   return state >>> 0;
 }
 
-/** 0 ≤ x < 1 by the hash of whole numbers. */
+/** A random number 0 ≤ x < 1 from the hash of whole numbers. */
 export function chance(...numbers: number[]): number {
   return scrambled(...numbers) / 2 ** 32;
 }
 
 /**
- * In -1 … 1: slow, smooth, never the same twice.
+ * A slow, smooth value between -1 and 1 that does not repeat over time.
  *
  * @param time s
- * @param period of the quickest of its sines, s
- * @param seed whose
- * @param channel tells apart what one person does
+ * @param period period of the quickest sine, s; it varies by a tenth with seed and channel
+ * @param seed seed of the person
+ * @param channel number of the movement; different movements of a person are independent
  */
 export function wander(time: number, period: number, seed: number, channel: number): number {
   return RATIOS.reduce((sum, ratio, number) => {

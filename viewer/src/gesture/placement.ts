@@ -6,22 +6,22 @@ import { about, twistAngle } from './turning.ts';
 
 const UP: Vector = [0, 1, 0];
 
-/** How a rig is posed: rotations of its joints about themselves, and metres that its root moves. */
+/** A pose of a rig. */
 export interface RigPose {
-  rotations: readonly Quat[]; // (J,4)
-  root: Vector;
+  rotations: readonly Quat[]; // (J,4) local rotation of each joint
+  root: Vector; // translation of the root from rest, m
 }
 
-/** Where somebody stands in the world, who in rest space stands at its origin and faces +z. */
+/** The rigid motion from rest space, where a person faces +z, to where the person was recorded. */
 export class Placement {
-  private readonly origin: Vector; // of rest space, m in the world
-  private readonly turn: Quat;
-  private readonly pivot: Vector; // joint 0 at rest
+  private readonly origin: Vector; // position of rest space's origin in the world, m
+  private readonly turn: Quat; // about the vertical
+  private readonly pivot: Vector; // joint 0 at rest, m
 
   /**
-   * Puts the feet where they were in a recorded pose, and turns the person as the hips were about the vertical.
+   * Keeps the position of the feet, and the direction of the hips, of a recorded pose.
    *
-   * @param figure of the rig
+   * @param figure figure of the person with this rig
    */
   constructor(rig: Rig, figure: Figure, recorded: RigPose) {
     const { turned, places } = rig.posed(recorded.rotations, recorded.root);
@@ -34,19 +34,19 @@ export class Placement {
     this.pivot = rig.joints[0]!;
   }
 
-  /** A pose of rest space, in the world. */
+  /** Moves a pose from rest space to the world. */
   place({ rotations, root }: RigPose): RigPose {
     const pivot = add(rotate(this.turn, add(this.pivot, root)), this.origin);
     return { rotations: [multiply(this.turn, rotations[0]!), ...rotations.slice(1)], root: subtract(pivot, this.pivot) };
   }
 
-  /** A point of the world, as rest space has it. */
+  /** Moves a point from the world to rest space, m. */
   toRest(point: Vector): Vector {
     return rotate(conjugate(this.turn), subtract(point, this.origin));
   }
 }
 
-/** How far a joint has moved rigidly from one pose to another: x goes to q·x + shift. */
+/** Rigid motion of a joint from one pose to another: a point x that it carries moves to q·x + shift, m. */
 export function jointMotion(rig: Rig, joint: number, from: RigPose, to: RigPose): [Quat, Vector] {
   const [before, after] = [from, to].map(({ rotations, root }) => rig.posed(rotations, root));
   const turn = multiply(after!.turned[joint]!, conjugate(before!.turned[joint]!));

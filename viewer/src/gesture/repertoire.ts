@@ -7,23 +7,23 @@ import { checkFigure, type Figure } from './figure.ts';
 import { findRole } from './roles.ts';
 
 const VERSION = 1;
-const SCALE = 32767; // int16 of 1
+const SCALE = 32767; // the int16 that stands for 1
 const TICKS = 1000; // key times are whole milliseconds
-const LONGEST = 60; // s
+const LONGEST = 60; // longest duration of a curve, s
 const PHASES = ['ready', 'stroke', 'hold', 'release', 'end'] as const;
 
-/** Somebody's figure and gestures, by name. */
+/** A person's figure and gestures. */
 export interface Repertoire {
   figure: Figure;
-  clips: Map<string, Clip>;
+  clips: Map<string, Clip>; // by name
 }
 
 /**
- * Reads what `ico3d/motion/repertoire.py` writes.
+ * Reads a file of gestures, as `ico3d/motion/repertoire.py` writes it.
  *
- * @param file name for error sentences
- * @param joints of the rig that it is for
- * @throws PageError if it is damaged or holds what is no gesture
+ * @param file its name, for error messages
+ * @param joints number of the joints of the rig that it is for
+ * @throws PageError if the file is damaged or does not hold gestures
  */
 export function readRepertoire(buffer: ArrayBuffer, file: string, joints: number): Repertoire {
   const tensors = parseSafetensors(buffer, file);
@@ -46,7 +46,7 @@ function parsed(text: string | undefined, file: string): unknown {
   }
 }
 
-/** Curves by clip and by number of the role. */
+/** Curves of each clip, by index of the role. */
 function readCurves(tensors: Map<string, Tensor>, file: string): Map<string, Map<number, Curve>> {
   const found = new Map<string, Map<number, Curve>>();
   for (const [key, rotations] of tensors) {
@@ -76,7 +76,7 @@ function readCurve(ticks: Tensor, rotations: Tensor, where: string): Curve {
   return new Curve(times, found);
 }
 
-/** The same rotation with the sign that is nearer to the one before. */
+/** The same rotation with the sign that is nearer to the quaternion before it. */
 function near(quat: Quat, before: Quat | undefined): Quat {
   if (!before || dotQuat(quat, before) >= 0) return quat;
   return [-quat[0], -quat[1], -quat[2], -quat[3]];

@@ -7,10 +7,10 @@ import { about, power, twistAngle } from './turning.ts';
 
 const DOWN = [0, -1, 0] as const;
 
-/** Takes poses by role to a rig; `docs/motion.md` defines it. */
+/** Converts poses by role to rotations of a rig's joints; `docs/motion.md` defines it. */
 export class Retarget {
   private readonly rig: Rig;
-  private readonly plan: Map<number, Part>; // by the role's first joint
+  private readonly plan: Map<number, Part>; // each role's part, by the index of its first joint
 
   constructor(rig: Rig, figure: Figure) {
     this.rig = rig;
@@ -18,9 +18,10 @@ export class Retarget {
   }
 
   /**
-   * Rotations of all joints about themselves.
+   * Local rotations of all joints for a pose by role.
    *
-   * @param byRole from the standard pose; a role that the rig lacks moves what its child plays
+   * @param byRole local rotations from the standard pose; that of a role that the rig lacks is added to the roles
+   *   below it
    */
   pose(byRole: readonly Quat[]): Quat[] {
     const wanted = inWorld(byRole);
@@ -36,7 +37,7 @@ export class Retarget {
   }
 }
 
-/** How each role is turned in the world from the standard pose. */
+/** Rotation of each role in the world, from the standard pose. */
 function inWorld(byRole: readonly Quat[]): Quat[] {
   const found: Quat[] = [];
   for (const [number, parent] of ROLE_PARENTS.entries()) {
@@ -45,7 +46,13 @@ function inWorld(byRole: readonly Quat[]): Quat[] {
   return found;
 }
 
-/** Sets the rotations of a role's joints; the first one's parent is turned by `before`. */
+/**
+ * Sets the local rotations of a role's joints.
+ *
+ * @param wanted rotation of each role in the world
+ * @param before rotation in the world of the parent of the role's first joint
+ * @param local is changed
+ */
 function turnPart(part: Part, byRole: readonly Quat[], wanted: Quat[], before: Quat, local: Quat[]): void {
   const { joints, shares, standard, axes } = part;
   const number = findRole(part.role)!;

@@ -1,6 +1,6 @@
 import { ROLES } from '../shared.ts';
 
-/** What a joint is to gestures: `hips`, `left_elbow` … */
+/** Name of a joint for gestures that is the same in all rigs, such as `hips` or `left_elbow`. */
 export type Role = (typeof ROLES)[number];
 export type Side = 'left' | 'right';
 
@@ -8,17 +8,17 @@ export const SIDES = ['left', 'right'] as const;
 
 const NUMBERS = new Map<string, number>(ROLES.map((role, number) => [role, number]));
 
-/** Number of a role in a pose; undefined if there is none of that name. */
+/** Index of a role in a pose; undefined if there is no role of this name. */
 export function findRole(name: string): number | undefined {
   return NUMBERS.get(name);
 }
 
-/** Number of a role in a pose. */
+/** Index of a role in a pose. */
 export function indexOf(role: Role): number {
   return NUMBERS.get(role)!;
 }
 
-/** Number of the same role on the other side. */
+/** Index of the same role on the other side; roles in the middle are their own mirror images. */
 export function mirroredRole(number: number): number {
   const swapped = ROLES[number]!.replace(/^(left|right)_/, (_, side) => (side === 'left' ? 'right_' : 'left_'));
   return NUMBERS.get(swapped)!;

@@ -3,11 +3,11 @@ import type { Figure, Leg } from './figure.ts';
 import { indexOf, SIDES } from './roles.ts';
 import { across, aligned, unit } from './turning.ts';
 
-const REACH = 0.998; // longest part of its length that a limb stretches to
-const LEAST = 0.2; // shortest part of it
+const REACH = 0.998; // largest distance of a limb's ends, relative to its length
+const LEAST = 0.2; // least distance of a limb's ends, relative to its length
 const DOWNWARDS: Vector = [0, -1, 0];
 
-/** How the two bones of a limb lie: unit directions, and the axis about which upper turns to lower. */
+/** Unit directions of the two bones of a limb, and the axis of its hinge, about which `upper` turns to `lower`. */
 export interface Bend {
   upper: Vector;
   lower: Vector;
@@ -15,9 +15,9 @@ export interface Bend {
 }
 
 /**
- * Two bones from `start` towards `end` (law of cosines).
+ * Directions of two bones that reach from `start` to `end`, or point there if it is out of reach (law of cosines).
  *
- * @param lengths of upper and lower bone, m
+ * @param lengths lengths of upper and lower bone, m
  * @param pole direction in which elbow or knee points
  */
 export function reach(start: Vector, end: Vector, lengths: readonly [number, number], pole: Vector): Bend {
@@ -34,10 +34,10 @@ export function reach(start: Vector, end: Vector, lengths: readonly [number, num
 }
 
 /**
- * Sets the legs so that the ankles are in their places and the feet flat.
+ * Poses the legs so that ankles are in their places and feet are flat on the ground.
  *
- * @param root m that the root moves from rest
- * @param pose by role, whose hips are set; its legs are changed
+ * @param root translation of the root from rest, m
+ * @param pose pose by role with the rotation of the hips; the roles of the legs are set
  */
 export function stand(figure: Figure, root: Vector, pose: Quat[]): void {
   const hips = pose[indexOf('hips')]!;
@@ -51,7 +51,7 @@ export function stand(figure: Figure, root: Vector, pose: Quat[]): void {
   }
 }
 
-/** How the two bones of a leg are turned in the world whose hip is at `start`. */
+/** Rotations in the world, from rest, of the two bones of a leg whose hip is at `start`. */
 function bones(leg: Leg, start: Vector): [Quat, Quat] {
   const pole = scaled(cross(leg.hinge, DOWNWARDS), -1);
   const bend = reach(start, leg.ankle, leg.lengths, pole);

@@ -1,4 +1,4 @@
-/** A rotation wxyz, of length 1 unless stated otherwise; functions as in `ico3d/rig/quaternions.py`. */
+/** A quaternion wxyz, of length 1 unless stated otherwise; functions are as in `ico3d/rig/quaternions.py`. */
 export type Quat = readonly [number, number, number, number];
 export type Vector = readonly [number, number, number];
 
@@ -28,13 +28,13 @@ export function dotQuat(a: Quat, b: Quat): number {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
 }
 
-/** Of length 1; zeros become the identity. */
+/** The quaternion scaled to length 1; zero becomes the identity. */
 export function normalized([w, x, y, z]: Quat): Quat {
   const length = Math.sqrt(w * w + x * x + y * y + z * z);
   return length > 1e-12 ? [w / length, x / length, y / length, z / length] : IDENTITY;
 }
 
-/** The index-th four of many numbers, made 1 long. */
+/** Quaternion number `index` of a flat array (…,4), scaled to length 1. */
 export function quatAt(values: ArrayLike<number>, index: number): Quat {
   const at = 4 * index;
   return normalized([values[at]!, values[at + 1]!, values[at + 2]!, values[at + 3]!]);
@@ -61,7 +61,7 @@ export function conjugate([w, x, y, z]: Quat): Quat {
   return [w, -x, -y, -z];
 }
 
-/** The vector turned by the quaternion. */
+/** The vector rotated by the quaternion. */
 export function rotate([w, x, y, z]: Quat, vector: Vector): Vector {
   const axis: Vector = [x, y, z];
   const twice = scaled(cross(axis, vector), 2);
@@ -77,14 +77,14 @@ export function toMatrix([w, x, y, z]: Quat): number[] {
   ];
 }
 
-/** Of a rotation vector: axis times radians. */
+/** The quaternion of a rotation vector: axis times angle in radians. */
 export function fromRotvec(vector: Vector): Quat {
   const angle = Math.sqrt(dot(vector, vector));
   const factor = angle > 0 ? Math.sin(angle / 2) / angle : 0.5;
   return [Math.cos(angle / 2), factor * vector[0], factor * vector[1], factor * vector[2]];
 }
 
-/** The rotation vector, at most π radians long. */
+/** The rotation vector of a quaternion: axis times angle, at most π radians. */
 export function toRotvec(quat: Quat): Vector {
   const sign = quat[0] < 0 ? -1 : 1;
   const axis: Vector = [sign * quat[1], sign * quat[2], sign * quat[3]];
@@ -93,7 +93,7 @@ export function toRotvec(quat: Quat): Vector {
   return scaled(axis, sine > 1e-9 ? angle / sine : 2);
 }
 
-/** On the shorter great arc from a (part 0) to b (part 1). */
+/** Interpolation on the shorter arc from a (part 0) to b (part 1). */
 export function slerp(a: Quat, b: Quat, part: number): Quat {
   return multiply(a, fromRotvec(scaled(toRotvec(multiply(conjugate(a), b)), part)));
 }

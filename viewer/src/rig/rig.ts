@@ -1,15 +1,19 @@
 import { add, multiply, rotate, subtract, toMatrix, type Quat, type Vector } from './quaternions.ts';
 
-/** Joints in the world. */
+/** The joints of a posed rig in the world. */
 export interface Posed {
-  turned: Quat[]; // (J,4) from rest space to the world
-  places: Vector[]; // (J,3) m
+  turned: Quat[]; // (J,4) rotations from rest space to the world
+  places: Vector[]; // (J,3) positions, m
 }
 
-/** Bones, as in `ico3d/rig/rig.py`: no joint is turned at rest, rotations are given in the axes of rest space. */
+/**
+ * A skeleton of J joints, as in `ico3d/rig/rig.py`.
+ *
+ * At rest all rotations are the identity; local rotations are given in the axes of rest space.
+ */
 export class Rig {
-  readonly parents: readonly number[]; // each before its children; -1 for joint 0, the only root
-  readonly joints: readonly Vector[]; // m, at rest
+  readonly parents: readonly number[]; // index of each joint's parent, which comes before it; -1 for joint 0, the root
+  readonly joints: readonly Vector[]; // positions at rest, m
 
   constructor(parents: readonly number[], joints: readonly Vector[]) {
     this.parents = parents;
@@ -17,10 +21,10 @@ export class Rig {
   }
 
   /**
-   * Where each joint is and how it is turned.
+   * Rotations and positions of the joints in a pose.
    *
-   * @param rotations of each joint about itself
-   * @param root m that the root moves
+   * @param rotations local rotation of each joint
+   * @param root translation of the root from rest, m
    */
   posed(rotations: readonly Quat[], root: Vector): Posed {
     const turned: Quat[] = [rotations[0]!];
@@ -35,9 +39,9 @@ export class Rig {
   }
 
   /**
-   * What takes points that are bound to each joint from rest to the world.
+   * Rigid transforms of points bound to each joint, from rest to the world.
    *
-   * @returns (J,3,4) rotation and, in the last column, shift
+   * @returns (J,3,4) rotation matrix and, in the last column, translation in m
    */
   matrices({ turned, places }: Posed): Float64Array {
     const found = new Float64Array(12 * turned.length);

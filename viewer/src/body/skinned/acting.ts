@@ -7,7 +7,7 @@ import type { Rig } from '../../rig/rig.ts';
 import type { SkinnedBody } from './body.ts';
 import type { Pose } from './skeleton.ts';
 
-/** Lets a body on a skeleton do what its body language says, where it stood when it was recorded. */
+/** Moves a body on a skeleton by its body language, at the place where the person was recorded. */
 export class ActingBody implements Actor {
   readonly objects = [];
   readonly language: BodyLanguage;
@@ -15,14 +15,14 @@ export class ActingBody implements Actor {
   private readonly rig: Rig;
   private readonly recorded: RigPose;
   private readonly placement: Placement;
-  private readonly head: number; // joint
+  private readonly head: number; // index of the head's joint
   private readonly visitor: () => Vector;
-  /** How it stands. */
+  /** The current pose in the world. */
   pose: RigPose;
 
   /**
-   * @param frame of the recording in which the person stands
-   * @param visitor where the visitor is, m in the world
+   * @param frame frame of the recording whose place and direction the person keeps
+   * @param visitor returns the position of the visitor, m in the world
    */
   constructor(body: SkinnedBody, language: BodyLanguage, rig: Rig, figure: Figure, frame: number, visitor: () => Vector) {
     this.body = body;
@@ -44,7 +44,7 @@ export class ActingBody implements Actor {
     return true;
   }
 
-  /** How far the head is from where it was recorded in the frame: x goes to q·x + shift. */
+  /** Rigid motion of the head from where it was in that frame: a point x of it moves to q·x + shift, m. */
   headMotion(): [Quat, Vector] {
     return jointMotion(this.rig, this.head, this.recorded, this.pose);
   }

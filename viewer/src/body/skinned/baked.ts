@@ -2,36 +2,40 @@ import type { SkinnedInfo } from '../../bundle/manifest.ts';
 import { takeTensor, type Tensor } from '../../bundle/safetensors.ts';
 import { PageError } from '../../errors.ts';
 
-/** A baked body on a skeleton (`docs/bundle.md`): N Gaussians, J joints, K residual shapes, F recorded poses. */
+/** A baked body on a skeleton (`docs/bundle.md`): N Gaussians, J joints, K residual shapes, F recorded frames. */
 export interface BakedSkinned {
   info: SkinnedInfo;
   means: Float32Array; // (N,3) metres at rest
   quats: Int16Array; // (N,4) wxyz · 32767
-  logScales: Float32Array; // (N,3)
-  colorLogits: Float32Array; // (N,3)
+  logScales: Float32Array; // (N,3) logarithms of metres
+  colorLogits: Float32Array; // (N,3) logits of r, g, b
   opacities: Uint8Array; // (N,) · 255
-  normals: Int8Array; // (N,3)
-  joints: Uint8Array; // (N,4)
-  weights: Uint8Array; // (N,4) · 255
-  shapes: Int8Array; // (N,K,6) position, logits
-  shapeScales: Float32Array; // (N,2) millimetres and logits per unit
-  light: Float32Array; // (8,3)
+  normals: Int8Array; // (N,3) directions in which the surface faces at rest, of any length
+  joints: Uint8Array; // (N,4) indices of the joints that carry each Gaussian
+  weights: Uint8Array; // (N,4) weights of these joints · 255
+  shapes: Int8Array; // (N,K,6) residual shapes: changes of position and of logits
+  shapeScales: Float32Array; // (N,2) millimetres and logits per unit of the shapes
+  light: Float32Array; // (8,3) coefficients of spherical harmonics of degrees 1 and 2
   poses: RecordedPoses;
 }
 
-/** How the body was recorded to stand, and its skeleton. */
+/** The skeleton and its recorded poses. */
 export interface RecordedPoses {
-  joints: Float32Array; // (J,3) metres at rest
-  held: Int16Array; // (J,4) wxyz · 32767 of joints that never turn
-  moving: Uint8Array; // (M,) joints that turn
-  rotations: Int16Array; // (F,M,4) theirs
-  roots: Float32Array; // (F,3) metres
-  coefficients: Float32Array; // (F,K)
-  known: Int16Array; // (P,) frames
-  kernelWidth: number;
+  joints: Float32Array; // (J,3) positions at rest, metres
+  held: Int16Array; // (J,4) local rotations wxyz · 32767 of the joints that do not turn in the recording
+  moving: Uint8Array; // (M,) indices of the joints that turn
+  rotations: Int16Array; // (F,M,4) local rotations wxyz · 32767 of the joints `moving` in each frame
+  roots: Float32Array; // (F,3) translation of the root from rest, metres
+  coefficients: Float32Array; // (F,K) coefficients of the residual shapes in each frame
+  known: Int16Array; // (P,) frames from which coefficients of other poses are interpolated
+  kernelWidth: number; // width of the kernel of that interpolation, in units of a pose's features
 }
 
-/** Takes a body's tensors out of its file, checked against the manifest's counts. */
+/**
+ * Takes a body's tensors out of its file.
+ *
+ * @throws PageError if they do not agree with the manifest's counts, or an index is out of range
+ */
 export function readBakedSkinned(tensors: Map<string, Tensor>, info: SkinnedInfo, file: string): BakedSkinned {
   const { num_gaussians: n, num_shapes: k, num_frames: f, num_moving: m, num_known: p } = info;
   const j = info.names.length;

@@ -4,16 +4,16 @@ import type { BakedSkinned } from './baked.ts';
 import { SkinnedGenerator } from './generator.ts';
 import type { Pose } from './skeleton.ts';
 
-/** A body on a skeleton on stage: it repeats what was recorded, or takes any pose. */
+/** A body on a skeleton on stage: it repeats the recorded motion, or takes any pose. */
 export class SkinnedBody implements Actor {
   readonly generator: SkinnedGenerator;
   readonly objects: SkinnedGenerator[];
   readonly motion: Motion;
-  /** What the next picture shows; all of the body is there from the start. */
+  /** What the next picture shows; nothing has to be loaded, so it never waits. */
   readonly shown: Seen = { time: 0, waiting: false };
   private readonly fps: number;
   private readonly pose: Pose;
-  private posing = false; // somebody else says how it stands
+  private posing = false; // whether a pose was given by `strike`
 
   constructor(baked: BakedSkinned, motion: Motion) {
     this.motion = motion;
@@ -24,7 +24,7 @@ export class SkinnedBody implements Actor {
     this.replay();
   }
 
-  /** The body time that is seen, s. */
+  /** Time of the recording that the picture shows, s. */
   get time(): number {
     return this.shown.time;
   }
@@ -37,10 +37,10 @@ export class SkinnedBody implements Actor {
   }
 
   /**
-   * Stands in a pose that need not have been recorded, until `show` or `release`.
+   * Takes any pose, and keeps it until `show` or `release`.
    *
-   * @param rotations (J,4) wxyz of each joint about itself
-   * @param root (3,) metres that the root moves from rest
+   * @param rotations (J,4) local rotation of each joint, wxyz
+   * @param root (3,) translation of the root from rest, metres
    */
   strike(rotations: ArrayLike<number>, root: ArrayLike<number>): void {
     this.posing = true;
@@ -50,13 +50,13 @@ export class SkinnedBody implements Actor {
     this.generator.pose(this.pose);
   }
 
-  /** Goes on with what was recorded. */
+  /** Continues with the recorded motion. */
   release(): void {
     this.posing = false;
     this.replay();
   }
 
-  /** Nothing has to be waited for. */
+  /** Resolves at once, as nothing has to be loaded. */
   async ready(): Promise<void> {}
 
   /** Goes to a time of the recording and stays there. */

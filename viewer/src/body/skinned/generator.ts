@@ -5,13 +5,13 @@ import type { BakedSkinned } from './baked.ts';
 import { packSkinned, type Texels } from './packed.ts';
 import { Skeleton, TABLE_ROW, type Pose } from './skeleton.ts';
 
-const SHAPE_WORDS = 1.5; // 32-bit words of a residual shape: position and logits, six bytes
+const SHAPE_WORDS = 1.5; // 32-bit words of a residual shape: six bytes, three of position and three of logits
 const MILLIMETRE = '1e-3';
 
 /** A body on a skeleton as a Spark generator: a shader that moves, turns and colours its Gaussians with their joints. */
 export class SkinnedGenerator extends SplatGenerator {
   readonly skeleton: Skeleton;
-  private readonly most: number; // Gaussians
+  private readonly most: number; // number of all Gaussians
   private readonly uniforms: Uniforms;
 
   constructor(baked: BakedSkinned) {
@@ -21,7 +21,7 @@ export class SkinnedGenerator extends SplatGenerator {
     super({
       numSplats: baked.info.num_gaussians,
       generator: makeGenerator(texels, baked.info.num_shapes, uniforms, transformer),
-      // Without this the program would place the body at infinity.
+      // Without this update, Spark's transformer would place the body at infinity.
       update: () => {
         if (transformer.update(this)) this.updateVersion();
       },
@@ -40,7 +40,7 @@ export class SkinnedGenerator extends SplatGenerator {
     this.updateVersion();
   }
 
-  /** Draws so many Gaussians at most: the most important ones. */
+  /** Limits the number of Gaussians that are drawn, to the most important ones. */
   limit(count: number): void {
     this.uniforms.skinnedCount.value = Math.min(count, this.most);
     this.updateVersion();
@@ -50,10 +50,10 @@ export class SkinnedGenerator extends SplatGenerator {
 interface Uniforms {
   [name: string]: { value: unknown };
   skinnedTexels: { value: THREE.DataArrayTexture };
-  skinnedJoints: { value: THREE.DataTexture }; // a row for each joint
-  skinnedResidual: { value: THREE.Vector4[] };
-  skinnedLight: { value: THREE.Vector3[] };
-  skinnedCount: { value: number };
+  skinnedJoints: { value: THREE.DataTexture }; // one row per joint, see TABLE_ROW
+  skinnedResidual: { value: THREE.Vector4[] }; // coefficients of the residual shapes
+  skinnedLight: { value: THREE.Vector3[] }; // (8,3) coefficients of spherical harmonics
+  skinnedCount: { value: number }; // Gaussians that are drawn
 }
 
 function makeUniforms({ info, light }: BakedSkinned, { width, rows, layers, words }: Texels): Uniforms {
@@ -108,7 +108,11 @@ const DECLARATIONS = dyno.unindent(`
   }
 `);
 
-/** Six signed bytes per shape, in words that lie in a row: Σ κ·position and Σ κ·logits. */
+/**
+ * Shader code that sums the residual shapes: `moved` = Σ κ·position and `tinted` = Σ κ·logits.
+ *
+ * A shape has six signed bytes; those of successive shapes follow each other without gaps.
+ */
 function residual(shapes: number): string {
   const words = Math.ceil(SHAPE_WORDS * shapes);
   const layers = Array.from({ length: Math.ceil(words / 4) }, (_, i) => `uvec4 l${i} = texelFetch(skinnedTexels, ivec3(texel, ${3 + i}), 0);`);

@@ -5,7 +5,7 @@ const WIDTH = 1024; // texels per row: one texel of each layer is one Gaussian
 const SHAPE = 6; // bytes of a residual shape
 const TEXEL = 16; // bytes
 
-/** Gaussians as texels of four 32-bit words in a few layers. */
+/** Gaussians as texels of four 32-bit words; a Gaussian has one texel in each layer. */
 export interface Texels {
   width: number;
   rows: number;
@@ -14,10 +14,11 @@ export interface Texels {
 }
 
 /**
- * Lays a body out for a texture, with what comes together in one word as the shader takes it apart.
+ * Lays a body out for a texture, in the words that the shader unpacks.
  *
- * Layer 0: centre (3 floats), joints. Layer 1: rotation (4 shorts, 2 words), weights, normal and
- * opacity. Layer 2: halves of log scales, colour, scales of the shapes. Further ones: the shapes.
+ * Layer 0: centre (3 floats), joints (4 bytes). Layer 1: rotation (4 shorts), weights (4 bytes), normal
+ * and opacity (4 bytes). Layer 2: log scales (3 half floats), colour logits (3) and scales of the shapes
+ * (2). Further layers: the residual shapes, 6 bytes each.
  */
 export function packSkinned(baked: BakedSkinned): Texels {
   const { num_gaussians: count, num_shapes: shapes } = baked.info;
@@ -25,7 +26,7 @@ export function packSkinned(baked: BakedSkinned): Texels {
   const shapeLayers = Math.ceil((SHAPE * shapes) / TEXEL);
   const layers = 3 + shapeLayers;
   const words = new Uint32Array(4 * WIDTH * rows * layers);
-  const layer = 4 * WIDTH * rows; // words
+  const layer = 4 * WIDTH * rows; // words in a layer
   const floats = new Float32Array(words.buffer);
   const bytes = new Uint8Array(words.buffer);
   const signed = new Int8Array(words.buffer);

@@ -3,26 +3,26 @@ import { quatAt, slerp, upper, type Quat, type Vector } from '../../rig/quaterni
 import { Rig } from '../../rig/rig.ts';
 import type { RecordedPoses } from './baked.ts';
 
-/** How a body stands. */
+/** A pose of the skeleton, with coefficients of the residual shapes. */
 export interface Pose {
-  rotations: Float64Array; // (J,4) wxyz of each joint about itself, 1 long
-  root: Float64Array; // (3,) metres that the root moves from rest
+  rotations: Float64Array; // (J,4) local rotation of each joint, unit quaternions wxyz
+  root: Float64Array; // (3,) translation of the root from rest, metres
   residual: Float64Array; // (K,) coefficients of the residual shapes
 }
 
-/** Numbers of a joint in a table: the rows of the matrix (R | t), the quaternion wxyz. */
+/** Numbers in a joint's row of a table: the three rows of the matrix (R | t), then the quaternion wxyz of R. */
 export const TABLE_ROW = 16;
 
-/** Of the distance to the nearest known pose, by which the kernel of any other pose is wider. */
+/** Share of the distance to the nearest known pose that is added, in squares, to the kernel's width. */
 const FARTHER = 0.5;
 
-/** Forward kinematics of a rig, its recorded poses, and what any other pose has of the residual shapes. */
+/** Forward kinematics of a rig, its recorded poses, and coefficients of the residual shapes in any pose. */
 export class Skeleton {
   readonly rig: Rig;
   private readonly info: SkinnedInfo;
   private readonly poses: RecordedPoses;
-  private readonly held: Float64Array; // (J,4)
-  private readonly known: Float64Array; // (P,3·M) features
+  private readonly held: Float64Array; // (J,4) local rotations of joints that do not turn in the recording
+  private readonly known: Float64Array; // (P,3·M) features of the known poses
 
   constructor(info: SkinnedInfo, poses: RecordedPoses) {
     this.info = info;
@@ -40,14 +40,14 @@ export class Skeleton {
     }
   }
 
-  /** A pose to write into: the rest pose. */
+  /** A new pose to write into, which is the rest pose. */
   empty(): Pose {
     const { names, num_shapes: shapes } = this.info;
     const rotations = Float64Array.from({ length: 4 * names.length }, (_, i) => (i % 4 === 0 ? 1 : 0));
     return { rotations, root: new Float64Array(3), residual: new Float64Array(shapes) };
   }
 
-  /** Writes the recorded pose at a frame; between two, joints turn on the shorter arc and all else goes straight. */
+  /** Writes the recorded pose at a frame; between two frames by slerp of rotations, all else linearly. */
   recorded(frame: number, out: Pose): void {
     const { num_frames: frames, num_moving: moving, num_shapes: shapes } = this.info;
     const { rotations, roots, coefficients } = this.poses;
@@ -63,7 +63,7 @@ export class Skeleton {
     mix(coefficients, shapes, first, part, out.residual);
   }
 
-  /** Writes the coefficients of a pose that need not have been recorded: a mean of those of poses like it. */
+  /** Writes the coefficients of any pose: a mean of those of the known poses, weighted by a Gaussian kernel. */
   interpolate(pose: Pose): void {
     const { num_moving: moving, num_shapes: shapes, num_known: count } = this.info;
     const { kernelWidth, coefficients, known } = this.poses;
@@ -82,7 +82,7 @@ export class Skeleton {
     });
   }
 
-  /** The square of how far the joints that the recording never turns are from how they are held. */
+  /** Squared distance of features of the joints that do not turn in the recording from how they are held there. */
   private awayFromHeld({ rotations }: Pose): number {
     let sum = 0;
     for (const j of this.info.names.keys()) {
@@ -93,9 +93,9 @@ export class Skeleton {
     return sum;
   }
 
-  /** Writes what takes each joint's points from rest to the world: (J, TABLE_ROW). */
+  /** Writes the rigid transforms of the joints from rest to the world: (J, TABLE_ROW). */
   table(pose: Pose, out: Float32Array): void {
-    // Each with w ≥ 0, so that the signs of a joint and its parent agree.
+    // All quaternions get w ≥ 0, so that the signs of products of joints and their parents agree.
     const rotations = this.info.parents.map((_, j) => upper(quatAt(pose.rotations, j)));
     const posed = this.rig.posed(rotations, [pose.root[0]!, pose.root[1]!, pose.root[2]!]);
     const matrices = this.rig.matrices(posed);
@@ -106,13 +106,13 @@ export class Skeleton {
   }
 }
 
-/** What poses are compared by, of one joint. */
+/** Features of a joint's rotation by which poses are compared: sin(angle / 2) times the axis. */
 function feature(quat: Quat): Vector {
   const [, x, y, z] = upper(quat);
   return [x, y, z];
 }
 
-/** Writes what lies between two rows. */
+/** Writes the linear interpolation between row `first` (part 0) and the next one (part 1). */
 function mix(rows: Float32Array, size: number, first: number, part: number, out: Float64Array): void {
   for (let i = 0; i < size; i++) out[i] = (1 - part) * rows[first * size + i]! + part * rows[(first + 1) * size + i]!;
 }

@@ -13,10 +13,11 @@ import { Listener, Loudness } from './listening.ts';
 import { Performer, type Clock } from './performer.ts';
 
 /**
- * Moves somebody's rig: they stand, look at the visitor, nod, and gesture as the server directs.
+ * Poses a person's rig: the person stands, looks at the visitor, nods, and gestures as the server directs.
  *
- * Directions count the seconds of their utterance. While it is heard these are the seconds of its sound,
- * so gestures stay on its accents and stand still where it pauses; afterwards they go on with the page.
+ * Times of directions are seconds of their utterance. While the utterance is heard, its sound is the clock:
+ * gestures stay on the accents of speech, and stand still while it is paused. Afterwards the page's clock
+ * takes over.
  */
 export class BodyLanguage {
   private readonly heard: () => Spoken | null;
@@ -26,14 +27,14 @@ export class BodyLanguage {
   private readonly gaze = new Gaze();
   private readonly listener: Listener;
   private readonly loudness = new Loudness(MICROPHONE_RATE);
-  private readonly own: Clock = { offset: 0 }; // of what the page decides itself
-  private clocks = new Map<number, Clock>(); // by utterance
-  private nods = 0;
-  private now = 0; // s of the page
+  private readonly own: Clock = { offset: 0 }; // clock of nods, which the page itself decides on
+  private clocks = new Map<number, Clock>(); // clock of each utterance
+  private nods = 0; // number of nods so far
+  private now = 0; // time of the page, s
 
   /**
-   * @param seed a whole number that decides all that is by chance
-   * @param heard what is heard now
+   * @param seed whole number, seed of all random movements
+   * @param heard returns what is heard now: the utterance and its second; null in silence
    */
   constructor(rig: Rig, { figure, clips }: Repertoire, seed: number, heard: () => Spoken | null) {
     this.heard = heard;
@@ -43,34 +44,34 @@ export class BodyLanguage {
     this.listener = new Listener(seed);
   }
 
-  /** Takes what the server directs for an utterance, or more of it. */
+  /** Adds directions of the server for an utterance. */
   plan(utterance: number, directions: readonly Direction[]): void {
     this.performer.follow(directions, this.clock(utterance));
   }
 
-  /** An utterance was interrupted: hands come down once their stroke has arrived. */
+  /** Ends an interrupted utterance: hands come down after the stroke that they have begun. */
   stop(utterance: number): void {
     const clock = this.clocks.get(utterance);
     if (clock) this.performer.stop(clock, this.now);
     this.clocks.delete(utterance);
   }
 
-  /** Stops all utterances: a new session counts them from 0. */
+  /** Stops all utterances, as a new session numbers them from 0 again. */
   reset(): void {
     for (const utterance of [...this.clocks.keys()]) this.stop(utterance);
   }
 
-  /** The visitor is there, m in rest space. */
+  /** Sets the position of the visitor, m in rest space. */
   look(visitor: Vector): void {
     this.gaze.look(...directionTo(this.eyes, visitor));
   }
 
-  /** Sound of the visitor; while nobody else speaks, phrases of it get nods. */
+  /** Takes sound of the visitor (int16 at MICROPHONE_RATE); after phrases the person may nod, unless speaking. */
   listen(pcm: Int16Array): void {
     for (const [, name] of this.listener.hear(this.loudness.push(pcm))) if (!this.heard()) this.nod(name);
   }
 
-  /** Goes on by `step` seconds. */
+  /** Advances the time of the page by `step` seconds. */
   advance(step: number): void {
     this.now += step;
     const heard = this.heard();
@@ -81,7 +82,7 @@ export class BodyLanguage {
     this.performer.tidy(this.now);
   }
 
-  /** How the rig is posed now. */
+  /** The pose of the rig now. */
   pose(): RigPose {
     const { pose, root } = this.performer.at(this.now, this.gaze.at(this.now));
     return { rotations: this.retarget.pose(pose), root };
@@ -93,16 +94,16 @@ export class BodyLanguage {
     return clock;
   }
 
-  /** Utterances before the one that is heard now will not be heard any more. */
+  /** Removes the clocks of earlier utterances, which will not be heard any more; unheard ones are stopped. */
   private leaveUnheard(utterance: number): void {
     for (const [earlier, { offset }] of [...this.clocks]) {
       if (earlier >= utterance) continue;
       if (offset === Infinity) this.stop(earlier);
-      else this.clocks.delete(earlier); // its gestures go on to their ends
+      else this.clocks.delete(earlier); // gestures that have begun go on to their ends
     }
   }
 
-  /** A gesture without words, as it was made, from now on. */
+  /** Makes a gesture from now on, at the pace of its clip. */
   private nod(name: string): void {
     const clip = this.performer.clip(name);
     if (!clip) return;

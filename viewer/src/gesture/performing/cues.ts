@@ -1,23 +1,23 @@
 import type { Cue, Release } from '../../protocol.ts';
 import type { Clip } from '../clip.ts';
 
-const BLEND_IN = 0.3; // s in which a gesture takes over
-const BLEND_OUT = 0.4; // s before its end in which it gives way
-const SETTLE = 0.15; // s that the end of a stroke stays at least: no stroke is cut off
+const BLEND_IN = 0.3; // s in which a gesture blends in at its beginning
+const BLEND_OUT = 0.4; // s in which a gesture blends out before its end
+const SETTLE = 0.15; // least time for which the end of a stroke is held, so that no stroke is cut off, s
 
-/** A gesture to make, or one that is let go; seconds of the utterance that it belongs to. */
+/** A gesture to make, or the release of a held one; times are seconds of the utterance that it belongs to. */
 export type Direction = Cue | Release;
 
 export function isCue(direction: Direction): direction is Cue {
   return 'name' in direction;
 }
 
-/** When the hold begins: the earliest release. */
+/** Time at which the hold of a cue begins, which is the earliest release, s. */
 function holdEnd({ marks }: Clip, cue: Cue): number {
   return cue.stroke + (marks.hold - marks.stroke);
 }
 
-/** When, not before `wanted`, a cue may be released: repetition ends where it began. */
+/** Earliest time, not before `wanted`, at which a cue may be released, s; a repeated motion is completed first. */
 export function roundedRelease(clip: Clip, cue: Cue, wanted: number): number {
   const first = holdEnd(clip, cue);
   const stays = clip.marks.release > clip.marks.hold ? SETTLE : 0; // a nod has no hold
@@ -25,7 +25,7 @@ export function roundedRelease(clip: Clip, cue: Cue, wanted: number): number {
   return clip.cycle > 0 ? first + clip.cycle * Math.ceil((from - first) / clip.cycle - 1e-9) : from;
 }
 
-/** Which second of the clip belongs to a time; `release` is null while the gesture is held. */
+/** Time of the clip that is shown at a time of the speech, s; `release` is null while the gesture is held. */
 export function clipTime(clip: Clip, cue: Cue, release: number | null, time: number): number {
   const { marks } = clip;
   const clamped = (seconds: number) => Math.min(Math.max(seconds, 0), marks.end);
@@ -39,18 +39,18 @@ export function clipTime(clip: Clip, cue: Cue, release: number | null, time: num
   return clamped(Math.min(marks.stroke + (time - cue.stroke), marks.hold));
 }
 
-/** When a cue is over; infinite while it is held. */
+/** Time at which a cue is over, s; infinite while it is held. */
 export function endOf({ marks }: Clip, release: number | null): number {
   return release === null ? Infinity : release + marks.end - marks.release;
 }
 
-/** How far a gesture prevails over what is beneath, 0 to 1. */
+/** Weight of a gesture over the pose beneath it, 0 to 1. */
 export function weight(clip: Clip, cue: Cue, release: number | null, time: number): number {
   const rising = smooth((time - cue.begin) / Math.min(BLEND_IN, cue.stroke - cue.begin));
   return release === null ? rising : rising * smooth((endOf(clip, release) - time) / BLEND_OUT);
 }
 
-/** 0 … 1 with zero slope at both ends. */
+/** Smoothstep: 0 up to x = 0, 1 from x = 1, with slope 0 at both. */
 function smooth(x: number): number {
   const part = Math.min(Math.max(x, 0), 1);
   return part * part * (3 - 2 * part);

@@ -2,19 +2,19 @@ import { multiply, subtract, type Quat, type Vector } from '../../rig/quaternion
 import { about } from '../turning.ts';
 
 const RADIANS = Math.PI / 180;
-const TICK = 0.01; // s of a step: whatever asks, motion is the same
-const HEAD_YAW = 50 * RADIANS; // how far neck and head turn against the chest
-const HEAD_PITCH = 22 * RADIANS;
-const CHEST_YAW = 24 * RADIANS;
-const CHEST_FROM = 15 * RADIANS; // the angle from which on the chest turns, too
-const CHEST_PART = 0.4; // of what is beyond
-const HEAD_SPEED = 140 * RADIANS; // a second, at most
-const CHEST_SPEED = 45 * RADIANS;
-const HEAD_STIFF = 7; // 1/s
-const CHEST_STIFF = 3;
-const BEHIND = 120 * RADIANS; // from here on the visitor is behind: she stays turned to the side where they went
+const TICK = 0.01; // s of a simulation step; steps are fixed, so motion does not depend on the frame rate
+const HEAD_YAW = 50 * RADIANS; // largest angle by which neck and head together turn against the chest
+const HEAD_PITCH = 22 * RADIANS; // largest angle by which neck and head together nod
+const CHEST_YAW = 24 * RADIANS; // largest angle by which the chest turns
+const CHEST_FROM = 15 * RADIANS; // angle of the visitor above which the chest turns, too
+const CHEST_PART = 0.4; // share of the angle beyond CHEST_FROM by which the chest turns
+const HEAD_SPEED = 140 * RADIANS; // largest speed per second
+const CHEST_SPEED = 45 * RADIANS; // largest speed per second
+const HEAD_STIFF = 7; // natural frequency with which the head follows, 1/s
+const CHEST_STIFF = 3; // natural frequency with which the chest follows, 1/s
+const BEHIND = 120 * RADIANS; // a visitor beyond this angle is behind: the person stays turned to the side of leaving
 
-/** An angle that follows a target, critically damped, no faster than a limit. */
+/** An angle that follows a target, critically damped and with limited speed. */
 class Hinge {
   angle = 0;
   private speed = 0;
@@ -34,7 +34,7 @@ class Hinge {
   }
 }
 
-/** Where chest and head are turned: to the visitor, as far and as fast as people do. */
+/** Rotations of chest, neck and head towards the visitor, as far and as fast as people turn. */
 export class Gaze {
   private steps = 0;
   private yaw = 0;
@@ -43,13 +43,13 @@ export class Gaze {
   private readonly head = new Hinge(HEAD_STIFF, HEAD_SPEED);
   private readonly nod = new Hinge(HEAD_STIFF, HEAD_SPEED);
 
-  /** The visitor is so many radians to the person's left, and downwards. */
+  /** Sets the direction of the visitor: radians to the person's left, and downwards. */
   look(yaw: number, pitch: number): void {
     this.yaw = Math.abs(yaw) <= BEHIND ? yaw : BEHIND * Math.sign(this.yaw || yaw);
     this.pitch = pitch;
   }
 
-  /** Turns of chest, neck and head at a time, s, not before the last one asked for. */
+  /** Local rotations of chest, neck and head at a time, s; times must not descend from call to call. */
   at(time: number): [Quat, Quat, Quat] {
     for (; this.steps * TICK < time - 1e-9; this.steps++) this.step();
     const half = multiply(about([0, 1, 0], 0.5 * this.head.angle), about([1, 0, 0], 0.5 * this.nod.angle));
@@ -64,7 +64,7 @@ export class Gaze {
   }
 }
 
-/** Radians to the person's left, and downwards, from eyes to a visitor. */
+/** Direction from eyes to a visitor, for a person facing +z: radians to the person's left, and downwards. */
 export function directionTo(eyes: Vector, visitor: Vector): [number, number] {
   const [x, y, z] = subtract(visitor, eyes);
   return [Math.atan2(x, z), -Math.atan2(y, Math.sqrt(x * x + z * z))];

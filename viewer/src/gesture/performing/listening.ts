@@ -1,30 +1,30 @@
 import { chance } from '../noise.ts';
 
 export const FRAME = 0.01; // s between two values of loudness
-const WINDOW = 0.025; // s of sound that each is of
-const FLOOR = -80; // dB
-const SPOKEN = 25; // dB below the loudest, down to which somebody speaks
-const AUDIBLE = -50; // dB below which nobody does
+const WINDOW = 0.025; // s of sound that a value of loudness measures
+const FLOOR = -80; // least value of loudness, dB
+const SPOKEN = 25; // sound counts as speech down to so many dB below the loudest value
+const AUDIBLE = -50; // loudness below which sound is never speech, dB
 const PHRASE = 1.2; // s that the visitor must have spoken since the last nod
-const PAUSE = 0.25; // s of silence after which a nod may come
-const APART = 3; // s from nod to nod, at least
-const OFTEN = 0.65; // how likely a pause gets a nod
+const PAUSE = 0.25; // s of silence after which a nod may follow
+const APART = 3; // least time between two nods, s
+const OFTEN = 0.65; // probability of a nod in a pause
 
-/** Loudness of sound that comes piece by piece; as in `ico3d/motion/composing/accents.py`. */
+/** Loudness of sound that arrives piece by piece; as `GrowingLoudness` in `ico3d/motion/composing/accents.py`. */
 export class Loudness {
   private readonly rate: number;
   private readonly half: number; // samples of half a window
-  private count = 0; // values so far
-  private first = 0; // number of the first sample that is kept
+  private count = 0; // number of values so far
+  private first = 0; // index of the first sample that is kept
   private kept = new Float64Array(0);
 
-  /** @param rate Hz */
+  /** @param rate samples per second */
   constructor(rate: number) {
     this.rate = rate;
     this.half = Math.round(0.5 * WINDOW * rate);
   }
 
-  /** Takes sound; decibels, every `FRAME` seconds, of all whose window is known now. */
+  /** Appends sound; returns the new values in dB, one per `FRAME` seconds, whose windows are complete now. */
   push(pcm: Int16Array): number[] {
     const joined = new Float64Array(this.kept.length + pcm.length);
     joined.set(this.kept);
@@ -48,7 +48,7 @@ export class Loudness {
   }
 }
 
-/** Nods to a visitor, after phrases, now and then; as in `ico3d/motion/composing/listening.py`. */
+/** Decides on nods, at random after the visitor's phrases; as in `ico3d/motion/composing/listening.py`. */
 export class Listener {
   private readonly seed: number;
   private frames = 0;
@@ -62,7 +62,7 @@ export class Listener {
     this.seed = seed;
   }
 
-  /** Takes loudness; nods to begin: seconds since the listener began, and the gesture's name. */
+  /** Takes loudness; returns nods to begin: seconds since the listener began, and the gesture's name. */
   hear(levels: readonly number[]): [number, string][] {
     return levels.flatMap((level) => this.step(level));
   }
@@ -80,7 +80,7 @@ export class Listener {
     return pauses ? this.pause() : [];
   }
 
-  /** The visitor paused after a phrase. */
+  /** A nod, or none, for a pause of the visitor after a phrase. */
   private pause(): [number, string][] {
     const now = this.frames * FRAME;
     this.pauses++;

@@ -7,16 +7,16 @@ import { indexOf } from '../roles.ts';
 import { power } from '../turning.ts';
 import { clipTime, endOf, isCue, roundedRelease, weight, type Direction } from './cues.ts';
 
-/** Roles whose gestures come upon what the rest does; those of the others replace it. */
+/** For each role, whether its rotations in gestures are added to the rest; for others they replace the rest. */
 const ADDED = ROLES.map((role) => /^(hips|spine|chest|neck|head|.*_clavicle)$/.test(role));
 const TURNED = (['chest', 'neck', 'head'] as const).map(indexOf);
 
-/** The time of an utterance. */
+/** The clock of an utterance. */
 export interface Clock {
-  offset: number; // the page's second at which its second 0 is; infinite until it begins
+  offset: number; // time of the page at which the utterance began, s; infinite until it begins
 }
 
-/** A cue that was taken on. */
+/** A cue that is followed. */
 interface Taken {
   cue: Cue;
   clip: Clip;
@@ -24,16 +24,16 @@ interface Taken {
   release: number | null;
 }
 
-/** What a gesture does at a moment: its roles' rotations and its weight. */
+/** A gesture at a moment. */
 interface Part {
-  poses: [number, Quat][];
-  weight: number;
+  poses: [number, Quat][]; // roles that it moves, with their rotations
+  weight: number; // over the pose beneath it, 0 to 1
 }
 
-/** Somebody who follows directions: the living rest, turned to the visitor, with gestures upon it. */
+/** A person who follows directions: the living rest, turned to the visitor, with gestures blended in. */
 export class Performer {
   private readonly living: Living;
-  private readonly clips: ReadonlyMap<string, readonly [Clip, Clip]>; // and mirrored
+  private readonly clips: ReadonlyMap<string, readonly [Clip, Clip]>; // each clip with its mirror image
   private taken: Taken[] = [];
 
   constructor(living: Living, clips: ReadonlyMap<string, Clip>) {
@@ -41,12 +41,12 @@ export class Performer {
     this.clips = new Map([...clips].map(([name, clip]) => [name, [clip, clip.mirrored()]]));
   }
 
-  /** The clip of a name, made with the right hand where it is one of one hand. */
+  /** The clip of a name, not mirrored. */
   clip(name: string): Clip | undefined {
     return this.clips.get(name)?.[0];
   }
 
-  /** Takes on more directions, whose times are those of a clock; gestures that nobody knows are left out. */
+  /** Adds directions, whose times are those of a clock; gestures that are not known are left out. */
   follow(directions: readonly Direction[], clock: Clock): void {
     for (const direction of directions) {
       if (isCue(direction)) {
@@ -59,7 +59,7 @@ export class Performer {
     }
   }
 
-  /** An utterance falls silent: what has not begun is dropped, what is held is let go after its stroke. */
+  /** Ends an utterance at a time of the page: gestures to come are dropped, held ones released after their strokes. */
   stop(clock: Clock, time: number): void {
     const now = time - clock.offset;
     this.taken = this.taken.filter((one) => one.clock !== clock || one.cue.begin < now);
@@ -69,21 +69,21 @@ export class Performer {
     }
   }
 
-  /** Forgets gestures that are over at a time. */
+  /** Removes gestures that are over at a time of the page, s. */
   tidy(time: number): void {
     this.taken = this.taken.filter(({ clip, release, clock }) => time - clock.offset <= endOf(clip, release));
   }
 
   /**
-   * The whole body at a time of the page, s.
+   * Pose of the whole body at a time of the page, s.
    *
-   * @param turn what chest, neck and head turn to the visitor
+   * @param turn rotations of chest, neck and head to the visitor, as by `Gaze.at`
    */
   at(time: number, turn?: readonly Quat[]): Moment {
     const { pose, root } = this.living.at(time);
     for (const [i, role] of TURNED.entries()) if (turn) pose[role] = multiply(turn[i]!, pose[role]!);
     const parts = this.taken.flatMap((one) => partOf(one, time));
-    const left = ROLES.map(() => 1); // what later gestures leave of earlier ones
+    const left = ROLES.map(() => 1); // share that later gestures leave to earlier ones
     for (const part of parts.toReversed()) {
       for (const [role, quat] of part.poses) {
         if (!ADDED[role]) continue;
@@ -98,7 +98,7 @@ export class Performer {
   }
 }
 
-/** What a gesture does at a time of the page; nothing before it begins and when it is over. */
+/** The gesture of a cue at a time of the page, s; none before it begins and after it is over. */
 function partOf({ cue, clip, clock, release }: Taken, time: number): Part[] {
   const now = time - clock.offset;
   if (now < cue.begin || now > endOf(clip, release)) return [];
