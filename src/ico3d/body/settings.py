@@ -275,7 +275,7 @@ class BodySettings:
     """How a body is trained; defaults are the paper's and, where the paper gives none, 3DGS's.
 
     Attributes:
-        steps: Optimisation steps of a window, with one picture each.
+        steps: Optimisation steps of a window, one picture each.
         steps_per_frame: Optimisation steps per frame of a window, instead of --steps; 0 gives each
             window the same number, --steps.
         warmup_steps: Number of first steps of a window that learn from its middle frame alone,
