@@ -194,7 +194,7 @@ def _hands(step: np.ndarray) -> float:
 
 
 def _division(speeds: np.ndarray) -> float:
-    """Speed that divides slow from fast frames: Otsu's threshold of the logarithms of (F,)."""
+    """Speed that divides slow from fast frames: Otsu's threshold of logarithms of speeds (F,)."""
     values = np.sort(np.log(speeds + 1e-4))
     if len(values) < 2:
         return float(speeds.max())

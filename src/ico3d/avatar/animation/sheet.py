@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 SIZE = 300, 500
 """Width and height in pixels of a picture of the person."""
 MOST = 16
-"""Most played and most refused actions that are shown, those with the best scores."""
+"""Largest number of played actions, and of refused ones, that are shown: the best by score."""
 COLUMNS = 6
 REST, ACTION, REFUSED, MADE = "tab:blue", "tab:orange", "tab:red", "tab:green"
 

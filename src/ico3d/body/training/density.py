@@ -27,7 +27,7 @@ FADING = 1e-3
 class RelocationStrategy(McmcStrategy):
     """FreeTime's density control: faint Gaussians move to where gradient and opacity are high.
 
-    It is the Markov chain strategy without its noise.
+    It is the Markov chain strategy with another choice of where Gaussians move to.
     """
 
     def __init__(self, schedule: Schedule, settings: McmcSettings, seed: int, extent: float):

@@ -26,7 +26,7 @@ from ico3d.studio.recording import Recording, record
 from ico3d.training.processes import fork_server
 
 SCORES = ("psnr_mask", "psnr_moving", "psnr", "ssim", "flicker", "num_gaussians", "train_seconds")
-"""Metrics of a trial that are kept; docs/architecture.md defines them."""
+"""Metrics of a trial that are kept; docs/measuring-bodies.md defines them."""
 PER_WINDOW = ("psnr_mask", "psnr_moving")
 """Metrics that are also kept for each window."""
 

@@ -26,7 +26,11 @@ _LEANING = 0.06
 _PAUSE = 0.1
 """Least duration of a pause in seconds; stop consonants are shorter silences."""
 _COMMA, _ASTRAY = 0.4, 0.3
-"""Seconds by which a pause may be farther from an end with a comma, and from any end of a word."""
+"""How pauses are matched with ends of words, in seconds of speech.
+
+Ends with a comma count as nearer by the first number; a pause farther than the second one from all
+ends belongs to none.
+"""
 _WORD = 0.35
 """Mean duration of a word in seconds."""
 UNKNOWN = "(unknown)"

@@ -34,7 +34,7 @@ ARRIVED = 0.1
 JITTER = 2.0, (0.1, 0.3)
 """A hand counts as held up to this multiple of a resting hand's apparent speed.
 
-That speed, caused by jitter of tracked poses, is clamped to the range per second given second.
+A resting hand seems to move, as tracked poses jitter. The product is clamped to the given range.
 """
 PREPARED, SOON = 0.22, 0.8
 """A first stop is a preparation if it is shorter than the first of these times in seconds, and if
