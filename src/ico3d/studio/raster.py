@@ -100,7 +100,8 @@ def vertex_normals(vertices, faces):
     for i in range(normals.shape[0]):
         length = np.sqrt(normals[i, 0] ** 2 + normals[i, 1] ** 2 + normals[i, 2] ** 2)
         if length > 0.0:
-            normals[i] /= length
+            for axis in range(3):  # a row as a whole takes seconds to compile
+                normals[i, axis] /= length
     return normals
 
 

@@ -54,8 +54,10 @@ def _blend(x, inputs, alpha, sets, out):
             target = out[(m * inputs + k) * BLOCK : (m * inputs + k + 1) * BLOCK]
             for p in range(BLOCK):
                 target[p] = factor[p] * source[p]
-    out[sets * inputs * BLOCK : sets * (inputs + 1) * BLOCK] = alpha[: sets * BLOCK]
-    out[sets * (inputs + 1) * BLOCK :] = ZERO
+    last = out[sets * inputs * BLOCK :]
+    for p in range(sets * BLOCK):  # `last[:] = alpha[:]` takes seconds to compile
+        last[p] = alpha[p]
+    last[sets * BLOCK :] = ZERO
 
 
 @kernel()

@@ -211,7 +211,8 @@ def _project_backward_all(
                         total,
                         g_cameras[part, c],
                     )
-            outs[i] = total
+            for k in range(GRADIENTS):  # a row as a whole takes seconds to compile
+                outs[i, k] = total[k]
 
 
 def project_backward(

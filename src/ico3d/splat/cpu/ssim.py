@@ -55,6 +55,13 @@ def _blur_column(rows, out):
 
 
 @kernel()
+def _copy(a, out):
+    """`out[:] = a`, which takes seconds to compile for what it would say if sizes differed."""
+    for i in range(a.size):
+        out[i] = a[i]
+
+
+@kernel()
 def _product(a, b, out):
     for i in range(a.size):
         out[i] = a[i] * b[i]
@@ -64,9 +71,9 @@ def _product(a, b, out):
 def _moments(x, y, padded, maps):
     """Rows of x, y, x², y², xy, blurred along x."""
     inner = padded[PAD : PAD + x.size]
-    inner[:] = x
+    _copy(x, inner)
     _blur_row(padded, maps[0])
-    inner[:] = y
+    _copy(y, inner)
     _blur_row(padded, maps[1])
     _product(x, x, inner)
     _blur_row(padded, maps[2])
@@ -121,11 +128,12 @@ def _compare(maps, sums, derivatives):
             _blur_column(maps[row : row + 11, k], stats[k])
         sums[row] = _similarity(stats, by_mean)
         padded = np.zeros(width + 2 * PAD, np.float32)
-        padded[PAD : PAD + width] = by_mean
+        inner = padded[PAD : PAD + width]
+        _copy(by_mean, inner)
         _blur_row(padded, derivatives[SSIM_RADIUS + row, 0])
-        padded[PAD : PAD + width] = stats[2]
+        _copy(stats[2], inner)
         _blur_row(padded, derivatives[SSIM_RADIUS + row, 1])
-        padded[PAD : PAD + width] = stats[4]
+        _copy(stats[4], inner)
         _blur_row(padded, derivatives[SSIM_RADIUS + row, 2])
 
 
