@@ -1,18 +1,13 @@
 /** In the page: the animated person, and the same splats standing still, drawn as fast as can be. */
-import { dyno, SplatMesh, type PackedSplats } from '@sparkjsdev/spark';
-import * as THREE from 'three';
-import type { BakedWindow } from '../../src/body/window.ts';
-import { readBakedWindow } from '../../src/body/window.ts';
-import { BundleFiles, loadManifest } from '../../src/bundle/load.ts';
-import type { HeadFiles } from '../../src/bundle/load.ts';
 import { ExpressionTrack } from '../../src/face/track.ts';
-import { Poses } from '../../src/head/poses.ts';
+import { putToRest } from './at-rest.ts';
 import { drawFrames, type Frame } from './drawing.ts';
 
 const STEP = 0.1; // s: windows change every ten frames
 const { stage, head, body, director, conversation } = window.ico3d!;
-const identity = await makeStill();
+const identity = await putToRest(stage, [head!.generator, body!.objects[body!.shown!.slot]]);
 let sound = 0; // s
+let moves = false; // not in the first picture, which is compared
 let uploaded = false;
 perform();
 window.scenes = { animated: (frames) => run(true, frames), still: (frames) => run(false, frames) };
@@ -21,10 +16,11 @@ window.scenes = { animated: (frames) => run(true, frames), still: (frames) => ru
 function run(animated: boolean, frames: number): Promise<Frame[]> {
   for (const object of [...head!.objects, ...body!.objects]) object.visible = animated;
   identity.visible = !animated;
+  moves = frames > 1;
   const change = () => {
     uploaded = false;
-    if (animated) move();
-    else identity.updateVersion();
+    if (!animated) identity.updateVersion();
+    else if (moves) move();
   };
   return drawFrames(stage, frames, change, () => ({ window: animated ? body!.shown!.window : -1, uploaded }));
 }
@@ -52,55 +48,5 @@ function perform(): void {
       uploaded = true;
       hold(content);
     };
-  }
-}
-
-/** The first window and the head as splats that go through an identity modifier. */
-async function makeStill(): Promise<SplatMesh> {
-  const manifest = await loadManifest();
-  const info = manifest.body!.windows[0]!;
-  const files = new BundleFiles(manifest.files);
-  const window = readBakedWindow(await files.tensors(info.file), manifest.body!, info);
-  const head = await files.head(manifest.head!);
-  const mesh = new SplatMesh({
-    constructSplats: (splats) => {
-      addBody(splats, window);
-      addHead(splats, head);
-    },
-    objectModifier: dyno.dynoBlock({ gsplat: dyno.Gsplat }, { gsplat: dyno.Gsplat }, ({ gsplat }) => ({ gsplat })),
-  });
-  await mesh.initialized;
-  mesh.visible = false;
-  stage.scene.add(mesh);
-  return mesh;
-}
-
-function addBody(splats: PackedSplats, { info, means, scales, quats, rgba }: BakedWindow): void {
-  for (let i = 0; i < info.num_gaussians; i++) {
-    const [w, x, y, z] = quats.subarray(4 * i, 4 * i + 4);
-    const [r, g, b, a] = rgba.subarray(4 * i, 4 * i + 4);
-    splats.pushSplat(
-      new THREE.Vector3().fromArray(means, 3 * i),
-      new THREE.Vector3().fromArray(scales, 3 * i),
-      new THREE.Quaternion(x, y, z, w).normalize(),
-      a! / 255,
-      new THREE.Color(r! / 255, g! / 255, b! / 255),
-    );
-  }
-}
-
-function addHead(splats: PackedSplats, { baked, poses }: HeadFiles): void {
-  const place = new THREE.Object3D();
-  new Poses(poses).apply(0, place);
-  for (let i = 0; i < baked.count; i++) {
-    const [w, x, y, z] = baked.quats.subarray(4 * i, 4 * i + 4);
-    const [r, g, b, a] = baked.meanLogits.subarray(4 * i, 4 * i + 4).map((logit) => 1 / (1 + Math.exp(-logit)));
-    splats.pushSplat(
-      new THREE.Vector3().fromArray(baked.means, 3 * i).applyQuaternion(place.quaternion).add(place.position),
-      new THREE.Vector3(...baked.scales.subarray(3 * i, 3 * i + 3).map(Math.exp)),
-      new THREE.Quaternion(x, y, z, w).premultiply(place.quaternion).normalize(),
-      a!,
-      new THREE.Color(r!, g!, b!),
-    );
   }
 }

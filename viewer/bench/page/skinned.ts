@@ -1,17 +1,15 @@
 /** In the page: the body on a skeleton that moves, and the same splats at rest. */
-import { dyno, SplatMesh, type PackedSplats } from '@sparkjsdev/spark';
-import * as THREE from 'three';
-import { readBakedSkinned, type BakedSkinned } from '../../src/body/skinned/baked.ts';
-import { BundleFiles, loadManifest, SKINNED } from '../../src/bundle/load.ts';
+import { loadManifest } from '../../src/bundle/load.ts';
+import { putToRest } from './at-rest.ts';
 import { drawFrames } from './drawing.ts';
 
 const STEP = 0.1; // s
 const { stage, skinned } = window.ico3d!;
-const manifest = await loadManifest();
-const baked = readBakedSkinned(await new BundleFiles(manifest.files).tensors(SKINNED), manifest.skinned!, SKINNED);
-const identity = await makeStill();
+const { fps, num_frames } = (await loadManifest()).skinned!;
 const rest = skinned!.generator.skeleton.empty();
 skinned!.strike(rest.rotations, rest.root);
+await stage.still();
+const identity = await putToRest(stage, skinned!.objects);
 let seconds = 0;
 let moves = false; // not in the first picture, which is compared
 window.scenes = { animated: (frames) => run(true, frames), still: (frames) => run(false, frames) };
@@ -28,32 +26,6 @@ function run(animated: boolean, frames: number) {
 function move(): void {
   const { skeleton } = skinned!.generator;
   const pose = skeleton.empty();
-  if (moves) skeleton.recorded((seconds += STEP) * baked.info.fps % (baked.info.num_frames - 1), pose);
+  if (moves) skeleton.recorded((seconds += STEP) * fps % (num_frames - 1), pose);
   skinned!.strike(pose.rotations, pose.root);
-}
-
-/** The body at rest as splats that go through an identity modifier. */
-async function makeStill(): Promise<SplatMesh> {
-  const mesh = new SplatMesh({
-    constructSplats: (splats) => addBody(splats, baked),
-    objectModifier: dyno.dynoBlock({ gsplat: dyno.Gsplat }, { gsplat: dyno.Gsplat }, ({ gsplat }) => ({ gsplat })),
-  });
-  await mesh.initialized;
-  mesh.visible = false;
-  stage.scene.add(mesh);
-  return mesh;
-}
-
-function addBody(splats: PackedSplats, { info, means, logScales, quats, colorLogits, opacities }: BakedSkinned): void {
-  for (let i = 0; i < info.num_gaussians; i++) {
-    const [w, x, y, z] = quats.subarray(4 * i, 4 * i + 4);
-    const [r, g, b] = colorLogits.subarray(3 * i, 3 * i + 3).map((logit) => 1 / (1 + Math.exp(-logit)));
-    splats.pushSplat(
-      new THREE.Vector3().fromArray(means, 3 * i),
-      new THREE.Vector3(...logScales.subarray(3 * i, 3 * i + 3).map(Math.exp)),
-      new THREE.Quaternion(x, y, z, w).normalize(),
-      opacities[i]! / 255,
-      new THREE.Color(r!, g!, b!),
-    );
-  }
 }

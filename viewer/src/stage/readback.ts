@@ -12,16 +12,21 @@ export interface Splats {
 }
 
 /** Reads back what is drawn of a generator. For tests: it stalls the GPU. */
-export function readSplats({ spark, renderer }: Stage, generator: SplatGenerator): Splats {
+export function readSplats(stage: Stage, generator: SplatGenerator): Splats {
+  return unpack(...readTexels(stage, generator), generator.numSplats);
+}
+
+/** Reads back what is drawn of a generator as the texels of Spark's extended splats, two for each; rows are filled up. */
+export function readTexels({ spark, renderer }: Stage, generator: SplatGenerator): [Uint32Array, Uint32Array] {
   const target = spark.display.target!;
   const { base, count } = spark.display.mapping.find(({ node }) => node === generator)!;
   const rows = Math.ceil(count / WIDTH);
-  const texels = [0, 1].map((texture) => {
+  const read = (texture: number) => {
     const out = new Uint32Array(WORDS * WIDTH * rows);
     renderer.readRenderTargetPixels(target, 0, base / WIDTH, WIDTH, rows, out, undefined, texture);
     return out;
-  });
-  return unpack(texels[0]!, texels[1]!, count);
+  };
+  return [read(0), read(1)];
 }
 
 /** Spark's extended splats: (x, y, z, half2(alpha, –)), (half2(r, g), half2(b, –), –, –). */
