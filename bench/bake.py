@@ -7,6 +7,7 @@ the others weigh them by what the picture shows of them.
 """
 
 import json
+import sys
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ from ico3d.avatar.baking import head_bundle, head_cost
 from ico3d.avatar.baking.samples import recorded_samples
 from ico3d.avatar.baking.shader_head import BakeSettings, HeadBaker, megabytes_per_10k
 from ico3d.capture.formats import open_capture
+from ico3d.cli import run_script
 from ico3d.head.model_folder import TrainedHead
 
 
@@ -61,4 +63,4 @@ class Bench:
 
 
 if __name__ == "__main__":
-    tyro.cli(Bench).run()
+    sys.exit(run_script(Bench))

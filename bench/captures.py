@@ -6,6 +6,7 @@ python bench/captures.py path/to/0012_11.smc --height 612 --json captures.json
 import gc
 import json
 import resource
+import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ import tyro
 
 from ico3d.capture.formats import open_capture
 from ico3d.capture.importing.resized import ResizedCapture
+from ico3d.cli import run_script
 
 
 @dataclass(frozen=True)
@@ -76,4 +78,4 @@ def peak() -> float:
 
 
 if __name__ == "__main__":
-    tyro.cli(Bench).run()
+    sys.exit(run_script(Bench))

@@ -7,6 +7,7 @@ Gaussians of SH degree 3.
 """
 
 import json
+import sys
 import tempfile
 import time
 import tracemalloc
@@ -19,6 +20,7 @@ import tyro
 
 from ico3d.avatar.render_bundle import baked_gaussians, visitor_camera
 from ico3d.bundle.format import Bundle
+from ico3d.cli import run_script
 from ico3d.splat.files.formats import read_gaussians, write_gaussians
 from ico3d.splat.files.raw import RawGaussians
 from ico3d.splat.gaussians import Gaussians
@@ -127,4 +129,4 @@ def psnr(before: Gaussians, after: Gaussians, camera) -> float:
 
 
 if __name__ == "__main__":
-    tyro.cli(Bench).run()
+    sys.exit(run_script(Bench))

@@ -11,13 +11,11 @@ import asyncio
 import statistics
 import sys
 import time
+from dataclasses import dataclass
 from functools import partial
 
 from loguru import logger
-
-logger.remove()
-
-from pipecat.frames.frames import (  # noqa: E402
+from pipecat.frames.frames import (
     EndFrame,
     Frame,
     LLMContextFrame,
@@ -26,20 +24,20 @@ from pipecat.frames.frames import (  # noqa: E402
     LLMTextFrame,
     TTSAudioRawFrame,
 )
-from pipecat.pipeline.pipeline import Pipeline  # noqa: E402
-from pipecat.pipeline.worker import PipelineParams, PipelineWorker  # noqa: E402
-from pipecat.processors.aggregators.llm_context import LLMContext  # noqa: E402
-from pipecat.processors.aggregators.llm_text_processor import LLMTextProcessor  # noqa: E402
-from pipecat.processors.frame_processor import FrameDirection, FrameProcessor  # noqa: E402
-from pipecat.workers.runner import WorkerRunner  # noqa: E402
+from pipecat.pipeline.pipeline import Pipeline
+from pipecat.pipeline.worker import PipelineParams, PipelineWorker
+from pipecat.processors.aggregators.llm_context import LLMContext
+from pipecat.processors.aggregators.llm_text_processor import LLMTextProcessor
+from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
+from pipecat.workers.runner import WorkerRunner
 
-from ico3d.chat.services.voice import espeak  # noqa: E402
-from ico3d.chat.services.voice.clauses import ClauseProcessor  # noqa: E402
-from ico3d.chat.services.voice.pieces import PieceVoice  # noqa: E402
-from ico3d.chat.wire.protocol import SPEECH_RATE  # noqa: E402
+from ico3d.chat.services.voice import espeak
+from ico3d.chat.services.voice.clauses import ClauseProcessor
+from ico3d.chat.services.voice.pieces import PieceVoice
+from ico3d.chat.wire.protocol import SPEECH_RATE
+from ico3d.cli import run_script
 
 TOKEN = 4  # characters
-SPEEDS = (10, 20, 50)  # tokens per second: a small model on a CPU to a served one on a GPU
 ANSWERS = (
     "That is a good question, and the answer depends on how much time you have today.",
     "In the year 1969, two people walked on the moon, and the whole world was watching them.",
@@ -48,6 +46,23 @@ ANSWERS = (
     "Yes. I can help you with that if you tell me where you want to go.",
     "Natürlich, das machen wir gern, aber bitte sagen Sie uns vorher, wann Sie kommen möchten.",
 )
+
+
+@dataclass(frozen=True)
+class FirstClause:
+    """The bench.
+
+    Attributes:
+        speeds: Tokens per second of the language model; by default those of a small one on a CPU
+            to those of a served one on a GPU.
+    """
+
+    speeds: tuple[int, ...] = (10, 20, 50)
+
+    def run(self) -> None:
+        """Prints a table."""
+        logger.remove()  # pipecat tells of every frame
+        asyncio.run(measure(self.speeds))
 
 
 class ScriptedModel(FrameProcessor):
@@ -104,10 +119,11 @@ async def spoken(answer: str, speed: float, pieces: FrameProcessor) -> tuple[flo
     return first - began, gap
 
 
-async def main() -> None:
+async def measure(speeds: tuple[int, ...]) -> None:
+    """Prints a row for each speed."""
     await spoken("Warm up.", 1000, ClauseProcessor())
     print("tokens/s  by sentence  by clause  ratio: median, least, most  gap: median, most")
-    for speed in SPEEDS:
+    for speed in speeds:
         whole = [await spoken(answer, speed, LLMTextProcessor()) for answer in ANSWERS]
         cut = [await spoken(answer, speed, ClauseProcessor()) for answer in ANSWERS]
         late, early, gaps = (
@@ -123,4 +139,4 @@ async def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(asyncio.run(main()))
+    sys.exit(run_script(FirstClause))

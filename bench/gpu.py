@@ -19,10 +19,10 @@ from pathlib import Path
 
 import numpy as np
 import torch
-import tyro
 from torch import Tensor
 
 from ico3d.capture.formats import open_capture
+from ico3d.cli import run_script
 from ico3d.common.camera import Camera, look_at
 from ico3d.common.device import DeviceName
 from ico3d.head.model import HeadModel, HeadShape
@@ -191,4 +191,4 @@ def _within_bounds(differences: dict[str, float]) -> bool:
 
 
 if __name__ == "__main__":
-    sys.exit(tyro.cli(Bench).run())
+    sys.exit(run_script(Bench))

@@ -21,6 +21,7 @@ from typing import Literal
 import numpy as np
 import tyro
 
+from ico3d.cli import run_script
 from ico3d.head.settings import PRESETS
 
 STEP_FACTOR = {"full": 1.0, "no-mlp": 1.6, "no-blending": 1.0, "static": 1.6}
@@ -99,4 +100,4 @@ def print_table(table: dict[str, dict[str, float | None]]) -> None:
 
 
 if __name__ == "__main__":
-    tyro.cli(Bench).run()
+    sys.exit(run_script(Bench))

@@ -8,6 +8,7 @@ OUT/variants.jpg shows recorded pictures and the variants, beside one another.
 """
 
 import json
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -26,6 +27,7 @@ from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.settings import JoiningSettings
 from ico3d.body.settings import BodySettings
 from ico3d.capture.capture import Capture
+from ico3d.cli import run_script
 from ico3d.common.camera import Camera
 from ico3d.measure.methods.bench import open_clip
 from ico3d.measure.methods.settings import OURS, preset
@@ -122,4 +124,4 @@ def _pictures(avatars: dict[str, TrainedAvatar], capture: Capture) -> Image.Imag
 
 
 if __name__ == "__main__":
-    tyro.cli(Joining).run()
+    sys.exit(run_script(Joining))

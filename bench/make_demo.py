@@ -17,6 +17,7 @@ import tyro
 
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.packaged import FILE
+from ico3d.cli import run_script
 
 MAX_BYTES = 12 << 20
 GESTURES = ("wave", "point", "open_hands", "shrug", "count_three", "nod", "shake", "think")
@@ -89,4 +90,4 @@ def ico3d(verb: str, *words: object) -> None:
 
 
 if __name__ == "__main__":
-    tyro.cli(Demo).run()
+    sys.exit(run_script(Demo))

@@ -29,6 +29,7 @@ from ico3d.capture.capture import Capture
 from ico3d.capture.face.canonical import canonical_landmarks
 from ico3d.capture.formats import open_capture
 from ico3d.capture.importing.resized import ResizedCapture
+from ico3d.cli import run_script
 from ico3d.head.model_folder import TrainedHead
 from ico3d.head.settings import PRESETS, HeadSettings, Initial
 from ico3d.head.train_head import HeadJob, train_head
@@ -143,4 +144,4 @@ def _away(placement: Placement, points: np.ndarray | None) -> float:
 
 
 if __name__ == "__main__":
-    tyro.cli(Placing).run()
+    sys.exit(run_script(Placing))

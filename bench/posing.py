@@ -7,11 +7,13 @@ CAPTURE is what `ico3d capture synthetic --rig body` wrote and `ico3d capture po
 that DNA-Rendering annotates, with noise and without masks.
 """
 
-import argparse
 import json
+import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import tyro
 
 from ico3d.capture.formats import open_capture
 from ico3d.capture.posing.model.landmarks import LANDMARKS
@@ -20,6 +22,8 @@ from ico3d.capture.posing.model.template import load_template
 from ico3d.capture.posing.seeing.evidence import ANNOTATED_STRAY, Evidence
 from ico3d.capture.posing.seeing.outlines import Outlines
 from ico3d.capture.posing.tracking import fit
+from ico3d.cli import run_script
+from ico3d.errors import CaptureError
 from ico3d.rig.body_track import BodyTrack
 from ico3d.studio.truth import TrueJoints, true_joints
 
@@ -29,11 +33,47 @@ NOISE = 0.003
 """Metres along each axis by which annotated joints err."""
 
 
+@dataclass(frozen=True)
+class Posing:
+    """The bench.
+
+    Attributes:
+        capture: Recording of a synthetic person's whole body.
+        subject: Subject file (.npz) that it shows.
+        annotated: Do not read the track: fit a skeleton to true joints with noise.
+        json: Where to write the table.
+    """
+
+    capture: tyro.conf.Positional[Path]
+    subject: tyro.conf.Positional[Path]
+    annotated: bool = False
+    json: Path | None = None
+
+    def run(self) -> None:
+        """Prints a table, and writes it as JSON."""
+        true = true_joints(self.capture, self.subject)
+        track = annotated(self.capture, true) if self.annotated else fitted(self.capture)
+        found = errors(track, true)
+        groups = {
+            "body": [name for name in found if name.split(".")[0] in MAIN],
+            "fingers": [name for name in found if name.startswith("finger")],
+        }
+        table = {group: figures(found, names) for group, names in groups.items()}
+        for group, row in table.items():
+            print(f"{group:8}", *(f"{key} {value:.1f} mm" for key, value in row.items()))
+        for name in groups["body"]:
+            middle = np.median(np.linalg.norm(found[name], axis=1))
+            constant = np.linalg.norm(found[name].mean(0))
+            print(f"{name:14} median {middle:5.1f} mm, constant {constant:5.1f}")
+        if self.json is not None:
+            self.json.write_text(json.dumps(table, indent=1))
+
+
 def fitted(capture: Path) -> BodyTrack:
     """The track that lies in a recording."""
     track = open_capture(capture).body_track()
     if track is None:
-        raise SystemExit(f"{capture} has no track: run ico3d capture pose {capture} first.")
+        raise CaptureError(f"{capture} has no track: run ico3d capture pose {capture} first.")
     return track
 
 
@@ -76,32 +116,5 @@ def figures(found: dict[str, np.ndarray], names: list[str]) -> dict[str, float]:
     }
 
 
-def main() -> None:
-    """Prints a table, and writes it as JSON."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("capture", type=Path)
-    parser.add_argument("subject", type=Path)
-    parser.add_argument("--json", type=Path)
-    parser.add_argument("--annotated", action="store_true")
-    arguments = parser.parse_args()
-    true = true_joints(arguments.capture, arguments.subject)
-    exact = arguments.annotated
-    track = annotated(arguments.capture, true) if exact else fitted(arguments.capture)
-    found = errors(track, true)
-    groups = {
-        "body": [name for name in found if name.split(".")[0] in MAIN],
-        "fingers": [name for name in found if name.startswith("finger")],
-    }
-    table = {group: figures(found, names) for group, names in groups.items()}
-    for group, row in table.items():
-        print(f"{group:8}", *(f"{key} {value:.1f} mm" for key, value in row.items()))
-    for name in groups["body"]:
-        middle = np.median(np.linalg.norm(found[name], axis=1))
-        constant = np.linalg.norm(found[name].mean(0))
-        print(f"{name:14} median {middle:5.1f} mm, constant {constant:5.1f}")
-    if arguments.json is not None:
-        arguments.json.write_text(json.dumps(table, indent=1))
-
-
 if __name__ == "__main__":
-    main()
+    sys.exit(run_script(Posing))

@@ -19,6 +19,7 @@ from smc_line import timed
 
 from ico3d.bundle.format import Bundle
 from ico3d.capture.formats import open_capture
+from ico3d.cli import run_script
 
 FPS = 30
 LEAST = 30.0
@@ -83,4 +84,4 @@ class RenderMeHead:
 
 
 if __name__ == "__main__":
-    tyro.cli(RenderMeHead).run()
+    sys.exit(run_script(RenderMeHead))

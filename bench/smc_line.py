@@ -20,6 +20,7 @@ from smc_files import write_dna, write_renderme
 
 from ico3d.bundle.format import Bundle
 from ico3d.capture.formats import open_capture
+from ico3d.cli import run_script
 
 FPS = 15
 LIMIT = 40.0
@@ -123,4 +124,4 @@ def timed(verb: str, *words: object) -> float:
 
 
 if __name__ == "__main__":
-    tyro.cli(Line).run()
+    sys.exit(run_script(Line))

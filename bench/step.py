@@ -8,6 +8,7 @@ what is left is the basis' optimiser, which torch does not see, and small operat
 """
 
 import json
+import sys
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +19,7 @@ import tyro
 from torch.profiler import ProfilerActivity, profile
 
 from ico3d.capture.formats import open_capture
+from ico3d.cli import run_script
 from ico3d.head.expressions import BlendshapeTrack
 from ico3d.head.initial_gaussians import initial_head
 from ico3d.head.optimise import HeadTrainer
@@ -89,4 +91,4 @@ class Bench:
 
 
 if __name__ == "__main__":
-    tyro.cli(Bench).run()
+    sys.exit(run_script(Bench))

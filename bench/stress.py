@@ -13,11 +13,12 @@ import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import tyro
 
+from ico3d.cli import run_script
 from ico3d.common.espeak import Speech, synthesize
 from ico3d.motion.clip import Clip
 from ico3d.motion.composing.accents import FRAME, loudness, smoothed, timed_words
@@ -74,9 +75,16 @@ class Stress:
         json: Where the figures go.
     """
 
-    subject: Annotated[Path, tyro.conf.Positional]
+    subject: tyro.conf.Positional[Path]
     seed: int = 0
     json: Path | None = None
+
+    def run(self) -> None:
+        """Prints, and writes, the figures."""
+        figures = measure(self.subject, self.seed)
+        print(json.dumps(figures, indent=1))
+        if self.json is not None:
+            self.json.write_text(json.dumps(figures, indent=1) + "\n")
 
 
 def rig_of(subject: Path) -> Rig:
@@ -172,18 +180,18 @@ def _shared(cue: Cue, other: Cue, clips: dict[str, Clip]) -> bool:
     return bool(one & two)
 
 
-def measure(bench: Stress) -> dict[str, Any]:
+def measure(subject: Path, seed: int) -> dict[str, Any]:
     """Speaks, composes, performs and measures."""
-    rest = living(rig_of(bench.subject), bench.seed)
+    rest = living(rig_of(subject), seed)
     clips = library(rest.person)
     to_peak, to_vowel, chance_peak, chance_vowel = [], [], [], []
     cut, count, seconds = 0, 0, 0.0
-    random = np.random.default_rng(bench.seed)
+    random = np.random.default_rng(seed)
     names: dict[str, int] = {}
     for number, text in enumerate(SENTENCES):
         for voice in VOICES:
             speech = synthesize(text, voice)
-            directions = composed(speech, text, clips, bench.seed + number)
+            directions = composed(speech, text, clips, seed + number)
             performer = Performer(rest, clips)
             performer.follow(directions)
             length = len(speech.samples) / speech.rate
@@ -223,8 +231,4 @@ def measure(bench: Stress) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    settings = tyro.cli(Stress, args=sys.argv[1:])
-    figures = measure(settings)
-    print(json.dumps(figures, indent=1))
-    if settings.json is not None:
-        settings.json.write_text(json.dumps(figures, indent=1) + "\n")
+    sys.exit(run_script(Stress))

@@ -2,7 +2,7 @@
 
 import importlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -73,6 +73,10 @@ VERBS: dict[str, Verb] = {
 }
 
 
+STYLE = (tyro.conf.PositionalMetavarFromFieldName, tyro.conf.DisallowNone)
+"""How options are made of settings."""
+
+
 def usage(group: str | None = None) -> str:
     """The list of verbs that `ico3d --help` prints, or `ico3d GROUP` those of a group."""
     verbs = [verb for verb in VERBS if group in (None, verb.split()[0])]
@@ -100,7 +104,7 @@ def parsed(verb: str, words: Sequence[str]) -> Any:
         prog=f"ico3d {verb}",
         args=list(words),
         default=default,
-        config=(tyro.conf.PositionalMetavarFromFieldName, tyro.conf.DisallowNone),
+        config=STYLE,
     )
 
 
@@ -120,14 +124,33 @@ def main(arguments: list[str] | None = None) -> int:
     verb = verb_of(words)
     if verb is None:
         return _list_verbs(words)
+    return ended(lambda: parsed(verb, words[len(verb.split()) :]).run())
+
+
+def run_script(settings: type) -> int:
+    """Runs a script of its own (`bench/`), whose options are the fields of a settings class.
+
+    Its `--help` shows the script's docstring.
+
+    Args:
+        settings: The class; it has a method `run`, which may return an exit status.
+
+    Returns:
+        The exit status, as of `ended`.
+    """
+    about = sys.modules[settings.__module__].__doc__
+    return ended(tyro.cli(settings, description=about, config=STYLE).run)
+
+
+def ended(run: Callable[[], int | None]) -> int:
+    """The exit status of what runs: its own, or 1 for an error the user can mend, which is said."""
     try:
-        parsed(verb, words[len(verb.split()) :]).run()
+        return run() or 0
     except Ico3dError as error:
         print(f"ico3d: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         return 130
-    return 0
 
 
 def _list_verbs(words: Sequence[str]) -> int:

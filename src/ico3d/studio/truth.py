@@ -41,9 +41,12 @@ def true_joints(folder: Path, subject: Path) -> TrueJoints:
         subject: The person's file, of which the recording stores only the name.
 
     Raises:
-        CaptureError: If the recording does not show a whole person.
+        CaptureError: If the folder holds no synthetic recording, or not of a whole person.
     """
-    settings = json.loads((folder / "capture.json").read_text())["settings"]
+    file = folder / "capture.json"
+    settings = json.loads(file.read_text()).get("settings") if file.exists() else None
+    if settings is None:
+        raise CaptureError(f"{folder} is no recording that ico3d capture synthetic made.")
     known = [field.name for field in fields(Recording) if field.name in settings]
     recording = Recording(**{name: settings[name] for name in known})  # older ones know fewer
     person = load_subject(str(subject), recording.whole)
