@@ -22,8 +22,7 @@ from pipecat.frames.frames import (
     VADUserStoppedSpeakingFrame,
 )
 from pipecat.processors.frame_processor import FrameDirection, FrameProcessor
-from pipecat.services.llm_service import LLMService
-from pipecat.services.settings import LLMSettings, STTSettings, TTSSettings
+from pipecat.services.settings import STTSettings, TTSSettings
 from pipecat.services.stt_service import STTService
 from pipecat.services.tts_service import TTSService
 from pipecat.utils.time import time_now_iso8601
@@ -97,12 +96,12 @@ class Recognition(STTService):
         await self.push_frame(words)
 
 
-class Language(LLMService):
+class Language(FrameProcessor):
     """A language model that gives the same answer to every question, word by word."""
 
     def __init__(self, script: Script):
         """Creates the language model of one session."""
-        super().__init__(settings=LLMSettings(model="scripted"))
+        super().__init__()
         self._script = script
 
     async def process_frame(self, frame: Frame, direction: FrameDirection):
