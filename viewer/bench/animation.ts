@@ -9,7 +9,7 @@ import { compare, SAME } from './compare.ts';
 import type { Frame } from './page/drawing.ts';
 
 const GAUSSIANS = '3500,2500'; // on the head, on the body
-const MOST_COST = 1.25; // of the still scene, where nothing else keeps both cores busy
+const MOST_COST = 1.25; // of the still scene
 const LONGEST = 3; // of the median
 
 test('an animated person against the same splats at rest', async () => {
@@ -29,6 +29,6 @@ test('an animated person against the same splats at rest', async () => {
   );
   expect(likeness).toBeGreaterThan(SAME);
   expect(changes.length).toBeGreaterThan(4);
-  expect(cost).toBeLessThan(MOST_COST);
+  expect(cost, 'frame time of the still scene, on a machine without other work').toBeLessThan(MOST_COST);
   expect(longest).toBeLessThan(Math.max(LONGEST, noise));
 });

@@ -1,6 +1,6 @@
 import { createServer } from 'vite';
 import { Browser } from '../support/browser/browser.ts';
-import { psnr, takePixels } from '../support/browser/pictures.ts';
+import { lookAsBundled, psnr, takePixels } from '../support/browser/pictures.ts';
 import { processorTime } from '../support/processor.ts';
 import { REPOSITORY } from '../support/python.ts';
 import { servePage } from '../support/servers/static.ts';
@@ -37,6 +37,7 @@ export async function compare(folder: string, script: string): Promise<Compariso
   const browser = await Browser.launch({ width: WIDTH, height: HEIGHT });
   const { page } = browser;
   await browser.open(pages.resolvedUrls!.local[0]!);
+  await lookAsBundled(page, folder);
   await page.evaluate(() => window.ico3d!.stage.still());
   await page.addScriptTag({ type: 'module', url: `/bench/page/${script}` });
   await page.waitForFunction(() => window.scenes !== undefined, undefined, { timeout: 120_000 });

@@ -9,5 +9,5 @@ const MOST_COST = 1.2; // of the still scene
 test('a body on a skeleton against the same splats at rest', async () => {
   const { likeness, cost } = await compare(makeSkinned({ gaussians: GAUSSIANS, times: [] }).folder, 'skinned.ts');
   expect(likeness).toBeGreaterThan(SAME);
-  expect(cost).toBeLessThan(MOST_COST);
+  expect(cost, 'frame time of the still scene, on a machine without other work').toBeLessThan(MOST_COST);
 });
