@@ -3,12 +3,15 @@
 import re
 import subprocess
 import sys
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
 
 import pytest
+import tyro
 
 from ico3d import cli
 from ico3d.body.settings import BodySettings
+from ico3d.errors import CaptureError
 from ico3d.head.settings import PRESETS, HeadSettings, Network
 from ico3d.scene.settings import SceneSettings
 from ico3d.speech.training.settings import EncoderSettings
@@ -121,6 +124,32 @@ def test_presets_depend_on_method_and_strategy(preset):
 )
 def test_what_is_wrong_is_said(shown, words, said):
     assert said in shown(f"train head capture out {words}", status=2)
+
+
+@dataclass(frozen=True)
+class Script:
+    """What a script of its own measures.
+
+    Attributes:
+        capture: Where the recording lies.
+    """
+
+    capture: tyro.conf.Positional[Path]
+
+    def run(self) -> None:
+        raise CaptureError(f"there is no capture at {self.capture}.")
+
+
+def test_a_script_says_what_it_measures_and_what_is_wrong_as_verbs_do(capsys, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["bench/script.py", "nowhere"])
+    assert cli.run_script(Script) == 1
+    assert capsys.readouterr().err == "ico3d: there is no capture at nowhere.\n"
+    monkeypatch.setattr(sys, "argv", ["bench/script.py", "--help"])
+    with pytest.raises(SystemExit):
+        cli.run_script(Script)
+    told = capsys.readouterr().out
+    assert "bench/script.py [-h] CAPTURE" in told and __doc__ is not None
+    assert __doc__ in told and "Where the recording lies." in told
 
 
 def test_a_group_lists_its_verbs(shown):
