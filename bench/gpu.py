@@ -21,6 +21,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ico3d.capture.capture import Capture
 from ico3d.capture.formats import open_capture
 from ico3d.cli import run_script
 from ico3d.common.camera import Camera, look_at
@@ -155,6 +156,7 @@ class Bench:
     def run(self) -> int:
         """Measures, prints, writes; the exit status."""
         device = decided(self.device)
+        capture = self.capture and open_capture(self.capture)
         name = device_name(torch.device(device))
         if device == "cpu":
             name = f"cpu ({platform.machine()}, {os.cpu_count()} cores)"
@@ -162,8 +164,8 @@ class Bench:
         figures["ms"] = raster_rows(device, self.runs) | head_rows(device, self.runs)
         if device == "cuda":
             figures["parity"] = parity()
-        if self.capture is not None:
-            figures["training_seconds"] = self._train(self.capture)
+        if capture is not None:
+            figures["training_seconds"] = self._train(capture)
         self.json.write_text(json.dumps(figures, indent=1))
         print(
             f"{figures['device']}, torch {figures['torch']}\n\n| | ms | per second |\n|---|---|---|"
@@ -176,10 +178,10 @@ class Bench:
             print(f"| training a head | {1000 * figures['training_seconds']:.0f} | |")
         return int(not _within_bounds(figures.get("parity", {})))
 
-    def _train(self, path: Path) -> float:
+    def _train(self, capture: Capture) -> float:
         job = HeadJob("blendshapes", "full", "builtin", 0, PRESETS["cpu"])
         with tempfile.TemporaryDirectory() as folder:
-            head = train_head(open_capture(path), Path(folder), job, device=self.device)
+            head = train_head(capture, Path(folder), job, device=self.device)
         return head.summary["train_seconds"]
 
 

@@ -77,8 +77,9 @@ class Bench:
 
 
 def _ico3d(*words: object) -> None:
-    """Runs one command in a process of its own, as a user would."""
-    subprocess.run([sys.executable, "-m", "ico3d.cli", *map(str, words)], check=True)
+    """Runs one command as a user would; ends this program where it fails."""
+    if subprocess.run([sys.executable, "-m", "ico3d.cli", *map(str, words)]).returncode:
+        sys.exit(f"ico3d {' '.join(map(str, words[:2]))} failed.")
 
 
 def _means(rows: list[dict]) -> dict[str, float | None]:

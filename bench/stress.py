@@ -20,6 +20,7 @@ import tyro
 
 from ico3d.cli import run_script
 from ico3d.common.espeak import Speech, synthesize
+from ico3d.errors import SettingsError
 from ico3d.motion.clip import Clip
 from ico3d.motion.composing.accents import FRAME, loudness, smoothed, timed_words
 from ico3d.motion.composing.composer import Composer, limbs
@@ -29,6 +30,7 @@ from ico3d.motion.gestures.library import library
 from ico3d.motion.living import living
 from ico3d.motion.person import Person
 from ico3d.rig.rig import Rig
+from ico3d.studio.person.choice import load_subject
 
 SENTENCES = (
     "Hello, and welcome! I am very glad that you are here.",
@@ -88,11 +90,16 @@ class Stress:
 
 
 def rig_of(subject: Path) -> Rig:
-    """The skeleton of a subject file."""
-    with np.load(subject) as content:
-        names = tuple(map(str, content["joint_names"]))
-        parents = tuple(map(int, content["joint_parents"]))
-        return Rig(names, parents, content["joint_pos"].astype(float))
+    """The skeleton of a subject file.
+
+    Raises:
+        SettingsError: If it has no body.
+    """
+    person = load_subject(str(subject), whole=True)
+    if person.skeleton is None:
+        raise SettingsError(f"{subject} has no body.")
+    bones = person.skeleton
+    return Rig(bones.names, tuple(map(int, bones.parents)), bones.at + person.head_in_world)
 
 
 def composed(speech: Speech, text: str, clips: dict[str, Clip], seed: int) -> list[Direction]:
