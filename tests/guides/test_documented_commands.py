@@ -13,8 +13,8 @@ from types import ModuleType
 import pytest
 import tyro
 
+from guides.written_commands import PAGES, ROOT, named, of_script, of_target, shown
 from ico3d import cli
-from support.written_commands import PAGES, ROOT, named, of_script, of_target, shown
 
 GROUPED = re.compile(r"--[a-z0-9-]+\.[a-z0-9-]+")
 """An option with the name of its group."""
