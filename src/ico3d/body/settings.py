@@ -283,7 +283,8 @@ class BodySettings:
         color_correction: Let each camera learn an affine correction of colours, for cameras whose
             colours differ.
         checkpoint_every: Steps from one checkpoint to the next.
-        cache_gib: Memory for recorded pictures, GiB; what does not fit is read again at each use.
+        cache_gib: Memory for recorded pictures, GiB; what does not fit is read again, in the
+            background, before each use.
         windows: Where the clip is cut into windows.
         encoder: The encoding of place and time that the MLP reads.
         mlp: The tunable MLP, which moves the Gaussians.

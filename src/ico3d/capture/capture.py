@@ -61,6 +61,14 @@ class Capture(ABC):
     def image(self, camera: int, frame: int) -> np.ndarray | None:
         """The picture of a camera in a frame, or None if it was not recorded."""
 
+    def has_image(self, camera: int, frame: int) -> bool:
+        """Whether a picture was recorded; formats say so without decoding it."""
+        return self.image(camera, frame) is not None
+
+    def has_mask(self, camera: int, frame: int) -> bool:
+        """Whether there is a mask of the person; formats say so without decoding it."""
+        return self.mask(camera, frame) is not None
+
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
         """The mask (H, W) of the person in a picture: 1 inside."""
         return None

@@ -1,6 +1,8 @@
 """Decodes pictures completely or not at all: a truncated JPEG is an error, not half grey."""
 
 import io
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -25,16 +27,10 @@ def decoded(source: Path | bytes, what: str) -> np.ndarray:
     Raises:
         CaptureError: If the picture is damaged or has more than 8 bits per value.
     """
-    try:
-        with Image.open(io.BytesIO(source) if isinstance(source, bytes) else source) as picture:
-            if picture.mode[0] in "IF":
-                raise CaptureError(f"{what} has more than 8 bits per value: convert it to 8 bits.")
-            clear = "A" in picture.getbands() or "transparency" in picture.info
-            return np.asarray(picture.convert("RGBA" if clear else "RGB"))
-    except FileNotFoundError as error:
-        raise CaptureError(f"{what} is missing.") from error
-    except (UnidentifiedImageError, *DAMAGED) as error:
-        raise CaptureError(f"{what} is damaged and cannot be decoded.") from error
+    with _opened(source, what) as picture:
+        if picture.mode[0] in "IF":
+            raise CaptureError(f"{what} has more than 8 bits per value: convert it to 8 bits.")
+        return np.asarray(picture.convert("RGBA" if _is_clear(picture) else "RGB"))
 
 
 def size_of(source: Path | bytes, what: str) -> tuple[int, int]:
@@ -43,13 +39,18 @@ def size_of(source: Path | bytes, what: str) -> tuple[int, int]:
     Raises:
         CaptureError: If the picture is missing or damaged.
     """
-    try:
-        with Image.open(io.BytesIO(source) if isinstance(source, bytes) else source) as picture:
-            return picture.size
-    except FileNotFoundError as error:
-        raise CaptureError(f"{what} is missing.") from error
-    except (UnidentifiedImageError, *DAMAGED) as error:
-        raise CaptureError(f"{what} is damaged and cannot be decoded.") from error
+    with _opened(source, what) as picture:
+        return picture.size
+
+
+def has_opacity(source: Path | bytes, what: str) -> bool:
+    """Whether a picture has transparent parts, from the file's header alone.
+
+    Raises:
+        CaptureError: If the picture is missing or damaged.
+    """
+    with _opened(source, what) as picture:
+        return _is_clear(picture)
 
 
 def unit(picture: np.ndarray) -> np.ndarray:
@@ -61,3 +62,20 @@ def largest_channel(picture: np.ndarray) -> np.ndarray:
     """(H, W) maximum of red, green and blue, which is the value of mask pictures."""
     # Ten times as fast as a maximum along an axis of length 3.
     return np.maximum(np.maximum(picture[..., 0], picture[..., 1]), picture[..., 2])
+
+
+@contextmanager
+def _opened(source: Path | bytes, what: str) -> Iterator[Image.Image]:
+    """An open picture; what Pillow cannot read within is one sentence."""
+    try:
+        with Image.open(io.BytesIO(source) if isinstance(source, bytes) else source) as picture:
+            yield picture
+    except FileNotFoundError as error:
+        raise CaptureError(f"{what} is missing.") from error
+    except (UnidentifiedImageError, *DAMAGED) as error:
+        raise CaptureError(f"{what} is damaged and cannot be decoded.") from error
+
+
+def _is_clear(picture: Image.Image) -> bool:
+    """Whether a picture has transparent parts."""
+    return "A" in picture.getbands() or "transparency" in picture.info

@@ -62,6 +62,14 @@ class SyntheticCapture(Capture):
             "licence": str(self._about.get("licence", "")),
         }
 
+    def has_image(self, camera: int, frame: int) -> bool:
+        """Whether the camera recorded this frame."""
+        return bool(self._frames["views"][self._index(frame), camera])
+
+    def has_mask(self, camera: int, frame: int) -> bool:
+        """Every picture has a mask."""
+        return self.has_image(camera, frame)
+
     def image(self, camera: int, frame: int) -> np.ndarray | None:
         """The picture, or None if the camera did not record this frame."""
         return self._picture("images", camera, frame, "RGB")
@@ -125,7 +133,7 @@ class SyntheticCapture(Capture):
         return frame
 
     def _picture(self, folder: str, camera: int, frame: int, mode: str) -> np.ndarray | None:
-        if not self._frames["views"][self._index(frame), camera]:
+        if not self.has_image(camera, frame):
             return None
         seen = self.cameras[camera]
         file = self.path / folder / seen.name / f"{frame:06d}.png"

@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from ico3d.capture.capture import Capture
+from ico3d.capture.pictures import AHEAD
 from ico3d.errors import CaptureError, SettingsError
 from ico3d.head.basis import update_basis
 from ico3d.head.density import HeadDensity, Sampled, bound_scales
@@ -20,6 +21,7 @@ from ico3d.splat.density import contributions
 from ico3d.splat.losses import tensor_psnr
 from ico3d.splat.render import render
 from ico3d.training.acceleration import accelerated
+from ico3d.training.epochs import Epochs
 from ico3d.training.optimiser import Optimiser
 
 CPU = torch.device("cpu")
@@ -71,6 +73,7 @@ class HeadTrainer:
         self.views = self.pictures.views(capture.split.train, LEAST_TOLD)
         if not self.views:
             raise CaptureError(f"{capture.path} has no picture among its training frames.")
+        self._epochs = Epochs([seed], len(self.views))
         few = FEW_FRAMES / len(capture.split.train)
         self._weight_decay = settings.rates.basis_weight_decay * few**4
         self.poses = poses_digest(capture)
@@ -90,6 +93,7 @@ class HeadTrainer:
     def step(self, index: int) -> Mapping[str, float]:
         """Renders one picture and updates the parameters; returns the loss and other numbers."""
         view = self._view(index)
+        self.pictures.expect(self._view(later) for later in range(index, index + AHEAD))
         picture = self.pictures.picture(view, self.model.device)
         background, target = self._staged(view, picture, index)
         expression = self._expression(view)  # (B,)
@@ -149,12 +153,8 @@ class HeadTrainer:
         return {"box": box, "poses": self.poses}
 
     def _view(self, index: int) -> View:
-        """Every view once per epoch, in an order of its own."""
-        epoch, place = divmod(index, len(self.views))
-        if place == 0 or not hasattr(self, "_order"):
-            rng = np.random.default_rng([self._seed, epoch])
-            self._order = rng.permutation(len(self.views))
-        return self.views[self._order[place]]
+        """The view of a step."""
+        return self.views[self._epochs.at(index)]
 
     def _staged(self, view: View, picture: Picture, index: int) -> tuple[Tensor, Tensor]:
         """The background to render over, and the recorded picture over that background.

@@ -146,7 +146,8 @@ class HeadSettings:
         steps: Optimisation steps, one picture each.
         optimiser: Adam, or stochastic gradient descent as the paper says.
         checkpoint_every: Steps from one checkpoint to the next.
-        cache_gib: Memory for recorded pictures, GiB; what does not fit is read again at each use.
+        cache_gib: Memory for recorded pictures, GiB; what does not fit is read again, in the
+            background, before each use.
         mixed_precision: Multiply the MLP's matrices in bfloat16; on CUDA only.
         compile: Compile the MLP with torch.compile, which takes half a minute at the start.
         network: Size of the model.

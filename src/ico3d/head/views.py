@@ -2,7 +2,7 @@
 
 import hashlib
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -119,9 +119,9 @@ class PictureCache:
         told, untold = [], []
         for frame in frames:
             for camera in range(len(self._capture.cameras)):
-                layers = self._cache.layers(camera, frame)
-                if layers is not None:
-                    tells = layers[1] is not None or self._plate(camera) is not None
+                if self._capture.has_image(camera, frame):
+                    masked = self._capture.has_mask(camera, frame)
+                    tells = masked or self._plate(camera) is not None
                     (told if tells else untold).append(view_of(self._capture, camera, frame))
         if told and len(told) < least * (len(told) + len(untold)):
             raise CaptureError(
@@ -141,6 +141,10 @@ class PictureCache:
         if plate is not None and plate.device != device:  # every step wants it there
             plate = self._backgrounds[index] = plate.to(device)
         return plate
+
+    def expect(self, views: Iterable[View]) -> None:
+        """Begins to read views that will be asked for soon."""
+        self._cache.expect(views)
 
     def picture(self, view: View, device: torch.device) -> Picture:
         """The picture and masks of a recorded view, on `device`.

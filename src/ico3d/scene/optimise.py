@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ico3d.capture.pictures import View
+from ico3d.capture.pictures import AHEAD, View
 from ico3d.scene.model import NAMES, StaticScene
 from ico3d.scene.settings import SceneSettings, StrategyName
 from ico3d.scene.surface_points import Start
@@ -23,6 +23,7 @@ from ico3d.splat.density import (
 from ico3d.splat.losses import photometric, tensor_psnr
 from ico3d.splat.render import render
 from ico3d.splat.rendering import Rendering
+from ico3d.training.epochs import Epochs
 from ico3d.training.optimiser import Optimiser
 
 CLONE_BELOW = 0.01
@@ -55,6 +56,7 @@ class SceneTrainer:
         """
         self.scene = start.scene
         self._views, self._settings, self._seed = views, settings, seed
+        self._epochs = Epochs([seed], len(views.train))
         self._extent = start.extent
         self._optimiser = Optimiser()
         self._strategy = density_control(strategy, settings, seed, start.extent)
@@ -70,6 +72,7 @@ class SceneTrainer:
     def step(self, index: int) -> Mapping[str, float]:
         """Renders one picture and updates the parameters; returns the loss and other numbers."""
         view = self._view(index)
+        self._views.expect(self._view(later) for later in range(index, index + AHEAD))
         example = self._example(view, index)
         degree = index // self._settings.sh_every
         rendering = render(
@@ -117,12 +120,8 @@ class SceneTrainer:
         self._strategy.restore(parts["density"])
 
     def _view(self, index: int) -> View:
-        """Every view once per epoch, in an order of its own."""
-        epoch, place = divmod(index, len(self._views.train))
-        if place == 0 or not hasattr(self, "_order"):
-            rng = np.random.default_rng([self._seed, epoch])
-            self._order = rng.permutation(len(self._views.train))
-        return self._views.train[self._order[place]]
+        """The view of a step."""
+        return self._views.train[self._epochs.at(index)]
 
     def _example(self, view: View, index: int) -> Example:
         """What a view asks for, on the scene's device; a person stands before a random colour."""

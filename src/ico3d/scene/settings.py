@@ -131,7 +131,8 @@ class SceneSettings:
             direction of view.
         sh_every: Steps between two increases of the degree that is trained, which starts at 0.
         checkpoint_every: Steps from one checkpoint to the next.
-        cache_gib: Memory for recorded pictures, GiB; what does not fit is read again at each use.
+        cache_gib: Memory for recorded pictures, GiB; what does not fit is read again, in the
+            background, before each use.
         loss: Weights of the terms of the loss.
         rates: Learning rates, and the factors to which they decay.
         initial: The Gaussians that training begins with.

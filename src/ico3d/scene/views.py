@@ -1,6 +1,6 @@
 """The pictures on which a static scene is trained and measured."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -89,6 +89,10 @@ class SceneViews:
         if not self.train:
             raise CaptureError(f"{capture.path} has no picture among its training frames.")
 
+    def expect(self, views: Iterable[View]) -> None:
+        """Begins to read views that will be asked for soon."""
+        self._cache.expect(views)
+
     def layers(self, view: View) -> tuple[Tensor, Tensor | None]:
         """Picture (H, W, 3) and mask (H, W) of a view, on the CPU.
 
@@ -141,8 +145,14 @@ class SceneViews:
             View(camera, frame, self._camera(camera, frame))
             for frame in frames
             for camera in cameras
-            if self._cache.layers(camera, frame) is not None
+            if self._is_recorded(camera, frame)
         )
+
+    def _is_recorded(self, camera: int, frame: int) -> bool:
+        """Whether there is something to read for a view."""
+        if self._plates:
+            return self._cache.layers(camera, frame) is not None  # one plate for each camera
+        return self._capture.has_image(camera, frame)
 
     def _moment(self, frames: Frames) -> Sequence[int]:
         """The frames that count as one moment; a plate is the same in all of them."""

@@ -15,12 +15,13 @@ from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings
 from ico3d.body.skinning.skinned import NETWORK, PER_FRAME
 from ico3d.body.training.views import BodyViews, Example
-from ico3d.capture.pictures import View
+from ico3d.capture.pictures import AHEAD, View
 from ico3d.splat.density import Population
 from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.losses import l1, photometric
 from ico3d.splat.render import render
 from ico3d.splat.rendering import Rendering
+from ico3d.training.epochs import Epochs
 from ico3d.training.optimiser import Optimiser
 
 
@@ -66,7 +67,7 @@ class Learner:
         cameras = 1 + max(view.camera_index for view in self.views)
         self.affine = torch.eye(3, 4, device=model.device).repeat(cameras, 1, 1)  # (C, 3, 4)
         self.affine.requires_grad_(settings.color_correction)
-        self._orders: dict[tuple[int, int], np.ndarray] = {}
+        self._epochs: dict[int, Epochs] = {}  # by the number of views
 
     @property
     def population(self) -> Population:
@@ -79,12 +80,12 @@ class Learner:
 
     def view(self, views: Sequence[View], index: int) -> View:
         """The view of step `index`: each of `views` once per epoch, in a new random order."""
-        epoch, place = divmod(index, len(views))
-        key = (len(views), epoch)
-        if key not in self._orders:
-            rng = np.random.default_rng([self._seed, *key])
-            self._orders = {key: rng.permutation(len(views))}
-        return views[self._orders[key][place]]
+        count = len(views)
+        if count not in self._epochs:
+            self._epochs[count] = Epochs([self._seed, count], count)
+        chosen = [views[self._epochs[count].at(step)] for step in range(index, index + AHEAD)]
+        self._pictures.expect(chosen)
+        return chosen[0]
 
     def random(self, index: int, purpose: int) -> np.random.Generator:
         """A generator of random numbers for one purpose in one step."""

@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from ico3d.capture.capture import Capture
-from ico3d.capture.pictures import LayerCache, Layers, View, train_cameras
+from ico3d.capture.pictures import LayerCache, Layers, View, read_in_turn, train_cameras
 from ico3d.errors import CaptureError
 from ico3d.rig.body_track import BodyTrack
 
@@ -42,7 +43,7 @@ class BodyViews:
     """
 
     def __init__(self, capture: Capture, frames: Iterable[int], cache_gib: float):
-        """Reads masks, and pictures as far as they fit into memory.
+        """Reads all masks, of which it takes the crops.
 
         Args:
             capture: The recording.
@@ -55,17 +56,17 @@ class BodyViews:
         self._capture = capture
         self._plates: dict[int, np.ndarray | None] = {}
         self._cache = LayerCache(self._read, cache_gib)
-        frames = list(frames)
+        frames, shown = list(frames), set[tuple[int, int]]()
         self._boxes = {
             camera: box
             for camera in train_cameras(capture)
-            if (box := self._common_box(camera, frames)) is not None
+            if (box := self._common_box(camera, frames, shown)) is not None
         }
         self.views = [
             View(camera, frame, capture.cameras[camera].cropped(*box.place))
             for frame in frames
             for camera, box in self._boxes.items()
-            if self._cache.layers(camera, frame) is not None
+            if (camera, frame) in shown and capture.has_image(camera, frame)
         ]
         if not self.views:
             raise CaptureError(f"{capture.path} has no picture of the person to train on.")
@@ -82,14 +83,26 @@ class BodyViews:
         behind = torch.from_numpy(color).to(device).float()
         return Example(person + (1 - mask[..., None]) * behind, mask, behind)
 
-    def _common_box(self, camera: int, frames: Iterable[int]) -> "_Box | None":
-        """The crop that holds the person in all frames of a camera; None where nobody is seen."""
+    def expect(self, views: Iterable[View]) -> None:
+        """Begins to read views that will be asked for soon."""
+        self._cache.expect(views)
+
+    def _common_box(
+        self, camera: int, frames: Iterable[int], shown: set[tuple[int, int]]
+    ) -> "_Box | None":
+        """The crop that holds the person in all frames of a camera; None where nobody is seen.
+
+        Args:
+            camera: Index of the camera.
+            frames: Frames to look at.
+            shown: Gets camera and frame of each view that shows the person.
+        """
         seen = self._capture.cameras[camera]
         inside = np.zeros((seen.height, seen.width), bool)
-        for frame in frames:
-            mask = self._mask(camera, frame)
-            if mask is not None:
+        for frame, mask in read_in_turn(partial(self._mask, camera), frames):
+            if mask is not None and mask.any():
                 inside |= mask > 0
+                shown.add((camera, frame))
         return _Box.around(inside) if inside.any() else None
 
     def _mask(self, camera: int, frame: int) -> np.ndarray | None:
@@ -99,7 +112,7 @@ class BodyViews:
             CaptureError: If there is a picture without a mask.
         """
         mask = self._capture.mask(camera, frame)
-        if mask is None and self._capture.image(camera, frame) is not None:
+        if mask is None and self._capture.has_image(camera, frame):
             name = self._capture.cameras[camera].name
             raise CaptureError(
                 f"{self._capture.path}: frame {frame} of camera {name} has no mask: a body is "

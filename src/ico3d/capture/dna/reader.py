@@ -56,10 +56,18 @@ class DnaRendering(SmcCapture):
         super().__init__(files.main, self._devices, count)
         self.split = all_frames(self.num_frames, self.cameras)
 
+    def has_image(self, camera: int, frame: int) -> bool:
+        """Whether the file holds the picture."""
+        return self._main.holds(self._picture_path(camera, frame))
+
+    def has_mask(self, camera: int, frame: int) -> bool:
+        """Whether the annotations hold a mask."""
+        return self._annotations.holds(self._mask_path(camera, frame))
+
     def image(self, camera: int, frame: int) -> np.ndarray | None:
         """The undistorted picture with corrected colours, or None."""
         device = self._devices[camera]
-        picture = self.decoded(self._main, device, f"{device.pictures}/{self.index(frame)}")
+        picture = self.decoded(self._main, device, self._picture_path(camera, frame))
         if picture is None:
             return None
         corrected = opencv("correcting colours").LUT(picture, device.colours[None])  # (H, W, 3)
@@ -68,9 +76,16 @@ class DnaRendering(SmcCapture):
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
         """The undistorted mask; None in parts of the data set without masks."""
         device = self._devices[camera]
-        inside = f"Mask/{device.number}/mask/{self.index(frame)}"
-        picture = self.decoded(self._annotations, device, inside)
+        picture = self.decoded(self._annotations, device, self._mask_path(camera, frame))
         return None if picture is None else unit(device.lens.straightened(person(picture)))
+
+    def _picture_path(self, camera: int, frame: int) -> str:
+        """Where a picture lies within the main file."""
+        return f"{self._devices[camera].pictures}/{self.index(frame)}"
+
+    def _mask_path(self, camera: int, frame: int) -> str:
+        """Where a mask lies within the annotations."""
+        return f"Mask/{self._devices[camera].number}/mask/{self.index(frame)}"
 
     def keypoints_2d(self, camera: int, frame: int) -> np.ndarray | None:
         """(J, 3) keypoints: pixels of the undistorted picture, and confidence; None if missing."""

@@ -25,6 +25,14 @@ class TrackedCapture(Capture):
         self.kind, self.path, self.cameras = capture.kind, capture.path, capture.cameras
         self.fps, self.num_frames, self.split = capture.fps, capture.num_frames, capture.split
 
+    def has_image(self, camera: int, frame: int) -> bool:
+        """Whether the wrapped recording has the picture."""
+        return self.whole.has_image(camera, frame)
+
+    def has_mask(self, camera: int, frame: int) -> bool:
+        """Whether the wrapped recording has a mask of the person."""
+        return self.whole.has_mask(camera, frame)
+
     def image(self, camera: int, frame: int) -> np.ndarray | None:
         """The recorded picture."""
         return self.whole.image(camera, frame)

@@ -35,6 +35,14 @@ class ResizedCapture(Capture):
         self.split, self.blendshape_names = capture.split, capture.blendshape_names
         self.cameras = tuple(_resized(camera, height) for camera in capture.cameras)
 
+    def has_image(self, camera: int, frame: int) -> bool:
+        """Whether the wrapped recording has the picture."""
+        return self.whole.has_image(camera, frame)
+
+    def has_mask(self, camera: int, frame: int) -> bool:
+        """Whether the wrapped recording has a mask of the person."""
+        return self.whole.has_mask(camera, frame)
+
     def image(self, camera: int, frame: int) -> np.ndarray | None:
         """The picture of a view; each pixel is the mean of those it replaces."""
         return self._shrunk(self.whole.image(camera, frame), camera)

@@ -5,6 +5,7 @@ from bisect import bisect_right
 from collections import OrderedDict
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -77,19 +78,30 @@ class Clip:
 
 
 class OpenClips:
-    """A cache of open clips, from which the least recently used ones are closed."""
+    """A cache of open clips, from which the least recently used ones are closed.
+
+    Threads take turns: a decoder goes on from the picture that it decoded last.
+    """
 
     def __init__(self):
         """Starts with an empty cache."""
         self._used: OrderedDict[Path, Clip] = OrderedDict()
+        self._turn = Lock()
+
+    def __getstate__(self) -> dict:
+        return {"_used": self._used}
+
+    def __setstate__(self, state: dict) -> None:
+        self.__dict__ |= state | {"_turn": Lock()}
 
     def picture(self, clip: Clip, number: int) -> np.ndarray | None:
         """A picture of a clip, as `Clip.picture` returns it."""
-        self._used[clip.path] = clip
-        self._used.move_to_end(clip.path)
-        if len(self._used) > MOST_OPEN:
-            self._used.popitem(last=False)[1].close()
-        return clip.picture(number)
+        with self._turn:
+            self._used[clip.path] = clip
+            self._used.move_to_end(clip.path)
+            if len(self._used) > MOST_OPEN:
+                self._used.popitem(last=False)[1].close()
+            return clip.picture(number)
 
 
 class _Index:

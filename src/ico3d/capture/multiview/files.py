@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.capture.decoding import decoded, largest_channel, size_of
+from ico3d.capture.decoding import decoded, has_opacity, largest_channel, size_of
 from ico3d.capture.lens import Lens
 from ico3d.capture.multiview.clip import Clip, OpenClips
 from ico3d.errors import CaptureError
@@ -29,6 +29,24 @@ class RecordedFiles:
     def clip(self, camera: int) -> Clip | None:
         """The video of a camera, or None for a camera with single pictures."""
         return self._clips[camera]
+
+    def has_picture(self, camera: int, frame: int) -> bool:
+        """Whether `picture` would return one; nothing is decoded."""
+        clip = self._clips[camera]
+        if clip is None:
+            return self.file("images", camera, frame) is not None
+        return frame < clip.count
+
+    def has_mask(self, camera: int, frame: int) -> bool:
+        """Whether there is a mask, or a picture with opacity; nothing is decoded.
+
+        Raises:
+            CaptureError: If the header of the picture is damaged.
+        """
+        if self.file("masks", camera, frame) is not None:
+            return True
+        file = self.file("images", camera, frame) if self._clips[camera] is None else None
+        return file is not None and has_opacity(file, self._named(file, camera, frame))
 
     def picture(self, camera: int, frame: int) -> np.ndarray | None:
         """uint8 RGB or RGBA (H, W, C), or None if missing."""
@@ -85,10 +103,14 @@ class RecordedFiles:
         file = self.file(kind, camera, frame)
         if file is None:
             return None
-        what = f"{file} (camera {self._lenses[camera].name}, frame {frame})"
+        what = self._named(file, camera, frame)
         picture = decoded(file, what)
         self._check_size(picture, camera, what)
         return picture
+
+    def _named(self, file: Path, camera: int, frame: int) -> str:
+        """Names a picture in errors."""
+        return f"{file} (camera {self._lenses[camera].name}, frame {frame})"
 
     def _check_size(self, picture: np.ndarray, camera: int, what: str) -> None:
         """A picture must be of its camera's size."""

@@ -57,6 +57,14 @@ class MultiviewCapture(Capture):
         self._track = read_track(path, self.num_frames, len(self.cameras))
         self.blendshape_names = None if self._track is None else BLENDSHAPES
 
+    def has_image(self, camera: int, frame: int) -> bool:
+        """Whether there is a file of the picture, or a video that is long enough."""
+        return self.files.has_picture(camera, self._index(frame))
+
+    def has_mask(self, camera: int, frame: int) -> bool:
+        """Whether there is a file of the mask, or a picture with opacity."""
+        return self.files.has_mask(camera, self._index(frame))
+
     def image(self, camera: int, frame: int) -> np.ndarray | None:
         """The undistorted picture, or None if missing."""
         picture = self.files.picture(camera, self._index(frame))

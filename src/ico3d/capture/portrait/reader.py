@@ -56,11 +56,24 @@ class TalkingPortrait(Capture):
         _check_ids(path, sorted(self._poses))
         self._check_rows()
 
+    def has_image(self, camera: int, frame: int) -> bool:
+        """Whether a face was found in the frame.
+
+        Raises:
+            CaptureError: If the frame's picture is missing.
+        """
+        return frame in self._poses and self._recorded(frame).is_file()
+
+    def has_mask(self, camera: int, frame: int) -> bool:
+        """Whether the frame has a soft mask or was parsed."""
+        files = (self.path / "alpha" / f"{frame}.png", self._parsing_file(frame))
+        return frame in self._poses and any(file.is_file() for file in files)
+
     def image(self, camera: int, frame: int) -> np.ndarray | None:
         """The person on the clean plate if the folder has one, else the recorded picture."""
         if frame not in self._poses:
             return None
-        return _picture(self._first(f"gt_imgs/{frame}.jpg", f"ori_imgs/{frame}.jpg"))
+        return _picture(self._recorded(frame))
 
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
         """The soft mask that ico3d writes, else all pixels not parsed as background."""
@@ -184,7 +197,7 @@ class TalkingPortrait(Capture):
 
     def _camera(self, transforms: dict) -> Camera:
         """The steady camera; it is the world."""
-        first = self._first(f"gt_imgs/{min(self._poses)}.jpg", f"ori_imgs/{min(self._poses)}.jpg")
+        first = self._recorded(min(self._poses))
         with _reading(first, lambda: Image.open(first)) as picture:
             width, height = picture.size
         file = self.path / "transforms_train.json"
@@ -202,24 +215,28 @@ class TalkingPortrait(Capture):
 
     def _parsing(self, frame: int) -> np.ndarray | None:
         """The parsing picture of a frame with a face, uint8 RGB."""
-        path = self.path / "parsing" / f"{frame}.png"
+        path = self._parsing_file(frame)
         if frame not in self._poses or not path.is_file():
             return None
         with _reading(path, lambda: Image.open(path)) as picture:
             return np.asarray(picture.convert("RGB"))
 
-    def _first(self, *names: str) -> Path:
-        """The first of these files that exists.
+    def _parsing_file(self, frame: int) -> Path:
+        """Where the parsing picture of a frame lies, if it was parsed."""
+        return self.path / "parsing" / f"{frame}.png"
+
+    def _recorded(self, frame: int) -> Path:
+        """The picture of a frame: on the clean plate if the folder has it, else as recorded.
 
         Raises:
-            CaptureError: If none does.
+            CaptureError: If there is neither.
         """
-        for name in names:
-            if (self.path / name).is_file():
-                return self.path / name
+        for folder in ("gt_imgs", "ori_imgs"):
+            if (file := self.path / folder / f"{frame}.jpg").is_file():
+                return file
         raise CaptureError(
-            f"{self.path}: frame {Path(names[-1]).stem} is listed in the transforms, "
-            f"but {names[-1]} is missing."
+            f"{self.path}: frame {frame} is listed in the transforms, but ori_imgs/{frame}.jpg is "
+            "missing."
         )
 
     def _check_rows(self) -> None:

@@ -70,6 +70,15 @@ class RenderMe360(SmcCapture):
         self.split = last_eleventh(count)
         self.flame_fits = FlameFits(self._holding("FLAME"), count, self.upright)
 
+    def has_image(self, camera: int, frame: int) -> bool:
+        """Whether the raw file holds the picture."""
+        return self._raw.holds(f"{self._devices[camera].pictures}/{self.index(frame)}")
+
+    def has_mask(self, camera: int, frame: int) -> bool:
+        """Whether a file of the recording holds a mask."""
+        folder = mask_folder(self._devices[camera].name)
+        return self._holding(folder).holds(f"{folder}/{self.index(frame)}")
+
     def image(self, camera: int, frame: int) -> np.ndarray | None:
         """The undistorted picture, or None if missing."""
         device = self._devices[camera]
