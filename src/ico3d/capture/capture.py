@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ico3d.capture.finding import Finding
+from ico3d.capture.smplx import SmplX
 from ico3d.common.camera import Camera
 from ico3d.common.expression import EYE_NAMES as EYE_NAMES
 from ico3d.rig.body_track import BodyTrack, read_body_track
@@ -111,6 +112,10 @@ class Capture(ABC):
 
     def whole_body_points(self, frame: int) -> np.ndarray | None:
         """(133, 3) annotated points of COCO-WholeBody in the world, metres; NaN where unknown."""
+        return None
+
+    def smplx(self, frame: int) -> SmplX | None:
+        """SMPL-X parameters that the recording brings for a frame; None where it has none."""
         return None
 
     def body_track(self) -> BodyTrack | None:

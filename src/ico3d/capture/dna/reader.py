@@ -8,7 +8,7 @@ import numpy as np
 
 from ico3d.capture.capture import all_frames
 from ico3d.capture.decoding import unit
-from ico3d.capture.dna.annotations import BodyFits, SmplX, gender_of, person, row
+from ico3d.capture.dna.annotations import BodyFits, gender_of, person, row
 from ico3d.capture.dna.calibration import GROUPS, read_devices
 from ico3d.capture.dna.examine import examine_files
 from ico3d.capture.dna.files import find_files
@@ -18,6 +18,7 @@ from ico3d.capture.finding import Finding
 from ico3d.capture.poses import turned
 from ico3d.capture.smc.file import SmcFile
 from ico3d.capture.smc.reader import SmcCapture, count_frames
+from ico3d.capture.smplx import SmplX
 
 log = logging.getLogger(__name__)
 FPS = 15.0

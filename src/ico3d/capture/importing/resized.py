@@ -5,6 +5,7 @@ import numpy as np
 from ico3d.capture.capture import Capture, Sound
 from ico3d.capture.extras import opencv
 from ico3d.capture.finding import Finding
+from ico3d.capture.smplx import SmplX
 from ico3d.common.camera import Camera
 from ico3d.errors import SettingsError
 
@@ -89,6 +90,14 @@ class ResizedCapture(Capture):
     def points(self, frame: int = 0) -> np.ndarray | None:
         """(P, 3) surface points of the wrapped capture."""
         return self.whole.points(frame)
+
+    def whole_body_points(self, frame: int) -> np.ndarray | None:
+        """(133, 3) annotated points of the wrapped capture, metres."""
+        return self.whole.whole_body_points(frame)
+
+    def smplx(self, frame: int) -> SmplX | None:
+        """SMPL-X parameters of the wrapped capture."""
+        return self.whole.smplx(frame)
 
     def inspect(self) -> list[Finding]:
         """Findings about the files of the wrapped capture."""

@@ -15,6 +15,7 @@ from ico3d.capture.multiview.parallel import View, each_camera
 from ico3d.capture.multiview.writing import new_folder
 from ico3d.capture.portrait.files import save_picture
 from ico3d.common.camera import Camera
+from ico3d.rig import body_track
 
 
 def resize_capture(source: Path, out: Path, height: int, workers: int) -> Description:
@@ -78,7 +79,7 @@ def _write_view(capture: ResizedCapture, work: Path, camera: int, frame: int) ->
 
 
 def _write_rest(capture: ResizedCapture, work: Path) -> None:
-    """Writes what belongs to no single picture: plates, sound, points, the tracked head."""
+    """Writes what belongs to no single picture: plates, sound, points, head and body tracks."""
     import soundfile
 
     for index, camera in enumerate(capture.cameras):
@@ -89,9 +90,10 @@ def _write_rest(capture: ResizedCapture, work: Path) -> None:
     sound = capture.audio()
     if sound is not None:
         soundfile.write(work / "audio.wav", sound.samples, sound.rate)
-    track = track_file(capture.path)
-    if track.is_file():
-        shutil.copyfile(track, work / TRACK)  # in metres, whatever the size of the pictures
+    tracks = {TRACK: track_file(capture.path), body_track.NAME: body_track.track_file(capture.path)}
+    for name, track in tracks.items():
+        if track.is_file():
+            shutil.copyfile(track, work / name)  # in metres, whatever the size of the pictures
     if capture.split.test:
         return  # a head: its points lie in its own head space, tracking will find another
     for frame in range(capture.num_frames):

@@ -25,7 +25,7 @@ def say(found: Fitted, written: Path) -> None:
         part = slice(first, last + 1)
         count = int(fitted[part].sum())
         text = f"frames {first}-{last}: {count} of {last - first + 1} fitted"
-        if count:
+        if np.isfinite(found.off[part]).any():
             text += f", landmarks {1e3 * np.nanmedian(found.off[part]):.0f} mm off"
         if np.isfinite(found.outside[part]).any():
             text += f", surface {1e3 * np.nanmedian(found.outside[part]):.0f} mm out of masks"
@@ -34,6 +34,7 @@ def say(found: Fitted, written: Path) -> None:
     if lost:
         names = [f"{a}" if a == b else f"{a}-{b}" for a, b in lost]
         show(f"[yellow]warning:[/] frames {', '.join(names)} are interpolated.")
+    show(f"skeleton: {found.track.source}", highlight=False, soft_wrap=True)
     show(f"{int(fitted.sum())} of {len(fitted)} frames fitted: {written}", soft_wrap=True)
 
 
