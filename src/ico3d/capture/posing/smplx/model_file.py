@@ -4,6 +4,8 @@ Equations of the model: Pavlakos et al., "Expressive Body Capture" (CVPR 2019), 
 "SMPL" (2015).
 """
 
+import struct
+import tokenize
 import zipfile
 import zlib
 from dataclasses import dataclass
@@ -34,8 +36,12 @@ SHAPES = {
     "hands_meanr": (45,),
 }
 """Shapes of the arrays that are read; a letter stands for a number that is the same everywhere."""
-DAMAGED = (OSError, ValueError, EOFError, KeyError, NotImplementedError, RuntimeError, MemoryError)
-"""What numpy and zipfile raise for damaged files."""
+DAMAGED = (
+    *(OSError, ValueError, EOFError, LookupError, TypeError, AttributeError, ArithmeticError),
+    *(RuntimeError, MemoryError, SyntaxError, tokenize.TokenError, struct.error),
+    *(zipfile.BadZipFile, zlib.error),
+)
+"""What numpy and zipfile raise for damaged files; numpy reads an array's header as Python."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +135,7 @@ def _arrays(file: Path) -> dict[str, np.ndarray]:
             arrays = {name: np.asarray(content[name]) for name in SHAPES}
     except FileNotFoundError as error:
         raise CaptureError(f"there is no SMPL-X model {file}.") from error
-    except (*DAMAGED, zipfile.BadZipFile, zlib.error) as error:
+    except DAMAGED as error:
         raise _wrong(file, "it is damaged, or pickled (.pkl)") from error
     lengths: dict[str | int, int] = {}
     for name, shape in SHAPES.items():
