@@ -83,8 +83,8 @@ class Resize:
     """Copies a capture of any format with smaller pictures into a multiview folder.
 
     Pictures of 5 or 12 megapixels are then decoded, corrected and undistorted only once instead of
-    at each use. Pictures, masks, clean plates, sound, surface points and the tracked head of a
-    multiview folder are copied.
+    at each use. Pictures, masks, clean plates, sound, surface points and the tracks of head
+    and body are copied.
 
     Attributes:
         source: A capture of any format.

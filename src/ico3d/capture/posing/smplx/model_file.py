@@ -108,11 +108,11 @@ def read_model(file: Path) -> BodyModel:
     hands = np.zeros((JOINTS, 3))
     for name, fingers in HANDS.items():
         hands[fingers] = arrays[name].reshape(-1, 3)
-    directions = arrays["shapedirs"].astype(np.float64)  # (V, 3, K)
+    directions = arrays["shapedirs"]  # (V, 3, K)
     return BodyModel(
         arrays["v_template"].astype(np.float64),
-        directions[..., :COEFFICIENTS],
-        directions[..., first : first + COEFFICIENTS],
+        directions[..., :COEFFICIENTS].astype(np.float64),
+        directions[..., first : first + COEFFICIENTS].astype(np.float64),
         arrays["J_regressor"].astype(np.float64),
         weights,
         (-1, *table[0, 1:].tolist()),
