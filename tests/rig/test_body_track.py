@@ -1,6 +1,7 @@
 """The file of a body track: round trip, and what is refused."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -41,6 +42,25 @@ def test_it_comes_back(track, tmp_path):
     assert (found.rig.names, found.rig.parents) == (RIG.names, RIG.parents)
     np.testing.assert_allclose(found.surface(3), track.surface(3))
     assert found.joints().shape == (5, 2, 3)
+
+
+def test_a_templates_licence_is_passed_on_and_may_be_missing(track, tmp_path):
+    known = {"kind": "film", "sources": ["a film"], "licence": "CC0"}
+    assert track.credited(known) == known
+    bound = replace(track, licence="for research")
+    passed = {"sources": ["a film", track.source], "licence": "CC0; for research"}
+    assert bound.credited(known) == known | passed
+    assert bound.credited(known | {"licence": ""})["licence"] == "for research"
+    file = write_body_track(bound, tmp_path)
+    found = read_body_track(tmp_path, 5, 15.0)
+    assert found and found.licence == bound.licence
+    with safe_open(file, "numpy") as content:
+        about = json.loads(content.metadata()["body_track"])
+        arrays = {name: content.get_tensor(name) for name in content.keys()}  # noqa: SIM118
+    del about["licence"]  # as earlier versions wrote it
+    save_file(arrays, file, {"body_track": json.dumps(about)})
+    found = read_body_track(tmp_path, 5, 15.0)
+    assert found and found.licence == ""
 
 
 def test_it_lies_beside_a_recording_that_is_a_file(tmp_path):

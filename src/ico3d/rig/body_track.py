@@ -38,6 +38,7 @@ class BodyTrack:
         faces: (T, 3) int32 corners of the surface's triangles, counter-clockwise from outside.
         binding: Joints that carry the vertices.
         source: What the template is and to what it was fitted, in words.
+        licence: Licence of the template where it allows less than this project's; else empty.
     """
 
     rig: Rig
@@ -49,6 +50,7 @@ class BodyTrack:
     faces: np.ndarray
     binding: Binding
     source: str
+    licence: str = ""
 
     @property
     def num_frames(self) -> int:
@@ -69,6 +71,20 @@ class BodyTrack:
         matrices = self.rig.matrices(self.rotations[frame], self.roots[frame])
         return self.binding.skinned(self.vertices, matrices)
 
+    def credited(self, provenance: dict[str, Any]) -> dict[str, Any]:
+        """Provenance of what is made from this track: the template's licence is added.
+
+        Args:
+            provenance: Provenance of the recording, with keys `sources` and `licence`.
+        """
+        if not self.licence:
+            return provenance
+        licences = (provenance["licence"], self.licence)
+        return provenance | {
+            "sources": [*provenance["sources"], self.source],
+            "licence": "; ".join(filter(None, licences)),
+        }
+
     def to_bytes(self) -> bytes:
         """Content of the file of this track."""
         about = {
@@ -77,6 +93,7 @@ class BodyTrack:
             "names": self.rig.names,
             "parents": self.rig.parents,
             "source": self.source,
+            "licence": self.licence,
         }
         arrays = {
             "joints": self.rig.joints.astype(np.float64),
@@ -186,6 +203,7 @@ def _read(file: Path) -> BodyTrack:
         arrays["faces"],
         Binding(arrays["vertex_joints"], arrays["vertex_weights"]),
         str(about["source"]),
+        str(about.get("licence", "")),
     )
 
 

@@ -108,7 +108,8 @@ def test_the_body_is_that_of_the_published_equations(main, models, monkeypatch, 
         np.testing.assert_allclose(track.joints()[frame], joints, atol=1e-5)
     assert track.vertices[:, 1].min() == pytest.approx(0, abs=1e-6)
     np.testing.assert_array_equal(track.faces, smplx_files.model_arrays()["f"])
-    assert LICENCE in track.source and "female" in track.source
+    assert track.licence == LICENCE and "female" in track.source
+    assert track.credited(capture.provenance)["licence"].endswith(f"agreement; {LICENCE}")
     said = capsys.readouterr().err
     assert "non-commercial" in said and "3 of 3 frames fitted" in said and "mm off" not in said
     (finding,) = (f for f in examine(capture) if f.what == "skeleton")

@@ -218,7 +218,7 @@ def write(
     files[THUMBNAIL] = staging.thumbnail(first, camera, background)
     if notices:
         files[LICENSES] = notices.encode()
-    about = capture.provenance if capture else body.summary.get("capture", {})
+    about = body.summary.get("capture") or (capture.provenance if capture else {})
     manifest = Manifest(
         name=persona.name,
         head=None,

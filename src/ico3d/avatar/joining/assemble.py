@@ -130,7 +130,7 @@ def assemble(
     head = TrainedHead.load(folder / HEAD)
     summary = {
         "head": head.summary.get("capture", {}),
-        "body": capture.provenance,
+        "body": body.summary["capture"],
         "settings": asdict(assembly.joining),
         "train_seconds": body.summary["train_seconds"],
     }

@@ -308,9 +308,10 @@ def _save(
     about: str = ABOUT,
 ) -> TrainedBody:
     """Writes the file `about`, which lists the windows' files; returns the body."""
+    known = capture.provenance
     summary = {
         "train_seconds": seconds,
-        "capture": capture.provenance,
+        "capture": tracked(capture).credited(known) if job.method in SKINNED else known,
         "settings": asdict(job.settings),
     }
     models = [load_window(task.file) for task in tasks]

@@ -34,7 +34,8 @@ def say(found: Fitted, written: Path) -> None:
     if lost:
         names = [f"{a}" if a == b else f"{a}-{b}" for a, b in lost]
         show(f"[yellow]warning:[/] frames {', '.join(names)} are interpolated.")
-    show(f"skeleton: {found.track.source}", highlight=False, soft_wrap=True)
+    about = "; ".join(filter(None, (found.track.source, found.track.licence)))
+    show(f"skeleton: {about}", highlight=False, soft_wrap=True)
     show(f"{int(fitted.sum())} of {len(fitted)} frames fitted: {written}", soft_wrap=True)
 
 

@@ -95,7 +95,8 @@ def track_from_parameters(capture: Capture, file: Path) -> Fitted:
         (scale * person.vertices - floor).astype(np.float32),
         model.faces,
         Binding.strongest(model.weights),
-        f"SMPL-X, {person.gender} ({LICENCE}), posed by the recording's own parameters",
+        f"SMPL-X, {person.gender}, posed by the recording's own parameters",
+        LICENCE,
     )
     off, outside = np.full((2, capture.num_frames), np.nan)
     off[person.frames] = _medians(person.marked(model.parents, scale) - known)
