@@ -1,5 +1,7 @@
 """Training Gaussians on a skeleton."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -120,11 +122,14 @@ def test_resuming_repeats_the_uninterrupted_run(capture, method):
 
 
 @pytest.mark.parametrize("method", ["skinned", "hugs"])
-def test_the_folder_holds_the_body(capture, tmp_path, method):
-    """One window for the whole clip, with rig, poses and names, which opens again."""
+def test_the_folder_holds_the_body(capture, tmp_path, method, monkeypatch):
+    """One window for the whole clip, with rig, poses, names and licence, which opens again."""
+    bound = replace(capture.body_track(), licence="for research")
+    monkeypatch.setattr(capture, "body_track", lambda: bound)
     body = train_body(capture, tmp_path / "model", job(method))
     assert body.windows == (CLIP,)
     loaded = TrainedBody.load(tmp_path / "model")
+    assert loaded.summary["capture"]["licence"] == "for research"
     motion = loaded.models[0].motion
     assert isinstance(motion, Skinned) and motion.names == ("trunk", "shoulder")
     assert (motion.shapes > 0, motion.light) == (method == "skinned", method == "skinned")

@@ -224,7 +224,7 @@ def content() -> tuple[bytes, list[int]]:
     stream = io.BytesIO()
     arrays = smplx_files.model_arrays()
     arrays["shapedirs"] = arrays["shapedirs"][..., :20]
-    np.savez(stream, **{name: arrays[name] for name in SHAPES})
+    np.savez(stream, allow_pickle=False, **{name: arrays[name] for name in SHAPES})
     with zipfile.ZipFile(stream) as archive:
         heads = [entry.header_offset for entry in archive.infolist()]
     return stream.getvalue(), heads

@@ -61,7 +61,6 @@ def model_arrays(seed: int = 3, influences: int = 4) -> dict[str, np.ndarray]:
         "hands_meanl": random.normal(0, 0.3, 45),
         "hands_meanr": random.normal(0, 0.3, 45),
         "joint2num": np.array(named, dtype=object),  # pickled, as in the published files
-        "allow_pickle": np.array(True),
     }
 
 
@@ -69,7 +68,7 @@ def write_model(file: Path, arrays: dict[str, np.ndarray] | None = None) -> Path
     """Writes a model file."""
     file.parent.mkdir(parents=True, exist_ok=True)
     with file.open("wb") as stream:
-        np.savez(stream, **(arrays or model_arrays()))
+        np.savez(stream, allow_pickle=True, **(arrays or model_arrays()))
     return file
 
 
@@ -81,7 +80,7 @@ def parameters(frames: int, seed: int = 5) -> dict[str, np.ndarray]:
         "expression": np.tile(random.normal(size=10), (frames, 1)),
         "fullpose": random.normal(0, 0.4, (frames, 55, 3)),
         "transl": random.normal(0, 0.5, (frames, 3)),
-        "scale": np.float64(1.02),
+        "scale": np.array(1.02),
     }
 
 
