@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from ico3d.capture.checking.check import examine
 from ico3d.capture.checking.contact_sheet import contact_sheet
 from ico3d.capture.formats import open_capture
+from ico3d.capture.importing.resized import ResizedCapture
 from ico3d.capture.importing.resizing import resize_capture
 from ico3d.capture.posing.command import Pose
 from ico3d.capture.posing.smplx.choosing import chosen_model
@@ -123,6 +124,9 @@ def test_a_smaller_copy_keeps_the_track(main, models, tmp_path):
     resize_capture(main, tmp_path / "small", 20, 1)
     copy = open_capture(tmp_path / "small").body_track()
     assert track and copy and copy.to_bytes() == track.to_bytes()
+    smaller = ResizedCapture(open_capture(main), 20).smplx(1)
+    assert smaller is not None
+    np.testing.assert_array_equal(smaller.fullpose, smplx_files.parameters(FRAMES)["fullpose"][1])
 
 
 def test_gestures_find_every_joint_and_arms_hang(main, models):
