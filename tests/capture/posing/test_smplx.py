@@ -205,6 +205,9 @@ def test_every_wrong_array_is_one_sentence(tmp_path):
     few = {"shapedirs": sound["shapedirs"][..., :15]}
     refused(smplx_files.write_model(tmp_path / "e", sound | few), "15 directions")
     refused(smplx_files.write_model(tmp_path / "f", sound | {"f": sound["f"] + 79}), "'f'")
+    nothing = {"f": sound["f"][:0]} | {n: sound[n][:0] for n in ("v_template", "weights")}
+    nothing |= {"shapedirs": sound["shapedirs"][:0], "J_regressor": sound["J_regressor"][:, :0]}
+    refused(smplx_files.write_model(tmp_path / "n", sound | nothing), "'f' is empty")
     for weights in (sound["weights"] * 2, sound["weights"] - 0.1):
         refused(smplx_files.write_model(tmp_path / "g", sound | {"weights": weights}), "'weights'")
     table = sound["kintree_table"].copy()

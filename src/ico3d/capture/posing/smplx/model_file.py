@@ -24,7 +24,7 @@ EXPRESSIONS_FROM = {400: 300, 20: 10}
 LARGEST = 2**30
 """Largest size of an array in bytes; a damaged file can claim any number."""
 ABOUT_ONE = 1e-3
-"""Largest deviation of the sum of a vertex's weights from 1."""
+"""Largest deviation of the sum of a vertex's weights from 1, and of a weight below 0."""
 SHAPES = {
     "v_template": ("V", 3),
     "shapedirs": ("V", 3, "K"),
@@ -98,9 +98,11 @@ def read_model(file: Path) -> BodyModel:
     weights = arrays["weights"].astype(np.float64)
     if first is None:
         raise _wrong(file, f"'shapedirs' has {count} directions, at least 20 are needed")
-    if faces.size and not (faces.min() >= 0 and faces.max() < len(weights)):
+    if not faces.size:
+        raise _wrong(file, "'f' is empty")
+    if not (faces.min() >= 0 and faces.max() < len(weights)):
         raise _wrong(file, "'f' names a vertex that is not there")
-    if weights.min(initial=0) < 0 or np.abs(weights.sum(1) - 1).max(initial=0) > ABOUT_ONE:
+    if weights.min(initial=0) < -ABOUT_ONE or np.abs(weights.sum(1) - 1).max(initial=0) > ABOUT_ONE:
         raise _wrong(file, "'weights' has a row that is negative or does not sum to 1")
     joints = np.arange(1, JOINTS)
     if not ((table[1, 1:] == joints) & (table[0, 1:] >= 0) & (table[0, 1:] < joints)).all():
@@ -114,7 +116,7 @@ def read_model(file: Path) -> BodyModel:
         directions[..., :COEFFICIENTS].astype(np.float64),
         directions[..., first : first + COEFFICIENTS].astype(np.float64),
         arrays["J_regressor"].astype(np.float64),
-        weights,
+        np.maximum(weights, 0),
         (-1, *table[0, 1:].tolist()),
         faces.astype(np.int32),
         hands,
