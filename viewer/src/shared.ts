@@ -4,7 +4,7 @@
 export const BUNDLE_FORMAT = "ico3d-bundle";
 
 /** The newest version of a manifest. */
-export const BUNDLE_VERSION = 3;
+export const BUNDLE_VERSION = 4;
 
 /** The oldest version that is read. */
 export const OLDEST_BUNDLE = 1;
@@ -20,6 +20,12 @@ export const MAX_JOINTS = 256;
 
 /** Groups of Gaussians in a window that move alike. */
 export const MAX_CLUSTERS = 256;
+
+/** Spheres that cast its shadow. */
+export const MAX_CASTERS = 20000;
+
+/** The map in which a lamp sees a body, in metres; bundle/skinned/lamp.py. */
+export const SHADOW = {"radius": 0.02, "texel": 0.0125, "side": 256, "off": 0.01, "bias": 0.03, "edge": 0.002, "wrap": 0.2} as const;
 
 /** Of a head's coefficients; bundle/evaluate.py. */
 export const LEAKY_SLOPE = 0.02;

@@ -93,12 +93,15 @@ class Skinning:
         dropout: Share of the steps, 0 to 1, that learn without the residual shapes, so that the
             body looks right without them, too.
         light: Let colours depend on the direction in which the posed surface faces.
+        shadow: Find the strongest lamp and let the body cast shadows on itself in its light; only
+            with light.
     """
 
     shapes: int = 8
     hidden: int = 32
     dropout: float = 0.1
     light: bool = True
+    shadow: bool = True
 
 
 @dataclass(frozen=True)
@@ -150,7 +153,7 @@ class Rates:
             step.
         shape_means: Learning rate of the positions of residual shapes, metres.
         shape_colors: Learning rate of the colours of residual shapes, logits.
-        light: Learning rate of a skinned body's light.
+        light: Learning rate of a skinned body's light, and of the strength of its lamp.
         coefficients: Learning rate of the network that mixes residual shapes by the pose.
         skin_decay: Factor to which the rates of residual shapes, their network and light have
             decayed at the last step.
@@ -196,6 +199,7 @@ class Rates:
             "shape_means": Rate(self.shape_means, self.skin_decay),
             "shape_colors": Rate(self.shape_colors, self.skin_decay),
             "light": Rate(self.light, self.skin_decay),
+            "lamp_strength": Rate(self.light, self.skin_decay),
             "coefficients": Rate(self.coefficients, self.skin_decay),
         }
 
@@ -359,7 +363,7 @@ def settings_for(preset: PresetName, method: Method) -> BodySettings:
     if method in SKINNED:
         skinning, steps_per_frame = settings.skinning, settings.steps_per_frame
         if method == "hugs":
-            skinning = replace(skinning, shapes=0, light=False)
+            skinning = replace(skinning, shapes=0, light=False, shadow=False)
         if preset == "cpu":
             steps_per_frame = STEPS_PER_FRAME
         rates = replace(settings.rates, position_decay=0.1, shape_decay=0.2)

@@ -21,3 +21,5 @@ MAX_POSED_FRAMES = 30_000
 """Frames of a body on a skeleton, whose numbers are stored in 16 bits."""
 MAX_KNOWN_POSES = 256
 """Stored poses with which a page compares every pose."""
+MAX_CASTERS = 20_000
+"""Spheres that a page draws into a shadow map at every pose."""

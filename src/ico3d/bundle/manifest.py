@@ -11,9 +11,11 @@ from ico3d.common.typed import Rules, fill, parse_json, plain
 from ico3d.errors import BundleError
 
 FORMAT = "ico3d-bundle"
-VERSION = 3
+VERSION = 4
 SINCE = {"body": 2, "skinned": 3}
 """Version in which a field appeared; in older manifests that field is read as null."""
+SINCE_CASTERS = 4
+"""Version in which a body on a skeleton got `num_casters`; older ones cast no shadow."""
 OLDEST = 1
 MANIFEST = "manifest.json"
 
@@ -212,6 +214,8 @@ class Manifest:
         value = parse_json(data, MANIFEST, BundleError)
         _check_version(value)
         missing = {name for name, since in SINCE.items() if value["version"] < since} - set(value)
+        if value["version"] < SINCE_CASTERS and isinstance(value.get("skinned"), dict):
+            value = {**value, "skinned": {"num_casters": 0, **value["skinned"]}}
         value = {**value, "version": VERSION, **dict.fromkeys(missing)}
         if "persona" in value:
             value = {**value, "persona": with_defaults(value["persona"])}

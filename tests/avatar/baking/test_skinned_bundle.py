@@ -25,7 +25,7 @@ from ico3d.errors import BundleError
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 from support.bodies.skinned_model import trained_like
-from support.bundles.skinned_person import FPS, FRAMES, capsule_person, unseen_pose
+from support.bundles.skinned_person import CASTERS, FPS, FRAMES, capsule_person, unseen_pose
 
 pytestmark = pytest.mark.slow
 
@@ -127,7 +127,9 @@ def test_the_command_writes_what_the_page_plays(person, tmp_path, capsys):
     manifest = bundle.manifest
     assert bundle.skinned is not None and manifest.body is None and manifest.name == "a"
     assert manifest.loss.psnr_baked_vs_exact is not None and strip.is_file()
-    assert manifest.files[SKINNED].size < 393 * 96 + FRAMES * (9 * 8 + 12 + 32) + 4000
+    assert (
+        manifest.files[SKINNED].size < 393 * 96 + 14 * CASTERS + FRAMES * (9 * 8 + 12 + 32) + 4000
+    )
     camera = visitor_camera(manifest.camera, 90, 120)
     behind = torch.tensor(manifest.background)
     exact = render(person.gaussians(1.1), [camera], behind).rgb[0].detach().numpy()

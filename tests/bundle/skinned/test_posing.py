@@ -42,11 +42,40 @@ def loop_evaluation(baked, pose) -> list[np.ndarray]:
         a, b = SECOND
         light = [*(0.48860251 * np.array([-y, z, -x])), a * x * y, -a * y * z]
         light += [b * (3 * z * z - 1), -a * x * z, a / 2 * (x * x - y * y)]
+        facing = np.array([x, y, z])
         logits = logits + np.array(light) @ baked.light
+        reach = slow_reach(baked.lamp, turned, places, baked.rig.joints, mean + 0.01 * facing)
+        lit = max(facing @ baked.lamp.lamp_direction + 0.2, 0)
+        logits = logits + np.log(1 + reach * lit * baked.lamp.lamp_strength)
         means.append(mean)
         quats.append(normalized(multiply(quat, baked.quats[n].astype(float))))
         colors.append(1 / (1 + np.exp(-logits)))
     return [np.array(values) for values in (means, quats, colors)]
+
+
+def slow_reach(lamp, turned, places, joints, point) -> float:
+    """Share of the lamp's light at a point, sphere by sphere."""
+    towards = lamp.lamp_direction.astype(float)
+    across = np.cross([0, 1, 0], towards) / np.linalg.norm(np.cross([0, 1, 0], towards))
+    axes = np.stack([across, np.cross(towards, across), towards])
+    share, (u, v, height) = 0.0, axes @ point
+    spheres = []
+    for rest, carried, parts in zip(
+        lamp.caster_points * 1e-4, lamp.caster_joints, lamp.caster_weights / 255, strict=True
+    ):
+        centre = np.zeros(3)
+        for joint, weight in zip(carried, parts, strict=True):
+            centre += weight * (rotate(turned[joint], rest - joints[joint]) + places[joint])
+        spheres.append(axes @ centre)
+    for row in range(math.floor(v / 0.0125) - 1, math.floor(v / 0.0125) + 3):
+        for column in range(math.floor(u / 0.0125) - 1, math.floor(u / 0.0125) + 3):
+            nearest = -math.inf
+            for x, y, z in spheres:
+                left = 0.02**2 - (column * 0.0125 - x) ** 2 - (row * 0.0125 - y) ** 2
+                nearest = max(nearest, z + math.sqrt(left)) if left >= 0 else nearest
+            weight = (1 - abs(u / 0.0125 - column) / 2) * (1 - abs(v / 0.0125 - row) / 2)
+            share += weight / 4 * min(max((height + 0.03 - nearest) / 0.002 + 0.5, 0), 1)
+    return share
 
 
 @pytest.mark.parametrize("frame", [0.0, 1.0, 2.6, 5.0])

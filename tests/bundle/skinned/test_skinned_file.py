@@ -81,6 +81,23 @@ def test_bodies_of_windows_are_read_as_before():
         Manifest.from_json(json.dumps(older).encode())
 
 
+def test_bodies_without_a_lamp_are_read_as_before(tmp_path):
+    """A manifest of version 3 knows no spheres, and its file has no lamp."""
+    bare = replace(BAKED, info=replace(BAKED.info, num_casters=0), lamp=None)
+    older = json.loads(skinned_manifest(bare).to_json())
+    older["version"] = 3
+    del older["skinned"]["num_casters"]
+    manifest = Manifest.from_json(json.dumps(older).encode())
+    assert manifest.skinned == bare.info
+    read = BakedSkinned.from_bytes(bare.to_bytes(), manifest.skinned)
+    assert read.lamp is None and set(read.tensors) == set(BAKED.tensors) - set(BAKED.lamp.tensors)
+    pose = recorded_pose(read, 2.0)
+    assert (posed(BAKED, pose).rgb >= posed(read, pose).rgb).all()
+    older["version"] = VERSION
+    with pytest.raises(BundleError, match="lacks 'num_casters'"):
+        Manifest.from_json(json.dumps(older).encode())
+
+
 @pytest.mark.parametrize(
     ("data", "message"),
     [
@@ -109,6 +126,13 @@ def test_bodies_of_windows_are_read_as_before():
         (spoiled("shape_scales", 60000.0), "residual shapes are out of range"),
         (spoiled("kernel_width", 0.0, 0), "'kernel_width' must be more than 0"),
         (spoiled("rig_joints", 1e3), "a joint of the rig lies more than 10 m"),
+        (without("caster_points"), "lacks tensor 'caster_points'"),
+        (spoiled("lamp_direction", 3.0, 0), "'lamp_direction' is not of length 1"),
+        (spoiled("lamp_direction", np.nan, 0), "'lamp_direction' holds a value that is not finite"),
+        (spoiled("lamp_strength", -0.1, 0), "'lamp_strength' must lie between 0 and 10000"),
+        (spoiled("lamp_strength", 1e9, 2), "'lamp_strength' must lie between 0 and 10000"),
+        (spoiled("caster_joints", 5), "'caster_joints' names one that is not there"),
+        (spoiled("caster_weights", 255), "'caster_weights' must sum to 255"),
         (random_skinned(21).to_bytes(), "must be"),
         (random_skinned(shapes=4).to_bytes(), "'shapes' must be"),
         (random_skinned(frames=7).to_bytes(), "'rotations' must be"),

@@ -7,6 +7,7 @@ from ico3d.body.motion.window_model import CANONICAL, WindowModel
 from ico3d.body.skinning.coefficients import initial_network
 from ico3d.body.skinning.skinned import NETWORK, Skinned
 from ico3d.bundle.skinned.baked import BakedSkinned
+from ico3d.bundle.skinned.lamp import POINT_UNIT
 from ico3d.bundle.skinned.posing import recorded_pose
 
 HIDDEN = 6
@@ -34,6 +35,15 @@ def trained_like(baked: BakedSkinned, shapes: bool = True, light: bool = True) -
         "rig_joints": baked.rig_joints,
         "light": baked.light,
     }
+    lamp = baked.lamp if light else None
+    if lamp:
+        arrays |= {
+            "lamp_direction": lamp.lamp_direction,
+            "lamp_strength": np.log(lamp.lamp_strength),
+            "caster_points": lamp.caster_points * np.float32(POINT_UNIT),
+            "caster_joints": lamp.caster_joints.astype(np.int32),
+            "caster_weights": lamp.caster_weights / np.float32(255),
+        }
     values = {name: torch.as_tensor(array) for name, array in arrays.items()}
     values["pose_rotations"] = rotations
     values["pose_roots"] = torch.from_numpy(baked.roots.copy())
@@ -42,6 +52,7 @@ def trained_like(baked: BakedSkinned, shapes: bool = True, light: bool = True) -
     network = initial_network(rotations, HIDDEN, info.num_shapes, generator)
     network["bias1"] = torch.linspace(-5, 5, info.num_shapes)
     values |= {NETWORK + name: value for name, value in network.items()}
-    motion = Skinned(info.names, info.parents, info.num_frames, count, HIDDEN, light)
+    lit = light, lamp is not None
+    motion = Skinned(info.names, info.parents, info.num_frames, count, HIDDEN, *lit)
     gaussians = {name: values[name] for name in (*CANONICAL, *motion.per_gaussian)}
     return WindowModel(motion, gaussians, {name: values[name] for name in motion.shared})

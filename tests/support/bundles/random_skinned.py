@@ -9,6 +9,7 @@ from ico3d.bundle.format import write_bundle
 from ico3d.bundle.manifest import Manifest
 from ico3d.bundle.skinned.baked import QUAT_UNIT, BakedSkinned
 from ico3d.bundle.skinned.info import SKINNED, SkinnedInfo
+from ico3d.bundle.skinned.lamp import POINT_UNIT, BakedLamp
 from ico3d.bundle.skinned.packing import packed_quats, packed_weights
 from ico3d.bundle.skinned.posing import kernel_width
 from support.bundles.random_body import body_manifest, random_windows
@@ -16,6 +17,7 @@ from support.bundles.random_bundle import thumbnail
 
 NAMES = ("root", "chest", "left arm", "left hand", "head")
 PARENTS = (-1, 0, 1, 2, 1)
+CASTERS = 150
 REST = ((0, 1, 0), (0, 1.3, 0), (0.2, 1.4, 0), (0.5, 1.4, 0), (0, 1.5, 0))
 
 
@@ -33,7 +35,7 @@ def random_skinned(
     bone = rng.integers(0, len(NAMES), (count, 4))
     low, high = (0.0, 0.5, -0.5), (1.0, 2.0, 0.5)
     info = SkinnedInfo(
-        15.0, frames, count, shapes, len(moving), len(known), NAMES, PARENTS, low, high
+        15.0, frames, count, shapes, len(moving), len(known), NAMES, PARENTS, low, high, CASTERS
     )
     return BakedSkinned(
         means=(joints[bone[:, 0]] + rng.normal(0, 0.1, (count, 3))).astype(np.float32),
@@ -56,6 +58,20 @@ def random_skinned(
         known=known,
         kernel_width=np.array([kernel_width(rotations[known] / QUAT_UNIT)], np.float32),
         info=info,
+        lamp=_lamp(rng, joints),
+    )
+
+
+def _lamp(rng: np.random.Generator, joints: np.ndarray) -> BakedLamp:
+    """Spheres about the joints, among the Gaussians."""
+    bone = rng.integers(0, len(NAMES), (CASTERS, 4))
+    points = joints[bone[:, 0]] + rng.normal(0, 0.1, (CASTERS, 3))
+    return BakedLamp(
+        lamp_direction=np.array([0.48, 0.6, 0.64], np.float32),
+        lamp_strength=np.array([1.5, 1.2, 0.9], np.float32),
+        caster_points=np.rint(points / POINT_UNIT).astype(np.int16),
+        caster_joints=bone.astype(np.uint8),
+        caster_weights=packed_weights(rng.dirichlet(np.ones(4), CASTERS)),
     )
 
 

@@ -9,13 +9,14 @@ from ico3d.bundle.format import write_bundle
 from ico3d.bundle.manifest import CameraInfo, Manifest
 from ico3d.bundle.skinned.baked import QUAT_UNIT, BakedSkinned
 from ico3d.bundle.skinned.info import SKINNED, SkinnedInfo
+from ico3d.bundle.skinned.lamp import POINT_UNIT, RADIUS, BakedLamp
 from ico3d.bundle.skinned.packing import packed_quats, packed_rotations, packed_weights
 from ico3d.bundle.skinned.posing import kernel_width
 from ico3d.rig.quaternions import Array, from_rotvec
 from support.bundles.random_body import body_manifest, random_windows
 from support.bundles.random_bundle import thumbnail
 
-FPS, FRAMES, SHAPES = 15.0, 31, 8
+FPS, FRAMES, SHAPES, CASTERS = 15.0, 31, 8, 2000
 BONES = {  # joint: (parent, place, end of the capsule, radius)
     "hips": (None, (0.0, 0.95, 0.0), (0.0, 1.1, 0.0), 0.14),
     "chest": ("hips", (0.0, 1.15, 0.0), (0.0, 1.42, 0.0), 0.15),
@@ -54,7 +55,7 @@ def capsule_person(count: int, frames: int = FRAMES, seed: int = 0) -> BakedSkin
     known = np.arange(0, frames, 2, dtype=np.int16)
     info = SkinnedInfo(
         FPS, frames, count, SHAPES, len(moving), len(known), NAMES, PARENTS,
-        (-0.8, 0.0, -0.4), (0.8, 1.9, 0.6),
+        (-0.8, 0.0, -0.4), (0.8, 1.9, 0.6), CASTERS,
     )  # fmt: skip
     phases = np.linspace(0, 2 * np.pi, frames)[:, None]
     return BakedSkinned(
@@ -78,6 +79,25 @@ def capsule_person(count: int, frames: int = FRAMES, seed: int = 0) -> BakedSkin
         known=known,
         kernel_width=np.array([kernel_width(rotations[known] / QUAT_UNIT)], np.float32),
         info=info,
+        lamp=_lamp(starts, ends, radii, sizes),
+    )
+
+
+def _lamp(starts: Array, ends: Array, radii: Array, sizes: Array) -> BakedLamp:
+    """Under the skin, lit from above and the left, so that arms shade the trunk."""
+    rng = np.random.default_rng(7)
+    bone = rng.choice(len(BONES), CASTERS, p=sizes / sizes.sum())  # (M,)
+    outward = rng.normal(size=(CASTERS, 3))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    points = starts[bone] + rng.uniform(0, 1, (CASTERS, 1)) * (ends - starts)[bone]
+    points += outward * (radii[bone, None] - RADIUS)
+    joints, weights = _carried(points, starts, ends, radii)
+    return BakedLamp(
+        lamp_direction=np.array([0.6, 0.48, 0.64], np.float32),
+        lamp_strength=np.array([1.3, 1.1, 0.8], np.float32),
+        caster_points=np.rint(points / POINT_UNIT).astype(np.int16),
+        caster_joints=joints,
+        caster_weights=packed_weights(weights),
     )
 
 

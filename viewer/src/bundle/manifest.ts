@@ -4,6 +4,7 @@ import {
   BUNDLE_VERSION,
   LID_NAMES,
   LIDS,
+  MAX_CASTERS,
   MAX_CLUSTERS,
   MAX_GAUSSIANS,
   MAX_JOINTS,
@@ -64,6 +65,7 @@ export interface SkinnedInfo {
   parents: number[]; // before their children, -1 for the root
   low: [number, number, number]; // bounds of what is seen at any time, world space
   high: [number, number, number];
+  num_casters: number; // spheres that cast shadows; 0 without a lamp
 }
 
 /** What the page reads of `manifest.json`; `docs/bundle.md` describes it whole. */
@@ -93,7 +95,7 @@ export function checkManifest(value: unknown): Manifest {
   }
   const { head, camera, background } = manifest;
   const body = manifest.body ?? null; // older manifests do not know of it
-  const skinned = manifest.skinned ?? null;
+  const skinned = manifest.skinned ? { ...manifest.skinned, num_casters: manifest.skinned.num_casters ?? 0 } : null;
   if (!head && !body && !skinned) bad('head');
   if (body && skinned) bad('skinned');
   if (head) checkHead(head);
@@ -145,6 +147,7 @@ function checkSkinned(info: SkinnedInfo): void {
   const most = { num_frames: Infinity, num_gaussians: MAX_GAUSSIANS, num_shapes: MAX_SHAPES, num_moving: names.length, num_known: info.num_frames };
   for (const [key, top] of Object.entries(most)) if (!isCount(info[key as keyof typeof most], top)) bad(`skinned.${key}`);
   if (info.num_frames < 2) bad('skinned.num_frames');
+  if (info.num_casters !== 0 && !isCount(info.num_casters, MAX_CASTERS)) bad('skinned.num_casters');
 }
 
 /** Frames of a body of windows. */

@@ -70,6 +70,12 @@ describe('a body on a skeleton that Python baked', () => {
     expect([...halves.subarray(6)]).toEqual([...given]);
   });
 
+  test('an older one has no lamp', () => {
+    const { num_casters: _, ...older } = info;
+    expect(checkManifest({ ...manifest, skinned: older }).skinned!.num_casters).toBe(0);
+    expect(readBakedSkinned(tensors(), { ...info, num_casters: 0 }, SKINNED).lamp).toBeNull();
+  });
+
   test('is as long as it was recorded', () => expect(bodyOf(manifest)).toMatchObject({ fps: 15, frames: 31 }));
 });
 
@@ -96,6 +102,10 @@ describe('a damaged body on a skeleton is refused in one sentence', () => {
     ['a joint that turns and is not there', spoil('moving', ({ data }) => (data[0] = 200)), /moving names one/],
     ['a frame that is not there', spoil('known', ({ data }) => (data[0] = 31)), /known names one/],
     ['no kernel', spoil('kernel_width', ({ data }) => (data[0] = 0)), /kernel_width/],
+    ['a sphere on a joint that is not there', spoil('caster_joints', ({ data }) => (data[9] = 10)), /caster_joints names one/],
+    ['a lamp nowhere', spoil('lamp_direction', ({ data }) => data.fill(0)), /lamp_direction/],
+    ['a lamp that darkens', spoil('lamp_strength', ({ data }) => (data[1] = -1)), /lamp_strength/],
+    ['too many spheres', field({ num_casters: 1e6 }), /num_casters/],
     ['other length', spoil('rotations', (tensor) => tensor.shape[0]!--), /rotations is I16/],
     ['two bodies', () => checkManifest({ ...manifest, body: { fps: 1 } }), /skinned/],
     ['no joints', field({ names: [] }), /skinned.names/],

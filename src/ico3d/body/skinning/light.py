@@ -1,4 +1,4 @@
-"""Light on surfaces that depends only on the direction in which they face."""
+"""Light on surfaces: from all around, by the direction in which they face, and from a lamp."""
 
 from functools import cache
 
@@ -9,6 +9,8 @@ from ico3d.splat import harmonics
 
 LIGHTS = 8
 """Number of spherical harmonics of degrees 1 and 2."""
+WRAP = 0.2
+"""Cosine by which a lamp reaches past the edge of its light: skin and cloth are soft."""
 FIRST, SECOND = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
 """Axes of the first and second factor of the products xx, yy, zz, xy, xz, yz."""
 
@@ -26,6 +28,26 @@ def lit(normals: Tensor, light: Tensor) -> Tensor:
     products = normals[:, FIRST] * normals[:, SECOND]  # (N, 6)
     polynomials = torch.cat([normals, products], 1)  # (N, 9)
     return polynomials @ (_harmonics_of_polynomials().to(light) @ light)
+
+
+def lamp_lit(normals: Tensor, reach: Tensor, direction: Tensor, strength: Tensor) -> Tensor:
+    """What a distant lamp adds to the colour logits of surfaces.
+
+    Of dark colours, logits are the logarithm: light from all around adds to them what it
+    multiplies colours by, and the lamp adds itself to that light.
+
+    Args:
+        normals: (N, 3) unit vectors.
+        reach: (N,) share of its light that nothing else stops, 0 to 1.
+        direction: (3,) unit vector towards the lamp.
+        strength: (3,) logarithms of its light where it falls straight on, RGB, in units of the
+            light from all around.
+
+    Returns:
+        (N, 3), at least 0.
+    """
+    facing = (normals @ direction + WRAP).clamp_min(0)  # (N,)
+    return torch.log1p((reach * facing)[:, None] * strength.exp())
 
 
 @cache

@@ -9,14 +9,19 @@ from torch.nn.functional import normalize
 
 from ico3d.body.motion.window_model import activated
 from ico3d.body.skinning import coefficients
-from ico3d.body.skinning.blending import blended
+from ico3d.body.skinning.blending import Posed, blended
 from ico3d.body.skinning.kinematics import transforms
-from ico3d.body.skinning.light import lit
+from ico3d.body.skinning.light import lamp_lit, lit
+from ico3d.body.skinning.shadow import posed_casters, reached
 from ico3d.rig import quaternions
 from ico3d.splat.gaussians import Gaussians
 
 NETWORK = "coefficients."
 """Prefix of the names of the tensors of the network that gives coefficients."""
+LAMP = ("lamp_direction", "lamp_strength")
+"""Tensors of the lamp."""
+CASTERS = ("caster_points", "caster_joints", "caster_weights")
+"""Tensors of the spheres that cast shadows."""
 PER_FRAME = ("pose_rotations", "pose_roots")
 """Tensors with one row per frame: a picture gives a gradient to one row only."""
 ON_FRAME = 1e-3
@@ -46,7 +51,8 @@ class Skinned:
     the weight w_j, rotation R_j, rest position joint_j and posed position place_j of joint j, and
     the pose's coefficient κ_k of residual shape k. Its rotation is the blended quaternion of the
     joints times the Gaussian's own. Its colour logits are those of the canonical Gaussian, plus
-    Σ_k κ_k Δc_k, plus the light's spherical harmonics at the posed normal.
+    Σ_k κ_k Δc_k, plus the light's spherical harmonics at the posed normal, plus what a
+    lamp adds where no part of the body stands before it.
 
     Attributes:
         names: Names of the J joints.
@@ -55,6 +61,7 @@ class Skinned:
         shapes: Number K of residual shapes; 0 for none.
         hidden: Width of the hidden layer of the network that gives their coefficients.
         light: Whether colours depend on the direction in which the posed surface faces.
+        shadow: Whether a lamp lights the body, which casts a shadow on itself; only with `light`.
     """
 
     names: tuple[str, ...]
@@ -63,6 +70,7 @@ class Skinned:
     shapes: int
     hidden: int
     light: bool
+    shadow: bool = False
 
     @property
     def per_gaussian(self) -> tuple[str, ...]:
@@ -82,10 +90,14 @@ class Skinned:
 
         They are `rig_joints` (J, 3) metres at rest; `pose_rotations` (F, J, 4) wxyz and
         `pose_roots` (F, 3) metres of the frames; with light `light` (8, 3); with residual shapes
-        the tensors of the network that gives their coefficients.
+        the tensors of the network that gives their coefficients. With a shadow `lamp_direction` (3,),
+        the unit vector towards the lamp, and `lamp_strength` (3,), logarithms; and the spheres that
+        cast it: `caster_points` (M, 3) metres at rest, `caster_joints` (M, 4) int32 and
+        `caster_weights` (M, 4).
         """
         names = ("rig_joints", "pose_rotations", "pose_roots")
         names += ("light",) if self.light else ()
+        names += (*LAMP, *CASTERS) if self.shadow else ()
         layers = coefficients.LAYERS if self.shapes else ()
         return (*names, *(NETWORK + layer for layer in layers))
 
@@ -95,7 +107,7 @@ class Skinned:
 
         Learning the weights gains nothing where those of the template are good (docs/choices.md).
         """
-        return ("skin_joints", "skin_logits", "normals")
+        return ("skin_joints", "skin_logits", "normals", "lamp_direction", *CASTERS)
 
     def at(self, values: Mapping[str, Tensor], tau: float) -> Gaussians:
         """Activated Gaussians in the world at τ; between two frames in an interpolated pose."""
@@ -112,7 +124,7 @@ class Skinned:
             return _between(self._frame(values, first), self._frame(values, first + 1), at - first)
 
     def posed(self, values: Mapping[str, Tensor], rotations: Tensor, root: Tensor) -> Gaussians:
-        """Activated Gaussians in the world, in any pose.
+        """Activated Gaussians in the world, in any pose, which gets no gradient by its shapes.
 
         Args:
             values: The tensors of `CANONICAL` and of this motion, by name.
@@ -121,22 +133,21 @@ class Skinned:
         """
         residual = None
         if self.shapes:
-            known = values["pose_rotations"]
-            mixed = coefficients.network(self._network(values), known)  # (F, K)
-            residual = coefficients.interpolated(known, mixed, rotations)
+            with torch.no_grad():  # a pose shall not follow what the shapes could make of it
+                known = values["pose_rotations"]
+                mixed = coefficients.network(self._network(values), known)  # (F, K)
+                residual = coefficients.interpolated(known, mixed, rotations)
         return self.drawn(values, Pose(rotations, root, residual))
 
     def drawn(self, values: Mapping[str, Tensor], pose: Pose) -> Gaussians:
         """Activated Gaussians in the world, in a pose with given coefficients of the shapes."""
-        table = transforms(self.parents, values["rig_joints"], pose.rotations, pose.root)
-        means = values["means"]
+        means, colors = values["means"], values["color_logits"]
         if pose.residual is not None:
             means = means + values["shape_means"] @ pose.residual  # (N, 3)
-        normals = values["normals"] if self.light else torch.zeros_like(means)
-        hung = (values["skin_joints"], values["skin_logits"])
-        posed = blended(table, *hung, means, values["quats"], normals)
-        colors = {"color_logits": self._colors(values, posed.normals, pose)}
-        return activated({**values, **colors}, posed.means, posed.quats)
+            colors = colors + values["shape_colors"] @ pose.residual  # (N, 3)
+        table, posed = self._hung(values, means, pose)
+        logits = {"color_logits": colors + self._light(values, table, posed)}
+        return activated({**values, **logits}, posed.means, posed.quats)
 
     def about(self) -> dict:
         """Kind and fields of this motion, for `motion_from`."""
@@ -153,14 +164,32 @@ class Skinned:
     def _network(self, values: Mapping[str, Tensor]) -> dict[str, Tensor]:
         return {layer: values[NETWORK + layer] for layer in coefficients.LAYERS}
 
-    def _colors(self, values: Mapping[str, Tensor], normals: Tensor, pose: Pose) -> Tensor:
-        """(N, 3) colour logits of surfaces with posed normals (N, 3) of any length."""
-        colors = values["color_logits"]
-        if self.light:
-            colors = colors + lit(normalize(normals, dim=1), values["light"])
-        if pose.residual is not None:
-            colors = colors + values["shape_colors"] @ pose.residual  # (N, 3)
-        return colors
+    def lighting(self, values: Mapping[str, Tensor], pose: Pose) -> Tensor:
+        """(N, 3) what light adds to colour logits in a pose; zeros without light."""
+        table, posed = self._hung(values, values["means"], pose)
+        return self._light(values, table, posed)
+
+    def _hung(
+        self, values: Mapping[str, Tensor], means: Tensor, pose: Pose
+    ) -> tuple[Tensor, Posed]:
+        """Transforms (J, 16) of the joints, and Gaussians with means (N, 3) at rest on them."""
+        table = transforms(self.parents, values["rig_joints"], pose.rotations, pose.root)
+        normals = values["normals"] if self.light else torch.zeros_like(means)
+        hung = (values["skin_joints"], values["skin_logits"])
+        return table, blended(table, *hung, means, values["quats"], normals)
+
+    def _light(self, values: Mapping[str, Tensor], table: Tensor, posed: Posed) -> Tensor:
+        """(N, 3) what light adds to colour logits of Gaussians as they lie and face."""
+        if not self.light:
+            return torch.zeros_like(posed.means)
+        normals = normalize(posed.normals, dim=1)  # (N, 3)
+        around = lit(normals, values["light"])
+        if not self.shadow:
+            return around
+        casters = posed_casters(table.detach(), *(values[name] for name in CASTERS))
+        direction, strength = (values[name] for name in LAMP)
+        reach = reached(posed.means, normals, casters, direction)  # (N,)
+        return around + lamp_lit(normals, reach, direction, strength)
 
 
 def without_residual(pose: Pose) -> Pose:

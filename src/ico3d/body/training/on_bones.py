@@ -20,6 +20,8 @@ POINTS = 20_000
 """Points of the template's skin to which distances are measured."""
 OFF = 0.01
 """Gaussians within this distance of the skin at rest, in metres, keep their joints."""
+NEAR = 0.03
+"""Gaussians within this distance of the skin at rest, in metres, take its normals."""
 NEARER = 0.75
 """A Gaussian is bound anew if posed skin is nearer than this share of its distance at rest."""
 
@@ -67,7 +69,12 @@ class OnBones:
         if self._skin is None or index == 0 or index % EVERY:
             return 0
         values = model.gaussians
-        away = KDTree(self._skin.points).query(_array(values["means"]))[0]  # (N,) metres at rest
+        away, which = KDTree(self._skin.points).query(_array(values["means"]))  # (N,)
+        if "normals" in values:
+            # Gaussians wander, and light goes by the skin where they have come to lie.
+            near = torch.from_numpy(np.flatnonzero(away < NEAR)).to(model.device)  # (C,)
+            facing = self._skin.normals[np.asarray(which)[away < NEAR]]  # (C, 3)
+            values["normals"][near] = torch.from_numpy(facing).to(values["normals"])
         chosen = np.flatnonzero(away > OFF)
         times = np.zeros(len(chosen), int)
         for tau in np.linspace(0, 1, MOMENTS):

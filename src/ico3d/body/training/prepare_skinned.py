@@ -8,11 +8,13 @@ from ico3d.body.companion import MOMENTS, MOST, Companion
 from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings
+from ico3d.body.skinning.casters import caster_tensors, spread_casters
 from ico3d.body.skinning.coefficients import initial_network
 from ico3d.body.skinning.light import LIGHTS
 from ico3d.body.skinning.skinned import NETWORK, Skinned
 from ico3d.body.skinning.template import Skin, hung_logits, sampled
 from ico3d.body.training.begin import Begin, round_gaussians, trespassing
+from ico3d.body.training.find_lamp import find_lighting
 from ico3d.body.training.standing_off import standing_off
 from ico3d.body.training.surface_points import initial_points
 from ico3d.capture.capture import Capture
@@ -60,6 +62,11 @@ def begin_skinned(
     gaussians = round_gaussians(capture, (window.center,), [places], settings)
     gaussians["means"] = torch.from_numpy(skin.points).float()
     gaussians |= _hung(skin, motion)
+    if motion.shadow:
+        shared |= _lamp_and_casters(capture, track, window)
+        values = {**gaussians, **shared}
+        pose = motion.pose_at(values, window.tau(window.center))
+        gaussians["color_logits"] = gaussians["color_logits"] - motion.lighting(values, pose)
     extent = float(np.ptp(skin.points, axis=0).max() / 2)
     return Begin(WindowModel(motion, gaussians, shared), extent, f"the skin of {track.source}")
 
@@ -146,7 +153,8 @@ def _motion(
 ) -> tuple[Skinned, dict[str, Tensor]]:
     """The motion, and its shared tensors with the poses of the body track."""
     sizes, rig, frames = settings.skinning, track.rig, slice(window.first, window.last + 1)
-    motion = Skinned(rig.names, rig.parents, len(window), sizes.shapes, sizes.hidden, sizes.light)
+    lit = sizes.light, sizes.light and sizes.shadow
+    motion = Skinned(rig.names, rig.parents, len(window), sizes.shapes, sizes.hidden, *lit)
     shared = {
         "rig_joints": torch.from_numpy(rig.joints).float(),
         "pose_rotations": torch.from_numpy(track.rotations[frames]).float().clone(),
@@ -158,6 +166,14 @@ def _motion(
         network = initial_network(shared["pose_rotations"], motion.hidden, motion.shapes, generator)
         shared |= {NETWORK + layer: value for layer, value in network.items()}
     return motion, shared
+
+
+def _lamp_and_casters(capture: Capture, track: BodyTrack, window: Window) -> dict[str, Tensor]:
+    """How the person is lit, as pictures tell, and what casts shadows."""
+    casters = caster_tensors(spread_casters(track))
+    found = find_lighting(capture, track, window, casters)
+    lamp = {"lamp_direction": found.direction, "lamp_strength": found.strength}
+    return {"light": found.light, **lamp, **casters}
 
 
 def _hung(skin: Skin, motion: Skinned) -> dict[str, Tensor]:

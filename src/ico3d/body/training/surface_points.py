@@ -112,10 +112,7 @@ def _anywhere(capture: Capture, count: int, rng: np.random.Generator) -> Start:
 
 
 def point_colors(points: np.ndarray, capture: Capture, frame: int) -> np.ndarray:
-    """Colours of surface points: median over the training pictures in which they are seen.
-
-    A point is seen where it projects onto the person and no other point lies clearly in front of
-    it; a point that is never seen takes the colour of the nearest seen point.
+    """Colours of surface points; a point that is never seen takes the colour of the nearest seen one.
 
     Args:
         points: (P, 3) metres, in the world, spread over the surface at this frame.
@@ -124,6 +121,27 @@ def point_colors(points: np.ndarray, capture: Capture, frame: int) -> np.ndarray
 
     Returns:
         (P, 3) float32 RGB in [0, 1]; grey where nothing is seen.
+    """
+    colors = seen_colors(points, capture, frame)  # (P, 3)
+    known = np.isfinite(colors).any(1)  # (P,)
+    if not known.any():
+        return np.full((len(points), 3), 0.5, np.float32)
+    return colors[known][KDTree(points[known]).query(points)[1]]
+
+
+def seen_colors(points: np.ndarray, capture: Capture, frame: int) -> np.ndarray:
+    """Colours of surface points: median over the training pictures in which they are seen.
+
+    A point is seen where it projects onto the person and no other point lies clearly in front of
+    it.
+
+    Args:
+        points: (P, 3) metres, in the world, spread over the surface at this frame.
+        capture: The recording.
+        frame: Frame number.
+
+    Returns:
+        (P, 3) float32 RGB in [0, 1]; NaN where a point is not seen.
     """
     gap = HIDING * float(np.quantile(spacing(points), 0.9))
     seen = np.full((0, len(points), 3), np.nan, np.float32)
@@ -137,11 +155,11 @@ def point_colors(points: np.ndarray, capture: Capture, frame: int) -> np.ndarray
         colors = np.full((1, len(points), 3), np.nan, np.float32)
         colors[0, inside] = image[pixels[inside, 1], pixels[inside, 0]]
         seen = np.concatenate([seen, colors])  # (V, P, 3)
+    found = np.full((len(points), 3), np.nan, np.float32)
     known = np.isfinite(seen).any((0, 2))  # (P,)
-    if not known.any():
-        return np.full((len(points), 3), 0.5, np.float32)
-    median = np.nanmedian(seen[:, known], axis=0)  # (K, 3)
-    return median[KDTree(points[known]).query(points)[1]]
+    if known.any():
+        found[known] = np.nanmedian(seen[:, known], axis=0)  # (K, 3)
+    return found
 
 
 def _on_person(

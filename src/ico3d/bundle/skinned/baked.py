@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from ico3d.bundle.skinned.info import SKINNED, SkinnedInfo
+from ico3d.bundle.skinned.lamp import BakedLamp, fault_of, lamp_spec
 from ico3d.bundle.tensors import Spec, decode_tensors, encode_tensors
 from ico3d.errors import BundleError
 from ico3d.rig.rig import Rig
@@ -56,6 +57,7 @@ class BakedSkinned:
         kernel_width: (1,) float32 > 0, width of the kernel of that interpolation, in the units of
             a pose's features (`posing.any_pose`).
         info: The manifest's entry about the body.
+        lamp: The lamp in whose light the body casts a shadow on itself, or None.
     """
 
     means: np.ndarray
@@ -78,6 +80,7 @@ class BakedSkinned:
     known: np.ndarray
     kernel_width: np.ndarray
     info: SkinnedInfo
+    lamp: BakedLamp | None = None
 
     @cached_property
     def rig(self) -> Rig:
@@ -107,14 +110,18 @@ class BakedSkinned:
             BundleError: If the file is damaged, shapes or dtypes disagree with the manifest's
                 entry, or a value is out of range.
         """
-        baked = BakedSkinned(**decode_tensors(data, _spec(info), SKINNED), info=info)
+        tensors = decode_tensors(data, _spec(info), SKINNED)
+        found = {name: tensors.pop(name) for name in lamp_spec(info)}
+        baked = BakedSkinned(**tensors, info=info, lamp=BakedLamp(**found) if found else None)
         _check_values(baked)
         return baked
 
     @property
     def tensors(self) -> dict[str, np.ndarray]:
         """The tensors of the file by name."""
-        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "info"}
+        others = ("info", "lamp")
+        own = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in others}
+        return own | (self.lamp.tensors if self.lamp else {})
 
 
 def _spec(info: SkinnedInfo) -> Spec:
@@ -139,6 +146,7 @@ def _spec(info: SkinnedInfo) -> Spec:
         "coefficients": ("F32", (f, k)),
         "known": ("I16", (info.num_known,)),
         "kernel_width": ("F32", (1,)),
+        **lamp_spec(info),
     }
 
 
@@ -176,6 +184,8 @@ def _check_values(baked: BakedSkinned) -> None:
     reach = reach * np.abs(baked.shape_scales.astype(np.float64)) * SCALE_UNITS
     moved = reach[:, 0].max() <= _MAX_LENGTH and reach[:, 1].max() <= _MAX_LOGIT
     _require(bool(moved), "its residual shapes are out of range")
+    fault = fault_of(baked.lamp, info.num_joints) if baked.lamp else None
+    _require(fault is None, str(fault))
     assert baked.rig  # making the rig checks its joints
 
 

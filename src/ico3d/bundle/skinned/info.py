@@ -24,7 +24,7 @@ class SkinnedInfo:
 
     Attributes:
         fps: Recorded frames per second; frame i is at i / fps seconds.
-        num_frames: Number F of recorded frames.
+            num_frames: Number F of recorded frames.
         num_gaussians: Number N of Gaussians.
         num_shapes: Number K of residual shapes.
         num_moving: Number M of joints that turn in the recording.
@@ -34,6 +34,7 @@ class SkinnedInfo:
             0, the only root.
         low: Least x, y, z of the Gaussians' centres in the recording, metres.
         high: Greatest x, y, z of the Gaussians' centres in the recording, metres.
+        num_casters: Number of spheres that cast shadows; 0 without a lamp.
     """
 
     fps: float
@@ -46,6 +47,7 @@ class SkinnedInfo:
     parents: tuple[int, ...]
     low: tuple[float, float, float]
     high: tuple[float, float, float]
+    num_casters: int = 0
 
     @property
     def num_joints(self) -> int:
@@ -79,6 +81,7 @@ def check_skinned(info: SkinnedInfo, require: Require) -> None:
         "num_gaussians": (1, limits.MAX_GAUSSIANS),
         "num_shapes": (1, limits.MAX_SHAPES),
         "num_moving": (1, min(info.num_joints, MOST_JOINTS)),
+        "num_casters": (0, limits.MAX_CASTERS),
         "num_known": (1, min(info.num_frames, limits.MAX_KNOWN_POSES)),
     }
     for name, (least, most) in ranges.items():

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ico3d.bundle.skinned.baked import QUAT_UNIT, SCALE_UNITS, WEIGHT_UNIT, BakedSkinned
+from ico3d.bundle.skinned.lamp import lamp_light
 from ico3d.rig.quaternions import Array, multiply, normalized, slerp
 
 _FIRST = 0.4886025119029199
@@ -132,6 +133,8 @@ def posed(baked: BakedSkinned, pose: SkinnedPose, count: int | None = None) -> P
     facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-6)
     logits = baked.color_logits[some].astype(np.float32) + residual[:, 3:] * units[:, 1:]
     logits = logits + harmonics(facing) @ baked.light  # (N, 3)
+    if baked.lamp:
+        logits = logits + lamp_light(baked.lamp, table, means, facing)
     quats = normalized(multiply(mixed[:, 12:], baked.quats[some].astype(np.float32)))
     return PosedGaussians(
         means.astype(np.float32),

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ico3d.bundle import evaluate, limits, manifest
+from ico3d.bundle.skinned import lamp
 from ico3d.chat.observing.timing import PARTS
 from ico3d.common.expression import EYE_NAMES, LIDS
 from ico3d.motion import roles
@@ -26,6 +27,20 @@ VALUES: tuple[tuple[str, str, Any], ...] = (
     ("MAX_SHAPES", "Residual shapes of a body on a skeleton.", limits.MAX_SHAPES),
     ("MAX_JOINTS", "Of a body's skeleton; rig/rig.py.", MOST_JOINTS),
     ("MAX_CLUSTERS", "Groups of Gaussians in a window that move alike.", limits.MAX_CLUSTERS),
+    ("MAX_CASTERS", "Spheres that cast its shadow.", limits.MAX_CASTERS),
+    (
+        "SHADOW",
+        "The map in which a lamp sees a body, in metres; bundle/skinned/lamp.py.",
+        {
+            "radius": lamp.RADIUS,
+            "texel": lamp.TEXEL,
+            "side": lamp.SIDE,
+            "off": lamp.OFF,
+            "bias": lamp.BIAS,
+            "edge": lamp.EDGE,
+            "wrap": lamp.WRAP,
+        },
+    ),
     ("LEAKY_SLOPE", "Of a head's coefficients; bundle/evaluate.py.", evaluate.LEAKY_SLOPE),
     ("LID_NAMES", "The eyelids among blendshapes.", [EYE_NAMES[lid] for lid in LIDS]),
     ("LIDS", "Their places in the eye and brow values; common/expression.py.", LIDS),

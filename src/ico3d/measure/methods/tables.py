@@ -7,6 +7,7 @@ from rich.table import Table
 
 from ico3d.body.settings import Method
 from ico3d.measure.methods.bench import OURS, Trial
+from ico3d.measure.methods.unseen import SCORES
 
 
 def line(trial: Trial, result: dict) -> str:
@@ -76,12 +77,11 @@ def _margins(margins: dict, spans: Sequence[str]) -> Table:
 
 
 def _unseen(figures: dict, methods: Sequence[str]) -> Table:
-    table = Table("frames not trained", "person", "moving")
+    table = Table("frames not trained", "person", "moving", "poses by pictures", "moving")
     for method in methods:
         mean = figures[method]["mean"]
-        table.add_row(
-            method, _number(mean["unseen_psnr_mask"]), _number(mean["unseen_psnr_moving"])
-        )
+        names = [f"{kind}_{name}" for kind in ("unseen", "unseen_fitted") for name in SCORES]
+        table.add_row(method, *(_number(mean.get(name)) for name in names))
     return table
 
 

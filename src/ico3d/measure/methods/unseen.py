@@ -3,6 +3,7 @@
 import torch
 
 from ico3d.body.model_folder import TrainedBody
+from ico3d.body.reposing.fit_poses import fitted_poses
 from ico3d.body.skinning.skinned import Skinned
 from ico3d.capture.capture import Capture
 from ico3d.measure.body import evaluate_body
@@ -41,6 +42,9 @@ class Reposed:
 def unseen_scores(body: TrainedBody, capture: Capture, first: int) -> dict[str, float | None]:
     """Metrics of the frames from `first` on, with the body in the poses that were tracked there.
 
+    Of a body on a skeleton also `unseen_fitted_…`: the same in poses that the training cameras'
+    pictures of these frames correct (`ico3d.body.reposing.fit_poses`).
+
     Args:
         body: Body that was trained on the frames before.
         capture: The whole recording.
@@ -49,7 +53,16 @@ def unseen_scores(body: TrainedBody, capture: Capture, first: int) -> dict[str, 
     Returns:
         The metrics of `SCORES`, each with the prefix `unseen_`.
     """
-    frames = range(first, capture.num_frames)
-    reposed = Reposed(body, capture.body_track())
-    found = evaluate_body(body, capture, frames=frames, drawn=reposed)
-    return {f"unseen_{name}": found[name] for name in SCORES}
+    frames, track = range(first, capture.num_frames), capture.body_track()
+    found = _scores(body, capture, frames, track, "unseen")
+    if track is not None and isinstance(body.models[-1].motion, Skinned):
+        fitted = fitted_poses(body, capture, track, frames)
+        found |= _scores(body, capture, frames, fitted, "unseen_fitted")
+    return found
+
+
+def _scores(
+    body: TrainedBody, capture: Capture, frames: range, track: BodyTrack | None, named: str
+) -> dict[str, float | None]:
+    found = evaluate_body(body, capture, frames=frames, drawn=Reposed(body, track))
+    return {f"{named}_{name}": found[name] for name in SCORES}

@@ -17,6 +17,16 @@ export interface BakedSkinned {
   shapeScales: Float32Array; // (N,2) millimetres and logits per unit of the shapes
   light: Float32Array; // (8,3) coefficients of spherical harmonics of degrees 1 and 2
   poses: RecordedPoses;
+  lamp: BakedLamp | null;
+}
+
+/** The strongest lamp, and M spheres just under the skin that stand in its light (`docs/bundle.md`). */
+export interface BakedLamp {
+  direction: Float32Array; // (3,) towards the lamp, 1 long
+  strength: Float32Array; // (3,) r, g, b
+  points: Int16Array; // (M,3) at rest, 0.1 mm
+  joints: Uint8Array; // (M,4)
+  weights: Uint8Array; // (M,4) · 255
 }
 
 /** The skeleton and its recorded poses. */
@@ -52,6 +62,7 @@ export function readBakedSkinned(tensors: Map<string, Tensor>, info: SkinnedInfo
   if (!(kernelWidth! > 0)) throw new PageError(`${file}: kernel_width must be more than 0.`);
   return {
     info,
+    lamp: info.num_casters ? readLamp(tensors, info, file) : null,
     joints,
     means: take('means', 'F32', [n, 3]),
     quats: take('quats', 'I16', [n, 4]),
@@ -74,4 +85,21 @@ export function readBakedSkinned(tensors: Map<string, Tensor>, info: SkinnedInfo
       coefficients: take('coefficients', 'F32', [f, k]),
     },
   };
+}
+
+function readLamp(tensors: Map<string, Tensor>, info: SkinnedInfo, file: string): BakedLamp {
+  const m = info.num_casters;
+  const take = <T>(name: string, dtype: Tensor['dtype'], shape: number[]): T =>
+    takeTensor(tensors, name, dtype, shape, file).data as T;
+  const lamp: BakedLamp = {
+    direction: take('lamp_direction', 'F32', [3]),
+    strength: take('lamp_strength', 'F32', [3]),
+    points: take('caster_points', 'I16', [m, 3]),
+    joints: take('caster_joints', 'U8', [m, 4]),
+    weights: take('caster_weights', 'U8', [m, 4]),
+  };
+  if (lamp.joints.some((joint) => joint >= info.names.length)) throw new PageError(`${file}: caster_joints names one that is not there.`);
+  if (Math.abs(Math.hypot(...lamp.direction) - 1) > 1e-3) throw new PageError(`${file}: lamp_direction is not of length 1.`);
+  if (lamp.strength.some((value) => value < 0)) throw new PageError(`${file}: lamp_strength must not be less than 0.`);
+  return lamp;
 }

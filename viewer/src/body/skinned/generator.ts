@@ -1,8 +1,10 @@
 import { dyno, SplatGenerator, SplatTransformer } from '@sparkjsdev/spark';
 import * as THREE from 'three';
+import { SHADOW } from '../../shared.ts';
 import { splatGenerator, type Generator } from '../../splat-shader.ts';
-import type { BakedSkinned } from './baked.ts';
+import type { BakedLamp, BakedSkinned } from './baked.ts';
 import { packSkinned, type Texels } from './packed.ts';
+import { SHADOW_DECLARATIONS, ShadowMap } from './shadow.ts';
 import { Skeleton, TABLE_ROW, type Pose } from './skeleton.ts';
 
 const SHAPE_WORDS = 1.5; // 32-bit words of a residual shape: six bytes, three of position and three of logits
@@ -13,14 +15,16 @@ export class SkinnedGenerator extends SplatGenerator {
   readonly skeleton: Skeleton;
   private readonly most: number; // number of all Gaussians
   private readonly uniforms: Uniforms;
+  private readonly shadow: Shadow | null;
 
   constructor(baked: BakedSkinned) {
     const texels = packSkinned(baked);
-    const uniforms = makeUniforms(baked, texels);
+    const shadow = baked.lamp && makeShadow(baked.lamp, baked.info.names.length);
+    const uniforms = { ...makeUniforms(baked, texels), ...shadow?.uniforms };
     const transformer = new SplatTransformer();
     super({
       numSplats: baked.info.num_gaussians,
-      generator: makeGenerator(texels, baked.info.num_shapes, uniforms, transformer),
+      generator: makeGenerator(texels, baked, uniforms, transformer),
       // Without this update, Spark's transformer would place the body at infinity.
       update: () => {
         if (transformer.update(this)) this.updateVersion();
@@ -28,14 +32,18 @@ export class SkinnedGenerator extends SplatGenerator {
     });
     this.most = baked.info.num_gaussians;
     this.uniforms = uniforms;
+    this.shadow = shadow;
     this.skeleton = new Skeleton(baked.info, baked.poses);
   }
 
   /** Shows a pose. */
   pose(pose: Pose): void {
     const { skinnedJoints, skinnedResidual } = this.uniforms;
-    this.skeleton.table(pose, skinnedJoints.value.image.data as Float32Array);
+    const table = skinnedJoints.value.image.data as Float32Array;
+    this.skeleton.table(pose, table);
     skinnedJoints.value.needsUpdate = true;
+    this.shadow?.map.draw(table);
+    if (this.shadow) this.shadow.texture.needsUpdate = true;
     pose.residual.forEach((value, k) => skinnedResidual.value[k >> 2]!.setComponent(k & 3, value));
     this.updateVersion();
   }
@@ -74,9 +82,27 @@ function makeUniforms({ info, light }: BakedSkinned, { width, rows, layers, word
   };
 }
 
-function makeGenerator(texels: Texels, shapes: number, uniforms: Uniforms, transformer: SplatTransformer): Generator {
+/** What the lamp sees, as a texture, and the lamp. */
+interface Shadow {
+  map: ShadowMap;
+  texture: THREE.DataTexture;
+  uniforms: Record<string, { value: unknown }>;
+}
+
+function makeShadow(lamp: BakedLamp, joints: number): Shadow {
+  const map = new ShadowMap(lamp, joints);
+  const texture = new THREE.DataTexture(map.depths, SHADOW.side, SHADOW.side, THREE.RedFormat, THREE.FloatType);
+  texture.needsUpdate = true;
+  const axes = [0, 3, 6].map((at) => new THREE.Vector3().fromArray(map.axes, at));
+  const lit = [...axes, new THREE.Vector3().fromArray(lamp.strength)];
+  return { map, texture, uniforms: { skinnedShadow: { value: texture }, skinnedLamp: { value: lit } } };
+}
+
+function makeGenerator(texels: Texels, { info, lamp }: BakedSkinned, uniforms: Uniforms, transformer: SplatTransformer): Generator {
+  const declarations = lamp ? DECLARATIONS + dyno.unindent(SHADOW_DECLARATIONS) : DECLARATIONS;
+  const lit = lamp ? ' + skinnedLampLit(centre, normal)' : '';
   return splatGenerator(
-    { declarations: DECLARATIONS, uniforms, statements: (index, gsplat) => statements(texels, shapes, index, gsplat) },
+    { declarations, uniforms, statements: (index, gsplat) => statements(texels, info.num_shapes, lit, index, gsplat) },
     transformer,
   );
 }
@@ -126,7 +152,7 @@ function residual(shapes: number): string {
   return `${layers.join(' ')} ${unpacked.join(' ')} vec3 moved = ${sum(0)}; vec3 tinted = ${sum(3)};`;
 }
 
-function statements({ width }: Texels, shapes: number, index: string, gsplat: string): string[] {
+function statements({ width }: Texels, shapes: number, lit: string, index: string, gsplat: string): string[] {
   return dyno.unindentLines(`
     ${gsplat}.flags = 0u;
     ${gsplat}.index = ${index};
@@ -153,10 +179,11 @@ function statements({ width }: Texels, shapes: number, index: string, gsplat: st
       normal = vec3(dot(x.xyz, normal), dot(y.xyz, normal), dot(z.xyz, normal));
       normal *= inversesqrt(max(dot(normal, normal), 1e-12));
       vec4 rotation = skinnedProduct(turn, vec4(skinnedShorts(b.x), skinnedShorts(b.y)) / 32767.0);
+      vec3 centre = vec3(dot(x, rest), dot(y, rest), dot(z, rest));
       vec2 between = unpackHalf2x16(c.y);
-      vec3 logits = vec3(between.y, unpackHalf2x16(c.z)) + units.y * tinted + skinnedLit(normal);
+      vec3 logits = vec3(between.y, unpackHalf2x16(c.z)) + units.y * tinted + skinnedLit(normal)${lit};
       ${gsplat}.flags = GSPLAT_FLAG_ACTIVE;
-      ${gsplat}.center = vec3(dot(x, rest), dot(y, rest), dot(z, rest));
+      ${gsplat}.center = centre;
       ${gsplat}.quaternion = rotation.yzwx * inversesqrt(max(dot(rotation, rotation), 1e-12));
       ${gsplat}.scales = exp(vec3(unpackHalf2x16(c.x), between.x));
       ${gsplat}.rgba = vec4(1.0 / (1.0 + exp(-logits)), float(b.w >> 24u) / 255.0);

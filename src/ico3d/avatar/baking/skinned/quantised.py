@@ -13,6 +13,7 @@ from ico3d.body.skinning.skinned import NETWORK, Skinned
 from ico3d.bundle.limits import MAX_KNOWN_POSES
 from ico3d.bundle.skinned.baked import QUAT_UNIT, SCALE_UNITS, BakedSkinned
 from ico3d.bundle.skinned.info import SkinnedInfo
+from ico3d.bundle.skinned.lamp import POINT_UNIT, BakedLamp
 from ico3d.bundle.skinned.packing import packed_quats, packed_rotations, packed_weights
 from ico3d.bundle.skinned.posing import kernel_width
 from ico3d.common.spread import spread
@@ -73,6 +74,7 @@ def quantised(model: WindowModel, clip: Clip, importance: np.ndarray) -> BakedSk
         parents=motion.parents,
         low=clip.low,
         high=clip.high,
+        num_casters=len(shared["caster_points"]) if motion.shadow else 0,
     )
     return BakedSkinned(
         means=shapes.means.astype(np.float32),
@@ -89,7 +91,19 @@ def quantised(model: WindowModel, clip: Clip, importance: np.ndarray) -> BakedSk
         rig_joints=shared["rig_joints"].numpy().astype(np.float32),
         coefficients=shapes.coefficients.astype(np.float32),
         info=info,
+        lamp=_lamp(shared) if motion.shadow else None,
         **poses,
+    )
+
+
+def _lamp(shared: Mapping[str, Tensor]) -> BakedLamp:
+    """The lamp and what stands in its light."""
+    return BakedLamp(
+        lamp_direction=shared["lamp_direction"].numpy(),
+        lamp_strength=shared["lamp_strength"].exp().numpy(),
+        caster_points=np.rint(shared["caster_points"].numpy() / POINT_UNIT).astype(np.int16),
+        caster_joints=shared["caster_joints"].numpy().astype(np.uint8),
+        caster_weights=packed_weights(shared["caster_weights"].numpy()),
     )
 
 

@@ -11,6 +11,7 @@ from ico3d.capture.face.mediapipe_face import MESH_LANDMARKS, CanonicalFace, Fac
 from ico3d.capture.headpose.shape import similarity_fit
 from ico3d.capture.headtrack.crops import Part, search
 from ico3d.common.camera import Camera, look_at
+from ico3d.common.spread import directions
 from ico3d.splat.gaussians import Gaussians
 
 DIRECTIONS, ROLLS = 40, (0, 90, -90, 180)
@@ -94,19 +95,11 @@ def _cameras(middle: np.ndarray, radius: float) -> list[Camera]:
     intrinsics = np.array([[focal, 0, PIXELS / 2], [0, focal, PIXELS / 2], [0, 0, 1]])
     cameras = []
     for roll in ROLLS:
-        for way in _sphere(DIRECTIONS):
+        for way in directions(DIRECTIONS):
             turn = Rotation.from_rotvec(np.radians(roll) * way)
             pose = look_at(middle + AWAY * radius * way, middle, turn.apply([0.0, 1.0, 0.0]))
             cameras.append(Camera(PIXELS, PIXELS, intrinsics, pose))
     return cameras
-
-
-def _sphere(count: int) -> np.ndarray:
-    """(count, 3) unit vectors evenly over a sphere (Fibonacci's spiral), beginning with +z."""
-    along = 1 - 2 * np.arange(count) / (count - 1)
-    angle = np.arange(count) * np.pi * (3 - np.sqrt(5))
-    across = np.sqrt(1 - along**2)
-    return np.stack([across * np.cos(angle), across * np.sin(angle), along], 1)
 
 
 def _large(parts: list[Part]) -> list[Part]:
