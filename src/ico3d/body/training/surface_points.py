@@ -112,7 +112,7 @@ def _anywhere(capture: Capture, count: int, rng: np.random.Generator) -> Start:
 
 
 def point_colors(points: np.ndarray, capture: Capture, frame: int) -> np.ndarray:
-    """Colours of surface points; a point that is never seen takes the colour of the nearest seen one.
+    """Colours of surface points; one that is never seen takes that of the nearest seen one.
 
     Args:
         points: (P, 3) metres, in the world, spread over the surface at this frame.
@@ -138,7 +138,7 @@ def seen_colors(points: np.ndarray, capture: Capture, frame: int) -> np.ndarray:
     Args:
         points: (P, 3) metres, in the world, spread over the surface at this frame.
         capture: The recording.
-        frame: Frame number.
+        frame: Index of the frame.
 
     Returns:
         (P, 3) float32 RGB in [0, 1]; NaN where a point is not seen.

@@ -24,7 +24,7 @@ class SkinnedInfo:
 
     Attributes:
         fps: Recorded frames per second; frame i is at i / fps seconds.
-            num_frames: Number F of recorded frames.
+        num_frames: Number F of recorded frames.
         num_gaussians: Number N of Gaussians.
         num_shapes: Number K of residual shapes.
         num_moving: Number M of joints that turn in the recording.
