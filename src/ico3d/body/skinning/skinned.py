@@ -90,10 +90,10 @@ class Skinned:
 
         They are `rig_joints` (J, 3) metres at rest; `pose_rotations` (F, J, 4) wxyz and
         `pose_roots` (F, 3) metres of the frames; with light `light` (8, 3); with residual shapes
-        the tensors of the network that gives their coefficients. With a shadow the lamp's
-        `lamp_direction` (3,), a unit vector towards it, and `lamp_strength` (3,), logarithms; and
-        the spheres that cast it: `caster_points` (M, 3) metres at rest, `caster_joints` (M, 4) int32 and
-        `caster_weights` (M, 4).
+        the tensors of the network that gives their coefficients. With a shadow `lamp_direction`
+        (3,), a unit vector, and `lamp_strength` (3,), logarithms; and the spheres that cast it:
+        `caster_points` (M, 3) metres at rest, `caster_joints` (M, 4) int32 and `caster_weights`
+        (M, 4).
         """
         names = ("rig_joints", "pose_rotations", "pose_roots")
         names += ("light",) if self.light else ()
