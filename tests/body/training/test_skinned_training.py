@@ -107,12 +107,13 @@ def test_copies_hang_on_the_joints_of_what_they_come_from(capture):
 
 @pytest.mark.parametrize("method", ["skinned", "hugs"])
 def test_resuming_repeats_the_uninterrupted_run(capture, method):
-    """Bit by bit, density control and dropped residuals included."""
-    whole = trainer_of(capture, method, window=CLIP)
+    """Bit by bit, density control, dropped residuals and the lamp included."""
+    lamp = {"skinning.shadow": method == "skinned"}
+    whole = trainer_of(capture, method, window=CLIP, **lamp)
     for index in range(40):
         whole.step(index)
     kept = {name: value.detach().clone() for name, value in whole.tensors().items()}
-    resumed = trainer_of(capture, method, window=CLIP)
+    resumed = trainer_of(capture, method, window=CLIP, **lamp)
     resumed.restore(kept, {})
     for index in range(40, 65):
         whole.step(index)

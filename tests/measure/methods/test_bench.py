@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from ico3d.body.planning.windows import Window
+from ico3d.body.reposing import fit_poses
 from ico3d.body.settings import ONE_WINDOW, SKINNED
 from ico3d.capture.formats import open_capture
 from ico3d.errors import SettingsError
@@ -169,6 +170,7 @@ def test_the_same_command_trains_nothing_twice(bench):
 def test_frames_that_were_not_trained(tmp_path, monkeypatch, capsys):
     """On a skeleton the body follows the track there; elsewhere it stays where it was."""
     open_with(monkeypatch, TrackedCapture)
+    monkeypatch.setattr(fit_poses, "STEPS", 7)
     command = BenchBody(
         tmp_path / "capture",
         folder=tmp_path / "runs",
@@ -182,6 +184,9 @@ def test_frames_that_were_not_trained(tmp_path, monkeypatch, capsys):
     figures = json.loads((tmp_path / "figures.json").read_text())
     still, hugs = (figures[method]["mean"]["unseen_psnr_mask"] for method in ("static", "hugs"))
     assert hugs > still + 0.5
+    fitted = figures["hugs"]["mean"]["unseen_fitted_psnr_mask"]
+    assert abs(fitted - hugs) < 3 and fitted != hugs
+    assert "unseen_fitted_psnr_mask" not in figures["static"]["mean"]
     assert "frames not trained" in capsys.readouterr().out
     with pytest.raises(SettingsError, match="--unseen needs --frames"):
         replace(command, frames=None).run()

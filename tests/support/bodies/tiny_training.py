@@ -9,7 +9,9 @@ from ico3d.body.training.views import BodyViews
 from support.settings import changed
 
 WINDOW = Window(4, 8)
-SMALL = {
+NO_LAMP = {"skinning.shadow": False}
+"""Looking for a lamp takes a second, and few tests are about it."""
+SMALL = NO_LAMP | {
     "initial.gaussians": 250,
     "density.max_gaussians": 400,
     "steps_per_frame": 50,
@@ -19,7 +21,7 @@ SMALL = {
     "encoder.space": 8,
     "mlp.width": 32,
 }
-TINY = {
+TINY = NO_LAMP | {
     "windows.longest": 6,
     "windows.shortest": 3,
     "initial.gaussians": 60,
