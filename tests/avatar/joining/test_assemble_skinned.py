@@ -19,6 +19,7 @@ from ico3d.motion.gestures.library import library
 from support.avatars.planted_person import FRAMES, planted_head
 from support.avatars.skeletal_person import SkeletalPerson
 from support.avatars.tiny_joining import assembly_of
+from support.settings import changed
 
 pytestmark = pytest.mark.slow
 
@@ -30,7 +31,9 @@ def made(tmp_path_factory):
     capture, said = SkeletalPerson(folder / "capture"), []
     (folder / "head").mkdir()
     planted_head().save(folder / "head")
-    assembly = replace(assembly_of(folder / "head", match_colors=False), method="skinned")
+    assembly = assembly_of(folder / "head", match_colors=False)
+    body = changed(assembly.body, {"steps_per_frame": 12})
+    assembly = replace(assembly, body=body, method="skinned")
     return capture, folder / "out", assemble(capture, folder / "out", assembly, said.append), said
 
 
