@@ -1,6 +1,7 @@
 """From a head and a capture of the body with a skeleton to somebody who gestures."""
 
 from dataclasses import replace
+from functools import partial
 
 import av
 import numpy as np
@@ -95,9 +96,10 @@ def test_the_head_nods_with_the_neck(made):
     assert float(tips[1][2] - tips[0][2]) > 0.005  # forwards
 
 
-def test_it_is_filmed(made, tmp_path, capsys):
+def test_it_is_filmed(made, tmp_path, capsys, monkeypatch):
     """As long as the gesture takes."""
     _, folder, *_ = made
+    monkeypatch.setattr("ico3d.avatar.poseable.library", partial(library, names=("wave",)))
     out = tmp_path / "film.mp4"
     words = ["render", str(folder), str(out), "--gestures", "wave", "--fps", "1", "--size", "60"]
     assert main([*words, "--path", "start"]) == 0
