@@ -51,13 +51,22 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 TOGETHER = (
+    "capture/portrait/test_clip.py",
+    "capture/portrait/test_photometric_poses.py",
     "chat/services/language/test_qwen.py",
     "chat/services/recognition/test_whisper.py",
+    "chat/test_pipecat_internals.py",
     "head/test_encoders.py",
     "measure/test_expression.py",
     "speech/test_hubert.py",
+    "speech/test_training.py",
+    "splat/test_primitive.py",
+    "training/test_acceleration.py",
+    "training/test_optimiser.py",
 )
-"""Files that need transformers, which takes three seconds to be imported: one process runs them."""
+"""Files that need transformers, which takes three seconds to be imported, or that compiler of
+torch's which transformers and torch.optim import: one process runs them.
+"""
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -92,6 +92,7 @@ def test_the_verbs_bake_film_and_animate_there(cuda, folder, tmp_path, monkeypat
     open_with(monkeypatch, lambda path: recordings[Path(path).name])
     monkeypatch.setattr(head_bundle, "BakeSettings", lambda: QUICK)
     monkeypatch.setattr(head_bundle, "MEASURED_VIEWS", 4)
+    monkeypatch.setattr(person_bundle, "VIEWS", 4)
     monkeypatch.setattr(body_bundle, "SHAPES", body_bundle.SHAPES[:1])
     bundle, film = tmp_path / "a.ico3d", tmp_path / "a.mp4"
     bake = ("bake", folder, "head", "body", bundle, "--rank", 4, "--force")

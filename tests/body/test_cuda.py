@@ -1,12 +1,14 @@
 """Bodies are trained, fine-tuned, and go on with that, where CUDA is."""
 
+import shutil
+
 import pytest
 import torch
 
-from ico3d.body.settings import SKINNED, settings_for
+from ico3d.body.settings import ONE_WINDOW, SKINNED, settings_for
 from ico3d.body.training.finetune_window import FineTuner
 from ico3d.body.training.optimise_window import BodyTrainer
-from ico3d.body.training.train_clip import BodyJob, train_body
+from ico3d.body.training.train_clip import BodyJob, plan_windows, train_body
 from support.bodies.tiny_training import TINY
 from support.bodies.tracked_capture import TrackedCapture
 from support.settings import changed
@@ -22,11 +24,30 @@ def _job(method: str, **changes) -> BodyJob:
     return BodyJob(method, 0, changed(settings_for("cpu", method), small | changes))
 
 
+@pytest.fixture(scope="module")
+def begun(tmp_path_factory):
+    """Begins model folders with the plan of the clip, which is made once for one and many windows.
+
+    Gives a function of capture, job and folder.
+    """
+    plans = {}
+
+    def begin(capture, job, folder):
+        alone = job.method in ONE_WINDOW
+        if alone not in plans:
+            plans[alone] = tmp_path_factory.mktemp("plan")
+            plan_windows(capture, job, plans[alone])
+        return shutil.copytree(plans[alone], folder)
+
+    return begin
+
+
 @pytest.mark.parametrize("method", ["swings++", "swings", "spacetime", "freetime", *SKINNED])
-def test_an_interrupted_run_goes_on_there(cuda, tmp_path, method, monkeypatch):
+def test_an_interrupted_run_goes_on_there(cuda, begun, tmp_path, method, monkeypatch):
     """To what it would have become, in the windows and in fine-tuning them."""
-    capture = TrackedCapture(tmp_path / "capture", 12.0)
-    whole = train_body(capture, tmp_path / "whole", _job(method))
+    capture, job = TrackedCapture(tmp_path / "capture", 12.0), _job(method)
+    whole = train_body(capture, begun(capture, job, tmp_path / "whole"), job)
+    parts = begun(capture, job, tmp_path / "parts")
     for kind, death in DEATHS.items():
         step = kind.step
 
@@ -40,8 +61,8 @@ def test_an_interrupted_run_goes_on_there(cuda, tmp_path, method, monkeypatch):
         with monkeypatch.context() as patch:
             patch.setattr(kind, "step", dying_step)
             with pytest.raises(KeyboardInterrupt):
-                train_body(capture, tmp_path / "parts", _job(method))
-    resumed = train_body(capture, tmp_path / "parts", _job(method))
+                train_body(capture, parts, job)
+    resumed = train_body(capture, parts, job)
     for ours, theirs in zip(resumed.models, whole.models, strict=True):
         for name, value in theirs.gaussians.items():
             assert torch.equal(ours.gaussians[name], value), name

@@ -93,7 +93,7 @@ def test_what_was_wrong_and_is_no_more_is_tried_again(bundle, kind):
 async def test_the_page_of_a_conversation_that_does_not_start_may_try_again(bundle, told, at_home):
     secret = "CUDA out of memory on gpu7.internal"
     adapt, errors = failing("language", RuntimeError(secret))
-    async with serving(bundle, OFFLINE, adapt=adapt) as (url, sessions):
+    async with serving(bundle, TYPED, adapt=adapt) as (url, sessions):
         assert sessions.at_home  # as it is bound
         sessions.at_home = at_home
         for _ in range(3):
@@ -121,7 +121,7 @@ async def test_a_service_that_never_starts_is_not_waited_for(bundle):
         slow = replace(voice, provider=replace(voice.provider, make=make))
         return replace(avatar, services=replace(avatar.services, voice=slow))
 
-    async with serving(bundle, OFFLINE, adapt=adapt) as (url, sessions):
+    async with serving(bundle, TYPED, adapt=adapt) as (url, sessions):
         sessions._starting = 0.5
         began = time.monotonic()
         error = await first_message(url)

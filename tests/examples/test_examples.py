@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 import wave
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +38,8 @@ def run(monkeypatch, example, *words):
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory):
     """What the first example writes."""
-    pytest.importorskip("anny", reason="the synthetic person needs the package anny")
+    if find_spec("anny") is None:  # importing it takes seconds
+        pytest.skip("the synthetic person needs the package anny")
     out = tmp_path_factory.mktemp("example")
     size = ["--frames", "22", "--size", "48", "--steps", "20", "--gaussians", "400"]
     with pytest.MonkeyPatch.context() as patch:

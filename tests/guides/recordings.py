@@ -18,9 +18,9 @@ from ico3d.common.expression import EYE_NAMES
 from ico3d.studio.picture import paint
 from ico3d.studio.recording import Recording, record
 
-SIZE, CAMERAS, FRAMES, FPS = 144, 4, 5, 15.0
+SIZE, CAMERAS, FRAMES, FPS = 144, 3, 4, 15.0
 WARM = np.array([1.0, 0.85, 0.65])
-PHONE_FPS, PHONE_ROUNDS = 25.0, 2
+PHONE_FPS, PHONE_ROUNDS = 25.0, 3
 
 
 def person(folder: Path) -> Path:

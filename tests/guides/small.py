@@ -4,11 +4,11 @@ Each command of a guide runs as it stands there, with these words behind it.
 """
 
 HEAD = (
-    "--steps 20 --initial.gaussians 500 --density.max-gaussians 600 --density.begin 10 "
-    "--density.every 10 --network.hidden 16 --network.features 8"
+    "--steps 12 --initial.gaussians 300 --density.max-gaussians 400 --density.begin 6 "
+    "--density.every 6 --network.hidden 16 --network.features 8"
 )
 BODY = (
-    "--steps-per-frame 5 --warmup-steps 10 --finetune.steps 10 --joining.color-steps 10 "
+    "--steps-per-frame 5 --warmup-steps 6 --finetune.steps 6 --joining.color-steps 6 "
     "--initial.gaussians 300 --density.max-gaussians 400 --joining.border-points 60 "
     "--density.begin 10 --encoder.space 8"
 )

@@ -33,7 +33,9 @@ def body(face):
 @pytest.fixture(autouse=True)
 def quick_bakes(monkeypatch):
     """What is baked has hardly been trained: its small network need not be exact."""
-    monkeypatch.setattr(head_bundle, "BakeSettings", partial(BakeSettings, 32, steps=60))
+    monkeypatch.setattr(
+        head_bundle, "BakeSettings", partial(BakeSettings, 32, augmented=20, steps=40)
+    )
 
 
 @pytest.fixture

@@ -24,12 +24,12 @@ pytestmark = pytest.mark.slow
 SETTINGS = changed(
     PRESETS["cpu"],
     {
-        "steps": 300,
+        "steps": 200,
         "initial.gaussians": 700,
         "density.max_gaussians": 1100,
         "density.begin": 40,
         "density.every": 40,
-        "density.until": 200,
+        "density.until": 140,
     },
 )
 

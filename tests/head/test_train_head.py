@@ -22,12 +22,12 @@ pytestmark = pytest.mark.slow
 SETTINGS = changed(
     PRESETS["cpu"],
     {
-        "steps": 160,
+        "steps": 100,
         "initial.gaussians": 200,
         "density.max_gaussians": 400,
         "density.begin": 40,
         "density.every": 20,
-        "density.until": 100,
+        "density.until": 70,
         "density.gradient": 1e-5,
         "rates.basis_weight_decay": 0.0,  # what this capture shows is exact
     },

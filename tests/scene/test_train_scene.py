@@ -37,7 +37,7 @@ def _job(only="person", strategy="default", frames="all", **changes) -> SceneJob
 @pytest.mark.parametrize("strategy", ["default", "mcmc"])
 def test_two_cameras_are_learnt(still, tmp_path, strategy):
     capture = still(2)
-    scene = train_scene(capture, tmp_path / "model", _job(strategy=strategy, steps=400))
+    scene = train_scene(capture, tmp_path / "model", _job(strategy=strategy, steps=300))
     metrics = evaluate_scene(scene, capture, "all", None)
     assert metrics["psnr"] > 33 and metrics["psnr_mask"] > 28
     assert 120 < metrics["num_gaussians"] <= 300

@@ -16,7 +16,8 @@ pytestmark = pytest.mark.slow
 def test_gradients_are_finite_differences(coefficients, antialiased):
     """Of every parameter, the harmonics and the camera's pose."""
     camera = camera_at((0.1, 0.2, 1.2), width=9, height=7, focal=11.0)
-    start = harmonic(scene(4, seed=3, spread=0.2), coefficients)
+    count = 2 if coefficients == 16 else 4  # so many harmonics take long, and are linear
+    start = harmonic(scene(count, seed=3, spread=0.2), coefficients)
     names = [name for name, value in vars(start).items() if value is not None]
     values = [getattr(start, name).requires_grad_() for name in names]
     pose = torch.from_numpy(camera.world_to_camera)[None].requires_grad_()

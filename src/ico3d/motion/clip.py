@@ -4,6 +4,7 @@ import base64
 import json
 import re
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, cast
 
@@ -95,6 +96,14 @@ class Clip:
     def roles(self) -> NDArray[np.integer]:
         """(M,) indices, in `ROLES`, of the roles that the gesture moves."""
         return np.array([INDEX[role] for role in self.curves], int)
+
+    @cached_property
+    def cycle(self) -> float:
+        """Duration in seconds of the motion that is repeated in a hold; 0 if the hold is still."""
+        marks = self.marks
+        held = np.linspace(marks.hold, marks.release, 9)
+        moving = any(np.ptp(curve.at(held), axis=0).max() > 1e-2 for curve in self.curves.values())
+        return marks.release - marks.hold if moving else 0.0
 
     def at(self, times: Array | float) -> Array:
         """(..., M, 4) rotations wxyz of the moved roles at times (...) in seconds."""

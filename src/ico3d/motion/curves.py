@@ -8,6 +8,7 @@ last key. Before the first and after the last key a curve is constant.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -72,21 +73,23 @@ class Curve:
         )
         span = self.times[index + 1] - self.times[index]
         part = np.clip((times - self.times[index]) / span, 0, 1)
-        steps, slopes = _steps(self.times, self.rotations)  # (K − 1, 3), (K, 3)
+        steps, slopes = self._steps  # (K − 1, 3), (K, 3)
         s, h = part[..., None], span[..., None]  # (..., 1)
         turn = s * s * (3 - 2 * s) * steps[index]
         turn = turn + h * s * (1 - s) * ((1 - s) * slopes[index] - s * slopes[index + 1])
         return multiply(self.rotations[index], from_rotvec(turn))
 
-
-def _steps(times: Array, rotations: Array) -> tuple[Array, Array]:
-    """(K − 1, 3) rotation vectors from key to key, and (K, 3) angular velocities at the keys."""
-    steps = to_rotvec(multiply(conjugate(rotations[:-1]), rotations[1:]))
-    spans = np.diff(times)[:, None]
-    speeds = steps / spans
-    slopes = np.zeros((len(times), 3))
-    slopes[1:-1] = (spans[1:] * speeds[:-1] + spans[:-1] * speeds[1:]) / (spans[1:] + spans[:-1])
-    return steps, slopes
+    @cached_property
+    def _steps(self) -> tuple[Array, Array]:
+        """(K − 1, 3) rotation vectors from key to key, and (K, 3) velocities at the keys."""
+        before, after = self.rotations[:-1], self.rotations[1:]
+        steps = to_rotvec(multiply(conjugate(before), after))
+        spans = np.diff(self.times)[:, None]
+        speeds = steps / spans
+        slopes = np.zeros((len(self.times), 3))
+        mean = (spans[1:] * speeds[:-1] + spans[:-1] * speeds[1:]) / (spans[1:] + spans[:-1])
+        slopes[1:-1] = mean
+        return steps, slopes
 
 
 def angles(a: Array, b: Array) -> Array:

@@ -14,8 +14,10 @@ import numpy as np
 from ico3d.motion.roles import INDEX, PARENTS, ROLES, SIDES, TWIST, Cast, cast
 from ico3d.motion.turning import about, across, aligned, arc, power, twist_angle, unit
 from ico3d.rig.quaternions import IDENTITY, Array, conjugate, multiply, rotate
-from ico3d.rig.rig import Rig
+from ico3d.rig.rig import Rig, levels
 
+LEVELS = levels(PARENTS)
+"""Roles and those above them, from the hips on."""
 DOWN = np.array([0.0, -1.0, 0.0])
 """(3,) direction of arms, hands and fingers in the standard pose."""
 HINGE = np.array([-1.0, 0.0, 0.0])
@@ -75,9 +77,8 @@ class Retarget:
     def world(self, by_role: Array) -> Array:
         """(..., R, 4) rotations C_r in the world, from the standard pose, of poses by role."""
         found = np.array(by_role, np.float64)  # (..., R, 4)
-        for number, parent in enumerate(PARENTS):
-            if parent >= 0:
-                found[..., number, :] = multiply(found[..., parent, :], found[..., number, :])
+        for roles, parents in LEVELS:
+            found[..., roles, :] = multiply(found[..., parents, :], found[..., roles, :])
         return found
 
     def by_role(self, rotations: Array) -> Array:

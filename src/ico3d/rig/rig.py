@@ -1,6 +1,8 @@
 """Rigs: the joints of a skeleton as a tree, and forward kinematics."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -77,11 +79,17 @@ class Rig:
         turned = np.array(rotations, np.float64)  # (..., J, 4)
         places = np.broadcast_to(self.joints, (*turned.shape[:-1], 3)).copy()  # (..., J, 3)
         places[..., 0, :] += root
-        for joint, parent in enumerate(self.parents[1:], 1):
-            turned[..., joint, :] = multiply(turned[..., parent, :], turned[..., joint, :])
-            bone = self.joints[joint] - self.joints[parent]  # (3,)
-            places[..., joint, :] = places[..., parent, :] + rotate(turned[..., parent, :], bone)
+        for joints, parents in self._levels:
+            above = turned[..., parents, :]  # (..., L, 4)
+            turned[..., joints, :] = multiply(above, turned[..., joints, :])
+            bones = self.joints[joints] - self.joints[parents]  # (L, 3)
+            places[..., joints, :] = places[..., parents, :] + rotate(above, bones)
         return turned, places
+
+    @cached_property
+    def _levels(self) -> list[tuple[list[int], list[int]]]:
+        """Joints and their parents, by how many joints lie between them and the root."""
+        return levels(self.parents)
 
     def matrices(self, rotations: Array, root: Array) -> Array:
         """(..., J, 4, 4) rigid transforms of points bound to each joint, from rest to the world.
@@ -103,3 +111,26 @@ class Rig:
         found = np.zeros((*shape, len(self), 4))  # (..., J, 4)
         found[..., 0] = 1
         return found
+
+
+def levels(parents: Sequence[int]) -> list[tuple[list[int], list[int]]]:
+    """What hangs on something in a forest, such that each level hangs on those before it.
+
+    Args:
+        parents: Of each its parent, which comes before it; −1 for roots.
+
+    Returns:
+        For each level its members and their parents.
+    """
+    depth: list[int] = []
+    found: list[tuple[list[int], list[int]]] = []
+    for member, parent in enumerate(parents):
+        depth.append(depth[parent] + 1 if parent >= 0 else 0)
+        if parent < 0:
+            continue
+        if depth[member] > len(found):
+            found.append(([], []))
+        members, above = found[depth[member] - 1]
+        members.append(member)
+        above.append(parent)
+    return found

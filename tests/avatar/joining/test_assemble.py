@@ -24,7 +24,7 @@ from ico3d.errors import CaptureError, ModelError, SettingsError
 from ico3d.head.model import HeadModel
 from ico3d.measure.body import evaluate_body
 from support.avatars.planted_person import ABROAD, FRAMES, NAMES, PlantedPerson, face, planted_head
-from support.avatars.tiny_joining import assembly_of
+from support.avatars.tiny_joining import STEPS_PER_FRAME, assembly_of
 from support.heads.shapes import head_shape
 
 pytestmark = pytest.mark.slow
@@ -80,7 +80,7 @@ def test_the_head_lands_where_it_is(made):
 def test_an_interrupted_run_goes_on(made):
     """From its checkpoint, with the head as it was."""
     _, folder, _, _, said, steps, before = made
-    assert steps == list(range(60, 35 * FRAMES))
+    assert steps == list(range(60, STEPS_PER_FRAME * FRAMES))
     assert HeadSource(folder / "out", 60, True).about() == before
     assert sum(line.startswith("colours:") for line in said) == 1
 

@@ -1,6 +1,7 @@
 """From a head and a capture of the body with a skeleton to somebody who gestures."""
 
 from dataclasses import replace
+from functools import partial
 
 import av
 import numpy as np
@@ -19,6 +20,7 @@ from ico3d.motion.gestures.library import library
 from support.avatars.planted_person import FRAMES, planted_head
 from support.avatars.skeletal_person import SkeletalPerson
 from support.avatars.tiny_joining import assembly_of
+from support.settings import changed
 
 pytestmark = pytest.mark.slow
 
@@ -30,7 +32,9 @@ def made(tmp_path_factory):
     capture, said = SkeletalPerson(folder / "capture"), []
     (folder / "head").mkdir()
     planted_head().save(folder / "head")
-    assembly = replace(assembly_of(folder / "head", match_colors=False), method="skinned")
+    assembly = assembly_of(folder / "head", match_colors=False)
+    body = changed(assembly.body, {"steps_per_frame": 12})
+    assembly = replace(assembly, body=body, method="skinned")
     return capture, folder / "out", assemble(capture, folder / "out", assembly, said.append), said
 
 
@@ -92,9 +96,10 @@ def test_the_head_nods_with_the_neck(made):
     assert float(tips[1][2] - tips[0][2]) > 0.005  # forwards
 
 
-def test_it_is_filmed(made, tmp_path, capsys):
+def test_it_is_filmed(made, tmp_path, capsys, monkeypatch):
     """As long as the gesture takes."""
     _, folder, *_ = made
+    monkeypatch.setattr("ico3d.avatar.poseable.library", partial(library, names=("wave",)))
     out = tmp_path / "film.mp4"
     words = ["render", str(folder), str(out), "--gestures", "wave", "--fps", "1", "--size", "60"]
     assert main([*words, "--path", "start"]) == 0

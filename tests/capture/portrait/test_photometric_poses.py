@@ -48,7 +48,7 @@ def test_a_rigid_motion_is_rotation_vector_and_shift():
 
 def test_wrong_poses_are_put_right(monkeypatch):
     monkeypatch.setattr(photometric_poses, "COUNT", 700)
-    monkeypatch.setattr(photometric_poses, "STEPS", (600, 600))
+    monkeypatch.setattr(photometric_poses, "STEPS", (450, 450))
     random = np.random.default_rng(0)
     head = _head(random)
     true = [_pose(random.uniform(-12, 12, 3), random.normal(0, 0.004, 3)) for _ in range(12)]

@@ -22,7 +22,7 @@ from ico3d.chat.wire.protocol import (
 from ico3d.errors import SettingsError
 from ico3d.measure.talking.page import open_page
 from support.chat.pages import FollowingPlayer
-from support.chat.serving import serving
+from support.chat.serving import TYPED, serving
 
 pytestmark = pytest.mark.slow
 
@@ -177,7 +177,7 @@ def test_a_body_that_stands_may_start_in_any_direction():
 
 
 async def test_timelines_travel_with_the_speech_and_end_at_rest(person):
-    async with serving(person) as (url, _):
+    async with serving(person, TYPED) as (url, _):
         page, _ = await open_page(url, microphone=False)
         page.player = FollowingPlayer()
         await page.send(Text("tell me something nobody has written down"))
@@ -194,7 +194,7 @@ async def test_timelines_travel_with_the_speech_and_end_at_rest(person):
 
 
 async def test_nothing_of_a_stopped_motion_follows_its_stop(person):
-    async with serving(person) as (url, _):
+    async with serving(person, TYPED) as (url, _):
         page, _ = await open_page(url, microphone=False)
         await page.send(Text("tell me something nobody has written down"))
         await page.wait(Timeline, where=lambda m: m.utterance == 0)

@@ -189,8 +189,8 @@ async def test_a_stalled_sender_goes_on_talking(served, question):
     await page.close()
 
 
-async def test_a_flood_of_sound_ends_the_conversation(served):
-    url, _ = served
+async def test_a_flood_of_sound_ends_the_conversation(typed):
+    url, _ = typed
     second = encode(Audio(0, np.zeros(16000, np.int16)))
     async with connect(url.replace("http", "ws") + "ws") as socket:
         await socket.send(encode(Hello(VERSION, None, -1)))

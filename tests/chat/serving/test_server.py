@@ -83,8 +83,8 @@ async def test_http_serves_the_bundle_and_nothing_else(served, bundle):
         assert foreign.status_code == 403
 
 
-async def test_figures_are_for_those_who_may_see_the_page(served):
-    url, _ = served
+async def test_figures_are_for_those_who_may_see_the_page(typed):
+    url, _ = typed
     page, welcome = await open_page(url, microphone=False)
     async with httpx.AsyncClient(base_url=url) as client:
         figures = await client.get("/metrics")
@@ -185,8 +185,8 @@ async def test_a_bad_hello_is_answered_in_one_sentence(served, first, code):
         assert "\n" not in error.message and len(error.message) < 300
 
 
-async def test_garbage_and_floods_end_their_connection_only(served):
-    url, _ = served
+async def test_garbage_and_floods_end_their_connection_only(typed):
+    url, _ = typed
     good, _ = await open_page(url, microphone=False)
     await good.wait(Speech)
     hello = encode(Hello(protocol.VERSION, None, -1))
@@ -209,8 +209,8 @@ async def test_garbage_and_floods_end_their_connection_only(served):
     await good.close()
 
 
-async def test_every_binary_frame_is_acknowledged_also_a_refused_one(served):
-    url, _ = served
+async def test_every_binary_frame_is_acknowledged_also_a_refused_one(typed):
+    url, _ = typed
     page, _ = await open_page(url, microphone=False)
     second = np.zeros(16_000, np.int16)
     for at in range(3):

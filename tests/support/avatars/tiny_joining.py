@@ -14,10 +14,11 @@ from ico3d.body.settings import settings_for
 from support.avatars.planted_person import face
 from support.settings import changed
 
+STEPS_PER_FRAME = 22
 TINY = {
     "initial.gaussians": 400,
     "density.max_gaussians": 600,
-    "steps_per_frame": 35,
+    "steps_per_frame": STEPS_PER_FRAME,
     "warmup_steps": 20,
     "density.begin": 30,
     "encoder.space": 8,

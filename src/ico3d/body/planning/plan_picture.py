@@ -15,6 +15,7 @@ from ico3d.common.spread import spread
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 COLORS = "tab10"
 MOST_PICTURES = 14
@@ -40,16 +41,12 @@ def draw_plan(plan: Plan, capture: Capture, path: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(14, 7.5), layout="constrained")
+    figure = Figure(figsize=(14, 7.5))
     FigureCanvasAgg(figure)
-    parts = figure.subfigures(2, 1, height_ratios=(3, 2))
-    above, below = parts  # type: ignore (its stub knows one part alone)
-    axes = above.subplots()
-    _curve(axes, plan)
+    _curve(figure.add_axes((0.05, 0.44, 0.9, 0.52)), plan)
     frames = _shown(plan.windows)
     box = _person(capture, plan.busiest, frames)
-    for place, frame in zip(below.subplots(1, len(frames), squeeze=False)[0], frames, strict=True):
-        _picture(place, capture, plan.busiest, frame, box)
+    _pictures(figure, capture, plan.busiest, frames, box)
     write_atomic(path, lambda file: figure.savefig(file, format="png", dpi=100))
 
 
@@ -113,13 +110,17 @@ def _person(capture: Capture, camera: int, frames: list[int]) -> tuple[slice, sl
     return spans[0], spans[1]
 
 
-def _picture(
-    axes: "Axes", capture: Capture, camera: int, frame: int, box: tuple[slice, slice]
+def _pictures(
+    figure: "Figure", capture: Capture, camera: int, frames: list[int], box: tuple[slice, slice]
 ) -> None:
-    """Draws one frame of a camera, cropped to rows and columns `box`."""
-    image = capture.image(camera, frame)
-    if image is not None:
+    """Draws frames of a camera in a row below the curve, cropped to rows and columns `box`."""
+    width = 0.98 / len(frames)
+    for number, frame in enumerate(frames):
+        left = 0.01 + width * number
+        figure.text(left + width / 2, 0.36, f"frame {frame}", ha="center", fontsize=9)
+        image = capture.image(camera, frame)
+        if image is None:
+            continue
+        axes = figure.add_axes((left, 0.01, 0.96 * width, 0.34))
         axes.imshow(np.clip(image[box], 0, 1))
-    axes.set_title(f"frame {frame}", fontsize=9, y=TITLE)
-    axes.set(xticks=(), yticks=())
-    axes.axis("off")
+        axes.axis("off")

@@ -68,15 +68,22 @@ def smoothed_poses(poses: np.ndarray, fps: float) -> np.ndarray:
     window = window_of(fps, count)
     if window == 1:
         return poses
-    from scipy.signal import savgol_coeffs  # takes long to import
-
     smooth = poses.copy()
     for frame in range(count):
         first = min(max(frame - window // 2, 0), count - window)
         part = poses[first : first + window]
-        shares = savgol_coeffs(window, DEGREE, pos=frame - first, use="dot")  # (window,)
+        shares = _shares(window, frame - first)
         own = Rotation.from_matrix(poses[frame, :3, :3])
         around = (own.inv() * Rotation.from_matrix(part[:, :3, :3])).as_rotvec()  # (window, 3)
         smooth[frame, :3, :3] = (own * Rotation.from_rotvec(shares @ around)).as_matrix()
         smooth[frame, :3, 3] = shares @ part[:, :3, 3]
     return smooth
+
+
+def _shares(window: int, place: int) -> np.ndarray:
+    """(window,) what each frame contributes to the parabola through all of them at one place.
+
+    These are `scipy.signal.savgol_coeffs`, whose module takes most of a second to import.
+    """
+    times = np.arange(window) - place
+    return np.linalg.pinv(np.vander(times, DEGREE + 1, increasing=True))[0]

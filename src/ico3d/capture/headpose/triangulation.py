@@ -6,6 +6,7 @@ for cameras near and far, of low and high resolution.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -43,6 +44,20 @@ class Sightings:
         turns, shifts = self.world_to_camera[:, :, :3], self.world_to_camera[:, :, 3:]
         return -(turns.transpose(0, 2, 1) @ shifts)[..., 0]  # (C, 3)
 
+    @cached_property
+    def system(self) -> tuple[np.ndarray, np.ndarray]:
+        """(C, N, 2, 3) and (C, N, 2): matrix · point − right side are residuals in metres."""
+        rows = self.world_to_camera[:, None]  # (C, 1, 3, 4)
+        system = rows[:, :, :2] - self.rays[..., None] * rows[:, :, 2:]  # (C, N, 2, 4)
+        return system[..., :3], -system[..., 3]
+
+    @cached_property
+    def normal(self) -> tuple[np.ndarray, np.ndarray]:
+        """(C, N, 3, 3) and (C, N, 3): what each camera adds to the normal equations of a point."""
+        matrix, right = self.system
+        turned = matrix.swapaxes(-1, -2)  # (C, N, 3, 2)
+        return turned @ matrix, (turned @ right[..., None])[..., 0]
+
 
 def sightings(cameras: list[Camera], pixels: np.ndarray) -> Sightings:
     """Sightings from pixels (C, N, 2), with pixel centres at +0.5."""
@@ -59,17 +74,19 @@ def triangulate(seen: Sightings, weights: np.ndarray) -> np.ndarray:
         seen: Sightings by at least two cameras.
         weights: (C, N) weights; each point needs two cameras with a positive weight.
     """
-    matrix, right = _system(seen)
-    weighted = matrix * weights[..., None, None]
-    normal = np.einsum("cnrp,cnrq->npq", weighted, matrix)  # (N, 3, 3)
-    pull = np.einsum("cnrp,cnr->np", weighted, right)  # (N, 3)
+    squares, pulls = seen.normal
+    normal = (weights[..., None, None] * squares).sum(0)  # (N, 3, 3)
+    pull = (weights[..., None] * pulls).sum(0)  # (N, 3)
     return np.linalg.solve(normal, pull[..., None])[..., 0]
 
 
 def misses(seen: Sightings, points: np.ndarray) -> np.ndarray:
     """(C, N) residuals of points (N, 3), metres; infinite for points behind the camera."""
-    matrix, right = _system(seen)
-    away = np.linalg.norm(np.einsum("cnrp,np->cnr", matrix, points) - right, axis=-1)
+    matrix, right = seen.system
+    # One axis after the other: sums along so short ones take several times as long.
+    parts = (matrix[..., axis] * points[:, None, axis] for axis in range(3))
+    off = sum(parts, start=-right)  # (C, N, 2)
+    away = np.hypot(off[..., 0], off[..., 1])
     last = seen.world_to_camera[:, 2]
     depths = points @ last[:, :3].T + last[:, 3]  # (N, C)
     return np.where(depths.T > 0, away, np.inf)
@@ -115,13 +132,6 @@ def robust(
         away = misses(seen, triangulate(seen, kept))
         kept = np.maximum(weights / (1 + (away / spread) ** 2), 1e-9)
     return triangulate(seen, kept), kept
-
-
-def _system(seen: Sightings) -> tuple[np.ndarray, np.ndarray]:
-    """(C, N, 2, 3) and (C, N, 2): matrix · point − right side are residuals in metres."""
-    rows = seen.world_to_camera[:, None]  # (C, 1, 3, 4)
-    system = rows[:, :, :2] - seen.rays[..., None] * rows[:, :, 2:]  # (C, N, 2, 4)
-    return system[..., :3], -system[..., 3]
 
 
 def _meeting_angle(two: Sightings) -> float:

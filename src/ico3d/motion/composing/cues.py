@@ -54,16 +54,6 @@ class Release:
 Direction = Cue | Release
 
 
-def cycle(clip: Clip) -> float:
-    """Duration in seconds of the motion that is repeated in a hold; 0 if the hold is still."""
-    marks = clip.marks
-    moving = any(
-        np.ptp(curve.at(np.linspace(marks.hold, marks.release, 9)), axis=0).max() > 1e-2
-        for curve in clip.curves.values()
-    )
-    return marks.release - marks.hold if moving else 0.0
-
-
 def hold_end(clip: Clip, cue: Cue) -> float:
     """Time in seconds at which the hold of a cue begins, which is the earliest release."""
     return cue.stroke + (clip.marks.hold - clip.marks.stroke)
@@ -82,7 +72,7 @@ def rounded_release(clip: Clip, cue: Cue, wanted: float) -> float:
     first = hold_end(clip, cue)
     stays = SETTLE if clip.marks.release > clip.marks.hold else 0.0  # a nod has no hold
     wanted = max(wanted, cue.stroke + stays, first)
-    around = cycle(clip)
+    around = clip.cycle
     if not around:
         return wanted
     return first + around * float(np.ceil((wanted - first) / around - 1e-9))
@@ -102,7 +92,7 @@ def clip_time(clip: Clip, cue: Cue, release: float | None, time: Array) -> Array
     before = cue.skip + (time - cue.begin) * rate
     first = hold_end(clip, cue)
     held = np.minimum(marks.stroke + (time - cue.stroke), marks.hold)
-    around = cycle(clip)
+    around = clip.cycle
     if around:
         since = np.maximum(time - first, 0)
         held = np.where(time > first, marks.hold + since - around * np.floor(since / around), held)

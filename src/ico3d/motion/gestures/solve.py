@@ -135,7 +135,8 @@ def _gesture(
     collar = INDEX[f"{side}_clavicle"]
     poses[:, collar] = multiply(poses[:, collar], lift)
     rotations = person.retarget.pose(poses)
-    shoulder = person.posed(poses, np.zeros(3))[f"{side}_shoulder"]  # (F, 3)
+    places = person.rig.posed(rotations, np.zeros(3))[1]  # (F, J, 3)
+    shoulder = places[:, person.cast.joints[f"{side}_shoulder"][0]]  # (F, 3)
     wrist = _pushed(person, side, arm, rotations)
     target = person.carried("chest", wrist, rotations, np.zeros(3))
     limb = (f"{side}_shoulder", f"{side}_elbow", f"{side}_wrist")

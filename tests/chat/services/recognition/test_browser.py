@@ -16,6 +16,8 @@ from support.chat.serving import serving
 pytestmark = pytest.mark.slow
 
 BROWSER = ChatSettings(recognition=Choice("browser", {"language": "en-US"}))
+ALONE = ChatSettings(recognition=Choice("browser", {"language": "en-US", "fallback": ""}))
+"""Without a decoder of the server's, which takes half a second to start."""
 
 
 async def spoken(page, question):
@@ -49,7 +51,7 @@ async def test_words_of_the_page_become_a_turn(bundle, question):
 
 
 async def test_partial_words_are_taken_when_no_more_come(bundle, question):
-    async with serving(bundle, BROWSER, adapt=silent) as (url, _):
+    async with serving(bundle, ALONE, adapt=silent) as (url, _):
         page, _ = await open_page(url)
         await spoken(page, question)
         await page.send(Heard(0, "what is your name", False))
@@ -62,7 +64,7 @@ async def test_partial_words_are_taken_when_no_more_come(bundle, question):
 
 
 async def test_a_voice_without_words_ends_its_turn(bundle, question, given_up):
-    async with serving(bundle, BROWSER, adapt=silent) as (url, _):
+    async with serving(bundle, ALONE, adapt=silent) as (url, _):
         page, _ = await open_page(url)
         await spoken(page, question)
         await page.wait(State, where=lambda m: m.state == "idle")
@@ -71,7 +73,7 @@ async def test_a_voice_without_words_ends_its_turn(bundle, question, given_up):
 
 
 async def test_words_without_a_voice_are_the_avatars_own(bundle):
-    async with serving(bundle, BROWSER, adapt=silent) as (url, _):
+    async with serving(bundle, ALONE, adapt=silent) as (url, _):
         page, _ = await open_page(url)
         await page.send(Heard(0, "hello I am Random", True))
         await asyncio.sleep(0.5)
