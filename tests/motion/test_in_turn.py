@@ -43,6 +43,8 @@ def test_what_nobody_knows_is_refused(rest):
     clips = library(rest.person, ("nod",))
     with pytest.raises(SettingsError, match="there is no gesture 'juggle': there are nod"):
         in_turn(clips, ("nod", "juggle"))
+    with pytest.raises(SettingsError, match=r"there is no gesture 'nod': there are none\.$"):
+        in_turn({}, ("nod",))
 
 
 def test_feet_stand_where_they_were_recorded(rest):

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import torch
 
-from ico3d.avatar.moving import Span
+from ico3d.avatar.moving import Span, tau_in
 from ico3d.bundle.body import BakedWindow
 from ico3d.bundle.format import Bundle
 from ico3d.bundle.skinned.baked import BakedSkinned
@@ -124,8 +124,7 @@ def place_in(spans: Sequence[Span], frame: float) -> tuple[int, float]:
     """
     frame = min(max(frame, 0.0), spans[-1].last)
     index = next(i for i, span in enumerate(spans) if frame <= span.last)
-    span = spans[index]
-    return index, (frame - span.first) / (span.last - span.first)
+    return index, tau_in(spans[index], frame)
 
 
 def window_gaussians(window: BakedWindow, tau: float) -> Gaussians:

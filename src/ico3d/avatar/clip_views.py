@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from ico3d.avatar.moving import Span
+from ico3d.avatar.moving import Span, tau_in
 from ico3d.avatar.staging import NEUTRAL
 from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera
@@ -81,8 +81,8 @@ def recorded_view(capture: Capture, camera: int, frame: int, span: Span) -> View
         behind = np.array(NEUTRAL, np.float32)
         if mask is not None:
             truth = truth * mask[..., None] + behind * (1 - mask[..., None])
-    tau = (frame - span.first) / (span.last - span.first)
-    return View(capture.cameras[camera], tau, torch.from_numpy(behind), truth, mask)
+    behind = torch.from_numpy(behind)
+    return View(capture.cameras[camera], tau_in(span, frame), behind, truth, mask)
 
 
 def drawn(person: At, view: View) -> tuple[np.ndarray, np.ndarray]:

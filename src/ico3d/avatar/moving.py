@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 import torch
 
+from ico3d.errors import BundleError
 from ico3d.splat.gaussians import Gaussians
 
 MOMENTS = 9
@@ -26,6 +27,11 @@ class Span(Protocol):
     def last(self) -> int:
         """The last frame."""
         ...
+
+
+def tau_in(span: Span, frame: float) -> float:
+    """Time τ in a span: 0 at its first frame and 1 at its last; 0 in a span of one frame."""
+    return (frame - span.first) / max(span.last - span.first, 1)
 
 
 class MovingBody(Protocol):
@@ -50,6 +56,19 @@ class MovingBody(Protocol):
         They have `colors`, and their number is the same at every τ of a window.
         """
         ...
+
+
+def check_moves(body: MovingBody) -> None:
+    """Refuses a body of a single frame, which neither a bundle nor an animation can hold.
+
+    Raises:
+        BundleError: If the clip has one frame.
+    """
+    if body.windows[-1].last == 0:
+        raise BundleError(
+            "the body has one frame, so it does not move: a bundle or an animation needs a body of "
+            "two frames or more."
+        )
 
 
 class Moving(Protocol):

@@ -51,7 +51,7 @@ class TrainBody(BodyChoice):
             the number of GPUs.
         ray: Address of a Ray cluster that trains the windows: host:port, or auto. The capture and
             the model folder must have the same path on all its machines.
-        plan: Only measure motion and show the windows.
+        plan: Only measure motion and show the windows; not for methods of one window.
         settings: How the body is trained.
     """
 

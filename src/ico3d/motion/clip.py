@@ -61,10 +61,11 @@ class Marks:
         """Checks the order.
 
         Raises:
-            ValueError: If a phase ends before it begins.
+            ValueError: If a phase ends before it begins, or the stroke arrives at time 0.
         """
         order = (0.0, self.ready, self.stroke, self.hold, self.release, self.end)
-        if not all(a <= b for a, b in pairwise(order)):  # also where one is NaN
+        ascend = all(a <= b for a, b in pairwise(order))  # not where one is NaN
+        if not ascend or self.stroke == 0:
             raise ValueError("a clip's marks do not ascend")
 
 

@@ -93,7 +93,10 @@ def test_the_same_seed_gives_the_same_body(trained, tmp_path):
 
 @pytest.mark.parametrize("method", ["4dgs", "spacetime", "freetime"])
 def test_some_methods_take_the_clip_as_one_window(trained, tmp_path, method):
-    """So there is nothing to fine-tune."""
+    """So there is nothing to plan, and nothing to fine-tune."""
     body = train_body(trained[0], tmp_path / method, job(method))
     assert body.windows == (Window(0, FRAMES - 1),)
-    assert not (tmp_path / method / "finetuned").exists()
+    written = {path.name for path in (tmp_path / method).iterdir()}
+    assert written == {"body.json", "finished.json", "settings.json", "windows"}
+    with pytest.raises(SettingsError, match=f"--method {method} takes the clip as one window"):
+        plan_windows(trained[0], job(method), tmp_path / method)

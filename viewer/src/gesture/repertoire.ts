@@ -84,7 +84,7 @@ function near(quat: Quat, before: Quat | undefined): Quat {
 
 function checkMarks(marks: Marks, where: string): Marks {
   const order = [0, ...PHASES.map((phase) => marks?.[phase])];
-  if (!order.every((mark, i) => i === 0 || order[i - 1]! <= mark!)) bad(where, 'marks');
+  if (!order.every((mark, i) => i === 0 || order[i - 1]! <= mark!) || marks.stroke === 0) bad(where, 'marks');
   return marks;
 }
 

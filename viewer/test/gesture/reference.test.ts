@@ -75,6 +75,10 @@ test('gaze', () => {
 });
 
 describe('listening', () => {
+  test('a window has a sample on each side at the lowest rates, too', () => {
+    expect(new Loudness(20).push(new Int16Array(4).fill(3277)).map(Math.round)).toEqual(Array(18).fill(-20));
+  });
+
   test('loudness, in whatever pieces sound comes', () => {
     const { pcm, levels } = reference.listening;
     for (const piece of [512, 16_000, 77]) {
@@ -208,6 +212,7 @@ describe('files of gestures', () => {
     expect(() => read(changed(() => {}, (bytes) => bytes.fill(0)))).toThrow(/are wrong/);
     expect(() => read(inHeader('clips', ({ marks }) => (marks.nod.end = 0.01)))).toThrow('nod holds no gesture: its marks are wrong');
     expect(() => read(inHeader('clips', ({ marks }) => (marks.nod.stroke = null)))).toThrow('marks are wrong');
+    expect(() => read(inHeader('clips', ({ marks }) => (marks.nod.ready = marks.nod.stroke = 0)))).toThrow('marks are wrong');
   });
 
   test('of another rig, or with impossible figures, are refused', () => {

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from scipy.spatial import KDTree
 
-from ico3d.avatar.moving import MovingBody
+from ico3d.avatar.moving import MovingBody, check_moves
 from ico3d.bundle.animation import ANIMATION, Action, Animation, Rest
 from ico3d.errors import BundleError
 
@@ -65,7 +65,11 @@ class Motion:
             body: The body; within a window its Gaussians keep their order.
             windows: What `window_places` yields for the body, wrapped by callers that show
                 progress; by default it is called here.
+
+        Raises:
+            BundleError: If the clip has one frame.
         """
+        check_moves(body)
         speeds, places = [], []
         for window in window_places(body) if windows is None else windows:
             speeds += [_hands(step) * body.fps for step in np.diff(window, axis=0)]

@@ -34,11 +34,13 @@ def strokes(person: Poseable, expression: np.ndarray) -> Iterator[tuple[str, Gau
 def filled(person: Poseable, expression: np.ndarray) -> np.ndarray:
     """(P, 3) float64 positions of a person's visible Gaussians at the strokes of all gestures.
 
+    Without gestures P is 0.
+
     Args:
         person: Who makes the gestures.
         expression: (B,) expression of the face.
     """
-    places = []
+    places = [np.zeros((0, 3))]
     for _, drawn in strokes(person, expression):
         places.append(drawn.means[drawn.opacities > SEEN].cpu().numpy())
     return np.concatenate(places).astype(np.float64)

@@ -235,12 +235,18 @@ def _baked(
     cuts: "tuple[Cut, ...] | None",
     report: Report,
 ) -> "tuple[BodyParts, Callable[[], None]]":
-    """The parts of the baked body, and a check that raises where baking costs too much."""
+    """The parts of the baked body, and a check that raises where baking costs too much.
+
+    Raises:
+        BundleError: If the body has one frame.
+    """
     from functools import partial
 
     from ico3d.avatar.baking import body_bundle
     from ico3d.avatar.baking.skinned import skinned_bundle
+    from ico3d.avatar.moving import check_moves
 
+    check_moves(body)
     if skinned_bundle.is_skinned(body):
         result = skinned_bundle.bake(body, capture, head, cuts)
         report(f"the body: {result}.")

@@ -13,6 +13,7 @@ from ico3d.avatar.animation.keyframes import Motion, find_animation, read_animat
 from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.baking import body_bundle, body_cost, head_bundle, head_cost
 from ico3d.avatar.baking.body_bundle import BodyParts
+from ico3d.avatar.baking.persona import spoken_texts
 from ico3d.avatar.baking.samples import (
     Samples,
     expressions_of,
@@ -67,7 +68,7 @@ def head_samples(
         capture: The head's recording: the head is baked from the expressions of its training
             frames and measured with those of its test frames. Without it, the expressions are
             those of the body's recording and, of a head driven by speech, those of synthetic
-            voices that read the answers of the persona's notes.
+            voices that read the persona's `spoken_texts`.
         persona: Who the avatar is.
 
     Raises:
@@ -79,8 +80,7 @@ def head_samples(
         expressions = training_expressions(head, capture)
         tests = expressions_of(head, capture, capture.split.test or capture.split.train)
     elif head.adaptor is not None:
-        answers = [note.partition("=>")[2].strip() for note in persona.notes]
-        expressions = np.concatenate([expressions, spoken_expressions(head, answers)])
+        expressions = np.concatenate([expressions, spoken_expressions(head, spoken_texts(persona))])
     return samples_around(head, expressions), references_around(
         head, tests, head_bundle.MEASURED_VIEWS
     )

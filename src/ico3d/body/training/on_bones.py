@@ -109,7 +109,11 @@ class OnBones:
         return transforms(self._motion.parents, joints, pose.rotations, pose.root).cpu()
 
     def _hang(self, model: WindowModel, chosen: np.ndarray) -> None:
-        """Binds C chosen Gaussians to the joints of the nearest skin; at τ = ½ they do not move."""
+        """Binds C chosen Gaussians to the joints of the nearest skin; at τ = ½ they do not move.
+
+        Adam's moments of the other limb stay: setting them to 0 gains nothing that counts
+        (docs/choices.md, "Bodies on a skeleton").
+        """
         assert self._skin is not None
         near: Skin = self._skin[self._nearest(model, 0.5, chosen)[1]]
         table = self._table(model, 0.5).double().numpy()  # (J, 16)

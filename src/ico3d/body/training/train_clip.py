@@ -24,7 +24,7 @@ from ico3d.capture.capture import Capture
 from ico3d.capture.formats import open_capture
 from ico3d.capture.pictures import train_cameras
 from ico3d.common.device import DeviceName
-from ico3d.errors import ModelError
+from ico3d.errors import ModelError, SettingsError
 from ico3d.splat.device import computing_device
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.run import RunFolder
@@ -215,7 +215,8 @@ def train_body(
 
     Args:
         capture: Recording by calibrated, synchronised cameras, with masks.
-        folder: Model folder, which also holds the plan and the run of each window.
+        folder: Model folder, which also holds the run of each window and, unless the method takes
+            the clip as one window, the plan.
         job: How the body is to be trained.
         runner: Trains the windows; by default one after another in this process.
 
@@ -228,12 +229,14 @@ def train_body(
         ModelError: If training diverges, or `job.continued` is of another method or clip.
     """
     if job.method in SKINNED:
-        tracked(capture)  # raises before a folder is made and motion is measured
+        tracked(capture)  # raises before a folder is made
     run = RunFolder(folder, job.about(capture.path) | {"settings": asdict(job.settings)})
     if run.finished() is not None:
         return TrainedBody.load(folder)
     if job.continued is not None:
         windows = _fitting(TrainedBody.load(job.continued), capture, job).windows
+    elif job.method in ONE_WINDOW:
+        windows = (Window(0, capture.num_frames - 1),)
     else:
         windows = plan_windows(capture, job, folder).windows
     tasks = [
@@ -280,17 +283,20 @@ def plan_windows(capture: Capture, job: BodyJob, folder: Path) -> Plan:
 
     Args:
         capture: The recording.
-        job: Method and settings; some methods take the whole clip as one window.
+        job: Method and settings.
         folder: The model folder.
 
     Raises:
         CaptureError: If motion cannot be measured.
         MissingExtraError: If no flow method is installed.
-        SettingsError: If the settings of windows contradict one another.
+        SettingsError: If the settings of windows contradict one another, or the method takes the
+            clip as one window.
     """
-    plan = make_plan(capture, job.settings.windows, folder, computing_device(job.device))
     if job.method in ONE_WINDOW:
-        plan = replace(plan, windows=(Window(0, capture.num_frames - 1),))
+        raise SettingsError(
+            f"--method {job.method} takes the clip as one window, so there is nothing to plan."
+        )
+    plan = make_plan(capture, job.settings.windows, folder, computing_device(job.device))
     print_plan(plan, Console())
     told, picture = folder / "plan.json", folder / "plan.png"
     if not (picture.is_file() and is_saved(plan, told)):  # a continued run has both already

@@ -61,7 +61,7 @@ class Composer:
         """Makes a composer that knows nothing of the speech yet.
 
         Args:
-            clips: Clips by name, among them those of `BEATS` with one or the other hand.
+            clips: Clips by name; an accent whose gesture is not among them gets none.
             seed: Seed of all random choices.
             start: Time before which no gesture begins.
         """
@@ -187,7 +187,8 @@ class Composer:
                 return take
         if not self._may_beat(index, stresses, meant):
             return None, False
-        return self._takes.one(*_beat(chance(self._seed, accent.word, 1)), draw)
+        beat, mirror = _beat(chance(self._seed, accent.word, 1))
+        return self._takes.one(beat, mirror, draw) if beat in self._takes else (None, False)
 
     def _may_mean(self, name: str, used: frozenset[str], time: float) -> bool:
         last = max((self._struck.get(limb, -np.inf) for limb in used), default=-np.inf)

@@ -31,7 +31,8 @@ def in_turn(clips: Mapping[str, Clip], names: Sequence[str]) -> tuple[list[Direc
     begin = BEGIN
     for number, name in enumerate(names):
         if name not in clips:
-            raise SettingsError(f"there is no gesture '{name}': there are {', '.join(clips)}.")
+            others = ", ".join(clips) or "none"
+            raise SettingsError(f"there is no gesture '{name}': there are {others}.")
         clip = clips[name]
         marks = clip.marks
         cue = Cue(number, name, False, begin, begin + marks.stroke)

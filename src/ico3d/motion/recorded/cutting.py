@@ -102,7 +102,8 @@ def _watched(recording: Recording) -> _Watched:
     speed = np.stack([recording.speed(side) for side in SIDES])  # (2, F)
     low = np.all([hand.place[:, 1] < HANGS for hand in hands], axis=0)
     calm = (speed < CALM).all(0) & low  # (F,)
-    long = [run for run in runs(calm) if run[1] - run[0] + 1 >= recording.frames(LEAST_REST)]
+    least = max(recording.frames(LEAST_REST), 2)  # a cut has two frames or more
+    long = [run for run in runs(calm) if run[1] - run[0] + 1 >= least]
     rest = max(long, key=lambda run: run[1] - run[0], default=None)
     away: list[Array] = []
     for side, hand in zip(SIDES, hands, strict=True):

@@ -105,7 +105,7 @@ class _Take:
         hold = self._hold()
         lead, tail = (self._way(frame) for frame in (self.cut.first, self.cut.last))
         before = self._seconds(self.cut.stroke - self.cut.first)
-        if self.cut.sides and lead + before < STROKE:
+        if lead + before < (STROKE if self.cut.sides else 1 / RATE):
             lead = LEAST
         after = self._seconds(self.cut.last - self.cut.release)
         stroke = lead + before

@@ -16,7 +16,11 @@ SOUND_RATE = 16000
 PAUSE = 0.25
 """Seconds of silence between sentences."""
 BLINK = (0.08, 0.03, 0.15)
-"""Seconds in which a lid closes, for which it stays closed, and in which it opens."""
+"""Seconds in which a lid closes, for which it stays closed, and in which it opens.
+
+Avatars blink by `speech.eyes`. Recordings do not: the same seed has to give the same recording, as
+`studio.truth` computes the truth of older ones anew and published figures were measured on them.
+"""
 YAW, PITCH, ROLL = 6.0, 3.5, 2.5
 """Largest rotations of the head's sway, degrees."""
 SHIFT = (0.018, 0.006, 0.012)

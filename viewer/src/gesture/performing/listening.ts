@@ -21,7 +21,7 @@ export class Loudness {
   /** @param rate samples per second */
   constructor(rate: number) {
     this.rate = rate;
-    this.half = Math.round(0.5 * WINDOW * rate);
+    this.half = Math.max(1, Math.round(0.5 * WINDOW * rate));
   }
 
   /** Appends sound; returns the new values in dB, one per `FRAME` seconds, whose windows are complete now. */

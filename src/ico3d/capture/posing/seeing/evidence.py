@@ -133,13 +133,13 @@ def _nobody(seen: Seen) -> str:
     if (views.sum(1) < 2).all():
         return (
             f"a person is found in {int(views.sum())} of {looked} pictures, but never by two "
-            f"cameras in one frame; cameras {', '.join(blind)} see nobody"
+            "cameras in one frame" + (f"; cameras {', '.join(blind)} see nobody" if blind else "")
         )
     return (
         f"people are found in {int(views.sum())} of {looked} pictures, but in no frame do two "
-        "cameras agree on where; are the calibration and its scale (metres) right, and do the "
-        "cameras run in step?"
-    ).rstrip("?")
+        "cameras agree on where: check the calibration and its scale (metres), and whether the "
+        "cameras run in step"
+    )
 
 
 def _by_one(watcher: Watcher) -> Evidence:
