@@ -50,22 +50,27 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: item.path not in slow)
 
 
-TOGETHER = (
-    "capture/portrait/test_clip.py",
-    "capture/portrait/test_photometric_poses.py",
-    "chat/services/language/test_qwen.py",
-    "chat/services/recognition/test_whisper.py",
-    "chat/test_pipecat_internals.py",
-    "head/test_encoders.py",
-    "measure/test_expression.py",
-    "speech/test_hubert.py",
-    "speech/test_training.py",
-    "splat/test_primitive.py",
-    "training/test_acceleration.py",
-    "training/test_optimiser.py",
-)
-"""Files that need transformers, which takes three seconds to be imported, or that compiler of
-torch's which transformers and torch.optim import: one process runs them.
+TOGETHER = {
+    "capture/portrait/test_clip.py": "transformers",
+    "capture/portrait/test_photometric_poses.py": "transformers",
+    "chat/services/language/test_qwen.py": "transformers",
+    "chat/services/recognition/test_whisper.py": "transformers",
+    "chat/test_pipecat_internals.py": "transformers",
+    "head/test_encoders.py": "transformers",
+    "measure/test_expression.py": "transformers",
+    "motion/recorded/test_cutting.py": "gestures",
+    "motion/test_composing.py": "gestures",
+    "motion/test_gestures.py": "gestures",
+    "speech/test_hubert.py": "transformers",
+    "speech/test_training.py": "transformers",
+    "splat/test_primitive.py": "transformers",
+    "training/test_acceleration.py": "transformers",
+    "training/test_optimiser.py": "transformers",
+}
+"""Files that one process runs, because of what they share.
+
+That is transformers, or the compiler of torch which transformers and torch.optim import: both take
+seconds; or all gestures of a person, which take a second to be made.
 """
 
 
@@ -79,7 +84,8 @@ def pytest_xdist_make_scheduler(config, log):
     class Scheduling(LoadFileScheduling):
         def _split_scope(self, nodeid):
             file = super()._split_scope(nodeid)
-            return "transformers" if file.endswith(TOGETHER) else file
+            shared = (group for end, group in TOGETHER.items() if file.endswith(end))
+            return next(shared, file)
 
     return Scheduling(config, log)
 

@@ -14,11 +14,10 @@ from ico3d.motion.composing.cues import SETTLE, Cue, Direction, Release, clip_ti
 from ico3d.motion.composing.gaze import CHEST_YAW, HEAD_SPEED, HEAD_YAW, Gaze, direction_to
 from ico3d.motion.composing.performer import Performer
 from ico3d.motion.composing.takes import limbs
-from ico3d.motion.gestures.library import library
 from ico3d.motion.living import Living, living
 from ico3d.motion.roles import INDEX, SIDES
 from ico3d.motion.turning import twist_angle
-from support.rigs import rig_of
+from support.rigs import gestures_of, rig_of
 from support.spoken import speech
 
 pytestmark = pytest.mark.slow
@@ -32,8 +31,8 @@ def rest() -> Living:
 
 
 @pytest.fixture(scope="module")
-def clips(rest) -> dict[str, Clip]:
-    return library(rest.person)
+def clips() -> dict[str, Clip]:
+    return gestures_of("SMPL-X", 0.0)
 
 
 def grown(clips, seed: int, step: float, ahead: float = 1.5) -> list[Direction]:

@@ -9,14 +9,14 @@ from ico3d.motion.clearance import way_out_of_head, way_out_of_trunk
 from ico3d.motion.clip import Clip, from_bytes, to_bytes
 from ico3d.motion.composing.lexicon import lexicon
 from ico3d.motion.gestures.hanging import hanging
-from ico3d.motion.gestures.library import gesture, library
+from ico3d.motion.gestures.library import gesture
 from ico3d.motion.gestures.scripts import SCRIPTS
 from ico3d.motion.person import Person, person_of
 from ico3d.motion.retarget import DOWN
 from ico3d.motion.roles import INDEX, SIDES
 from ico3d.motion.turning import twist_angle
 from ico3d.rig.quaternions import conjugate, rotate
-from support.rigs import rig_of
+from support.rigs import gestures_of, rig_of
 
 pytestmark = pytest.mark.slow
 MOMENTS = 40
@@ -58,9 +58,8 @@ class Made:
 @pytest.fixture(scope="module", params=["A", "T"])
 def made(request) -> Made:
     """Of a small person who rests in an A-pose, and a tall one in a T-pose."""
-    rig = {"A": lambda: rig_of("MakeHuman", 45.0, 35.0, 0.92), "T": lambda: rig_of("SMPL-X", 0.0)}
-    person = person_of(rig[request.param]())
-    clips = library(person)
+    about = {"A": ("MakeHuman", 45.0, 35.0, 0.92), "T": ("SMPL-X", 0.0)}[request.param]
+    person, clips = person_of(rig_of(*about)), gestures_of(*about)
     poses = [
         posed(person, clip, np.linspace(0, clip.marks.end, MOMENTS)) for clip in clips.values()
     ]

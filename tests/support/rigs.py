@@ -1,7 +1,12 @@
 """Rigs of known proportions in other rest poses: arms lowered by 45° as MakeHuman's, or spread."""
 
+from functools import cache
+
 import numpy as np
 
+from ico3d.motion.clip import Clip
+from ico3d.motion.gestures.library import library
+from ico3d.motion.person import person_of
 from ico3d.motion.roles import NAMINGS, PARENTS, ROLES, SIDES
 from ico3d.rig.rig import Rig
 
@@ -43,6 +48,14 @@ def rig_of(naming: str, lowered: float = 45.0, bent: float = 0.0, scale: float =
             parent = len(names) - 1
         last[role] = parent
     return Rig(tuple(names), tuple(parents), scale * np.stack(joints))
+
+
+@cache
+def gestures_of(
+    naming: str, lowered: float, bent: float = 0.0, scale: float = 1.0
+) -> dict[str, Clip]:
+    """All gestures of the package for a person of `rig_of`, made once in a process."""
+    return library(person_of(rig_of(naming, lowered, bent, scale)))
 
 
 def _leg(side: str, sign: float) -> dict[str, np.ndarray]:

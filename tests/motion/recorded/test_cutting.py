@@ -9,7 +9,6 @@ from ico3d.motion.clip import Clip, from_bytes, other_hand, to_bytes
 from ico3d.motion.composing.cues import Cue
 from ico3d.motion.composing.performer import Performer
 from ico3d.motion.curves import angles
-from ico3d.motion.gestures.library import library
 from ico3d.motion.living import Living, living
 from ico3d.motion.recorded.cut import REST, Cut
 from ico3d.motion.recorded.cutting import find_cuts
@@ -18,7 +17,7 @@ from ico3d.motion.recorded.recording import Recording, recording_of
 from ico3d.motion.roles import INDEX, SIDES
 from ico3d.rig.quaternions import from_rotvec, multiply
 from support.recorded import Made, performed
-from support.rigs import rig_of
+from support.rigs import gestures_of, rig_of
 
 pytestmark = pytest.mark.slow
 SLOW = ("wave", "think")
@@ -51,10 +50,10 @@ class Recorded:
 @pytest.fixture(scope="module", params=["25 a second", "15 a second, mirrored, with jitter"])
 def seen(request) -> Recorded:
     mirror = "mirrored" in request.param
-    rig = rig_of("SMPL-X", 0.0) if mirror else rig_of("MakeHuman", 45.0, 20.0)
+    about = ("SMPL-X", 0.0) if mirror else ("MakeHuman", 45.0, 20.0)
+    rig, gestures = rig_of(*about), gestures_of(*about)
     fps = 15.0 if mirror else 25.0
     rest = living(rig, 4)
-    gestures = library(rest.person)
     rotations, made = performed(rest, gestures, fps, mirror)
     if mirror:
         jitter = np.random.default_rng(0).normal(0, np.radians(0.3), (*rotations.shape[:-1], 3))

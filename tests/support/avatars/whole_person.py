@@ -7,7 +7,7 @@ import numpy as np
 import torch
 
 from ico3d.avatar.avatar import BODY, Placement, TrainedAvatar
-from ico3d.avatar.baking.samples import training_expressions
+from ico3d.avatar.baking.samples import expressions_at
 from ico3d.body.model_folder import TrainedBody, save_window
 from ico3d.body.motion.formulas import SPACETIME
 from ico3d.body.motion.window_model import WindowModel
@@ -27,7 +27,9 @@ NECK = np.array([0.0, 1.55, 0.0])
 def write_whole_person(folder: Path) -> TrainedAvatar:
     """An avatar's folder, as `ico3d assemble` leaves it."""
     body, head = _body(folder / BODY), _head(planted_eyes(head_recording(folder)))
-    expressions = training_expressions(head, head_recording(folder))[10 : 10 + FRAMES]
+    recording = head_recording(folder)
+    shown = recording.split.train[10 : 10 + FRAMES]
+    expressions = expressions_at(head.track(recording), shown)
     avatar = TrainedAvatar(head, body, _placement(), expressions, {})
     avatar.save(folder)
     return TrainedAvatar.load(folder)

@@ -16,11 +16,10 @@ from ico3d.avatar.baking.body_bundle import BodyParts
 from ico3d.avatar.baking.persona import spoken_texts
 from ico3d.avatar.baking.samples import (
     Samples,
-    expressions_of,
+    expressions_at,
     references_around,
     samples_around,
     spoken_expressions,
-    training_expressions,
 )
 from ico3d.avatar.moving import MOMENTS
 from ico3d.avatar.render_bundle import BakedAvatar
@@ -77,8 +76,9 @@ def head_samples(
     head, tests = avatar.head, avatar.expressions
     expressions = avatar.expressions
     if capture is not None:
-        expressions = training_expressions(head, capture)
-        tests = expressions_of(head, capture, capture.split.test or capture.split.train)
+        track, split = head.track(capture), capture.split
+        expressions = expressions_at(track, split.train)
+        tests = expressions_at(track, split.test or split.train)
     elif head.adaptor is not None:
         expressions = np.concatenate([expressions, spoken_expressions(head, spoken_texts(persona))])
     return samples_around(head, expressions), references_around(

@@ -13,7 +13,7 @@ from ico3d.capture.capture import Capture
 from ico3d.common.camera import Camera, look_at
 from ico3d.common.espeak import synthesize
 from ico3d.common.spread import spread
-from ico3d.head.expressions import FEATURE_RATE
+from ico3d.head.expressions import FEATURE_RATE, ExpressionTrack
 from ico3d.head.model import HeadModel
 from ico3d.head.model_folder import TrainedHead
 from ico3d.head.views import view_of
@@ -45,7 +45,9 @@ class Samples:
 
 def recorded_samples(head: TrainedHead, capture: Capture) -> Samples:
     """Samples from a capture: expressions of training frames, importance as its cameras see."""
-    return Samples(training_expressions(head, capture), importance_of(head, capture))
+    track = head.track(capture)
+    expressions = expressions_at(track, capture.split.train)
+    return Samples(expressions, _importance(head, capture, track))
 
 
 def samples_around(head: TrainedHead, expressions: np.ndarray) -> Samples:
@@ -73,14 +75,8 @@ def references_around(head: TrainedHead, expressions: np.ndarray, count: int) ->
     return [reference(head, camera, expression, colour) for camera, expression in pairs]
 
 
-def training_expressions(head: TrainedHead, capture: Capture) -> np.ndarray:
-    """(T, B) expressions of a capture's training frames."""
-    return expressions_of(head, capture, capture.split.train)
-
-
-def expressions_of(head: TrainedHead, capture: Capture, frames) -> np.ndarray:
-    """(T, B) expressions of T frames of a capture."""
-    track = head.track(capture)
+def expressions_at(track: ExpressionTrack, frames: Sequence[int]) -> np.ndarray:
+    """(T, B) expressions of T frames."""
     with torch.no_grad():
         return np.stack([track.at(frame).numpy() for frame in frames])
 
@@ -122,15 +118,13 @@ def lips_of(head: TrainedHead, samples: np.ndarray, rate: int) -> np.ndarray:
         return head.adaptor.track(features).numpy()
 
 
-def importance_of(head: TrainedHead, capture: Capture) -> np.ndarray:
+def _importance(head: TrainedHead, capture: Capture, track: ExpressionTrack) -> np.ndarray:
     """(N, 4) importance of each logit in training frames, seen by the capture's cameras in turn."""
     frames = capture.split.train
     frames = [frames[i] for i in np.linspace(0, len(frames) - 1, _PROBES).astype(int)]
     frames = [frame for frame in frames if capture.world_from_head(frame) is not None]
     cameras = [view_of(capture, i % len(capture.cameras), f).camera for i, f in enumerate(frames)]
-    track = head.track(capture)
-    with torch.no_grad():
-        expressions = torch.stack([track.at(frame) for frame in frames])  # (P, B)
+    expressions = torch.from_numpy(expressions_at(track, frames))  # (P, B)
     colour = torch.tensor(staging.background_colour(capture, 0))
     return logit_importance(head.model, expressions, cameras, colour, seed=0)
 
