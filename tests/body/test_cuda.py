@@ -26,18 +26,19 @@ def _job(method: str, **changes) -> BodyJob:
 
 @pytest.fixture(scope="module")
 def begun(tmp_path_factory):
-    """Begins model folders with the plan of the clip, which is made once for one and many windows.
+    """Begins model folders; the plan of a clip in windows is made once for all of them.
 
     Gives a function of capture, job and folder.
     """
-    plans = {}
+    plans = []
 
     def begin(capture, job, folder):
-        alone = job.method in ONE_WINDOW
-        if alone not in plans:
-            plans[alone] = tmp_path_factory.mktemp("plan")
-            plan_windows(capture, job, plans[alone])
-        return shutil.copytree(plans[alone], folder)
+        if job.method in ONE_WINDOW:
+            return folder
+        if not plans:
+            plans.append(tmp_path_factory.mktemp("plan"))
+            plan_windows(capture, job, plans[0])
+        return shutil.copytree(plans[0], folder)
 
     return begin
 

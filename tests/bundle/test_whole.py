@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from ico3d.bundle.backdrop import check_background
 from ico3d.bundle.format import Bundle, write_bundle
+from ico3d.bundle.manifest import VERSION
 from ico3d.errors import BundleError
 from support.bundles.random_bundle import random_files, random_head, random_manifest
 from support.bundles.random_whole import (
@@ -38,7 +39,7 @@ def test_a_whole_person_reads_back(tmp_path):
     files = whole_files() | {"background.ply": ply()}
     write_bundle(tmp_path / "a.ico3d", whole_manifest(), files)
     bundle = Bundle.open(tmp_path / "a.ico3d")
-    assert bundle.manifest.is_whole and bundle.manifest.version == 3
+    assert bundle.manifest.is_whole and bundle.manifest.version == VERSION
     assert bundle.head is not None and bundle.window(1).num_gaussians == 23
     assert bundle.world_from_head.shape == (FRAMES, 4, 4)
     assert bundle.background == "background.ply"

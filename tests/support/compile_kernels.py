@@ -19,6 +19,8 @@ from ico3d.body.training.train_clip import train_window
 from ico3d.head.train_head import HeadJob, train_head
 from ico3d.studio import recording
 from support.bodies.recorded_capture import record
+from support.bodies.tiny_training import trainer_of
+from support.bodies.tracked_capture import TrackedCapture
 from support.bodies.window_tasks import tasks
 from support.heads.tiny_capture import TinyCapture
 from support.heads.train_tiny import SETTINGS
@@ -48,7 +50,7 @@ def main() -> None:
 
 
 def compile_kernels() -> None:
-    """Trains a head and the windows of a body and draws a person, as briefly as touches kernels."""
+    """Trains a head and bodies and draws a person, as briefly as touches kernels."""
     numba.set_num_threads(1)
     torch.set_num_threads(1)
     with tempfile.TemporaryDirectory() as name:
@@ -62,6 +64,8 @@ def compile_kernels() -> None:
         record(folder / "clip")
         for task in tasks(folder / "clip", folder / "body", steps_per_frame=8):
             train_window(task)
+        hung = {"skinning.shadow": True, "initial.source": "hull"}
+        trainer_of(TrackedCapture(folder / "hung"), "skinned", **hung).step(0)
         recording.record(PICTURE, folder / "studio", 1)
 
 
