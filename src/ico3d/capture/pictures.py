@@ -38,7 +38,7 @@ Layers = tuple[np.ndarray | None, ...]
 
 AHEAD = 8
 """Steps of training for which pictures are read in advance."""
-READERS = max(1, min(8, (os.cpu_count() or 1) // 2))
+READERS = min(8, os.cpu_count() or 1)
 """Threads that read pictures while training computes."""
 
 
