@@ -6,7 +6,6 @@ import sys
 import threading
 import time
 import wave
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from ico3d.bundle.packaged import bundle_path
 from ico3d.chat.serving import server
 from ico3d.chat.settings.conversation import ChatSettings, Choice
 from ico3d.head.model_folder import TrainedHead
+from support.needs import skip_without
 
 pytestmark = pytest.mark.slow
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -38,8 +38,7 @@ def run(monkeypatch, example, *words):
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory):
     """What the first example writes."""
-    if find_spec("anny") is None:  # importing it takes seconds
-        pytest.skip("the synthetic person needs the package anny")
+    skip_without("anny")  # of which the synthetic person is made
     out = tmp_path_factory.mktemp("example")
     size = ["--frames", "22", "--size", "48", "--steps", "20", "--gaussians", "400"]
     with pytest.MonkeyPatch.context() as patch:

@@ -24,7 +24,7 @@ export const MAX_CLUSTERS = 256;
 /** Spheres that cast its shadow. */
 export const MAX_CASTERS = 20000;
 
-/** The map in which a lamp sees a body, in metres; bundle/skinned/lamp.py. */
+/** The map in which a lamp sees a body, in metres; rig/shadow_map.py. */
 export const SHADOW = {"radius": 0.02, "texel": 0.0125, "side": 256, "off": 0.01, "bias": 0.03, "edge": 0.002, "wrap": 0.2} as const;
 
 /** Of a head's coefficients; bundle/evaluate.py. */

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from torch.nn.functional import normalize
 
 from ico3d.body.skinning.light import lamp_lit
-from ico3d.body.skinning.shadow import BIAS, RADIUS, SIDE, TEXEL, posed_casters, reached
+from ico3d.body.skinning.shadow import posed_casters, reached
+from ico3d.rig.shadow_map import BIAS, RADIUS, SIDE, TEXEL
 
 UP = torch.tensor([0.0, 1.0, 0.0])
 FRONT = torch.tensor([0.0, 0.0, 1.0])

@@ -10,8 +10,9 @@ from torch.nn.functional import normalize
 from ico3d.body.planning.windows import Window
 from ico3d.body.skinning.casters import caster_tensors, spread_casters
 from ico3d.body.skinning.light import lamp_lit, lit
-from ico3d.body.skinning.shadow import RADIUS, reached
+from ico3d.body.skinning.shadow import reached
 from ico3d.body.training.find_lamp import Seen, find_lighting, regressed
+from ico3d.rig.shadow_map import RADIUS
 from support.bodies.moving_capture import FRAMES
 from support.bodies.tracked_capture import TrackedCapture
 

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ from ico3d.cli import main
 from ico3d.studio import studio
 from ico3d.studio.picture import paint
 from ico3d.studio.recording import Recording, record
-from support.needs import needs
+from support.needs import needs, skip_without
 from support.recordings import multiview_folders
 from support.shared import MODELS, SUBJECTS
 
@@ -49,8 +48,7 @@ def _recorded(folder: Path, **settings) -> tuple[Capture, Path]:
 
 @pytest.fixture(scope="module")
 def head(tmp_path_factory):
-    if find_spec("anny") is None:  # importing it takes seconds
-        pytest.skip("anny is not installed")
+    skip_without("anny")
     shape = dict(subject="anny", rig="head", cameras=5, views_per_frame=5)
     folder = tmp_path_factory.mktemp("head")
     return _recorded(folder, frames=5, fps=5.0, size=192, **shape)

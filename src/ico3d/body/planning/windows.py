@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ico3d.common.spread import spread
 from ico3d.errors import SettingsError
 
 
@@ -33,6 +34,10 @@ class Window:
     def center(self) -> int:
         """The frame in the middle, on whose surface the canonical Gaussians begin."""
         return (self.first + self.last) // 2
+
+    def moments(self, most: int) -> list[int]:
+        """At most `most` frames, evenly spread, first and last among them."""
+        return [self.frames[index] for index in spread(len(self), most)]
 
     def tau(self, frame: float) -> float:
         """Time τ within the window: 0 at its first frame, 1 at its last."""

@@ -5,9 +5,9 @@ import torch
 from scipy.spatial import KDTree
 from torch import Tensor
 
-from ico3d.body.skinning.shadow import RADIUS
 from ico3d.body.skinning.template import Skin, sampled
 from ico3d.rig.body_track import BodyTrack
+from ico3d.rig.shadow_map import RADIUS
 
 SPARE = 6.0
 """Times as many points as spheres of the same area are drawn: those near to others are left out."""

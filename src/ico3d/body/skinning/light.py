@@ -5,12 +5,11 @@ from functools import cache
 import torch
 from torch import Tensor
 
+from ico3d.rig.shadow_map import WRAP
 from ico3d.splat import harmonics
 
 LIGHTS = 8
 """Number of spherical harmonics of degrees 1 and 2."""
-WRAP = 0.2
-"""Cosine by which a lamp reaches past the edge of its light: skin and cloth are soft."""
 FIRST, SECOND = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
 """Axes of the first and second factor of the products xx, yy, zz, xy, xz, yz."""
 

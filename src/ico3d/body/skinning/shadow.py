@@ -5,22 +5,7 @@ from torch import Tensor
 from torch.nn.functional import embedding_bag
 
 from ico3d.body.skinning import shadow_kernels
-
-RADIUS = 0.02
-"""Metres of the spheres that cast shadows, which lie just under the skin, this far apart."""
-TEXEL = 0.0125
-"""Metres of the depth map's texels."""
-SIDE = 256
-"""Texels along the map's sides. It repeats every 3.2 m, across which nobody reaches: so it needs no
-frame that follows the person."""
-OFF = 0.01
-"""Metres above the skin at which light is looked for."""
-BIAS = 0.03
-"""Metres behind the nearest sphere that are lit all the same, or skin would shade itself."""
-EDGE = 0.002
-"""Metres over which depth goes from shadow to light, so that rounding is not seen."""
-FAR = -1e9
-"""Where no sphere lies."""
+from ico3d.rig.shadow_map import BIAS, EDGE, FAR, OFF, RADIUS, SIDE, TEXEL
 
 
 def posed_casters(table: Tensor, points: Tensor, joints: Tensor, weights: Tensor) -> Tensor:

@@ -89,7 +89,7 @@ def find_lighting(
     """
     rng = np.random.default_rng(0)
     skin = sampled(track, POINTS, rng)
-    frames = sorted({round(f) for f in np.linspace(window.first, window.last, MOMENTS)})
+    frames = window.moments(MOMENTS)
     tables = [_table(track, frame) for frame in frames]
     hung = torch.from_numpy(skin.binding.joints.astype(np.int32)), hung_logits(skin.binding)
     rest, normals = torch.from_numpy(skin.points).float(), torch.from_numpy(skin.normals).float()

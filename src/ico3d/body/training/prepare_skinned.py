@@ -96,7 +96,7 @@ def _seen(skin: Skin, track: BodyTrack, capture: Capture, window: Window) -> Ski
     """
     cameras = [capture.cameras[index] for index in train_cameras(capture)]
     seen = np.zeros(len(skin), bool)
-    for frame in _moments(window):
+    for frame in window.moments(MOMENTS):
         places = skin.posed(track, frame)  # (P, 3)
         gap = HIDING * float(np.median(spacing(places)))
         seen |= np.any([visible(places, camera, gap) for camera in cameras], axis=0)  # (P,)
@@ -108,18 +108,13 @@ def _seen(skin: Skin, track: BodyTrack, capture: Capture, window: Window) -> Ski
     return skin[seen]
 
 
-def _moments(window: Window) -> list[int]:
-    """Up to `MOMENTS` frames of a window, evenly spread, its ends among them."""
-    return sorted({round(frame) for frame in np.linspace(window.first, window.last, MOMENTS)})
-
-
 def _beside(
     companion: Companion, skin: Skin, track: BodyTrack, window: Window, rng: np.random.Generator
 ) -> Skin:
     """The points, and points near the companion's border, without those that trespass mostly."""
     frame = window.center
     border = skin.pulled_back(companion.border(frame, rng), track, frame)
-    both, frames = Skin.joined(skin, border), _moments(window)
+    both, frames = Skin.joined(skin, border), window.moments(MOMENTS)
     times = [trespassing(companion, both.posed(track, frame), frame) for frame in frames]
     return both[np.sum(times, 0) < min(MOST, len(frames))]
 

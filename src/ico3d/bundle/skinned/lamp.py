@@ -7,26 +7,12 @@ import numpy as np
 from ico3d.bundle.skinned.info import SkinnedInfo
 from ico3d.bundle.tensors import Spec
 from ico3d.rig.quaternions import Array
+from ico3d.rig.shadow_map import BIAS, EDGE, FAR, OFF, RADIUS, SIDE, TEXEL, WRAP
 
 POINT_UNIT = 1e-4
 """Metres per unit of `caster_points`."""
 WEIGHT_UNIT = 255
 """The sum of a sphere's weights."""
-RADIUS = 0.02
-"""Metres of the spheres that cast shadows."""
-TEXEL = 0.0125
-"""Metres of the depth map's texels."""
-SIDE = 256
-"""Texels along the map's sides; it repeats."""
-OFF = 0.01
-"""Metres above the skin at which light is looked for."""
-BIAS = 0.03
-"""Metres behind the nearest sphere that are lit all the same."""
-EDGE = 0.002
-"""Metres over which depth goes from shadow to light."""
-WRAP = 0.2
-"""How far past the edge of day the lamp reaches, as a cosine."""
-_FAR = -1e9
 _UNEVEN = 1e-3
 """By which the length of the direction may differ from 1."""
 _MOST = 1e4
@@ -124,7 +110,7 @@ def shadow_map(lamp: BakedLamp, table: Array) -> Array:
     rest = lamp.caster_points * POINT_UNIT  # (M, 3)
     centres = np.einsum("mab,mb->ma", matrices[..., :3], rest) + matrices[..., 3]
     centres = centres @ _axes(lamp.lamp_direction).T  # (M, 3)
-    depths = np.full((SIDE, SIDE), _FAR)
+    depths = np.full((SIDE, SIDE), FAR)
     reach = int(RADIUS / TEXEL) + 1
     middle = np.rint(centres[:, :2] / TEXEL)  # (M, 2)
     for down in range(-reach, reach + 1):

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from ico3d.bundle import evaluate, limits, manifest
-from ico3d.bundle.skinned import lamp
 from ico3d.chat.observing.timing import PARTS
 from ico3d.common.expression import EYE_NAMES, LIDS
 from ico3d.motion import roles
+from ico3d.rig import shadow_map
 from ico3d.rig.rig import MOST_JOINTS
 from ico3d.speech import eyes
 
@@ -30,15 +30,15 @@ VALUES: tuple[tuple[str, str, Any], ...] = (
     ("MAX_CASTERS", "Spheres that cast its shadow.", limits.MAX_CASTERS),
     (
         "SHADOW",
-        "The map in which a lamp sees a body, in metres; bundle/skinned/lamp.py.",
+        "The map in which a lamp sees a body, in metres; rig/shadow_map.py.",
         {
-            "radius": lamp.RADIUS,
-            "texel": lamp.TEXEL,
-            "side": lamp.SIDE,
-            "off": lamp.OFF,
-            "bias": lamp.BIAS,
-            "edge": lamp.EDGE,
-            "wrap": lamp.WRAP,
+            "radius": shadow_map.RADIUS,
+            "texel": shadow_map.TEXEL,
+            "side": shadow_map.SIDE,
+            "off": shadow_map.OFF,
+            "bias": shadow_map.BIAS,
+            "edge": shadow_map.EDGE,
+            "wrap": shadow_map.WRAP,
         },
     ),
     ("LEAKY_SLOPE", "Of a head's coefficients; bundle/evaluate.py.", evaluate.LEAKY_SLOPE),
