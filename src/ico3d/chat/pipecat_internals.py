@@ -5,6 +5,9 @@ version of pipecat lacks one; for that reason pyproject.toml allows only one min
 """
 
 import asyncio
+import copy
+import functools
+import threading
 from collections.abc import AsyncGenerator, AsyncIterator, Callable
 from typing import Any, TypeVar
 
@@ -47,6 +50,7 @@ _SEGMENTS = "pipecat.services.stt_service:SegmentedSTTService"
 _VOICE = "pipecat.services.tts_service:TTSService"
 _AGGREGATOR = "pipecat.utils.text.simple_text_aggregator:SimpleTextAggregator"
 _TURN = "pipecat.audio.turn.smart_turn.base_smart_turn:BaseSmartTurn"
+_loading = threading.Lock()  # two sessions that begin at once load a model once
 
 
 @touches(_LANGUAGE, "_push_llm_text")
@@ -171,3 +175,44 @@ def judge_turn(analyzer: Any, sound: list[tuple[float, Any]]) -> asyncio.Future:
     """Smart-Turn's verdict on a sound, computed in its own thread."""
     loop = asyncio.get_running_loop()
     return loop.run_in_executor(analyzer._model_executor, analyzer._process_speech_segment, sound)
+
+
+@touches("pipecat.audio.vad.silero:SileroVADAnalyzer", "_model")
+def begin_silero(analyzer: Any, **options: Any) -> None:
+    """Does what the constructor of Silero's analyser does, with one loaded model for all of them.
+
+    What the model remembers of a voice stays each analyser's own.
+    """
+    from pipecat.audio.vad.vad_analyzer import VADAnalyzer
+
+    with _loading:
+        loaded = _silero()
+    vars(analyzer).update(vars(loaded))
+    VADAnalyzer.__init__(analyzer, **options)
+    analyzer._model = copy.copy(loaded._model)
+    analyzer._model.reset_states()
+
+
+@touches("pipecat.audio.turn.smart_turn.local_smart_turn_v3:LocalSmartTurnAnalyzerV3", "_session")
+def begin_smart_turn(analyzer: Any, **options: Any) -> None:
+    """Does what the constructor of Smart-Turn does, with one loaded model, `_session`, for all."""
+    from pipecat.audio.turn.smart_turn.base_smart_turn import BaseSmartTurn
+
+    with _loading:
+        loaded = _smart_turn()
+    vars(analyzer).update(vars(loaded))
+    BaseSmartTurn.__init__(analyzer, **options)
+
+
+@functools.cache
+def _silero() -> Any:
+    from pipecat.audio.vad.silero import SileroVADAnalyzer
+
+    return SileroVADAnalyzer()
+
+
+@functools.cache
+def _smart_turn() -> Any:
+    from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
+
+    return LocalSmartTurnAnalyzerV3()

@@ -38,6 +38,26 @@ EAR = EagerSilero(Turns().pause)
 EAR.set_sample_rate(RATE)
 
 
+async def test_an_ear_hears_nothing_of_what_another_hears():
+    """Visitors share the loaded model; what it remembers of a voice is their own."""
+    voice = np.pad(said("where do you live?"), RATE // 5)
+    other = np.random.default_rng(0).normal(0, 0.1, len(voice))
+    windows = [
+        (np.clip(sound, -1, 1) * 32767).astype(np.int16)[: 512 * (len(sound) // 512)]
+        for sound in (voice, other)
+    ]
+    pieces = [sound.reshape(-1, 512) for sound in windows]
+    alone, first, second = (EagerSilero(0.2) for _ in range(3))
+    for ear in (alone, first, second):
+        ear.set_sample_rate(RATE)
+    heard = [alone.voice_confidence(piece.tobytes()) for piece in pieces[0]]
+    among = []
+    for piece, disturbing in zip(*pieces, strict=True):
+        among.append(first.voice_confidence(piece.tobytes()))
+        second.voice_confidence(disturbing.tobytes())
+    assert max(heard) > 0.9 and among == heard
+
+
 async def verdicts(sound, phase=0):
     """Verdicts on a voice over the avatar's, with seconds from its first audible sample."""
     noise = np.random.default_rng(0).normal(0, 3e-4, RATE + phase + len(sound) + RATE)

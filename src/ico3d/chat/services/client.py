@@ -33,8 +33,13 @@ def client_options(url: str, key_variable: str, where: str, **http: Any) -> dict
     """
     key = key_for(url, key_variable, where) or NONE
     hooks = {} if is_openai(url) else {"request": [_without_openais(key)]}
+    secure = not url.startswith("http:")  # else certificates would be read for nothing
     client = DefaultAsyncHttpxClient(
-        follow_redirects=False, trust_env=not goes_here(url), event_hooks=hooks, **http
+        follow_redirects=False,
+        verify=secure,
+        trust_env=not goes_here(url),
+        event_hooks=hooks,
+        **http,
     )
     return {"api_key": key, "base_url": url or OPENAI, "http_client": client}
 

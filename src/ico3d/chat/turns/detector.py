@@ -13,6 +13,7 @@ from pipecat.processors.audio.vad_processor import VADProcessor
 from pipecat.processors.frame_processor import FrameDirection
 
 from ico3d.chat.frames import VoiceFrame, message_in
+from ico3d.chat.pipecat_internals import begin_silero
 from ico3d.chat.turns.bands import Bands
 from ico3d.chat.wire.protocol import MICROPHONE_RATE, Talk
 
@@ -31,9 +32,8 @@ class EagerSilero(SileroVADAnalyzer):
 
     def __init__(self, pause: float):
         """A voice is over after `pause` seconds of silence."""
-        super().__init__(
-            sample_rate=MICROPHONE_RATE, params=VADParams(stop_secs=pause, min_volume=QUIETEST)
-        )
+        params = VADParams(stop_secs=pause, min_volume=QUIETEST)
+        begin_silero(self, sample_rate=MICROPHONE_RATE, params=params)
         self._hint = False
         self.silence = 0.0  # s of a pause that may end the voice
 

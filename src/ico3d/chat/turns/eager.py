@@ -8,7 +8,12 @@ from pipecat.audio.turn.base_turn_analyzer import EndOfTurnState
 from pipecat.audio.turn.smart_turn.local_smart_turn_v3 import LocalSmartTurnAnalyzerV3
 from pipecat.metrics.metrics import MetricsData, TurnMetricsData
 
-from ico3d.chat.pipecat_internals import judge_turn, keep_turn_sound, turn_sound
+from ico3d.chat.pipecat_internals import (
+    begin_smart_turn,
+    judge_turn,
+    keep_turn_sound,
+    turn_sound,
+)
 from ico3d.chat.wire.protocol import MICROPHONE_RATE
 
 SOON = 0.09  # s of silence after which a voice may well have ended
@@ -33,9 +38,9 @@ class EagerSmartTurn(LocalSmartTurnAnalyzerV3):
 
         Args:
             pause: Seconds of silence after which pipecat asks for a verdict.
-            **kwargs: As the base takes it.
+            **kwargs: As `BaseSmartTurn` takes it.
         """
-        super().__init__(**kwargs)
+        begin_smart_turn(self, **kwargs)
         self._pause = pause
         self._early: asyncio.Future[Verdict] | None = None
 
