@@ -1,9 +1,6 @@
 """Disks that are full and GPUs that fail: one sentence, and the run resumes exactly."""
 
-import resource
-import signal
 import tracemalloc
-from contextlib import contextmanager
 
 import pytest
 import torch
@@ -14,6 +11,7 @@ from ico3d.errors import DeviceError, StorageError
 from ico3d.training.checkpoint import DTYPES, load_tensors, save_tensors, size_of_tensors
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.run import RunFolder
+from training.full_disk import files_of_at_most
 from training.walk import Walk
 
 SETTINGS = LoopSettings(steps=20, log_every=5, checkpoint_every=4)
@@ -30,19 +28,6 @@ class Broad(Walk):
         assert tensors.pop("wide").max() == state["calls"]
         assert tensors.pop("other").max() == 2 * state["calls"]
         super().restore(tensors, state)
-
-
-@contextmanager
-def files_of_at_most(size: int):
-    """Lets this process write no file larger than `size` bytes, as on a disk that is full."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    silent = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-        signal.signal(signal.SIGXFSZ, silent)
 
 
 def test_a_full_disk_keeps_the_last_checkpoint(tmp_path):
