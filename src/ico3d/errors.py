@@ -34,6 +34,14 @@ class SettingsError(Ico3dError):
     """Settings contradict one another or the data."""
 
 
+class StorageError(Ico3dError):
+    """A disk is full."""
+
+
+class DeviceError(Ico3dError):
+    """A GPU failed while it computed."""
+
+
 class ProtocolError(Ico3dError):
     """A message on the wire is malformed or over its limits."""
 

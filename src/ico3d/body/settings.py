@@ -287,8 +287,10 @@ class BodySettings:
         color_correction: Let each camera learn an affine correction of colours, for cameras whose
             colours differ.
         checkpoint_every: Steps from one checkpoint to the next.
-        cache_gib: Memory for recorded pictures, GiB; what does not fit is read again, in the
-            background, before each use.
+        cache_gib: Memory for recorded pictures, GiB, or auto for half of what is free; what does
+            not fit is read again, in the background, before each use.
+        cache_dir: Folder on a disk with room where pictures that do not fit in memory are kept
+            decoded while training runs, instead of being read again.
         windows: Where the clip is cut into windows.
         encoder: The encoding of place and time that the MLP reads.
         mlp: The tunable MLP, which moves the Gaussians.
@@ -305,7 +307,8 @@ class BodySettings:
     warmup_steps: int = 1_000
     color_correction: bool = False
     checkpoint_every: int = 1_000
-    cache_gib: float = 2.0
+    cache_gib: float | Literal["auto"] = "auto"
+    cache_dir: str = ""
     windows: Windows = Windows()
     encoder: Encoder = Encoder()
     mlp: Mlp = Mlp()

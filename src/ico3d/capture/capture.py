@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ico3d.capture.box import Box, cut_out
+from ico3d.capture.decoding import to_bytes, unit
 from ico3d.capture.finding import Finding
 from ico3d.capture.smplx import SmplX
 from ico3d.common.camera import Camera
@@ -47,7 +49,10 @@ class Capture(ABC):
 
     Frames are numbered 0 … num_frames − 1; frame i is at i / fps seconds. Methods return None for
     what a recording does not contain. Pictures are float32 RGB (H, W, 3) in [0, 1], masks float32
-    (H, W) in [0, 1].
+    (H, W) in [0, 1]. What trains takes them as bytes, cropped.
+
+    Attributes:
+        tells_head: Whether `head_mask` differs from `mask`.
     """
 
     kind: str
@@ -57,6 +62,7 @@ class Capture(ABC):
     num_frames: int
     split: Split
     blendshape_names: tuple[str, ...] | None = None
+    tells_head: bool = False
 
     @abstractmethod
     def image(self, camera: int, frame: int) -> np.ndarray | None:
@@ -77,6 +83,20 @@ class Capture(ABC):
     def head_mask(self, camera: int, frame: int) -> np.ndarray | None:
         """The mask (H, W) for `psnr_mask`: the person; in portraits face, hair and mouth."""
         return self.mask(camera, frame)
+
+    def image_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The part of `image` in a box, uint8 (h, w, 3); the whole picture for None."""
+        return _cut_bytes(self.image(camera, frame), box)
+
+    def mask_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The part of `mask` in a box, uint8 (h, w); the whole mask for None."""
+        return _cut_bytes(self.mask(camera, frame), box)
+
+    def head_mask_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The part of `head_mask` in a box, uint8 (h, w); the whole mask for None."""
+        if not self.tells_head:
+            return self.mask_bytes(camera, frame, box)
+        return _cut_bytes(self.head_mask(camera, frame), box)
 
     def background(self, camera: int) -> np.ndarray | None:
         """The clean plate (H, W, 3): what the camera sees without the person."""
@@ -134,6 +154,33 @@ class Capture(ABC):
     def provenance(self) -> dict:
         """Who was recorded, how, and under which licence; copied into a bundle's manifest."""
         return {"kind": self.kind, "sources": [], "consent": "", "licence": ""}
+
+
+class RecordedCapture(Capture):
+    """A recording whose pictures and masks are stored with 8 bits per value."""
+
+    @abstractmethod
+    def image_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The part of a picture in a box, uint8 (h, w, 3); the whole picture for None."""
+
+    @abstractmethod
+    def mask_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The part of a mask in a box, uint8 (h, w); the whole mask for None."""
+
+    def image(self, camera: int, frame: int) -> np.ndarray | None:
+        """The picture (H, W, 3), or None if it was not recorded."""
+        found = self.image_bytes(camera, frame)
+        return None if found is None else unit(found)
+
+    def mask(self, camera: int, frame: int) -> np.ndarray | None:
+        """The mask (H, W) of the person, or None if there is none."""
+        found = self.mask_bytes(camera, frame)
+        return None if found is None else unit(found)
+
+
+def _cut_bytes(picture: np.ndarray | None, box: Box | None) -> np.ndarray | None:
+    """The part of a float32 picture in a box, as bytes."""
+    return None if picture is None else to_bytes(cut_out(picture, box))
 
 
 def last_eleventh(num_frames: int) -> Split:

@@ -30,7 +30,8 @@ def decoded(source: Path | bytes, what: str) -> np.ndarray:
     with _opened(source, what) as picture:
         if picture.mode[0] in "IF":
             raise CaptureError(f"{what} has more than 8 bits per value: convert it to 8 bits.")
-        return np.asarray(picture.convert("RGBA" if _is_clear(picture) else "RGB"))
+        wanted = "RGBA" if _is_clear(picture) else "RGB"
+        return np.asarray(picture if picture.mode == wanted else picture.convert(wanted))
 
 
 def size_of(source: Path | bytes, what: str) -> tuple[int, int]:
@@ -56,6 +57,11 @@ def has_opacity(source: Path | bytes, what: str) -> bool:
 def unit(picture: np.ndarray) -> np.ndarray:
     """Converts uint8 to float32 in [0, 1]."""
     return picture.astype(np.float32) / np.float32(255)
+
+
+def to_bytes(picture: np.ndarray) -> np.ndarray:
+    """Converts floats in [0, 1] to uint8, rounded."""
+    return (picture * 255 + 0.5).astype(np.uint8)
 
 
 def largest_channel(picture: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ico3d.capture.box import Box, cut_out
 from ico3d.capture.extras import opencv
 from ico3d.errors import CaptureError
 
@@ -87,17 +88,28 @@ class Lens:
             )
         return _our_matrix(matrix)
 
-    def straightened(self, picture: np.ndarray) -> np.ndarray:
-        """Undistorts a picture (H, W, ...), uint8 or float32."""
+    def straightened(self, picture: np.ndarray, box: Box | None = None) -> np.ndarray:
+        """Undistorts a picture (H, W, ...), uint8 or float32.
+
+        Args:
+            picture: The whole picture as recorded.
+            box: The part of the undistorted picture that is wanted; None for all of it.
+        """
         if not self.bends:
-            return picture
-        return opencv(PURPOSE).undistort(
-            picture,
+            return cut_out(picture, box)
+        cv2 = opencv(PURPOSE)
+        box = box or Box(0, 0, self.width, self.height)
+        matrix = _opencv_matrix(self.straight_intrinsics)
+        matrix[:2, 2] -= box.left, box.top
+        maps = cv2.initUndistortRectifyMap(
             _opencv_matrix(self.intrinsics),
             self._coefficients,
             None,
-            _opencv_matrix(self.straight_intrinsics),
-        )
+            matrix,
+            (box.width, box.height),
+            cv2.CV_16SC2,
+        )  # (h, w, 2), (h, w)
+        return cv2.remap(picture, *maps, cv2.INTER_LINEAR)
 
     def straightened_points(self, pixels: np.ndarray) -> np.ndarray:
         """Undistorts pixel positions (P, 2)."""

@@ -9,7 +9,9 @@ from PIL import Image, UnidentifiedImageError
 from safetensors import SafetensorError
 from safetensors.numpy import load
 
-from ico3d.capture.capture import Capture, Sound, all_frames, last_eleventh
+from ico3d.capture.box import Box, cut_out
+from ico3d.capture.capture import RecordedCapture, Sound, all_frames, last_eleventh
+from ico3d.capture.decoding import unit
 from ico3d.capture.sound import check_claim
 from ico3d.common.camera import Camera
 from ico3d.common.sound import WAV_ERRORS, open_claim
@@ -21,7 +23,7 @@ READABLE = (1, 2)
 NEEDED = ("format", "version", "fps", "num_frames", "blendshape_names", "cameras", "sources")
 
 
-class SyntheticCapture(Capture):
+class SyntheticCapture(RecordedCapture):
     """A synthetic person recorded by `ico3d capture synthetic`, with exact ground truth."""
 
     kind = "synthetic"
@@ -70,19 +72,20 @@ class SyntheticCapture(Capture):
         """Every picture has a mask."""
         return self.has_image(camera, frame)
 
-    def image(self, camera: int, frame: int) -> np.ndarray | None:
-        """The picture, or None if the camera did not record this frame."""
-        return self._picture("images", camera, frame, "RGB")
+    def image_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The picture, uint8, or None if the camera did not record this frame."""
+        return self._picture("images", camera, frame, "RGB", box)
 
-    def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """(H, W) exact coverage of the person, or None without a picture."""
-        return self._picture("masks", camera, frame, "L")
+    def mask_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """(H, W) exact coverage of the person, uint8, or None without a picture."""
+        return self._picture("masks", camera, frame, "L", box)
 
     def background(self, camera: int) -> np.ndarray | None:
         """(H, W, 3) clean plate: the backdrop."""
         name = self.cameras[camera].name
         file = self.path / "backgrounds" / f"{name}.png"
-        return _read_png(file, self.cameras[camera], "RGB", f"the background of camera {name}")
+        what = f"the background of camera {name}"
+        return unit(_read_png(file, self.cameras[camera], "RGB", what))
 
     def audio(self) -> Sound | None:
         """The sound, 16 kHz mono.
@@ -132,12 +135,15 @@ class SyntheticCapture(Capture):
             raise CaptureError(f"{self.path} has frames 0 to {self.num_frames - 1}, not {frame}.")
         return frame
 
-    def _picture(self, folder: str, camera: int, frame: int, mode: str) -> np.ndarray | None:
+    def _picture(
+        self, folder: str, camera: int, frame: int, mode: str, box: Box | None
+    ) -> np.ndarray | None:
         if not self.has_image(camera, frame):
             return None
         seen = self.cameras[camera]
         file = self.path / folder / seen.name / f"{frame:06d}.png"
-        return _read_png(file, seen, mode, f"frame {frame} of camera {seen.name}")
+        what = f"frame {frame} of camera {seen.name}"
+        return cut_out(_read_png(file, seen, mode, what), box)
 
     def _read_frames(self) -> dict[str, np.ndarray]:
         file = self.path / "frames.safetensors"
@@ -204,9 +210,10 @@ def _camera(entry: dict, path: Path) -> Camera:
 
 
 def _read_png(file: Path, camera: Camera, mode: str, what: str) -> np.ndarray:
+    """uint8 pixels of a file that must have the size of its camera."""
     try:
         with Image.open(file) as image:
-            pixels = np.asarray(image.convert(mode), np.float32) / 255
+            pixels = np.asarray(image if image.mode == mode else image.convert(mode))
     except (OSError, UnidentifiedImageError, ValueError) as error:
         raise CaptureError(f"{file} ({what}) is missing or damaged: record again.") from error
     if pixels.shape[:2] != (camera.height, camera.width):

@@ -1,13 +1,21 @@
 """Writing files so that a crash never leaves half of one."""
 
+import errno
 import os
 import re
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from pathlib import Path
+
+from ico3d.errors import StorageError
 
 _TEMPORARY = re.compile(r"\..+\.[0-9a-f]{16}(\.[^.]+)?")
 """Names that `write_atomic` gives to unfinished files."""
+
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""What a system says when a disk, a quota or the limit of a file's size is reached."""
 
 
 def write_atomic(path: Path | str, write: Callable[[Path], None] | bytes) -> None:
@@ -16,22 +24,44 @@ def write_atomic(path: Path | str, write: Callable[[Path], None] | bytes) -> Non
     Args:
         path: The file to write; its folder is made where missing.
         write: The contents, or a function that writes them to the temporary path it is given.
+
+    Raises:
+        StorageError: If the disk is full; a file that was there before is kept.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     # Not mkstemp: its files are readable by their owner only, and stay so after the rename.
     temporary = path.with_name(f".{path.stem}.{secrets.token_hex(8)}{path.suffix}")
     try:
-        if isinstance(write, bytes):
-            temporary.write_bytes(write)
-        else:
-            write(temporary)
-        with temporary.open("rb") as file:
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
-        _sync_folder(path.parent)
+        with full_disk(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            if isinstance(write, bytes):
+                temporary.write_bytes(write)
+            else:
+                write(temporary)
+            with temporary.open("rb") as file:
+                os.fsync(file.fileno())
+            os.replace(temporary, path)
+            _sync_folder(path.parent)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def full_disk(path: Path) -> Generator[None]:
+    """Makes one sentence of a disk that is full while `path` is written.
+
+    Raises:
+        StorageError: If it is.
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        raise StorageError(
+            f"{path} cannot be written, as the disk is full ({error.strerror}): free some space "
+            "and run the same command again; what was there before is kept."
+        ) from error
 
 
 def remove_unfinished(folder: Path) -> None:

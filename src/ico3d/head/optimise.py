@@ -7,7 +7,6 @@ import torch
 from torch import Tensor
 
 from ico3d.capture.capture import Capture
-from ico3d.capture.pictures import AHEAD
 from ico3d.errors import CaptureError, SettingsError
 from ico3d.head.basis import update_basis
 from ico3d.head.density import HeadDensity, Sampled, bound_scales
@@ -69,7 +68,7 @@ class HeadTrainer:
         """
         self.model, self.track, self.adaptor = model, track, adaptor
         self._settings, self._seed = settings, seed
-        self.pictures = PictureCache(capture, settings.cache_gib)
+        self.pictures = PictureCache(capture, settings.cache_gib, settings.cache_dir)
         self.views = self.pictures.views(capture.split.train, LEAST_TOLD)
         if not self.views:
             raise CaptureError(f"{capture.path} has no picture among its training frames.")
@@ -92,8 +91,8 @@ class HeadTrainer:
 
     def step(self, index: int) -> Mapping[str, float]:
         """Renders one picture and updates the parameters; returns the loss and other numbers."""
-        view = self._view(index)
-        self.pictures.expect(self._view(later) for later in range(index, index + AHEAD))
+        self.pictures.expect(range(index, self._settings.steps), self._view)
+        view = self.pictures.readable(self.views, self._epochs.at(index))
         picture = self.pictures.picture(view, self.model.device)
         background, target = self._staged(view, picture, index)
         expression = self._expression(view)  # (B,)

@@ -146,8 +146,10 @@ class HeadSettings:
         steps: Optimisation steps, one picture each.
         optimiser: Adam, or stochastic gradient descent as the paper says.
         checkpoint_every: Steps from one checkpoint to the next.
-        cache_gib: Memory for recorded pictures, GiB; what does not fit is read again, in the
-            background, before each use.
+        cache_gib: Memory for recorded pictures, GiB, or auto for half of what is free; what does
+            not fit is read again, in the background, before each use.
+        cache_dir: Folder on a disk with room where pictures that do not fit in memory are kept
+            decoded while training runs, instead of being read again.
         mixed_precision: Multiply the MLP's matrices in bfloat16; on CUDA only.
         compile: Compile the MLP with torch.compile, which takes half a minute at the start.
         network: Size of the model.
@@ -160,7 +162,8 @@ class HeadSettings:
     steps: int = 50_000
     optimiser: Literal["adam", "sgd"] = "adam"
     checkpoint_every: int = 1_000
-    cache_gib: float = 2.0
+    cache_gib: float | Literal["auto"] = "auto"
+    cache_dir: str = ""
     mixed_precision: bool = False
     compile: bool = False
     network: Network = Network()

@@ -2,7 +2,7 @@
 
 import hashlib
 import logging
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +10,10 @@ import torch
 from torch import Tensor
 
 from ico3d.capture.capture import Capture
-from ico3d.capture.pictures import LayerCache, Layers
 from ico3d.capture.pictures import View as View
+from ico3d.capture.reading.layer_cache import LayerCache
+from ico3d.capture.reading.memory import Gib
+from ico3d.capture.reading.spill import Layers
 from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 
@@ -97,11 +99,11 @@ def view_of(capture: Capture, camera: int, frame: int) -> View:
 class PictureCache:
     """Pictures of a capture, kept in memory as bytes up to a limit, otherwise read at each use."""
 
-    def __init__(self, capture: Capture, budget_gib: float):
-        """Sets the limit of memory in GiB."""
+    def __init__(self, capture: Capture, cache: Gib, folder: str = ""):
+        """Sets the limit of memory, GiB or `auto`, and where to keep what does not fit in it."""
         self._capture = capture
         self._backgrounds: dict[int, Tensor | None] = {}
-        self._cache = LayerCache(self._read, budget_gib)
+        self._cache = LayerCache(self._read, cache, folder)
 
     def views(self, frames: Sequence[int], least: float = 0.0) -> list[View]:
         """All recorded views of some frames, frame by frame.
@@ -142,9 +144,13 @@ class PictureCache:
             plate = self._backgrounds[index] = plate.to(device)
         return plate
 
-    def expect(self, views: Iterable[View]) -> None:
-        """Begins to read views that will be asked for soon."""
-        self._cache.expect(views)
+    def expect(self, steps: range, view: Callable[[int], View]) -> None:
+        """Begins to read what coming steps need, as `LayerCache.expect`."""
+        self._cache.expect(steps, view)
+
+    def readable(self, views: Sequence[View], place: int) -> View:
+        """The view at a place, or the next that can be read, as `LayerCache.readable`."""
+        return self._cache.readable(views, place)
 
     def picture(self, view: View, device: torch.device) -> Picture:
         """The picture and masks of a recorded view, on `device`.
@@ -173,18 +179,20 @@ class PictureCache:
 
     def _read(self, camera: int, frame: int) -> Layers | None:
         """Picture, mask and torso."""
-        image = self._capture.image(camera, frame)
+        image = self._capture.image_bytes(camera, frame)
         if image is None:
             return None
-        mask = self._capture.mask(camera, frame)
+        mask = self._capture.mask_bytes(camera, frame)
         return image, mask, self._torso(mask, camera, frame)
 
     def _torso(self, mask: np.ndarray | None, camera: int, frame: int) -> np.ndarray | None:
-        """(H, W) the person without the head."""
-        head = self._capture.head_mask(camera, frame)
-        if mask is None or head is None:
+        """uint8 (H, W) the person without the head."""
+        if mask is None or not self._capture.tells_head:
             return None
-        torso = np.clip(mask - head, 0, 1)
+        head = self._capture.head_mask_bytes(camera, frame)
+        if head is None:
+            return None
+        torso = np.maximum(mask, head) - head
         return torso if torso.any() else None
 
 

@@ -38,7 +38,7 @@ def evaluate_scene(
     Raises:
         CaptureError: If there is no picture to compare with.
     """
-    views = SceneViews(capture, trained.only, trained.frames, cache_gib=0)
+    views = SceneViews(capture, trained.only, trained.frames, cache=0)
     chosen = views.test if which == "test" else views.train + views.test
     if not chosen:
         raise CaptureError(

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ico3d.capture.pictures import AHEAD, View
+from ico3d.capture.pictures import View
 from ico3d.scene.model import NAMES, StaticScene
 from ico3d.scene.settings import SceneSettings, StrategyName
 from ico3d.scene.surface_points import Start
@@ -71,8 +71,8 @@ class SceneTrainer:
 
     def step(self, index: int) -> Mapping[str, float]:
         """Renders one picture and updates the parameters; returns the loss and other numbers."""
-        view = self._view(index)
-        self._views.expect(self._view(later) for later in range(index, index + AHEAD))
+        self._views.expect(range(index, self._settings.steps), self._view)
+        view = self._views.readable(self._views.train, self._epochs.at(index))
         example = self._example(view, index)
         degree = index // self._settings.sh_every
         rendering = render(

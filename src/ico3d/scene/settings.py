@@ -131,8 +131,10 @@ class SceneSettings:
             direction of view.
         sh_every: Steps between two increases of the degree that is trained, which starts at 0.
         checkpoint_every: Steps from one checkpoint to the next.
-        cache_gib: Memory for recorded pictures, GiB; what does not fit is read again, in the
-            background, before each use.
+        cache_gib: Memory for recorded pictures, GiB, or auto for half of what is free; what does
+            not fit is read again, in the background, before each use.
+        cache_dir: Folder on a disk with room where pictures that do not fit in memory are kept
+            decoded while training runs, instead of being read again.
         loss: Weights of the terms of the loss.
         rates: Learning rates, and the factors to which they decay.
         initial: The Gaussians that training begins with.
@@ -144,7 +146,8 @@ class SceneSettings:
     sh_degree: int = 3
     sh_every: int = 1_000
     checkpoint_every: int = 1_000
-    cache_gib: float = 2.0
+    cache_gib: float | Literal["auto"] = "auto"
+    cache_dir: str = ""
     loss: Loss = Loss()
     rates: Rates = Rates()
     initial: Initial = Initial()

@@ -61,7 +61,7 @@ def train_scene(
         return TrainedScene.load(folder)
     place = computing_device(device)
     settings = job.settings
-    views = SceneViews(capture, job.only, job.frames, settings.cache_gib)
+    views = SceneViews(capture, job.only, job.frames, settings.cache_gib, settings.cache_dir)
     start = initial_scene(capture, views, settings, np.random.default_rng(job.seed))
     start.scene.to(place)
     trainer = SceneTrainer(start, views, job.strategy, settings, job.seed)

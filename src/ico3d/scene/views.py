@@ -1,6 +1,6 @@
 """The pictures on which a static scene is trained and measured."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,7 +9,11 @@ import torch
 from torch import Tensor
 
 from ico3d.capture.capture import Capture
-from ico3d.capture.pictures import LayerCache, Layers, View
+from ico3d.capture.decoding import to_bytes
+from ico3d.capture.pictures import View
+from ico3d.capture.reading.layer_cache import LayerCache
+from ico3d.capture.reading.memory import Gib
+from ico3d.capture.reading.spill import Layers
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
 
@@ -59,14 +63,15 @@ class SceneViews:
         test: Views for measuring: the capture's test frames, or every 8th view of a single frame.
     """
 
-    def __init__(self, capture: Capture, only: Only, frames: Frames, cache_gib: float):
+    def __init__(self, capture: Capture, only: Only, frames: Frames, cache: Gib, folder: str = ""):
         """Finds the recorded views.
 
         Args:
             capture: The recording.
             only: The part of the pictures to train: all, the person, or the background.
             frames: All frames, or the number of one.
-            cache_gib: Memory for pictures, GiB.
+            cache: Memory for pictures, GiB, or `auto`.
+            folder: Where to keep pictures that do not fit in memory; "" for nowhere.
 
         Raises:
             CaptureError: If there are no pictures, a mask is missing, or there is no such frame.
@@ -79,7 +84,7 @@ class SceneViews:
         self._plates = only == "background" and capture.background(0) is not None
         follows = only == "person" and capture.world_from_head(0) is not None
         self.space: Space = "head" if follows else "world"
-        self._cache = LayerCache(self._read, cache_gib)
+        self._cache = LayerCache(self._read, cache, folder)
         self._known_plates: dict[int, Tensor | None] = {}
         if frames == "all" and capture.split.train and capture.split.test and not self._plates:
             self.train = self._views(capture.split.train)
@@ -89,9 +94,13 @@ class SceneViews:
         if not self.train:
             raise CaptureError(f"{capture.path} has no picture among its training frames.")
 
-    def expect(self, views: Iterable[View]) -> None:
-        """Begins to read views that will be asked for soon."""
-        self._cache.expect(views)
+    def expect(self, steps: range, view: Callable[[int], View]) -> None:
+        """Begins to read what coming steps need, as `LayerCache.expect`."""
+        self._cache.expect(steps, view)
+
+    def readable(self, views: Sequence[View], place: int) -> View:
+        """The view at a place, or the next that can be read, as `LayerCache.readable`."""
+        return self._cache.readable(views, place)
 
     def layers(self, view: View) -> tuple[Tensor, Tensor | None]:
         """Picture (H, W, 3) and mask (H, W) of a view, on the CPU.
@@ -177,9 +186,9 @@ class SceneViews:
         """Picture and mask of a view; of a background its clean plate alone."""
         if self._plates:
             plate = self._capture.background(camera)
-            return None if plate is None else (plate, None)
-        image = self._capture.image(camera, frame)
-        return None if image is None else (image, self._capture.mask(camera, frame))
+            return None if plate is None else (to_bytes(plate), None)
+        image = self._capture.image_bytes(camera, frame)
+        return None if image is None else (image, self._capture.mask_bytes(camera, frame))
 
     def _where(self, view: View) -> str:
         """Names a picture in an error."""

@@ -1,23 +1,72 @@
 """Checkpoints: tensors and a JSON state in one safetensors file, written atomically."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
 from torch import Tensor
 
 from ico3d.common.files import write_atomic
 from ico3d.errors import ModelError
 
+DTYPES = {
+    torch.float64: "F64",
+    torch.float32: "F32",
+    torch.float16: "F16",
+    torch.bfloat16: "BF16",
+    torch.int64: "I64",
+    torch.int32: "I32",
+    torch.int16: "I16",
+    torch.int8: "I8",
+    torch.uint8: "U8",
+    torch.bool: "BOOL",
+}
+"""The names that the safetensors format has for types of numbers."""
+ALIGNMENT = 8
+"""The header of a safetensors file ends at a multiple of this many bytes."""
 
-def save_tensors(path: Path, tensors: dict[str, Tensor], state: dict) -> None:
-    """Writes tensors and a JSON-serialisable state into one file, atomically."""
-    contiguous = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
-    write_atomic(path, save(contiguous, metadata={"state": json.dumps(state)}))
+
+def save_tensors(path: Path, tensors: Mapping[str, Tensor], state: dict) -> None:
+    """Writes tensors and a JSON-serialisable state into one file, atomically.
+
+    The tensors go to the disk one by one: beside them, memory holds at most a copy of one of them.
+
+    Raises:
+        StorageError: If the disk is full; a file that was there before is kept.
+    """
+    write_atomic(path, lambda temporary: _stream(temporary, tensors, state))
+
+
+def size_of_tensors(tensors: Mapping[str, Tensor]) -> int:
+    """Bytes that tensors take in memory and, but for a header, in a file."""
+    return sum(tensor.numel() * tensor.element_size() for tensor in tensors.values())
+
+
+def _stream(path: Path, tensors: Mapping[str, Tensor], state: dict) -> None:
+    """Writes a safetensors file piece by piece.
+
+    The functions of the safetensors package first copy all tensors of a GPU into memory.
+    """
+    # Wide numbers first: each tensor begins at a multiple of the size of its numbers.
+    names = sorted(tensors, key=lambda name: (-tensors[name].element_size(), name))
+    header: dict[str, dict] = {"__metadata__": {"state": json.dumps(state)}}
+    end = 0
+    for name in names:
+        tensor, begin = tensors[name], end
+        end += tensor.numel() * tensor.element_size()
+        shape, kind = list(tensor.shape), DTYPES[tensor.dtype]
+        header[name] = {"dtype": kind, "shape": shape, "data_offsets": [begin, end]}
+    text = json.dumps(header, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % ALIGNMENT)
+    with path.open("wb") as file:
+        file.write(len(text).to_bytes(8, "little"))
+        file.write(text)
+        for name in names:
+            flat = tensors[name].detach().cpu().contiguous().reshape(-1)  # (all numbers,)
+            file.write(flat.view(torch.uint8).numpy().data)
 
 
 def load_tensors(path: Path) -> tuple[dict[str, Tensor], dict]:

@@ -10,7 +10,9 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
+from ico3d.common.files import full_disk
 from ico3d.training.checkpoint import placed
+from ico3d.training.devices import device_failure
 from ico3d.training.finite import NotFiniteError, check_finite
 from ico3d.training.log import MetricsLog, progress_bar, readable
 from ico3d.training.run import RunFolder, checkpoint_state
@@ -86,7 +88,17 @@ def run_loop(
     Raises:
         ModelError: If the loss, a gradient or a parameter is no longer finite; the sentence names
             the tensor, and the latest checkpoint is kept.
+        DeviceError: If the GPU fails; the latest checkpoint is kept.
+        StorageError: If the disk is full; the latest checkpoint is kept.
     """
+    with full_disk(run.path):
+        return _run_steps(trainee, run, settings, watch)
+
+
+def _run_steps(
+    trainee: Trainee, run: RunFolder, settings: LoopSettings, watch: Watch | None
+) -> float:
+    """Does what `run_loop` promises, except on a full disk."""
     first, seconds = _resume(trainee, run)
     log = MetricsLog(run.path, first)
     saved = index = first
@@ -114,6 +126,11 @@ def run_loop(
                     saved = done
     except NotFiniteError as error:
         raise error.at(index, saved) from error
+    except RuntimeError as error:
+        failure = device_failure(error, index, saved)
+        if failure is None:
+            raise
+        raise failure from error
     finally:
         log.close()
     return seconds

@@ -14,13 +14,17 @@ CHECKPOINT = "checkpoint.safetensors"
 NESTED = "settings"
 """Key under which the options of the command line are stored; older runs store them unnested."""
 
+FREE = ("cache_gib", "cache_dir")
+"""Settings that a resumed run may have otherwise: they change no result."""
+
 
 class RunFolder:
     """The files of one training run.
 
     Attributes:
         path: The folder; created if missing.
-        settings: The settings that the run was started with; a resumed run must have the same.
+        settings: The settings that the run was started with; a resumed run must have the same, but
+            for those in `FREE`.
     """
 
     def __init__(self, path: Path, settings: Mapping):
@@ -50,7 +54,8 @@ class RunFolder:
             )
         before, now = _flat(earlier), _flat(self.settings)
         for name in sorted({*before, *now}):
-            if before.get(name) != now.get(name):
+            free = name.rpartition(".")[2] in FREE
+            if not free and before.get(name) != now.get(name):
                 raise SettingsError(
                     f"{self.path} holds a run with another '{name}' ({before.get(name)}, not "
                     f"{now.get(name)}): choose another folder, or remove it to start afresh."

@@ -100,6 +100,7 @@ class FineTuner(WindowTrainee):
     def _remember(self, index: int) -> Mapping[str, float]:
         """Gradients of the loss of a recorded picture, so that the window keeps its quality."""
         learner = self._learner
+        learner.expect(range(index, self._settings.steps), lambda _: learner.views)
         view = learner.view(learner.views, index)
         example = learner.example(view, index)
         rendering = learner.draw(self.model.at(learner.tau(view)), view, example)

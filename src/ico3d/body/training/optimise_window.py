@@ -1,6 +1,6 @@
 """Optimises one window, with one picture per step (paper, dynamic 3D body Gaussians)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from torch import Tensor
 
@@ -66,8 +66,9 @@ class BodyTrainer(WindowTrainee):
     def step(self, index: int) -> Mapping[str, float]:
         """Renders one recorded view, learns from the difference, and controls density."""
         learner = self._learner
-        still = index < self._warmup and bool(self._center)
-        view = learner.view(self._center if still else learner.views, index)
+        still = self._is_still(index)
+        learner.expect(range(index, self._steps), self._views)
+        view = learner.view(self._views(index), index)
         example = learner.example(view, index)
         gaussians = self.model.canonical() if still else self._moved(view, index)
         rendering = learner.draw(gaussians, view, example)
@@ -88,6 +89,14 @@ class BodyTrainer(WindowTrainee):
             "psnr": tensor_psnr(rendering.rgb[0], example.target, example.mask),
             "gaussians": len(self.model),
         }
+
+    def _is_still(self, index: int) -> bool:
+        """Whether a step learns from the window's middle frame, without motion."""
+        return index < self._warmup and bool(self._center)
+
+    def _views(self, index: int) -> Sequence[View]:
+        """The views among which a step chooses."""
+        return self._center if self._is_still(index) else self._learner.views
 
     def _moved(self, view: View, index: int) -> Gaussians:
         """Gaussians at the time of a view; on a skeleton at random without residual shapes."""

@@ -1,7 +1,7 @@
 """What training and fine-tuning of a window share: the loss of a picture, and learning from it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings
 from ico3d.body.skinning.skinned import NETWORK, PER_FRAME
 from ico3d.body.training.views import BodyViews, Example
-from ico3d.capture.pictures import AHEAD, View
+from ico3d.capture.pictures import View
 from ico3d.splat.density import Population
 from ico3d.splat.gaussians import Gaussians, cat
 from ico3d.splat.losses import l1, photometric
@@ -78,14 +78,24 @@ class Learner:
         """Time τ in the window at which a view was taken."""
         return self._window.tau(view.frame)
 
+    def expect(self, steps: range, views: Callable[[int], Sequence[View]]) -> None:
+        """Begins to read the pictures of coming steps.
+
+        Args:
+            steps: The steps of the training from the next one to the last.
+            views: The views among which a step chooses.
+        """
+        self._pictures.expect(steps, lambda step: (v := views(step))[self._epoch(len(v)).at(step)])
+
     def view(self, views: Sequence[View], index: int) -> View:
         """The view of step `index`: each of `views` once per epoch, in a new random order."""
-        count = len(views)
+        return self._pictures.readable(views, self._epoch(len(views)).at(index))
+
+    def _epoch(self, count: int) -> Epochs:
+        """The orders of `count` views."""
         if count not in self._epochs:
             self._epochs[count] = Epochs([self._seed, count], count)
-        chosen = [views[self._epochs[count].at(step)] for step in range(index, index + AHEAD)]
-        self._pictures.expect(chosen)
-        return chosen[0]
+        return self._epochs[count]
 
     def random(self, index: int, purpose: int) -> np.random.Generator:
         """A generator of random numbers for one purpose in one step."""

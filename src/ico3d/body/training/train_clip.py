@@ -127,7 +127,7 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     companion = job.companion.open(device) if job.companion else None
     begin = _begin(task, capture, companion, device)
     begin.model.to(device)
-    pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
+    pictures = BodyViews(capture, window.frames, job.settings.cache_gib, job.settings.cache_dir)
     seed = job.seed + 1_000 * task.index
     trainer = BodyTrainer(
         begin.model, window, pictures, job.method, job.settings, begin.extent, seed, companion
@@ -191,7 +191,7 @@ def finetune_window(
     model.to(device)
     previous.to(device)
     cameras = [capture.cameras[index] for index in train_cameras(capture)]
-    pictures = BodyViews(capture, window.frames, job.settings.cache_gib)
+    pictures = BodyViews(capture, window.frames, job.settings.cache_gib, job.settings.cache_dir)
     seed = job.seed + 1_000 * task.index + 500
     companion = job.companion.open(device) if job.companion else None
     tuner = FineTuner(

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ico3d.capture.box import Box, cut_out
 from ico3d.capture.capture import all_frames
-from ico3d.capture.decoding import unit
 from ico3d.capture.dna.annotations import BodyFits, gender_of, person, row
 from ico3d.capture.dna.calibration import GROUPS, read_devices
 from ico3d.capture.dna.examine import examine_files
@@ -65,20 +65,26 @@ class DnaRendering(SmcCapture):
         """Whether the annotations hold a mask."""
         return self._annotations.holds(self._mask_path(camera, frame))
 
-    def image(self, camera: int, frame: int) -> np.ndarray | None:
-        """The undistorted picture with corrected colours, or None."""
+    def image_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The undistorted picture with corrected colours, uint8, or None."""
         device = self._devices[camera]
         picture = self.decoded(self._main, device, self._picture_path(camera, frame))
         if picture is None:
             return None
-        corrected = opencv("correcting colours").LUT(picture, device.colours[None])  # (H, W, 3)
-        return unit(device.lens.straightened(corrected))
+        cv2 = opencv("correcting colours")
+        if device.lens.bends:  # pixels are mixed after their colours were corrected
+            return device.lens.straightened(cv2.LUT(picture, device.colours[None]), box)
+        return cv2.LUT(np.ascontiguousarray(cut_out(picture, box)), device.colours[None])
 
-    def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """The undistorted mask; None in parts of the data set without masks."""
+    def mask_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The undistorted mask, uint8; None in parts of the data set without masks."""
         device = self._devices[camera]
         picture = self.decoded(self._annotations, device, self._mask_path(camera, frame))
-        return None if picture is None else unit(device.lens.straightened(person(picture)))
+        if picture is None:
+            return None
+        if device.lens.bends:
+            return device.lens.straightened(person(picture), box)
+        return person(cut_out(picture, box))
 
     def _picture_path(self, camera: int, frame: int) -> str:
         """Where a picture lies within the main file."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ico3d.capture.box import Box
 from ico3d.capture.capture import Capture, Sound
 from ico3d.capture.face.expressions import BLENDSHAPES
 from ico3d.capture.finding import Finding
@@ -21,7 +22,7 @@ class TrackedCapture(Capture):
 
     def __init__(self, capture: Capture, track: HeadTrack):
         """Wraps an open capture."""
-        self.whole, self._track = capture, track
+        self.whole, self._track, self.tells_head = capture, track, capture.tells_head
         self.kind, self.path, self.cameras = capture.kind, capture.path, capture.cameras
         self.fps, self.num_frames, self.split = capture.fps, capture.num_frames, capture.split
 
@@ -44,6 +45,14 @@ class TrackedCapture(Capture):
     def head_mask(self, camera: int, frame: int) -> np.ndarray | None:
         """The mask for `psnr_mask`."""
         return self.whole.head_mask(camera, frame)
+
+    def image_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The part of a recorded picture in a box, uint8."""
+        return self.whole.image_bytes(camera, frame, box)
+
+    def mask_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The part of a mask in a box, uint8."""
+        return self.whole.mask_bytes(camera, frame, box)
 
     def background(self, camera: int) -> np.ndarray | None:
         """What the camera sees without the person."""

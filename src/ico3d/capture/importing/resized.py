@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ico3d.capture.box import Box, cut_out
 from ico3d.capture.capture import Capture, Sound
 from ico3d.capture.extras import opencv
 from ico3d.capture.finding import Finding
@@ -32,6 +33,7 @@ class ResizedCapture(Capture):
             raise SettingsError(f"pictures cannot have a height of {height} pixels.")
         self.whole = capture
         self.kind, self.path = capture.kind, capture.path
+        self.tells_head = capture.tells_head
         self.fps, self.num_frames = capture.fps, capture.num_frames
         self.split, self.blendshape_names = capture.split, capture.blendshape_names
         self.cameras = tuple(_resized(camera, height) for camera in capture.cameras)
@@ -55,6 +57,14 @@ class ResizedCapture(Capture):
     def head_mask(self, camera: int, frame: int) -> np.ndarray | None:
         """The mask for `psnr_mask`, in the size of the pictures."""
         return self._shrunk(self.whole.head_mask(camera, frame), camera)
+
+    def image_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The part of a picture in a box, uint8."""
+        return self._shrunk(self.whole.image_bytes(camera, frame), camera, box)
+
+    def mask_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The part of a mask in a box, uint8."""
+        return self._shrunk(self.whole.mask_bytes(camera, frame), camera, box)
 
     def background(self, camera: int) -> np.ndarray | None:
         """What the camera sees without the person."""
@@ -108,15 +118,21 @@ class ResizedCapture(Capture):
         """The provenance of the wrapped capture."""
         return self.whole.provenance
 
-    def _shrunk(self, picture: np.ndarray | None, camera: int) -> np.ndarray | None:
-        """A picture (H, W, ...) in the size of its camera."""
+    def _shrunk(
+        self, picture: np.ndarray | None, camera: int, box: Box | None = None
+    ) -> np.ndarray | None:
+        """A picture (H, W, ...) in the size of its camera, or its part in a box."""
         lens = self.cameras[camera]
-        if picture is None or picture.shape[:2] == (lens.height, lens.width):
-            return picture
+        if picture is None:
+            return None
+        if picture.shape[:2] == (lens.height, lens.width):
+            return cut_out(picture, box)
         cv2 = opencv("scaling pictures")
-        # Means of values in [0, 1] may leave it by a rounding error.
-        small = cv2.resize(picture, (lens.width, lens.height), interpolation=cv2.INTER_AREA)
-        return np.clip(small, 0.0, 1.0)
+        size = (lens.width, lens.height)
+        small: np.ndarray = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+        if small.dtype != np.uint8:
+            small = np.clip(small, 0.0, 1.0)  # means may leave [0, 1] by a rounding error
+        return cut_out(small, box)
 
 
 def _resized(camera: Camera, height: int) -> Camera:

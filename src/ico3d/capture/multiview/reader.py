@@ -4,8 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.capture.capture import Capture, Sound, all_frames, last_eleventh
-from ico3d.capture.decoding import unit
+from ico3d.capture.box import Box
+from ico3d.capture.capture import RecordedCapture, Sound, all_frames, last_eleventh
+from ico3d.capture.decoding import to_bytes, unit
 from ico3d.capture.face.expressions import BLENDSHAPES
 from ico3d.capture.finding import Finding, missing_and_damaged
 from ico3d.capture.headpose.track_file import read_track
@@ -18,7 +19,7 @@ from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError
 
 
-class MultiviewCapture(Capture):
+class MultiviewCapture(RecordedCapture):
     """A recording by several fixed, synchronised cameras.
 
     Pictures, masks and plates are undistorted. The transparency of an RGBA picture is its mask; the
@@ -65,21 +66,23 @@ class MultiviewCapture(Capture):
         """Whether there is a file of the mask, or a picture with opacity."""
         return self.files.has_mask(camera, self._index(frame))
 
-    def image(self, camera: int, frame: int) -> np.ndarray | None:
-        """The undistorted picture, or None if missing."""
+    def image_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The undistorted picture, uint8, or None if missing."""
         picture = self.files.picture(camera, self._index(frame))
         if picture is None:
             return None
-        straight = unit(self.lenses[camera].straightened(picture))
-        return straight[..., :3] * straight[..., 3:] if picture.shape[-1] == 4 else straight
+        straight = self.lenses[camera].straightened(picture, box)
+        if picture.shape[-1] < 4:
+            return straight
+        return to_bytes(unit(straight[..., :3]) * unit(straight[..., 3:]))
 
-    def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """The undistorted mask, else the picture's opacity, else None."""
+    def mask_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The undistorted mask, uint8, else the picture's opacity, else None."""
         mask = self.files.mask(camera, self._index(frame))
         if mask is None and self.files.clip(camera) is None:
             picture = self.files.picture(camera, frame)
             mask = None if picture is None or picture.shape[-1] < 4 else picture[..., 3]
-        return None if mask is None else unit(self.lenses[camera].straightened(mask))
+        return None if mask is None else self.lenses[camera].straightened(mask, box)
 
     def background(self, camera: int) -> np.ndarray | None:
         """The undistorted clean plate, or None if missing."""

@@ -9,7 +9,9 @@ from typing import TypeVar
 import numpy as np
 from PIL import Image
 
-from ico3d.capture.capture import EYE_NAMES, Capture, Sound, Split
+from ico3d.capture.box import Box, cut_out
+from ico3d.capture.capture import EYE_NAMES, RecordedCapture, Sound, Split
+from ico3d.capture.decoding import to_bytes, unit
 from ico3d.capture.face.expressions import AU_COLUMNS, eyes_of_action_units, eyes_of_blendshapes
 from ico3d.capture.portrait.files import DETAILS, OPENGL_FROM_OPENCV, load_landmarks
 from ico3d.capture.portrait.parsing import BACKGROUND, FACE, HAIR, MOUTH, is_class
@@ -22,7 +24,7 @@ FPS = 25.0
 Result = TypeVar("Result")
 
 
-class TalkingPortrait(Capture):
+class TalkingPortrait(RecordedCapture):
     """A talking-portrait folder: one steady camera, one head.
 
     The world is the camera's frame in OpenGL axes (y up, camera looks along -z), so a person who
@@ -31,6 +33,7 @@ class TalkingPortrait(Capture):
     """
 
     kind = "portrait"
+    tells_head = True
 
     def __init__(self, path: Path):
         """Opens the folder and checks that its files agree; pictures are read when asked for.
@@ -69,19 +72,21 @@ class TalkingPortrait(Capture):
         files = (self.path / "alpha" / f"{frame}.png", self._parsing_file(frame))
         return frame in self._poses and any(file.is_file() for file in files)
 
-    def image(self, camera: int, frame: int) -> np.ndarray | None:
-        """The person on the clean plate if the folder has one, else the recorded picture."""
+    def image_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The person on the clean plate if the folder has one, else the recorded picture; uint8."""
         if frame not in self._poses:
             return None
-        return _picture(self._recorded(frame))
+        return cut_out(_picture(self._recorded(frame)), box)
 
-    def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """The soft mask that ico3d writes, else all pixels not parsed as background."""
+    def mask_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The soft mask that ico3d writes, else all pixels not parsed as background; uint8."""
         soft = self.path / "alpha" / f"{frame}.png"
         if frame in self._poses and soft.is_file():
-            return _picture(soft)
+            return cut_out(_picture(soft), box)
         parsing = self._parsing(frame)
-        return None if parsing is None else 1.0 - is_class(parsing, BACKGROUND)
+        if parsing is None:
+            return None
+        return to_bytes(1.0 - is_class(cut_out(parsing, box), BACKGROUND))
 
     def head_mask(self, camera: int, frame: int) -> np.ndarray | None:
         """The mask of face, hair and mouth."""
@@ -91,7 +96,7 @@ class TalkingPortrait(Capture):
     def background(self, camera: int) -> np.ndarray | None:
         """The clean plate `bc.jpg`."""
         plate = self.path / "bc.jpg"
-        return _picture(plate) if plate.is_file() else None
+        return unit(_picture(plate)) if plate.is_file() else None
 
     def audio(self) -> Sound | None:
         """The sound of `aud.wav` at 16 kHz."""
@@ -338,10 +343,14 @@ def _read_json(path: Path) -> dict:
 
 
 def _picture(path: Path) -> np.ndarray:
-    """A picture as float32 in [0, 1]; (H, W, 3), or (H, W) where it is grey."""
+    """A picture as uint8 (H, W, 3), or (H, W) where it is grey."""
     with _reading(path, lambda: Image.open(path)) as picture:
-        plain = picture if picture.mode == "L" else picture.convert("RGB")
-        return _reading(path, lambda: np.asarray(plain, np.float32) / 255)
+        return _reading(path, lambda: np.asarray(_plain(picture)))
+
+
+def _plain(picture: Image.Image) -> Image.Image:
+    """A picture in grey or RGB."""
+    return picture if picture.mode in ("L", "RGB") else picture.convert("RGB")
 
 
 def _reading(path: Path, read: Callable[[], Result]) -> Result:

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ico3d.capture.box import Box
 from ico3d.capture.capture import Sound, last_eleventh
-from ico3d.capture.decoding import largest_channel, unit
+from ico3d.capture.decoding import largest_channel
 from ico3d.capture.finding import Finding
 from ico3d.capture.renderme.calibration import frame_rate, read_cameras
 from ico3d.capture.renderme.examine import examine_files, mask_folder
@@ -79,20 +80,20 @@ class RenderMe360(SmcCapture):
         folder = mask_folder(self._devices[camera].name)
         return self._holding(folder).holds(f"{folder}/{self.index(frame)}")
 
-    def image(self, camera: int, frame: int) -> np.ndarray | None:
-        """The undistorted picture, or None if missing."""
+    def image_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The undistorted picture, uint8, or None if missing."""
         device = self._devices[camera]
         picture = self.decoded(self._raw, device, f"{device.pictures}/{self.index(frame)}")
-        return None if picture is None else unit(device.lens.straightened(picture))
+        return None if picture is None else device.lens.straightened(picture, box)
 
-    def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """The undistorted mask, soft along hair; None if missing."""
+    def mask_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The undistorted mask, uint8, soft along hair; None if missing."""
         device = self._devices[camera]
         folder = mask_folder(device.name)
         picture = self.decoded(self._holding(folder), device, f"{folder}/{self.index(frame)}")
         if picture is None:
             return None
-        return unit(device.lens.straightened(largest_channel(picture)))
+        return device.lens.straightened(largest_channel(picture), box)
 
     def audio(self) -> Sound | None:
         """The whole sound, mono at 16 kHz; only parts with speech have one.

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ico3d.capture.capture import Capture
+from ico3d.capture.capture import RecordedCapture
 from ico3d.capture.decoding import decoded
 from ico3d.capture.finding import Finding, missing_and_damaged
 from ico3d.capture.headpose.from_landmarks import HeadMotion, head_from_landmarks
@@ -20,7 +20,7 @@ MOST_FRAMES = 100_000
 MAGICS = (b"\xff\xd8\xff", b"\x89PNG")
 
 
-class SmcCapture(Capture):
+class SmcCapture(RecordedCapture):
     """A recording in SMC files.
 
     The world of the files is turned by multiples of 90° so that +y is up.
