@@ -21,7 +21,7 @@ class TrackedCapture(Capture):
 
     def __init__(self, capture: Capture, track: HeadTrack):
         """Wraps an open capture."""
-        self.whole, self._track = capture, track
+        self.whole, self._track, self.shows = capture, track, capture.shows
         self.kind, self.path, self.cameras = capture.kind, capture.path, capture.cameras
         self.fps, self.num_frames, self.split = capture.fps, capture.num_frames, capture.split
 
@@ -74,16 +74,19 @@ class TrackedCapture(Capture):
         seen = self.cameras[camera].moved(self.world_from_head(frame))
         return seen.project(self.landmarks_3d(frame))[0]
 
-    def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) surface points of the recording, metres; of heads, in the track's head space."""
-        points = self.whole.points(frame)
-        if not self.split.test:  # a body, whose points lie in the world
-            return points
-        pose = self.whole.world_from_head(frame)
+    def head_points(self, frame: int = 0) -> np.ndarray | None:
+        """(P, 3) surface points of the head, in the track's head space; None of bodies."""
+        if self.shows == "body":
+            return None
+        points, pose = self.whole.head_points(frame), self.whole.world_from_head(frame)
         if points is None or pose is None:
             return head_hull(self, frame)
         between = np.linalg.inv(self.world_from_head(frame)) @ pose
         return points @ between[:3, :3].T + between[:3, 3]
+
+    def world_points(self, frame: int = 0) -> np.ndarray | None:
+        """(P, 3) surface points of the body, in the world."""
+        return self.whole.world_points(frame)
 
     def inspect(self) -> list[Finding]:
         """Findings about the recording's files, and about interpolated frames of the track."""

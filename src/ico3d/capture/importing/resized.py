@@ -31,7 +31,7 @@ class ResizedCapture(Capture):
         if height < 1:
             raise SettingsError(f"pictures cannot have a height of {height} pixels.")
         self.whole = capture
-        self.kind, self.path = capture.kind, capture.path
+        self.kind, self.path, self.shows = capture.kind, capture.path, capture.shows
         self.fps, self.num_frames = capture.fps, capture.num_frames
         self.split, self.blendshape_names = capture.split, capture.blendshape_names
         self.cameras = tuple(_resized(camera, height) for camera in capture.cameras)
@@ -87,9 +87,13 @@ class ResizedCapture(Capture):
         """Blendshape weights of the wrapped capture."""
         return self.whole.blendshapes(frame)
 
-    def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) surface points of the wrapped capture."""
-        return self.whole.points(frame)
+    def head_points(self, frame: int = 0) -> np.ndarray | None:
+        """(P, 3) surface points of the wrapped capture's head, in head space."""
+        return self.whole.head_points(frame)
+
+    def world_points(self, frame: int = 0) -> np.ndarray | None:
+        """(P, 3) surface points of the wrapped capture's body, in the world."""
+        return self.whole.world_points(frame)
 
     def whole_body_points(self, frame: int) -> np.ndarray | None:
         """(133, 3) annotated points of the wrapped capture, metres."""
