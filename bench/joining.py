@@ -23,10 +23,10 @@ from rich.table import Table
 from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.joining.assemble import Assembly, assemble
 from ico3d.avatar.joining.face_views import face_views
-from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.settings import JoiningSettings
 from ico3d.body.settings import BodySettings
 from ico3d.capture.capture import Capture
+from ico3d.capture.face.region import HeadRegion
 from ico3d.cli import run_script
 from ico3d.common.camera import Camera
 from ico3d.measure.methods.bench import open_clip

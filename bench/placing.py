@@ -23,10 +23,10 @@ from ico3d.avatar.avatar import Placement
 from ico3d.avatar.joining.assemble import align
 from ico3d.avatar.joining.cropping import cropped
 from ico3d.avatar.joining.finding.found_placement import found_in_pictures
-from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.similarity import moved
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.canonical import canonical_landmarks
+from ico3d.capture.face.region import HeadRegion
 from ico3d.capture.formats import open_capture
 from ico3d.capture.importing.resized import ResizedCapture
 from ico3d.cli import run_script
@@ -124,9 +124,9 @@ class Unmarked(ResizedCapture):
     def eyes(self, frame: int) -> None:
         """None."""
 
-    def points(self, frame: int = 0) -> np.ndarray | None:
+    def head_points(self, frame: int = 0) -> np.ndarray | None:
         """(P, 3) those above the chin."""
-        points = super().points(frame)
+        points = super().head_points(frame)
         return None if points is None else points[points[:, 1] > BELOW_CHIN]
 
 

@@ -106,7 +106,7 @@ def _renderme_files(capture: Capture, folder: Path, name: str) -> Iterator[h5py.
 
 def _head_points(capture: Capture) -> np.ndarray:
     """(V, 3) of the capture's surface points, those within `HEAD_BOX`, in canonical head space."""
-    points = capture.points()
+    points = capture.head_points()
     assert points is not None, "a synthetic capture knows its surface"
     across, height, forward = np.abs(points[:, 0]), points[:, 1], points[:, 2]
     upper = height > height.max() - HEAD_BOX[1]

@@ -95,7 +95,7 @@ def test_a_run_and_its_head_know_their_space(tiny, tmp_path, monkeypatch):
     job = _job(steps=40, checkpoint_every=10)
     _train_until(25, monkeypatch, tiny, tmp_path / "head", job)
     with monkeypatch.context() as patch:
-        patch.setattr(tiny, "points", lambda frame=0: 1.1 * type(tiny).points(tiny))
+        patch.setattr(tiny, "head_points", lambda frame=0: 1.1 * type(tiny).head_points(tiny))
         with pytest.raises(SettingsError, match="have changed since: train in an empty folder"):
             train_head(tiny, tmp_path / "head", job)
     head = train_head(tiny, tmp_path / "head", job)  # nothing was lost
@@ -171,7 +171,7 @@ def test_the_adaptor_learns(tiny, tmp_path):
     ("method", "inputs", "sentence"),
     [
         ("audio", "speech", "has no sound"),
-        ("points", "blendshapes", "no finite surface points"),
+        ("head_points", "blendshapes", "no finite surface points"),
         ("blendshapes", "blendshapes", "frame 0 has no finite blendshapes"),
         ("world_from_head", "blendshapes", "frame 0 has no finite head pose"),
     ],

@@ -33,7 +33,7 @@ def test_a_person_begins_on_its_surface(still):
 
 def test_without_surface_points_a_person_begins_on_the_hull_of_its_masks(still, monkeypatch):
     capture = still(6)
-    monkeypatch.setattr(type(capture), "points", lambda _: None)
+    monkeypatch.setattr(type(capture), "head_points", lambda _: None)
     means = _means(_start(capture, "person"))
     from_middle = np.linalg.norm(means, axis=1)
     # the hull bulges towards the middle of the arc; across it, it is as tall as the ball's edge
@@ -76,7 +76,7 @@ def test_never_more_than_the_cap(still):
 def test_what_cannot_be_placed_is_one_sentence(still, monkeypatch):
     capture = still(3)
     with monkeypatch.context() as patch:
-        patch.setattr(type(capture), "points", lambda _: None)
+        patch.setattr(type(capture), "head_points", lambda _: None)
         patch.setattr(type(capture), "mask", lambda *_: np.zeros((32, 32), np.float32))
         with pytest.raises(CaptureError, match="agree on no place"):
             _start(capture, "person")

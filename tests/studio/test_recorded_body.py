@@ -210,7 +210,7 @@ def test_the_head_is_rigid_and_points_are_on_the_mesh(folder, person):
         np.testing.assert_allclose(capture.landmarks_3d(frame), marks, atol=1e-5)
         turn = capture.world_from_head(frame)[:3, :3]
         np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-12)
-        world = capture.points(frame)
+        world = capture.world_points(frame)
         assert world.shape == (4000, 3) and -0.001 < world[:, 1].min() < 0.02
 
 
@@ -218,7 +218,7 @@ def test_points_lie_in_the_masks(folder):
     capture = open_capture(folder)
     for frame in range(capture.num_frames):
         for index, camera in enumerate(capture.cameras):
-            pixels, _ = camera.project(capture.points(frame))
+            pixels, _ = camera.project(capture.world_points(frame))
             x, y = np.floor(pixels).astype(int).T
             inside = np.pad(capture.mask(index, frame), 1)
             around = np.max([inside[y + i, x + j] for i in range(3) for j in range(3)], axis=0)
@@ -274,7 +274,7 @@ def test_the_same_settings_write_the_same_bytes(folder, person, tmp_path):
 def test_another_light_changes_pictures_only(folder, person, tmp_path):
     record(_settings(person, light="warm"), tmp_path / "warm", workers=2)
     one, other = open_capture(folder), open_capture(tmp_path / "warm")
-    np.testing.assert_array_equal(one.points(3), other.points(3))
+    np.testing.assert_array_equal(one.world_points(3), other.world_points(3))
     np.testing.assert_array_equal(one.mask(2, 3), other.mask(2, 3))
     for capture, warmer in ((one, False), (other, True)):
         red, _, blue = capture.image(0, 0)[capture.mask(0, 0) == 1].mean(axis=0)
@@ -287,7 +287,7 @@ def test_a_head_of_version_1_can_still_be_read(person, tmp_path):
     del about["shows"]
     (tmp_path / "old" / "capture.json").write_text(json.dumps(about | {"version": 1}))
     capture = open_capture(tmp_path / "old")
-    assert capture.split.test == (10,) and capture.points(3).shape == (6000, 3)
+    assert capture.split.test == (10,) and capture.head_points(3).shape == (6000, 3)
     (tmp_path / "old" / "capture.json").write_text(json.dumps(about | {"version": 3}))
     with pytest.raises(CaptureError, match="version 3"):
         open_capture(tmp_path / "old")

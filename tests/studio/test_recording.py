@@ -84,7 +84,7 @@ def test_reader_gives_what_was_recorded(folder):
     assert len(capture.cameras) == 3
     sound = capture.audio()
     assert sound.rate == 16000 and len(sound.samples) == 11 * 640
-    assert capture.points().shape == (6000, 3)
+    assert capture.head_points().shape == (6000, 3)
     assert capture.eyes(0).shape == (7,)
     assert capture.blendshapes(0).shape == (len(capture.blendshape_names),)
     assert "espeak-ng" in str(capture.provenance["sources"])

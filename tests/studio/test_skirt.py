@@ -222,7 +222,7 @@ def test_a_skirt_is_recorded_alike_each_time(person, tmp_path, monkeypatch):
     assert about["settings"]["garment"] == "skirt"
     skirt, bare = open_capture(tmp_path / "one"), open_capture(tmp_path / "bare")
     assert skirt.mask(0, 2).sum() > 1.15 * bare.mask(0, 2).sum()
-    pixels, _ = skirt.cameras[0].project(skirt.points(2))
+    pixels, _ = skirt.cameras[0].project(skirt.world_points(2))
     x, y = np.floor(pixels).astype(int).T
     inside = np.pad(skirt.mask(0, 2), 1)
     around = np.max([inside[y + i, x + j] for i in range(3) for j in range(3)], axis=0)

@@ -100,6 +100,11 @@ class TrainedAvatar:
         self.body.to(device)
         return self
 
+    @property
+    def records(self) -> list[dict]:
+        """What trained head, colours and body, by `capture.parts.trained_on`."""
+        return [*self.head.records, *self.body.records]
+
     def expression(self, seconds: float) -> np.ndarray:
         """(B,) recorded expression at a time in seconds, interpolated linearly between frames."""
         place = min(max(seconds * self.fps, 0.0), len(self.expressions) - 1.0)

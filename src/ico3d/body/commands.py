@@ -45,6 +45,7 @@ class TrainBody(BodyChoice):
         capture: A capture by calibrated, synchronised cameras, with masks.
         out: The model folder to write.
         seed: Seed of all randomness.
+        hold_out: Leave out the validation cameras, too, for ico3d evaluate --frames validation.
         device: Where to compute: by default with CUDA where that works, else on the CPU; each
             machine of a Ray cluster decides for itself.
         jobs: Number of windows that train at once, each in a process of its own; with CUDA, at most
@@ -58,6 +59,7 @@ class TrainBody(BodyChoice):
     capture: tyro.conf.Positional[Path]
     out: tyro.conf.Positional[Path]
     seed: int = 0
+    hold_out: bool = False
     device: DeviceName = "auto"
     jobs: int = 1
     ray: str | None = None
@@ -85,7 +87,8 @@ class TrainBody(BodyChoice):
 
         device = self.device if self.ray else decided(self.device)
         runner = None if self.plan else runner_of(self.jobs, self.ray, device)
-        job = BodyJob(self.method, self.seed, self.settings, device=device)
+        given = (self.method, self.seed, self.settings)
+        job = BodyJob(*given, device=device, hold_out=self.hold_out)
         capture = open_capture(self.capture)
         if self.plan:
             plan_windows(capture, job, self.out)

@@ -71,6 +71,11 @@ class TrainedBody:
         """Length of the clip in seconds."""
         return self.windows[-1].last / self.fps
 
+    @property
+    def records(self) -> list[dict]:
+        """What trained the body, by `capture.parts.trained_on`; bodies it went on from included."""
+        return [self.summary.get("recording", {}), *self.summary.get("continued", [])]
+
     def window_at(self, seconds: float) -> int:
         """Index of the window that shows a time; at a shared frame that of the earlier window."""
         frame = seconds * self.fps - ROUNDING

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -34,14 +35,26 @@ class Split:
     """Which pictures are for training and which for tests (docs/architecture.md); sorted.
 
     Attributes:
-        train: Frames for training.
+        train: Frames for training, those for validation among them.
         test: Frames for tests; empty for bodies, which are tested with cameras.
         test_cameras: Indices of cameras that are used for tests only.
+        validation_cameras: Indices of training cameras that a training which tunes settings leaves
+            out, so that they can be measured in place of the test cameras.
     """
 
     train: tuple[int, ...]
     test: tuple[int, ...]
     test_cameras: tuple[int, ...] = ()
+    validation_cameras: tuple[int, ...] = ()
+
+    @property
+    def validation(self) -> tuple[int, ...]:
+        """Training frames that a training which tunes settings leaves out: the last tenth.
+
+        Empty where cameras are for tests instead of frames.
+        """
+        count = len(self.train) // 10 if self.test else 0
+        return self.train[len(self.train) - count :]
 
 
 class Capture(ABC):
@@ -56,6 +69,8 @@ class Capture(ABC):
     """
 
     kind: str
+    shows: Literal["head", "body"] = "head"
+    """What of the person the pictures show: a head (with shoulders), or the whole body."""
     path: Path
     cameras: Sequence[Camera]
     fps: float
@@ -126,8 +141,12 @@ class Capture(ABC):
         """(68, 3) Multi-PIE landmarks of a frame in canonical head space, metres."""
         return None
 
-    def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) surface points of a frame, metres: of bodies in the world, else in head space."""
+    def head_points(self, frame: int = 0) -> np.ndarray | None:
+        """(P, 3) surface points of the head in a frame, in canonical head space, metres."""
+        return None
+
+    def world_points(self, frame: int = 0) -> np.ndarray | None:
+        """(P, 3) surface points of the whole body in a frame, in the world, metres."""
         return None
 
     def whole_body_points(self, frame: int) -> np.ndarray | None:
@@ -190,16 +209,22 @@ def last_eleventh(num_frames: int) -> Split:
 
 
 TEST_CAMERA_EVERY = 5
+VALIDATION_CAMERA_EVERY = 10
+FIRST_VALIDATION_CAMERA = 4
+"""Place in the ring of cameras: as far from test cameras, at places 2 and 7, as a place can be."""
 
 
 def all_frames(num_frames: int, cameras: Sequence[Camera]) -> Split:
     """The split of bodies: all frames are for training, every fifth camera by azimuth for tests.
 
     The azimuth is measured about the upward axis y through the centre of the cameras. The first
-    test camera is the third of the ring, so that a ring of three cameras already has one.
+    test camera is the third of the ring, so that a ring of three cameras already has one. Of the
+    training cameras the fifth of the ring and every tenth from there are for validation.
     """
     centers = np.stack([camera.camera_to_world[:3, 3] for camera in cameras])  # (C, 3)
     across = centers - centers.mean(0)
     ring = np.argsort(np.arctan2(across[:, 0], across[:, 2]), kind="stable")
     tested = sorted(int(index) for index in ring[TEST_CAMERA_EVERY // 2 :: TEST_CAMERA_EVERY])
-    return Split(tuple(range(num_frames)), (), tuple(tested) if len(cameras) > 2 else ())
+    tuned = sorted(int(index) for index in ring[FIRST_VALIDATION_CAMERA::VALIDATION_CAMERA_EVERY])
+    tests = tuple(tested) if len(cameras) > 2 else ()
+    return Split(tuple(range(num_frames)), (), tests, tuple(tuned))

@@ -41,10 +41,10 @@ class SyntheticCapture(RecordedCapture):
         self.num_frames = int(about["num_frames"])
         self.blendshape_names = tuple(about["blendshape_names"])
         self.cameras = tuple(_camera(c, path) for c in about["cameras"])
-        self.shows_body = about.get("shows", "head") == "body"
+        self.shows = "body" if about.get("shows", "head") == "body" else "head"
         self.split = (
             all_frames(self.num_frames, self.cameras)
-            if self.shows_body
+            if self.shows == "body"
             else last_eleventh(self.num_frames)
         )
         self._frames = self._read_frames()
@@ -125,10 +125,13 @@ class SyntheticCapture(RecordedCapture):
         """(68, 3) landmarks in canonical head space, metres."""
         return self._frames["landmarks"][self._index(frame)]
 
-    def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) surface points, metres: of a body in the frame, else of a neutral head."""
-        points = self._frames["points"]
-        return points[self._index(frame)] if self.shows_body else points
+    def head_points(self, frame: int = 0) -> np.ndarray | None:
+        """(P, 3) surface points of a neutral head in head space; None in recordings of bodies."""
+        return self._frames["points"] if self.shows == "head" else None
+
+    def world_points(self, frame: int = 0) -> np.ndarray | None:
+        """(P, 3) surface points of a body in a frame, in the world; None for heads."""
+        return self._frames["points"][self._index(frame)] if self.shows == "body" else None
 
     def _index(self, frame: int) -> int:
         if not 0 <= frame < self.num_frames:
@@ -158,7 +161,7 @@ class SyntheticCapture(RecordedCapture):
             "blendshapes": (frames, shapes),
             "landmarks": (frames, 68, 3),
             "views": (frames, len(self.cameras)),
-            "points": (frames, None, 3) if self.shows_body else (None, 3),
+            "points": (frames, None, 3) if self.shows == "body" else (None, 3),
         }
         for name, shape in expected.items():
             _check_array(file, name, arrays.get(name), shape)

@@ -36,6 +36,7 @@ class TrainHead(HeadChoice):
             the expression given to the MLP instead of blended, or no expression at all.
         encoder: Speech encoder for speech-driven heads: builtin, ave (SyncTalk's) or hubert.
         seed: Seed of all random numbers.
+        hold_out: Leave out the validation pictures, too, for ico3d evaluate --frames validation.
         device: Where to compute: by default CUDA where that works, else the CPU.
         watch: Show the training in the browser while it lasts.
         watch_port: Port of that page, on this machine only; if it is taken, the next free one.
@@ -48,6 +49,7 @@ class TrainHead(HeadChoice):
     variant: Literal["full", "no-mlp", "no-blending", "static"] = "full"
     encoder: str = "builtin"
     seed: int = 0
+    hold_out: bool = False
     device: DeviceName = "auto"
     watch: bool = False
     watch_port: int = 8080
@@ -66,7 +68,8 @@ class TrainHead(HeadChoice):
         from ico3d.capture.formats import open_capture
         from ico3d.head.train_head import HeadJob, train_head
 
-        job = HeadJob(self.inputs, self.variant, self.encoder, self.seed, self.settings)
+        given = (self.inputs, self.variant, self.encoder, self.seed, self.settings)
+        job = HeadJob(*given, self.hold_out)
         port = self.watch_port if self.watch else None
         head = train_head(open_capture(self.capture), self.out, job, port, self.device)
         seconds = head.summary["train_seconds"]

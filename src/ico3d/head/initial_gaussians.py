@@ -55,7 +55,7 @@ def initial_head(
     Raises:
         CaptureError: If the capture has no surface points, or one is not finite.
     """
-    surface = capture.points()
+    surface = capture.head_points()
     if surface is None or len(surface) < LEAST_POINTS or not np.isfinite(surface).all():
         raise CaptureError(f"{capture.path} has no finite surface points to start from.")
     points = _whole_person(capture, surface, settings.initial.gaussians, rng)  # (N, 3)
@@ -79,11 +79,14 @@ def initial_head(
 def _whole_person(
     capture: Capture, surface: np.ndarray, count: int, rng: np.random.Generator
 ) -> np.ndarray:
-    """(count, 3) points on a surface (P, 3), and on what it leaves out of the person."""
+    """(count, 3) points on a surface (P, 3), and on what it leaves out of the person.
+
+    Of a body's recording only the head is wanted, and nothing else is looked for.
+    """
     train = capture.split.train
     looked, compared = spread(len(train), FRAMES), spread(len(train), MOMENTS)
     cameras = _cameras(capture, [train[place] for place in looked])
-    moments = _moments(capture, compared)
+    moments = [] if capture.shows == "body" else _moments(capture, compared)
     surface = _in_sight(capture, np.asarray(surface, np.float64), cameras)  # (P', 3)
     reach = max(REACH * float(np.quantile(spacing(surface), 0.9)), LEAST_REACH)
     gap = find_gap(surface, moments, reach)

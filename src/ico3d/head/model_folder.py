@@ -58,6 +58,11 @@ class TrainedHead:
         self.model.to(device)
         return self
 
+    @property
+    def records(self) -> list[dict]:
+        """What trained the head and its colours, by `capture.parts.trained_on`."""
+        return [self.summary.get(part, {}) for part in ("recording", "recoloured")]
+
     def track(self, capture: Capture) -> ExpressionTrack:
         """The expressions that drive this head through a capture.
 

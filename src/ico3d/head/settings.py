@@ -34,6 +34,7 @@ class Loss:
         perceptual_from: First step with the perceptual term.
         torso: Weight, 0 to 1, of pixels that show the person but not the head, where the capture
             tells them apart. Low values keep a torso that moves by itself from disturbing the head.
+            In recordings of the whole body always 0.
         alpha: Weight of the L1 difference of rendered alpha and mask, where the capture has masks.
             Not in the paper.
     """

@@ -1,7 +1,7 @@
 """Trains a head on a capture and writes the model folder."""
 
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +9,10 @@ import torch
 
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.canonical import canonical_landmarks
+from ico3d.capture.parts.head_of_body import head_in
+from ico3d.capture.parts.held_out import training_part
+from ico3d.capture.parts.trained_on import trained_on
+from ico3d.capture.pictures import train_cameras
 from ico3d.common.device import DeviceName
 from ico3d.common.expression import EyeRange, eye_range
 from ico3d.errors import CaptureError
@@ -37,6 +41,7 @@ class HeadJob:
         encoder: Name of the speech encoder where `inputs` is `speech`.
         seed: Seed of all random numbers.
         settings: How the head is trained.
+        hold_out: Whether the validation pictures are left out of the training.
     """
 
     inputs: Inputs
@@ -44,6 +49,14 @@ class HeadJob:
     encoder: str
     seed: int
     settings: HeadSettings
+    hold_out: bool = False
+
+    def about(self, capture: Path) -> dict:
+        """Values that a run must share with an interrupted one to continue it."""
+        about = {"capture": str(capture.resolve()), **asdict(self)}
+        if not self.hold_out:
+            del about["hold_out"]  # runs of earlier versions say nothing of it
+        return about
 
 
 def train_head(
@@ -56,7 +69,8 @@ def train_head(
     """Trains a head, or continues an interrupted run of the same settings.
 
     Args:
-        capture: The recording, with pictures, head poses and expressions.
+        capture: The recording, with pictures, head poses and expressions. Where it shows the whole
+            body, the head is cut out of its pictures, and its test cameras are left out.
         folder: The model folder, which also holds metrics and checkpoints.
         job: Inputs, variant, seed and settings.
         watch_port: Port of a live page that shows the training; None for no page.
@@ -72,16 +86,20 @@ def train_head(
         ModelError: If training diverges.
         MissingExtraError: If a live page is wanted and viser is not installed.
     """
-    run = RunFolder(folder, {"capture": str(capture.path.resolve()), **asdict(job)})
+    run = RunFolder(folder, job.about(capture.path))
     if run.finished() is not None:
         return TrainedHead.load(folder)
     place = computing_device(device)
+    recording, capture = capture, head_in(training_part(capture, job.hold_out))
+    settings = job.settings
+    if capture.shows == "body":
+        settings = replace(settings, loss=replace(settings.loss, torso=0.0))
     torch.manual_seed(job.seed)  # layers draw their weights
     track, adaptor, encoder = _inputs(capture, job, place)
     rng = np.random.default_rng(job.seed)
-    model = initial_head(capture, job.settings, job.variant, track.size, rng)
+    model = initial_head(capture, settings, job.variant, track.size, rng)
     model.to(place)
-    trainer = HeadTrainer(capture, model, track, adaptor, job.settings, job.seed)
+    trainer = HeadTrainer(capture, model, track, adaptor, settings, job.seed)
     every = job.settings.checkpoint_every
     loop = LoopSettings(job.settings.steps, checkpoint_every=every, label="head")
     with _page(trainer, watch_port) as page:
@@ -90,7 +108,8 @@ def train_head(
     summary = {
         "train_seconds": seconds,
         "capture": capture.provenance,
-        "recording": {"path": str(capture.path.resolve()), "poses": trainer.poses},
+        "recording": trained_on(recording, train_cameras(capture), capture.split.train)
+        | {"poses": trainer.poses},
         "settings": asdict(trainer.settings),
     }
     landmarks = canonical_landmarks(capture)

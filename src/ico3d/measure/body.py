@@ -13,6 +13,7 @@ from rich.progress import track
 from ico3d.body.model_folder import ROUNDING, TrainedBody
 from ico3d.body.planning.windows import Window
 from ico3d.capture.capture import Capture
+from ico3d.capture.parts.held_out import scored_pictures
 from ico3d.capture.pictures import View, train_cameras
 from ico3d.common.psnr import psnr
 from ico3d.errors import CaptureError
@@ -173,12 +174,7 @@ PictureScores = dict[str, float | None]
 
 
 def _test_cameras(capture: Capture) -> tuple[int, ...]:
-    if not capture.split.test_cameras:
-        raise CaptureError(
-            f"{capture.path} has no test cameras (of fewer than 3, all train): "
-            "measure with all by --frames all."
-        )
-    return capture.split.test_cameras
+    return scored_pictures(capture, "test")[0]
 
 
 def _shown(body: TrainedBody, capture: Capture) -> range:

@@ -26,9 +26,11 @@ class Evaluate:
         capture: The recording to compare with; its sound or blendshapes drive the head.
         json: File for the metrics.
         images: Folder for pictures: {pred,gt,mask}/CAMERA/%06d.png.
-        frames: `test`: the capture's test frames (of a single frame its test cameras), or all (for
-            a capture that was not used for training). For bodies and whole persons `test` means all
-            frames by the test cameras, and `all` all frames by all cameras.
+        frames: `test`: the capture's test frames (of a single frame its test cameras); of a capture
+            of the whole body all frames by the test cameras. `validation`: likewise those of a
+            model that was trained with --hold-out. `all`: all frames by all cameras, for a capture
+            that was not used for training. Refused where a test or validation picture trained
+            anything in the model.
         plots: For bodies: folder for plots of PSNR over frames and by camera.
         untuned: For bodies: measure the windows as they were before temporal fine-tuning.
         device: Where to compute: by default CUDA where that works, else the CPU.
@@ -38,7 +40,7 @@ class Evaluate:
     capture: tyro.conf.Positional[Path]
     json: Path | None = None
     images: Path | None = None
-    frames: Literal["test", "all"] = "test"
+    frames: Literal["test", "validation", "all"] = "test"
     plots: Path | None = None
     untuned: bool = False
     device: DeviceName = "auto"
@@ -67,6 +69,10 @@ class Evaluate:
         from ico3d.avatar.avatar import TrainedAvatar
         from ico3d.avatar.models import open_model
         from ico3d.body.model_folder import TrainedBody
+        from ico3d.capture.parts.head_of_body import head_in
+        from ico3d.capture.parts.held_out import PartOfCapture, scored_pictures
+        from ico3d.capture.parts.trained_on import check_untrained
+        from ico3d.errors import SettingsError
         from ico3d.head.model_folder import TrainedHead
         from ico3d.measure.head import evaluate_head
         from ico3d.measure.scene import evaluate_scene
@@ -76,13 +82,23 @@ class Evaluate:
         model = open_model(self.model, TrainedHead, TrainedBody, TrainedAvatar, TrainedScene)
         model.to(computing_device(self.device))
         if isinstance(model, TrainedScene):
+            if self.frames == "validation":
+                raise SettingsError("a static scene has no validation pictures: use --frames test.")
             return evaluate_scene(model, capture, self.frames, self.images)
+        cameras, frames = scored_pictures(capture, self.frames)
+        if self.frames != "all":
+            check_untrained(model.records, capture, cameras, frames)
         if isinstance(model, TrainedHead):
-            frames = capture.split.test if self.frames == "test" else range(capture.num_frames)
-            return evaluate_head(model, capture, frames, self.images)
-        return self._body(model, capture)
+            part = head_in(PartOfCapture(capture, cameras, frames))
+            return evaluate_head(model, part, frames, self.images)
+        return self._body(model, capture, cameras)
 
-    def _body(self, drawn: "TrainedBody | TrainedAvatar", capture: "Capture") -> dict:
+    def _body(
+        self,
+        drawn: "TrainedBody | TrainedAvatar",
+        capture: "Capture",
+        cameras: tuple[int, ...],
+    ) -> dict:
         """Measures a body, alone or with the head on it."""
         from dataclasses import replace
 
@@ -97,7 +113,6 @@ class Evaluate:
             folder = self.model / BODY if with_head else self.model
             body = TrainedBody.load(folder, UNTUNED).to(body.device)
             drawn = replace(drawn, body=body) if with_head else body
-        cameras = range(len(capture.cameras)) if self.frames == "all" else None
         metrics = evaluate_body(body, capture, cameras, images=self.images, drawn=drawn)
         if self.plots is not None:
             plot_body(metrics, self.plots)

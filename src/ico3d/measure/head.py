@@ -58,7 +58,8 @@ def evaluate_head(
     """All metrics of a head (docs/architecture.md, "Metrics").
 
     Where a capture has no clean background, the person is cut out by the mask, and both pictures
-    are shown on the same grey.
+    are shown on the same grey. Where it shows the whole body, what of the person is not the head
+    counts as drawn perfectly.
 
     Args:
         head: The trained head; it is drawn on its model's device.
@@ -110,6 +111,9 @@ def _quality(
         plate = pictures.background(view, torch.device("cpu"))
         behind, target = staged(Picture(torch.from_numpy(recorded), cut, None), plate)
         truth, predicted = target.numpy(), renderer.picture(view, behind)
+        if capture.shows == "body" and person is not None and measured is not None:
+            torso = np.clip(person - measured, 0, 1)[..., None]  # (H, W, 1)
+            predicted = predicted + torso * (truth - predicted)
         add_picture(scores, predicted, truth)
         scores.add("psnr_mask", None if measured is None else psnr(predicted, truth, measured))
         if squareness(view.camera) > SHOWS_MOUTH:
@@ -147,7 +151,9 @@ def most_frontal_camera(capture: Capture, frames: Sequence[int]) -> int:
     def average(camera: int) -> float:
         return float(np.mean([squareness(view_of(capture, camera, f).camera) for f in some]))
 
-    return max(range(len(capture.cameras)), key=average)
+    cameras = range(len(capture.cameras))
+    seeing = [c for c in cameras if any(capture.has_image(c, frame) for frame in frames)]
+    return max(seeing, key=average)
 
 
 def _lips(

@@ -72,12 +72,17 @@ def initial_scene(
 
 def _surface(capture: Capture, views: SceneViews, some: Sequence[View]) -> np.ndarray | None:
     """(P, 3) the capture's points that some picture holds, in the scene's space."""
-    points = capture.points()
+    frame = some[0].frame
+    pose, points = capture.world_from_head(frame), capture.head_points()
+    if points is None:
+        points = capture.world_points(frame)
+        pose = None if pose is None or views.space == "world" else np.linalg.inv(pose)
+    elif views.space != "world":
+        pose = None
     if points is None or not np.isfinite(points).all():
         return None
     points = np.asarray(points, np.float64)
-    pose = capture.world_from_head(some[0].frame)
-    if pose is not None and views.space == "world":
+    if pose is not None:
         points = points @ pose[:3, :3].T + pose[:3, 3]  # (P, 3)
     seen = points[in_pictures(points, [view.camera for view in some]).any(0)]
     return seen if len(seen) >= 4 else None

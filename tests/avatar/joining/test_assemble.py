@@ -14,12 +14,12 @@ from ico3d.avatar.joining import assemble as module
 from ico3d.avatar.joining.assemble import align, assemble, measured
 from ico3d.avatar.joining.checking import write_checks
 from ico3d.avatar.joining.companion import HeadSource
-from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.settings import JoiningSettings
 from ico3d.avatar.joining.similarity import moved
 from ico3d.body.companion import Pruning
 from ico3d.body.training.optimise_window import BodyTrainer
 from ico3d.capture.capture import Capture
+from ico3d.capture.face.region import HeadRegion
 from ico3d.errors import CaptureError, ModelError, SettingsError
 from ico3d.head.model import HeadModel
 from ico3d.measure.body import evaluate_body

@@ -9,7 +9,7 @@ from ico3d.avatar.avatar import Placement
 from ico3d.avatar.joining.cropping import cropped, near_border
 from ico3d.avatar.joining.driving import head_poses, recorded_expressions
 from ico3d.avatar.joining.face_views import WIDEST, face_views, faces
-from ico3d.avatar.joining.region import CHIN, HeadRegion
+from ico3d.capture.face.region import CHIN, HeadRegion
 from ico3d.errors import CaptureError, ModelError
 from support.avatars.planted_person import AXES, FRAMES, face
 

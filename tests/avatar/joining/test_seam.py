@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from ico3d.avatar.avatar import Placement, TrainedAvatar
 from ico3d.avatar.joining.driving import head_poses
 from ico3d.avatar.joining.face_views import face_views
-from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.seam import gap, largest_gap, seam_scores
+from ico3d.capture.face.region import HeadRegion
 from ico3d.errors import CaptureError
 from ico3d.splat.gaussians import Gaussians
 from support.avatars.planted_person import FRAMES, face

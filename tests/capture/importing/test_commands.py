@@ -61,7 +61,7 @@ def test_colmap_models_of_every_kind(tmp_path, model, binary):
     pose = capture.cameras[2].camera_to_world
     np.testing.assert_allclose(pose[:3, 3], Y_UP @ foreign_models.poses()[2, :3, 3], atol=1e-9)
     np.testing.assert_allclose(pose[:3, :3], Y_UP @ foreign_models.poses()[2, :3, :3], atol=1e-9)
-    np.testing.assert_allclose(capture.points(0), foreign_models.POINTS @ Y_UP.T, atol=1e-6)
+    np.testing.assert_allclose(capture.world_points(0), foreign_models.POINTS @ Y_UP.T, atol=1e-6)
 
 
 def test_colmap_worlds_are_turned_upright_and_scaled(tmp_path):
@@ -74,7 +74,7 @@ def test_colmap_worlds_are_turned_upright_and_scaled(tmp_path):
     np.testing.assert_allclose(np.hypot(centers[:, 0], centers[:, 2]), 2.5 * 2.0, atol=1e-9)
     for camera, pose in zip(capture.cameras, poses, strict=True):
         local = (foreign_models.POINTS - pose[:3, 3]) @ pose[:3, :3]
-        pixels, depth = camera.project(capture.points(0))
+        pixels, depth = camera.project(capture.world_points(0))
         np.testing.assert_allclose(depth, 2.5 * local[:, 2], rtol=1e-5)
         expected = local[:, :2] / local[:, 2:] * (55, 57) + (20.5, 16.5)
         np.testing.assert_allclose(pixels, expected, atol=1e-3)

@@ -62,7 +62,7 @@ def test_everything_else_is_that_of_the_capture(folder):
     np.testing.assert_array_equal(small.landmarks(0, 3), whole.landmarks(0, 3) / 4)
     np.testing.assert_array_equal(small.eyes(3), whole.eyes(3))
     np.testing.assert_array_equal(small.world_from_head(3), whole.world_from_head(3))
-    np.testing.assert_array_equal(small.points(), whole.points())
+    np.testing.assert_array_equal(small.head_points(), whole.head_points())
     np.testing.assert_array_equal(small.audio().samples, whole.audio().samples)
     assert small.head_mask(0, 3).shape == (16, 16)
     assert small.provenance == whole.provenance and small.blendshapes(3) is None
@@ -89,6 +89,6 @@ def test_the_command_writes_a_smaller_capture(two_sizes, tmp_path, capsys):
         np.testing.assert_allclose(
             small.background(index), expected.background(index), atol=0.51 / 255
         )
-    np.testing.assert_array_equal(small.points(0), expected.points(0))
+    np.testing.assert_array_equal(small.world_points(0), expected.world_points(0))
     assert main(["capture", "resize", str(two_sizes), str(out)]) == 1
     assert "exists already" in capsys.readouterr().err

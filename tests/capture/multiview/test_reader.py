@@ -45,7 +45,7 @@ def test_pictures_come_back_as_they_were_saved(folder):
                 np.rint(image * 255), multiview_folders.picture(index, frame)
             )
     assert capture.mask(0, 0) is None and capture.background(0) is None
-    assert capture.audio() is None and capture.points() is None
+    assert capture.audio() is None and capture.world_points() is None
     assert capture.provenance["consent"] == "not stated"
 
 
@@ -60,8 +60,9 @@ def test_masks_plates_points_and_sound(folder):
     capture = open_capture(folder)
     np.testing.assert_array_equal(np.rint(capture.mask(1, 2) * 255), coverage)
     assert capture.background(1) == pytest.approx(90 / 255, abs=1e-6)
-    np.testing.assert_array_equal(capture.points(1), points)
-    assert capture.points(0) is None and len(capture.audio().samples) == 16_000
+    np.testing.assert_array_equal(capture.world_points(1), points)
+    assert capture.world_points(0) is None and capture.head_points(1) is None
+    assert len(capture.audio().samples) == 16_000
 
 
 def test_transparency_is_a_mask_before_black(folder):
@@ -199,7 +200,7 @@ def test_cameras_that_cannot_be_are_refused(folder, change, words):
 def test_pickled_points_are_refused(folder):
     (folder / "points").mkdir()
     np.save(folder / "points/000000.npy", np.array([{"a": 1}], object), allow_pickle=True)
-    fails(lambda: open_capture(folder).points(), "000000.npy", "damaged")
+    fails(lambda: open_capture(folder).world_points(), "000000.npy", "damaged")
 
 
 @settings(max_examples=60, deadline=None)
@@ -238,13 +239,13 @@ def test_a_folder_that_shows_a_head_is_split_by_time_and_has_its_hull(tmp_path):
     multiview_folders.write_cameras(folder, entries, frames, shows="head")
     capture = open_capture(folder)
     assert capture.split.train == tuple(range(10)) and capture.split.test == (10,)
-    assert capture.points() is None  # nobody knows where head space is
+    assert capture.head_points() is None  # nobody knows where head space is
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], middle - (0, 0.05, 0)
     zeros = [np.zeros((frames, *s), np.float32) for s in ((68, 3), (7,), (52,))]
     seen = np.ones((frames, len(cameras)), np.uint8)
     HeadTrack(np.tile(pose, (frames, 1, 1)), *zeros, seen).write(folder)
-    points = open_capture(folder).points()
+    points = open_capture(folder).head_points()
     np.testing.assert_allclose(points.mean(0), (0, 0.05, 0), atol=0.01)  # in head space
     away = np.linalg.norm(points - (0, 0.05, 0), axis=1)
     assert 0.9 * radius < away.min() and np.median(away) < 1.1 * radius

@@ -35,7 +35,7 @@ def test_what_a_folder_of_other_tools_holds(folder):
     assert capture.head_mask(0, 3).sum() == 32 * 32
     assert capture.background(0) == pytest.approx(200 / 255, abs=2 / 255)
     assert capture.audio().rate == 16_000 and len(capture.audio().samples) == 22 * 640
-    assert np.isfinite(capture.points()).all() and capture.points().shape[1] == 3
+    assert np.isfinite(capture.head_points()).all() and capture.head_points().shape[1] == 3
     assert capture.blendshapes(0) is None and capture.provenance["consent"] == "not stated"
 
 

@@ -70,7 +70,7 @@ def test_frames_without_a_fit_have_no_pose(tmp_path):
     capture = open_capture(renderme_files.write_recording(tmp_path, rig))
     known = [capture.world_from_head(frame) is not None for frame in range(4)]
     assert known == [False, True, False, True]
-    assert capture.flame(0) is None and capture.points(0) is None
+    assert capture.flame(0) is None and capture.head_points(0) is None
     assert capture.landmarks_3d(0) is None and capture.landmarks(0, 0) is not None
     (finding,) = (f for f in examine(capture) if f.what == "FLAME")
     assert (finding.level, finding.text) == ("warn", "2 of 4 frames")

@@ -35,7 +35,7 @@ LOOK = textwrap.dedent(
             camera, frame = random.integers(60), random.integers(24)
             assert capture.image(camera, frame) is not None
             assert capture.mask(camera, frame) is not None
-            capture.keypoints_2d(camera, frame), capture.points(frame)
+            capture.keypoints_2d(camera, frame), capture.head_points(frame)
         sizes.append(resident())
     print(json.dumps({"sizes": sizes, "open": len(__import__("os").listdir("/proc/self/fd"))}))
     """

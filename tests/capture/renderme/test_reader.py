@@ -105,7 +105,7 @@ def test_the_head_is_the_skull_of_the_fits(tmp_path):
     np.testing.assert_allclose(fixed[:3, :3], np.eye(3), atol=1e-9)  # FLAME's axes
     assert np.linalg.norm(fixed[:3, 3]) < 0.15  # the middle of the skull
     for frame in (0, 31):
-        local = capture.points(frame)
+        local = capture.head_points(frame)
         world = (
             renderme_files.flame_vertices(rig, frame) + renderme_files.flame(rig, frame)["cam"][1:]
         )
@@ -149,20 +149,20 @@ def test_heads_of_parts_without_fits_come_from_landmarks(tmp_path):
     face = faces.moved(rig.world_from_skull()[:1], faces.face())[0]
     marks = faces.moved(found[:1], capture.landmarks_3d(0))[0]
     np.testing.assert_allclose(marks, face, atol=1e-6)
-    hull = capture.points(0)  # of round mattes: a ball
+    hull = capture.head_points(0)  # of round mattes: a ball
     assert len(hull) > 1000 and np.linalg.norm(hull, axis=1).max() < 0.25
 
 
 def test_the_hull_takes_mattes_of_other_frames_where_a_frame_has_few(tmp_path):
     rig = renderme_files.Rig(part="h0", frames=6, cameras=(0, 10, 22, 25, 28, 45), size=(80, 96))
     raw = renderme_files.write_recording(tmp_path, rig, same_picture=True)
-    all_views = open_capture(raw).points(0)
+    all_views = open_capture(raw).head_points(0)
     thin = renderme_files.write_recording(tmp_path / "thin", rig, same_picture=True)
     with h5py.File(thin.with_name("0026_h0_anno.smc"), "a") as file:
         for turn, camera in enumerate(rig.cameras):
             for frame in set(range(6)) - {turn}:
                 del file[f"Camera/{camera:02d}/mask/{frame}"]
-    few = open_capture(thin).points(0)
+    few = open_capture(thin).head_points(0)
     near, _ = KDTree(all_views[::5]).query(few)
     assert len(few) > 0.5 * len(all_views) and np.median(near) < 0.02
 

@@ -66,7 +66,7 @@ def test_its_surface_moves_to_the_tracks_head_space(plain):
 
     def placed(capture):
         pose = capture.world_from_head(1)
-        return capture.points(1) @ pose[:3, :3].T + pose[:3, 3]
+        return capture.head_points(1) @ pose[:3, :3].T + pose[:3, 3]
 
     np.testing.assert_allclose(placed(found), placed(own), atol=1e-9)
     pixels = found.cameras[2].project(

@@ -15,6 +15,7 @@ class FilmedPerson(Capture):
     """Five cameras around the person; pictures with noise, masks, a plain background."""
 
     kind = "filmed"
+    shows = "body"
     fps = FPS
 
     def __init__(self, person: MovingPerson, path):

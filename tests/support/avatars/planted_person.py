@@ -104,6 +104,7 @@ class PlantedPerson(Capture):
     """
 
     kind = "planted person"
+    shows = "body"
     fps = 15.0
     num_frames = FRAMES
     blendshape_names = NAMES
@@ -162,7 +163,7 @@ class PlantedPerson(Capture):
     def blendshapes(self, frame):
         return (0.5 + 0.5 * np.sin(frame * 0.7 + np.arange(10))).astype(np.float32)
 
-    def points(self, frame=0):
+    def world_points(self, frame=0):
         return self.person(frame).means.numpy()
 
     def person(self, frame) -> Gaussians:

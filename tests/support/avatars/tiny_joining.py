@@ -8,9 +8,9 @@ from ico3d.avatar.joining.assemble import Assembly
 from ico3d.avatar.joining.driving import head_poses, recorded_expressions
 from ico3d.avatar.joining.face_views import face_views
 from ico3d.avatar.joining.recolour import RecolourSettings
-from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.settings import JoiningSettings
 from ico3d.body.settings import settings_for
+from ico3d.capture.face.region import HeadRegion
 from support.avatars.planted_person import face
 from support.settings import changed
 

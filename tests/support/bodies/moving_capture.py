@@ -18,6 +18,7 @@ class MovingCapture(Capture):
     """Calm for the first half of the frames, then the arm rises by 70 degrees."""
 
     kind = "moving"
+    shows = "body"
     fps = 15.0
     num_frames = FRAMES
 
@@ -46,7 +47,7 @@ class MovingCapture(Capture):
         """How far the arm is up, radians."""
         return np.radians(70) * max(0.0, (frame - FRAMES // 2) / (FRAMES - 1 - FRAMES // 2))
 
-    def points(self, frame=0):
+    def world_points(self, frame=0):
         c, s = np.cos(self.angle(frame)), np.sin(self.angle(frame))
         turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
         shoulder = np.array([0.14, 0.2, 0])
@@ -67,7 +68,7 @@ class MovingCapture(Capture):
 
     def _taken(self, camera, frame):
         gaussians = Gaussians(
-            torch.from_numpy(self.points(frame)).float(),
+            torch.from_numpy(self.world_points(frame)).float(),
             torch.tensor([1.0, 0, 0, 0]).repeat(POINTS, 1),
             torch.full((POINTS, 3), 0.022),
             torch.full((POINTS,), 0.9),

@@ -25,7 +25,7 @@ def record(folder: Path) -> None:
         "blendshapes": np.zeros((FRAMES, 1)),
         "landmarks": np.zeros((FRAMES, 68, 3)),
         "views": np.ones((FRAMES, CAMERAS), np.uint8),
-        "points": np.stack([capture.points(frame) for frame in range(FRAMES)]),
+        "points": np.stack([capture.world_points(frame) for frame in range(FRAMES)]),
     }
     save_file(frames, folder / "frames.safetensors")
     about = {

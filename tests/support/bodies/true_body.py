@@ -45,14 +45,14 @@ def true_body(capture: MovingCapture, lighter=(0.0, 0.0)) -> TrainedBody:
     """A body whose windows are lighter than the truth by so much."""
     models = []
     for window, extra in zip(WINDOWS, lighter, strict=True):
-        places = [capture.points(frame) for frame in range(window.first, window.last + 1)]
+        places = [capture.world_points(frame) for frame in range(window.first, window.last + 1)]
         models.append(WindowModel(Known(places, extra), _values(capture), {}))
     return TrainedBody(models, WINDOWS, capture.fps, "swings++", {"train_seconds": 7.0})
 
 
 def still_body(capture: MovingCapture, folder: Path, about=ABOUT, frame=0) -> TrainedBody:
     """A saved body that stands as it does at one frame."""
-    values = _values(capture) | {"means": torch.from_numpy(capture.points(frame)).float()}
+    values = _values(capture) | {"means": torch.from_numpy(capture.world_points(frame)).float()}
     model = WindowModel(Still(), values, {})
     save_window(folder / f"{about}.safetensors", model)
     body = TrainedBody([model, model], WINDOWS, capture.fps, "static", {"train_seconds": 7.0})

@@ -40,7 +40,7 @@ class TinyCapture(Capture):
             [np.sin(9 * times) ** 2, np.cos(5 * times) ** 2, 0 * times], 1
         ).astype(np.float32)
 
-    def points(self, frame=0):
+    def head_points(self, frame=0):
         return self._points
 
     def blendshapes(self, frame):

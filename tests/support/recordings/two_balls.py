@@ -79,7 +79,7 @@ class TwoBalls(Capture):
         self.path, self.cameras = path, arc(size)
         self.split = last_eleventh(self.num_frames)
 
-    def points(self, frame=0):
+    def head_points(self, frame=0):
         return ball_points(0, 600)
 
     def blendshapes(self, frame):

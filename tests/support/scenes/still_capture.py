@@ -44,7 +44,7 @@ class Still(Capture):
         self.surface = 0.2 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
         self.colors = rng.random((POINTS, 3))
 
-    def points(self, frame=0):
+    def head_points(self, frame=0):
         return self.surface
 
     def world_from_head(self, frame):

@@ -122,10 +122,11 @@ class Bake:
         from ico3d.avatar.baking.persona import load_persona
         from ico3d.avatar.baking.samples import recorded_samples
         from ico3d.capture.formats import open_capture
+        from ico3d.capture.parts.head_of_body import head_in
 
         self._check_rank()
         persona, notices = load_persona(self.persona), self._notices()
-        capture = open_capture(self.files[0])
+        capture = head_in(open_capture(self.files[0]))
         neutral = staging.background_colour(capture, 0)
         views = head_cost.references(head, capture, neutral, head_bundle.MEASURED_VIEWS)
         samples = recorded_samples(head, capture)

@@ -22,7 +22,6 @@ from ico3d.avatar.joining.driving import head_poses, recorded_expressions
 from ico3d.avatar.joining.face_views import face_views
 from ico3d.avatar.joining.finding.found_placement import found_in_pictures
 from ico3d.avatar.joining.recolour import RecolourSettings, color_difference, recolour
-from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.seam import largest_gap, seam_scores
 from ico3d.avatar.joining.settings import JoiningSettings
 from ico3d.avatar.joining.similarity import canonical_from_head, fit_in_words, moved
@@ -30,6 +29,10 @@ from ico3d.body.settings import BodySettings, Method
 from ico3d.body.training.train_clip import BodyJob, Runner, train_body
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.canonical import canonical_landmarks
+from ico3d.capture.face.region import HeadRegion
+from ico3d.capture.parts.held_out import training_part
+from ico3d.capture.parts.trained_on import is_same_recording, trained_on
+from ico3d.capture.pictures import train_cameras
 from ico3d.common.device import DeviceName
 from ico3d.errors import CaptureError, ModelError
 from ico3d.head.model_folder import TrainedHead
@@ -55,6 +58,7 @@ class Assembly:
         method: How the body's Gaussians are moved.
         continued: Folder of a body, trained without the head, from which training goes on.
         device: Where to compute; an interrupted run may go on with another one.
+        hold_out: Whether the validation cameras are left out of colours and body.
     """
 
     head: Path
@@ -64,18 +68,24 @@ class Assembly:
     method: Method = "swings++"
     continued: Path | None = None
     device: DeviceName = "auto"
+    hold_out: bool = False
 
     def about(self, capture: Path) -> dict:
         """Settings that a run must share with an interrupted one to continue it."""
         paths = {"head": str(self.head.resolve()), "capture": str(capture.resolve())}
         if self.continued:
             paths["continued"] = str(self.continued.resolve())
-        return paths | {
-            "seed": self.seed,
-            "method": self.method,
-            "joining": asdict(self.joining),
-            "settings": asdict(self.body),
-        }
+        held = {"hold_out": True} if self.hold_out else {}
+        return (
+            paths
+            | held
+            | {
+                "seed": self.seed,
+                "method": self.method,
+                "joining": asdict(self.joining),
+                "settings": asdict(self.body),
+            }
+        )
 
 
 Say = Callable[[str], None]
@@ -124,13 +134,15 @@ def assemble(
         return TrainedAvatar.load(folder)
     source = HeadSource(folder.resolve(), assembly.joining.border_points, assembly.joining.pruning)
     continued = assembly.continued and assembly.continued.resolve()
-    job = BodyJob(assembly.method, assembly.seed, assembly.body, source, continued, assembly.device)
+    given = (assembly.method, assembly.seed, assembly.body, source, continued, assembly.device)
+    job = BodyJob(*given, assembly.hold_out)
     body = train_body(capture, folder / BODY, job, runner)
     placement, expressions = load_placement(folder / PLACEMENT)
     head = TrainedHead.load(folder / HEAD)
     summary = {
         "head": head.summary.get("capture", {}),
         "body": body.summary["capture"],
+        "trained_on": [*head.records, *body.records],
         "settings": asdict(assembly.joining),
         "train_seconds": body.summary["train_seconds"],
     }
@@ -169,7 +181,10 @@ def place_head(capture: Capture, folder: Path, assembly: Assembly, say: Say) -> 
     head = cropped(head, region).to(device)
     expressions = recorded_expressions(head, capture, head.neutral())
     if assembly.joining.match_colors:
-        _match_colors(head, capture, placement, expressions, assembly, say)
+        if is_same_recording(head.summary.get("recording", {}), capture):
+            say("colours: head and body are of one recording, so there is nothing to match.")
+        else:
+            _match_colors(head, capture, placement, expressions, assembly, say)
     (folder / HEAD).mkdir(parents=True, exist_ok=True)
     head.save(folder / HEAD)
     save_placement(folder / PLACEMENT, placement, expressions)
@@ -276,11 +291,14 @@ def _match_colors(
             "train one with --variant full, or assemble with --joining.no-match-colors."
         )
     joining, landmarks = assembly.joining, _landmarks(head, assembly.head)
+    recording, capture = capture, training_part(capture, assembly.hold_out)
     views = face_views(capture, placement, HeadRegion.around(landmarks), landmarks)
     before = color_difference(head.model, placement, expressions, views)
     settings = RecolourSettings(joining.color_steps, joining.color_rate, assembly.seed)
     recolour(head.model, placement, expressions, views, settings)
     after = color_difference(head.model, placement, expressions, views)
+    taught = trained_on(recording, train_cameras(capture), range(capture.num_frames))
+    head.summary = head.summary | {"recoloured": taught}
     say(f"colours: the face differed by {before:.4f} from {len(views)} pictures, now {after:.4f}.")
 
 

@@ -8,9 +8,9 @@ from PIL import Image
 
 from ico3d.avatar.avatar import HEAD, PLACEMENT, load_placement
 from ico3d.avatar.joining.face_views import FaceView, face_views
-from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.similarity import moved
 from ico3d.capture.capture import Capture
+from ico3d.capture.face.region import HeadRegion
 from ico3d.errors import ModelError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.device import CPU

@@ -49,6 +49,7 @@ class Assemble(AssembleChoice):
         out: The avatar's folder to write.
         check: Folder for pictures that show the head drawn over the body's recording.
         seed: Seed of all randomness.
+        hold_out: Leave out the validation cameras, too, for ico3d evaluate --frames validation.
         device: Where to compute: by default with CUDA where that works, else on the CPU; each
             machine of a Ray cluster decides for itself.
         jobs: Number of windows that train at once, each in a process of its own.
@@ -62,6 +63,7 @@ class Assemble(AssembleChoice):
     out: tyro.conf.Positional[Path]
     check: Path | None = None
     seed: int = 0
+    hold_out: bool = False
     device: DeviceName = "auto"
     jobs: int = 1
     ray: str | None = None
@@ -119,4 +121,5 @@ class Assemble(AssembleChoice):
             self.method,
             self.body,
             self.device,
+            self.hold_out,
         )

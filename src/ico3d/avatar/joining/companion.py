@@ -9,8 +9,8 @@ import torch
 from torch import Tensor
 
 from ico3d.avatar.avatar import HEAD, PLACEMENT, Placement, load_placement
-from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.similarity import moved
+from ico3d.capture.face.region import HeadRegion
 from ico3d.errors import ModelError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.gaussians import Gaussians

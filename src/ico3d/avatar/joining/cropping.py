@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from ico3d.avatar.joining.region import HeadRegion
+from ico3d.capture.face.region import HeadRegion
 from ico3d.errors import ModelError
 from ico3d.head.model import GAUSSIAN_AXES, HeadModel
 from ico3d.head.model_folder import TrainedHead

@@ -8,9 +8,9 @@ import torch
 from torch import Tensor
 
 from ico3d.avatar.avatar import Placement
-from ico3d.avatar.joining.region import BROWS, CHIN, HeadRegion
 from ico3d.avatar.joining.similarity import moved
 from ico3d.capture.capture import Capture
+from ico3d.capture.face.region import BROWS, CHIN, HeadRegion
 from ico3d.capture.pictures import train_cameras
 from ico3d.common.camera import Camera
 from ico3d.common.spread import spread

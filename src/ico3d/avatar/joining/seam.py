@@ -10,8 +10,8 @@ from scipy.spatial import KDTree
 
 from ico3d.avatar.avatar import TrainedAvatar
 from ico3d.avatar.joining.face_views import FaceView
-from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.similarity import moved
+from ico3d.capture.face.region import HeadRegion
 from ico3d.common.camera import Camera, look_at
 from ico3d.common.psnr import decibels
 from ico3d.errors import CaptureError

@@ -22,6 +22,8 @@ from ico3d.body.training.prepare_window import Begin, begin_window, continued_wi
 from ico3d.body.training.views import BodyViews
 from ico3d.capture.capture import Capture
 from ico3d.capture.formats import open_capture
+from ico3d.capture.parts.held_out import training_part
+from ico3d.capture.parts.trained_on import trained_on
 from ico3d.capture.pictures import train_cameras
 from ico3d.common.device import DeviceName
 from ico3d.errors import ModelError, SettingsError
@@ -45,6 +47,7 @@ class BodyJob:
             None begins with points on the surface.
         device: Where to compute, decided by each process that trains. An interrupted run may go on
             with another device.
+        hold_out: Whether the validation cameras are left out of the training.
     """
 
     method: Method
@@ -53,12 +56,15 @@ class BodyJob:
     companion: CompanionSource | None = None
     continued: Path | None = None
     device: DeviceName = "auto"
+    hold_out: bool = False
 
     def about(self, capture: Path) -> dict:
         """Values, beside the settings, that a run must share with an interrupted one."""
         about = {"capture": str(capture.resolve()), "method": self.method, "seed": self.seed}
         if self.continued is not None:
             about["continued"] = str(self.continued.resolve())
+        if self.hold_out:
+            about["hold_out"] = True
         return about | ({"companion": self.companion.about()} if self.companion else {})
 
 
@@ -122,7 +128,7 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     finished = run.finished()
     if finished is not None:
         return finished["train_seconds"]
-    capture = capture or open_capture(task.capture)
+    capture = training_part(capture or open_capture(task.capture), job.hold_out)
     device = computing_device(job.device)
     companion = job.companion.open(device) if job.companion else None
     begin = _begin(task, capture, companion, device)
@@ -184,6 +190,7 @@ def finetune_window(
     finished = run.finished()
     if finished is not None:
         return finished["train_seconds"]
+    capture = training_part(capture, job.hold_out)
     model = load_window(trained / WINDOW_FILE)
     before = RunFolder(trained, about).finished()
     assert before is not None
@@ -296,6 +303,7 @@ def plan_windows(capture: Capture, job: BodyJob, folder: Path) -> Plan:
         raise SettingsError(
             f"--method {job.method} takes the clip as one window, so there is nothing to plan."
         )
+    capture = training_part(capture, job.hold_out)
     plan = make_plan(capture, job.settings.windows, folder, computing_device(job.device))
     print_plan(plan, Console())
     told, picture = folder / "plan.json", folder / "plan.png"
@@ -318,13 +326,22 @@ def _save(
     summary = {
         "train_seconds": seconds,
         "capture": tracked(capture).credited(known) if job.method in SKINNED else known,
+        "recording": _record(capture, job),
         "settings": asdict(job.settings),
     }
+    if job.continued is not None:
+        summary["continued"] = TrainedBody.load(job.continued).records
     models = [load_window(task.file) for task in tasks]
     windows = tuple(task.window for task in tasks)
     body = TrainedBody(models, windows, capture.fps, job.method, summary)
     body.save(folder, [str(task.file.relative_to(folder)) for task in tasks], about)
     return body
+
+
+def _record(capture: Capture, job: BodyJob) -> dict:
+    """Which pictures train the body."""
+    part = training_part(capture, job.hold_out)
+    return trained_on(capture, train_cameras(part), part.split.train)
 
 
 def _about(capture: Path, window: Window, job: BodyJob) -> dict:

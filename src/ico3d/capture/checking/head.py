@@ -153,7 +153,7 @@ def expressions(capture: Capture) -> Finding:
 
 def points(capture: Capture) -> Finding:
     """Checks the surface points from which Gaussians start."""
-    found = capture.points()
+    found = capture.head_points() if capture.shows == "head" else capture.world_points()
     if found is None:
         return Finding("points", "warn", "no surface points")
     if found.ndim != 2 or found.shape[1] != 3 or not np.isfinite(found).all():

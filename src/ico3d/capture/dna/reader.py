@@ -35,6 +35,7 @@ class DnaRendering(SmcCapture):
     """
 
     kind = "dna-rendering"
+    shows = "body"
     fps = FPS
 
     def __init__(self, path: Path):

@@ -2,65 +2,26 @@
 
 import numpy as np
 
-from ico3d.capture.box import Box
-from ico3d.capture.capture import Capture, Sound
+from ico3d.capture.capture import Capture
 from ico3d.capture.face.expressions import BLENDSHAPES
 from ico3d.capture.finding import Finding
 from ico3d.capture.headpose.track_file import HeadTrack, read_track
+from ico3d.capture.parts.wrapped import WrappedCapture
 from ico3d.capture.surface.head import head_hull
 from ico3d.errors import CaptureError
 
 
-class TrackedCapture(Capture):
+class TrackedCapture(WrappedCapture):
     """A recording whose data about the head come from a track.
 
     Attributes:
         whole: The wrapped recording, for methods that only its format has.
     """
 
-    blendshape_names = BLENDSHAPES
-
     def __init__(self, capture: Capture, track: HeadTrack):
         """Wraps an open capture."""
-        self.whole, self._track, self.tells_head = capture, track, capture.tells_head
-        self.kind, self.path, self.cameras = capture.kind, capture.path, capture.cameras
-        self.fps, self.num_frames, self.split = capture.fps, capture.num_frames, capture.split
-
-    def has_image(self, camera: int, frame: int) -> bool:
-        """Whether the wrapped recording has the picture."""
-        return self.whole.has_image(camera, frame)
-
-    def has_mask(self, camera: int, frame: int) -> bool:
-        """Whether the wrapped recording has a mask of the person."""
-        return self.whole.has_mask(camera, frame)
-
-    def image(self, camera: int, frame: int) -> np.ndarray | None:
-        """The recorded picture."""
-        return self.whole.image(camera, frame)
-
-    def mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """The mask of the person."""
-        return self.whole.mask(camera, frame)
-
-    def head_mask(self, camera: int, frame: int) -> np.ndarray | None:
-        """The mask for `psnr_mask`."""
-        return self.whole.head_mask(camera, frame)
-
-    def image_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
-        """The part of a recorded picture in a box, uint8."""
-        return self.whole.image_bytes(camera, frame, box)
-
-    def mask_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
-        """The part of a mask in a box, uint8."""
-        return self.whole.mask_bytes(camera, frame, box)
-
-    def background(self, camera: int) -> np.ndarray | None:
-        """What the camera sees without the person."""
-        return self.whole.background(camera)
-
-    def audio(self) -> Sound | None:
-        """The sound."""
-        return self.whole.audio()
+        super().__init__(capture)
+        self._track, self.blendshape_names = track, BLENDSHAPES
 
     def world_from_head(self, frame: int) -> np.ndarray:
         """The tracked head pose (4, 4) of a frame."""
@@ -83,12 +44,11 @@ class TrackedCapture(Capture):
         seen = self.cameras[camera].moved(self.world_from_head(frame))
         return seen.project(self.landmarks_3d(frame))[0]
 
-    def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) surface points of the recording, metres; of heads, in the track's head space."""
-        points = self.whole.points(frame)
-        if not self.split.test:  # a body, whose points lie in the world
-            return points
-        pose = self.whole.world_from_head(frame)
+    def head_points(self, frame: int = 0) -> np.ndarray | None:
+        """(P, 3) surface points of the head, in the track's head space; None of bodies."""
+        if self.shows == "body":
+            return None
+        points, pose = self.whole.head_points(frame), self.whole.world_from_head(frame)
         if points is None or pose is None:
             return head_hull(self, frame)
         between = np.linalg.inv(self.world_from_head(frame)) @ pose
@@ -97,11 +57,6 @@ class TrackedCapture(Capture):
     def inspect(self) -> list[Finding]:
         """Findings about the recording's files, and about interpolated frames of the track."""
         return [*self.whole.inspect(), self._track.finding()]
-
-    @property
-    def provenance(self) -> dict:
-        """The provenance of the wrapped recording."""
-        return self.whole.provenance
 
     def _index(self, frame: int) -> int:
         if not 0 <= frame < self.num_frames:

@@ -3,15 +3,14 @@
 import numpy as np
 
 from ico3d.capture.box import Box, cut_out
-from ico3d.capture.capture import Capture, Sound
+from ico3d.capture.capture import Capture
 from ico3d.capture.extras import opencv
-from ico3d.capture.finding import Finding
-from ico3d.capture.smplx import SmplX
+from ico3d.capture.parts.wrapped import WrappedCapture
 from ico3d.common.camera import Camera
 from ico3d.errors import SettingsError
 
 
-class ResizedCapture(Capture):
+class ResizedCapture(WrappedCapture):
     """A capture of any format with smaller pictures; all other data are unchanged.
 
     Attributes:
@@ -31,20 +30,8 @@ class ResizedCapture(Capture):
         """
         if height < 1:
             raise SettingsError(f"pictures cannot have a height of {height} pixels.")
-        self.whole = capture
-        self.kind, self.path = capture.kind, capture.path
-        self.tells_head = capture.tells_head
-        self.fps, self.num_frames = capture.fps, capture.num_frames
-        self.split, self.blendshape_names = capture.split, capture.blendshape_names
+        super().__init__(capture)
         self.cameras = tuple(_resized(camera, height) for camera in capture.cameras)
-
-    def has_image(self, camera: int, frame: int) -> bool:
-        """Whether the wrapped recording has the picture."""
-        return self.whole.has_image(camera, frame)
-
-    def has_mask(self, camera: int, frame: int) -> bool:
-        """Whether the wrapped recording has a mask of the person."""
-        return self.whole.has_mask(camera, frame)
 
     def image(self, camera: int, frame: int) -> np.ndarray | None:
         """The picture of a view; each pixel is the mean of those it replaces."""
@@ -66,6 +53,10 @@ class ResizedCapture(Capture):
         """The part of a mask in a box, uint8."""
         return self._shrunk(self.whole.mask_bytes(camera, frame), camera, box)
 
+    def head_mask_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The part of the mask for `psnr_mask` in a box, uint8."""
+        return self._shrunk(self.whole.head_mask_bytes(camera, frame), camera, box)
+
     def background(self, camera: int) -> np.ndarray | None:
         """What the camera sees without the person."""
         return self._shrunk(self.whole.background(camera), camera)
@@ -76,47 +67,6 @@ class ResizedCapture(Capture):
         small, large = self.cameras[camera], self.whole.cameras[camera]
         scale = (small.width / large.width, small.height / large.height)
         return None if marks is None else marks * scale
-
-    def landmarks_3d(self, frame: int) -> np.ndarray | None:
-        """(68, 3) landmarks of the wrapped capture."""
-        return self.whole.landmarks_3d(frame)
-
-    def audio(self) -> Sound | None:
-        """The sound of the wrapped capture."""
-        return self.whole.audio()
-
-    def world_from_head(self, frame: int) -> np.ndarray | None:
-        """(4, 4) head pose of the wrapped capture."""
-        return self.whole.world_from_head(frame)
-
-    def eyes(self, frame: int) -> np.ndarray | None:
-        """(7,) eye values of the wrapped capture."""
-        return self.whole.eyes(frame)
-
-    def blendshapes(self, frame: int) -> np.ndarray | None:
-        """Blendshape weights of the wrapped capture."""
-        return self.whole.blendshapes(frame)
-
-    def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) surface points of the wrapped capture."""
-        return self.whole.points(frame)
-
-    def whole_body_points(self, frame: int) -> np.ndarray | None:
-        """(133, 3) annotated points of the wrapped capture, metres."""
-        return self.whole.whole_body_points(frame)
-
-    def smplx(self, frame: int) -> SmplX | None:
-        """SMPL-X parameters of the wrapped capture."""
-        return self.whole.smplx(frame)
-
-    def inspect(self) -> list[Finding]:
-        """Findings about the files of the wrapped capture."""
-        return self.whole.inspect()
-
-    @property
-    def provenance(self) -> dict:
-        """The provenance of the wrapped capture."""
-        return self.whole.provenance
 
     def _shrunk(
         self, picture: np.ndarray | None, camera: int, box: Box | None = None

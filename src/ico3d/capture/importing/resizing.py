@@ -44,7 +44,7 @@ def resize_capture(source: Path, out: Path, height: int, workers: int) -> Descri
         tuple(known["sources"]),
         known["consent"],
         known["licence"],
-        "head" if capture.split.test else "body",
+        capture.shows,
     )
     cameras = range(len(capture.cameras))
     with new_folder(out) as work:
@@ -94,10 +94,10 @@ def _write_rest(capture: ResizedCapture, work: Path) -> None:
     for name, track in tracks.items():
         if track.is_file():
             shutil.copyfile(track, work / name)  # in metres, whatever the size of the pictures
-    if capture.split.test:
+    if capture.shows == "head":
         return  # a head: its points lie in its own head space, tracking will find another
     for frame in range(capture.num_frames):
-        points = capture.points(frame)
+        points = capture.world_points(frame)
         if points is not None:
             (work / "points").mkdir(exist_ok=True)
             np.save(work / "points" / f"{frame:06d}.npy", points.astype(np.float32))

@@ -49,10 +49,10 @@ class MultiviewCapture(RecordedCapture):
             )
             for place in self._about.places
         )
-        self._shows_head = self._about.shows == "head"
+        self.shows = "head" if self._about.shows == "head" else "body"
         self.split = (
             last_eleventh(self.num_frames)
-            if self._shows_head
+            if self.shows == "head"
             else all_frames(self.num_frames, self.cameras)
         )
         self._track = read_track(path, self.num_frames, len(self.cameras))
@@ -116,15 +116,30 @@ class MultiviewCapture(RecordedCapture):
         seen = self.cameras[camera].moved(self._track.world_from_head[self._index(frame)])
         return seen.project(self._track.landmarks[frame])[0]
 
-    def points(self, frame: int = 0) -> np.ndarray | None:
-        """(P, 3) points of `points/FRAME.npy`; else, for heads, the visual hull; else None.
+    def head_points(self, frame: int = 0) -> np.ndarray | None:
+        """(P, 3) of heads, the points of `points/FRAME.npy`, else the visual hull; else None.
 
         Raises:
             CaptureError: If the file of points is damaged.
         """
+        if self.shows == "body":
+            return None
+        points = self._points(frame)
+        return head_hull(self, frame) if points is None else points
+
+    def world_points(self, frame: int = 0) -> np.ndarray | None:
+        """(P, 3) of bodies, the points of `points/FRAME.npy`; else None.
+
+        Raises:
+            CaptureError: If the file of points is damaged.
+        """
+        return self._points(frame) if self.shows == "body" else None
+
+    def _points(self, frame: int) -> np.ndarray | None:
+        """(P, 3) the file's points, in the space that the folder's kind decides."""
         file = self.path / "points" / f"{self._index(frame):06d}.npy"
         if not file.is_file():
-            return head_hull(self, frame) if self._shows_head else None
+            return None
         try:
             points = np.load(file, allow_pickle=False)
         except (OSError, ValueError, EOFError) as error:

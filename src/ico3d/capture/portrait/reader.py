@@ -128,7 +128,7 @@ class TalkingPortrait(RecordedCapture):
             raise CaptureError(f"{path}: expected 68 finite landmarks; delete or redo the file.")
         return points
 
-    def points(self, frame: int = 0) -> np.ndarray | None:
+    def head_points(self, frame: int = 0) -> np.ndarray | None:
         """(P, 3) tracked face with a guessed body around it, or a guess of both."""
         path = self.path / "points.npy"
         if not path.is_file():

@@ -158,7 +158,7 @@ class RenderMe360(SmcCapture):
             return None
         return np.stack([self._in_space(frame) for frame in range(self.num_frames)])
 
-    def points(self, frame: int = 0) -> np.ndarray | None:
+    def head_points(self, frame: int = 0) -> np.ndarray | None:
         """(P, 3) in head space: FLAME's vertices, else the visual hull of the masks, else None."""
         pose, vertices = self.world_from_head(frame), self.flame_fits.vertices(frame)
         if pose is None:

@@ -11,9 +11,9 @@ from ico3d.avatar.avatar import Placement
 from ico3d.avatar.joining.cropping import cropped
 from ico3d.avatar.joining.driving import head_poses
 from ico3d.avatar.joining.finding.found_face import FaceSeeker, FoundFace, face_seeker
-from ico3d.avatar.joining.region import HeadRegion
 from ico3d.avatar.joining.similarity import canonical_from_head, fit_in_words
 from ico3d.capture.capture import Capture
+from ico3d.capture.face.region import HeadRegion
 from ico3d.head.model_folder import TrainedHead
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render

@@ -1,0 +1,100 @@
+"""Which pictures of which recording trained a model, so that nobody takes them for tests."""
+
+import hashlib
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from ico3d.capture.capture import Capture
+from ico3d.errors import CaptureError
+
+
+def trained_on(capture: Capture, cameras: Iterable[int], frames: Sequence[int]) -> dict:
+    """The record that a model's folder keeps of its training pictures.
+
+    Args:
+        capture: The recording.
+        cameras: Indices of the cameras whose pictures trained.
+        frames: The frames that trained.
+
+    Returns:
+        JSON values: `path` and `fingerprint` of the recording, `cameras` (names), `frames` (pairs
+        of first and last frame of each run).
+    """
+    return {
+        "path": str(capture.path.resolve()),
+        "fingerprint": fingerprint(capture),
+        "cameras": [capture.cameras[camera].name for camera in cameras],
+        "frames": _runs(frames),
+    }
+
+
+def fingerprint(capture: Capture) -> str:
+    """A hash that tells recordings apart wherever they lie: clock, cameras' poses, one picture."""
+    digest = hashlib.sha256(f"{capture.fps:g} {capture.num_frames}".encode())
+    for camera in capture.cameras:
+        digest.update(camera.name.encode())
+        digest.update(np.round(camera.world_to_camera, 4).astype("<f4").tobytes())
+    first = _first_picture(capture)
+    if first is not None:
+        digest.update((first * 255 + 0.5).astype(np.uint8).tobytes())
+    return digest.hexdigest()
+
+
+def is_same_recording(record: dict, capture: Capture) -> bool:
+    """Whether a record of `trained_on` tells of this recording."""
+    if record.get("path") == str(capture.path.resolve()):
+        return True
+    return "fingerprint" in record and record["fingerprint"] == fingerprint(capture)
+
+
+def check_untrained(
+    records: Iterable[dict],
+    capture: Capture,
+    cameras: Sequence[int],
+    frames: Sequence[int],
+) -> None:
+    """Refuses to score pictures as held out if one of them trained anything.
+
+    Args:
+        records: What the parts of a model were trained on, by `trained_on`.
+        capture: The recording that is to be scored.
+        cameras: Indices of the cameras that are to be scored.
+        frames: Frames that are to be scored.
+
+    Raises:
+        CaptureError: If a picture of these cameras and frames trained a part of the model.
+    """
+    asked = {capture.cameras[camera].name for camera in cameras}
+    for record in records:
+        if "cameras" not in record or not is_same_recording(record, capture):
+            continue
+        seen = sorted(asked & set(record["cameras"]))
+        taught = {f for first, last in record["frames"] for f in range(first, last + 1)}
+        both = sorted(taught & set(frames))
+        if seen and both:
+            raise CaptureError(
+                f"{capture.path}: frame {both[0]} by camera {seen[0]} trained this model and "
+                "cannot test it: train without it (--hold-out leaves out validation pictures), or "
+                "score all pictures, trained or not, by --frames all."
+            )
+
+
+def _first_picture(capture: Capture) -> np.ndarray | None:
+    """(H, W, 3) the first picture of the first camera that recorded one."""
+    for camera in range(len(capture.cameras)):
+        for frame in range(capture.num_frames):
+            if capture.has_image(camera, frame):
+                return capture.image(camera, frame)
+    return None
+
+
+def _runs(frames: Iterable[int]) -> list[list[int]]:
+    """First and last of each run of successive frames."""
+    runs: list[list[int]] = []
+    for frame in sorted(frames):
+        if runs and frame == runs[-1][1] + 1:
+            runs[-1][1] = frame
+        else:
+            runs.append([frame, frame])
+    return runs
