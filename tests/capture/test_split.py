@@ -33,3 +33,15 @@ def test_two_cameras_both_train():
 def test_heads_test_with_the_last_eleventh_of_the_frames():
     """110 frames: the last ten."""
     assert last_eleventh(110).test == tuple(range(100, 110))
+
+
+def test_validation_cameras_are_training_cameras_away_from_tests():
+    """Every tenth of the ring; a ring of fewer than five has none to spare."""
+    order = np.random.default_rng(2).permutation(20)
+    split = all_frames(7, ring(20, order))
+    validation = order[list(split.validation_cameras)]
+    assert len(validation) == 2 and abs(validation[0] - validation[1]) == 10
+    steps = np.abs(np.subtract.outer(validation, order[list(split.test_cameras)]))
+    assert np.minimum(steps, 20 - steps).min() == 2
+    assert all_frames(7, ring(5, np.arange(5))).validation_cameras != ()
+    assert all_frames(7, ring(4, np.arange(4))).validation_cameras == ()

@@ -66,7 +66,7 @@ def initial_points(
 
 def _surface(capture: Capture, frame: int) -> Start | None:
     """The capture's own points in view of some training camera; None if there are too few."""
-    points = capture.points(frame)
+    points = capture.world_points(frame)
     if points is None or not np.isfinite(points).all():
         return None
     cameras = [capture.cameras[index] for index in train_cameras(capture)]
