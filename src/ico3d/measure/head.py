@@ -20,6 +20,7 @@ from ico3d.head.model_folder import TrainedHead
 from ico3d.head.views import GREY, Picture, PictureCache, View, staged, view_of
 from ico3d.measure.lips import LandmarkReader, landmark_reader, lip_correlation, lip_gap, lip_lag_ms
 from ico3d.measure.metrics import lmd, psnr_mouth
+from ico3d.measure.pictures.temporal import TemporalFlicker
 from ico3d.measure.scores import Scores, add_picture, write_pictures
 from ico3d.measure.stopwatch import Stopwatch
 from ico3d.splat.render import render
@@ -97,7 +98,7 @@ def _quality(
     images: Path | None,
 ) -> Scores:
     """Picture metrics over all recorded views of the frames."""
-    scores, pictures = Scores(), PictureCache(capture, 0)
+    scores, flicker, pictures = Scores(), TemporalFlicker(), PictureCache(capture, 0)
     views = pictures.views(frames)
     if not views:
         raise CaptureError(f"{capture.path} has no picture in the frames to measure.")
@@ -110,8 +111,10 @@ def _quality(
         plate = pictures.background(view, torch.device("cpu"))
         behind, target = staged(Picture(torch.from_numpy(recorded), cut, None), plate)
         truth, predicted = target.numpy(), renderer.picture(view, behind)
-        add_picture(scores, predicted, truth)
+        add_picture(scores, predicted, truth, renderer.watch.device)
         scores.add("psnr_mask", None if measured is None else psnr(predicted, truth, measured))
+        change = flicker.add(view.camera_index, view.frame, predicted, truth, measured)
+        scores.add("temporal_flicker", change)
         if squareness(view.camera) > SHOWS_MOUTH:
             landmarks = capture.landmarks(view.camera_index, view.frame)
             if landmarks is None and reader is not None:
