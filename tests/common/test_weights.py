@@ -25,7 +25,8 @@ def test_every_entry_says_all_that_a_person_must_know():
         assert weights.name == name and weights.purpose and weights.licence and weights.size > 0
         assert bool(weights.files) != bool(weights.repository)
         assert bool(weights.wanted) == bool(weights.repository)
-        assert bool(weights.notice) == ("NC" in weights.licence)
+        restricted = "NC" in weights.licence or "research" in weights.licence
+        assert bool(weights.notice) == restricted
         if weights.package is not None:
             assert re.fullmatch(r"\d+\.\d+\.\d+", weights.package.version)
         ends = {Path(file.name).suffix for file in weights.files}

@@ -19,6 +19,7 @@ _AROUND_ZERO = (127.5, 127.5)  # mean and deviation: 0..255 becomes -1..1
 _TO_ONE = (0.0, 255.0)
 _LANGUAGES = ("English", "Spanish", "French", "Chinese", "Japanese", "Korean")
 _MB = 10**6
+_SYNCNET = "https://www.robots.ox.ac.uk/~vgg/software/lipsync/data"
 _LPIPS = "https://github.com/richzhang/PerceptualSimilarity/raw/master/lpips/weights/v0.1"
 
 
@@ -194,6 +195,22 @@ TABLE: dict[str, Weights] = {
                 ),
             ),
             _ALEXNET,
+        ),
+        Weights(
+            "syncnet",
+            "lip synchronisation (SyncNet)",
+            55 * _MB,
+            "CC BY, for research",
+            (RemoteFile("syncnet_v2.model", f"{_SYNCNET}/syncnet_v2.model"),),
+            notice="The page of SyncNet's authors gives the model to research, under a Creative "
+            "Commons Attribution licence.",
+        ),
+        Weights(
+            "s3fd",
+            "finding faces for syncnet (S3FD)",
+            90 * _MB,
+            "not stated",
+            (RemoteFile("sfd_face.pth", f"{_SYNCNET}/sfd_face.pth"),),
         ),
         Weights(
             "raft",

@@ -25,6 +25,7 @@ _TIMEOUT = 30.0  # s without a byte
 _ZIP = (b"PK",)
 _BEGINNINGS = {
     ".pth": (*_ZIP, b"\x80"),  # PyTorch's archive, or its older pickle
+    ".model": (*_ZIP, b"\x80"),  # likewise, as SyncNet's authors name it
     ".task": _ZIP,
     ".bin": _ZIP,  # numpy's archive of voices
     ".onnx": (b"\x08",),
