@@ -6,7 +6,7 @@ import pytest
 
 from ico3d.cli import main
 from ico3d.common.catalogue import table as room
-from ico3d.common.catalogue.kinds import RemoteFile, Weights
+from ico3d.common.catalogue.kinds import ModelPackage, RemoteFile, Weights
 from ico3d.common.weights import cached, model_file
 from ico3d.errors import MissingModelError, SettingsError
 
@@ -25,13 +25,19 @@ def test_every_entry_says_all_that_a_person_must_know():
         assert weights.name == name and weights.purpose and weights.licence and weights.size > 0
         assert bool(weights.files) != bool(weights.repository)
         assert bool(weights.wanted) == bool(weights.repository)
-        assert bool(weights.notice) == ("NC" in weights.licence)
+        restricted = "NC" in weights.licence or "research" in weights.licence
+        assert bool(weights.notice) == restricted
         if weights.package is not None:
-            assert len(weights.files) == 1 and weights.files[0].name.endswith(".task")
             assert re.fullmatch(r"\d+\.\d+\.\d+", weights.package.version)
+        ends = {Path(file.name).suffix for file in weights.files}
+        if isinstance(weights.package, ModelPackage):
+            assert len(weights.files) == 1 and ends == {".task"}
             for model in weights.package.models:
                 assert model.name.endswith(".tflite") and model.path.endswith(".tflite")
                 assert re.fullmatch(r"[0-9a-f]{64}", model.sha256)
+        elif weights.package is not None:
+            assert ends == {".safetensors"} and all(file.keep for file in weights.files)
+            assert re.fullmatch(r"[0-9a-f]{64}", weights.package.sha256)
         for file in weights.files:
             assert file.url.startswith("https://")
             assert re.fullmatch(r"([0-9a-f]{8}|[0-9a-f]{64})?", file.sha256)

@@ -1,6 +1,6 @@
 import pytest
 
-from ico3d.measure import lpips
+from ico3d.measure.pictures import lpips
 from support.lpips_weights import write_weights
 
 

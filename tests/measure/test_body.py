@@ -29,6 +29,8 @@ def test_the_truth_scores_highest(truth_scores):
     for key in ("psnr", "psnr_mask", "psnr_moving"):
         assert truth_scores[key] > 100
     assert truth_scores["ssim"] == pytest.approx(1, abs=1e-5)
+    assert truth_scores["temporal_flicker"] == pytest.approx(0, abs=1e-5)
+    assert truth_scores["fps"] == pytest.approx(1000 / truth_scores["ms_per_frame"])
     assert truth_scores["num_gaussians"] == 2 * POINTS
     assert truth_scores["train_seconds"] == 7.0 and truth_scores["ms_per_frame"] > 0
     json.dumps(truth_scores, allow_nan=False)
@@ -59,6 +61,10 @@ def test_an_error_is_found_in_its_window_alone(capture):
             alpha = capture.mask(camera, frame).astype(np.float64)
             expected.append(-10 * np.log10(0.01 * (alpha**3).sum() / alpha.sum()))
     assert second["psnr_mask"] == pytest.approx(np.mean(expected), abs=1e-3)
+    # Between frames 4 and 5 the person becomes lighter by 0.1·α; later the error moves with it.
+    changes = [entry["temporal_flicker"] for entry in scores["per_frame"]]
+    assert changes[0] is None and max(changes[1:5]) < 1e-5
+    assert 0.05 < changes[5] < 0.1 and 0.001 < max(changes[6:]) < changes[5]
     frames = [entry["psnr_mask"] for entry in scores["per_frame"]]
     assert scores["psnr_mask"] == pytest.approx(np.mean(frames))
     cameras = [entry["psnr_mask"] for entry in scores["per_camera"]]

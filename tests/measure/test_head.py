@@ -74,6 +74,8 @@ def test_metrics_of_a_known_error(tmp_path, no_models, caplog):
     for key in ("psnr", "psnr_mask", "psnr_mouth"):
         assert scores[key] == pytest.approx(20.0, abs=1e-3)
     assert 0 < scores["ssim"] < 1
+    assert scores["temporal_flicker"] == pytest.approx(0, abs=1e-6)  # the error stays the same
+    assert [scores[key] for key in ("ms_ssim", "lpips", "lpips_alex")] == [None] * 3
     assert scores["num_gaussians"] == 40
     assert scores["train_seconds"] == 7.0
     assert scores["ms_per_frame"] > 0

@@ -24,3 +24,27 @@ def write_weights(path: Path) -> tuple[dict, dict]:
     save_file(vgg, path / "vgg16.safetensors")
     save_file(linear, path / "lpips_vgg.safetensors")
     return vgg, linear
+
+
+ALEXNET = (
+    (0, 64, 3, 11, {"stride": 4, "padding": 2}),
+    (3, 192, 64, 5, {"padding": 2}),
+    (6, 384, 192, 3, {"padding": 1}),
+    (8, 256, 384, 3, {"padding": 1}),
+    (10, 256, 256, 3, {"padding": 1}),
+)
+"""AlexNet's convolutions: number, channels out and in, size, stride and padding."""
+
+
+def write_alexnet(path: Path) -> tuple[dict, dict]:
+    """Random weights of AlexNet, under torchvision's and the authors' names."""
+    generator = torch.Generator().manual_seed(1)
+    features, linear = {}, {}
+    for stage, (number, out, width, size, _) in enumerate(ALEXNET):
+        weight = torch.randn((out, width, size, size), generator=generator)
+        features[f"features.{number}.weight"] = weight / (size * width**0.5)
+        features[f"features.{number}.bias"] = 0.1 * torch.randn(out, generator=generator)
+        linear[f"lin{stage}.model.1.weight"] = torch.rand(1, out, 1, 1, generator=generator)
+    save_file(features, path / "alexnet.safetensors")
+    save_file(linear, path / "lpips_alex.safetensors")
+    return features, linear

@@ -18,15 +18,15 @@ from ico3d.capture.pictures import View, train_cameras
 from ico3d.common.psnr import psnr
 from ico3d.errors import CaptureError
 from ico3d.measure.flicker import border_flicker, novel_cameras
-from ico3d.measure.lpips import lpips
 from ico3d.measure.metrics import moving_pixels, psnr_moving
-from ico3d.measure.scores import Scores, add_picture, write_pictures
+from ico3d.measure.pictures.temporal import TemporalFlicker
+from ico3d.measure.scores import PICTURE, Scores, add_picture, write_pictures
 from ico3d.measure.stopwatch import Stopwatch
 from ico3d.splat.device import CPU
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 
-QUALITY = ("psnr", "psnr_mask", "psnr_moving", "ssim", "lpips")
+QUALITY = (*PICTURE[:1], "psnr_mask", "psnr_moving", *PICTURE[1:], "temporal_flicker")
 """Metrics of a picture; for several pictures, the mean over those that have a value."""
 
 
@@ -190,7 +190,7 @@ def _measured(
     images: Path | None,
 ) -> dict[tuple[int, int], PictureScores]:
     """Scores by camera and frame."""
-    truths = BodyTruth(capture)
+    truths, flicker = BodyTruth(capture), TemporalFlicker()
     chosen = [(camera, frame) for camera in cameras for frame in frames]
     found = {}
     for camera, frame in track(chosen, "pictures", transient=True):
@@ -198,7 +198,9 @@ def _measured(
         if truth is None:
             continue
         predicted = renderer.picture(camera, frame)
-        found[camera, frame] = picture_scores(predicted, truth, renderer.device)
+        values = picture_scores(predicted, truth, renderer.device)
+        change = flicker.add(camera, frame, predicted, truth.picture, truth.mask)
+        found[camera, frame] = values | {"temporal_flicker": change if truth.whole else None}
         if images is not None:
             view = View(camera, frame, capture.cameras[camera])
             write_pictures(images, view, predicted, truth.picture, truth.mask)
@@ -213,12 +215,11 @@ def picture_scores(
     Args:
         predicted: (H, W, 3) in [0, 1].
         truth: The recorded picture.
-        device: Device for LPIPS.
+        device: Device for LPIPS and MS-SSIM.
     """
     scores = Scores({name: [] for name in QUALITY})
     if truth.whole:
-        add_picture(scores, predicted, truth.picture)
-        scores.add("lpips", lpips(predicted, truth.picture, device))
+        add_picture(scores, predicted, truth.picture, device)
     if truth.mask is not None and truth.mask.any():
         box = _box(truth.mask)
         seen, true, mask = predicted[box], truth.picture[box], truth.mask[box]

@@ -20,6 +20,7 @@ from ico3d.head.model_folder import TrainedHead
 from ico3d.head.views import GREY, Picture, PictureCache, View, staged, view_of
 from ico3d.measure.lips import LandmarkReader, landmark_reader, lip_correlation, lip_gap, lip_lag_ms
 from ico3d.measure.metrics import lmd, psnr_mouth
+from ico3d.measure.pictures.temporal import TemporalFlicker
 from ico3d.measure.scores import Scores, add_picture, write_pictures
 from ico3d.measure.stopwatch import Stopwatch
 from ico3d.splat.render import render
@@ -98,7 +99,7 @@ def _quality(
     images: Path | None,
 ) -> Scores:
     """Picture metrics over all recorded views of the frames."""
-    scores, pictures = Scores(), PictureCache(capture, 0)
+    scores, flicker, pictures = Scores(), TemporalFlicker(), PictureCache(capture, 0)
     views = pictures.views(frames)
     if not views:
         raise CaptureError(f"{capture.path} has no picture in the frames to measure.")
@@ -114,8 +115,10 @@ def _quality(
         if capture.shows == "body" and person is not None and measured is not None:
             torso = np.clip(person - measured, 0, 1)[..., None]  # (H, W, 1)
             predicted = predicted + torso * (truth - predicted)
-        add_picture(scores, predicted, truth)
+        add_picture(scores, predicted, truth, renderer.watch.device)
         scores.add("psnr_mask", None if measured is None else psnr(predicted, truth, measured))
+        change = flicker.add(view.camera_index, view.frame, predicted, truth, measured)
+        scores.add("temporal_flicker", change)
         if squareness(view.camera) > SHOWS_MOUTH:
             landmarks = capture.landmarks(view.camera_index, view.frame)
             if landmarks is None and reader is not None:

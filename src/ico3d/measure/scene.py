@@ -52,7 +52,7 @@ def evaluate_scene(
         assert truth is not None
         predicted = renderer.picture(view)
         if renderer.shows_all(view, person):
-            add_picture(scores, predicted, truth)
+            add_picture(scores, predicted, truth, renderer.watch.device)
         if trained.only != "background" and person is not None:
             measured = capture.head_mask(view.camera_index, view.frame)
             scores.add("psnr_mask", None if measured is None else psnr(predicted, truth, measured))

