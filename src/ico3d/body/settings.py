@@ -284,8 +284,8 @@ class BodySettings:
             window the same number, --steps.
         warmup_steps: Number of first steps of a window that learn from its middle frame alone,
             without motion.
-        color_correction: Let each camera learn an affine correction of colours, for cameras whose
-            colours differ.
+        color_correction: Let each camera learn an affine map of colours, for cameras whose colours
+            differ; the mean over cameras is the identity, with which test cameras are drawn.
         checkpoint_every: Steps from one checkpoint to the next.
         cache_gib: Memory for recorded pictures, GiB; what does not fit is read again, in the
             background, before each use.

@@ -52,9 +52,18 @@ class WindowModel:
             (N, 4) wxyz not normalised, `log_scales` (N, 3), `opacity_logits` (N,), `color_logits`
             (N, 3), and those of `motion.per_gaussian`. Density control replaces them.
         shared: Tensors of `motion.shared` by name.
+        camera_colors: (C, 3, 4) how the recording cameras' colours differ from those of the
+            Gaussians, by index of the camera (`ico3d.body.camera_colors`); None where that was not
+            learnt. Training alone uses it.
     """
 
-    def __init__(self, motion: Motion, gaussians: dict[str, Tensor], shared: dict[str, Tensor]):
+    def __init__(
+        self,
+        motion: Motion,
+        gaussians: dict[str, Tensor],
+        shared: dict[str, Tensor],
+        camera_colors: Tensor | None = None,
+    ):
         """Makes a model of tensors, which are not copied.
 
         Raises:
@@ -70,6 +79,7 @@ class WindowModel:
         if len({len(tensor) for tensor in gaussians.values()}) != 1:
             raise ValueError("per-Gaussian tensors differ in length")
         self.motion, self.gaussians, self.shared = motion, gaussians, shared
+        self.camera_colors = camera_colors
 
     def __len__(self) -> int:
         """Number of Gaussians."""
@@ -84,6 +94,8 @@ class WindowModel:
         """Moves all tensors to a device."""
         self.gaussians = {name: value.to(device) for name, value in self.gaussians.items()}
         self.shared = {name: value.to(device) for name, value in self.shared.items()}
+        if self.camera_colors is not None:
+            self.camera_colors = self.camera_colors.to(device)
 
     def at(self, tau: float) -> Gaussians:
         """Activated Gaussians in the world at a time τ in [0, 1] of the window."""

@@ -25,7 +25,7 @@ STILL_SEEN = 0.05
 
 
 class FineTuner(WindowTrainee):
-    """A `Trainee` of the canonical Gaussians of a window; the tensors of its motion are frozen.
+    """A `Trainee` of the canonical Gaussians of a window; motion and colour maps are frozen.
 
     Some steps compare the first frame of the window with the same frame of the previous window,
     rendered by novel cameras between the recording ones. The others learn from recorded pictures.
@@ -58,6 +58,8 @@ class FineTuner(WindowTrainee):
         """
         for name, tensor in {**model.gaussians, **model.shared}.items():
             tensor.requires_grad_(name in CANONICAL)
+        if model.camera_colors is not None:
+            model.camera_colors.requires_grad_(False)  # or it would be learnt from few pictures
         super().__init__(Learner(model, window, pictures, settings, extent, seed, companion))
         self._settings, self._cameras = settings.finetune, cameras
         self._shared = window.first

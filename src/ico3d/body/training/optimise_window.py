@@ -54,6 +54,8 @@ class BodyTrainer(WindowTrainee):
         for name, tensor in {**model.gaussians, **model.shared}.items():
             tensor.requires_grad_(name not in fixed)
         super().__init__(Learner(model, window, pictures, settings, extent, seed, companion))
+        if model.camera_colors is not None:
+            model.camera_colors.requires_grad_(settings.color_correction)
         self._settings = settings
         # A copy, as training changes the joints in place.
         self._joints = model.shared["rig_joints"].detach().clone() if fixed else None  # (J, 3)
