@@ -90,6 +90,17 @@ class HeadTrainer:
         """The settings in effect: the perceptual weight is 0 if VGG's weights are not installed."""
         return self._loss.settings
 
+    @property
+    def used(self) -> dict:
+        """What takes effect, where the settings alone do not tell."""
+        settings = self.settings
+        looked = settings.steps > settings.loss.perceptual_from
+        return {
+            "optimiser": settings.optimiser,
+            "perceptual": settings.loss.perceptual if looked else 0.0,
+            "mixed_precision": settings.mixed_precision and self.model.device.type == "cuda",
+        }
+
     def step(self, index: int) -> Mapping[str, float]:
         """Renders one picture and updates the parameters; returns the loss and other numbers."""
         view = self._view(index)

@@ -23,6 +23,7 @@ from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.device import computing_device
 from ico3d.training.loop import LoopSettings, run_loop
+from ico3d.training.provenance import note_environment, provenance
 from ico3d.training.run import RunFolder
 from ico3d.training.watch import LivePage
 
@@ -76,6 +77,7 @@ def train_head(
     if run.finished() is not None:
         return TrainedHead.load(folder)
     place = computing_device(device)
+    note_environment(folder, place)
     torch.manual_seed(job.seed)  # layers draw their weights
     track, adaptor, encoder = _inputs(capture, job, place)
     rng = np.random.default_rng(job.seed)
@@ -92,6 +94,7 @@ def train_head(
         "capture": capture.provenance,
         "recording": {"path": str(capture.path.resolve()), "poses": trainer.poses},
         "settings": asdict(trainer.settings),
+        "made": provenance([folder], job.seed, trainer.used | {"encoder": encoder[0] or None}),
     }
     landmarks = canonical_landmarks(capture)
     eyes = _eyes(capture, track)

@@ -27,6 +27,7 @@ from ico3d.common.device import DeviceName
 from ico3d.errors import ModelError, SettingsError
 from ico3d.splat.device import computing_device
 from ico3d.training.loop import LoopSettings, run_loop
+from ico3d.training.provenance import note_environment, provenance
 from ico3d.training.run import RunFolder
 
 WINDOW_FILE = "window.safetensors"
@@ -124,6 +125,7 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
         return finished["train_seconds"]
     capture = capture or open_capture(task.capture)
     device = computing_device(job.device)
+    note_environment(task.folder, device)
     companion = job.companion.open(device) if job.companion else None
     begin = _begin(task, capture, companion, device)
     begin.model.to(device)
@@ -188,6 +190,7 @@ def finetune_window(
     before = RunFolder(trained, about).finished()
     assert before is not None
     device = computing_device(job.device)
+    note_environment(task.folder, device)
     model.to(device)
     previous.to(device)
     cameras = [capture.cameras[index] for index in train_cameras(capture)]
@@ -233,12 +236,14 @@ def train_body(
     run = RunFolder(folder, job.about(capture.path) | {"settings": asdict(job.settings)})
     if run.finished() is not None:
         return TrainedBody.load(folder)
+    flow = None
     if job.continued is not None:
         windows = _fitting(TrainedBody.load(job.continued), capture, job).windows
     elif job.method in ONE_WINDOW:
         windows = (Window(0, capture.num_frames - 1),)
     else:
-        windows = plan_windows(capture, job, folder).windows
+        plan = plan_windows(capture, job, folder)
+        windows, flow = plan.windows, plan.method
     tasks = [
         WindowTask(
             capture.path, folder / "windows" / f"{index:04d}", folder / "flow", window, index, job
@@ -246,14 +251,16 @@ def train_body(
         for index, window in enumerate(windows)
     ]
     seconds = sum(runner(tasks) if runner else (train_window(task, capture) for task in tasks))
-    body = _save(capture, folder, job, tasks, seconds)
+    made = _made(job, tasks, flow)
+    body = _save(capture, folder, job, tasks, seconds, made)
     if job.settings.finetune.steps and len(tasks) > 1:
-        _save(capture, folder, job, tasks, seconds, UNTUNED)
+        _save(capture, folder, job, tasks, seconds, made, UNTUNED)
         tuned = [replace(t, folder=folder / "finetuned" / f"{t.index:04d}") for t in tasks[1:]]
         for before, task, after in zip(tasks, tasks[1:], tuned, strict=False):
             source = before if before.index == 0 else tuned[before.index - 1]
             seconds += finetune_window(after, capture, task.folder, load_window(source.file))
-        body = _save(capture, folder, job, [tasks[0], *tuned], seconds)
+        made = _made(job, [*tasks, *tuned], flow)
+        body = _save(capture, folder, job, [tasks[0], *tuned], seconds, made)
     run.finish({"train_seconds": seconds, "num_gaussians": sum(map(len, body.models))})
     return body
 
@@ -311,6 +318,7 @@ def _save(
     job: BodyJob,
     tasks: Sequence[WindowTask],
     seconds: float,
+    made: dict,
     about: str = ABOUT,
 ) -> TrainedBody:
     """Writes the file `about`, which lists the windows' files; returns the body."""
@@ -319,12 +327,19 @@ def _save(
         "train_seconds": seconds,
         "capture": tracked(capture).credited(known) if job.method in SKINNED else known,
         "settings": asdict(job.settings),
+        "made": made,
     }
     models = [load_window(task.file) for task in tasks]
     windows = tuple(task.window for task in tasks)
     body = TrainedBody(models, windows, capture.fps, job.method, summary)
     body.save(folder, [str(task.file.relative_to(folder)) for task in tasks], about)
     return body
+
+
+def _made(job: BodyJob, tasks: Sequence[WindowTask], flow: str | None) -> dict:
+    """How a body was made by some runs; `flow` names the flow method, None where none was used."""
+    used = {"optimiser": "adam", "flow": flow, "color_correction": job.settings.color_correction}
+    return provenance([task.folder for task in tasks], job.seed, used)
 
 
 def _about(capture: Path, window: Window, job: BodyJob) -> dict:
