@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from ico3d.common.presets import PresetName
-from ico3d.training.rate import Rate
+from ico3d.training.rate import REST_FACTOR, Rate
 
 Method = Literal["swings++", "swings", "4dgs", "spacetime", "freetime", "static", "skinned", "hugs"]
 """How a body's Gaussians are moved.
@@ -136,7 +136,8 @@ class Rates:
         rotation: Learning rate of the Gaussians' rotations (quaternions).
         scale: Learning rate of the logarithms of the Gaussians' sizes.
         opacity: Learning rate of the opacities' logits.
-        color: Learning rate of the colours' logits.
+        color: Learning rate of the colours' logits; that of harmonics above degree 0 is a
+            twentieth.
         shape_decay: Factor to which the rates of rotations, sizes, opacities and colours have
             decayed at the last step.
         mlp: Learning rate of the MLP.
@@ -189,6 +190,7 @@ class Rates:
             "log_scales": Rate(self.scale, self.shape_decay),
             "opacity_logits": Rate(self.opacity, self.shape_decay),
             "color_logits": Rate(self.color, self.shape_decay),
+            "harmonics": Rate(self.color * REST_FACTOR, self.shape_decay),
             "alpha": Rate(self.blend, self.motion_decay),
             "mlp": Rate(self.mlp, self.motion_decay),
             "grid": Rate(self.grid, self.motion_decay),
@@ -284,6 +286,9 @@ class BodySettings:
             window the same number, --steps.
         warmup_steps: Number of first steps of a window that learn from its middle frame alone,
             without motion.
+        sh_degree: Degree of the spherical harmonics, 0 to 3, by which colours depend on the
+            direction of view in the world; bundles keep degree 0. Not on a skeleton.
+        sh_every: Steps between two increases of the degree that is trained, which starts at 0.
         color_correction: Let each camera learn an affine map of colours, for cameras whose colours
             differ; the mean over cameras is the identity, with which test cameras are drawn.
         checkpoint_every: Steps from one checkpoint to the next.
@@ -303,6 +308,8 @@ class BodySettings:
     steps: int = 30_000
     steps_per_frame: int = 0
     warmup_steps: int = 1_000
+    sh_degree: int = 0
+    sh_every: int = 1_000
     color_correction: bool = False
     checkpoint_every: int = 1_000
     cache_gib: float = 2.0

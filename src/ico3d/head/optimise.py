@@ -14,7 +14,7 @@ from ico3d.head.density import HeadDensity, Sampled, bound_scales
 from ico3d.head.expressions import ExpressionTrack
 from ico3d.head.loss import HeadLoss
 from ico3d.head.model import HeadModel
-from ico3d.head.settings import HeadSettings
+from ico3d.head.settings import HeadSettings, sgd_gain
 from ico3d.head.views import Picture, PictureCache, View, poses_digest, staged
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.density import contributions
@@ -97,6 +97,7 @@ class HeadTrainer:
         looked = settings.steps > settings.loss.perceptual_from
         return {
             "optimiser": settings.optimiser,
+            "sh_degree": min((settings.steps - 1) // settings.sh_every, settings.sh_degree),
             "perceptual": settings.loss.perceptual if looked else 0.0,
             "mixed_precision": settings.mixed_precision and self.model.device.type == "cuda",
         }
@@ -110,6 +111,7 @@ class HeadTrainer:
         expression = self._expression(view)  # (B,)
         features = self._features(expression)  # (N, w)
         gaussians = self.model.gaussians(self._decode(features, expression))
+        gaussians = gaussians.up_to_degree(index // self._settings.sh_every)
         absgrad = self._settings.density.absgrad
         rendering = render(gaussians, [view.camera], background, absgrad=absgrad)
         loss = self._loss(rendering, target, picture, index)
@@ -194,6 +196,8 @@ class HeadTrainer:
         groups = self._settings.rates.by_parameter(self.model.shape.has_mlp)
         rates = {name: rate.at(progress) for name, rate in groups.items()}
         rates["means"] *= self.model.shape.box_size
+        if self._settings.optimiser == "sgd":
+            rates = {name: r * sgd_gain(name, len(self.model)) for name, r in rates.items()}
         weights = self.model.row_weights(expression)
         assert features.grad is not None
         update_basis(

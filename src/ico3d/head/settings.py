@@ -96,6 +96,28 @@ class Rates:
         }
 
 
+SGD_GAINS = {
+    "means": 0.5,
+    "quats": 500.0,
+    "log_scales": 75.0,
+    "basis": 350.0,
+    "mlp": 1_500.0,
+    "adaptor": 5_000.0,
+}
+"""Factors of the learning rates under SGD, measured (docs/choices.md).
+
+Adam's steps are about as long as the learning rate, those of SGD are as much shorter as gradients
+are. The factors are half the reciprocals of usual gradients; with three times as much training
+diverges. Those of a Gaussian's parameters are multiplied by the number of Gaussians, because
+gradients are smaller where many share a picture.
+"""
+
+
+def sgd_gain(name: str, gaussians: int) -> float:
+    """Factor of a learning rate under SGD: key of `Rates.by_parameter`, number of Gaussians."""
+    return SGD_GAINS[name] * (1 if name in ("mlp", "adaptor") else gaussians)
+
+
 @dataclass(frozen=True)
 class Initial:
     """The Gaussians that training begins with.
@@ -144,7 +166,11 @@ class HeadSettings:
 
     Attributes:
         steps: Optimisation steps, one picture each.
-        optimiser: Adam, or stochastic gradient descent as the paper says.
+        optimiser: Adam, or stochastic gradient descent as the paper says; then learning rates count
+            multiples of usual gradients, because the paper's rates are Adam's (docs/choices.md).
+        sh_degree: Degree of the spherical harmonics, 0 to 3, by which colours depend on the
+            direction of view; bundles keep degree 0.
+        sh_every: Steps between two increases of the degree that is trained, which starts at 0.
         checkpoint_every: Steps from one checkpoint to the next.
         cache_gib: Memory for recorded pictures, GiB; what does not fit is read again, in the
             background, before each use.
@@ -159,6 +185,8 @@ class HeadSettings:
 
     steps: int = 50_000
     optimiser: Literal["adam", "sgd"] = "adam"
+    sh_degree: int = 0
+    sh_every: int = 1_000
     checkpoint_every: int = 1_000
     cache_gib: float = 2.0
     mixed_precision: bool = False

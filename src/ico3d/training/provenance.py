@@ -4,7 +4,7 @@ import json
 import subprocess
 from collections.abc import Iterable, Mapping
 from functools import cache
-from importlib.metadata import version
+from importlib import import_module
 from pathlib import Path
 
 import torch
@@ -19,12 +19,12 @@ ENVIRONMENTS = "environments.json"
 
 def environment(device: torch.device) -> dict[str, str | None]:
     """Versions and device of a training in this process; `commit` is None outside of a checkout."""
-    backend = "numba" if device.type == "cpu" else "gsplat"
+    backend = import_module("numba" if device.type == "cpu" else "gsplat")
     return {
         "ico3d": ico3d.__version__,
         "commit": _commit(),
         "torch": torch.__version__,
-        backend: version(backend),
+        backend.__name__: backend.__version__,
         "device": device_name(device),
     }
 

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from ico3d.body.companion import Companion
-from ico3d.body.motion.window_model import CANONICAL, WindowModel
+from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings
 from ico3d.body.training.novel_views import novel_camera
@@ -57,7 +57,7 @@ class FineTuner(WindowTrainee):
             companion: Other Gaussians that are in the pictures; None for none.
         """
         for name, tensor in {**model.gaussians, **model.shared}.items():
-            tensor.requires_grad_(name in CANONICAL)
+            tensor.requires_grad_(name in model.canonical_names)
         if model.camera_colors is not None:
             model.camera_colors.requires_grad_(False)  # or it would be learnt from few pictures
         super().__init__(Learner(model, window, pictures, settings, extent, seed, companion))

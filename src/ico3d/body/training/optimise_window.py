@@ -72,6 +72,7 @@ class BodyTrainer(WindowTrainee):
         view = learner.view(self._center if still else learner.views, index)
         example = learner.example(view, index)
         gaussians = self.model.canonical() if still else self._moved(view, index)
+        gaussians = gaussians.up_to_degree(index // self._settings.sh_every)
         rendering = learner.draw(gaussians, view, example)
         loss = learner.loss(rendering, example) + self._penalties()
         loss.backward()

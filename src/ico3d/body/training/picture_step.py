@@ -10,7 +10,7 @@ from torch import Tensor
 from ico3d.body import camera_colors
 from ico3d.body.companion import Companion, Pruning
 from ico3d.body.motion.deformation import GRID, MLP
-from ico3d.body.motion.window_model import CANONICAL, WindowModel
+from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings
 from ico3d.body.skinning.skinned import NETWORK, PER_FRAME
@@ -152,7 +152,7 @@ class Learner:
     def keep_mean(self, count: int) -> None:
         """Adds the canonical Gaussians to their running mean, so far one of `count` steps."""
         moments = self.optimiser.moments
-        for name in CANONICAL:
+        for name in self.model.canonical_names:
             value = self.model.gaussians[name].detach()
             mean = moments.setdefault(f"{name}.mean", value.clone())
             mean.lerp_(value, 1 / (count + 1))
@@ -160,7 +160,7 @@ class Learner:
     @torch.no_grad()
     def take_mean(self) -> None:
         """Replaces the canonical Gaussians by their running mean (`keep_mean`)."""
-        for name in CANONICAL:
+        for name in self.model.canonical_names:
             self.model.gaussians[name].copy_(self.optimiser.moments[f"{name}.mean"])
 
     def tensors(self) -> dict[str, Tensor]:

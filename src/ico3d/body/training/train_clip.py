@@ -233,6 +233,11 @@ def train_body(
     """
     if job.method in SKINNED:
         tracked(capture)  # raises before a folder is made
+        if job.settings.sh_degree:
+            raise SettingsError(
+                f"--sh-degree is not for --method {job.method}: on a skeleton colours follow the "
+                "light, not the direction of view."
+            )
     run = RunFolder(folder, job.about(capture.path) | {"settings": asdict(job.settings)})
     if run.finished() is not None:
         return TrainedBody.load(folder)
@@ -338,7 +343,13 @@ def _save(
 
 def _made(job: BodyJob, tasks: Sequence[WindowTask], flow: str | None) -> dict:
     """How a body was made by some runs; `flow` names the flow method, None where none was used."""
-    used = {"optimiser": "adam", "flow": flow, "color_correction": job.settings.color_correction}
+    settings = job.settings
+    used = {
+        "optimiser": "adam",
+        "flow": flow,
+        "sh_degree": settings.sh_degree,
+        "color_correction": settings.color_correction,
+    }
     return provenance([task.folder for task in tasks], job.seed, used)
 
 
