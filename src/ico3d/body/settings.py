@@ -42,11 +42,14 @@ class Windows:
             docs/bodies.md).
         shortest: Least number of frames of a window.
         longest: Largest number of frames of a window.
+        segment: Number of frames of each window of methods that do not follow the motion, such as
+            spacetime; 0 takes the clip as one window.
     """
 
     threshold: float = 100.0
     shortest: int = 6
     longest: int = 16
+    segment: int = 0
 
 
 @dataclass(frozen=True)
@@ -360,11 +363,21 @@ STEPS_PER_FRAME = 150
 """Steps per frame of skinned bodies in the preset `cpu`: their one window may have any length."""
 
 
+SEGMENT = 45
+"""Frames of a segment of Spacetime Gaussians in the preset `paper`: more did not fit into memory.
+
+Segments were trained apart there, without fine-tuning.
+"""
+
+
 def settings_for(preset: PresetName, method: Method) -> BodySettings:
     """The settings of a preset for a method; other methods differ as their own papers do."""
     settings = PRESETS[preset]
     if method == "swings":
         return replace(settings, mlp=replace(settings.mlp, depth=4))
+    if method == "spacetime" and preset == "paper":
+        windows = replace(settings.windows, segment=SEGMENT)
+        return replace(settings.without_finetuning(), windows=windows)
     if method == "4dgs":
         return replace(settings, mlp=replace(settings.mlp, sets=1))
     if method in SKINNED:

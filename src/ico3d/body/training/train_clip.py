@@ -13,7 +13,7 @@ from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.flow import clip_flow, dynamic_weights
 from ico3d.body.planning.plan import Plan, is_saved, make_plan, print_plan, save_plan
 from ico3d.body.planning.plan_picture import draw_plan
-from ico3d.body.planning.windows import Window
+from ico3d.body.planning.windows import Window, segments
 from ico3d.body.settings import ONE_WINDOW, SKINNED, BodySettings, Method
 from ico3d.body.training.finetune_window import FineTuner
 from ico3d.body.training.optimise_window import BodyTrainer
@@ -233,10 +233,10 @@ def train_body(
     """
     if job.method in SKINNED:
         tracked(capture)  # raises before a folder is made
-        if job.settings.sh_degree:
+        if job.settings.sh_degree or job.settings.windows.segment:
             raise SettingsError(
-                f"--sh-degree is not for --method {job.method}: on a skeleton colours follow the "
-                "light, not the direction of view."
+                f"--sh-degree and --windows.segment are not for --method {job.method}: on a "
+                "skeleton colours follow the light, and the clip is one window."
             )
     run = RunFolder(folder, job.about(capture.path) | {"settings": asdict(job.settings)})
     if run.finished() is not None:
@@ -245,7 +245,7 @@ def train_body(
     if job.continued is not None:
         windows = _fitting(TrainedBody.load(job.continued), capture, job).windows
     elif job.method in ONE_WINDOW:
-        windows = (Window(0, capture.num_frames - 1),)
+        windows = segments(capture.num_frames, job.settings.windows.segment)
     else:
         plan = plan_windows(capture, job, folder)
         windows, flow = plan.windows, plan.method
