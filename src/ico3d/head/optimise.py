@@ -14,7 +14,7 @@ from ico3d.head.density import HeadDensity, Sampled, bound_scales
 from ico3d.head.expressions import ExpressionTrack
 from ico3d.head.loss import HeadLoss
 from ico3d.head.model import HeadModel
-from ico3d.head.settings import HeadSettings, sgd_gain
+from ico3d.head.settings import SGD_GAINS, HeadSettings
 from ico3d.head.views import Picture, PictureCache, View, poses_digest, staged
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.density import contributions
@@ -197,7 +197,7 @@ class HeadTrainer:
         rates = {name: rate.at(progress) for name, rate in groups.items()}
         rates["means"] *= self.model.shape.box_size
         if self._settings.optimiser == "sgd":
-            rates = {name: r * sgd_gain(name, len(self.model)) for name, r in rates.items()}
+            rates = {name: rate * SGD_GAINS[name] for name, rate in rates.items()}
         weights = self.model.row_weights(expression)
         assert features.grad is not None
         update_basis(

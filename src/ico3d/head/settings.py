@@ -97,25 +97,18 @@ class Rates:
 
 
 SGD_GAINS = {
-    "means": 0.5,
-    "quats": 500.0,
-    "log_scales": 75.0,
-    "basis": 350.0,
-    "mlp": 1_500.0,
-    "adaptor": 5_000.0,
+    "means": 2.5e3,
+    "quats": 2.5e6,
+    "log_scales": 4e5,
+    "basis": 2e6,
+    "mlp": 3e3,
+    "adaptor": 1e4,
 }
 """Factors of the learning rates under SGD, measured (docs/choices.md).
 
 Adam's steps are about as long as the learning rate, those of SGD are as much shorter as gradients
-are. The factors are half the reciprocals of usual gradients; with three times as much training
-diverges. Those of a Gaussian's parameters are multiplied by the number of Gaussians, because
-gradients are smaller where many share a picture.
+are. So the factors are about the reciprocals of usual gradients.
 """
-
-
-def sgd_gain(name: str, gaussians: int) -> float:
-    """Factor of a learning rate under SGD: key of `Rates.by_parameter`, number of Gaussians."""
-    return SGD_GAINS[name] * (1 if name in ("mlp", "adaptor") else gaussians)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,9 @@ from ico3d.body.settings import settings_for
 from ico3d.body.training.finetune_window import FineTuner
 from ico3d.body.training.optimise_window import BodyTrainer
 from ico3d.body.training.train_clip import BodyJob, train_body
+from ico3d.errors import SettingsError
 from support.bodies.moving_capture import MovingCapture
+from support.bodies.tracked_capture import TrackedCapture
 from support.raft import NAME, install_torchvision, write_raft
 from support.settings import changed
 
@@ -91,6 +93,14 @@ def _assert_colors_kept(folder):
     tuned = load_window(folder / "finetuned/0001/window.safetensors").camera_colors
     assert torch.equal(trained, tuned)
     assert (trained - torch.eye(3, 4)).abs().max() > 1e-3
+
+
+def test_a_skeleton_takes_neither_harmonics_nor_segments(tmp_path):
+    """One sentence, before a folder is made."""
+    for change in ({"sh_degree": 1}, {"windows.segment": 45, "sh_degree": 0}):
+        with pytest.raises(SettingsError, match="are not for --method skinned"):
+            train_body(TrackedCapture(tmp_path), tmp_path / "body", _job("skinned", **change))
+    assert not (tmp_path / "body").exists()
 
 
 def test_spacetime_gaussians_are_trained_in_segments(tmp_path):

@@ -232,10 +232,11 @@ def _flat_body(body: "TrainedBody", capture: "Capture | None", report: Report) -
     from ico3d.avatar.baking.body_cost import ring_of_cameras
     from ico3d.avatar.baking.flat import colors, cost
 
+    if not colors.depends_on_view(body):
+        return body
     around = ring_of_cameras(*seen_box(partial(body.window_gaussians, 0)), count=8)
     flat = colors.flat_body(body, colors.seeing_cameras(capture) if capture else around)
-    if flat is not body:
-        report(_flattened("the body", cost.body_loss(body, flat, capture, around)))
+    report(_flattened("the body", cost.body_loss(body, flat, capture, around)))
     return flat
 
 

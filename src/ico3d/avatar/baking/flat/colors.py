@@ -112,15 +112,18 @@ def flat_head(
     return replace(head, model=FlatHead(model, mean_harmonics(pairs)))
 
 
+def depends_on_view(body: TrainedBody) -> bool:
+    """Whether colours of a body depend on the direction of view."""
+    return any(HARMONICS in model.gaussians for model in body.models)
+
+
 def flat_body(body: TrainedBody, cameras: Sequence[Camera]) -> TrainedBody:
-    """A trained body with colours of degree 0; the body itself where it has no others.
+    """A trained body with colours of degree 0.
 
     Args:
-        body: The exact body.
+        body: The exact body, whose colours depend on the view.
         cameras: Cameras in the world from which Gaussians are seen.
     """
-    if not any(HARMONICS in model.gaussians for model in body.models):
-        return body
     return replace(body, models=[_flat_window(model, cameras) for model in body.models])
 
 
