@@ -5,9 +5,9 @@
 Records a synthetic person and trains head, body and scene on it by the command line, with
 --preset paper, SGD and VGG from the first step for the head, harmonics of degree 3, colour maps for
 the body's cameras, and a density control that is squeezed into so few steps. Each is trained
-twice: once at a stretch, once killed by SIGKILL as soon as it has a checkpoint and then gone on with.
-Both must hold the same tensors, bit for bit. VGG's weights are those that are installed; without,
-random ones of its shape are written to OUT.
+twice: once at a stretch, once killed by SIGKILL as soon as it has a checkpoint, and then gone on
+with. Both must hold the same tensors, bit for bit. VGG's weights are those that are installed;
+without, random ones of its shape are written to OUT.
 """
 
 import json
@@ -101,10 +101,8 @@ class Paper:
     def _body(self) -> list[str]:
         count = ["--initial.gaussians", "500", "--density.max-gaussians", "1000"]
         warm = ["--warmup-steps", str(self.steps // 10), "--finetune.steps", str(self.steps // 3)]
-        return ["--color-correction", "--windows.longest", "6", "--windows.shortest", "3"] + [
-            *warm,
-            *count,
-        ]
+        cut = ["--windows.longest", "6", "--windows.shortest", "3"]
+        return ["--color-correction", *cut, *warm, *count]
 
     @property
     def _scene(self) -> list[str]:

@@ -99,8 +99,8 @@ class Rates:
 SGD_GAINS = {
     "means": 2.5e3,
     "quats": 2.5e6,
-    "log_scales": 4e5,
-    "basis": 2e6,
+    "log_scales": 3.75e5,
+    "basis": 1.75e6,
     "mlp": 3e3,
     "adaptor": 1e4,
 }
