@@ -61,6 +61,15 @@ def test_no_body_and_damaged_ones(body, tmp_path):
         TrainedBody.load(tmp_path)
 
 
+def test_how_cameras_differ_in_colour_is_kept(tmp_path):
+    """Bit by bit; a model without that stays without."""
+    maps = torch.randn(4, 3, 4)
+    for colors in (maps, None):
+        save_window(tmp_path / "w.safetensors", WindowModel(Still(), canonical(), {}, colors))
+        found = load_window(tmp_path / "w.safetensors").camera_colors
+        assert found is colors is None or torch.equal(found, maps)
+
+
 def test_a_window_of_something_else_is_refused(tmp_path):
     """A file of the right kind with other tensors."""
     model = WindowModel(Still(), canonical(), {})

@@ -10,7 +10,8 @@ import pytest
 from safetensors.torch import load_file
 
 from ico3d.training.processes import fork_server
-from support.heads.train_tiny import SETTINGS, train_tiny
+from support.heads.train_tiny import PAPER, SETTINGS, train_as_paper, train_tiny
+from support.lpips_weights import write_vgg
 
 pytestmark = pytest.mark.slow
 
@@ -63,6 +64,42 @@ def test_killed_five_times_it_gives_the_same_head_bit_for_bit(processes, tmp_pat
     for name, tensor in models[0].items():
         assert tensor.equal(models[1][name]), name
     _assert_tidy(tmp_path / "parts" / "model")
+
+
+def test_the_papers_settings_are_killed_and_give_the_same_head_bit_for_bit(
+    processes, tmp_path, monkeypatch
+):
+    """SGD, VGG from the first step, harmonics and growing; what was used is written down."""
+    models = tmp_path / "models"
+    models.mkdir()
+    write_vgg(models)
+    (tmp_path / "whole").mkdir()
+    (tmp_path / "whole" / "models").symlink_to(models)
+    killed = processes.Process(target=train_as_paper, args=(tmp_path, 13))
+    killed.start()
+    monkeypatch.setenv("ICO3D_MODELS", str(models))
+    train_as_paper(tmp_path / "whole")
+    killed.join()
+    assert killed.exitcode == -9 and (tmp_path / "model" / "checkpoint.safetensors").is_file()
+    train_as_paper(tmp_path)
+    whole, parts = (
+        load_file(folder / "model" / "model.safetensors")
+        for folder in (tmp_path / "whole", tmp_path)
+    )
+    assert len(whole["means"]) > PAPER.initial.gaussians
+    assert whole["harmonics_branch.weight"].abs().max() > 0
+    assert whole.keys() == parts.keys()
+    for name, tensor in whole.items():
+        assert tensor.equal(parts[name]), name
+    made = json.loads((tmp_path / "model" / "head.json").read_text())["summary"]["made"]
+    assert made["seed"] == 0 and len(made["environments"]) == 1
+    assert made["used"] == {
+        "optimiser": "sgd",
+        "sh_degree": 3,
+        "perceptual": 0.1,
+        "mixed_precision": False,
+        "encoder": None,
+    }
 
 
 def _assert_tidy(folder: Path) -> None:

@@ -7,6 +7,7 @@ import torch
 
 from ico3d.errors import ModelError
 from ico3d.head.model import HeadModel
+from ico3d.splat import harmonics
 from ico3d.training.checkpoint import save_tensors
 from support.heads.shapes import head_shape
 
@@ -86,6 +87,40 @@ def test_a_file_brings_the_same_head_back(tmp_path, variant):
     assert loaded.shape == model.shape
     expression = torch.tensor([0.2, -0.5, 0.7])
     assert torch.equal(loaded.logits(expression), model.logits(expression))
+
+
+@pytest.mark.parametrize("variant", ["full", "no-mlp"])
+def test_colours_that_depend_on_the_view(variant, tmp_path):
+    """A slow sum over the harmonics, gradients by finite differences, and the file."""
+    shape = head_shape(2, variant, features=4, hidden=3, frequencies=1, sh_degree=2)
+    model = HeadModel(shape, 3).double()
+    for value in model.parameters():
+        value.data = 0.3 * torch.randn_like(value)
+    expression = torch.tensor([0.2, -0.5], dtype=torch.float64)
+    values, gaussians = model.logits(expression), model(expression)
+    assert values.shape == (3, 4 + 3 * 8) and gaussians.colors is None
+    way = torch.nn.functional.normalize(torch.randn(3, 3, dtype=torch.float64), dim=-1)
+    seen = harmonics.to_colors(gaussians.sh, way)
+    for n in range(3):
+        weights = harmonics.basis(way[n], 2)
+        for c in range(3):
+            slow = values[n, c].sigmoid()
+            for k in range(1, 9):
+                slow = slow + weights[k] * values[n, 4 + 3 * (k - 1) + c]
+            torch.testing.assert_close(seen[n, c], slow.clamp_min(0))
+    names = [n for n, _ in model.named_parameters() if n not in ("quats", "log_scales", "means")]
+
+    def harmonics_of(*parameters):
+        named = dict(zip(names, parameters, strict=True))
+        return torch.func.functional_call(model, named, expression).sh
+
+    assert torch.autograd.gradcheck(
+        harmonics_of, [dict(model.named_parameters())[n] for n in names]
+    )
+    model.float().save(tmp_path / "model.safetensors")
+    loaded = HeadModel.load(tmp_path / "model.safetensors")
+    assert loaded.shape == shape
+    assert torch.equal(loaded(expression.float()).sh, model(expression.float()).sh)
 
 
 def test_a_file_of_something_else_is_one_sentence(tmp_path):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from ico3d.body.planning.windows import Window
 from ico3d.errors import CaptureError
@@ -34,6 +35,15 @@ def test_the_truth_scores_highest(truth_scores):
     assert truth_scores["num_gaussians"] == 2 * POINTS
     assert truth_scores["train_seconds"] == 7.0 and truth_scores["ms_per_frame"] > 0
     json.dumps(truth_scores, allow_nan=False)
+
+
+def test_through_which_colours_test_cameras_look_is_said(capture, truth_scores):
+    """Their own are not known; training cameras' would say nothing of them."""
+    assert "camera_colors" not in truth_scores
+    body = true_body(capture)
+    body.models[0].camera_colors = torch.full((len(capture.cameras), 3, 4), 0.3)
+    scores = evaluate_body(body, capture, capture.split.test_cameras[:1], frames=[0])
+    assert scores["camera_colors"] == "identity" and scores["psnr"] > 100
 
 
 def test_what_is_reported_on(capture, truth_scores):

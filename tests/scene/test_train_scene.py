@@ -29,8 +29,8 @@ SMALL = {
 }
 
 
-def _job(only="person", strategy="default", frames="all", **changes) -> SceneJob:
-    settings = changed(settings_for("cpu", strategy), SMALL | changes)
+def _job(only="person", strategy="default", frames="all", preset="cpu", **changes) -> SceneJob:
+    settings = changed(settings_for(preset, strategy), SMALL | changes)
     return SceneJob(only, frames, strategy, 0, settings)
 
 
@@ -54,11 +54,13 @@ def test_a_person_has_no_background(still, tmp_path):
     assert alpha[outside].mean() < 0.02
 
 
-@pytest.mark.parametrize("strategy", ["default", "mcmc"])
-def test_a_killed_run_resumes_to_the_same_scene(still, tmp_path, strategy, monkeypatch):
+@pytest.mark.parametrize(
+    ("preset", "strategy"), [("cpu", "default"), ("cpu", "mcmc"), ("paper", "default")]
+)
+def test_a_killed_run_resumes_to_the_same_scene(still, tmp_path, preset, strategy, monkeypatch):
     capture = still(3)
-    often = {"checkpoint_every": 25, "density.begin": 10, "density.reset_every": 30}
-    job = _job(strategy=strategy, steps=60, **often)
+    often = {"checkpoint_every": 25, "density.begin": 10, "density.reset_every": 30, "sh_every": 15}
+    job = _job(strategy=strategy, preset=preset, steps=60, **often)
     whole = train_scene(capture, tmp_path / "whole", job)
     step = SceneTrainer.step
 
@@ -75,6 +77,8 @@ def test_a_killed_run_resumes_to_the_same_scene(still, tmp_path, strategy, monke
     assert len(whole.scene) > 120
     for name, value in whole.scene.parameters.items():
         assert torch.equal(resumed.scene.parameters[name], value), name
+    made = TrainedScene.load(tmp_path / "parts").summary["made"]
+    assert made["used"] == {"optimiser": "adam", "sh_degree": 3 if preset == "paper" else 1}
 
 
 def test_a_saved_scene_is_the_same(still, tmp_path):

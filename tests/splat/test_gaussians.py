@@ -90,7 +90,23 @@ def test_cat_and_selection_undo_each_other():
     both = cat([a, b])
     assert len(both) == 10
     assert torch.equal(both[4:].sh, b.sh) and torch.equal(both[:4].quats, a.quats)
-    with pytest.raises(ValueError, match="colors"):
-        cat([a, reference.scene(3, dtype=torch.float32)])
-    with pytest.raises(ValueError, match="shape of sh"):
-        cat([a, with_harmonics(3, 2)])
+
+
+def test_joined_gaussians_look_as_before():
+    """Whether they have colours, or harmonics of whatever degree."""
+    parts = [with_harmonics(4, 1), reference.scene(3, dtype=torch.float32), with_harmonics(3, 2)]
+    both = cat(parts)
+    assert both.sh.shape == (10, 9, 3) and both.colors is None
+    ways = torch.nn.functional.normalize(torch.randn(10, 3), dim=-1)
+    seen = harmonics.to_colors(both.sh, ways).split([4, 3, 3])
+    torch.testing.assert_close(seen[0], harmonics.to_colors(parts[0].sh, ways[:4]))
+    torch.testing.assert_close(seen[1], parts[1].colors)
+    torch.testing.assert_close(seen[2], harmonics.to_colors(parts[2].sh, ways[7:]))
+
+
+def test_what_is_above_a_degree_is_dropped():
+    a = with_harmonics(4, 2)
+    assert torch.equal(a.up_to_degree(1).sh, a.sh[:, :4])
+    assert torch.equal(a.up_to_degree(3).sh, a.sh)
+    painted = a.painted(torch.ones(4, 3))
+    assert painted.sh is None and painted.up_to_degree(0) is painted

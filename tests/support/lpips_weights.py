@@ -8,6 +8,20 @@ from safetensors.torch import save_file
 STAGES = ((64, 64), (128, 128), (256, 256, 256), (512, 512, 512), (512, 512, 512))
 
 
+def write_vgg(path: Path) -> None:
+    """Random weights of VGG-16 up to relu3_3, of a size that keeps that of features."""
+    generator = torch.Generator().manual_seed(0)
+    values, number, width = {}, 0, 3
+    for widths in STAGES[:3]:
+        for channels in widths:
+            weight = torch.randn((channels, width, 3, 3), generator=generator)
+            values[f"features.{number}.weight"] = weight * (2 / (9 * width)) ** 0.5
+            values[f"features.{number}.bias"] = torch.zeros(channels)
+            number, width = number + 2, channels
+        number += 1  # the pooling
+    save_file(values, path / "vgg16.safetensors")
+
+
 def write_weights(path: Path) -> tuple[dict, dict]:
     """Random weights, under torchvision's and the authors' names."""
     generator = torch.Generator().manual_seed(0)

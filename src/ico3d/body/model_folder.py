@@ -20,6 +20,8 @@ ABOUT = "body.json"
 """Name of the file that marks a folder as a body's."""
 UNTUNED = "untuned.json"
 """Name of the file that lists the windows before temporal fine-tuning, if there was one."""
+CAMERA_COLORS = "camera_colors"
+"""Name of the tensor of a window's file that says how the cameras' colours differ."""
 ROUNDING = 1e-6
 """Tolerance in frames for times that stand for whole frames: (31 / 15 s) · 15 may exceed 31."""
 
@@ -28,6 +30,8 @@ def save_window(file: Path, model: WindowModel) -> None:
     """Writes the model of one window."""
     named = {f"gaussians.{name}": tensor for name, tensor in model.gaussians.items()}
     named |= {f"shared.{name}": tensor for name, tensor in model.shared.items()}
+    if model.camera_colors is not None:
+        named[CAMERA_COLORS] = model.camera_colors
     save_tensors(file, named, model.motion.about())
 
 
@@ -39,11 +43,12 @@ def load_window(file: Path) -> WindowModel:
     """
     tensors, about = load_tensors(file)
     parts: dict[str, dict] = {"gaussians": {}, "shared": {}}
+    colors = tensors.pop(CAMERA_COLORS, None)
     try:
         for name, tensor in tensors.items():
             part, _, rest = name.partition(".")
             parts[part][rest] = tensor
-        return WindowModel(motion_from(about), parts["gaussians"], parts["shared"])
+        return WindowModel(motion_from(about), parts["gaussians"], parts["shared"], colors)
     except (KeyError, TypeError, ValueError) as error:
         raise ModelError(f"{file} does not hold a window of a body: {error}.") from error
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from ico3d.common.presets import PresetName
-from ico3d.training.rate import Rate
+from ico3d.training.rate import REST_FACTOR, Rate
 
 Method = Literal["swings++", "swings", "4dgs", "spacetime", "freetime", "static", "skinned", "hugs"]
 """How a body's Gaussians are moved.
@@ -42,11 +42,14 @@ class Windows:
             docs/bodies.md).
         shortest: Least number of frames of a window.
         longest: Largest number of frames of a window.
+        segment: Number of frames of each window of methods that do not follow the motion, such as
+            spacetime; 0 takes the clip as one window.
     """
 
     threshold: float = 100.0
     shortest: int = 6
     longest: int = 16
+    segment: int = 0
 
 
 @dataclass(frozen=True)
@@ -136,7 +139,8 @@ class Rates:
         rotation: Learning rate of the Gaussians' rotations (quaternions).
         scale: Learning rate of the logarithms of the Gaussians' sizes.
         opacity: Learning rate of the opacities' logits.
-        color: Learning rate of the colours' logits.
+        color: Learning rate of the colours' logits; that of harmonics above degree 0 is a
+            twentieth.
         shape_decay: Factor to which the rates of rotations, sizes, opacities and colours have
             decayed at the last step.
         mlp: Learning rate of the MLP.
@@ -189,6 +193,7 @@ class Rates:
             "log_scales": Rate(self.scale, self.shape_decay),
             "opacity_logits": Rate(self.opacity, self.shape_decay),
             "color_logits": Rate(self.color, self.shape_decay),
+            "harmonics": Rate(self.color * REST_FACTOR, self.shape_decay),
             "alpha": Rate(self.blend, self.motion_decay),
             "mlp": Rate(self.mlp, self.motion_decay),
             "grid": Rate(self.grid, self.motion_decay),
@@ -284,8 +289,11 @@ class BodySettings:
             window the same number, --steps.
         warmup_steps: Number of first steps of a window that learn from its middle frame alone,
             without motion.
-        color_correction: Let each camera learn an affine correction of colours, for cameras whose
-            colours differ.
+        sh_degree: Degree of the spherical harmonics, 0 to 3, by which colours depend on the
+            direction of view in the world; bundles keep degree 0. Not on a skeleton.
+        sh_every: Steps between two increases of the degree that is trained, which starts at 0.
+        color_correction: Let each camera learn an affine map of colours, for cameras whose colours
+            differ; the mean over cameras is the identity, with which test cameras are drawn.
         checkpoint_every: Steps from one checkpoint to the next.
         cache_gib: Memory for recorded pictures, GiB, or auto for half of what is free; what does
             not fit is read again, in the background, before each use.
@@ -305,6 +313,8 @@ class BodySettings:
     steps: int = 30_000
     steps_per_frame: int = 0
     warmup_steps: int = 1_000
+    sh_degree: int = 0
+    sh_every: int = 1_000
     color_correction: bool = False
     checkpoint_every: int = 1_000
     cache_gib: float | Literal["auto"] = "auto"
@@ -356,11 +366,21 @@ STEPS_PER_FRAME = 150
 """Steps per frame of skinned bodies in the preset `cpu`: their one window may have any length."""
 
 
+SEGMENT = 45
+"""Frames of a segment of Spacetime Gaussians in the preset `paper`: more did not fit into memory.
+
+Segments were trained apart there, without fine-tuning.
+"""
+
+
 def settings_for(preset: PresetName, method: Method) -> BodySettings:
     """The settings of a preset for a method; other methods differ as their own papers do."""
     settings = PRESETS[preset]
     if method == "swings":
         return replace(settings, mlp=replace(settings.mlp, depth=4))
+    if method == "spacetime" and preset == "paper":
+        windows = replace(settings.windows, segment=SEGMENT)
+        return replace(settings.without_finetuning(), windows=windows)
     if method == "4dgs":
         return replace(settings, mlp=replace(settings.mlp, sets=1))
     if method in SKINNED:

@@ -69,6 +69,7 @@ def initial_head(
         frequencies=settings.network.frequencies,
         box_center=tuple(((low + high) / 2).tolist()),
         box_size=float((high - low).max() / 2),
+        sh_degree=settings.sh_degree,
     )
     model = HeadModel(shape, len(points))
     model.means.data = torch.from_numpy(points).float()

@@ -11,6 +11,7 @@ from torch import Tensor, nn
 
 from ico3d.errors import ModelError
 from ico3d.head.basis import blend
+from ico3d.splat import harmonics
 from ico3d.splat.gaussians import Gaussians
 from ico3d.training.checkpoint import load_tensors, save_tensors
 
@@ -37,6 +38,8 @@ class HeadShape:
         box_center: Centre of the head's bounding box in metres; encoded positions are relative to
             it.
         box_size: Half of the box's longest edge in metres.
+        sh_degree: Degree of the spherical harmonics by which colours depend on the direction of
+            view; 0 for colours that do not.
     """
 
     expression_size: int
@@ -47,6 +50,12 @@ class HeadShape:
     frequencies: int
     box_center: tuple[float, float, float] = (0.0, 0.0, 0.0)
     box_size: float = 1.0
+    sh_degree: int = 0
+
+    @property
+    def outputs(self) -> int:
+        """V, values of a Gaussian: logits of r, g, b and opacity, harmonics above degree 0."""
+        return 4 + 3 * ((self.sh_degree + 1) ** 2 - 1)
 
     @property
     def blends(self) -> bool:
@@ -65,8 +74,8 @@ class HeadShape:
 
     @property
     def width(self) -> int:
-        """w, numbers per row and Gaussian; without an MLP these are the four logits."""
-        return self.features if self.has_mlp else 4
+        """w, numbers per row and Gaussian; without an MLP these are the values themselves."""
+        return self.features if self.has_mlp else self.outputs
 
     @property
     def mlp_inputs(self) -> int:
@@ -78,8 +87,11 @@ class HeadShape:
 class HeadModel(nn.Module):
     """N Gaussians in canonical head space, driven by an expression.
 
-    Geometry is static. Colour (SH degree 0) and opacity are φ(f, γ(μ)): the MLP φ reads the blended
-    features f = Fᵀe + f_0 and the encoded position γ(μ) of each Gaussian.
+    Geometry is static. Colour and opacity are φ(f, γ(μ)): the MLP φ reads the blended features
+    f = Fᵀe + f_0 and the encoded position γ(μ) of each Gaussian. The values (N, V) that φ returns
+    are logits of red, green, blue and opacity. If V > 4, coefficients of spherical harmonics above
+    degree 0 follow, three colours each, which change the colours by the direction of view in
+    canonical head space.
 
     Attributes:
         shape: Sizes and variant.
@@ -104,6 +116,10 @@ class HeadModel(nn.Module):
             self.color_branch = nn.Linear(shape.hidden, 3)
             self.opacity_branch = nn.Linear(shape.hidden, 1)
             nn.init.constant_(self.opacity_branch.bias, bias)
+            if shape.sh_degree:
+                self.harmonics_branch = nn.Linear(shape.hidden, shape.outputs - 4)
+                nn.init.zeros_(self.harmonics_branch.weight)
+                nn.init.zeros_(self.harmonics_branch.bias)
         else:
             self.basis.data[-1, :, 3] = bias
 
@@ -136,7 +152,7 @@ class HeadModel(nn.Module):
         return self.gaussians(self.logits(expression))
 
     def logits(self, expression: Tensor) -> Tensor:
-        """(N, 4) logits of red, green, blue and opacity for an expression (B,) on any device."""
+        """(N, V) values of the Gaussians for an expression (B,) on any device."""
         return self.decode(self.blended(expression), expression)
 
     def blended(self, expression: Tensor) -> Tensor:
@@ -149,14 +165,17 @@ class HeadModel(nn.Module):
         return torch.cat([expression.to(self.device), one]) if self.shape.blends else one
 
     def decode(self, features: Tensor, expression: Tensor) -> Tensor:
-        """The MLP φ: features (N, w) and expression (B,) to logits (N, 4)."""
+        """The MLP φ: features (N, w) and expression (B,) to values (N, V)."""
         if not self.shape.has_mlp:
             return features
         return self.branches(self.hidden(features, expression))
 
     def branches(self, hidden: Tensor) -> Tensor:
-        """The last layer of φ: activations (N, hidden) to logits (N, 4)."""
-        return torch.cat([self.color_branch(hidden), self.opacity_branch(hidden)], 1)  # (N, 4)
+        """The last layer of φ: activations (N, hidden) to values (N, V)."""
+        parts = [self.color_branch(hidden), self.opacity_branch(hidden)]
+        if self.shape.sh_degree:
+            parts.append(self.harmonics_branch(hidden))
+        return torch.cat(parts, 1)  # (N, V)
 
     def hidden(self, features: Tensor, expression: Tensor) -> Tensor:
         """Input (N, hidden) of the last layer of φ; arguments as for `decode`."""
@@ -174,14 +193,18 @@ class HeadModel(nn.Module):
         return torch.cat([positions, angles.sin(), angles.cos()], 1)
 
     def gaussians(self, logits: Tensor) -> Gaussians:
-        """Renderable Gaussians with the given logits (N, 4)."""
-        values = torch.sigmoid(logits)
+        """Renderable Gaussians with the given values (N, V)."""
+        values, rest = torch.sigmoid(logits[:, :4]), logits[:, 4:]
+        colors, sh = values[:, :3], None
+        if rest.shape[1]:
+            sh = harmonics.of_colors(colors, rest.unflatten(1, (-1, 3)))  # (N, K, 3)
         return Gaussians(
             means=self.means,
             quats=self.quats,
             scales=self.log_scales.exp(),
             opacities=values[:, 3],
-            colors=values[:, :3],
+            colors=colors if sh is None else None,
+            sh=sh,
         )
 
     def save(self, path: Path) -> None:

@@ -13,7 +13,7 @@ from ico3d.head.density import HeadDensity, Sampled, bound_scales
 from ico3d.head.expressions import ExpressionTrack
 from ico3d.head.loss import HeadLoss
 from ico3d.head.model import HeadModel
-from ico3d.head.settings import HeadSettings
+from ico3d.head.settings import SGD_GAINS, HeadSettings
 from ico3d.head.views import Picture, PictureCache, View, poses_digest, staged
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.density import contributions
@@ -89,6 +89,18 @@ class HeadTrainer:
         """The settings in effect: the perceptual weight is 0 if VGG's weights are not installed."""
         return self._loss.settings
 
+    @property
+    def used(self) -> dict:
+        """What takes effect, where the settings alone do not tell."""
+        settings = self.settings
+        looked = settings.steps > settings.loss.perceptual_from
+        return {
+            "optimiser": settings.optimiser,
+            "sh_degree": min((settings.steps - 1) // settings.sh_every, settings.sh_degree),
+            "perceptual": settings.loss.perceptual if looked else 0.0,
+            "mixed_precision": settings.mixed_precision and self.model.device.type == "cuda",
+        }
+
     def step(self, index: int) -> Mapping[str, float]:
         """Renders one picture and updates the parameters; returns the loss and other numbers."""
         self.pictures.expect(range(index, self._settings.steps), self._view)
@@ -98,6 +110,7 @@ class HeadTrainer:
         expression = self._expression(view)  # (B,)
         features = self._features(expression)  # (N, w)
         gaussians = self.model.gaussians(self._decode(features, expression))
+        gaussians = gaussians.up_to_degree(index // self._settings.sh_every)
         absgrad = self._settings.density.absgrad
         rendering = render(gaussians, [view.camera], background, absgrad=absgrad)
         loss = self._loss(rendering, target, picture, index)
@@ -182,6 +195,8 @@ class HeadTrainer:
         groups = self._settings.rates.by_parameter(self.model.shape.has_mlp)
         rates = {name: rate.at(progress) for name, rate in groups.items()}
         rates["means"] *= self.model.shape.box_size
+        if self._settings.optimiser == "sgd":
+            rates = {name: rate * SGD_GAINS[name] for name, rate in rates.items()}
         weights = self.model.row_weights(expression)
         assert features.grad is not None
         update_basis(

@@ -44,15 +44,23 @@ class PerceptualLoss(nn.Module):
 
     def forward(self, image: Tensor, target: Tensor) -> Tensor:
         """The distance (a scalar) of two pictures (H, W, 3) in [0, 1]."""
-        pair = torch.stack([image, target])  # (2, H, W, 3)
-        values = (pair - pair.new_tensor(MEAN)) / pair.new_tensor(DEVIATION)
-        values = values.permute(0, 3, 1, 2)  # (2, 3, H, W)
-        total = values.new_zeros(())
+        with (
+            torch.no_grad()
+        ):  # nothing learns from the target: its half of the backward pass is saved
+            wanted = self._taps(target)
+        pairs = zip(self._taps(image), wanted, strict=True)
+        return torch.stack([nn.functional.mse_loss(ours, theirs) for ours, theirs in pairs]).sum()
+
+    def _taps(self, picture: Tensor) -> list[Tensor]:
+        """Features (1, C, H', W') of a picture (H, W, 3) at the depths that are compared."""
+        values = (picture - picture.new_tensor(MEAN)) / picture.new_tensor(DEVIATION)
+        values = values.permute(2, 0, 1)[None]  # (1, 3, H, W)
+        found = []
         for index, layer in enumerate(self.features):
             values = layer(values)
             if index in TAPS:
-                total = total + nn.functional.mse_loss(values[0], values[1])
-        return total
+                found.append(values)
+        return found
 
 
 def vgg_layers(channels_of: Sequence[int]) -> nn.Sequential:

@@ -97,6 +97,21 @@ class Rates:
         }
 
 
+SGD_GAINS = {
+    "means": 2.5e3,
+    "quats": 2.5e6,
+    "log_scales": 3.75e5,
+    "basis": 1.75e6,
+    "mlp": 3e3,
+    "adaptor": 1e4,
+}
+"""Factors of the learning rates under SGD, measured (docs/choices.md).
+
+Adam's steps are about as long as the learning rate, those of SGD are as much shorter as gradients
+are. So the factors are about the reciprocals of usual gradients.
+"""
+
+
 @dataclass(frozen=True)
 class Initial:
     """The Gaussians that training begins with.
@@ -145,7 +160,11 @@ class HeadSettings:
 
     Attributes:
         steps: Optimisation steps, one picture each.
-        optimiser: Adam, or stochastic gradient descent as the paper says.
+        optimiser: Adam, or stochastic gradient descent as the paper says; then learning rates count
+            multiples of usual gradients, because the paper's rates are Adam's (docs/choices.md).
+        sh_degree: Degree of the spherical harmonics, 0 to 3, by which colours depend on the
+            direction of view; bundles keep degree 0.
+        sh_every: Steps between two increases of the degree that is trained, which starts at 0.
         checkpoint_every: Steps from one checkpoint to the next.
         cache_gib: Memory for recorded pictures, GiB, or auto for half of what is free; what does
             not fit is read again, in the background, before each use.
@@ -162,6 +181,8 @@ class HeadSettings:
 
     steps: int = 50_000
     optimiser: Literal["adam", "sgd"] = "adam"
+    sh_degree: int = 0
+    sh_every: int = 1_000
     checkpoint_every: int = 1_000
     cache_gib: float | Literal["auto"] = "auto"
     cache_dir: str = ""

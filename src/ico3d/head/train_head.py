@@ -27,6 +27,7 @@ from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.device import computing_device
 from ico3d.training.loop import LoopSettings, run_loop
+from ico3d.training.provenance import note_environment, provenance
 from ico3d.training.run import RunFolder
 from ico3d.training.watch import LivePage
 
@@ -94,6 +95,7 @@ def train_head(
     settings = job.settings
     if capture.shows == "body":
         settings = replace(settings, loss=replace(settings.loss, torso=0.0))
+    note_environment(folder, place)
     torch.manual_seed(job.seed)  # layers draw their weights
     track, adaptor, encoder = _inputs(capture, job, place)
     rng = np.random.default_rng(job.seed)
@@ -111,6 +113,7 @@ def train_head(
         "recording": trained_on(recording, train_cameras(capture), capture.split.train)
         | {"poses": trainer.poses},
         "settings": asdict(trainer.settings),
+        "made": provenance([folder], job.seed, trainer.used | {"encoder": encoder[0] or None}),
     }
     landmarks = canonical_landmarks(capture)
     eyes = _eyes(capture, track)

@@ -133,7 +133,8 @@ def evaluate_body(
     Returns:
         Values by metric, None where the capture does not allow the metric; `per_window`,
         `per_camera` and `per_frame`: lists of the same for parts of the pictures. `flicker` is the
-        mean of `per_border` (see `border_flicker`), None for a single window.
+        mean of `per_border` (see `border_flicker`), None for a single window. `camera_colors` is
+        there where training cameras have colour maps: `identity`, with which all are drawn here.
 
     Raises:
         CaptureError: If there is no picture to compare with.
@@ -152,6 +153,8 @@ def evaluate_body(
     result["num_gaussians"] = sum(map(len, body.models))
     result |= renderer.watch.figures()
     result["train_seconds"] = body.summary.get("train_seconds")
+    if any(model.camera_colors is not None for model in body.models):
+        result["camera_colors"] = "identity"  # a test camera's own map could only be learnt from it
     result["per_window"] = _per_window(found, spans or body.windows)
     result["per_border"] = [
         {"frame": window.last, "flicker": value}

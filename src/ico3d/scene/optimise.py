@@ -65,6 +65,11 @@ class SceneTrainer:
             parameter.requires_grad_()
 
     @property
+    def degree(self) -> int:
+        """The degree of the harmonics that the last step trains."""
+        return min((self._settings.steps - 1) // self._settings.sh_every, self.scene.degree)
+
+    @property
     def _population(self) -> Population:
         """The scene as density control sees it."""
         return Population(self.scene.parameters, self._optimiser.moments)

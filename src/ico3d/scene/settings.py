@@ -4,13 +4,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from ico3d.common.presets import PresetName
-from ico3d.training.rate import Rate
+from ico3d.training.rate import REST_FACTOR, Rate
 
 StrategyName = Literal["default", "mcmc"]
 """How Gaussians multiply: as in 3DGS, or as a Markov chain (Kheradmand et al. 2024)."""
-
-REST_FACTOR = 1 / 20
-"""Learning rate of harmonics above degree 0, as a factor of that of degree 0 (as in 3DGS)."""
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from ico3d.scene.surface_points import initial_scene
 from ico3d.scene.views import Frames, Only, SceneViews
 from ico3d.splat.device import computing_device
 from ico3d.training.loop import LoopSettings, run_loop
+from ico3d.training.provenance import note_environment, provenance
 from ico3d.training.run import RunFolder
 
 
@@ -60,6 +61,7 @@ def train_scene(
     if run.finished() is not None:
         return TrainedScene.load(folder)
     place = computing_device(device)
+    note_environment(folder, place)
     settings = job.settings
     views = SceneViews(capture, job.only, job.frames, settings.cache_gib, settings.cache_dir)
     start = initial_scene(capture, views, settings, np.random.default_rng(job.seed))
@@ -72,6 +74,7 @@ def train_scene(
         "capture": capture.provenance,
         "strategy": job.strategy,
         "settings": asdict(settings),
+        "made": provenance([folder], job.seed, {"optimiser": "adam", "sh_degree": trainer.degree}),
     }
     scene = TrainedScene(trainer.scene, job.only, job.frames, views.space, summary)
     scene.save(folder)

@@ -5,7 +5,7 @@
 # (torch leaves some of its functions untyped)
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import torch
@@ -55,6 +55,16 @@ class Gaussians:
     def __getitem__(self, index: Tensor | slice) -> "Gaussians":
         """Those that a mask, an index tensor or a slice selects."""
         return self.map(lambda tensor: tensor[index])
+
+    def painted(self, colors: Tensor) -> "Gaussians":
+        """The same Gaussians with other colours (N, 3), which look alike from everywhere."""
+        return replace(self, colors=colors, sh=None)
+
+    def up_to_degree(self, degree: int) -> "Gaussians":
+        """Without harmonics above a degree; the same Gaussians where there are none."""
+        if self.sh is None:
+            return self
+        return replace(self, sh=self.sh[:, : (degree + 1) ** 2])  # (N, K', 3)
 
     def drawable(self) -> Tensor:
         """(N,) bool: whether all parameters are finite and the quaternion is not 0."""
@@ -121,17 +131,26 @@ def _split_similarity(matrix: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def cat(parts: Sequence[Gaussians]) -> Gaussians:
-    """Concatenates several sets of Gaussians.
+    """Concatenates several sets of Gaussians; if any has harmonics, all have of the highest degree.
 
-    Raises:
-        ValueError: If some sets have colours and others harmonics, or harmonics differ in degree.
+    Harmonics that a set lacks are 0, so it looks as before.
     """
-    values = {}
+    most = max(0 if part.sh is None else part.sh.shape[1] for part in parts)
+    if most:
+        parts = [_with_harmonics(part, most) for part in parts]
+    values: dict[str, Tensor] = {}
     for field in fields(Gaussians):
         tensors = [getattr(part, field.name) for part in parts]
-        if any(t is None for t in tensors) != all(t is None for t in tensors):
-            raise ValueError(f"only some of the Gaussians to join have {field.name}")
-        if len({t.shape[1:] for t in tensors if t is not None}) > 1:
-            raise ValueError(f"the Gaussians to join differ in the shape of {field.name}")
-        values[field.name] = None if tensors[0] is None else torch.cat(tensors)
+        if tensors[0] is not None:
+            values[field.name] = torch.cat(tensors)
     return Gaussians(**values)
+
+
+def _with_harmonics(part: Gaussians, count: int) -> Gaussians:
+    """The same Gaussians with `count` coefficients of harmonics."""
+    sh = part.sh
+    if sh is None:
+        assert part.colors is not None
+        sh = harmonics.of_colors(part.colors)  # (N, 1, 3)
+    missing = sh.new_zeros(len(part), count - sh.shape[1], 3)
+    return replace(part, colors=None, sh=torch.cat([sh, missing], 1))  # (N, K, 3)

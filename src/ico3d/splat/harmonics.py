@@ -60,6 +60,12 @@ def to_colors(sh: Tensor, directions: Tensor) -> Tensor:
     return (torch.einsum("...nk,nkc->...nc", weights, sh) + 0.5).clamp_min(0)
 
 
+def of_colors(colors: Tensor, rest: Tensor | None = None) -> Tensor:
+    """Coefficients (N, K, 3) of colours (N, 3) that depend on the view by `rest` (N, K − 1, 3)."""
+    base = ((colors - 0.5) / C0)[:, None]  # (N, 1, 3)
+    return base if rest is None else torch.cat([base, rest], 1)  # (N, K, 3)
+
+
 def rotate(sh: Tensor, rotation: Tensor) -> Tensor:
     """Coefficients (N, K, 3) for objects that were turned by `rotation` (3, 3).
 

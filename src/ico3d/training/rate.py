@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+REST_FACTOR = 1 / 20
+"""Learning rate of harmonics above degree 0, as a factor of that of degree 0 (as in 3DGS)."""
+
 
 @dataclass(frozen=True)
 class Rate:

@@ -1,18 +1,17 @@
 """How much moves, and where."""
 
 import sys
-from types import ModuleType
 
 import cv2
 import numpy as np
 import pytest
-import torch
 
 from ico3d.body.planning.flow import clip_flow, dynamic_weights
 from ico3d.body.planning.flow_methods import DisFlow, best_method
 from ico3d.body.planning.windows import Window
 from ico3d.errors import CaptureError, MissingExtraError
 from support.bodies.moving_ball import BALL, HEIGHT
+from support.raft import NAME, install_torchvision, write_raft
 
 pytestmark = pytest.mark.slow
 
@@ -180,34 +179,12 @@ def test_without_raft_it_is_dis(monkeypatch):
         best_method()
 
 
-class Difference(torch.nn.Module):
-    """Has RAFT's interface: two batches of pictures in [-1, 1] in, a list of flows out."""
-
-    def __init__(self):
-        super().__init__()
-        self.factor = torch.nn.Parameter(torch.zeros(()))
-
-    def forward(self, before, after):
-        assert before.shape[2] % 8 == 0 and before.shape[3] % 8 == 0
-        assert min(before.shape[2:]) >= 128 and before.abs().max() <= 1
-        flow = self.factor * torch.stack([after[:, 0] - before[:, 0], after[:, 1]], 1)
-        return [flow * 0, flow]
-
-
 def test_raft_is_taken_where_its_weights_are(monkeypatch, tmp_path):
-    flows = ModuleType("torchvision.models.optical_flow")
-    flows.raft_small = lambda weights, progress: Difference()
-    models = ModuleType("torchvision.models")
-    models.optical_flow = flows
-    monkeypatch.setitem(sys.modules, "torchvision", ModuleType("torchvision"))
-    monkeypatch.setitem(sys.modules, "torchvision.models", models)
-    monkeypatch.setattr(torch.hub, "get_dir", lambda: str(tmp_path))
+    install_torchvision(monkeypatch, tmp_path)
     assert best_method().name == "dis"
-    (tmp_path / "checkpoints").mkdir()
-    file = tmp_path / "checkpoints" / "raft_small_C_T_V2-01064c6d.pth"
-    torch.save({"factor": torch.tensor(2.0)}, file)
+    write_raft(tmp_path, 2.0)
     method = best_method()
-    assert method.name == "raft_small_C_T_V2-01064c6d"
+    assert method.name == NAME
     before = np.zeros((150, 90, 3), np.uint8)
     after = before.copy()
     after[:, 40:] = 255

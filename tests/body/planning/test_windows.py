@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ico3d.body.planning.windows import Window, cut
+from ico3d.body.planning.windows import Window, cut, segments
 from ico3d.errors import SettingsError
 
 
@@ -117,3 +117,12 @@ def test_no_window_moves_more_than_the_threshold_where_any_length_is_allowed(mot
             calm = threshold / 2 / len(motion)
             burst = list(takewhile(calm.__lt__, motion[window.last :]))
             assert motion[window.last - 1] <= calm and moved + sum(burst) > threshold * (1 - 1e-9)
+
+
+def test_segments_are_of_equal_length():
+    """The paper's clip has 225 frames, in five segments of 45."""
+    found = segments(225, 45)
+    assert len(found) == 5 and (found[0].first, found[-1].last) == (0, 224)
+    assert all(a.last == b.first for a, b in pairwise(found))
+    assert set(_lengths(found)) == {45, 46}
+    assert segments(9, 0) == (Window(0, 8),) and segments(1, 45) == (Window(0, 0),)

@@ -115,6 +115,23 @@ def test_rates_begin_where_they_are_told(capture, models, monkeypatch):
     assert seen == [0.5, 0.75, 1.0]
 
 
+def test_maps_of_colours_are_kept_and_used(capture, models):
+    """They stay what training found, and recorded pictures are compared through them."""
+    maps = torch.eye(3, 4).repeat(len(capture.cameras), 1, 1)
+    maps[:, 0, 0] = torch.linspace(0.5, 1.5, len(maps))
+    models[1].camera_colors = maps.clone()
+    tuner = tuner_of(capture, models, 0.0, color_correction=True)
+    learner = tuner._learner
+    view = next(view for view in learner.views if view.camera_index == 0)
+    example = learner.example(view, 0)
+    drawn = learner.draw(models[1].at(0.0), view, example)
+    person = drawn.rgb - (1 - drawn.alpha)[..., None] * example.color
+    torch.testing.assert_close(person[..., 0], 0.5 * drawn.drawing.rgb[..., 0], rtol=0, atol=1e-6)
+    for index in range(10):
+        tuner.step(index)
+    assert torch.equal(models[1].camera_colors, maps)
+
+
 def test_resuming_repeats_the_uninterrupted_run(capture, models):
     """Bit by bit."""
     start = {n: v.detach().clone() for n, v in models[1].gaussians.items()}

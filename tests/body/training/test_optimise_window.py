@@ -140,9 +140,12 @@ def test_cameras_that_see_other_colors_are_corrected(capture):
     trainer = trainer_of(capture, color_correction=True, **{"rates.motion": 2e-2})
     for index in range(160):
         trainer.step(index)
-    affine = trainer.tensors()["affine"].detach()
-    grey = (affine @ torch.tensor([0.5, 0.5, 0.5, 1.0])).mean(1)  # (C,)
+    maps = trainer.model.camera_colors.detach()
+    grey = (maps @ torch.tensor([0.5, 0.5, 0.5, 1.0])).mean(1)  # (C,)
     assert grey[1] / grey[[0, 2]].mean() == pytest.approx(0.8, abs=0.06)
+    learnt = sorted({view.camera_index for view in trainer._learner.views})
+    assert set(capture.split.test_cameras).isdisjoint(learnt)
+    torch.testing.assert_close(maps[learnt].mean(0), torch.eye(3, 4), rtol=0, atol=1e-6)
 
 
 def test_epochs_show_every_view_once(capture):

@@ -22,13 +22,14 @@ class TinyCapture(Capture):
     num_frames = FRAMES
     blendshape_names = ("redden", "pale", "unused")
 
-    def __init__(self, path: Path):
-        self.path = path
+    def __init__(self, path: Path, size: int = SIZE):
+        self.path, self._size = path, size
         self.split = last_eleventh(FRAMES)
-        intrinsics = np.array([[60.0, 0, SIZE / 2], [0, 60.0, SIZE / 2], [0, 0, 1]])
+        focal = 1.25 * size
+        intrinsics = np.array([[focal, 0, size / 2], [0, focal, size / 2], [0, 0, 1]])
         eyes = ([0.0, 0.0, 1.0], [0.4, 0.1, 0.9])
         self.cameras = tuple(
-            Camera(SIZE, SIZE, intrinsics, look_at(np.array(eye), np.zeros(3)), str(number))
+            Camera(size, size, intrinsics, look_at(np.array(eye), np.zeros(3)), str(number))
             for number, eye in enumerate(eyes)
         )
         rng = np.random.default_rng(0)
@@ -58,7 +59,7 @@ class TinyCapture(Capture):
         return pose
 
     def background(self, camera):
-        return np.full((SIZE, SIZE, 3), 0.5, np.float32)
+        return np.full((self._size, self._size, 3), 0.5, np.float32)
 
     def audio(self):
         times = np.arange(int(16000 * FRAMES / self.fps)) / 16000

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ico3d.avatar.baking.body_cost import HeadAt
     from ico3d.body.model_folder import TrainedBody
     from ico3d.bundle.animation import Animation
-    from ico3d.bundle.manifest import Persona
+    from ico3d.bundle.manifest import Loss, Persona
     from ico3d.capture.capture import Capture
     from ico3d.head.model_folder import TrainedHead
     from ico3d.motion.recorded.cut import Cut
@@ -119,6 +119,7 @@ class Bake:
     def _bake_head(self, head: "TrainedHead", report: Report) -> None:
         from ico3d.avatar import staging
         from ico3d.avatar.baking import head_bundle, head_cost
+        from ico3d.avatar.baking.flat import colors, cost
         from ico3d.avatar.baking.persona import load_persona
         from ico3d.avatar.baking.samples import recorded_samples
         from ico3d.capture.formats import open_capture
@@ -129,6 +130,12 @@ class Bake:
         capture = head_in(open_capture(self.files[0]))
         neutral = staging.background_colour(capture, 0)
         views = head_cost.references(head, capture, neutral, head_bundle.MEASURED_VIEWS)
+        if head.model.shape.sh_degree:
+            track = head.track(capture)
+            shown = [track.at(frame).detach() for frame in capture.split.train]
+            exact, head = views, colors.flat_head(head, capture, shown)
+            report(_flattened("the head", cost.head_loss(head, exact)))
+            views = head_cost.references(head, capture, neutral, head_bundle.MEASURED_VIEWS)
         samples = recorded_samples(head, capture)
         result = head_bundle.bake(head, views, samples, self.rank, report)
         if self.strip:
@@ -146,6 +153,7 @@ class Bake:
             self._refuse("--rank is for heads: what a body keeps is chosen window by window.")
         persona, notices = self._body_persona(), self._notices()
         capture = self._capture(0)
+        body = _flat_body(body, capture, report)
         parts, check = _baked(body, capture, None, read_cuts(self.model, body), report)
         if self.strip:
             _save_picture(body_bundle.strip(body, parts.baked, capture), self.strip)
@@ -162,6 +170,7 @@ class Bake:
         persona, notices = load_persona(self.persona), self._notices()
         animation = person_bundle.animation_of(self.model, avatar)
         head_capture, body_capture = self._capture(0), self._capture(1)
+        avatar = _flat_avatar(avatar, head_capture, body_capture, report)
         samples, views = person_bundle.head_samples(avatar, head_capture, persona)
         head = head_bundle.bake(avatar.head, views, samples, self.rank, report)
         head_at = person_bundle.head_at(avatar)
@@ -214,6 +223,51 @@ class Bake:
         from ico3d.errors import SettingsError
 
         raise SettingsError(sentence)
+
+
+def _flat_body(body: "TrainedBody", capture: "Capture | None", report: Report) -> "TrainedBody":
+    """The body with colours that do not depend on the view; reports what that costs."""
+    from functools import partial
+
+    from ico3d.avatar.baking.body_bundle import seen_box
+    from ico3d.avatar.baking.body_cost import ring_of_cameras
+    from ico3d.avatar.baking.flat import colors, cost
+
+    if not colors.depends_on_view(body):
+        return body
+    around = ring_of_cameras(*seen_box(partial(body.window_gaussians, 0)), count=8)
+    flat = colors.flat_body(body, colors.seeing_cameras(capture) if capture else around)
+    report(_flattened("the body", cost.body_loss(body, flat, capture, around)))
+    return flat
+
+
+def _flat_avatar(
+    avatar: "TrainedAvatar",
+    head_capture: "Capture | None",
+    body_capture: "Capture | None",
+    report: Report,
+) -> "TrainedAvatar":
+    """The person with colours that do not depend on the view; reports what that costs."""
+    from dataclasses import replace
+
+    import torch
+
+    from ico3d.avatar.baking.flat import colors, cost
+    from ico3d.avatar.baking.samples import references_around
+
+    head, shown = avatar.head, [torch.from_numpy(row) for row in avatar.expressions]
+    flat = colors.flat_head(head, head_capture, shown)
+    if flat is not head:
+        views = references_around(head, avatar.expressions, colors.PROBES)
+        report(_flattened("the head", cost.head_loss(flat, views)))
+    return replace(avatar, head=flat, body=_flat_body(avatar.body, body_capture, report))
+
+
+def _flattened(what: str, loss: "Loss") -> str:
+    """A line about what it costs that colours do not depend on the view."""
+    from ico3d.avatar.baking.head_cost import in_words
+
+    return f"{what} without view-dependent colours: {in_words(loss)}."
 
 
 def _played(animation: "Animation", report: Report) -> "Animation":

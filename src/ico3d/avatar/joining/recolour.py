@@ -7,7 +7,7 @@ done once, before the body's windows are trained with this head.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -189,7 +189,7 @@ class _Frozen:
 def _difference(layer: nn.Module, frozen: _Frozen, view: FaceView) -> Tensor:
     """Mean absolute difference over pixels that head and person cover, but for mouth and eyes."""
     hidden, drawn = frozen.at(view.frame)
-    rendering = render(replace(drawn, colors=layer(hidden).sigmoid()), [view.camera], view.image)
+    rendering = render(drawn.painted(layer(hidden).sigmoid()), [view.camera], view.image)
     weight = ((rendering.alpha[0] > CERTAIN) & (view.mask > CERTAIN)) * view.steady  # (H, W)
     difference = (rendering.rgb[0] - view.image).abs().mean(-1)  # (H, W)
     return (difference * weight).sum() / weight.sum().clamp_min(1)

@@ -1,7 +1,7 @@
 """How well a head sits on a body: the gap in space, and the seam in pictures."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -147,7 +147,7 @@ def _scores_of(avatar: TrainedAvatar, view: FaceView) -> tuple[float, float, flo
 def _share(head: Gaussians, body: Gaussians, view: FaceView) -> np.ndarray:
     """(H, W) share of each pixel, 0 to 1, that the head covers in front of the body."""
     white, black = torch.ones_like(head.means), torch.zeros_like(body.means)
-    marked = cat([replace(body, colors=black), replace(head, colors=white)])
+    marked = cat([body.painted(black), head.painted(white)])
     return render(marked, [view.camera]).rgb[0, :, :, 0].cpu().numpy()
 
 

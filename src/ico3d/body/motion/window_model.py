@@ -6,10 +6,15 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
+from ico3d.splat import harmonics
 from ico3d.splat.gaussians import Gaussians
 
 CANONICAL = ("means", "quats", "log_scales", "opacity_logits", "color_logits")
 """Names of the tensors that all Gaussians have, as they are trained and stored."""
+
+HARMONICS = "harmonics"
+"""Name of the tensor (N, K − 1, 3) that Gaussians also have if their colours depend on the view:
+coefficients of spherical harmonics above degree 0, in the world."""
 
 
 class Motion(Protocol):
@@ -50,11 +55,21 @@ class WindowModel:
         motion: What moves the Gaussians.
         gaussians: Tensors of the Gaussians by name, as stored: `means` (N, 3) metres, `quats`
             (N, 4) wxyz not normalised, `log_scales` (N, 3), `opacity_logits` (N,), `color_logits`
-            (N, 3), and those of `motion.per_gaussian`. Density control replaces them.
+            (N, 3), those of `motion.per_gaussian`, and `HARMONICS` where colours depend on the
+            view. Density control replaces them.
         shared: Tensors of `motion.shared` by name.
+        camera_colors: (C, 3, 4) how the recording cameras' colours differ from those of the
+            Gaussians, by index of the camera (`ico3d.body.camera_colors`); None where that was not
+            learnt. Training alone uses it.
     """
 
-    def __init__(self, motion: Motion, gaussians: dict[str, Tensor], shared: dict[str, Tensor]):
+    def __init__(
+        self,
+        motion: Motion,
+        gaussians: dict[str, Tensor],
+        shared: dict[str, Tensor],
+        camera_colors: Tensor | None = None,
+    ):
         """Makes a model of tensors, which are not copied.
 
         Raises:
@@ -65,15 +80,21 @@ class WindowModel:
             ("per-Gaussian", gaussians, {*CANONICAL, *motion.per_gaussian}),
             ("shared", shared, {*motion.shared}),
         ):
-            if set(tensors) != names:
+            if set(tensors) - {HARMONICS} != names:
                 raise ValueError(f"{kind} tensors are {sorted(tensors)}, expected {sorted(names)}")
         if len({len(tensor) for tensor in gaussians.values()}) != 1:
             raise ValueError("per-Gaussian tensors differ in length")
         self.motion, self.gaussians, self.shared = motion, gaussians, shared
+        self.camera_colors = camera_colors
 
     def __len__(self) -> int:
         """Number of Gaussians."""
         return len(self.gaussians["means"])
+
+    @property
+    def canonical_names(self) -> tuple[str, ...]:
+        """Names of the tensors of the canonical Gaussians."""
+        return (*CANONICAL, HARMONICS) if HARMONICS in self.gaussians else CANONICAL
 
     @property
     def device(self) -> torch.device:
@@ -84,6 +105,8 @@ class WindowModel:
         """Moves all tensors to a device."""
         self.gaussians = {name: value.to(device) for name, value in self.gaussians.items()}
         self.shared = {name: value.to(device) for name, value in self.shared.items()}
+        if self.camera_colors is not None:
+            self.camera_colors = self.camera_colors.to(device)
 
     def at(self, tau: float) -> Gaussians:
         """Activated Gaussians in the world at a time τ in [0, 1] of the window."""
@@ -111,10 +134,12 @@ def activated(
         visibility: (N,) factors of the opacities; None for 1.
     """
     opacities = values["opacity_logits"].sigmoid()  # (N,)
+    colors, rest = values["color_logits"].sigmoid(), values.get(HARMONICS)
     return Gaussians(
         means=values["means"] if means is None else means,
         quats=values["quats"] if quats is None else quats,
         scales=(values["log_scales"] if log_scales is None else log_scales).exp(),
         opacities=opacities if visibility is None else opacities * visibility,
-        colors=values["color_logits"].sigmoid(),
+        colors=colors if rest is None else None,
+        sh=None if rest is None else harmonics.of_colors(colors, rest),  # (N, K, 3)
     )

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -42,6 +43,18 @@ class Window:
     def tau(self, frame: float) -> float:
         """Time τ within the window: 0 at its first frame, 1 at its last."""
         return (frame - self.first) / max(self.last - self.first, 1)
+
+
+def segments(frames: int, length: int) -> tuple[Window, ...]:
+    """Cuts a clip into windows of equal length, whatever moves; neighbours share one frame.
+
+    Args:
+        frames: Number of frames of the clip.
+        length: Number of frames of a window, but for the shared ones; 0 for a single window.
+    """
+    count = min(math.ceil(frames / length), max(frames - 1, 1)) if length else 1
+    edges = np.linspace(0, frames - 1, count + 1).round().astype(int).tolist()
+    return tuple(Window(first, last) for first, last in pairwise(edges))
 
 
 def cut(

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from ico3d.body.companion import Companion
-from ico3d.body.motion.window_model import WindowModel
+from ico3d.body.motion.window_model import HARMONICS, WindowModel
 from ico3d.body.settings import BodySettings
 from ico3d.body.training.surface_points import point_colors
 from ico3d.capture.capture import Capture
@@ -51,10 +51,12 @@ def round_gaussians(
     sizes = np.concatenate([spacing(cloud) for cloud in clouds]) * settings.initial.scale  # (P,)
     count, opacity = len(sizes), settings.initial.opacity
     color = torch.from_numpy(np.concatenate(colors).clip(0.02, 0.98)).float()  # (P, 3)
+    rest = torch.zeros(count, (settings.sh_degree + 1) ** 2 - 1, 3)
     return {
         "means": torch.from_numpy(np.concatenate(clouds)).float(),
         "quats": torch.tensor([1.0, 0, 0, 0]).repeat(count, 1),
         "log_scales": torch.from_numpy(np.log(sizes)).float()[:, None].repeat(1, 3),
         "opacity_logits": torch.full((count,), math.log(opacity / (1 - opacity))),
         "color_logits": color.logit(),
+        **({HARMONICS: rest} if settings.sh_degree else {}),
     }

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from ico3d.body.companion import Companion
-from ico3d.body.motion.window_model import CANONICAL, WindowModel
+from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings
 from ico3d.body.training.novel_views import novel_camera
@@ -25,7 +25,7 @@ STILL_SEEN = 0.05
 
 
 class FineTuner(WindowTrainee):
-    """A `Trainee` of the canonical Gaussians of a window; the tensors of its motion are frozen.
+    """A `Trainee` of the canonical Gaussians of a window; motion and colour maps are frozen.
 
     Some steps compare the first frame of the window with the same frame of the previous window,
     rendered by novel cameras between the recording ones. The others learn from recorded pictures.
@@ -57,7 +57,9 @@ class FineTuner(WindowTrainee):
             companion: Other Gaussians that are in the pictures; None for none.
         """
         for name, tensor in {**model.gaussians, **model.shared}.items():
-            tensor.requires_grad_(name in CANONICAL)
+            tensor.requires_grad_(name in model.canonical_names)
+        if model.camera_colors is not None:
+            model.camera_colors.requires_grad_(False)  # or it would be learnt from few pictures
         super().__init__(Learner(model, window, pictures, settings, extent, seed, companion))
         self._settings, self._cameras = settings.finetune, cameras
         self._shared = window.first

@@ -54,6 +54,8 @@ class BodyTrainer(WindowTrainee):
         for name, tensor in {**model.gaussians, **model.shared}.items():
             tensor.requires_grad_(name not in fixed)
         super().__init__(Learner(model, window, pictures, settings, extent, seed, companion))
+        if model.camera_colors is not None:
+            model.camera_colors.requires_grad_(settings.color_correction)
         self._settings = settings
         # A copy, as training changes the joints in place.
         self._joints = model.shared["rig_joints"].detach().clone() if fixed else None  # (J, 3)
@@ -71,6 +73,7 @@ class BodyTrainer(WindowTrainee):
         view = learner.view(self._views(index), index)
         example = learner.example(view, index)
         gaussians = self.model.canonical() if still else self._moved(view, index)
+        gaussians = gaussians.up_to_degree(index // self._settings.sh_every)
         rendering = learner.draw(gaussians, view, example)
         loss = learner.loss(rendering, example) + self._penalties()
         loss.backward()

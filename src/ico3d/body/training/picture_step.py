@@ -2,15 +2,15 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from ico3d.body import camera_colors
 from ico3d.body.companion import Companion, Pruning
 from ico3d.body.motion.deformation import GRID, MLP
-from ico3d.body.motion.window_model import CANONICAL, WindowModel
+from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings
 from ico3d.body.skinning.skinned import NETWORK, PER_FRAME
@@ -32,7 +32,6 @@ class Learner:
         model: The window's model.
         optimiser: The optimiser, with its moments.
         views: All recorded views of the window's frames.
-        affine: (C, 3, 4) affine correction of colours for each camera, the identity at first.
         companion: Other Gaussians, which are drawn after those of the model; None for none.
     """
 
@@ -64,9 +63,9 @@ class Learner:
         self.views = pictures.views
         self._pictures, self._window, self._settings = pictures, window, settings
         self._rates, self._extent, self._seed = settings.rates.by_parameter(), extent, seed
-        cameras = 1 + max(view.camera_index for view in self.views)
-        self.affine = torch.eye(3, 4, device=model.device).repeat(cameras, 1, 1)  # (C, 3, 4)
-        self.affine.requires_grad_(settings.color_correction)
+        self._cameras = sorted({view.camera_index for view in self.views})
+        if settings.color_correction and model.camera_colors is None:
+            model.camera_colors = camera_colors.identities(1 + self._cameras[-1], model.device)
         self._epochs: dict[int, Epochs] = {}  # by the number of views
 
     @property
@@ -107,9 +106,12 @@ class Learner:
 
     def draw(self, gaussians: Gaussians, view: View, example: Example) -> Rendering:
         """Renders Gaussians and the companion for a view, before the example's colour."""
-        seen = self._corrected(self.accompanied(gaussians, view.frame), view.camera_index)
-        absgrad = self._settings.density.absgrad
-        return render(seen, [view.camera], example.color, absgrad=absgrad)
+        absgrad, maps = self._settings.density.absgrad, self.model.camera_colors
+        person = self.accompanied(gaussians, view.frame)
+        rendering = render(person, [view.camera], example.color, absgrad=absgrad)
+        if maps is None:
+            return rendering
+        return camera_colors.seen_by(rendering, maps[view.camera_index], example.color)
 
     def accompanied(self, gaussians: Gaussians, frame: int) -> Gaussians:
         """The Gaussians, followed by those of the companion at a frame."""
@@ -139,9 +141,10 @@ class Learner:
         Args:
             progress: Share of the steps that are done, 0 to 1, for the decay of learning rates.
         """
-        tensors = {**self.model.gaussians, **self.model.shared, "affine": self.affine}
+        maps = self.model.camera_colors
+        tensors = {**self.model.gaussians, **self.model.shared, "camera_colors": maps}
         for name, tensor in tensors.items():
-            if tensor.grad is None:
+            if tensor is None or tensor.grad is None:
                 continue
             rate = self._rates[_group(name)].at(progress)
             if name == "means":
@@ -152,12 +155,14 @@ class Learner:
                 rate /= math.sqrt(len(tensor))
             self.optimiser.update(name, tensor, tensor.grad, rate)
             tensor.grad = None
+        if maps is not None and maps.requires_grad:
+            camera_colors.center(maps, self._cameras)
 
     @torch.no_grad()
     def keep_mean(self, count: int) -> None:
         """Adds the canonical Gaussians to their running mean, so far one of `count` steps."""
         moments = self.optimiser.moments
-        for name in CANONICAL:
+        for name in self.model.canonical_names:
             value = self.model.gaussians[name].detach()
             mean = moments.setdefault(f"{name}.mean", value.clone())
             mean.lerp_(value, 1 / (count + 1))
@@ -165,7 +170,7 @@ class Learner:
     @torch.no_grad()
     def take_mean(self) -> None:
         """Replaces the canonical Gaussians by their running mean (`keep_mean`)."""
-        for name in CANONICAL:
+        for name in self.model.canonical_names:
             self.model.gaussians[name].copy_(self.optimiser.moments[f"{name}.mean"])
 
     def tensors(self) -> dict[str, Tensor]:
@@ -173,7 +178,8 @@ class Learner:
         named = {f"gaussians.{n}": value for n, value in self.model.gaussians.items()}
         named |= {f"shared.{n}": value for n, value in self.model.shared.items()}
         named |= {f"moments.{n}": value for n, value in self.optimiser.moments.items()}
-        return named | {"affine": self.affine}
+        maps = self.model.camera_colors
+        return named if maps is None else named | {"camera_colors": maps}
 
     def restore(self, tensors: dict[str, Tensor]) -> None:
         """Restores the state that `tensors` returned; the same tensors require gradients."""
@@ -181,19 +187,13 @@ class Learner:
             part, _, rest = name.partition(".")
             if part == "moments":
                 self.optimiser.moments[rest] = tensor
-            elif part == "affine":
-                self.affine = tensor.requires_grad_(self.affine.requires_grad)
+            elif part == "camera_colors":
+                assert self.model.camera_colors is not None
+                learns = self.model.camera_colors.requires_grad
+                self.model.camera_colors = tensor.requires_grad_(learns)
             elif part in ("gaussians", "shared"):
                 held = self.model.gaussians if part == "gaussians" else self.model.shared
                 held[rest] = tensor.requires_grad_(held[rest].requires_grad)
-
-    def _corrected(self, gaussians: Gaussians, camera: int) -> Gaussians:
-        """The Gaussians with the colour correction of one camera."""
-        if not self._settings.color_correction:
-            return gaussians
-        assert gaussians.colors is not None
-        matrix, offset = self.affine[camera, :, :3], self.affine[camera, :, 3]  # (3, 3), (3,)
-        return replace(gaussians, colors=gaussians.colors @ matrix.T + offset)
 
 
 class WindowTrainee:
@@ -235,5 +235,5 @@ def _group(name: str) -> str:
         return "grid"
     if name.startswith(NETWORK):
         return "coefficients"
-    formulas = ("center", "log_duration", "path", "turn", "affine")
+    formulas = ("center", "log_duration", "path", "turn", "camera_colors")
     return "motion" if name in formulas else name

@@ -13,7 +13,7 @@ from ico3d.body.motion.window_model import WindowModel
 from ico3d.body.planning.flow import clip_flow, dynamic_weights
 from ico3d.body.planning.plan import Plan, is_saved, make_plan, print_plan, save_plan
 from ico3d.body.planning.plan_picture import draw_plan
-from ico3d.body.planning.windows import Window
+from ico3d.body.planning.windows import Window, segments
 from ico3d.body.settings import ONE_WINDOW, SKINNED, BodySettings, Method
 from ico3d.body.training.finetune_window import FineTuner
 from ico3d.body.training.optimise_window import BodyTrainer
@@ -29,6 +29,7 @@ from ico3d.common.device import DeviceName
 from ico3d.errors import ModelError, SettingsError
 from ico3d.splat.device import computing_device
 from ico3d.training.loop import LoopSettings, run_loop
+from ico3d.training.provenance import note_environment, provenance
 from ico3d.training.run import RunFolder
 
 WINDOW_FILE = "window.safetensors"
@@ -130,6 +131,7 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
         return finished["train_seconds"]
     capture = training_part(capture or open_capture(task.capture), job.hold_out)
     device = computing_device(job.device)
+    note_environment(task.folder, device)
     companion = job.companion.open(device) if job.companion else None
     begin = _begin(task, capture, companion, device)
     begin.model.to(device)
@@ -195,6 +197,7 @@ def finetune_window(
     before = RunFolder(trained, about).finished()
     assert before is not None
     device = computing_device(job.device)
+    note_environment(task.folder, device)
     model.to(device)
     previous.to(device)
     cameras = [capture.cameras[index] for index in train_cameras(capture)]
@@ -237,15 +240,22 @@ def train_body(
     """
     if job.method in SKINNED:
         tracked(capture)  # raises before a folder is made
+        if job.settings.sh_degree or job.settings.windows.segment:
+            raise SettingsError(
+                f"--sh-degree and --windows.segment are not for --method {job.method}: on a "
+                "skeleton colours follow the light, and the clip is one window."
+            )
     run = RunFolder(folder, job.about(capture.path) | {"settings": asdict(job.settings)})
     if run.finished() is not None:
         return TrainedBody.load(folder)
+    flow = None
     if job.continued is not None:
         windows = _fitting(TrainedBody.load(job.continued), capture, job).windows
     elif job.method in ONE_WINDOW:
-        windows = (Window(0, capture.num_frames - 1),)
+        windows = segments(capture.num_frames, job.settings.windows.segment)
     else:
-        windows = plan_windows(capture, job, folder).windows
+        plan = plan_windows(capture, job, folder)
+        windows, flow = plan.windows, plan.method
     tasks = [
         WindowTask(
             capture.path, folder / "windows" / f"{index:04d}", folder / "flow", window, index, job
@@ -253,14 +263,16 @@ def train_body(
         for index, window in enumerate(windows)
     ]
     seconds = sum(runner(tasks) if runner else (train_window(task, capture) for task in tasks))
-    body = _save(capture, folder, job, tasks, seconds)
+    made = _made(job, tasks, flow)
+    body = _save(capture, folder, job, tasks, seconds, made)
     if job.settings.finetune.steps and len(tasks) > 1:
-        _save(capture, folder, job, tasks, seconds, UNTUNED)
+        _save(capture, folder, job, tasks, seconds, made, UNTUNED)
         tuned = [replace(t, folder=folder / "finetuned" / f"{t.index:04d}") for t in tasks[1:]]
         for before, task, after in zip(tasks, tasks[1:], tuned, strict=False):
             source = before if before.index == 0 else tuned[before.index - 1]
             seconds += finetune_window(after, capture, task.folder, load_window(source.file))
-        body = _save(capture, folder, job, [tasks[0], *tuned], seconds)
+        made = _made(job, [*tasks, *tuned], flow)
+        body = _save(capture, folder, job, [tasks[0], *tuned], seconds, made)
     run.finish({"train_seconds": seconds, "num_gaussians": sum(map(len, body.models))})
     return body
 
@@ -319,6 +331,7 @@ def _save(
     job: BodyJob,
     tasks: Sequence[WindowTask],
     seconds: float,
+    made: dict,
     about: str = ABOUT,
 ) -> TrainedBody:
     """Writes the file `about`, which lists the windows' files; returns the body."""
@@ -328,6 +341,7 @@ def _save(
         "capture": tracked(capture).credited(known) if job.method in SKINNED else known,
         "recording": _record(capture, job),
         "settings": asdict(job.settings),
+        "made": made,
     }
     if job.continued is not None:
         summary["continued"] = TrainedBody.load(job.continued).records
@@ -342,6 +356,18 @@ def _record(capture: Capture, job: BodyJob) -> dict:
     """Which pictures train the body."""
     part = training_part(capture, job.hold_out)
     return trained_on(capture, train_cameras(part), part.split.train)
+
+
+def _made(job: BodyJob, tasks: Sequence[WindowTask], flow: str | None) -> dict:
+    """How a body was made by some runs; `flow` names the flow method, None where none was used."""
+    settings = job.settings
+    used = {
+        "optimiser": "adam",
+        "flow": flow,
+        "sh_degree": settings.sh_degree,
+        "color_correction": settings.color_correction,
+    }
+    return provenance([task.folder for task in tasks], job.seed, used)
 
 
 def _about(capture: Path, window: Window, job: BodyJob) -> dict:

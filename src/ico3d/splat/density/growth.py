@@ -1,7 +1,7 @@
 """The rules of 3D Gaussian Splatting by which Gaussians are cloned, split and removed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import log
 
 import torch
@@ -92,7 +92,7 @@ def contributions(gaussians: Gaussians, cameras: Sequence[Camera]) -> Tensor:
     one = gaussians.means.new_zeros(len(gaussians), 3).requires_grad_()
     given: list[Tensor] = []
     for camera in cameras:
-        colored = replace(gaussians, colors=one, sh=None)
+        colored = gaussians.painted(one)
         with torch.enable_grad():
             total = render(colored, [camera]).rgb[..., 0].sum()
             given.append(torch.autograd.grad(total, one)[0][:, 0])  # (N,): d(Σ w·c)/dc
