@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
-from smc_files import write_renderme_fits
+from ico3d.studio.layouts.smc import write_renderme_fits
 from smc_line import timed
 
 from ico3d.bundle.format import Bundle

@@ -5,7 +5,7 @@ import shutil
 from pathlib import Path
 
 import numpy as np
-from bench import smc_files
+from ico3d.studio.layouts import smc
 from PIL import Image
 
 from ico3d.avatar.film.video import write_video
@@ -58,8 +58,8 @@ def many_cameras(face: Path, body: Path, work: Path) -> None:
 
 def data_sets(face: Path, body: Path, work: Path) -> None:
     """What the makers of the data sets hand out."""
-    smc_files.write_renderme(open_capture(face), work / "renderme", "0026_s1_all")
-    smc_files.write_dna(open_capture(body), work / "dna", "0012_11")
+    smc.write_renderme(open_capture(face), work / "renderme", "0026_s1_all")
+    smc.write_dna(open_capture(body), work / "dna", "0012_11")
     shutil.copy(face / "audio.wav", work / "speech.wav")
 
 
