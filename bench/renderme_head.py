@@ -14,12 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
-from smc_files import write_renderme_fits
 from smc_line import timed
 
 from ico3d.bundle.format import Bundle
 from ico3d.capture.formats import open_capture
 from ico3d.cli import run_script
+from ico3d.studio.layouts.smc import write_renderme_fits
 
 FPS = 30
 LEAST = 30.0

@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
-from smc_files import write_dna, write_renderme
 
 from ico3d.bundle.format import Bundle
 from ico3d.capture.formats import open_capture
 from ico3d.cli import run_script
+from ico3d.studio.layouts.smc import write_dna, write_renderme
 
 FPS = 15
 LIMIT = 40.0

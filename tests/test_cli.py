@@ -22,7 +22,7 @@ SETTINGS = {
     "train static": SceneSettings,
     "train speech": EncoderSettings,
     "assemble": BodySettings,
-    "bench body": BodySettings,
+    "measure body": BodySettings,
 }
 PLACES = ["capture", "out"]
 
@@ -164,7 +164,7 @@ def test_a_group_lists_its_verbs(shown):
 def test_a_verb_that_is_none_is_named(shown):
     text = shown("train heads --steps 3", status=2)
     assert text.startswith("ico3d: no such verb: train heads") and "train head" in text
-    assert "bench body" not in text
+    assert "measure body" not in text
     assert "no such verb: trian head" in shown("trian head", status=2)
 
 

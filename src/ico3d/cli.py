@@ -46,6 +46,8 @@ VERBS: dict[str, Verb] = {
     "assemble": Verb("ico3d.avatar.joining.command", "Assemble", "put a head on a person's body"),
     "evaluate": Verb("ico3d.measure.commands", "Evaluate", "measure a model on held-out frames"),
     "animate": Verb("ico3d.avatar.animation.command", "Animate", "find a body's rest and gestures"),
+    "measure body": Verb("ico3d.protocols.commands", "MeasureBody", "methods for bodies: a report"),
+    "measure viewer": Verb("ico3d.protocols.commands", "MeasureViewer", "frame rates: a report"),
     "bake": Verb("ico3d.avatar.baking.command", "Bake", "make the bundle that browsers play"),
     "bundle info": Verb("ico3d.bundle.commands", "Info", "check a bundle, say what is in it"),
     "render": Verb("ico3d.avatar.film.command", "Render", "film a person who talks or moves"),
@@ -61,7 +63,6 @@ VERBS: dict[str, Verb] = {
     "serve-module": Verb(
         "ico3d.chat.remote.commands", "ServeModule", "serve one part of the conversation"
     ),
-    "bench body": Verb("ico3d.measure.commands", "BenchBody", "compare methods for bodies"),
     "bench expression": Verb("ico3d.measure.commands", "BenchExpression", "measure the mouth"),
     "bench raster": Verb("ico3d.measure.commands", "BenchRaster", "time the rasteriser"),
     "bench chat": Verb(

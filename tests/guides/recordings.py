@@ -5,7 +5,6 @@ import shutil
 from pathlib import Path
 
 import numpy as np
-from bench import smc_files
 from PIL import Image
 
 from ico3d.avatar.film.video import write_video
@@ -15,6 +14,7 @@ from ico3d.capture.formats import open_capture
 from ico3d.capture.headpose.track_file import HeadTrack
 from ico3d.capture.importing.resizing import resize_capture
 from ico3d.common.expression import EYE_NAMES
+from ico3d.studio.layouts import smc
 from ico3d.studio.picture import paint
 from ico3d.studio.recording import Recording, record
 
@@ -58,8 +58,8 @@ def many_cameras(face: Path, body: Path, work: Path) -> None:
 
 def data_sets(face: Path, body: Path, work: Path) -> None:
     """What the makers of the data sets hand out."""
-    smc_files.write_renderme(open_capture(face), work / "renderme", "0026_s1_all")
-    smc_files.write_dna(open_capture(body), work / "dna", "0012_11")
+    smc.write_renderme(open_capture(face), work / "renderme", "0026_s1_all")
+    smc.write_dna(open_capture(body), work / "dna", "0012_11")
     shutil.copy(face / "audio.wav", work / "speech.wav")
 
 

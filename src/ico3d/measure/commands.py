@@ -1,15 +1,12 @@
 """The verbs `ico3d evaluate` and `ico3d bench`."""
 
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, get_args
+from typing import TYPE_CHECKING, Literal
 
 import tyro
 
-from ico3d.body.settings import SKINNED, BodySettings, Method
 from ico3d.common.device import DeviceName
-from ico3d.measure.methods.settings import OURS, preset
 
 if TYPE_CHECKING:
     from ico3d.avatar.avatar import TrainedAvatar
@@ -237,107 +234,3 @@ class BenchExpression:
             "differs: slices from the whole; silence: the mouth from rest, of its way in speech; "
             "r and lag for each recording."
         )
-
-
-@dataclass(frozen=True)
-class BenchBody:
-    """Trains SWinGS++ and methods to compare with on one recording, and measures all of them.
-
-    All methods have equal numbers of Gaussians and steps: one that takes the clip as a single
-    window has those of all windows together; one on a skeleton has as many Gaussians as one window.
-    All start on the visual hull, or on the skin. The same command continues an interrupted run.
-
-    Attributes:
-        capture: A recording of a whole person; by default one is made of --subject.
-        subject: The person of the standard recording, an .npz file.
-        garment: What that person wears over the clothes; with a skirt the hips turn, so that the
-            skirt swings. A folder holds only one standard recording.
-        folder: Folder for the recording and the trainings.
-        seeds: Number of trainings of each method, each with another seed.
-        methods: Methods to train; skinned and hugs, which need a body track, only if they are
-            named.
-        frames: Use only this many of the first frames; by default all.
-        unseen: Also measure the frames that --frames leaves out: a body on a skeleton takes the
-            poses of the body track, others stay as they were in the last trained frame.
-        finetune: Fine-tune SWinGS++ at the end and measure before and after; the table shows the
-            state before.
-        device: Where to compute: by default CUDA where that works, else the CPU.
-        jobs: Number of trainings at a time, which share the cores.
-        json: File for the figures.
-        settings: How SWinGS++ is trained. The other methods are trained in the same way, except
-            where their papers differ; options given here apply to all methods.
-    """
-
-    capture: tyro.conf.Positional[Path | None] = None
-    subject: Path | None = None
-    garment: Literal["none", "skirt"] = "none"
-    folder: Path = Path("bench-body")
-    seeds: int = 1
-    methods: tuple[Method, ...] = tuple(m for m in get_args(Method) if m not in SKINNED)
-    frames: int | None = None
-    unseen: bool = False
-    finetune: bool = False
-    device: DeviceName = "auto"
-    jobs: int = 1
-    json: Path | None = None
-    settings: Annotated[BodySettings, tyro.conf.arg(name="")] = field(
-        default_factory=partial(preset, OURS)
-    )
-
-    def run(self) -> None:
-        """Prints the table and margins, and writes the file.
-
-        Raises:
-            SettingsError: If neither a recording nor a person to record is given.
-        """
-        import json
-
-        from rich.console import Console
-
-        from ico3d.common.files import write_atomic
-        from ico3d.measure.methods import bench, tables
-        from ico3d.splat.device import decided
-
-        console = Console()
-        terms = bench.terms_for(
-            self._recording(),
-            self.frames,
-            self.folder,
-            self.settings,
-            self.finetune,
-            decided(self.device),
-            self.unseen,
-        )
-        trials = [
-            bench.Trial(method, seed, terms)
-            for seed in range(self.seeds)
-            for method in self.methods
-        ]
-        results = bench.run_trials(
-            trials, self.jobs, lambda *found: console.print(tables.line(*found))
-        )
-        figures = bench.summary(results)
-        figures["windows"] = [[window.first, window.last] for window in terms.windows]
-        figures["jobs"] = self.jobs
-        if self.json is not None:
-            write_atomic(self.json, json.dumps(figures, indent=1).encode())
-        for table in tables.tables(figures):
-            console.print(table)
-
-    def _recording(self) -> Path:
-        """The capture to train on."""
-        import os
-
-        from ico3d.errors import SettingsError
-        from ico3d.measure.methods.bench import record_standard
-
-        if self.seeds < 1 or self.jobs < 1 or (self.frames or 2) < 2:
-            raise SettingsError("--seeds and --jobs must be at least 1, and --frames at least 2.")
-        if self.capture is not None:
-            return self.capture
-        if self.subject is None:
-            raise SettingsError(
-                "ico3d bench body needs a capture, or a person to record: --subject FILE.npz."
-            )
-        folder, workers = self.folder / "capture", os.cpu_count() or 1
-        return record_standard(self.subject, folder, workers, self.garment)

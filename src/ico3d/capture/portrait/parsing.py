@@ -72,9 +72,9 @@ def _plain(person: np.ndarray, landmarks: np.ndarray) -> dict[tuple, np.ndarray]
     chin = landmarks[CHIN]
     rows = np.arange(person.shape[0])[:, None] + 0.5
     beside = np.abs(np.arange(person.shape[1]) + 0.5 - chin[0])[None] > 0.4 * wide
-    face = _filled(person.shape, landmarks[FACE_OVAL])
+    face = filled(person.shape, landmarks[FACE_OVAL])
     cheeks = (
-        face & (rows > landmarks[NOSE_BRIDGE, 1]) & ~_filled(person.shape, landmarks[OUTER_LIPS])
+        face & (rows > landmarks[NOSE_BRIDGE, 1]) & ~filled(person.shape, landmarks[OUTER_LIPS])
     )
     return {
         HAIR: person & ~face & (rows < landmarks[FOREHEAD, 1] + 0.25 * tall),
@@ -107,8 +107,8 @@ def parse(
     scores = [_averaged(colours.tables[part][cells]) + likely[part] for part in parts]
     parsing = np.array(parts, np.uint8)[np.argmax(scores, axis=0)]
     parsing[~person] = BACKGROUND
-    parsing[_filled(person.shape, landmarks[FACE_OVAL]) & person] = FACE
-    parsing[_filled(person.shape, landmarks[INNER_LIPS])] = MOUTH
+    parsing[filled(person.shape, landmarks[FACE_OVAL]) & person] = FACE
+    parsing[filled(person.shape, landmarks[INNER_LIPS])] = MOUTH
     return parsing
 
 
@@ -149,7 +149,7 @@ def face_size(landmarks: np.ndarray) -> tuple[float, float]:
     return float(tall), float(np.linalg.norm(landmarks[SIDES[1]] - landmarks[SIDES[0]]))
 
 
-def _filled(shape: tuple[int, ...], outline: np.ndarray) -> np.ndarray:
+def filled(shape: tuple[int, ...], outline: np.ndarray) -> np.ndarray:
     """(H, W) bool: inside a polygon of pixels."""
     import cv2
 

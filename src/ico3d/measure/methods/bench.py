@@ -17,16 +17,19 @@ from ico3d.body.training.train_clip import BodyJob, plan_windows, train_body
 from ico3d.capture.capture import Capture, all_frames
 from ico3d.capture.formats import open_capture
 from ico3d.common.device import DeviceName
+from ico3d.common.presets import PresetName
 from ico3d.errors import SettingsError
 from ico3d.measure.body import evaluate_body
 from ico3d.measure.methods.settings import OURS, changed_alike
 from ico3d.measure.methods.unseen import unseen_scores
 from ico3d.splat.device import computing_device
-from ico3d.studio.recording import Recording, record
 from ico3d.training.processes import fork_server
 
-SCORES = ("psnr_mask", "psnr_moving", "psnr", "ssim", "flicker", "num_gaussians", "train_seconds")
-"""Metrics of a trial that are kept; docs/measuring-bodies.md defines them."""
+SCORES = (
+    *("psnr_mask", "psnr_moving", "psnr", "ssim", "lpips"),
+    *("flicker", "num_gaussians", "train_seconds"),
+)
+"""Metrics of a trial that are kept; docs/measuring.md defines them."""
 PER_WINDOW = ("psnr_mask", "psnr_moving")
 """Metrics that are also kept for each window."""
 
@@ -44,6 +47,7 @@ class Terms:
         finetune: Whether SWinGS++ is fine-tuned in the end.
         device: Where to compute.
         unseen: Whether frames after the trained ones are measured, too.
+        preset: The preset from which all methods' settings come.
     """
 
     capture: Path
@@ -54,6 +58,7 @@ class Terms:
     finetune: bool
     device: DeviceName = "auto"
     unseen: bool = False
+    preset: PresetName = "cpu"
 
     def settings(self, method: Method) -> BodySettings:
         """The settings of a method.
@@ -61,7 +66,7 @@ class Terms:
         A method that takes the clip as one window gets the steps of all windows together and the
         Gaussians of all windows together; on a skeleton it gets those of one window.
         """
-        settings = changed_alike(method, self.ours)
+        settings = changed_alike(method, self.ours, self.preset)
         if not (self.finetune and method == OURS):
             settings = settings.without_finetuning()
         if method not in ONE_WINDOW:
@@ -117,6 +122,13 @@ class Trial:
         before = self._scores(TrainedBody.load(self.folder, UNTUNED), capture)
         return {"seed": self.seed} | before | {"tuned": self._scores(body, capture)}
 
+    def line(self, result: dict) -> str:
+        """One line about the trial's result."""
+        return (
+            f"{self.method}, seed {self.seed}: PSNR-M {result['psnr_mask']:.2f} dB, "
+            f"{result['train_seconds']:.0f} s"
+        )
+
     def _scores(self, body: TrainedBody, capture: Capture) -> dict:
         body.to(computing_device(self.terms.device))
         found = evaluate_body(body, capture, spans=self.terms.windows)
@@ -129,41 +141,6 @@ class Trial:
             whole = open_capture(self.terms.capture)
             scores |= unseen_scores(body, whole, capture.num_frames)
         return scores
-
-
-def record_standard(subject: Path, folder: Path, workers: int, garment: str = "none") -> Path:
-    """Records the synthetic clip for which figures are quoted, or continues recording it.
-
-    It has 20 cameras, and 41 frames at 15 per second, 288 pixels high. The person is calm, then
-    gestures, then gestures fast; with a garment the hips turn as well (motion `sway`).
-
-    Args:
-        subject: File `.npz` of the person.
-        folder: Folder of the capture.
-        workers: Number of threads that draw.
-        garment: What the person wears over the clothes; "none" for nothing.
-
-    Returns:
-        Path of the capture.
-    """
-    if not (folder / "capture.json").is_file():
-        recording = Recording(
-            subject=str(subject),
-            rig="body",
-            cameras=20,
-            frames=41,
-            fps=15.0,
-            views_per_frame=20,
-            size=288,
-            text="",
-            seed=0,
-            lively=True,
-            light="studio",
-            motion="showcase" if garment == "none" else "sway",
-            garment=garment,
-        )
-        record(recording, folder, workers)
-    return folder
 
 
 def open_clip(path: Path, frames: int | None) -> Capture:
@@ -185,6 +162,7 @@ def terms_for(
     finetune: bool,
     device: DeviceName = "auto",
     unseen: bool = False,
+    preset: PresetName = "cpu",
 ) -> Terms:
     """Cuts the clip into windows, once for all trials, and makes the terms.
 
@@ -196,6 +174,7 @@ def terms_for(
         finetune: Whether SWinGS++ is fine-tuned in the end.
         device: Where to compute.
         unseen: Whether frames after the trained ones are measured, too.
+        preset: The preset from which `settings` come.
 
     Raises:
         SettingsError: If unseen frames are asked for and there are none.
@@ -206,7 +185,7 @@ def terms_for(
     named = folder / (f"{clip.num_frames}-frames")
     job = BodyJob(OURS, 0, settings, device=device)
     windows = plan_windows(clip, job, named).windows
-    return Terms(capture, frames, named, windows, settings, finetune, device, unseen)
+    return Terms(capture, frames, named, windows, settings, finetune, device, unseen, preset)
 
 
 def run_trials(

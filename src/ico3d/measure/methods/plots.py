@@ -4,6 +4,7 @@ from pathlib import Path
 
 from ico3d.common.files import write_atomic
 
+PSNR = "PSNR (dB)"
 INK, PALE, BORDER = "#2255aa", "#dd8833", "#999999"
 
 
@@ -15,13 +16,13 @@ def plot_body(result: dict, folder: Path) -> None:
         folder: Folder for `frames.png` (PSNR over frames, window borders dashed) and `cameras.png`
             (PSNR of each camera).
     """
-    _save(_frames(result), folder / "frames.png")
-    _save(_cameras(result), folder / "cameras.png")
+    save_figure(_frames(result), folder / "frames.png")
+    save_figure(_cameras(result), folder / "cameras.png")
 
 
 def _frames(result: dict):
     """Chart of the PSNR on the person and on moving pixels over frames."""
-    figure, axes = _figure(9)
+    figure, axes = new_figure(9, PSNR)
     numbers = [entry["frame"] for entry in result["per_frame"]]
     for key, label, color in (
         ("psnr_mask", "person", INK),
@@ -39,7 +40,7 @@ def _frames(result: dict):
 def _cameras(result: dict):
     """Chart of the PSNR on the person, with a bar for each camera."""
     entries = result["per_camera"]
-    figure, axes = _figure(max(4.0, 0.5 * len(entries) + 2))
+    figure, axes = new_figure(max(4.0, 0.5 * len(entries) + 2), PSNR)
     values = [_or_gap(entry["psnr_mask"]) for entry in entries]
     axes.bar([entry["camera"] for entry in entries], values, color=INK)
     seen = [value for value in values if value == value]
@@ -50,12 +51,13 @@ def _cameras(result: dict):
     return figure
 
 
-def _figure(width: float):
+def new_figure(width: float, label: str):
+    """A figure of a width in inches, and its axes, whose upward one has a label."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, 4), dpi=120, layout="constrained")
     axes = figure.add_subplot()
-    axes.set_ylabel("PSNR (dB)")
+    axes.set_ylabel(label)
     axes.grid(axis="y", alpha=0.3)
     return figure, axes
 
@@ -64,5 +66,6 @@ def _or_gap(value: float | None) -> float:
     return float("nan") if value is None else value
 
 
-def _save(figure, path: Path) -> None:
+def save_figure(figure, path: Path) -> None:
+    """Writes a figure as a PNG file."""
     write_atomic(path, lambda temporary: figure.savefig(temporary))

@@ -4,6 +4,7 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any, TypeVar
 
 from ico3d.body.settings import BodySettings, Method, settings_for
+from ico3d.common.presets import PresetName
 
 OURS: Method = "swings++"
 """The method that others are compared with."""
@@ -11,21 +12,22 @@ OURS: Method = "swings++"
 Settings = TypeVar("Settings")
 
 
-def preset(method: Method) -> BodySettings:
-    """The preset `cpu` of a method, with first points on the visual hull, not on true surfaces."""
-    settings = settings_for("cpu", method)
+def preset(method: Method, name: PresetName = "cpu") -> BodySettings:
+    """A preset of a method, with first points on the visual hull, not on true surfaces."""
+    settings = settings_for(name, method)
     return replace(settings, initial=replace(settings.initial, source="hull"))
 
 
-def changed_alike(method: Method, settings: BodySettings) -> BodySettings:
-    """The preset of a method, with the same changes as settings of SWinGS++.
+def changed_alike(method: Method, settings: BodySettings, name: PresetName = "cpu") -> BodySettings:
+    """A preset of a method, with the same changes as settings of SWinGS++.
 
     Args:
         method: The method.
         settings: Settings of SWinGS++; values that differ from its preset replace those of
             `method`.
+        name: The preset.
     """
-    return _changed(preset(method), preset(OURS), settings)
+    return _changed(preset(method, name), preset(OURS, name), settings)
 
 
 def _changed(target: Settings, before: Settings, after: Settings) -> Settings:

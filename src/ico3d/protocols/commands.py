@@ -1,0 +1,146 @@
+"""The verbs `ico3d measure …`: protocols that train, measure and write a report."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Annotated, get_args
+
+import tyro
+
+from ico3d.body.settings import SKINNED, BodySettings, Method
+from ico3d.common.device import DeviceName
+from ico3d.common.presets import PresetName, chosen
+from ico3d.measure.methods.settings import OURS, preset
+
+
+@dataclass(frozen=True)
+class MeasureViewer:
+    """Times how fast a person is drawn: background, body, head and all, at 512² and 1080p.
+
+    Attributes:
+        model: A person, as written by ico3d assemble, or a bundle; `demo` is that of the package.
+        out: Folder of the report.
+        background: Folder of ico3d train static; by default a bundle's own background.
+        device: Where to compute: by default CUDA where that works, else the CPU.
+    """
+
+    model: tyro.conf.Positional[Path]
+    out: tyro.conf.Positional[Path]
+    background: Path | None = None
+    device: DeviceName = "auto"
+
+    def run(self) -> None:
+        """Measures, and writes the report."""
+        from ico3d.protocols.viewer import measure_viewer
+        from ico3d.splat.device import computing_device
+
+        device = computing_device(self.device)
+        _say(measure_viewer(self.model, self.out, self.background, device).markdown(), self.out)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyPreset:
+    """The option that decides the defaults of all settings.
+
+    Attributes:
+        preset: The paper's settings, or settings sized for two CPU cores; all methods take theirs.
+            The defaults shown here are those of SWinGS++ in the chosen preset.
+    """
+
+    preset: PresetName = "cpu"
+
+
+@dataclass(frozen=True)
+class MeasureBody(BodyPreset):
+    """Trains SWinGS++ and methods to compare with on one recording, and measures all of them.
+
+    All methods have equal numbers of Gaussians and steps: one that takes the clip as a single
+    window has those of all windows together; one on a skeleton has as many Gaussians as one window.
+    All start on the visual hull, or on the skin. The same command continues an interrupted run.
+
+    Attributes:
+        capture: A recording of a whole person by at least three cameras.
+        out: Folder for the report and the trainings.
+        seeds: Number of trainings of each method, each with another seed.
+        methods: Methods to train; skinned and hugs, which need a body track, only if they are
+            named.
+        frames: Use only this many of the first frames; by default all.
+        unseen: Also measure the frames that --frames leaves out: a body on a skeleton takes the
+            poses of the body track, others stay as they were in the last trained frame.
+        finetune: Fine-tune SWinGS++ at the end and measure before and after; the table shows the
+            state before.
+        device: Where to compute: by default CUDA where that works, else the CPU.
+        jobs: Number of trainings at a time, which share the cores.
+        settings: How SWinGS++ is trained. The other methods are trained in the same way, except
+            where their papers differ; options given here apply to all methods.
+    """
+
+    capture: tyro.conf.Positional[Path]
+    out: tyro.conf.Positional[Path]
+    seeds: int = 1
+    methods: tuple[Method, ...] = tuple(m for m in get_args(Method) if m not in SKINNED)
+    frames: int | None = None
+    unseen: bool = False
+    finetune: bool = False
+    device: DeviceName = "auto"
+    jobs: int = 1
+    settings: Annotated[BodySettings, tyro.conf.arg(name="")] = field(
+        default_factory=partial(preset, OURS)
+    )
+
+    @classmethod
+    def defaults(cls, words: Sequence[str]) -> "MeasureBody":
+        """The verb with the settings of the preset that `words` choose."""
+        settings = preset(OURS, chosen(BodyPreset, words).preset)
+        return cls(tyro.MISSING, tyro.MISSING, settings=settings)
+
+    def run(self) -> None:
+        """Trains and measures what is missing, and writes the report.
+
+        Raises:
+            SettingsError: If a number makes no sense.
+        """
+        from rich.console import Console
+
+        from ico3d.errors import SettingsError
+        from ico3d.measure.methods import bench
+        from ico3d.protocols.body import body_report
+        from ico3d.splat.device import decided
+
+        if self.seeds < 1 or self.jobs < 1 or (self.frames or 2) < 2:
+            raise SettingsError("--seeds and --jobs must be at least 1, and --frames at least 2.")
+        terms = bench.terms_for(
+            self.capture,
+            self.frames,
+            self.out,
+            self.settings,
+            self.finetune,
+            decided(self.device),
+            self.unseen,
+            self.preset,
+        )
+        trials = [
+            bench.Trial(method, seed, terms)
+            for seed in range(self.seeds)
+            for method in self.methods
+        ]
+        console = Console()
+        results = bench.run_trials(
+            trials, self.jobs, lambda trial, found: console.print(trial.line(found))
+        )
+        report = body_report(results, trials, self.out)
+        report.write(self.out)
+        _say(report.sections[0].markdown(1), self.out)
+
+
+def _say(text: str, out: Path) -> None:
+    """Shows Markdown, and where the report lies."""
+    from rich.console import Console
+    from rich.markdown import Markdown
+
+    from ico3d.protocols.report import MARKDOWN
+
+    console = Console()
+    console.print(Markdown(text))
+    console.print(f"The report lies in {out / MARKDOWN}.")
