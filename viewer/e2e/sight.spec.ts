@@ -1,7 +1,7 @@
 import type { CDPSession, Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
-import { drawSeldom, refreshed } from '../support/browser/drawing.ts';
+import { drawSeldom, hideBody, refreshed } from '../support/browser/drawing.ts';
 import { seeChin, seeEyes } from '../support/browser/eyes.ts';
 
 const MOST_SCRIPT = 1.2e6; // bytes on the wire until she is seen
@@ -56,6 +56,7 @@ describe.skipIf(!demoUrl)('first sight of the packaged demo', () => {
     sent.length = 0;
     await browser.open(demoUrl!);
     await drawSeldom(page);
+    await hideBody(page);
     expect(sent.filter(({ url }) => url.includes('/assets/')).map(({ bytes }) => bytes)).toEqual([0, 0]);
     expect(sent.find(({ url }) => url === demoUrl)!.bytes).toBeGreaterThan(0);
   });

@@ -26,6 +26,16 @@ export function drawSeldom(page: Page, every = Infinity): Promise<void> {
   }, every);
 }
 
+/**
+ * Leaves the head alone on stage. A software GPU takes 20 µs for each Gaussian, however few pixels
+ * there are, and nine in ten are those of a body's windows.
+ */
+export function hideBody(page: Page): Promise<void> {
+  return page.evaluate(() => {
+    for (const object of window.ico3d!.body?.objects ?? []) object.visible = false;
+  });
+}
+
 /** Stops time on stage, too: faces stand still and nothing is drawn. */
 export function pauseDrawing(page: Page): Promise<void> {
   return page.evaluate(() => void window.ico3d!.stage.renderer.setAnimationLoop(null));

@@ -1,6 +1,6 @@
 import type { Page } from 'playwright-core';
 import type { Manifest } from '../../src/bundle/manifest.ts';
-import { drawSeldom } from './drawing.ts';
+import { drawSeldom, hideBody } from './drawing.ts';
 
 /** The speech in the face's expression at one moment. */
 export interface Sight {
@@ -23,11 +23,12 @@ declare global {
 }
 
 /**
- * Watches the mouth of a face that is at rest now: its expression at each tick, and a picture now
- * and then; no others are drawn.
+ * Watches the mouth of a face that is at rest now: its expression at each tick, and a picture of the
+ * head alone now and then; no others are drawn.
  */
 export async function watchMouth(page: Page): Promise<void> {
   await drawSeldom(page);
+  await hideBody(page);
   await page.evaluate(async (every) => {
     const FEATURES = 32; // of speech; those of the eyes follow
     const SETTLED = 3; // pictures in a row that do not differ
