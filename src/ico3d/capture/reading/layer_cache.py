@@ -138,6 +138,12 @@ class LayerCache:
             self._kept[key] = layers
         return layers
 
+    def needs(self, count: int) -> tuple[int, int]:
+        """Bytes of `count` views' layers, judged by those read last, and how many memory keeps."""
+        total = self._typical * count
+        kept = sum(size_of(layers) for layers in self._kept.values())
+        return total, min(total, kept + max(self.budget.left(), 0))
+
     def _load(self, camera: int, frame: int) -> Layers | None:
         """The layers from the disk, or read now and written there if memory does not keep them."""
         if self._spill is None:
