@@ -84,12 +84,8 @@ class TrainBody(BodyChoice):
         """
         from rich.console import Console
 
-        from ico3d.body.training.train_clip import (
-            BodyJob,
-            needs_of_body,
-            plan_windows,
-            train_body,
-        )
+        from ico3d.body.training.needs import needs_of_body
+        from ico3d.body.training.train_clip import BodyJob, plan_windows, train_body
         from ico3d.capture.formats import open_capture
         from ico3d.splat.device import decided
 

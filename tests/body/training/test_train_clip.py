@@ -7,7 +7,8 @@ import torch
 
 from ico3d.body.model_folder import TrainedBody
 from ico3d.body.planning.windows import Window
-from ico3d.body.training.train_clip import needs_of_body, plan_windows, train_body
+from ico3d.body.training.needs import needs_of_body
+from ico3d.body.training.train_clip import plan_windows, train_body
 from ico3d.errors import SettingsError
 from support.bodies.moving_capture import FRAMES, MovingCapture
 from support.bodies.tiny_training import job

@@ -28,7 +28,6 @@ from ico3d.capture.pictures import train_cameras
 from ico3d.common.device import DeviceName
 from ico3d.errors import ModelError, SettingsError
 from ico3d.splat.device import computing_device
-from ico3d.training.dry_run import Needs, needs_of
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.provenance import note_environment, provenance
 from ico3d.training.run import RunFolder
@@ -131,7 +130,7 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     if finished is not None:
         return finished["train_seconds"]
     capture = training_part(capture or open_capture(task.capture), job.hold_out)
-    trainer, begin = _trainer(task, capture)
+    trainer, begin = window_trainer(task, capture)
     note_environment(task.folder, trainer.model.device)
     loop = LoopSettings(
         task.steps,
@@ -145,29 +144,7 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     return seconds
 
 
-def needs_of_body(capture: Capture, folder: Path, job: BodyJob) -> Needs:
-    """What the training of a body takes; some steps of its longest window are done.
-
-    Args:
-        capture: As for `train_body`.
-        folder: As for `train_body`; only the plan of the windows and the motion that it is made of
-            are written there, which the training takes over.
-        job: How the body is to be trained.
-
-    Raises:
-        Ico3dError: As for `train_body`.
-    """
-    capture = training_part(capture, job.hold_out)
-    tasks, _ = _tasks(capture, folder, job)
-    longest = max(tasks, key=lambda task: len(task.window))
-    trainer, _ = _trainer(longest, capture)
-    tuned = job.settings.finetune.steps * (len(tasks) - 1)
-    total = sum(task.steps for task in tasks) + tuned
-    most = job.settings.density.max_gaussians
-    return needs_of(trainer, longest.steps, most, total, len(tasks), trainer.pictures_needed())
-
-
-def _trainer(task: WindowTask, capture: Capture) -> tuple[BodyTrainer, Begin]:
+def window_trainer(task: WindowTask, capture: Capture) -> tuple[BodyTrainer, Begin]:
     """The trainee of a window before its first step, and the state in which it begins."""
     job, window = task.job, task.window
     device = computing_device(job.device)
@@ -278,7 +255,7 @@ def train_body(
     run = RunFolder(folder, job.about(capture.path) | {"settings": asdict(job.settings)})
     if run.finished() is not None:
         return TrainedBody.load(folder)
-    tasks, flow = _tasks(capture, folder, job)
+    tasks, flow = window_tasks(capture, folder, job)
     seconds = sum(runner(tasks) if runner else (train_window(task, capture) for task in tasks))
     made = _made(job, tasks, flow)
     body = _save(capture, folder, job, tasks, seconds, made)
@@ -294,7 +271,9 @@ def train_body(
     return body
 
 
-def _tasks(capture: Capture, folder: Path, job: BodyJob) -> tuple[list[WindowTask], str | None]:
+def window_tasks(
+    capture: Capture, folder: Path, job: BodyJob
+) -> tuple[list[WindowTask], str | None]:
     """The trainings of the windows, and how motion was measured to plan them, where it was.
 
     Raises:
