@@ -11,9 +11,9 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
-import torch
 import tyro
 
 from ico3d.body.settings import BodySettings
@@ -21,7 +21,8 @@ from ico3d.body.training.views import BodyViews
 from ico3d.capture.capture import Capture
 from ico3d.capture.formats import open_capture
 from ico3d.capture.importing.resized import ResizedCapture
-from ico3d.capture.pictures import AHEAD, READERS
+from ico3d.capture.pictures import View
+from ico3d.capture.reading.layer_cache import READERS
 from ico3d.cli import run_script
 from ico3d.training.epochs import Epochs
 
@@ -37,8 +38,10 @@ class Bench:
         window: Frames of a body's window whose training is measured, too: its steps are pauses of
             `step` milliseconds, as if a GPU computed; none where 0.
         steps: Steps of that training.
+        warmup: First steps of that training, which see the middle frame alone.
         step: Milliseconds of a step.
-        cache_gib: Memory for its pictures, GiB.
+        cache_gib: Memory for its pictures, GiB, or auto.
+        cache_dir: Folder for those that do not fit in memory.
         json: Where to write the figures.
     """
 
@@ -46,9 +49,11 @@ class Bench:
     views: int = 300
     height: int = 0
     window: int = 0
-    steps: int = 2150
+    steps: int = 4000
+    warmup: int = BodySettings().warmup_steps
     step: float = 20.0
-    cache_gib: float = BodySettings().cache_gib
+    cache_gib: float | Literal["auto"] = BodySettings().cache_gib
+    cache_dir: str = ""
     json: Path | None = None
 
     def run(self) -> None:
@@ -62,8 +67,8 @@ class Bench:
         sizes, begin = [], time.perf_counter()
         for _ in range(self.views):
             camera, frame = random.integers((len(capture.cameras), capture.num_frames)).tolist()
-            capture.image(camera, frame)
-            capture.mask(camera, frame)
+            capture.image_bytes(camera, frame)
+            capture.mask_bytes(camera, frame)
             sizes.append(resident())
         seconds = (time.perf_counter() - begin) / self.views
         row = {
@@ -83,25 +88,37 @@ class Bench:
 
     def _waiting(self, capture: Capture) -> dict[str, float]:
         """How long a window's training waits: before its first step, and for pictures."""
-        begin = time.perf_counter()
-        pictures = BodyViews(capture, range(self.window), self.cache_gib)
-        ready = time.perf_counter() - begin
-        views, epochs = pictures.views, Epochs([0], len(pictures.views))
-        waits = []
+        begin, computed = time.perf_counter(), time.process_time()
+        pictures = BodyViews(capture, range(self.window), self.cache_gib, self.cache_dir)
+        ready, prepared = time.perf_counter() - begin, time.process_time() - computed
+        views = pictures.views
+        center = [view for view in views if view.frame == self.window // 2]
+        order = {len(v): Epochs([0, len(v)], len(v)) for v in (views, center)}
+
+        def seen(step: int) -> list[View]:
+            return center if step < self.warmup else views
+
+        def place(step: int) -> int:
+            return order[len(seen(step))].at(step)
+
+        waits, computed = [], time.process_time()
         for index in range(self.steps):
-            pictures.expect(views[epochs.at(step)] for step in range(index, index + AHEAD))
+            pictures.expect(range(index, self.steps), lambda step: seen(step)[place(step)])
             begin = time.perf_counter()
-            pictures.example(views[epochs.at(index)], np.zeros(3), torch.device("meta"))
+            pictures.readable(seen(index), place(index))
             waits.append(time.perf_counter() - begin)
             time.sleep(self.step / 1000)
-        first, last = waits[: len(views)], waits[len(views) :]
+        epoch = self.warmup + len(views)
         return {
             "views": len(views),
             "readers": READERS,
             "first_step_s": ready,
+            "mask_cpu_s": prepared / len(views),
+            "picture_cpu_s": (time.process_time() - computed) / len(views),
             "waiting_share": _share(waits, self.step),
-            "waiting_share_first_epoch": _share(first, self.step),
-            "waiting_share_later": _share(last, self.step),
+            "waiting_share_first_epoch": _share(waits[:epoch], self.step),
+            "waiting_share_later": _share(waits[epoch:], self.step),
+            "memory_mib": resident(),
         }
 
 

@@ -1,6 +1,7 @@
 """Pictures that are kept, read again, or read in advance."""
 
 import threading
+import time
 
 import numpy as np
 import psutil
@@ -8,7 +9,7 @@ import pytest
 
 from ico3d.capture.pictures import View
 from ico3d.capture.reading import memory
-from ico3d.capture.reading.layer_cache import AHEAD, LayerCache, read_in_turn
+from ico3d.capture.reading.layer_cache import AHEAD, QUEUED, LayerCache, read_in_turn
 from ico3d.common.camera import Camera
 from ico3d.errors import CaptureError, SettingsError
 from training.full_disk import files_of_at_most
@@ -78,15 +79,27 @@ def test_what_is_not_kept_is_read_at_each_use():
 
 
 def test_all_that_memory_keeps_is_read_ahead_and_no_more():
-    steps = [View(0, step + 10, CAMERA) for step in range(100)]
+    steps = [View(0, step + 10, CAMERA) for step in range(200)]
     for gib, ahead in ((1.0, 100), (0.0, AHEAD), (30 * 12 / 2**30, 30)):
         reader = Reader()
         cache = LayerCache(reader, gib)
-        for index in (0, 1):  # how large pictures are is known after the first
-            cache.expect(range(index, 100), steps.__getitem__)
-            assert cache.layers(0, steps[index].frame) is not None
-        cache._readers.shutdown()
+        assert cache.layers(0, steps[0].frame) is not None  # tells how large they are
+        for _ in range(100):  # as if a step lasted until its pictures were read
+            cache.expect(range(1, 101), steps.__getitem__)
+            while len(reader.read) <= len(cache._coming):
+                time.sleep(0.001)
         assert abs(len(reader.read) - ahead) <= 2, gib
+
+
+def test_a_training_that_ends_reads_few_pictures_more():
+    reader = Reader()
+    cache = LayerCache(reader, 1.0)
+    assert cache.layers(0, 1) is not None
+    reader.gate.clear()
+    cache.expect(range(1000), lambda step: View(0, step + 10, CAMERA))
+    reader.gate.set()
+    cache._readers.shutdown()
+    assert len(reader.read) == 1 + QUEUED
 
 
 def test_what_does_not_fit_in_memory_is_read_once_and_kept_on_a_disk(tmp_path):

@@ -114,6 +114,17 @@ def test_the_verb_trains_and_exports(still, tmp_path, monkeypatch):
     np.testing.assert_array_equal(turned.opacities, parameters["opacity_logits"])
 
 
+def test_a_dry_run_writes_nothing(still, tmp_path, monkeypatch, capsys):
+    open_with(monkeypatch, lambda _: still(2))
+    words = ["train", "static", str(tmp_path), str(tmp_path / "model"), "--dry-run"]
+    words += ["--initial.gaussians", "80", "--density.max-gaussians", "250", "--cache-gib", "0"]
+    assert cli.main(words) == 0
+    said = capsys.readouterr().out
+    assert "with 80 Gaussians" in said and "with 250;" in said and "GB are free" in said
+    assert "give --cache-dir a folder" in said
+    assert not (tmp_path / "model").exists()
+
+
 def test_harmonics_are_raised_over_time(still, tmp_path):
     scenes = [
         train_scene(still(2), tmp_path / str(every), _job(steps=30, sh_every=every, sh_degree=2))

@@ -53,6 +53,8 @@ class TrainBody(BodyChoice):
         ray: Address of a Ray cluster that trains the windows: host:port, or auto. The capture and
             the model folder must have the same path on all its machines.
         plan: Only measure motion and show the windows; not for methods of one window.
+        dry_run: Only say how much time, memory and disk the training takes in one process; windows
+            are planned, and a few steps of the longest are done.
         settings: How the body is trained.
     """
 
@@ -64,6 +66,7 @@ class TrainBody(BodyChoice):
     jobs: int = 1
     ray: str | None = None
     plan: bool = False
+    dry_run: bool = False
     settings: Annotated[BodySettings, tyro.conf.arg(name="")] = PRESETS["cpu"]
 
     @classmethod
@@ -81,17 +84,21 @@ class TrainBody(BodyChoice):
         """
         from rich.console import Console
 
+        from ico3d.body.training.needs import needs_of_body
         from ico3d.body.training.train_clip import BodyJob, plan_windows, train_body
         from ico3d.capture.formats import open_capture
         from ico3d.splat.device import decided
 
         device = self.device if self.ray else decided(self.device)
-        runner = None if self.plan else runner_of(self.jobs, self.ray, device)
+        runner = None if self.plan or self.dry_run else runner_of(self.jobs, self.ray, device)
         given = (self.method, self.seed, self.settings)
         job = BodyJob(*given, device=device, hold_out=self.hold_out)
         capture = open_capture(self.capture)
         if self.plan:
             plan_windows(capture, job, self.out)
+            return
+        if self.dry_run:
+            print(*needs_of_body(capture, self.out, job).lines(self.out), sep="\n")
             return
         body = train_body(capture, self.out, job, runner)
         seconds, count = body.summary["train_seconds"], sum(map(len, body.models))

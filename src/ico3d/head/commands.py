@@ -40,6 +40,8 @@ class TrainHead(HeadChoice):
         device: Where to compute: by default CUDA where that works, else the CPU.
         watch: Show the training in the browser while it lasts.
         watch_port: Port of that page, on this machine only; if it is taken, the next free one.
+        dry_run: Only say how much time, memory and disk the training takes; a few of its steps are
+            done, and nothing is written.
         settings: How the head is trained.
     """
 
@@ -53,6 +55,7 @@ class TrainHead(HeadChoice):
     device: DeviceName = "auto"
     watch: bool = False
     watch_port: int = 8080
+    dry_run: bool = False
     settings: Annotated[HeadSettings, tyro.conf.arg(name="")] = PRESETS["cpu"]
 
     @classmethod
@@ -66,11 +69,15 @@ class TrainHead(HeadChoice):
         from rich.console import Console
 
         from ico3d.capture.formats import open_capture
-        from ico3d.head.train_head import HeadJob, train_head
+        from ico3d.head.train_head import HeadJob, needs_of_head, train_head
 
         given = (self.inputs, self.variant, self.encoder, self.seed, self.settings)
         job = HeadJob(*given, self.hold_out)
         port = self.watch_port if self.watch else None
-        head = train_head(open_capture(self.capture), self.out, job, port, self.device)
+        capture = open_capture(self.capture)
+        if self.dry_run:
+            print(*needs_of_head(capture, job, self.device).lines(self.out), sep="\n")
+            return
+        head = train_head(capture, self.out, job, port, self.device)
         seconds = head.summary["train_seconds"]
         Console().print(f"{self.out}: {len(head.model)} Gaussians, trained in {seconds:.0f} s.")

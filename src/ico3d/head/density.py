@@ -16,6 +16,7 @@ from ico3d.splat.density import (
     Plan,
     Population,
     densify_plan,
+    growth_plan,
 )
 from ico3d.splat.rendering import RenderInfo
 from ico3d.training.optimiser import Optimiser
@@ -107,6 +108,12 @@ class HeadDensity:
         generator = torch.Generator().manual_seed(hash((self._seed, step)) % 2**63)
         _carry_out(plan, model, optimiser, generator)
         self._stats = DensityStats.zeros(len(model), model.means.device)
+
+    def grow(self, model: HeadModel, optimiser: Optimiser, count: int) -> None:
+        """Splits Gaussians at random until there are `count`."""
+        generator = torch.Generator().manual_seed(self._seed)
+        while len(model) < count:
+            _carry_out(growth_plan(len(model), count, generator), model, optimiser, generator)
 
     def tensors(self) -> dict[str, Tensor]:
         """Gradients, and the number of views that gave them, since the last densification."""

@@ -121,6 +121,14 @@ class HeadTrainer:
         psnr = tensor_psnr(rendering.rgb[0], target)
         return {"loss": float(loss.detach()), "psnr": psnr, "gaussians": len(self.model)}
 
+    def __len__(self) -> int:
+        """The number of Gaussians."""
+        return len(self.model)
+
+    def grow(self, count: int) -> None:
+        """Splits Gaussians at random until there are `count`."""
+        self._density.grow(self.model, self._optimiser, count)
+
     def tensors(self) -> dict[str, Tensor]:
         """Parameters, moments, and the statistics of density control."""
         named = {f"model.{name}": value for name, value in self.model.state_dict().items()}

@@ -26,6 +26,7 @@ from ico3d.head.watch import WatchedHead
 from ico3d.speech.encoder import load_encoder
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.device import computing_device
+from ico3d.training.dry_run import Needs, needs_of
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.provenance import note_environment, provenance
 from ico3d.training.run import RunFolder
@@ -90,18 +91,10 @@ def train_head(
     run = RunFolder(folder, job.about(capture.path))
     if run.finished() is not None:
         return TrainedHead.load(folder)
-    place = computing_device(device)
     recording, capture = capture, head_in(training_part(capture, job.hold_out))
-    settings = job.settings
-    if capture.shows == "body":
-        settings = replace(settings, loss=replace(settings.loss, torso=0.0))
-    note_environment(folder, place)
-    torch.manual_seed(job.seed)  # layers draw their weights
-    track, adaptor, encoder = _inputs(capture, job, place)
-    rng = np.random.default_rng(job.seed)
-    model = initial_head(capture, settings, job.variant, track.size, rng)
-    model.to(place)
-    trainer = HeadTrainer(capture, model, track, adaptor, settings, job.seed)
+    trainer, encoder = _trainer(capture, job, device)
+    track, adaptor = trainer.track, trainer.adaptor
+    note_environment(folder, trainer.model.device)
     every = job.settings.checkpoint_every
     loop = LoopSettings(job.settings.steps, checkpoint_every=every, label="head")
     with _page(trainer, watch_port) as page:
@@ -123,6 +116,35 @@ def train_head(
     head.save(folder)
     run.finish({"train_seconds": seconds, "num_gaussians": len(trainer.model)})
     return head
+
+
+def needs_of_head(capture: Capture, job: HeadJob, device: DeviceName = "auto") -> Needs:
+    """What the training of a head takes; a few steps are done, and nothing is written.
+
+    Raises:
+        Ico3dError: As for `train_head`.
+    """
+    trainer, _ = _trainer(head_in(training_part(capture, job.hold_out)), job, device)
+    settings, views = job.settings, trainer.views
+    trainer.pictures.picture(views[0], trainer.model.device)  # one tells how large they are
+    pictures = trainer.pictures.needs(len(views))
+    most = settings.density.max_gaussians
+    return needs_of(trainer, settings.steps, most, settings.steps, 1, pictures)
+
+
+def _trainer(
+    capture: Capture, job: HeadJob, device: DeviceName
+) -> tuple[HeadTrainer, tuple[str, str]]:
+    """The trainee before its first step, and the speech encoder's name and sha256."""
+    place, settings = computing_device(device), job.settings
+    if capture.shows == "body":
+        settings = replace(settings, loss=replace(settings.loss, torso=0.0))
+    torch.manual_seed(job.seed)  # layers draw their weights
+    track, adaptor, encoder = _inputs(capture, job, place)
+    rng = np.random.default_rng(job.seed)
+    model = initial_head(capture, settings, job.variant, track.size, rng)
+    model.to(place)
+    return HeadTrainer(capture, model, track, adaptor, settings, job.seed), encoder
 
 
 def _eyes(capture: Capture, track: ExpressionTrack) -> EyeRange:

@@ -152,6 +152,10 @@ class PictureCache:
         """The view at a place, or the next that can be read, as `LayerCache.readable`."""
         return self._cache.readable(views, place)
 
+    def needs(self, count: int) -> tuple[int, int]:
+        """Bytes of `count` views' pictures, and how many of them memory keeps."""
+        return self._cache.needs(count)
+
     def picture(self, view: View, device: torch.device) -> Picture:
         """The picture and masks of a recorded view, on `device`.
 

@@ -42,6 +42,8 @@ class TrainStatic(SceneChoice):
         device: Where to compute: by default CUDA where that works, else the CPU.
         export: Also write a file for other programs: .ply (lossless) or .spz (small; for scenes of
             avatars).
+        dry_run: Only say how much time, memory and disk the training takes; a few of its steps are
+            done, and nothing is written.
         settings: How the scene is trained.
     """
 
@@ -52,6 +54,7 @@ class TrainStatic(SceneChoice):
     seed: int = 0
     device: DeviceName = "auto"
     export: Path | None = None
+    dry_run: bool = False
     settings: Annotated[SceneSettings, tyro.conf.arg(name="")] = PRESETS["cpu"]
 
     @classmethod
@@ -66,13 +69,17 @@ class TrainStatic(SceneChoice):
         from rich.console import Console
 
         from ico3d.capture.formats import open_capture
-        from ico3d.scene.train_scene import SceneJob, train_scene
+        from ico3d.scene.train_scene import SceneJob, needs_of_scene, train_scene
         from ico3d.splat.files.formats import check_writable, write_gaussians
 
         if self.export is not None:
             check_writable(self.export)
         job = SceneJob(self.only, self.frames, self.strategy, self.seed, self.settings)
-        trained = train_scene(open_capture(self.capture), self.out, job, self.device)
+        capture = open_capture(self.capture)
+        if self.dry_run:
+            print(*needs_of_scene(capture, job, self.device).lines(self.out), sep="\n")
+            return
+        trained = train_scene(capture, self.out, job, self.device)
         if self.export is not None:
             write_gaussians(self.export, trained.scene.raw())
         seconds = trained.summary["train_seconds"]

@@ -98,6 +98,14 @@ class SceneTrainer:
             "gaussians": len(self.scene),
         }
 
+    def __len__(self) -> int:
+        """The number of Gaussians."""
+        return len(self.scene)
+
+    def grow(self, count: int) -> None:
+        """Splits Gaussians at random until there are `count`."""
+        self._population.grow(count, torch.Generator().manual_seed(self._seed))
+
     def tensors(self) -> dict[str, Tensor]:
         """Parameters, moments, and the statistics of density control."""
         named = {f"scene.{name}": value for name, value in self.scene.parameters.items()}

@@ -13,6 +13,7 @@ from ico3d.scene.settings import SceneSettings, StrategyName
 from ico3d.scene.surface_points import initial_scene
 from ico3d.scene.views import Frames, Only, SceneViews
 from ico3d.splat.device import computing_device
+from ico3d.training.dry_run import Needs, needs_of
 from ico3d.training.loop import LoopSettings, run_loop
 from ico3d.training.provenance import note_environment, provenance
 from ico3d.training.run import RunFolder
@@ -60,13 +61,9 @@ def train_scene(
     run = RunFolder(folder, {"capture": str(capture.path.resolve()), **asdict(job)})
     if run.finished() is not None:
         return TrainedScene.load(folder)
-    place = computing_device(device)
-    note_environment(folder, place)
     settings = job.settings
-    views = SceneViews(capture, job.only, job.frames, settings.cache_gib, settings.cache_dir)
-    start = initial_scene(capture, views, settings, np.random.default_rng(job.seed))
-    start.scene.to(place)
-    trainer = SceneTrainer(start, views, job.strategy, settings, job.seed)
+    trainer, views = _trainer(capture, job, device)
+    note_environment(folder, trainer.scene.device)
     loop = LoopSettings(settings.steps, checkpoint_every=settings.checkpoint_every, label="scene")
     seconds = run_loop(trainer, run, loop)
     summary = {
@@ -80,3 +77,28 @@ def train_scene(
     scene.save(folder)
     run.finish({"train_seconds": seconds, "num_gaussians": len(trainer.scene)})
     return scene
+
+
+def needs_of_scene(capture: Capture, job: SceneJob, device: DeviceName = "auto") -> Needs:
+    """What the training of a scene takes; a few steps are done, and nothing is written.
+
+    Raises:
+        Ico3dError: As for `train_scene`.
+    """
+    trainer, views = _trainer(capture, job, device)
+    settings = job.settings
+    views.layers(views.train[0])  # one tells how large they are
+    pictures = views.needs(len(views.train))
+    most = settings.density.max_gaussians
+    return needs_of(trainer, settings.steps, most, settings.steps, 1, pictures)
+
+
+def _trainer(
+    capture: Capture, job: SceneJob, device: DeviceName
+) -> tuple[SceneTrainer, SceneViews]:
+    """The trainee before its first step, and the pictures it learns from."""
+    settings, place = job.settings, computing_device(device)
+    views = SceneViews(capture, job.only, job.frames, settings.cache_gib, settings.cache_dir)
+    start = initial_scene(capture, views, settings, np.random.default_rng(job.seed))
+    start.scene.to(place)
+    return SceneTrainer(start, views, job.strategy, settings, job.seed), views

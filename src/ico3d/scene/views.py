@@ -102,6 +102,10 @@ class SceneViews:
         """The view at a place, or the next that can be read, as `LayerCache.readable`."""
         return self._cache.readable(views, place)
 
+    def needs(self, count: int) -> tuple[int, int]:
+        """Bytes of `count` views' pictures, and how many of them memory keeps."""
+        return self._cache.needs(count)
+
     def layers(self, view: View) -> tuple[Tensor, Tensor | None]:
         """Picture (H, W, 3) and mask (H, W) of a view, on the CPU.
 

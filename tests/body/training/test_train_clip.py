@@ -7,6 +7,7 @@ import torch
 
 from ico3d.body.model_folder import TrainedBody
 from ico3d.body.planning.windows import Window
+from ico3d.body.training.needs import needs_of_body
 from ico3d.body.training.train_clip import plan_windows, train_body
 from ico3d.errors import SettingsError
 from support.bodies.moving_capture import FRAMES, MovingCapture
@@ -89,6 +90,18 @@ def test_the_same_seed_gives_the_same_body(trained, tmp_path):
     first = [some.models[0].at(1.0).means for some in (body, same, other)]
     assert torch.equal(first[0], first[1])
     assert first[0].shape != first[2].shape or not torch.equal(first[0], first[2])
+
+
+def test_a_dry_run_says_what_the_run_takes(trained, tmp_path):
+    """Within a factor of three, on a machine that others use; only the plan is written."""
+    capture, folder, body = trained
+    needs = needs_of_body(capture, tmp_path / "dry", job())
+    low, high = needs.seconds
+    assert low / 3 <= body.summary["train_seconds"] <= high * 3
+    assert needs.parts == len(body.windows)
+    files = list((folder / "windows").glob("*/window.safetensors"))
+    assert max(file.stat().st_size for file in files) <= needs.end.kept + 20_000
+    assert not {"settings.json", "windows"} & {p.name for p in (tmp_path / "dry").iterdir()}
 
 
 @pytest.mark.parametrize("method", ["4dgs", "spacetime", "freetime"])

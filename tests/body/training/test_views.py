@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from ico3d.body.training.views import MARGIN, BodyViews
+from ico3d.body.training.views import MARGIN, BodyViews, without_background
 from ico3d.errors import CaptureError
 from support.bodies.moving_capture import MovingCapture
 
@@ -50,6 +50,46 @@ def test_a_capture_without_masks_is_refused(capture):
     capture.mask = lambda camera, frame: None
     with pytest.raises(CaptureError, match="frame 0 of camera c0 has no mask"):
         BodyViews(capture, [0], 0.1)
+
+
+def test_few_cameras_without_masks_are_left_out(capture, caplog):
+    """One warning names them."""
+    seen = capture.mask
+    capture.mask = lambda camera, frame: None if camera == 2 else seen(camera, frame)
+    views = BodyViews(capture, [0, 1], 0.1).views
+    assert 2 not in {view.camera_index for view in views} and len(views) >= 6
+    assert "2 of 12 pictures have no mask and are left out (camera c2)" in caplog.text
+
+
+def test_a_damaged_mask_is_left_out(capture, caplog):
+    """Too many end the training."""
+    seen, damaged = capture.mask, {(2, 1)}
+
+    def mask(camera, frame):
+        if (camera, frame) in damaged:
+            raise CaptureError(f"mask {frame} of camera {camera} is damaged.")
+        return seen(camera, frame)
+
+    capture.mask = mask
+    views = BodyViews(capture, [0, 1], 0.1).views
+    assert (2, 1) not in {(view.camera_index, view.frame) for view in views}
+    assert "mask 1 of camera 2 is damaged. Training goes on" in caplog.text
+    damaged |= {(c, 0) for c in range(7)}
+    with pytest.raises(CaptureError, match="too many to train without"):
+        BodyViews(capture, [0, 1], 0.1)
+
+
+@pytest.mark.parametrize("plate", [False, True])
+def test_the_background_is_taken_out_exactly(plate):
+    """Bytes are computed with as the formula says, rounded."""
+    rng = np.random.default_rng(0)
+    image, behind = rng.integers(0, 256, (2, 9, 7, 3), dtype=np.uint8)
+    mask = rng.choice(np.array([0, 1, 100, 254, 255], np.uint8), (9, 7))
+    share = mask[..., None] / 255
+    expected = (image - (1 - share) * behind).clip(0, 255) if plate else image * share
+    found = without_background(image, mask, behind if plate else None)
+    assert found.dtype == np.uint8
+    np.testing.assert_allclose(found, expected, atol=0.5001)
 
 
 def test_views_without_anybody_are_left_out(capture):

@@ -96,6 +96,11 @@ class Learner:
             self._epochs[count] = Epochs([self._seed, count], count)
         return self._epochs[count]
 
+    def pictures_needed(self) -> tuple[int, int]:
+        """Bytes of all pictures, and how many of them memory keeps; one is read to judge them."""
+        self._pictures.readable(self.views, 0)
+        return self._pictures.needs(len(self.views))
+
     def random(self, index: int, purpose: int) -> np.random.Generator:
         """A generator of random numbers for one purpose in one step."""
         return np.random.default_rng([self._seed, index, purpose])
@@ -211,6 +216,18 @@ class WindowTrainee:
     def tensors(self) -> dict[str, Tensor]:
         """Parameters, and moments of the optimiser."""
         return self._learner.tensors()
+
+    def __len__(self) -> int:
+        """The number of Gaussians."""
+        return len(self.model)
+
+    def pictures_needed(self) -> tuple[int, int]:
+        """Bytes of all pictures, and how many of them memory keeps."""
+        return self._learner.pictures_needed()
+
+    def grow(self, count: int) -> None:
+        """Splits Gaussians at random until there are `count`."""
+        self._learner.population.grow(count, torch.Generator().manual_seed(0))
 
     def place(self, name: str) -> torch.device:
         """The device for a tensor of a checkpoint: always that of the model."""

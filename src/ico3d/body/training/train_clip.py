@@ -130,16 +130,8 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     if finished is not None:
         return finished["train_seconds"]
     capture = training_part(capture or open_capture(task.capture), job.hold_out)
-    device = computing_device(job.device)
-    note_environment(task.folder, device)
-    companion = job.companion.open(device) if job.companion else None
-    begin = _begin(task, capture, companion, device)
-    begin.model.to(device)
-    pictures = BodyViews(capture, window.frames, job.settings.cache_gib, job.settings.cache_dir)
-    seed = job.seed + 1_000 * task.index
-    trainer = BodyTrainer(
-        begin.model, window, pictures, job.method, job.settings, begin.extent, seed, companion
-    )
+    trainer, begin = window_trainer(task, capture)
+    note_environment(task.folder, trainer.model.device)
     loop = LoopSettings(
         task.steps,
         checkpoint_every=job.settings.checkpoint_every,
@@ -150,6 +142,21 @@ def train_window(task: WindowTask, capture: Capture | None = None) -> float:
     summary = {"train_seconds": seconds, "num_gaussians": len(trainer.model)}
     run.finish({**summary, "extent": begin.extent, "source": begin.source})
     return seconds
+
+
+def window_trainer(task: WindowTask, capture: Capture) -> tuple[BodyTrainer, Begin]:
+    """The trainee of a window before its first step, and the state in which it begins."""
+    job, window = task.job, task.window
+    device = computing_device(job.device)
+    companion = job.companion.open(device) if job.companion else None
+    begin = _begin(task, capture, companion, device)
+    begin.model.to(device)
+    pictures = BodyViews(capture, window.frames, job.settings.cache_gib, job.settings.cache_dir)
+    seed = job.seed + 1_000 * task.index
+    trainer = BodyTrainer(
+        begin.model, window, pictures, job.method, job.settings, begin.extent, seed, companion
+    )
+    return trainer, begin
 
 
 def _begin(
@@ -248,6 +255,30 @@ def train_body(
     run = RunFolder(folder, job.about(capture.path) | {"settings": asdict(job.settings)})
     if run.finished() is not None:
         return TrainedBody.load(folder)
+    tasks, flow = window_tasks(capture, folder, job)
+    seconds = sum(runner(tasks) if runner else (train_window(task, capture) for task in tasks))
+    made = _made(job, tasks, flow)
+    body = _save(capture, folder, job, tasks, seconds, made)
+    if job.settings.finetune.steps and len(tasks) > 1:
+        _save(capture, folder, job, tasks, seconds, made, UNTUNED)
+        tuned = [replace(t, folder=folder / "finetuned" / f"{t.index:04d}") for t in tasks[1:]]
+        for before, task, after in zip(tasks, tasks[1:], tuned, strict=False):
+            source = before if before.index == 0 else tuned[before.index - 1]
+            seconds += finetune_window(after, capture, task.folder, load_window(source.file))
+        made = _made(job, [*tasks, *tuned], flow)
+        body = _save(capture, folder, job, [tasks[0], *tuned], seconds, made)
+    run.finish({"train_seconds": seconds, "num_gaussians": sum(map(len, body.models))})
+    return body
+
+
+def window_tasks(
+    capture: Capture, folder: Path, job: BodyJob
+) -> tuple[list[WindowTask], str | None]:
+    """The trainings of the windows, and how motion was measured to plan them, where it was.
+
+    Raises:
+        ModelError: If `job.continued` is of another method or clip.
+    """
     flow = None
     if job.continued is not None:
         windows = _fitting(TrainedBody.load(job.continued), capture, job).windows
@@ -262,19 +293,7 @@ def train_body(
         )
         for index, window in enumerate(windows)
     ]
-    seconds = sum(runner(tasks) if runner else (train_window(task, capture) for task in tasks))
-    made = _made(job, tasks, flow)
-    body = _save(capture, folder, job, tasks, seconds, made)
-    if job.settings.finetune.steps and len(tasks) > 1:
-        _save(capture, folder, job, tasks, seconds, made, UNTUNED)
-        tuned = [replace(t, folder=folder / "finetuned" / f"{t.index:04d}") for t in tasks[1:]]
-        for before, task, after in zip(tasks, tasks[1:], tuned, strict=False):
-            source = before if before.index == 0 else tuned[before.index - 1]
-            seconds += finetune_window(after, capture, task.folder, load_window(source.file))
-        made = _made(job, [*tasks, *tuned], flow)
-        body = _save(capture, folder, job, [tasks[0], *tuned], seconds, made)
-    run.finish({"train_seconds": seconds, "num_gaussians": sum(map(len, body.models))})
-    return body
+    return tasks, flow
 
 
 def _fitting(body: TrainedBody, capture: Capture, job: BodyJob) -> TrainedBody:

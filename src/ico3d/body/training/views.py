@@ -105,6 +105,10 @@ class BodyViews:
         """The view at a place, or the next that can be read, as `LayerCache.readable`."""
         return self._cache.readable(views, place)
 
+    def needs(self, count: int) -> tuple[int, int]:
+        """Bytes of `count` views' pictures, and how many of them memory keeps."""
+        return self._cache.needs(count)
+
     def _find_person(self, keys: Sequence[tuple[int, int]]) -> dict[tuple[int, int], Box]:
         """The boxes around the person, by camera and frame, where the person is seen.
 

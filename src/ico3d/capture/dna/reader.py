@@ -60,11 +60,11 @@ class DnaRendering(SmcCapture):
 
     def has_image(self, camera: int, frame: int) -> bool:
         """Whether the file holds the picture."""
-        return self._main.holds(self._picture_path(camera, frame))
+        return self._main.lists(self._picture_path(camera, frame))
 
     def has_mask(self, camera: int, frame: int) -> bool:
         """Whether the annotations hold a mask."""
-        return self._annotations.holds(self._mask_path(camera, frame))
+        return self._annotations.lists(self._mask_path(camera, frame))
 
     def image_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
         """The undistorted picture with corrected colours, uint8, or None."""

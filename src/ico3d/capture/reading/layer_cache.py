@@ -19,6 +19,8 @@ AHEAD = 8
 """Steps of training for which pictures are read in advance where memory keeps no more."""
 HORIZON = 2_000
 """Most steps for which pictures are read in advance."""
+QUEUED = 32
+"""Most pictures that wait for a reader: a training that ends, or is interrupted, reads them all."""
 READERS = min(8, os.cpu_count() or 1)
 """Threads that read pictures while training computes; decoding lets go of Python's lock."""
 MOST_LOST = 0.05
@@ -87,13 +89,16 @@ class LayerCache:
         if not first <= self._expected <= first + HORIZON:
             self._expected = first
         room = self.budget.left() // self._typical if self._typical else 0
+        queued = sum(not coming.done() for coming in self._coming.values())
         for step in range(self._expected, min(steps.stop, first + HORIZON)):
-            if step >= first + AHEAD and len(self._coming) >= room:
+            full = len(self._coming) >= room or queued >= QUEUED
+            if step >= first + AHEAD and full:
                 break
             self._expected = step + 1
             key = _key(view(step))
             if not (key in self._kept or key in self._coming or key in self._lost):
                 self._coming[key] = self._readers.submit(self._load, *key)
+                queued += 1
 
     def readable(self, views: Sequence[View], place: int) -> View:
         """The view at a place, or the next one whose picture can be read.
@@ -137,6 +142,12 @@ class LayerCache:
         if self.budget.take(size):
             self._kept[key] = layers
         return layers
+
+    def needs(self, count: int) -> tuple[int, int]:
+        """Bytes of `count` views' layers, judged by those read last, and how many memory keeps."""
+        total = self._typical * count
+        kept = sum(size_of(layers) for layers in self._kept.values())
+        return total, min(total, kept + max(self.budget.left(), 0))
 
     def _load(self, camera: int, frame: int) -> Layers | None:
         """The layers from the disk, or read now and written there if memory does not keep them."""

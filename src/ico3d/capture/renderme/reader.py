@@ -73,12 +73,12 @@ class RenderMe360(SmcCapture):
 
     def has_image(self, camera: int, frame: int) -> bool:
         """Whether the raw file holds the picture."""
-        return self._raw.holds(f"{self._devices[camera].pictures}/{self.index(frame)}")
+        return self._raw.lists(f"{self._devices[camera].pictures}/{self.index(frame)}")
 
     def has_mask(self, camera: int, frame: int) -> bool:
         """Whether a file of the recording holds a mask."""
         folder = mask_folder(self._devices[camera].name)
-        return self._holding(folder).holds(f"{folder}/{self.index(frame)}")
+        return self._holding(folder).lists(f"{folder}/{self.index(frame)}")
 
     def image_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
         """The undistorted picture, uint8, or None if missing."""

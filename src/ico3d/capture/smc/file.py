@@ -35,9 +35,10 @@ class SmcFile:
         """
         self.path = path
         self._opened: tuple[int, Any] | None = None
+        self._names: dict[str, frozenset[str]] = {}
 
     def __getstate__(self) -> dict:
-        return {"path": self.path, "_opened": None}
+        return {"path": self.path, "_opened": None, "_names": self._names}
 
     def keys(self, inside: str) -> list[str]:
         """Names in a group; empty if there is no such group."""
@@ -50,6 +51,16 @@ class SmcFile:
         """Whether there is a group or dataset at this path."""
         with self._guard(inside):
             return self._find(inside) is not None
+
+    def lists(self, inside: str) -> bool:
+        """Whether the group above a path has its last name; each group is read only once.
+
+        A recording has tens of thousands of pictures, for each of which `holds` walks the file.
+        """
+        group, _, name = inside.rpartition("/")
+        if group not in self._names:
+            self._names[group] = frozenset(self.keys(group))
+        return name in self._names[group]
 
     def attribute(self, inside: str, name: str) -> Any:
         """An attribute of a group, or None if missing.

@@ -17,6 +17,7 @@ from ico3d.splat.density.plan import (
     apply_plan,
     apply_plan_to_geometry,
     apply_plan_to_state,
+    growth_plan,
 )
 from ico3d.splat.density.relocation import MAX_COPIES, relocated
 from ico3d.splat.density.strategy import (
@@ -43,6 +44,7 @@ __all__ = [
     "apply_plan_to_state",
     "contributions",
     "densify_plan",
+    "growth_plan",
     "relocated",
     "reset_opacity_logits",
 ]

@@ -36,6 +36,20 @@ class Plan:
         return torch.cat([self.keep, self.clone_from, self.split_from])
 
 
+def growth_plan(now: int, wanted: int, generator: torch.Generator) -> Plan:
+    """A plan that splits random Gaussians, each at most once, so that there are `wanted` or fewer.
+
+    Args:
+        now: Number of Gaussians before.
+        wanted: Number of Gaussians after, if at most twice as many.
+        generator: Random generator on the CPU.
+    """
+    order = torch.randperm(now, generator=generator)
+    count = max(min(wanted - now, now), 0)
+    split, keep = order[:count], order[count:].sort().values
+    return Plan(keep, order[:0], split.repeat(2))
+
+
 def apply_plan(values: Tensor, plan: Plan, axis: int = 0) -> Tensor:
     """Applies a plan to values stored per Gaussian; clones and parts copy the original's values.
 
@@ -133,6 +147,16 @@ class Population:
             for moment in self._moments_of(name):
                 state = self.moments[moment]
                 self.moments[moment] = apply_plan_to_state(state, plan, self.axis(name))
+
+    def grow(self, count: int, generator: torch.Generator) -> None:
+        """Splits Gaussians at random until there are `count`.
+
+        Args:
+            count: Number of Gaussians that is wanted.
+            generator: Random generator on the CPU.
+        """
+        while len(self) < count:
+            self.carry_out(growth_plan(len(self), count, generator), generator)
 
     def replace(self, name: str, value: Tensor) -> None:
         """Replaces a parameter's value; the new tensor requires gradients if the old one did."""
