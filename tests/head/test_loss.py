@@ -63,6 +63,19 @@ def test_a_torso_counts_by_its_weight():
     torch.testing.assert_close(slopes[8:], torch.full((8, 20, 3), 0.25 * 0.8 / 960))
 
 
+def test_a_torso_without_weight_may_be_there_or_not():
+    """Neither colours nor alpha count on it: bodies' recordings ask for heads alone."""
+    image, target = _images()
+    alpha = torch.full((16, 20), 0.25, requires_grad=True)
+    torso = torch.zeros(16, 20)
+    torso[8:] = 1
+    settings = changed(PAPER, {"steps": 10, "loss.torso": 0.0, "loss.alpha": 0.5})
+    picture = Picture(target, torch.ones(16, 20), torso)
+    HeadLoss(settings, CPU)(_rendering(image, alpha), target, picture, 0).backward()
+    torch.testing.assert_close(alpha.grad[:8], torch.full((8, 20), -0.5 / 320))
+    assert (alpha.grad[8:] == 0).all()
+
+
 @pytest.fixture
 def models(tmp_path, monkeypatch):
     monkeypatch.setenv("ICO3D_MODELS", str(tmp_path))

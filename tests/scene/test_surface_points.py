@@ -48,6 +48,16 @@ def test_surface_points_follow_the_head_into_the_world(still):
     assert on_shell.sum() == 50
 
 
+def test_surface_points_of_a_body_are_in_the_world_already(still, monkeypatch):
+    """Its head may move; the points stay where they are."""
+    capture = still(2, 3)
+    shell = type(capture).head_points(capture)
+    monkeypatch.setattr(type(capture), "head_points", lambda _: None)
+    monkeypatch.setattr(type(capture), "world_points", lambda _, frame=0: shell)
+    means = _means(_start(capture, "all", 2))
+    assert (np.abs(np.linalg.norm(means, axis=1) - 0.2) < 1e-6).sum() == 50
+
+
 def test_a_background_begins_before_the_cameras_in_their_pictures(still):
     capture = still(2)
     start = _start(capture, "background")

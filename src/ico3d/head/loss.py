@@ -67,16 +67,16 @@ class HeadLoss:
         """
         weights = self.settings.loss
         image = rendering.rgb  # (1, H, W, 3)
-        alpha = rendering.alpha[0]  # (H, W)
         if weights.torso != 1 and picture.torso is not None:
             ignored = ((1 - weights.torso) * picture.torso)[..., None]  # (H, W, 1)
             image = image + ignored * (target - image)
-        if weights.torso == 0 and picture.torso is not None:
-            alpha = alpha + picture.torso * (1 - alpha)  # of no matter whether anything is there
         loss = weights.l1 * l1(image, target[None])
         loss = loss + weights.ssim * (1 - ssim(image, target[None]))
         if weights.alpha and picture.mask is not None:
-            loss = loss + weights.alpha * (alpha - picture.mask).abs().mean()
+            away = rendering.alpha[0] - picture.mask  # (H, W)
+            if weights.torso == 0 and picture.torso is not None:
+                away = away * (1 - picture.torso)  # nor does it matter whether anything is there
+            loss = loss + weights.alpha * away.abs().mean()
         if self._perceptual is not None and step >= weights.perceptual_from:
             loss = loss + weights.perceptual * self._perceptual(image[0], target)
         return loss

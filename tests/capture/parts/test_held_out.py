@@ -1,10 +1,11 @@
 """Test and validation pictures are kept out, and records tell what trained."""
 
+import inspect
 from dataclasses import replace
 
 import pytest
 
-from ico3d.capture.capture import last_eleventh
+from ico3d.capture.capture import Capture, last_eleventh
 from ico3d.capture.parts.held_out import scored_pictures, training_part
 from ico3d.capture.parts.trained_on import check_untrained, is_same_recording, trained_on
 from ico3d.errors import CaptureError
@@ -30,6 +31,20 @@ def test_nothing_of_a_held_out_camera_is_seen(person, hold_out, hidden):
         assert [layer is not None for layer in shown] == [sees] * 3
         assert (part.landmarks(camera, 2) is not None) == sees
     assert part.world_from_head(2) is not None and part.world_points(2) is not None
+
+
+def test_whatever_tells_of_a_picture_is_hidden(person):
+    """Each method of a capture that takes a camera and a frame, those to come included."""
+    part = training_part(person, False)
+    about = [
+        name
+        for name, method in vars(Capture).items()
+        if callable(method) and {"camera", "frame"} <= inspect.signature(method).parameters.keys()
+    ]
+    assert {"image", "mask_bytes", "landmarks"} <= set(about)
+    for name in about:
+        assert getattr(part, name)(3, 2) in (None, False), name
+        assert getattr(part, name)(2, 2) is not None, name
 
 
 def test_the_last_training_frames_of_a_head_are_for_validation(tmp_path):

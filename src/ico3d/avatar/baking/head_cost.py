@@ -10,6 +10,7 @@ from ico3d.avatar.render_bundle import baked_gaussians
 from ico3d.bundle.head import BakedHead
 from ico3d.bundle.manifest import Loss
 from ico3d.capture.capture import Capture
+from ico3d.capture.parts.held_out import PartOfCapture, scored_pictures
 from ico3d.common.camera import Camera
 from ico3d.common.psnr import psnr
 from ico3d.common.spread import spread
@@ -48,7 +49,7 @@ class Reference:
 def references(
     head: TrainedHead, capture: Capture, neutral: tuple[float, float, float], count: int
 ) -> list[Reference]:
-    """Recorded pictures of test frames, evenly spread, each with one of the exact head.
+    """Recorded test pictures, evenly spread, each with one of the exact head.
 
     Args:
         head: The exact head.
@@ -57,14 +58,15 @@ def references(
         count: Number of pictures at most.
 
     Raises:
-        CaptureError: If no test frame has a picture.
+        CaptureError: If there is no test picture.
     """
-    pictures, track = PictureCache(capture, 0.0), head.track(capture)
-    frames = capture.split.test
+    cameras, frames = scored_pictures(capture, "test")
+    pictures = PictureCache(PartOfCapture(capture, cameras, frames), 0.0)
+    track = head.track(capture)
     chosen = [frames[i] for i in spread(len(frames), count)]
     views = pictures.views(chosen)[: 4 * count]
     if not views:
-        raise CaptureError(f"{capture.path}: no test frame has a picture to measure baking with.")
+        raise CaptureError(f"{capture.path}: there is no test picture to measure baking with.")
     with torch.no_grad():
         return [
             _reference(head, pictures, view, track.at(view.frame), neutral)

@@ -14,6 +14,7 @@ from ico3d.capture.face.mediapipe_face import MESH_LANDMARKS, CanonicalFace, Fac
 from ico3d.capture.headpose.shape import similarity_fit
 from ico3d.capture.headpose.triangulation import Sightings, agreeing, robust, sightings
 from ico3d.capture.headtrack.crops import HEAD, Part, around, search
+from ico3d.capture.pictures import train_cameras
 from ico3d.errors import CaptureError
 
 SEES_FACE = np.cos(np.radians(100.0))
@@ -54,7 +55,7 @@ class Head:
 
 
 class Finder:
-    """Finds the head in the pictures of all cameras, with several threads.
+    """Finds the head in the pictures of all cameras but those for tests, with several threads.
 
     Attributes:
         capture: The recording.
@@ -118,14 +119,13 @@ class Finder:
             lens = self.capture.cameras[camera]
             return search(lens.height, lens.width, self._opened[camera].mask(camera, frame))
 
-        return self._look(frame, range(len(self.capture.cameras)), parts)
+        return self._look(frame, train_cameras(self.capture), parts)
 
     def _facing(self, head: Head) -> list[int]:
         """Cameras that may see the face."""
-        cameras = range(len(self.capture.cameras))
         return [
             camera
-            for camera in cameras
+            for camera in train_cameras(self.capture)
             if head.frontality(self.capture, camera) > SEES_FACE and self._around(camera, head)
         ]
 
