@@ -86,7 +86,7 @@ class Evaluate:
         if self.frames != "all":
             check_untrained(model.records, capture, cameras, frames)
         if isinstance(model, TrainedHead):
-            part = head_in(PartOfCapture(capture, cameras, frames))
+            part = head_in(PartOfCapture(capture, cameras, frames), model.over_torso)
             return evaluate_head(model, part, frames, self.images)
         return self._body(model, capture, cameras)
 

@@ -110,7 +110,9 @@ def _quality(
         assert recorded is not None
         cut = None if person is None else torch.from_numpy(person)
         plate = pictures.background(view, torch.device("cpu"))
-        behind, target = staged(Picture(torch.from_numpy(recorded), cut, None), plate)
+        moving = capture.behind(view.camera_index, view.frame) if capture.moves_behind else None
+        own = None if moving is None else torch.from_numpy(moving)
+        behind, target = staged(Picture(torch.from_numpy(recorded), cut, None, own), plate)
         truth, predicted = target.numpy(), renderer.picture(view, behind)
         if capture.shows == "body" and person is not None and measured is not None:
             torso = np.clip(person - measured, 0, 1)[..., None]  # (H, W, 1)
@@ -187,9 +189,9 @@ def _landmark_pairs(
     frames: Sequence[int],
 ) -> Iterator[tuple[np.ndarray | None, np.ndarray | None]]:
     """Landmarks of the rendered and the true frame: the capture's, or seen in its picture."""
-    plate = capture.background(camera)
-    behind = torch.full((3,), GREY) if plate is None else torch.from_numpy(plate)
     for frame in track(frames, "lips", transient=True):
+        plate = capture.behind(camera, frame)
+        behind = torch.full((3,), GREY) if plate is None else torch.from_numpy(plate)
         truth = capture.landmarks(camera, frame)
         if truth is None:
             picture = capture.image(camera, frame)

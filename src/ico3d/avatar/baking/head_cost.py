@@ -10,6 +10,7 @@ from ico3d.avatar.render_bundle import baked_gaussians
 from ico3d.bundle.head import BakedHead
 from ico3d.bundle.manifest import Loss
 from ico3d.capture.capture import Capture
+from ico3d.capture.parts.head_of_body import head_in
 from ico3d.common.camera import Camera
 from ico3d.common.psnr import psnr
 from ico3d.common.spread import spread
@@ -59,7 +60,8 @@ def references(
     Raises:
         CaptureError: If no test frame has a picture.
     """
-    pictures, track = PictureCache(capture, 0.0), head.track(capture)
+    pictures = PictureCache(head_in(capture, head.over_torso), 0.0)
+    track = head.track(capture)
     frames = capture.split.test
     chosen = [frames[i] for i in spread(len(frames), count)]
     views = pictures.views(chosen)[: 4 * count]

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from ico3d.capture.box import Box
 from ico3d.capture.capture import Capture, Split
 from ico3d.capture.parts.wrapped import WrappedCapture
 from ico3d.errors import CaptureError
@@ -45,6 +46,22 @@ class PartOfCapture(WrappedCapture):
     def head_mask(self, camera: int, frame: int) -> np.ndarray | None:
         """The mask for `psnr_mask`; None where it cannot be seen."""
         return self.whole.head_mask(camera, frame) if self._shows(camera, frame) else None
+
+    def image_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The part of a picture in a box; None where the picture cannot be seen."""
+        return super().image_bytes(camera, frame, box) if self._shows(camera, frame) else None
+
+    def mask_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The part of a mask in a box; None where it cannot be seen."""
+        return super().mask_bytes(camera, frame, box) if self._shows(camera, frame) else None
+
+    def head_mask_bytes(self, camera: int, frame: int, box: Box | None = None) -> np.ndarray | None:
+        """The part of the mask for `psnr_mask` in a box; None where it cannot be seen."""
+        return super().head_mask_bytes(camera, frame, box) if self._shows(camera, frame) else None
+
+    def torso(self, camera: int, frame: int) -> np.ndarray | None:
+        """(H, W, 4) what a portrait shows below the head; None where it cannot be seen."""
+        return self.whole.torso(camera, frame) if self._shows(camera, frame) else None
 
     def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
         """(68, 2) landmarks in pixels; None where the picture cannot be seen."""
