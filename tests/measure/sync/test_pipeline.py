@@ -17,6 +17,8 @@ from ico3d.measure.sync.score import scores_of
 from ico3d.measure.sync.tracks import Crops, Track
 from support.sync_weights import made_up, made_up_faces, made_up_sound
 
+pytestmark = pytest.mark.slow
+
 BOX = np.array([60.0, 40.0, 165.0, 150.0])
 
 
