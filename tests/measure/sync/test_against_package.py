@@ -2,7 +2,7 @@
 
 Expected numbers are those of the package syncnet-python 0.2.3 (S, calc_pdist, S3FD.detect_faces)
 and of python_speech_features 0.6, on CPU, with the made-up weights, pictures and sounds of
-`support.sync_weights`, which are the same on any machine.
+`support.weights.sync`, which are the same on any machine.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from ico3d.measure.sync.network import SyncNet
 from ico3d.measure.sync.pipeline import lip_features, sound_features
 from ico3d.measure.sync.s3fd import S3fd, faces_of
 from ico3d.measure.sync.score import mean_distances, scores_of
-from support.sync_weights import made_up, made_up_faces, made_up_features, made_up_sound
+from support.weights.sync import made_up, made_up_faces, made_up_features, made_up_sound
 
 
 def test_mfcc():

@@ -15,7 +15,9 @@ from ico3d.measure.sync.mfcc import mfcc
 from ico3d.measure.sync.network import SyncNet
 from ico3d.measure.sync.score import scores_of
 from ico3d.measure.sync.tracks import Crops, Track
-from support.sync_weights import made_up, made_up_faces, made_up_sound
+from support.weights.sync import made_up, made_up_faces, made_up_sound
+
+pytestmark = pytest.mark.slow
 
 BOX = np.array([60.0, 40.0, 165.0, 150.0])
 
