@@ -57,8 +57,9 @@ def staged(
             default.
 
     Returns:
-        With a background of its own: that, and the unchanged picture. With a plate: the plate and the unchanged picture. With a mask only: `color`, and the person
-        blended over `color`. With neither: black and the unchanged picture.
+        With a background of its own: that, and the unchanged picture. With a plate: the plate and
+        the unchanged picture. With a mask only: `color`, and the person blended over `color`. With
+        neither: black and the unchanged picture.
     """
     image = picture.image
     if picture.behind is not None:
