@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import numpy as np
 import torch
 from PIL import Image
 
@@ -35,6 +34,7 @@ from ico3d.protocols.renders import (
     sync_row,
 )
 from ico3d.protocols.report import Column, Picture, Report, Section, Table, Value
+from ico3d.protocols.rows import means
 from ico3d.splat.device import computing_device
 
 COSTS = (
@@ -138,17 +138,6 @@ def measure_portrait(terms: PortraitTerms) -> Report:
     report = Report("How good is a talking head?", facts, sections, {"self-driven": rows})
     report.write(terms.out)
     return report
-
-
-def means(rows: Sequence[Mapping[str, Value]]) -> dict[str, Value]:
-    """Means over rows of the numbers that all of them have."""
-    found: dict[str, Value] = {}
-    for key in rows[0]:
-        values = [row.get(key) for row in rows]
-        numbers = [value for value in values if isinstance(value, float | int)]
-        if len(numbers) == len(rows):
-            found[key] = float(np.mean(numbers))
-    return found
 
 
 def _recorded(
