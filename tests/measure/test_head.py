@@ -9,6 +9,7 @@ import pytest
 import torch
 from PIL import Image
 
+from ico3d.capture.capture import Sound
 from ico3d.capture.face.landmarks import MULTI_PIE
 from ico3d.capture.face.mediapipe_face import Face
 from ico3d.common.camera import look_at
@@ -16,6 +17,7 @@ from ico3d.errors import CaptureError
 from ico3d.head.views import view_of
 from ico3d.measure.head import evaluate_head, most_frontal_camera
 from ico3d.measure.metrics import mouth_box
+from ico3d.measure.sync.score import SyncScores
 from ico3d.splat.render import render
 from support.heads.offset_head import ERROR, SIZE, OffsetHead, offset_head
 
@@ -161,3 +163,21 @@ def test_a_capture_of_another_face_is_one_sentence(tmp_path, no_models):
     capture.blendshape_names = ("b", "extra", "c")
     with pytest.raises(CaptureError, match="has no blendshape 'a'"):
         evaluate_head(head, capture, (3,), None)
+
+
+def test_lips_are_compared_with_the_sound_of_the_same_frames(tmp_path, no_models, monkeypatch):
+    class Speaking(OffsetHead):
+        def audio(self):
+            return Sound(np.arange(16_000, dtype=np.float32), 16_000)
+
+    def scores(frames, fps, sound, device):
+        assert [frame.shape for frame in frames] == [(SIZE, SIZE, 3)] * 3
+        assert (fps, str(device), sound.rate) == (25.0, "cpu", 16_000)
+        assert sound.samples[0] == 3 * 640  # the first of the frames is number 3
+        return SyncScores(5.5, 8.25, -2, 3, "s3fd")
+
+    monkeypatch.setattr("ico3d.measure.head.sync_or_none", scores)
+    head = offset_head()
+    found = evaluate_head(head, Speaking(tmp_path, head), (3, 4, 5), None)
+    keys = ("sync_c", "sync_d", "sync_offset", "sync_faces_by")
+    assert [found[key] for key in keys] == [5.5, 8.25, -2, "s3fd"]
