@@ -46,6 +46,12 @@ VERBS: dict[str, Verb] = {
     "assemble": Verb("ico3d.avatar.joining.command", "Assemble", "put a head on a person's body"),
     "evaluate": Verb("ico3d.measure.commands", "Evaluate", "measure a model on held-out frames"),
     "animate": Verb("ico3d.avatar.animation.command", "Animate", "find a body's rest and gestures"),
+    "measure portrait": Verb(
+        "ico3d.protocols.commands", "MeasurePortrait", "talking heads: a report"
+    ),
+    "measure renders": Verb(
+        "ico3d.protocols.commands", "MeasureRenders", "anybody's pictures: a report"
+    ),
     "measure body": Verb("ico3d.protocols.commands", "MeasureBody", "methods for bodies: a report"),
     "measure viewer": Verb("ico3d.protocols.commands", "MeasureViewer", "frame rates: a report"),
     "bake": Verb("ico3d.avatar.baking.command", "Bake", "make the bundle that browsers play"),

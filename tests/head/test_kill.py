@@ -11,7 +11,7 @@ from safetensors.torch import load_file
 
 from ico3d.training.processes import fork_server
 from support.heads.train_tiny import PAPER, SETTINGS, train_as_paper, train_tiny
-from support.lpips_weights import write_vgg
+from support.weights.lpips import write_vgg
 
 pytestmark = pytest.mark.slow
 

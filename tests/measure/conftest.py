@@ -1,7 +1,7 @@
 import pytest
 
 from ico3d.measure.pictures import lpips
-from support.lpips_weights import write_weights
+from support.weights.lpips import write_weights
 
 
 @pytest.fixture(scope="session")

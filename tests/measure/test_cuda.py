@@ -27,7 +27,7 @@ def _same(found: dict, wanted: dict) -> None:
     assert found.keys() == wanted.keys()
     for name in wanted.keys() - {"ms_per_frame", "fps", "device"}:
         if isinstance(wanted[name], float):
-            assert found[name] == pytest.approx(wanted[name], rel=1e-3), name
+            assert found[name] == pytest.approx(wanted[name], rel=1e-3, abs=1e-6), name
 
 
 @pytest.fixture

@@ -9,11 +9,15 @@ import pytest
 import torch
 from PIL import Image
 
+from ico3d.capture.capture import Sound
+from ico3d.capture.face.landmarks import MULTI_PIE
+from ico3d.capture.face.mediapipe_face import Face
 from ico3d.common.camera import look_at
 from ico3d.errors import CaptureError
 from ico3d.head.views import view_of
 from ico3d.measure.head import evaluate_head, most_frontal_camera
 from ico3d.measure.metrics import mouth_box
+from ico3d.measure.sync.score import SyncScores
 from ico3d.splat.render import render
 from support.heads.offset_head import ERROR, SIZE, OffsetHead, offset_head
 
@@ -56,9 +60,18 @@ class Reader:
     def __exit__(self, *details):
         pass
 
+    names = ("jawOpen",)
+    rigidity = np.ones(468)
+
     def read(self, picture, mask=None):
         self.seen.append(picture)
         return OffsetHead.landmarks(None, 0, 0)
+
+    def face(self, picture, mask=None):
+        """A mouth as `OffsetHead` has it, 3 pixels further to the right; it opens with time."""
+        points = np.zeros((478, 2))
+        points[MULTI_PIE] = OffsetHead.landmarks(None, 0, 0) + np.array([3, 0])
+        return Face(points, np.array([0.1 * (len(self.seen) % 2)]), np.eye(4), np.zeros(478))
 
 
 @pytest.fixture
@@ -79,8 +92,10 @@ def test_metrics_of_a_known_error(tmp_path, no_models, caplog):
     assert scores["num_gaussians"] == 40
     assert scores["train_seconds"] == 7.0
     assert scores["ms_per_frame"] > 0
-    assert [scores[key] for key in ("lmd", "lip_correlation", "lip_lag_ms")] == [None] * 3
+    unseen = ("lmd", "lip_correlation", "lip_lag_ms", "identity_distance", "sync_c", "sync_offset")
+    assert [scores[key] for key in unseen] == [None] * 6
     assert "lips are not measured" in caplog.text
+    assert "has no sound: lip synchronisation is not measured" in caplog.text
     json.dumps(scores, allow_nan=False)
 
 
@@ -107,6 +122,9 @@ def test_a_mouth_without_landmarks_is_found_in_the_recorded_picture(tmp_path, mo
     expected = np.mean([20 - 10 * np.log10(share) for share in shares])
     assert scores["psnr_mouth"] == pytest.approx(expected, abs=1e-3)
     np.testing.assert_array_equal(reader.seen[0], capture.image(0, 3))
+    assert scores["lmd"] == pytest.approx(0, abs=1e-9)
+    assert scores["blendshape_error_lower"] == scores["blendshape_error_upper"] == 0
+    assert scores["identity_distance"] == pytest.approx(0, abs=1e-6)
 
 
 def test_cameras_that_see_no_face_are_not_asked_for_one(tmp_path, monkeypatch, caplog):
@@ -115,11 +133,12 @@ def test_cameras_that_see_no_face_are_not_asked_for_one(tmp_path, monkeypatch, c
     capture = BeforeCurtain(tmp_path, head)
     behind = look_at(np.array([0.1, 0.0, -0.7]), np.zeros(3))
     capture.cameras = tuple(replace(c, world_to_camera=behind) for c in capture.cameras)
-    reader.read = lambda picture, mask=None: None
+    reader.read = reader.face = lambda picture, mask=None: None
     scores = evaluate_head(head, capture, (3, 4, 5), None)
     assert scores["psnr_mouth"] is None and reader.seen == []
-    (told,) = [record for record in caplog.records if "not measured" in record.getMessage()]
-    assert "psnr_mouth, lmd, lip_correlation, lip_lag_ms" in told.getMessage()
+    (told,) = [record for record in caplog.records if "not measured: " in record.getMessage()]
+    lacking = "psnr_mouth, lmd, lip_correlation, lip_lag_ms, blendshape_error_lower"
+    assert lacking in told.getMessage() and "identity_drift" in told.getMessage()
 
 
 def test_pictures_lie_where_anybody_can_score_them(tmp_path, no_models):
@@ -144,3 +163,21 @@ def test_a_capture_of_another_face_is_one_sentence(tmp_path, no_models):
     capture.blendshape_names = ("b", "extra", "c")
     with pytest.raises(CaptureError, match="has no blendshape 'a'"):
         evaluate_head(head, capture, (3,), None)
+
+
+def test_lips_are_compared_with_the_sound_of_the_same_frames(tmp_path, no_models, monkeypatch):
+    class Speaking(OffsetHead):
+        def audio(self):
+            return Sound(np.arange(16_000, dtype=np.float32), 16_000)
+
+    def scores(frames, fps, sound, device):
+        assert [frame.shape for frame in frames] == [(SIZE, SIZE, 3)] * 3
+        assert (fps, str(device), sound.rate) == (25.0, "cpu", 16_000)
+        assert sound.samples[0] == 3 * 640  # the first of the frames is number 3
+        return SyncScores(5.5, 8.25, -2, 3, "s3fd")
+
+    monkeypatch.setattr("ico3d.measure.head.sync_or_none", scores)
+    head = offset_head()
+    found = evaluate_head(head, Speaking(tmp_path, head), (3, 4, 5), None)
+    keys = ("sync_c", "sync_d", "sync_offset", "sync_faces_by")
+    assert [found[key] for key in keys] == [5.5, 8.25, -2, "s3fd"]

@@ -66,6 +66,7 @@ class Capture(ABC):
 
     Attributes:
         tells_head: Whether `head_mask` differs from `mask`.
+        moves_behind: Whether `behind` differs from frame to frame.
     """
 
     kind: str
@@ -78,6 +79,7 @@ class Capture(ABC):
     split: Split
     blendshape_names: tuple[str, ...] | None = None
     tells_head: bool = False
+    moves_behind: bool = False
 
     @abstractmethod
     def image(self, camera: int, frame: int) -> np.ndarray | None:
@@ -115,6 +117,14 @@ class Capture(ABC):
 
     def background(self, camera: int) -> np.ndarray | None:
         """The clean plate (H, W, 3): what the camera sees without the person."""
+        return None
+
+    def behind(self, camera: int, frame: int) -> np.ndarray | None:
+        """(H, W, 3) what a camera sees in a frame without what `mask` shows: the clean plate."""
+        return self.background(camera)
+
+    def torso(self, camera: int, frame: int) -> np.ndarray | None:
+        """(H, W, 4) colour and opacity of what a portrait shows of the person below the head."""
         return None
 
     def audio(self) -> Sound | None:

@@ -37,6 +37,8 @@ class TrainHead(HeadChoice):
         encoder: Speech encoder for speech-driven heads: builtin, ave (SyncTalk's) or hubert.
         seed: Seed of all random numbers.
         hold_out: Leave out the validation pictures, too, for ico3d evaluate --frames validation.
+        over_torso: Learn the head of a portrait alone, over the recorded torso of each frame, as
+            papers compare it; such a head has no shoulders of its own.
         device: Where to compute: by default CUDA where that works, else the CPU.
         watch: Show the training in the browser while it lasts.
         watch_port: Port of that page, on this machine only; if it is taken, the next free one.
@@ -52,6 +54,7 @@ class TrainHead(HeadChoice):
     encoder: str = "builtin"
     seed: int = 0
     hold_out: bool = False
+    over_torso: bool = False
     device: DeviceName = "auto"
     watch: bool = False
     watch_port: int = 8080
@@ -72,7 +75,7 @@ class TrainHead(HeadChoice):
         from ico3d.head.train_head import HeadJob, needs_of_head, train_head
 
         given = (self.inputs, self.variant, self.encoder, self.seed, self.settings)
-        job = HeadJob(*given, self.hold_out)
+        job = HeadJob(*given, self.hold_out, self.over_torso)
         port = self.watch_port if self.watch else None
         capture = open_capture(self.capture)
         if self.dry_run:

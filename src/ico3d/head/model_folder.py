@@ -63,6 +63,11 @@ class TrainedHead:
         """What trained the head and its colours, by `capture.parts.trained_on`."""
         return [self.summary.get(part, {}) for part in ("recording", "recoloured")]
 
+    @property
+    def over_torso(self) -> bool:
+        """Whether the head alone was learnt, over the recorded torso of a portrait."""
+        return self.summary.get("recording", {}).get("over_torso", False)
+
     def track(self, capture: Capture) -> ExpressionTrack:
         """The expressions that drive this head through a capture.
 

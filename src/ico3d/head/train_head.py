@@ -44,6 +44,7 @@ class HeadJob:
         seed: Seed of all random numbers.
         settings: How the head is trained.
         hold_out: Whether the validation pictures are left out of the training.
+        over_torso: Whether the head alone is learnt, over the recorded torso of a portrait.
     """
 
     inputs: Inputs
@@ -52,12 +53,14 @@ class HeadJob:
     seed: int
     settings: HeadSettings
     hold_out: bool = False
+    over_torso: bool = False
 
     def about(self, capture: Path) -> dict:
         """Values that a run must share with an interrupted one to continue it."""
         about = {"capture": str(capture.resolve()), **asdict(self)}
-        if not self.hold_out:
-            del about["hold_out"]  # runs of earlier versions say nothing of it
+        for name in ("hold_out", "over_torso"):
+            if not about[name]:
+                del about[name]  # runs of earlier versions say nothing of it
         return about
 
 
@@ -91,7 +94,7 @@ def train_head(
     run = RunFolder(folder, job.about(capture.path))
     if run.finished() is not None:
         return TrainedHead.load(folder)
-    recording, capture = capture, head_in(training_part(capture, job.hold_out))
+    recording, capture = capture, head_in(training_part(capture, job.hold_out), job.over_torso)
     trainer, encoder = _trainer(capture, job, device)
     track, adaptor = trainer.track, trainer.adaptor
     note_environment(folder, trainer.model.device)
@@ -104,7 +107,7 @@ def train_head(
         "train_seconds": seconds,
         "capture": capture.provenance,
         "recording": trained_on(recording, train_cameras(capture), capture.split.train)
-        | {"poses": trainer.poses},
+        | {"poses": trainer.poses, "over_torso": job.over_torso},
         "settings": asdict(trainer.settings),
         "made": provenance([folder], job.seed, trainer.used | {"encoder": encoder[0] or None}),
     }

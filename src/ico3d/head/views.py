@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from ico3d.capture.capture import Capture
+from ico3d.capture.decoding import to_bytes
 from ico3d.capture.pictures import View as View
 from ico3d.capture.reading.layer_cache import LayerCache
 from ico3d.capture.reading.memory import Gib
@@ -34,11 +35,14 @@ class Picture:
         mask: (H, W) in [0, 1], 1 on the person; None where the capture has none.
         torso: (H, W) in [0, 1], 1 on the person except the head; None where the capture does not
             tell them apart.
+        behind: (H, W, 3) what the camera sees in this frame without what `mask` shows, where that
+            differs from frame to frame; else None.
     """
 
     image: Tensor
     mask: Tensor | None
     torso: Tensor | None
+    behind: Tensor | None = None
 
 
 def staged(
@@ -53,10 +57,13 @@ def staged(
             default.
 
     Returns:
-        With a plate: the plate and the unchanged picture. With a mask only: `color`, and the person
-        blended over `color`. With neither: black and the unchanged picture.
+        With a background of its own: that, and the unchanged picture. With a plate: the plate and
+        the unchanged picture. With a mask only: `color`, and the person blended over `color`. With
+        neither: black and the unchanged picture.
     """
     image = picture.image
+    if picture.behind is not None:
+        return picture.behind, image
     if plate is not None:
         return plate, image
     if picture.mask is None:
@@ -168,11 +175,11 @@ class PictureCache:
                 f"{self._capture.path}: the picture of frame {view.frame} by camera "
                 f"{view.camera_index} has vanished."
             )
-        image, mask, torso = (
+        image, mask, torso, behind = (
             None if layer is None else _as_floats(layer, device) for layer in layers
         )
         assert image is not None
-        return Picture(image, mask, torso)
+        return Picture(image, mask, torso, behind)
 
     def _plate(self, camera: int) -> Tensor | None:
         """(H, W, 3) what a camera sees without the person."""
@@ -182,12 +189,14 @@ class PictureCache:
         return self._backgrounds[camera]
 
     def _read(self, camera: int, frame: int) -> Layers | None:
-        """Picture, mask and torso."""
+        """Picture, mask, torso, and what is behind where that moves."""
         image = self._capture.image_bytes(camera, frame)
         if image is None:
             return None
         mask = self._capture.mask_bytes(camera, frame)
-        return image, mask, self._torso(mask, camera, frame)
+        behind = self._capture.behind(camera, frame) if self._capture.moves_behind else None
+        torso = self._torso(mask, camera, frame)
+        return image, mask, torso, None if behind is None else to_bytes(behind)
 
     def _torso(self, mask: np.ndarray | None, camera: int, frame: int) -> np.ndarray | None:
         """uint8 (H, W) the person without the head."""

@@ -30,6 +30,8 @@ class Evaluate:
             anything in the model.
         plots: For bodies: folder for plots of PSNR over frames and by camera.
         untuned: For bodies: measure the windows as they were before temporal fine-tuning.
+        openface: For heads: two tables (.csv) that OpenFace wrote of the rendered and of the
+            recorded pictures (see --images), for the error of action units.
         device: Where to compute: by default CUDA where that works, else the CPU.
     """
 
@@ -40,6 +42,7 @@ class Evaluate:
     frames: Literal["test", "validation", "all"] = "test"
     plots: Path | None = None
     untuned: bool = False
+    openface: tuple[Path, Path] | None = None
     device: DeviceName = "auto"
 
     def run(self) -> None:
@@ -86,9 +89,18 @@ class Evaluate:
         if self.frames != "all":
             check_untrained(model.records, capture, cameras, frames)
         if isinstance(model, TrainedHead):
-            part = head_in(PartOfCapture(capture, cameras, frames))
-            return evaluate_head(model, part, frames, self.images)
+            part = head_in(PartOfCapture(capture, cameras, frames), model.over_torso)
+            return evaluate_head(model, part, frames, self.images) | self._action_units()
         return self._body(model, capture, cameras)
+
+    def _action_units(self) -> dict[str, float | None]:
+        """AUE of the tables that were given."""
+        from ico3d.measure.faces.action_units import action_unit_error, read_action_units
+
+        if self.openface is None:
+            return {"aue_lower": None, "aue_upper": None}
+        error = action_unit_error(*map(read_action_units, self.openface))
+        return {"aue_lower": error.lower, "aue_upper": error.upper}
 
     def _body(
         self,

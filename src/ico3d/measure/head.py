@@ -10,7 +10,7 @@ import torch
 from rich.progress import track
 from torch import Tensor
 
-from ico3d.capture.capture import Capture
+from ico3d.capture.capture import Capture, Sound
 from ico3d.common.camera import Camera
 from ico3d.common.psnr import psnr
 from ico3d.common.spread import spread
@@ -18,11 +18,13 @@ from ico3d.errors import CaptureError
 from ico3d.head.expressions import ExpressionTrack
 from ico3d.head.model_folder import TrainedHead
 from ico3d.head.views import GREY, Picture, PictureCache, View, staged, view_of
-from ico3d.measure.lips import LandmarkReader, landmark_reader, lip_correlation, lip_gap, lip_lag_ms
-from ico3d.measure.metrics import lmd, psnr_mouth
+from ico3d.measure.faces.comparison import METRICS, FaceComparison
+from ico3d.measure.lips import LandmarkReader, landmark_reader
+from ico3d.measure.metrics import psnr_mouth
 from ico3d.measure.pictures.temporal import TemporalFlicker
 from ico3d.measure.scores import Scores, add_picture, write_pictures
 from ico3d.measure.stopwatch import Stopwatch
+from ico3d.measure.sync.pipeline import sync_or_none
 from ico3d.splat.render import render
 
 FACING = np.array([0.0, 0.0, 1.0])
@@ -55,7 +57,7 @@ class HeadRenderer:
 
 def evaluate_head(
     head: TrainedHead, capture: Capture, frames: Sequence[int], images: Path | None
-) -> dict[str, float | str | None]:
+) -> dict[str, float | int | str | None]:
     """All metrics of a head (docs/architecture.md, "Metrics").
 
     Where a capture has no clean background, the person is cut out by the mask, and both pictures
@@ -76,15 +78,16 @@ def evaluate_head(
         CaptureError: If the capture lacks what drives the head, or has no picture in these frames.
     """
     renderer = HeadRenderer(head, capture)
-    result: dict[str, float | str | None]
+    result: dict[str, float | int | str | None]
     reader = landmark_reader()
     with nullcontext() if reader is None else reader:
         scores = _quality(renderer, reader, capture, frames, images)
-        lips = _lips(renderer, reader, capture, frames)
+        faces = _faces(renderer, reader, capture, frames)
     result = {"psnr": None, "psnr_mask": None, "psnr_mouth": None, "ssim": None, **scores.means()}
-    result |= lips
+    result |= faces
     if reader is not None:
         _say_why(result, capture)
+    result |= _sync(renderer, capture, frames)
     result["num_gaussians"] = len(head.model)
     result |= renderer.watch.figures()
     result["train_seconds"] = head.summary.get("train_seconds")
@@ -110,7 +113,9 @@ def _quality(
         assert recorded is not None
         cut = None if person is None else torch.from_numpy(person)
         plate = pictures.background(view, torch.device("cpu"))
-        behind, target = staged(Picture(torch.from_numpy(recorded), cut, None), plate)
+        moving = capture.behind(view.camera_index, view.frame) if capture.moves_behind else None
+        own = None if moving is None else torch.from_numpy(moving)
+        behind, target = staged(Picture(torch.from_numpy(recorded), cut, None, own), plate)
         truth, predicted = target.numpy(), renderer.picture(view, behind)
         if capture.shows == "body" and person is not None and measured is not None:
             torso = np.clip(person - measured, 0, 1)[..., None]  # (H, W, 1)
@@ -130,9 +135,9 @@ def _quality(
     return scores
 
 
-def _say_why(result: dict[str, float | str | None], capture: Capture) -> None:
+def _say_why(result: dict[str, float | int | str | None], capture: Capture) -> None:
     """Warns where the faces seen did not suffice for a metric."""
-    keys = ("psnr_mouth", "lmd", "lip_correlation", "lip_lag_ms")
+    keys = ("psnr_mouth", *METRICS)
     lacking = [key for key in keys if result[key] is None]
     if lacking:
         log.warning(
@@ -159,43 +164,57 @@ def most_frontal_camera(capture: Capture, frames: Sequence[int]) -> int:
     return max(seeing, key=average)
 
 
-def _lips(
+def _faces(
     renderer: HeadRenderer,
     reader: LandmarkReader | None,
     capture: Capture,
     frames: Sequence[int],
 ) -> dict[str, float | None]:
-    """Lip metrics on consecutive frames of the most frontal camera."""
+    """Metrics of the face on consecutive frames of the most frontal camera."""
     if reader is None:
-        return {"lmd": None, "lip_correlation": None, "lip_lag_ms": None}
+        return dict.fromkeys(METRICS)
     camera = most_frontal_camera(capture, frames)
-    pairs = list(_landmark_pairs(renderer, reader, capture, camera, frames))
-    both = [(seen, true) for seen, true in pairs if seen is not None and true is not None]
-    gaps, true_gaps = (np.array([_gap_or_nan(pair[side]) for pair in pairs]) for side in (0, 1))
+    found = FaceComparison(reader.rigidity)
+    for frame, rendered in _rendered(renderer, capture, camera, frames, "faces"):
+        picture = capture.image(camera, frame)
+        true = None if picture is None else reader.face(picture)
+        found.add(reader.face(rendered), true, capture.landmarks(camera, frame))
+    return found.figures(capture.fps, reader.names)
+
+
+def _sync(
+    renderer: HeadRenderer, capture: Capture, frames: Sequence[int]
+) -> dict[str, float | int | str | None]:
+    """How well the lips fit the sound, on consecutive frames of the most frontal camera."""
+    sound = capture.audio()
+    scores = None
+    if sound is None:
+        log.warning("%s has no sound: lip synchronisation is not measured.", capture.path)
+    else:
+        camera = most_frontal_camera(capture, frames)
+        begin = round(frames[0] / capture.fps * sound.rate)
+        shown = _rendered(renderer, capture, camera, frames, "lips and sound")
+        scores = sync_or_none(
+            (picture for _, picture in shown),
+            capture.fps,
+            Sound(sound.samples[begin:], sound.rate),
+            renderer.watch.device,
+        )
+    if scores is None:
+        return dict.fromkeys(("sync_c", "sync_d", "sync_offset", "sync_faces_by"))
     return {
-        "lmd": float(np.mean([lmd(seen, true) for seen, true in both])) if both else None,
-        "lip_correlation": lip_correlation(gaps, true_gaps),
-        "lip_lag_ms": lip_lag_ms(gaps, true_gaps, capture.fps),
+        "sync_c": scores.confidence,
+        "sync_d": scores.distance,
+        "sync_offset": scores.offset,
+        "sync_faces_by": scores.detector,
     }
 
 
-def _landmark_pairs(
-    renderer: HeadRenderer,
-    reader: LandmarkReader,
-    capture: Capture,
-    camera: int,
-    frames: Sequence[int],
-) -> Iterator[tuple[np.ndarray | None, np.ndarray | None]]:
-    """Landmarks of the rendered and the true frame: the capture's, or seen in its picture."""
-    plate = capture.background(camera)
-    behind = torch.full((3,), GREY) if plate is None else torch.from_numpy(plate)
-    for frame in track(frames, "lips", transient=True):
-        truth = capture.landmarks(camera, frame)
-        if truth is None:
-            picture = capture.image(camera, frame)
-            truth = None if picture is None else reader.read(picture)
-        yield reader.read(renderer.picture(view_of(capture, camera, frame), behind)), truth
-
-
-def _gap_or_nan(landmarks: np.ndarray | None) -> float:
-    return float("nan") if landmarks is None else lip_gap(landmarks)
+def _rendered(
+    renderer: HeadRenderer, capture: Capture, camera: int, frames: Sequence[int], what: str
+) -> Iterator[tuple[int, np.ndarray]]:
+    """Frames as a camera would see the head, before the clean plate or grey."""
+    for frame in track(frames, what, transient=True):
+        plate = capture.behind(camera, frame)
+        behind = torch.full((3,), GREY) if plate is None else torch.from_numpy(plate)
+        yield frame, renderer.picture(view_of(capture, camera, frame), behind)

@@ -1,10 +1,15 @@
 """Metrics of lip movement: correlation and delay of the mouth's opening over time."""
 
 import logging
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ico3d.errors import MissingExtraError, MissingModelError
+
+if TYPE_CHECKING:
+    from ico3d.capture.face.mediapipe_face import Face
 
 UPPER_INNER_LIP = (61, 62, 63)
 LOWER_INNER_LIP = (67, 66, 65)
@@ -63,7 +68,7 @@ def _shifted_correlation(gaps: np.ndarray, truth: np.ndarray, shift: int) -> flo
 
 
 class LandmarkReader:
-    """Finds the 68 landmarks of a face in a picture with MediaPipe."""
+    """Finds the face in a picture with MediaPipe."""
 
     def __init__(self):
         """Loads MediaPipe and its model.
@@ -75,8 +80,8 @@ class LandmarkReader:
         from ico3d.capture.face.mediapipe_face import FaceReader
         from ico3d.common.weights import model_file
 
-        model = model_file("face_landmarker.task", "measuring lips")
-        self._reader = FaceReader(model)
+        self._model = model_file("face_landmarker.task", "measuring lips")
+        self._reader = FaceReader(self._model)
 
     def __enter__(self) -> "LandmarkReader":
         return self
@@ -84,8 +89,27 @@ class LandmarkReader:
     def __exit__(self, *details) -> None:
         self._reader.__exit__(*details)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the blendshapes of faces; empty until a face was found."""
+        return self._reader.names
+
+    @cached_property
+    def rigidity(self) -> np.ndarray:
+        """(468,) how rigidly each landmark of the face's surface sits on the skull, 0 to 1."""
+        from ico3d.capture.face.mediapipe_face import canonical_face
+
+        return canonical_face(self._model).rigidity
+
     def read(self, picture: np.ndarray, mask: np.ndarray | None = None) -> np.ndarray | None:
-        """The landmarks of a face in a picture.
+        """The landmarks of a face in a picture (see `face`): (68, 2) pixels, or None."""
+        from ico3d.capture.face.landmarks import MULTI_PIE
+
+        face = self.face(picture, mask)
+        return None if face is None else face.landmarks[MULTI_PIE]
+
+    def face(self, picture: np.ndarray, mask: np.ndarray | None = None) -> "Face | None":
+        """The face in a picture.
 
         Args:
             picture: (H, W, 3) in [0, 1].
@@ -93,19 +117,18 @@ class LandmarkReader:
                 person. None searches the whole picture only.
 
         Returns:
-            (68, 2) pixels, or None if no face is found.
+            The face, in pixels of the picture; None if none is found.
         """
-        from ico3d.capture.face.landmarks import MULTI_PIE
         from ico3d.capture.headtrack.crops import search
 
         face = self._reader.read((np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8))
         if face is not None:
-            return face.landmarks[MULTI_PIE]
+            return face
         height, width = picture.shape[:2]
         for part in [] if mask is None else search(height, width, mask):
             face = self._reader.read(part.cut(np.clip(picture, 0, 1)))
             if face is not None:
-                return part.whole(face.landmarks)[MULTI_PIE]
+                return part.whole_face(face)
         return None
 
 
@@ -115,7 +138,8 @@ def landmark_reader() -> LandmarkReader | None:
         return LandmarkReader()
     except (MissingExtraError, MissingModelError) as error:
         log.warning(
-            "lips are not measured, nor mouths in pictures without landmarks of their own: %s",
+            "lips are not measured, nor expression and identity, nor mouths in pictures without "
+            "landmarks of their own: %s",
             error,
         )
         return None

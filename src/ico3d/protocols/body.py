@@ -14,6 +14,7 @@ from ico3d.measure.methods.bench import OURS, Terms, Trial, open_clip, summary
 from ico3d.protocols.charts import draw_lines, draw_quality, draw_strip
 from ico3d.protocols.facts import facts_of
 from ico3d.protocols.report import Column, Picture, Report, Section, Table, Value
+from ico3d.protocols.rows import spread_of
 from ico3d.splat.device import computing_device
 
 QUALITY = (
@@ -90,8 +91,7 @@ def _how(capture: Capture, terms: Terms) -> str:
 def _rows(figures: Mapping, methods: Sequence[Method]) -> list[dict[str, Value]]:
     rows = []
     for method in methods:
-        values = [result["psnr_mask"] for result in figures[method]["seeds"]]
-        apart = max(values) - min(values) if len(values) > 1 else None
+        apart = spread_of(figures[method]["seeds"], "psnr_mask")
         rows.append({"name": method, "seeds_apart": apart, **figures[method]["mean"]})
     return rows
 

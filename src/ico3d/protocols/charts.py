@@ -1,12 +1,16 @@
 """Charts and strips of pictures for reports."""
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ico3d.measure.methods.plots import new_figure, save_figure
+from ico3d.training.log import METRICS
 
+SMOOTHED = 25
+"""A training's PSNR is shown as a running mean over this part of its entries: one in so many."""
 LARGEST_ERROR = 0.2
 """Colour difference, of 1, that error maps show brightest."""
 
@@ -35,6 +39,39 @@ def draw_quality(
         axes.grid(alpha=0.3)
     all_axes[0].set_ylabel(quality)
     all_axes[0].legend(fontsize=8)
+    save_figure(figure, path)
+
+
+def draw_training(path: Path, runs: Mapping[str, tuple[Path, float]]) -> None:
+    """Draws how trainings went: PSNR of their training pictures over time and over Gaussians.
+
+    Args:
+        path: The PNG file.
+        runs: By name: folder of the model, and the seconds that its training took.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 4), dpi=120, layout="constrained")
+    over_time, over_count = figure.subplots(1, 2, sharey=True)
+    for name, (folder, seconds) in runs.items():
+        lines = (folder / METRICS).read_text().splitlines()
+        steps, psnr, count = np.array(
+            [
+                [entry[key] for key in ("step", "psnr", "gaussians")]
+                for entry in map(json.loads, lines)
+            ]
+        ).T
+        width = max(1, len(psnr) // SMOOTHED)
+        smooth = np.convolve(psnr, np.ones(width) / width, "valid")
+        late = slice(len(psnr) - len(smooth), None)
+        over_time.plot(seconds * steps[late] / steps[-1], smooth, label=name)
+        over_count.plot(count[late], smooth, ".", label=name)
+    over_time.set_xlabel("training, s")
+    over_count.set_xlabel("Gaussians")
+    over_time.set_ylabel("PSNR of training pictures, running mean (dB)")
+    over_time.legend(fontsize=8)
+    for axes in (over_time, over_count):
+        axes.grid(alpha=0.3)
     save_figure(figure, path)
 
 

@@ -11,6 +11,8 @@ import tyro
 from ico3d.body.settings import SKINNED, BodySettings, Method
 from ico3d.common.device import DeviceName
 from ico3d.common.presets import PresetName, chosen
+from ico3d.head.commands import HeadChoice
+from ico3d.head.settings import PRESETS, HeadSettings
 from ico3d.measure.methods.settings import OURS, preset
 
 
@@ -37,6 +39,98 @@ class MeasureViewer:
 
         device = computing_device(self.device)
         _say(measure_viewer(self.model, self.out, self.background, device).markdown(), self.out)
+
+
+@dataclass(frozen=True)
+class MeasurePortrait(HeadChoice):
+    """Trains heads on a talking portrait and measures them, self-driven and cross-driven.
+
+    Heads are driven by speech. The same command continues an interrupted run.
+
+    Attributes:
+        capture: A talking portrait with its sound; the last 1/11 of its frames tests.
+        out: Folder for the report, the trainings and their pictures.
+        seeds: Number of trainings, each with another seed.
+        encoder: Speech encoder: builtin, ave (SyncTalk's) or hubert.
+        over_torso: Learn the head alone and compare it over the recorded torso of each frame, as
+            other papers do; else the whole person is drawn.
+        sounds: Sounds of other people that drive the heads.
+        against: Recordings of the same person with other words, to compare lips with.
+        device: Where to compute: by default CUDA where that works, else the CPU.
+        settings: How heads are trained.
+    """
+
+    capture: tyro.conf.Positional[Path]
+    out: tyro.conf.Positional[Path]
+    seeds: int = 1
+    encoder: str = "builtin"
+    over_torso: bool = True
+    sounds: tuple[Path, ...] = ()
+    against: tuple[Path, ...] = ()
+    device: DeviceName = "auto"
+    settings: Annotated[HeadSettings, tyro.conf.arg(name="")] = PRESETS["cpu"]
+
+    @classmethod
+    def defaults(cls, words: Sequence[str]) -> "MeasurePortrait":
+        """The verb with the settings of the preset that `words` choose."""
+        settings = PRESETS[chosen(HeadChoice, words).preset]
+        return cls(tyro.MISSING, tyro.MISSING, settings=settings)
+
+    def run(self) -> None:
+        """Trains and measures what is missing, and writes the report.
+
+        Raises:
+            SettingsError: If no training is asked for.
+        """
+        from ico3d.errors import SettingsError
+        from ico3d.protocols.portrait import PortraitTerms, measure_portrait
+
+        if self.seeds < 1:
+            raise SettingsError("--seeds must be at least 1.")
+        terms = PortraitTerms(
+            self.capture,
+            self.out,
+            tuple(range(self.seeds)),
+            self.encoder,
+            self.over_torso,
+            self.settings,
+            self.sounds,
+            self.against,
+            self.device,
+        )
+        _say(measure_portrait(terms).markdown(), self.out)
+
+
+@dataclass(frozen=True)
+class MeasureRenders:
+    """Scores pictures or videos of a talking head against the recorded ones, whoever made them.
+
+    Attributes:
+        out: Folder of the report.
+        recorded: Folder of the recorded pictures, in the order of their names, or a video.
+        rendered: Folders of rendered pictures, as many and in the same order, or videos.
+        masks: Folder of masks of the head, one for each picture, for the PSNR on it.
+        sound: The sound from the first picture on, for SyncNet.
+        fps: Pictures per second.
+        device: Where to compute: by default CUDA where that works, else the CPU.
+    """
+
+    out: tyro.conf.Positional[Path]
+    recorded: Path
+    rendered: tuple[Path, ...]
+    masks: Path | None = None
+    sound: Path | None = None
+    fps: float = 25.0
+    device: DeviceName = "auto"
+
+    def run(self) -> None:
+        """Scores the pictures, and writes the report."""
+        from ico3d.protocols.renders import measure_renders, recorded_side
+        from ico3d.splat.device import computing_device
+
+        side = recorded_side(self.recorded, self.fps, self.masks, self.sound)
+        device = computing_device(self.device)
+        _say(measure_renders(self.rendered, side, self.out, device).markdown(), self.out)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ from safetensors.torch import save_file
 
 from ico3d.errors import ModelError
 from ico3d.measure.pictures import lpips as room
-from support.lpips_weights import ALEXNET, STAGES, write_alexnet
+from support.weights.lpips import ALEXNET, STAGES, write_alexnet
 
 pytestmark = pytest.mark.usefixtures("look_again")
 

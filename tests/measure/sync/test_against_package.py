@@ -1,8 +1,8 @@
 """Each part of the pipeline against an independent implementation of the published program.
 
-Expected numbers are those of the package syncnet-python 0.2.3 (S, calc_pdist, S3FD.detect_faces)
+Expected numbers are those of the package syncnet-python 0.2.3 (calc_pdist, S3FD.detect_faces)
 and of python_speech_features 0.6, on CPU, with the made-up weights, pictures and sounds of
-`support.sync_weights`, which are the same on any machine.
+`support.weights.sync`, which are the same on any machine.
 """
 
 import numpy as np
@@ -11,11 +11,9 @@ import torch
 
 from ico3d.measure.sync.detectors import reduced
 from ico3d.measure.sync.mfcc import mfcc
-from ico3d.measure.sync.network import SyncNet
-from ico3d.measure.sync.pipeline import lip_features, sound_features
 from ico3d.measure.sync.s3fd import S3fd, faces_of
 from ico3d.measure.sync.score import mean_distances, scores_of
-from support.sync_weights import made_up, made_up_faces, made_up_features, made_up_sound
+from support.weights.sync import made_up, made_up_faces, made_up_features, made_up_sound
 
 
 def test_mfcc():
@@ -28,18 +26,6 @@ def test_mfcc():
     ]
     np.testing.assert_allclose(rows[[0, 20, -1]][:, [0, 1, 5, 12]], expected, atol=1e-5)
     assert mfcc(np.zeros(100, np.int16)).shape == (1, 13)
-
-
-def test_features_of_lips_and_sound():
-    network = SyncNet()
-    network.load_state_dict(made_up(network, 1))
-    lips = lip_features(network, made_up_faces(12)[:6])
-    assert lips.shape == (2, 1024)
-    expected = [-2.1327231, 9.2391176, -0.9261863, -2.6858404]
-    np.testing.assert_allclose(lips[0, [0, 1, 500, 1023]], expected, atol=1e-4)
-    sound = sound_features(network, mfcc(made_up_sound(0.48)), 3)
-    expected = [-3.4816737, 0.6973919, -0.2391962, -2.1936059]
-    np.testing.assert_allclose(sound[1, [0, 1, 500, 1023]], expected, atol=1e-4)
 
 
 def test_scores():

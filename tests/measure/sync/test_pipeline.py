@@ -15,7 +15,9 @@ from ico3d.measure.sync.mfcc import mfcc
 from ico3d.measure.sync.network import SyncNet
 from ico3d.measure.sync.score import scores_of
 from ico3d.measure.sync.tracks import Crops, Track
-from support.sync_weights import made_up, made_up_faces, made_up_sound
+from support.weights.sync import made_up, made_up_faces, made_up_sound
+
+pytestmark = pytest.mark.slow
 
 BOX = np.array([60.0, 40.0, 165.0, 150.0])
 
@@ -48,6 +50,14 @@ def weights(tmp_path_factory):
     return folder
 
 
+@pytest.fixture(scope="module")
+def network(weights):
+    """SyncNet with these weights."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ICO3D_MODELS", str(weights))
+        return room.load_syncnet()
+
+
 @pytest.fixture
 def only(weights, tmp_path, monkeypatch):
     """No weights but SyncNet's."""
@@ -55,29 +65,36 @@ def only(weights, tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
 
 
-def test_the_face_is_compared_with_the_sound_of_its_own_frames(only, monkeypatch):
+def test_the_face_is_compared_with_the_sound_of_its_own_frames(only, network, monkeypatch):
+    monkeypatch.setattr(room, "load_syncnet", lambda: network)
     monkeypatch.setattr(tracks, "MORE_THAN", 8)
     monkeypatch.setattr(room, "detector_on", lambda device: Everywhere())
-    faces, samples = made_up_faces(15), made_up_sound(10 / 25)
+    faces, samples = made_up_faces(15), made_up_sound(8 / 25)
     sound = Sound(samples.astype(np.float32) / 32768, 16_000)
     found = room.sync_scores(iter(faces.astype(np.float32) / 255), 25.0, sound)
-    network = room.load_syncnet()
     crops = Crops(Track(2, np.tile(BOX, (13, 1))))
-    cut = [crops.cut(faces[k + 2], k) for k in range(7)]
-    heard = room.sound_features(network, mfcc(samples[2 * 640 :]), 3)
+    cut = [crops.cut(faces[k + 2], k) for k in range(5)]
+    heard = room.sound_features(network, mfcc(samples[2 * 640 :]), 1)
     expected = scores_of(room.lip_features(network, cut), heard, 13, "s3fd")
     # the pictures waited as JPEG
     assert found.distance == pytest.approx(expected.distance, rel=0.01)
     assert (found.frames, found.detector) == (13, "s3fd")
 
 
-def test_batches_do_not_change_features(only, monkeypatch):
-    network, faces = room.load_syncnet(), made_up_faces(7)
-    whole = room.lip_features(network, faces)
+def test_features_are_those_of_an_independent_implementation_in_batches_too(network, monkeypatch):
+    # of the class S of the package syncnet-python 0.2.3, with the same weights
+    expected = [-2.1327231, 9.2391176, -0.9261863, -2.6858404]
+    monkeypatch.setattr(room, "BATCH", 1)
+    lips = room.lip_features(network, made_up_faces(12)[:6])
+    assert lips.shape == (2, 1024)
+    np.testing.assert_allclose(lips[0, [0, 1, 500, 1023]], expected, atol=1e-4)
     monkeypatch.setattr(room, "BATCH", 2)
-    parts = room.lip_features(network, faces)
-    assert whole.shape == (3, 1024)
-    torch.testing.assert_close(parts, whole, rtol=1e-4, atol=1e-4)
+    torch.testing.assert_close(
+        room.lip_features(network, made_up_faces(12)[:6]), lips, rtol=1e-4, atol=1e-4
+    )
+    sound = room.sound_features(network, mfcc(made_up_sound(0.48)), 3)
+    expected = [-3.4816737, 0.6973919, -0.2391962, -2.1936059]
+    np.testing.assert_allclose(sound[1, [0, 1, 500, 1023]], expected, atol=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -103,7 +120,8 @@ def test_without_any_detector_it_says_how_to_get_the_published_one(only, caplog)
     assert "ico3d weights fetch s3fd" in caplog.text
 
 
-def test_pictures_without_a_face_are_one_sentence(only, monkeypatch):
+def test_pictures_without_a_face_are_one_sentence(network, monkeypatch):
+    monkeypatch.setattr(room, "load_syncnet", lambda: network)
     monkeypatch.setattr(room, "detector_on", lambda device: Everywhere())
     sound = Sound(np.zeros(16_000, np.float32), 16_000)
     with pytest.raises(CaptureError, match=r"no face .* \(1 of 3 show one\)"):

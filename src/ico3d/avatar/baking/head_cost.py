@@ -11,6 +11,7 @@ from ico3d.bundle.head import BakedHead
 from ico3d.bundle.manifest import Loss
 from ico3d.capture.capture import Capture
 from ico3d.capture.parts.held_out import PartOfCapture, scored_pictures
+from ico3d.capture.parts.over_torso import HeadOverTorso
 from ico3d.common.camera import Camera
 from ico3d.common.psnr import psnr
 from ico3d.common.spread import spread
@@ -61,7 +62,8 @@ def references(
         CaptureError: If there is no test picture.
     """
     cameras, frames = scored_pictures(capture, "test")
-    pictures = PictureCache(PartOfCapture(capture, cameras, frames), 0.0)
+    shown = PartOfCapture(capture, cameras, frames)
+    pictures = PictureCache(HeadOverTorso(shown) if head.over_torso else shown, 0.0)
     track = head.track(capture)
     chosen = [frames[i] for i in spread(len(frames), count)]
     views = pictures.views(chosen)[: 4 * count]

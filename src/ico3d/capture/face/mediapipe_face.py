@@ -26,11 +26,14 @@ class Face:
         blendshapes: (52,) weights.
         pose: (4, 4) from MediaPipe's canonical face (cm) to a camera of 63 degrees vertical field
             of view in OpenGL axes; only accurate enough as a starting point.
+        depths: (478,) pixels, how far behind the head's middle each landmark lies, to the scale of
+            `landmarks`; None where they were not kept.
     """
 
     landmarks: np.ndarray
     blendshapes: np.ndarray
     pose: np.ndarray
+    depths: np.ndarray | None = None
 
 
 class FaceReader:
@@ -97,6 +100,7 @@ class FaceReader:
             np.array([(p.x * width, p.y * height) for p in found.face_landmarks[0]]),
             np.array([shape.score for shape in found.face_blendshapes[0]], np.float32),
             np.asarray(found.facial_transformation_matrixes[0], np.float64),
+            np.array([p.z * width for p in found.face_landmarks[0]]),
         )
 
 

@@ -4,11 +4,12 @@ MediaPipe finds faces that fill at least a fifth of a picture. In pictures of wh
 30 to 60 pixels high, so MediaPipe gets parts of the picture, scaled to one size.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from PIL import Image
 
+from ico3d.capture.face.mediapipe_face import Face
 from ico3d.common.camera import Camera
 
 READ_AT = 384
@@ -50,6 +51,11 @@ class Part:
     def whole(self, pixels: np.ndarray) -> np.ndarray:
         """Converts pixels (N, 2) of the part that `cut` returns to pixels of the whole picture."""
         return pixels * (self.side / READ_AT) + (self.left, self.top)
+
+    def whole_face(self, face: Face) -> Face:
+        """Converts a face in the part that `cut` returns to pixels of the whole picture."""
+        depths = None if face.depths is None else face.depths * (self.side / READ_AT)
+        return replace(face, landmarks=self.whole(face.landmarks), depths=depths)
 
 
 def around(camera: Camera, center: np.ndarray, size: float = HEAD) -> Part | None:

@@ -61,6 +61,14 @@ class ResizedCapture(WrappedCapture):
         """What the camera sees without the person."""
         return self._shrunk(self.whole.background(camera), camera)
 
+    def behind(self, camera: int, frame: int) -> np.ndarray | None:
+        """What the camera sees in a frame without what the mask shows."""
+        return self._shrunk(self.whole.behind(camera, frame), camera)
+
+    def torso(self, camera: int, frame: int) -> np.ndarray | None:
+        """(H, W, 4) what a portrait shows below the head."""
+        return self._shrunk(self.whole.torso(camera, frame), camera)
+
     def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
         """(68, 2) landmarks in pixels of the smaller picture."""
         marks = self.whole.landmarks(camera, frame)

@@ -7,6 +7,7 @@ from ico3d.capture.capture import Capture
 from ico3d.capture.decoding import to_bytes
 from ico3d.capture.face.canonical import canonical_landmarks
 from ico3d.capture.parts.head_solid import HeadSolid
+from ico3d.capture.parts.over_torso import HeadOverTorso
 from ico3d.capture.parts.wrapped import WrappedCapture
 from ico3d.capture.surface.head import EDGE
 from ico3d.capture.surface.hull import Silhouette, visual_hull
@@ -167,12 +168,18 @@ class HeadOfBody(WrappedCapture):
         return None if picture is None or crop is None else np.ascontiguousarray(picture[crop.cut])
 
 
-def head_in(capture: Capture) -> Capture:
+def head_in(capture: Capture, over_torso: bool = False) -> Capture:
     """The capture if it shows a head, else the head in it.
 
+    Args:
+        capture: The recording.
+        over_torso: Whether only the head of a portrait is meant, over the recorded torso.
+
     Raises:
-        CaptureError: If the body's capture tells of no head.
+        CaptureError: If the body's capture tells of no head, or a portrait of no torso.
     """
+    if over_torso:
+        return HeadOverTorso(capture)
     return capture if capture.shows == "head" else HeadOfBody(capture)
 
 

@@ -61,6 +61,10 @@ class PartOfCapture(WrappedCapture):
             self.whole.head_mask_bytes(camera, frame, box) if self._shows(camera, frame) else None
         )
 
+    def torso(self, camera: int, frame: int) -> np.ndarray | None:
+        """(H, W, 4) what a portrait shows below the head; None where it cannot be seen."""
+        return self.whole.torso(camera, frame) if self._shows(camera, frame) else None
+
     def landmarks(self, camera: int, frame: int) -> np.ndarray | None:
         """(68, 2) landmarks in pixels; None where the picture cannot be seen."""
         return self.whole.landmarks(camera, frame) if self._shows(camera, frame) else None

@@ -23,6 +23,7 @@ class WrappedCapture(Capture):
         self.cameras, self.split = capture.cameras, capture.split
         self.fps, self.num_frames = capture.fps, capture.num_frames
         self.blendshape_names, self.tells_head = capture.blendshape_names, capture.tells_head
+        self.moves_behind = self.moves_behind or capture.moves_behind
 
     def has_image(self, camera: int, frame: int) -> bool:
         """Whether the wrapped capture has the picture."""
@@ -59,6 +60,16 @@ class WrappedCapture(Capture):
     def background(self, camera: int) -> np.ndarray | None:
         """What the camera sees without the person."""
         return self.whole.background(camera)
+
+    def behind(self, camera: int, frame: int) -> np.ndarray | None:
+        """What the camera sees in a frame without what the mask shows."""
+        if self.whole.moves_behind:
+            return self.whole.behind(camera, frame)
+        return self.background(camera)
+
+    def torso(self, camera: int, frame: int) -> np.ndarray | None:
+        """(H, W, 4) what a portrait shows below the head."""
+        return self.whole.torso(camera, frame)
 
     def audio(self) -> Sound | None:
         """The sound."""

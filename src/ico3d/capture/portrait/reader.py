@@ -98,6 +98,20 @@ class TalkingPortrait(RecordedCapture):
         plate = self.path / "bc.jpg"
         return unit(_picture(plate)) if plate.is_file() else None
 
+    def torso(self, camera: int, frame: int) -> np.ndarray | None:
+        """(H, W, 4) neck and clothes of `torso_imgs`, with their opacity.
+
+        Raises:
+            CaptureError: If the file is damaged or has no opacity.
+        """
+        file = self.path / "torso_imgs" / f"{frame}.png"
+        if frame not in self._poses or not file.is_file():
+            return None
+        with _reading(file, lambda: Image.open(file)) as picture:
+            if picture.mode != "RGBA":
+                raise CaptureError(f"{file} has no opacity: it must be RGBA.")
+            return _reading(file, lambda: np.asarray(picture, np.float32) / 255)
+
     def audio(self) -> Sound | None:
         """The sound of `aud.wav` at 16 kHz."""
         return read_sound_file(self.path / "aud.wav")
