@@ -380,10 +380,11 @@ def _record(capture: Capture, job: BodyJob) -> dict:
 def _made(job: BodyJob, tasks: Sequence[WindowTask], flow: str | None) -> dict:
     """How a body was made by some runs; `flow` names the flow method, None where none was used."""
     settings = job.settings
+    raised = min((task.steps - 1) // settings.sh_every for task in tasks)
     used = {
         "optimiser": "adam",
         "flow": flow,
-        "sh_degree": settings.sh_degree,
+        "sh_degree": min(raised, settings.sh_degree),
         "color_correction": settings.color_correction,
     }
     return provenance([task.folder for task in tasks], job.seed, used)
