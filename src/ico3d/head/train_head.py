@@ -127,7 +127,9 @@ def needs_of_head(capture: Capture, job: HeadJob, device: DeviceName = "auto") -
     Raises:
         Ico3dError: As for `train_head`.
     """
-    trainer, _ = _trainer(head_in(training_part(capture, job.hold_out)), job, device)
+    trainer, _ = _trainer(
+        head_in(training_part(capture, job.hold_out), job.over_torso), job, device
+    )
     settings, views = job.settings, trainer.views
     trainer.pictures.picture(views[0], trainer.model.device)  # one tells how large they are
     pictures = trainer.pictures.needs(len(views))

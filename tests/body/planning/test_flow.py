@@ -11,7 +11,7 @@ from ico3d.body.planning.flow_methods import DisFlow, best_method
 from ico3d.body.planning.windows import Window
 from ico3d.errors import CaptureError, MissingExtraError
 from support.bodies.moving_ball import BALL, HEIGHT
-from support.raft import NAME, install_torchvision, write_raft
+from support.weights.raft import NAME, install_torchvision, write_raft
 
 pytestmark = pytest.mark.slow
 

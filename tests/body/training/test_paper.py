@@ -13,7 +13,7 @@ from ico3d.body.training.train_clip import BodyJob, train_body
 from ico3d.errors import SettingsError
 from support.bodies.moving_capture import MovingCapture
 from support.bodies.tracked_capture import TrackedCapture
-from support.raft import NAME, install_torchvision, write_raft
+from support.weights.raft import NAME, install_torchvision, write_raft
 from support.settings import changed
 
 pytestmark = pytest.mark.slow
