@@ -121,9 +121,9 @@ class AblationTerms:
         only: Names of the ablations; all if empty.
         seeds: Seeds of the trainings.
         preset: Preset of the settings.
-        steps: Steps of the whole method, of a body's window; those of the preset if None.
         inputs: What drives heads.
         device: Where to compute.
+        settings: Settings of the whole method; those of the preset if None.
     """
 
     capture: Path
@@ -132,9 +132,9 @@ class AblationTerms:
     only: tuple[str, ...] = ()
     seeds: tuple[int, ...] = (0,)
     preset: PresetName = "cpu"
-    steps: int | None = None
     inputs: Inputs = "speech"
     device: DeviceName = "auto"
+    settings: HeadSettings | BodySettings | None = None
 
     def chosen(self) -> list[str]:
         """Names of the ablations, the whole method first.
@@ -206,9 +206,8 @@ def _below(columns: Sequence[Column], rows: Sequence[Mapping[str, Value]]) -> Se
 def _head_rows(terms: AblationTerms, names: Sequence[str]) -> dict[str, list[dict]]:
     """Results by ablation, one for each seed."""
     capture = open_capture(terms.capture)
-    settings = PRESETS[terms.preset]
-    if terms.steps is not None:
-        settings = replace(settings, steps=terms.steps)
+    given = terms.settings
+    settings = given if isinstance(given, HeadSettings) else PRESETS[terms.preset]
     cameras, frames = scored_pictures(capture, "test")
     part = head_in(PartOfCapture(capture, cameras, frames))
     found: dict[str, list[dict]] = {}
@@ -226,9 +225,8 @@ def _head_rows(terms: AblationTerms, names: Sequence[str]) -> dict[str, list[dic
 
 def _body_rows(terms: AblationTerms, names: Sequence[str]) -> dict[str, list[dict]]:
     """Results by ablation, one for each seed."""
-    settings = preset(OURS, terms.preset)
-    if terms.steps is not None:
-        settings = replace(settings, steps=terms.steps, steps_per_frame=0)
+    given = terms.settings
+    settings = given if isinstance(given, BodySettings) else preset(OURS, terms.preset)
     base = terms_for(
         terms.capture, None, terms.out, settings, False, terms.device, preset=terms.preset
     )
