@@ -53,6 +53,10 @@ VERBS: dict[str, Verb] = {
         "ico3d.protocols.commands", "MeasureRenders", "anybody's pictures: a report"
     ),
     "measure body": Verb("ico3d.protocols.commands", "MeasureBody", "methods for bodies: a report"),
+    "measure ablations": Verb(
+        "ico3d.protocols.commands", "MeasureAblations", "what each part is worth: a report"
+    ),
+    "measure all": Verb("ico3d.protocols.commands", "MeasureAll", "every protocol, one report"),
     "measure viewer": Verb("ico3d.protocols.commands", "MeasureViewer", "frame rates: a report"),
     "bake": Verb("ico3d.avatar.baking.command", "Bake", "make the bundle that browsers play"),
     "bundle info": Verb("ico3d.bundle.commands", "Info", "check a bundle, say what is in it"),

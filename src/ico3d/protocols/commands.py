@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Annotated, get_args
+from typing import Annotated, Literal, get_args
 
 import tyro
 
@@ -82,15 +82,12 @@ class MeasurePortrait(HeadChoice):
         Raises:
             SettingsError: If no training is asked for.
         """
-        from ico3d.errors import SettingsError
         from ico3d.protocols.portrait import PortraitTerms, measure_portrait
 
-        if self.seeds < 1:
-            raise SettingsError("--seeds must be at least 1.")
         terms = PortraitTerms(
             self.capture,
             self.out,
-            tuple(range(self.seeds)),
+            _seeds(self.seeds),
             self.encoder,
             self.over_torso,
             self.settings,
@@ -202,8 +199,9 @@ class MeasureBody(BodyPreset):
         from ico3d.protocols.body import body_report
         from ico3d.splat.device import decided
 
-        if self.seeds < 1 or self.jobs < 1 or (self.frames or 2) < 2:
-            raise SettingsError("--seeds and --jobs must be at least 1, and --frames at least 2.")
+        if self.jobs < 1 or (self.frames or 2) < 2:
+            raise SettingsError("--jobs must be at least 1, and --frames at least 2.")
+        seeds = _seeds(self.seeds)
         terms = bench.terms_for(
             self.capture,
             self.frames,
@@ -214,11 +212,7 @@ class MeasureBody(BodyPreset):
             self.unseen,
             self.preset,
         )
-        trials = [
-            bench.Trial(method, seed, terms)
-            for seed in range(self.seeds)
-            for method in self.methods
-        ]
+        trials = [bench.Trial(method, seed, terms) for seed in seeds for method in self.methods]
         console = Console()
         results = bench.run_trials(
             trials, self.jobs, lambda trial, found: console.print(trial.line(found))
@@ -226,6 +220,111 @@ class MeasureBody(BodyPreset):
         report = body_report(results, trials, self.out)
         report.write(self.out)
         _say(report.sections[0].markdown(1), self.out)
+
+
+@dataclass(frozen=True)
+class MeasureAblations:
+    """Trains a method without one of its parts at a time, and measures what each part is worth.
+
+    The same command continues an interrupted run.
+
+    Attributes:
+        capture: A recording of a head (`--of head`) or of a whole person (`--of body`).
+        out: Folder for the report and the trainings.
+        of: Whose method.
+        only: Parts to leave out, by name; all by default. A wrong name lists them.
+        seeds: Number of trainings of each, each with another seed.
+        preset: The paper's settings, or settings sized for two CPU cores.
+        inputs: What drives heads: speech, or the recording's blendshapes.
+        device: Where to compute: by default CUDA where that works, else the CPU.
+    """
+
+    capture: tyro.conf.Positional[Path]
+    out: tyro.conf.Positional[Path]
+    of: Literal["head", "body"]
+    only: tuple[str, ...] = ()
+    seeds: int = 1
+    preset: PresetName = "cpu"
+    inputs: Literal["speech", "blendshapes"] = "speech"
+    device: DeviceName = "auto"
+
+    def run(self) -> None:
+        """Trains and measures what is missing, and writes the report.
+
+        Raises:
+            SettingsError: If no training is asked for.
+        """
+        from ico3d.protocols.ablations import AblationTerms, measure_ablations
+
+        terms = AblationTerms(
+            self.capture,
+            self.out,
+            self.of,
+            self.only,
+            _seeds(self.seeds),
+            self.preset,
+            self.inputs,
+            self.device,
+        )
+        _say(measure_ablations(terms).markdown(), self.out)
+
+
+@dataclass(frozen=True)
+class MeasureAll:
+    """Runs every protocol and writes one report: viewer, portraits, bodies, ablations.
+
+    Where no recordings are given, people who do not exist are recorded, in the layouts of talking
+    portraits and of DNA-Rendering. The same command continues an interrupted run.
+
+    Attributes:
+        out: Folder for everything.
+        small: Small recordings and short trainings with one seed, within 40 minutes on two cores.
+        portraits: Talking portraits, with torso_imgs and bc.jpg.
+        bodies: Recordings of whole persons by at least three cameras.
+        avatar: A person to draw, of ico3d assemble or a bundle; `demo` is that of the package.
+        subject: Who is recorded if no recordings are given: `anny` (pip install
+            'ico3d[synthetic]') or an .npz subject file.
+        preset: The paper's settings, or settings sized for two CPU cores.
+        device: Where to compute: by default CUDA where that works, else the CPU.
+    """
+
+    out: tyro.conf.Positional[Path]
+    small: bool = False
+    portraits: tuple[Path, ...] = ()
+    bodies: tuple[Path, ...] = ()
+    avatar: Path = Path("demo")
+    subject: str = "anny"
+    preset: PresetName = "cpu"
+    device: DeviceName = "auto"
+
+    def run(self) -> None:
+        """Measures what is missing, and writes the reports."""
+        from ico3d.protocols.everything import SMALL, AllTerms, Size, measure_all
+
+        terms = AllTerms(
+            self.out,
+            self.portraits,
+            self.bodies,
+            self.avatar,
+            self.subject,
+            SMALL if self.small else Size(),
+            self.preset,
+            self.device,
+        )
+        _say(measure_all(terms).markdown(), self.out)
+
+
+def _seeds(count: int) -> tuple[int, ...]:
+    """Seeds of so many trainings.
+
+    Raises:
+        SettingsError: If there is none.
+    """
+    from ico3d.errors import SettingsError
+
+    if count < 1:
+        raise SettingsError("--seeds must be at least 1.")
+    return tuple(range(count))
 
 
 def _say(text: str, out: Path) -> None:
