@@ -210,4 +210,5 @@ class PictureCache:
 
 
 def _as_floats(picture: np.ndarray, device: torch.device) -> Tensor:
-    return torch.from_numpy(picture).to(device).float() / 255
+    owned = np.require(picture, requirements="W")  # torch warns of others
+    return torch.from_numpy(owned).to(device).float() / 255

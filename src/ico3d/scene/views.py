@@ -115,7 +115,7 @@ class SceneViews:
         found = self._cache.layers(view.camera_index, view.frame)
         if found is None:
             raise CaptureError(f"{self._where(view)} has vanished.")
-        image, mask = (None if layer is None else torch.from_numpy(layer) / 255 for layer in found)
+        image, mask = (None if layer is None else _as_floats(layer) for layer in found)
         assert image is not None
         return image, mask
 
@@ -205,3 +205,7 @@ def _every_eighth(views: tuple[View, ...]) -> tuple[tuple[View, ...], tuple[View
         return views, ()
     kept = tuple(view for place, view in enumerate(views) if place % TEST_EVERY)
     return kept, views[::TEST_EVERY]
+
+
+def _as_floats(picture: np.ndarray) -> Tensor:
+    return torch.from_numpy(np.require(picture, requirements="W")) / 255  # torch warns of others
