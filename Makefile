@@ -54,8 +54,8 @@ SUBJECT ?= anny
 RESULTS ?= runs/bench
 bench: install ## long quality and speed runs; figures go to docs/benchmarks.md
 	ico3d capture synthetic $(RESULTS)/capture --subject $(SUBJECT) --cameras 6 --frames 1100 --views-per-frame 1 --size 256
-	$(PY) bench/head.py $(RESULTS)/capture $(RESULTS)/head
-	$(PY) bench/bake.py $(RESULTS)/head/blendshapes-full-0 $(RESULTS)/capture --json $(RESULTS)/bake.json
+	ico3d measure ablations $(RESULTS)/capture $(RESULTS)/head --of head --inputs blendshapes --seeds 3
+	$(PY) bench/bake.py $(RESULTS)/head/whole-method/seed0 $(RESULTS)/capture --json $(RESULTS)/bake.json
 	$(if $(OPPONENT),ico3d bench raster --against $(OPPONENT) --json $(RESULTS)/raster.json)
 	$(PY) bench/step.py $(RESULTS)/capture --json $(RESULTS)/step.json
 	$(PY) bench/gpu.py --json $(RESULTS)/gpu.json --capture $(RESULTS)/capture

@@ -63,7 +63,7 @@ def test_there_are_commands_to_look_at():
     assert sum(len(shown(page)) for page in PAGES) > 80
     assert sum(len(named(page)) for page in PAGES) > 150
     benchmarks = named(ROOT / "docs" / "benchmarks.md")
-    assert {words[1] for words in benchmarks if words[0] == "python"} > {"bench/head.py"}
+    assert {words[1] for words in benchmarks if words[0] == "python"} > {"bench/step.py"}
     assert sum(len(words) > 3 for words in benchmarks) > 20
 
 
