@@ -18,6 +18,7 @@ export default defineConfig({
     proxy: { '/bundle': SERVER, '/health': SERVER, '/ws': { target: SERVER, ws: true } },
   },
   test: {
+    globalSetup: 'support/scratch.ts',
     isolate: false, // loading three and Spark anew for each file takes longer than most of the tests
     projects: [
       { extends: true, test: { name: 'unit', include: ['test/**/*.test.ts'] } },
@@ -26,7 +27,7 @@ export default defineConfig({
         test: {
           name: 'e2e',
           include: ['e2e/*.spec.ts'],
-          globalSetup: 'support/servers/shared.ts',
+          globalSetup: ['support/scratch.ts', 'support/servers/shared.ts'],
           maxWorkers: 2, // much of a talk is waiting
           sequence: { groupOrder: 1 },
           testTimeout: 120_000,
