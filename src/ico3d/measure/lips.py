@@ -45,7 +45,8 @@ def lip_lag_ms(gaps: np.ndarray, truth: np.ndarray, fps: float) -> float | None:
     neighbours gives fractions of a frame.
 
     Returns:
-        The delay, positive if `gaps` is late; None if there is no correlation.
+        The delay, positive if `gaps` is late; None if there is no correlation, or if it still grows
+        at the largest delay that is tried.
     """
     reach = min(round(LONGEST_LAG * fps), len(gaps) // 2)
     values = [_shifted_correlation(gaps, truth, shift) for shift in range(-reach, reach + 1)]
@@ -53,10 +54,10 @@ def lip_lag_ms(gaps: np.ndarray, truth: np.ndarray, fps: float) -> float | None:
         return None
     series = np.array(values, float)
     peak = int(series.argmax())
-    offset = 0.0
-    if 0 < peak < len(series) - 1:
-        before, at, after = series[peak - 1 : peak + 2]
-        offset = 0.5 * (before - after) / (before - 2 * at + after)
+    if not 0 < peak < len(series) - 1:
+        return None
+    before, at, after = series[peak - 1 : peak + 2]
+    offset = 0.5 * (before - after) / (before - 2 * at + after)
     return float((peak - reach + offset) / fps * 1000)
 
 

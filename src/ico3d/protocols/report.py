@@ -123,7 +123,7 @@ class Section:
         if self.table is not None:
             parts.append(self.table.markdown())
             if absent := self.table.absent():
-                parts.append(f"Not measured here: {', '.join(absent)}.")
+                parts.append(f"Not measured here: {'; '.join(absent)}.")
         parts += [f"![{p.caption}]({place}{p.file})\n\n*{p.caption}*" for p in self.pictures]
         return "\n\n".join(part for part in parts if part)
 
