@@ -6,6 +6,7 @@ files therefore start when all kernels lie in numba's cache. Tests and what they
 beside them, for each of those processes would do so otherwise.
 """
 
+import gc
 import sys
 import tempfile
 from dataclasses import replace
@@ -44,6 +45,7 @@ PICTURE = recording.Recording(
 
 def main() -> None:
     """Leaves Python's and numba's caches filled."""
+    gc.set_threshold(100_000, 50, 100)  # little of what a compiler makes is garbage
     compile_kernels()
     if not sys.dont_write_bytecode:
         pytest.main(["--collect-only"])  # its assertions are not Python's

@@ -21,9 +21,16 @@ export const ENVIRONMENT = {
   PYTHONPATH: `${REPOSITORY}src:${REPOSITORY}tests`,
 };
 
+/** Runs a script as Python does, without looking for garbage: what is imported, which takes longest, stays. */
+const WITHOUT_COLLECTING = `import gc, os, runpy, sys
+gc.disable()
+sys.argv = sys.argv[1:]
+sys.path[0] = os.path.dirname(sys.argv[0])
+runpy.run_path(sys.argv[0], run_name="__main__")`;
+
 /** Runs a script of `support/` to its end; what it printed. */
 export function runPython(script: string, ...args: string[]): string {
   const path = `${REPOSITORY}viewer/support/${script}`;
   const stdio = ['ignore', 'pipe', 'inherit'] as const;
-  return execFileSync(PYTHON, [path, ...args], { cwd: REPOSITORY, env: ENVIRONMENT, stdio: [...stdio], encoding: 'utf8' });
+  return execFileSync(PYTHON, ['-c', WITHOUT_COLLECTING, path, ...args], { cwd: REPOSITORY, env: ENVIRONMENT, stdio: [...stdio], encoding: 'utf8' });
 }

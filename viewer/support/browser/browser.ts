@@ -3,6 +3,24 @@ import { join } from 'node:path';
 import { chromium, type Browser as Chromium, type BrowserContext, type Page } from 'playwright-core';
 import { scratchFolder } from '../scratch.ts';
 
+const WITHOUT = [
+  // Each window would fill the popups of its address bar, hidden, at the cost of another page.
+  'WebUIOmniboxPopup',
+  'WebUIOmniboxAimPopup',
+  // What playwright goes without, too: its list is replaced by this one.
+  'AvoidCorsURLLoaderRestartOnRedirect',
+  'AvoidUnnecessaryBeforeUnloadCheckSync',
+  'DestroyProfileOnBrowserClose',
+  'HttpsFirstBalancedModeAutoEnable',
+  'HttpsUpgrades',
+  'LensOverlay',
+  'MediaRouter',
+  'NetworkTimeServiceQuerying',
+  'OptimizationHints',
+  'PaintHolding',
+  'PreconnectToSearch',
+  'ThirdPartyStoragePartitioning',
+];
 const FLAGS = [
   '--headless=new',
   '--no-sandbox',
@@ -15,6 +33,7 @@ const FLAGS = [
   '--enable-unsafe-swiftshader',
   '--disable-gpu-compositing', // only WebGL is drawn by the software GPU, which is slow at putting a page together
   '--autoplay-policy=no-user-gesture-required',
+  `--disable-features=${WITHOUT.join()}`,
 ];
 /** What the fake microphone plays, once, each time that it is opened. */
 const HEARD = join(scratchFolder(), 'microphone.wav');

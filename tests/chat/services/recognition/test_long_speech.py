@@ -20,6 +20,7 @@ from pipecat.services.stt_service import SegmentedSTTService
 from pipecat.tests.utils import SleepFrame, run_test
 from pipecat.utils.time import time_now_iso8601
 
+from ico3d.chat.remote.headless import run
 from ico3d.chat.services import ChosenService, choose
 from ico3d.chat.services.provider import Provider
 from ico3d.chat.services.recognition import openai, sphinx, whisper
@@ -175,6 +176,22 @@ class SlowDecoder:
 
     async def close(self):
         pass
+
+
+class CountedDecoder(SlowDecoder):
+    starts = 0
+
+    async def start(self):
+        self.starts += 1
+
+
+@pytest.mark.parametrize("sounds", [0, 1])
+async def test_whoever_only_types_starts_no_decoder(sounds):
+    service = sphinx.SphinxRecognition()
+    service._decoder = CountedDecoder()
+    async for _ in run(service, [InputAudioRawFrame(bytes(640), RATE, 1)] * sounds, 10):
+        pass
+    assert service._decoder.starts == sounds
 
 
 async def test_pocketsphinx_keeps_no_more_than_it_can_take():

@@ -97,9 +97,8 @@ class SphinxRecognition(STTService):
         self._task: asyncio.Task | None = None
 
     async def start(self, frame: StartFrame):
-        """Starts the decoder and the task that feeds it."""
+        """Starts the task that feeds the decoder."""
         await super().start(frame)
-        await self._decoder.start()
         self._task = self._task or self.create_task(self._decode_all())
 
     async def stop(self, frame: EndFrame):
@@ -116,7 +115,11 @@ class SphinxRecognition(STTService):
         await self._decoder.close()
 
     async def run_stt(self, audio: bytes) -> AsyncGenerator[Frame | None, None]:
-        """Queues sound; transcripts are pushed by the task that decodes."""
+        """Queues sound; transcripts are pushed by the task that decodes.
+
+        The first sound starts the decoder: whoever only types needs none.
+        """
+        await self._decoder.start()
         if self._hearing and audio:
             await self._listen(audio)
         else:
