@@ -13,8 +13,8 @@ from ico3d.body.training.train_clip import BodyJob, train_body
 from ico3d.errors import SettingsError
 from support.bodies.moving_capture import MovingCapture
 from support.bodies.tracked_capture import TrackedCapture
-from support.weights.raft import NAME, install_torchvision, write_raft
 from support.settings import changed
+from support.weights.raft import NAME, install_torchvision, write_raft
 
 pytestmark = pytest.mark.slow
 
