@@ -28,14 +28,11 @@ def two_threads():
 
 @pytest.fixture
 def cuda(monkeypatch):
-    """A machine with CUDA and gsplat, as far as errors of devices go; gives the device."""
-    from ico3d.splat.device import cuda_fault
-    from support.pretended_cuda import CUDA, pretended_cuda
+    """A CUDA device; where there is none, one as far as errors of devices go."""
+    from support.pretended_cuda import cuda_or_pretended
 
-    cuda_fault.cache_clear()
-    with pretended_cuda(monkeypatch):
-        yield CUDA
-    cuda_fault.cache_clear()
+    with cuda_or_pretended(monkeypatch) as device:
+        yield device
 
 
 def pytest_collection_finish() -> None:

@@ -3,14 +3,15 @@
 import shutil
 
 import pytest
-import torch
 
 from ico3d.body.settings import ONE_WINDOW, SKINNED, settings_for
 from ico3d.body.training.finetune_window import FineTuner
+from ico3d.body.training.needs import needs_of_body
 from ico3d.body.training.optimise_window import BodyTrainer
 from ico3d.body.training.train_clip import BodyJob, plan_windows, train_body
 from support.bodies.tiny_training import TINY
 from support.bodies.tracked_capture import TrackedCapture
+from support.pretended_cuda import assert_same_run
 from support.settings import changed
 
 pytestmark = pytest.mark.slow
@@ -21,7 +22,8 @@ DEATHS = {BodyTrainer: 8, FineTuner: 4}
 
 def _job(method: str, **changes) -> BodyJob:
     small = TINY | {"steps_per_frame": 2, "checkpoint_every": 3, "color_correction": True}
-    return BodyJob(method, 0, changed(settings_for("cpu", method), small | changes))
+    device = changes.pop("device", "auto")
+    return BodyJob(method, 0, changed(settings_for("cpu", method), small | changes), device=device)
 
 
 @pytest.fixture(scope="module")
@@ -65,5 +67,12 @@ def test_an_interrupted_run_goes_on_there(cuda, begun, tmp_path, method, monkeyp
                 train_body(capture, parts, job)
     resumed = train_body(capture, parts, job)
     for ours, theirs in zip(resumed.models, whole.models, strict=True):
-        for name, value in theirs.gaussians.items():
-            assert torch.equal(ours.gaussians[name], value), name
+        assert_same_run(ours.gaussians, theirs.gaussians)
+
+
+def test_a_dry_run_trains_there(cuda, tmp_path):
+    """With maps of the cameras' colours and with harmonics, as the paper's settings may have."""
+    capture = TrackedCapture(tmp_path / "capture", 12.0)
+    job = _job("4dgs", sh_degree=2, sh_every=1, device="cuda")
+    needs = needs_of_body(capture, tmp_path / "dry", job)
+    assert needs.end.gaussians == 90 and needs.device_memory > 0

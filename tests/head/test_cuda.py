@@ -1,5 +1,7 @@
 """Heads are trained, and go on being trained, where CUDA is."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
@@ -10,10 +12,10 @@ from ico3d.head.initial_gaussians import initial_head
 from ico3d.head.optimise import HeadTrainer
 from ico3d.head.perceptual import CHANNELS, WEIGHTS, vgg_layers
 from ico3d.head.settings import PRESETS
-from ico3d.head.train_head import HeadJob, train_head
+from ico3d.head.train_head import HeadJob, needs_of_head, train_head
 from ico3d.head.watch import WatchedHead
 from ico3d.training.watch import _side_by_side
-from support.pretended_cuda import is_moved
+from support.pretended_cuda import assert_same_run, is_on_cuda
 from support.settings import changed
 
 pytestmark = pytest.mark.slow
@@ -49,7 +51,7 @@ def vgg(tmp_path, monkeypatch):
 @pytest.mark.parametrize("variant", ["full", "no-mlp", "no-blending"])
 def test_every_variant_trains_there(cuda, tiny, tmp_path, variant):
     head = train_head(tiny, tmp_path, _job(variant=variant))
-    assert is_moved(head.model.means) and is_moved(head.model.basis)
+    assert is_on_cuda(head.model.means) and is_on_cuda(head.model.basis)
 
 
 def test_a_perceptual_term_looks_at_pictures_there(cuda, vgg, tiny, tmp_path):
@@ -57,7 +59,7 @@ def test_a_perceptual_term_looks_at_pictures_there(cuda, vgg, tiny, tmp_path):
     head = train_head(
         tiny, tmp_path, _job(**{"loss.perceptual": 0.1, "loss.perceptual_from": 2}, steps=4)
     )
-    assert is_moved(head.model.means)
+    assert is_on_cuda(head.model.means)
 
 
 def test_it_is_watched_there(cuda, tiny):
@@ -65,7 +67,7 @@ def test_it_is_watched_there(cuda, tiny):
     model = initial_head(tiny, SETTINGS, "full", 3, np.random.default_rng(0)).to(cuda)
     track = BlendshapeTrack(tiny, tiny.blendshape_names)
     watched = WatchedHead(HeadTrainer(tiny, model, track, None, SETTINGS, 0))
-    assert is_moved(watched.gaussians(0, watched.values(0)).colors)
+    assert is_on_cuda(watched.gaussians(0, watched.values(0)).colors)
     assert _side_by_side(*watched.pictures(0)).shape == (48, 96, 3)
 
 
@@ -85,5 +87,23 @@ def test_an_interrupted_run_goes_on_there(cuda, tiny, tmp_path, inputs, monkeypa
         with pytest.raises(KeyboardInterrupt):
             train_head(tiny, tmp_path / "parts", _job(inputs))
     resumed = train_head(tiny, tmp_path / "parts", _job(inputs))
-    for name, value in whole.model.state_dict().items():
-        assert torch.equal(resumed.model.state_dict()[name], value), name
+    assert_same_run(resumed.model.state_dict(), whole.model.state_dict())
+
+
+def test_the_papers_switches_work_there(cuda, vgg, tiny, tmp_path):
+    """SGD, harmonics that turn with the head, and the perceptual term, for heads that speak."""
+    job = _job(
+        "speech",
+        **{"optimiser": "sgd", "sh_degree": 3, "sh_every": 1, "loss.perceptual": 0.1},
+        **{"loss.perceptual_from": 3, "steps": 4, "density.begin": 2, "density.every": 2},
+    )
+    head = train_head(tiny, tmp_path, job)
+    assert is_on_cuda(head.model.means)
+    assert head.summary["made"]["used"]["sh_degree"] == 3
+
+
+def test_a_dry_run_trains_there(cuda, tiny):
+    needs = needs_of_head(tiny, _job(steps=1), "cuda")
+    assert needs.end.gaussians == 400 and needs.device_memory > 0
+    assert any("memory of the GPU" in line for line in needs.lines(Path()))
+    assert needs_of_head(tiny, _job(steps=1), "cpu").device_memory == 0

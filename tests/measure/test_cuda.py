@@ -12,6 +12,7 @@ from ico3d.measure.body import evaluate_body
 from ico3d.measure.head import evaluate_head
 from ico3d.measure.pictures import lpips as room
 from ico3d.measure.scene import evaluate_scene
+from ico3d.splat.device import device_name
 from support.bodies.moving_capture import MovingCapture
 from support.bodies.tiny_training import job
 from support.captures import open_with
@@ -43,7 +44,7 @@ def test_a_head(cuda, no_models, tmp_path):
     head.model.to(cuda)
     there = evaluate_head(head, capture, (3, 4, 5), tmp_path / "pictures")
     _same(there, here)
-    assert (here["device"], there["device"]) == ("cpu", "cuda (Pretended)")
+    assert (here["device"], there["device"]) == ("cpu", device_name(cuda))
 
 
 def test_a_body(cuda, no_models, tmp_path):
@@ -54,7 +55,7 @@ def test_a_body(cuda, no_models, tmp_path):
         model.to(cuda)
     there = evaluate_body(body, capture, frames=(0, 3), images=tmp_path / "pictures")
     _same(there, here)
-    assert (here["device"], there["device"]) == ("cpu", "cuda (Pretended)")
+    assert (here["device"], there["device"]) == ("cpu", device_name(cuda))
 
 
 @pytest.mark.parametrize("only", ["all", "person"])
@@ -65,7 +66,7 @@ def test_a_scene(cuda, tmp_path, only):
     scene.scene.to(cuda)
     there = evaluate_scene(scene, capture, "test", tmp_path / "pictures")
     _same(there, here)
-    assert (here["device"], there["device"]) == ("cpu", "cuda (Pretended)")
+    assert (here["device"], there["device"]) == ("cpu", device_name(cuda))
 
 
 def test_lpips_looks_there(cuda, lpips_weights, look_again, monkeypatch):
@@ -85,4 +86,4 @@ def test_the_verb(cuda, no_models, tmp_path, monkeypatch, device):
         assert main([*map(str, words), "--device", device]) == 0
     assert (len(pictures) > 0) == (device != "cpu")
     figures = json.loads((tmp_path / "a.json").read_text())
-    assert figures["device"] == ("cpu" if device == "cpu" else "cuda (Pretended)")
+    assert figures["device"] == ("cpu" if device == "cpu" else device_name(cuda))

@@ -1,12 +1,11 @@
 """Scenes are trained, and go on being trained, where CUDA is."""
 
 import pytest
-import torch
 
 from ico3d.scene.optimise import SceneTrainer
 from ico3d.scene.settings import settings_for
-from ico3d.scene.train_scene import SceneJob, train_scene
-from support.pretended_cuda import is_moved
+from ico3d.scene.train_scene import SceneJob, needs_of_scene, train_scene
+from support.pretended_cuda import assert_same_run, is_on_cuda
 from support.settings import changed
 
 SMALL = {
@@ -41,6 +40,11 @@ def test_an_interrupted_run_goes_on_there(cuda, still, tmp_path, strategy, monke
         with pytest.raises(KeyboardInterrupt):
             train_scene(capture, tmp_path / "parts", job)
     resumed = train_scene(capture, tmp_path / "parts", job)
-    assert is_moved(resumed.scene.parameters["means"])
-    for name, value in whole.scene.parameters.items():
-        assert torch.equal(resumed.scene.parameters[name], value), name
+    assert is_on_cuda(resumed.scene.parameters["means"])
+    assert_same_run(resumed.scene.parameters, whole.scene.parameters)
+
+
+def test_a_dry_run_trains_there(cuda, still):
+    job = SceneJob("person", "all", "default", 0, changed(settings_for("cpu", "default"), SMALL))
+    needs = needs_of_scene(still(3), job, "cuda")
+    assert needs.end.gaussians == 120 and needs.device_memory > 0

@@ -5,12 +5,15 @@ with on the CPU, and hands the same down to all that is made of it. Mixing it wi
 not moved, or turning it into numpy without `.cpu()`, is the error that CUDA makes of it. Control
 flow, losses and gradients are real, so that whole trainings run.
 
+Where CUDA and gsplat work, `cuda_or_pretended` gives the real ones, and the same tests run there.
+
 `gsplat` stands for the package of that name: its contract, fulfilled by the CPU's rasteriser.
 """
 
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from importlib import import_module
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
@@ -21,6 +24,7 @@ from torch.overrides import TorchFunctionMode
 from ico3d.common.camera import Camera
 from ico3d.splat.cpu.backend import draw_gaussians
 from ico3d.splat.density import relocated
+from ico3d.splat.device import cuda_fault
 from ico3d.splat.gaussians import Gaussians
 
 CUDA, CPU = torch.device("cuda", 0), torch.device("cpu")
@@ -36,6 +40,8 @@ GIVEN_TO_ANY = {
 JOINING = {torch.cat, torch.stack, torch.concat, torch.hstack, torch.vstack}
 """What takes not even a single number of another device."""
 _NEW_PARAMETER = nn.Parameter.__new__
+PEAK = 123_000_000
+"""Bytes that are said to have been the most on the device."""
 INDEXING = {Tensor.__getitem__, Tensor.__setitem__}
 _GROUPS = (tuple, list, dict)
 
@@ -191,10 +197,47 @@ def pretended_cuda(monkeypatch, **changes: Any) -> Iterator[None]:
     monkeypatch.setattr(torch.cuda, "device_count", lambda: 1)
     monkeypatch.setattr(torch.cuda, "synchronize", lambda *_: None)
     monkeypatch.setattr(torch.cuda, "get_device_name", lambda *_: "Pretended")
+    monkeypatch.setattr(torch.cuda, "reset_peak_memory_stats", lambda *_: None)
+    monkeypatch.setattr(torch.cuda, "max_memory_allocated", lambda *_: PEAK)
     monkeypatch.setattr(nn.Parameter, "__new__", _new_parameter)  # no function of torch's
     install_gsplat(monkeypatch, **changes)
     with PretendedCuda():
         yield
+
+
+@contextmanager
+def cuda_or_pretended(monkeypatch) -> Iterator[torch.device]:
+    """A CUDA device: a real one where it can be used, else one that is pretended."""
+    cuda_fault.cache_clear()
+    if cuda_fault() is None:
+        yield CUDA
+        return
+    cuda_fault.cache_clear()
+    with pretended_cuda(monkeypatch):
+        yield CUDA
+    cuda_fault.cache_clear()
+
+
+def is_on_cuda(tensor: Tensor) -> bool:
+    """Whether a tensor lies on the device of `cuda_or_pretended`."""
+    return is_moved(tensor) or tensor.device.type == "cuda"
+
+
+def assert_same_run(ours: Mapping[str, Tensor], theirs: Mapping[str, Tensor]) -> None:
+    """Two trainings that differ by an interruption gave the same tensors, on CUDA.
+
+    A real GPU adds gradients in any order, so that Gaussians split elsewhere and their number
+    differs after some steps; there, tensors only need the same names and widths, and to be
+    finite. `python bench/gpu.py` states how far apart such trainings are.
+    """
+    pretended = import_module("gsplat").rasterization is rasterization
+    assert ours.keys() == theirs.keys()
+    for name, value in theirs.items():
+        if pretended:
+            assert torch.equal(ours[name], value), name
+        else:
+            assert ours[name].shape[1:] == value.shape[1:], name
+            assert bool(ours[name].isfinite().all()), name
 
 
 def _new_parameter(
@@ -282,12 +325,14 @@ def compute_relocation(
 def drawn(monkeypatch) -> Iterator[list[int]]:
     """Gathers how many Gaussians each picture had that gsplat was asked for meanwhile."""
     pictures: list[int] = []
+    gsplat = import_module("gsplat")
+    draw = gsplat.rasterization
 
     def counting(means: Tensor, *arguments: Any, **options: Any) -> tuple[Tensor, Tensor, dict]:
         if len(means) > 1:  # one alone tries the device
             pictures.append(len(means))
-        return rasterization(means, *arguments, **options)
+        return draw(means, *arguments, **options)
 
     with monkeypatch.context() as patch:
-        patch.setattr(sys.modules["gsplat"], "rasterization", counting)
+        patch.setattr(gsplat, "rasterization", counting)
         yield pictures

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 import numpy as np
 import torch
 
-from ico3d.splat.device import device_name
+from ico3d.splat.device import device_name, wait_for
 
 
 class Stopwatch:
@@ -25,10 +25,10 @@ class Stopwatch:
     @contextmanager
     def picture(self) -> Iterator[None]:
         """Times the `with` block, all of its work on CUDA and none of what CUDA did before."""
-        self._wait()
+        wait_for(self.device)
         begin = time.perf_counter()
         yield
-        self._wait()
+        wait_for(self.device)
         self._seconds.append(time.perf_counter() - begin)
 
     def figures(self) -> dict[str, float | str]:
@@ -43,8 +43,3 @@ class Stopwatch:
     def within(self, share: float) -> float:
         """Milliseconds within which a share of the pictures, 0 to 1, were computed."""
         return float(np.quantile(self._seconds, share) * 1000)
-
-    def _wait(self) -> None:
-        """Returns once CUDA has done what it was told to do."""
-        if self.device.type == "cuda":
-            torch.cuda.synchronize(self.device)

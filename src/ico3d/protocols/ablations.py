@@ -182,8 +182,8 @@ def measure_ablations(terms: AblationTerms) -> Report:
         _below(columns, rows),
         Section("Pictures", pictures=[shown]),
     ]
-    about = {name: value for name, value in asdict(terms).items() if name != "device"}
-    facts = facts_of(computing_device(terms.device), **about)
+    asked = asdict(terms)
+    facts = facts_of(computing_device(asked.pop("device")), **asked)
     report = Report(f"What is each part of the {terms.model} worth?", facts, sections, found)
     report.write(terms.out)
     return report

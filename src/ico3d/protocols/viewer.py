@@ -24,6 +24,7 @@ SIZES = ((512, 512), (1920, 1080))
 """Widths and heights of the pictures in pixels."""
 PICTURES, WARM = 30, 3
 """Pictures of each row that are timed, and those before them, which are not."""
+PEAK = "memory of the GPU, MiB"
 COMBINATIONS = (
     ("background",),
     ("background", "body"),
@@ -35,19 +36,20 @@ COMBINATIONS = (
 Part = Callable[[float], Gaussians]
 """Returns the Gaussians of a part in the world at a time in seconds."""
 
-COLUMNS = (
-    Column("gaussians", "Gaussians", 0),
-    *(
+
+def viewer_columns(sizes: Sequence[tuple[int, int]]) -> list[Column]:
+    """Columns of the rows that `viewer_rows` gives for pictures of these sizes."""
+    timed = [
         column
-        for width, height in SIZES
+        for width, height in sizes
         for column in (
             Column(f"fps_{width}x{height}", f"{width}×{height}: FPS", 1, "more"),
             Column(f"ms_{width}x{height}", "ms", 2),
             Column(f"p95_{width}x{height}", "95 % within, ms", 2),
         )
-    ),
-    Column("peak_mib", "memory of the GPU, MiB", 0),
-)
+    ]
+    gaussians, peak = Column("gaussians", "Gaussians", 0), Column("peak_mib", PEAK, 0)
+    return [gaussians, *timed, peak]
 
 
 @dataclass(frozen=True)
@@ -141,8 +143,15 @@ def frame_rate(
     return {"fps": 1000 / median, "ms": median, "p95": watch.within(0.95), "gaussians": count}
 
 
-def viewer_rows(shown: Staged) -> list[dict[str, float | str | None]]:
+def viewer_rows(
+    shown: Staged, sizes: Sequence[tuple[int, int]], pictures: int
+) -> list[dict[str, float | str | None]]:
     """A row for each combination of parts that there is.
+
+    Args:
+        shown: The parts.
+        sizes: Widths and heights of the pictures in pixels.
+        pictures: Number of pictures of each size that are timed.
 
     Raises:
         ModelError: If there is neither body nor head.
@@ -157,8 +166,8 @@ def viewer_rows(shown: Staged) -> list[dict[str, float | str | None]]:
         row: dict[str, float | str | None] = {"name": " + ".join(present)}
         if shown.device.type == "cuda":
             torch.cuda.reset_peak_memory_stats(shown.device)
-        for width, height in SIZES:
-            cameras = orbit(ring_around(places), places, PICTURES + WARM, width, height)
+        for width, height in sizes:
+            cameras = orbit(ring_around(places), places, pictures + WARM, width, height)
             parts = [shown.parts[name] for name in present]
             found = frame_rate(parts, cameras, shown.seconds, shown.device)
             row["gaussians"] = found.pop("gaussians")
@@ -182,7 +191,7 @@ def measure_viewer(model: Path, out: Path, background: Path | None, device: torc
         The report, which has been written.
     """
     shown = staged(model, background, device)
-    rows = viewer_rows(shown)
+    rows = viewer_rows(shown, SIZES, PICTURES)
     text = (
         f"Medians of {PICTURES} pictures, each of another moment of the clip and by another camera "
         "of an orbit, from the moment's Gaussians to the finished picture. The paper's viewer "
@@ -191,7 +200,8 @@ def measure_viewer(model: Path, out: Path, background: Path | None, device: torc
     )
     if "background" not in shown.parts:
         text += " There is no background."
-    section = Section("Frames per second, part by part", text, Table(COLUMNS, rows, "drawn"))
+    table = Table(viewer_columns(SIZES), rows, "drawn")
+    section = Section("Frames per second, part by part", text, table)
     facts = facts_of(device, model=str(model), background=str(background or "the bundle's own"))
     report = Report("How fast is the viewer?", facts, [section], {"rows": rows})
     report.write(out)

@@ -60,6 +60,12 @@ def device_name(device: torch.device) -> str:
     return "cpu" if device.type == "cpu" else f"cuda ({torch.cuda.get_device_name(device)})"
 
 
+def wait_for(device: torch.device) -> None:
+    """Returns once a device has done what it was told to do; the CPU has already."""
+    if device.type == "cuda":
+        torch.cuda.synchronize(device)
+
+
 @cache
 def cuda_fault() -> str | None:
     """Why CUDA cannot be used, as the end of a sentence; None if it can."""

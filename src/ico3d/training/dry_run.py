@@ -10,6 +10,7 @@ from typing import Protocol
 
 import torch
 
+from ico3d.splat.device import CPU, wait_for
 from ico3d.training.checkpoint import size_of_tensors
 from ico3d.training.loop import Trainee
 
@@ -132,20 +133,31 @@ def needs_of(
         parts: Number of parts like this one.
         pictures: Bytes of all pictures, and of those that memory keeps, before the first step.
     """
-    begin = _timed(trainee, steps)
+    device = _device(trainee)
+    if device.type == "cuda":
+        torch.cuda.reset_peak_memory_stats(device)
+    begin = _timed(trainee, steps, device)
     trainee.grow(most)
-    end = _timed(trainee, steps)
+    end = _timed(trainee, steps, device)
     resident = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    cuda = torch.cuda.max_memory_allocated() if torch.cuda.is_available() else 0
+    cuda = torch.cuda.max_memory_allocated(device) if device.type == "cuda" else 0
     return Needs(total, parts, begin, end, *pictures, resident + pictures[1], cuda)
 
 
-def _timed(trainee: Growing, steps: int) -> Timing:
-    """Times the last steps of a training."""
+def _device(trainee: Growing) -> torch.device:
+    """The GPU where any tensor of a trainee is to lie, else the CPU."""
+    places = {trainee.place(name) for name in trainee.tensors()}
+    return next((place for place in places if place.type == "cuda"), CPU)
+
+
+def _timed(trainee: Growing, steps: int, device: torch.device) -> Timing:
+    """Times the last steps of a training, all of their work on the device."""
     last, seconds = range(max(steps - TIMED, 0), steps), []
     for index in (*last, *last):
+        wait_for(device)
         begin = time.perf_counter()
         trainee.step(index)
+        wait_for(device)
         seconds.append(time.perf_counter() - begin)
     tensors = trainee.tensors()
     model = {n: t for n, t in tensors.items() if not n.startswith(("moments.", "density."))}

@@ -18,7 +18,7 @@ from ico3d.avatar.joining.seam import seam_scores
 from ico3d.capture.face.region import HeadRegion
 from support.avatars.planted_person import FRAMES, PlantedPerson, face, planted_head
 from support.avatars.tiny_joining import RECOLOUR, assembly_of, parts_of
-from support.pretended_cuda import drawn, is_moved
+from support.pretended_cuda import drawn, is_on_cuda
 from support.settings import changed
 
 pytestmark = pytest.mark.slow
@@ -32,7 +32,7 @@ def test_colours_are_matched(cuda, head, abroad):
     quick = replace(RECOLOUR, steps=20)
     recolour(head.model, placement, expressions, views, quick)
     recolour(other, placement, expressions, views, quick)
-    assert is_moved(other.color_branch.weight)
+    assert is_on_cuda(other.color_branch.weight)
     here = color_difference(head.model, placement, expressions, tested)
     there = color_difference(other, placement, expressions, tested)
     assert there == pytest.approx(here, rel=0.02)
@@ -52,7 +52,7 @@ def test_an_avatar_is_assembled_and_measured(cuda, tmp_path, monkeypatch):
         before = len(pictures)
         write_checks(tmp_path / "out", capture, tmp_path / "check", cuda)
         assert len(pictures) > before
-    assert is_moved(avatar.head.model.means) and is_moved(avatar.gaussians(0.0).means)
+    assert is_on_cuda(avatar.head.model.means) and is_on_cuda(avatar.gaussians(0.0).means)
     assert np.isfinite(avatar.summary["psnr_face"]) and "gap_mm" in avatar.summary
     _same_scores(TrainedAvatar.load(tmp_path / "out"), avatar, capture)
 
