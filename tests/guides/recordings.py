@@ -73,12 +73,19 @@ def phone(face: Path, work: Path) -> None:
 
 
 def write_known_track(truth: Capture, folder: Path) -> None:
-    """What `ico3d capture track` would find, from what is known about the head."""
+    """What `ico3d capture track` would find, from what is known about the head.
+
+    Args:
+        truth: The studio's recording.
+        folder: The same recording in another format; its world may be turned.
+    """
+    first = open_capture(folder).cameras[0]
+    turn = first.camera_to_world @ truth.cameras[0].world_to_camera
     frames = range(truth.num_frames)
     eyes = [truth.eyes(frame) for frame in frames]
     closed = np.zeros(len(EYE_NAMES))
     HeadTrack(
-        np.stack([truth.world_from_head(frame) for frame in frames]),
+        np.stack([turn @ truth.world_from_head(frame) for frame in frames]),
         np.stack([truth.landmarks_3d(frame) for frame in frames]).astype(np.float32),
         np.stack([closed if row is None else row for row in eyes]).astype(np.float32),
         np.zeros((len(frames), len(BLENDSHAPES)), np.float32),

@@ -77,7 +77,7 @@ def test_many_cameras(face, body, tracker, tmp_path, monkeypatch):
 def test_dna_renderme(face, body, tracker, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     recordings.data_sets(face, body, tmp_path)
-    guide.follow("dna-renderme.md", SMALL, _tracked(tracker, face="renderme", body="dna"))
+    guide.follow("dna-renderme.md", SMALL, _tracked(tracker, face=face, body=body))
     assert _is_whole("person.ico3d")
     assert "RenderMe-360" in str(Bundle.open(Path("person.ico3d")).manifest.provenance)
 

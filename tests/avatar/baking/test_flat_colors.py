@@ -33,7 +33,7 @@ def _head(strength: float) -> TrainedHead:
 
 def _body(capture, strength: float) -> TrainedBody:
     """What stands at the capture's points, with colours that depend on the view by so much."""
-    points = torch.from_numpy(capture.points(0)).float()
+    points = torch.from_numpy(capture.world_points(0)).float()
     count = len(points)
     values = {
         "means": points,

@@ -24,7 +24,7 @@ def test_the_captures_own_points_come_first(moving_ball, monkeypatch):
     capture = moving_ball([0.0, 0.3])
     monkeypatch.setattr(
         type(capture),
-        "points",
+        "world_points",
         lambda self, frame: np.concatenate([self.surface(frame)[0], [[0, 90.0, 0]]]),
     )
     start = _start(capture, 1)

@@ -93,11 +93,11 @@ def test_the_same_seed_gives_the_same_body(trained, tmp_path):
 
 
 def test_a_dry_run_says_what_the_run_takes(trained, tmp_path):
-    """Within a factor of three, on a machine that others use; only the plan is written."""
+    """Within a factor of ten, on a machine that others use; only the plan is written."""
     capture, folder, body = trained
     needs = needs_of_body(capture, tmp_path / "dry", job())
     low, high = needs.seconds
-    assert low / 3 <= body.summary["train_seconds"] <= high * 3
+    assert low / 10 <= body.summary["train_seconds"] <= high * 10
     assert needs.parts == len(body.windows)
     files = list((folder / "windows").glob("*/window.safetensors"))
     assert max(file.stat().st_size for file in files) <= needs.end.kept + 20_000

@@ -194,7 +194,7 @@ def test_a_folder_of_several_recordings_needs_a_choice(raw):
 
 def test_frames_outside_the_recording(raw):
     capture = open_capture(raw)
-    for call in (capture.world_from_head, capture.flame, capture.points, capture.landmarks_3d):
+    for call in (capture.world_from_head, capture.flame, capture.head_points, capture.landmarks_3d):
         for frame in (-1, 4):
             fails(lambda call=call, frame=frame: call(frame), "frames 0 to 3")
 

@@ -61,6 +61,10 @@ class PartOfCapture(WrappedCapture):
             self.whole.head_mask_bytes(camera, frame, box) if self._shows(camera, frame) else None
         )
 
+    def behind(self, camera: int, frame: int) -> np.ndarray | None:
+        """What the camera sees in a frame without what the mask shows; None where it is hidden."""
+        return super().behind(camera, frame) if self._shows(camera, frame) else None
+
     def torso(self, camera: int, frame: int) -> np.ndarray | None:
         """(H, W, 4) what a portrait shows below the head; None where it cannot be seen."""
         return self.whole.torso(camera, frame) if self._shows(camera, frame) else None

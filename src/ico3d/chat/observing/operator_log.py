@@ -12,6 +12,7 @@ import logging
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING, TextIO
 
 from ico3d.chat.observing.failures import cause
@@ -51,7 +52,8 @@ class OperatorLog:
             del self._seen[next(iter(self._seen))]
         again = f" ({more} more of these since)" if more else ""
         when = time.strftime("%H:%M:%S")
-        print(f"{when} {level}: {line}{again}", file=self._file or sys.stderr, flush=True)
+        with suppress(OSError):  # a full disk loses lines, not conversations
+            print(f"{when} {level}: {line}{again}", file=self._file or sys.stderr, flush=True)
 
     def take(self, message: "Message") -> None:
         """Handles a record of loguru, of ico3d or pipecat."""
