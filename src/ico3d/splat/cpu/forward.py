@@ -54,10 +54,13 @@ def power_of_two(x):
 @kernel()
 def finished(state):
     """Whether every pixel of the tile at the start of `state` has used up its transmittance."""
-    most = -ONE
-    for p in range(PIXELS):
-        most = max(most, state[p])
-    return most < ZERO
+    for y in range(TILE_HEIGHT):
+        left = np.int32(0)
+        for x in range(TILE_WIDTH):
+            left += np.int32(state[y * TILE_WIDTH + x] > ZERO)
+        if left > 0:
+            return False
+    return True
 
 
 @kernel()
@@ -135,9 +138,11 @@ def load(records, entries, center, splats):
     """
     for k in range(entries.shape[0]):
         record, splat = records[entries[k, 0]], splats[k]
-        splat[0], splat[1] = record[0] - center[0], record[1] - center[1]
-        for j in range(2, 9):
-            splat[j] = record[j]
+        x, y = record[0] - center[0], record[1] - center[1]
+        by_x, by_y, rest, top = record[2], record[3], record[4], record[5]
+        r, g, b = record[6], record[7], record[8]
+        splat[0], splat[1], splat[2], splat[3], splat[4], splat[5] = x, y, by_x, by_y, rest, top
+        splat[6], splat[7], splat[8] = r, g, b
 
 
 @kernel()
