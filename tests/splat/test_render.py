@@ -8,9 +8,8 @@ import torch
 
 from ico3d.errors import MissingExtraError
 from ico3d.splat import cuda
-from ico3d.splat.cpu.forward import PIXELS
 from ico3d.splat.cpu.rasterise import Project, bin_views, camera_numbers
-from ico3d.splat.cpu.tiles import VECTOR
+from ico3d.splat.cpu.tiles import TILE_HEIGHT, unpack_rows
 from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.render import render
 from support.splats import reference
@@ -176,11 +175,13 @@ def test_broken_numbers_do_no_harm_to_memory(cameras, name, value):
     tiles = bin_views(*broken_projection(ours, cameras), 44, 30)
     for view in tiles:
         owned = [range(*ends) for ends in zip(view.first_pair, view.end_pair, strict=True)]
-        assert sorted(view.pairs) == [pair for pairs in owned for pair in pairs]
-        assert view.first_entry[-1] == len(view.pairs) <= len(view.splats)
-        spans = view.spans[view.pairs]
-        assert (spans[:, 0] < spans[:, 1]).all() and not (spans % VECTOR).any()
-        assert not len(spans) or (spans.min() >= 0 and spans.max() <= PIXELS)
+        splats, rows, pairs = view.entries.T
+        found = sorted(zip(pairs, splats, strict=True))
+        listed = zip(owned, view.order, strict=True)
+        assert found == [(pair, splat) for own, splat in listed for pair in own]
+        assert view.first_entry[-1] == len(pairs) <= view.room
+        spans = [unpack_rows(packed) for packed in rows]
+        assert all(0 <= first < end <= TILE_HEIGHT for first, end in spans)
 
 
 def broken_projection(gaussians, cameras):

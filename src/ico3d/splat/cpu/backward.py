@@ -5,6 +5,8 @@
 # pyright: reportUnknownMemberType=false
 # (numba finds the types of a kernel's arguments when it is called)
 
+from math import exp2, log
+
 import numba
 import numpy as np
 
@@ -12,87 +14,84 @@ from ico3d.splat.cpu.compile import kernel
 from ico3d.splat.cpu.forward import (
     CHECK,
     HALF,
+    LEAST,
     MAX_ALPHA,
-    MIN_ALPHA,
     MIN_TRANSMITTANCE,
     ONE,
     PIXELS,
     PLANE,
     ZERO,
-    falloff,
     finished,
     first_center,
-    pixel_positions,
+    load,
+    power_of_two,
     window,
 )
-from ico3d.splat.cpu.tiles import BLOCK, TILE_WIDTH, Tiles, tiles_across
+from ico3d.splat.cpu.tiles import BLOCK, TILE_WIDTH, Tiles, tiles_across, unpack_rows
 
 GRADIENTS = 9
 """Gradients per splat: mean (2), conic (3), opacity, colour (3)."""
 ABSOLUTE = 2
 """Further gradients on request: the mean's two, summed over pixels as absolute values."""
+TWICE_LOG_2 = np.float32(2 * log(2))
 
 
 @kernel()
-def _gather(state, count, splat, left, top, absolute, out):
-    """Sums one splat's gradients over the next `count` pixels of a tile.
+def _pixel_positions(state, plane):
+    """Writes pixel centres, relative to the tile's first pixel, into two planes of a state."""
+    for p in range(BLOCK * PIXELS):
+        state[plane * PLANE + p] = np.float32(p % TILE_WIDTH)
+        state[(plane + 1) * PLANE + p] = np.float32(p % PIXELS // TILE_WIDTH)
+
+
+@kernel()
+def _gather(state, first, end, splat, absolute, out):
+    """Sums one splat's gradients over the rows from `first` to `end` of a tile.
 
     The planes of `state` (see `forward._blend`): transmittance so far (negative where finished),
     the loss's derivative by everything from here to the background, weighted as it shows (rest),
     the pixel gradient's red, green, blue, then x and y. With c·g = colour · pixel gradient,
-    dL/dα = T·c·g − rest behind it / (1 − α).
+    dL/dα = T·c·g − rest behind it / (1 − α). `out` gets sums of α·dL/dα: by 1, dx, dy, dx², dx·dy,
+    dy²; the colour's gradient; with `absolute` those of the mean, as `_sum` would make them.
     """
-    mx, my = splat[0] - left, splat[1] - top
-    xx, xy, yy, opacity = splat[2], splat[3], splat[4], splat[5]
+    mx, my, by_x, by_y, rest, top = splat[0], splat[1], splat[2], splat[3], splat[4], splat[5]
     r, g, b = splat[6], splat[7], splat[8]
-    sum_r, sum_g, sum_b, sum_s = ZERO, ZERO, ZERO, ZERO
+    sum_r, sum_g, sum_b, sum_1 = ZERO, ZERO, ZERO, ZERO
     sum_x, sum_y, sum_xx, sum_xy, sum_yy = ZERO, ZERO, ZERO, ZERO, ZERO
     absolute_x, absolute_y = ZERO, ZERO
-    for p in range(count):
-        red, green, blue = (
-            state[2 * PLANE + p],
-            state[3 * PLANE + p],
-            state[4 * PLANE + p],
-        )
-        dx, dy = state[5 * PLANE + p] - mx, state[6 * PLANE + p] - my
-        raw = opacity * falloff(dx * (xx * dx + xy * dy) + yy * dy * dy)
-        alpha = min(raw, MAX_ALPHA)
-        alpha = alpha if alpha >= MIN_ALPHA else ZERO
-        before, clear = state[p], ONE - alpha
-        after = before * clear
-        alpha = alpha if after > MIN_TRANSMITTANCE else ZERO
+    for p in range(first * np.uint64(TILE_WIDTH), end * np.uint64(TILE_WIDTH)):
+        red, green = state[np.uint64(2 * PLANE) + p], state[np.uint64(3 * PLANE) + p]
+        blue = state[np.uint64(4 * PLANE) + p]
+        dx, dy = state[np.uint64(5 * PLANE) + p] - mx, state[np.uint64(6 * PLANE) + p] - my
+        across = by_x * dx + by_y * dy
+        log_alpha = top - rest * dy * dy - across * across
+        raw = power_of_two(log_alpha)
+        before = state[p]
+        weight = min(raw, MAX_ALPHA) * before if log_alpha >= LEAST else ZERO
+        after = before - weight
+        weight = weight if after > MIN_TRANSMITTANCE else ZERO
         state[p] = after if after > MIN_TRANSMITTANCE else -abs(before)
-        weight = alpha * before
         sum_r += weight * red
         sum_g += weight * green
         sum_b += weight * blue
         seen = weight * (r * red + g * green + b * blue)
-        behind = state[PLANE + p] - seen
-        state[PLANE + p] = behind
-        by_exponent = seen - alpha * behind / clear
+        behind = state[np.uint64(PLANE) + p] - seen
+        state[np.uint64(PLANE) + p] = behind
+        by_exponent = seen - weight * behind / after
         by_exponent = by_exponent if raw <= MAX_ALPHA else ZERO
-        by_x, by_y = by_exponent * dx, by_exponent * dy
-        sum_s += by_exponent
-        sum_x += by_x
-        sum_y += by_y
-        sum_xx += by_x * dx
-        sum_xy += by_x * dy
-        sum_yy += by_y * dy
+        sum_1 += by_exponent
+        sum_x += by_exponent * dx
+        sum_y += by_exponent * dy
+        sum_xx += by_exponent * dx * dx
+        sum_xy += by_exponent * dx * dy
+        sum_yy += by_exponent * dy * dy
         if absolute:  # the same for all pixels: LLVM makes two loops of it
-            absolute_x += abs((xx + xx) * by_x + xy * by_y)
-            absolute_y += abs(xy * by_x + (yy + yy) * by_y)
-    out[0] = (xx + xx) * sum_x + xy * sum_y
-    out[1] = xy * sum_x + (yy + yy) * sum_y
-    out[2] = -HALF * sum_xx
-    out[3] = -sum_xy
-    out[4] = -HALF * sum_yy
-    out[5] = sum_s / opacity
-    out[6] = sum_r
-    out[7] = sum_g
-    out[8] = sum_b
+            absolute_x += abs(by_exponent * across)
+            absolute_y += abs(by_exponent * (by_y * across + rest * dy))
+    out[0], out[1], out[2], out[3], out[4] = sum_x, sum_y, sum_xx, sum_xy, sum_yy
+    out[5], out[6], out[7], out[8] = sum_1, sum_r, sum_g, sum_b
     if absolute:
-        out[9] = absolute_x
-        out[10] = absolute_y
+        out[9], out[10] = TWICE_LOG_2 * by_x * absolute_x, TWICE_LOG_2 * absolute_y
 
 
 @kernel()
@@ -112,29 +111,30 @@ def _read(state, image, light, g_image, g_light):
 
 
 @kernel()
-def _collect(state, records, spans, splats, entries, center, parts):
+def _collect(state, records, entries, center, splats, parts):
     """Writes the gradients of the pairs of one tile, whose state begins here."""
-    done = False
-    for k in range(entries.size):
-        pair = entries[k]
+    done, absolute = False, parts.shape[1] > GRADIENTS
+    for start in range(0, entries.shape[0], CHECK):
+        some = entries[start : start + CHECK]
         if done:
-            parts[pair] = ZERO
+            for k in range(some.shape[0]):
+                parts[some[k, 2]] = ZERO
             continue
-        low, high = spans[pair]
-        splat = records[splats[pair]]
-        absolute = parts.shape[1] > GRADIENTS
-        _gather(state[low:], high - low, splat, center[0], center[1], absolute, parts[pair])
-        done = k % CHECK == CHECK - 1 and finished(state)
+        load(records, some, center, splats)
+        for k in range(some.shape[0]):
+            first, end = unpack_rows(some[k, 1])
+            _gather(state, first, end, splats[k], absolute, parts[some[k, 2]])
+        done = finished(state)
 
 
 @kernel(parallel=True)
 def _collect_all(
-    hands, across, records, spans, splats, first_entry, pairs, image, light, g_image, g_light, parts
+    hands, across, records, first_entry, entries, image, light, g_image, g_light, parts
 ):
     """Writes the gradients of all pairs; each thread takes every `hands`-th block."""
     for hand in numba.prange(hands):
-        state = np.empty(7 * PLANE, np.float32)
-        pixel_positions(state, 5)
+        state, splats = np.empty(7 * PLANE, np.float32), np.empty((CHECK, 9), np.float32)
+        _pixel_positions(state, 5)
         for block in range(hand, first_entry.size // BLOCK, hands):
             _read(
                 state,
@@ -145,20 +145,28 @@ def _collect_all(
             )
             for i in range(BLOCK):
                 tile = block * BLOCK + i
-                entries = pairs[first_entry[tile] : first_entry[tile + 1]]
+                some = entries[first_entry[tile] : first_entry[tile + 1]]
                 center = first_center(tile, across)
-                _collect(state[i * PIXELS :], records, spans, splats, entries, center, parts)
+                _collect(state[i * PIXELS :], records, some, center, splats, parts)
 
 
 @kernel(parallel=True)
-def _sum(first_pair, end_pair, parts, gradients):
-    """Sums each splat's pairs in their order."""
-    for i in numba.prange(first_pair.size):
-        for k in range(parts.shape[1]):
-            gradients[i, k] = ZERO
-        for pair in range(first_pair[i], end_pair[i]):
-            for k in range(parts.shape[1]):
-                gradients[i, k] += parts[pair, k]
+def _sum(order, first_pair, end_pair, records, parts, gradients):
+    """Sums each splat's pairs in their order, and makes gradients of what `_gather` found."""
+    for k in numba.prange(order.size):
+        splat, out = records[order[k]], gradients[order[k]]
+        for j in range(parts.shape[1]):
+            out[j] = ZERO
+        for pair in range(first_pair[k], end_pair[k]):
+            for j in range(parts.shape[1]):
+                out[j] += parts[pair, j]
+        if first_pair[k] == end_pair[k]:
+            continue  # its record may not be finite
+        across = splat[2] * out[0] + splat[3] * out[1]
+        out[0] = TWICE_LOG_2 * splat[2] * across
+        out[1] = TWICE_LOG_2 * (splat[3] * across + splat[4] * out[1])
+        out[2], out[3], out[4] = -HALF * out[2], -out[3], -HALF * out[4]
+        out[5] *= exp2(-splat[5])
 
 
 def draw_backward(
@@ -185,22 +193,12 @@ def draw_backward(
         (N, 9) float32: mean (2), conic (3), opacity, colour (3); with `absolute` (N, 11).
     """
     columns = GRADIENTS + (ABSOLUTE if absolute else 0)
-    parts = np.empty((len(tiles.splats), columns), np.float32)
+    parts = np.empty((tiles.room, columns), np.float32)
     gradients = np.empty((len(records), columns), np.float32)
-    across = tiles_across(tiles.width)
+    across, hands = tiles_across(tiles.width), numba.get_num_threads()
+    first_entry, entries = tiles.first_entry, tiles.entries
     _collect_all(
-        numba.get_num_threads(),
-        across,
-        records,
-        tiles.spans,
-        tiles.splats,
-        tiles.first_entry,
-        tiles.pairs,
-        image,
-        light,
-        g_image,
-        g_light,
-        parts,
+        hands, across, records, first_entry, entries, image, light, g_image, g_light, parts
     )
-    _sum(tiles.first_pair, tiles.end_pair, parts, gradients)
+    _sum(tiles.order, tiles.first_pair, tiles.end_pair, records, parts, gradients)
     return gradients

@@ -5,17 +5,17 @@
 # pyright: reportUnknownMemberType=false
 # (numba finds the types of a kernel's arguments when it is called)
 
-from math import factorial
+from math import e, log2, sqrt
 
 import numba
 import numpy as np
 
 from ico3d.splat import convention
 from ico3d.splat.cpu.compile import kernel
-from ico3d.splat.cpu.tiles import BLOCK, TILE_HEIGHT, TILE_WIDTH, VECTOR, Tiles, tiles_across
+from ico3d.splat.cpu.tiles import BLOCK, TILE_HEIGHT, TILE_WIDTH, Tiles, tiles_across, unpack_rows
 
 PIXELS = TILE_WIDTH * TILE_HEIGHT
-PLANE = BLOCK * PIXELS + 3 * VECTOR
+PLANE = BLOCK * PIXELS + 48
 """Numbers from one plane of a block's state to the next; the state consists of several planes.
 
 The padding keeps planes from lying a multiple of 4096 bytes apart, where the processor's store
@@ -25,67 +25,71 @@ buffer would mistake one plane for another.
 CHECK = 32
 """Number of splats after which a tile checks whether all of its pixels are finished."""
 
-MIN_ALPHA = np.float32(convention.MIN_ALPHA)
+LEAST = np.float32(log2(convention.MIN_ALPHA))
+"""A splat ends where the binary logarithm of its alpha falls below this."""
 MAX_ALPHA = np.float32(convention.MAX_ALPHA)
 MIN_TRANSMITTANCE = np.float32(convention.MIN_TRANSMITTANCE)
 ZERO, HALF, ONE = np.float32(0), np.float32(0.5), np.float32(1)
-FARTHEST = np.float32(8)
-"""Largest exponent that is evaluated: exp(−8) is below MIN_ALPHA, so a splat has ended there."""
 
-E1, E2, E3, E4, E5, E6 = (np.float32((-1 / 16) ** k / factorial(k)) for k in range(1, 7))
-"""Coefficients of the Taylor series of exp(−x/16) after the constant 1."""
+P1, P2, P3, P4, P5 = map(np.float32, (0.69314372, 0.24018014, 0.05529736, 0.0092058, 0.0009449))
+"""Coefficients of the polynomial that is nearest to 2^x for x in (−1, 0], after the constant 1.
 
-
-@kernel()
-def falloff(exponent):
-    """exp(−exponent) as the 16th power of a polynomial, which vectorises, unlike a call of exp."""
-    x = min(exponent, FARTHEST)
-    power = ONE + x * (E1 + x * (E2 + x * (E3 + x * (E4 + x * (E5 + x * E6)))))
-    power *= power
-    power *= power
-    power *= power
-    return power * power
+Its relative error is at most 2.1e-7, with the rounding of float32.
+"""
+LOG2_E = log2(e)
+MANTISSA = 23
+"""Bits of a float32 below its exponent."""
 
 
 @kernel()
-def pixel_positions(state, plane):
-    """Writes pixel centres, relative to the tile's first pixel, into two planes of a state."""
-    for p in range(BLOCK * PIXELS):
-        state[plane * PLANE + p] = np.float32(p % TILE_WIDTH)
-        state[(plane + 1) * PLANE + p] = np.float32(p % PIXELS // TILE_WIDTH)
+def power_of_two(x):
+    """2^x for −126 < x ≤ 0, which vectorises, unlike a call of exp; anything for smaller x."""
+    whole = np.int32(x)
+    part = x - np.float32(whole)
+    power = ONE + part * (P1 + part * (P2 + part * (P3 + part * (P4 + part * P5))))
+    bits = np.float32(power).view(np.int32) + (whole << np.int32(MANTISSA))
+    return np.int32(bits).view(np.float32)
 
 
 @kernel()
 def finished(state):
     """Whether every pixel of the tile at the start of `state` has used up its transmittance."""
-    most = -ONE
-    for p in range(PIXELS):
-        most = max(most, state[p])
-    return most < ZERO
+    for y in range(TILE_HEIGHT):
+        left = np.int32(0)
+        for x in range(TILE_WIDTH):
+            left += np.int32(state[y * TILE_WIDTH + x] > ZERO)
+        if left > 0:
+            return False
+    return True
 
 
 @kernel()
-def _blend(state, count, splat, left, top):
-    """Composites one splat into the next `count` pixels of a tile.
+def _blend(state, first, end, splat):
+    """Composites one splat into the rows from `first` to `end` of a tile.
 
     The planes of `state` follow at fixed distances, so that LLVM knows that they do not overlap:
-    transmittance so far (negative where the pixel is finished), red, green, blue, x, y. There is
-    no branch: LLVM turns the conditional values into masks.
+    transmittance so far (negative where the pixel is finished), red, green, blue. There is no
+    branch: LLVM turns the conditional values into masks, and a row into one vector. Indices are
+    unsigned, because numba would look for negative ones.
     """
-    mx, my = splat[0] - left, splat[1] - top
-    xx, xy, yy, opacity = splat[2], splat[3], splat[4], splat[5]
+    mx, my, by_x, by_y, rest, top = splat[0], splat[1], splat[2], splat[3], splat[4], splat[5]
     r, g, b = splat[6], splat[7], splat[8]
-    for p in range(count):
-        dx, dy = state[4 * PLANE + p] - mx, state[5 * PLANE + p] - my
-        alpha = min(opacity * falloff(dx * (xx * dx + xy * dy) + yy * dy * dy), MAX_ALPHA)
-        alpha = alpha if alpha >= MIN_ALPHA else ZERO
-        before = state[p]
-        after = before * (ONE - alpha)
-        weight = alpha * before if after > MIN_TRANSMITTANCE else ZERO
-        state[PLANE + p] += weight * r
-        state[2 * PLANE + p] += weight * g
-        state[3 * PLANE + p] += weight * b
-        state[p] = after if after > MIN_TRANSMITTANCE else -abs(before)
+    for y in range(first, end):
+        dy = np.float32(y) - my
+        shift, most = by_y * dy, top - rest * dy * dy
+        for x in range(np.uint64(TILE_WIDTH)):
+            p = y * np.uint64(TILE_WIDTH) + x
+            across = by_x * (np.float32(x) - mx) + shift
+            log_alpha = most - across * across
+            alpha = min(power_of_two(log_alpha), MAX_ALPHA)
+            before = state[p]
+            weight = alpha * before if log_alpha >= LEAST else ZERO
+            after = before - weight
+            weight = weight if after > MIN_TRANSMITTANCE else ZERO
+            state[p] = after if after > MIN_TRANSMITTANCE else -abs(before)
+            state[np.uint64(PLANE) + p] += weight * r
+            state[np.uint64(2 * PLANE) + p] += weight * g
+            state[np.uint64(3 * PLANE) + p] += weight * b
 
 
 @kernel()
@@ -127,30 +131,45 @@ def _write(state, image, light):
 
 
 @kernel()
-def _draw(state, records, spans, splats, entries, center):
+def load(records, entries, center, splats):
+    """Copies the records of some entries into `splats`, relative to the tile's first pixel.
+
+    A loop of its own, so that the processor waits for several records at the same time.
+    """
+    for k in range(entries.shape[0]):
+        record, splat = records[entries[k, 0]], splats[k]
+        x, y = record[0] - center[0], record[1] - center[1]
+        by_x, by_y, rest, top = record[2], record[3], record[4], record[5]
+        r, g, b = record[6], record[7], record[8]
+        splat[0], splat[1], splat[2], splat[3], splat[4], splat[5] = x, y, by_x, by_y, rest, top
+        splat[6], splat[7], splat[8] = r, g, b
+
+
+@kernel()
+def _draw(state, records, entries, center, splats):
     """Draws one tile, whose state begins here, from its entries."""
-    for k in range(entries.size):
-        pair = entries[k]
-        low, high = spans[pair]
-        _blend(state[low:], high - low, records[splats[pair]], center[0], center[1])
-        if k % CHECK == CHECK - 1 and finished(state):
+    for start in range(0, entries.shape[0], CHECK):
+        some = entries[start : start + CHECK]
+        load(records, some, center, splats)
+        for k in range(some.shape[0]):
+            first, end = unpack_rows(some[k, 1])
+            _blend(state, first, end, splats[k])
+        if finished(state):
             break
 
 
 @kernel(parallel=True)
-def _draw_all(hands, across, records, spans, splats, first_entry, pairs, image, light):
+def _draw_all(hands, across, records, first_entry, entries, image, light):
     """Draws all blocks; each thread takes every `hands`-th."""
     for hand in numba.prange(hands):
-        state = np.empty(6 * PLANE, np.float32)
-        pixel_positions(state, 4)
+        state, splats = np.empty(4 * PLANE, np.float32), np.empty((CHECK, 9), np.float32)
         for block in range(hand, first_entry.size // BLOCK, hands):
             state[:PLANE] = ONE
-            state[PLANE : 4 * PLANE] = ZERO
+            state[PLANE:] = ZERO
             for i in range(BLOCK):
                 tile = block * BLOCK + i
-                entries = pairs[first_entry[tile] : first_entry[tile + 1]]
-                center = first_center(tile, across)
-                _draw(state[i * PIXELS :], records, spans, splats, entries, center)
+                some = entries[first_entry[tile] : first_entry[tile + 1]]
+                _draw(state[i * PIXELS :], records, some, first_center(tile, across), splats)
             _write(state, window(image, block, across), window(light, block, across))
 
 
@@ -158,8 +177,11 @@ def _draw_all(hands, across, records, spans, splats, first_entry, pairs, image, 
 def _pack(means2d, conics, alphas, colors, records):
     for i in range(records.shape[0]):
         records[i, 0], records[i, 1] = means2d[i, 0], means2d[i, 1]
-        records[i, 2], records[i, 4] = HALF * conics[i, 0], HALF * conics[i, 2]
-        records[i, 3], records[i, 5] = conics[i, 1], alphas[i]
+        by_x = sqrt(0.5 * LOG2_E * conics[i, 0])
+        by_y = 0.5 * LOG2_E * conics[i, 1] / by_x
+        records[i, 2], records[i, 3] = by_x, by_y
+        records[i, 4] = 0.5 * LOG2_E * conics[i, 2] - by_y * by_y
+        records[i, 5] = log2(alphas[i])
         for k in range(3):
             records[i, 6 + k] = colors[i, k]
 
@@ -169,6 +191,9 @@ def splat_records(
 ) -> np.ndarray:
     """Packs what a tile reads of each splat side by side in memory.
 
+    The binary logarithm of alpha is written as l − (a·dx + b·dy)² − c·dy² (the conic's Cholesky
+    factors): no large numbers cancel, and within a row only a·dx differs from pixel to pixel.
+
     Args:
         means2d: (N, 2) pixels.
         conics: (N, 3) entries xx, xy, yy of the inverse 2D covariances.
@@ -176,7 +201,7 @@ def splat_records(
         colors: (N, 3).
 
     Returns:
-        (N, 9) float32: mean (2), ½ conic xx, conic xy, ½ conic yy, opacity, colour (3).
+        (N, 9) float32: mean (2), a, b, c, l, colour (3).
     """
     records = np.empty((len(means2d), 9), np.float32)
     _pack(means2d, conics, alphas, colors, records)
@@ -197,15 +222,5 @@ def draw(records: np.ndarray, tiles: Tiles) -> tuple[np.ndarray, np.ndarray]:
     light = np.empty((tiles.height, tiles.width), np.float32)
     across = tiles_across(tiles.width)
     hands = numba.get_num_threads()  # not in the kernel, which could not be cached then
-    _draw_all(
-        hands,
-        across,
-        records,
-        tiles.spans,
-        tiles.splats,
-        tiles.first_entry,
-        tiles.pairs,
-        image,
-        light,
-    )
+    _draw_all(hands, across, records, tiles.first_entry, tiles.entries, image, light)
     return image, light

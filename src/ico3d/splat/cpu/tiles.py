@@ -24,8 +24,8 @@ The tiles of a block together fill whole cache lines of a picture. Every row con
 blocks; the last tile may lie outside of the picture.
 """
 
-VECTOR = 16
-"""Number of pixels that are drawn together: two rows of a tile, one or two vector registers."""
+ROWS = 128
+"""A number of rows above `TILE_HEIGHT`."""
 
 SLACK = 0.01
 """Pixels by which a splat's outline is widened, so that rounding errors cut nothing off."""
@@ -44,23 +44,23 @@ class Tiles:
     Attributes:
         width: Image width in pixels.
         height: Image height in pixels.
-        first_pair: (N,) int32, number of a splat's first pair.
-        end_pair: (N,) int32, number behind a splat's last pair.
-        spans: (P, 2) int32, first and end pixel of the tile's rows that the pair's splat touches,
-            widened to whole vectors.
-        splats: (P,) int32, the splat of each pair.
-        first_entry: (tiles + 1,) int32, index into `pairs` at which a tile's entries begin.
-        pairs: (P,) int32, numbers of the pairs, tile by tile, front to back.
+        order: (N,) uint32, the splats front to back.
+        first_pair: (N,) int32, number of the first pair of each splat in `order`.
+        end_pair: (N,) int32, number behind its last pair.
+        room: Number behind the last pair of all.
+        first_entry: (tiles + 1,) int32, index into `entries` at which a tile's begin.
+        entries: (P, 3) int32, the pairs tile by tile, front to back: splat, the rows of the tile
+            that it touches (from `pack_rows`), number of the pair.
     """
 
     width: int
     height: int
+    order: np.ndarray
     first_pair: np.ndarray
     end_pair: np.ndarray
-    spans: np.ndarray
-    splats: np.ndarray
+    room: int
     first_entry: np.ndarray
-    pairs: np.ndarray
+    entries: np.ndarray
 
 
 def tiles_across(width: int) -> int:
@@ -69,29 +69,15 @@ def tiles_across(width: int) -> int:
 
 
 @kernel()
-def _reach(p, b, q, cut, low, high, v_max):
-    """Range of v in the ellipse p·u² + b·u·v + q·v² ≤ cut, given that u lies in [low, high].
+def pack_rows(first, end):
+    """First and end row of a tile in one number, which halves the memory that pairs take."""
+    return first * ROWS + end
 
-    Args:
-        p: Half the conic's entry of u.
-        b: The conic's mixed entry.
-        q: Half the conic's entry of v.
-        cut: The exponent at which the splat ends.
-        low: Least u.
-        high: Greatest u.
-        v_max: Greatest v of the whole ellipse.
 
-    Returns:
-        Least and greatest v; least > greatest where nothing is left.
-    """
-    tip = -0.5 * b / p * v_max
-    top, bottom = min(max(tip, low), high), min(max(-tip, low), high)
-    under_top = (b * b - 4 * p * q) * top * top + 4 * q * cut
-    under_bottom = (b * b - 4 * p * q) * bottom * bottom + 4 * q * cut
-    if under_top < 0 or under_bottom < 0:
-        return 1.0, -1.0
-    scale = 0.5 / q
-    return (-b * bottom - sqrt(under_bottom)) * scale, (-b * top + sqrt(under_top)) * scale
+@kernel()
+def unpack_rows(rows):
+    """First and end row of a tile, from `pack_rows`; unsigned, so that numba checks no signs."""
+    return np.uint64(rows) // np.uint64(ROWS), np.uint64(rows) % np.uint64(ROWS)
 
 
 @kernel()
@@ -101,93 +87,126 @@ def _span(low, high, tile, count):
 
 
 @kernel()
-def _columns(mean, conic, cut, extent, row, across):
-    """First and end tile that a splat touches in one row of tiles."""
-    low = row * TILE_HEIGHT + 0.5 - mean[1] - SLACK
-    high = low + TILE_HEIGHT - 1 + 2 * SLACK
-    left, right = _reach(0.5 * conic[2], conic[1], 0.5 * conic[0], cut, low, high, extent[0])
-    if left > right:
-        return 0, 0
-    return _span(mean[0] + left - SLACK, mean[0] + right + SLACK, TILE_WIDTH, across)
+def _columns(splat, across):
+    """First and end column of tiles that a splat touches."""
+    reach = splat[6] + SLACK
+    return _span(splat[0] - reach, splat[0] + reach, TILE_WIDTH, across)
 
 
 @kernel()
-def _pixels(mean, conic, cut, extent, column, row):
-    """First and end pixel within a tile of the rows that a splat touches, in whole vectors."""
-    low = column * TILE_WIDTH + 0.5 - mean[0] - SLACK
-    high = low + TILE_WIDTH - 1 + 2 * SLACK
-    top, bottom = _reach(0.5 * conic[0], conic[1], 0.5 * conic[2], cut, low, high, extent[1])
-    if top > bottom:
-        return 0, 0
-    offset = mean[1] - row * TILE_HEIGHT - 0.5
-    first = max(0, floor(offset + top - SLACK) + 1)
-    end = min(TILE_HEIGHT, floor(offset + bottom + SLACK) + 1)
-    if first >= end:
-        return 0, 0
-    return first * TILE_WIDTH // VECTOR * VECTOR, -(-end * TILE_WIDTH // VECTOR) * VECTOR
-
-
-@kernel()
-def _box(mean, extent, across, down):
-    """The tiles of a splat's box: first and end column, first and end row."""
-    across_by, down_by = extent[0] + SLACK, extent[1] + SLACK
-    left, right = _span(mean[0] - across_by, mean[0] + across_by, TILE_WIDTH, across)
-    top, bottom = _span(mean[1] - down_by, mean[1] + down_by, TILE_HEIGHT, down)
-    return left, right, top, bottom
-
-
-@kernel()
-def _most_pairs(means, alphas, extents, across, down, first, end):
-    """How many pairs some splats have at most: the tiles of their boxes."""
-    total = 0
-    for i in range(first, end):
-        if alphas[i] > 0:
-            left, right, top, bottom = _box(means[i], extents[i], across, down)
-            total += max(0, right - left) * max(0, bottom - top)
-    return total
-
-
-@kernel()
-def _list(
-    means, conics, alphas, extents, across, down, first, end, pair, starts, ends, tiles, spans, of
-):
-    """Lists the tiles of some splats and the pixels they touch there, from pair `pair` on."""
-    for i in range(first, end):
-        starts[i] = pair
-        if alphas[i] > 0:
-            cut = log(alphas[i] / MIN_ALPHA)
-            leftmost, rightmost, top, bottom = _box(means[i], extents[i], across, down)
-            for row in range(top, bottom):
-                left, right = _columns(means[i], conics[i], cut, extents[i], row, across)
-                for column in range(max(left, leftmost), min(right, rightmost)):
-                    low, high = _pixels(means[i], conics[i], cut, extents[i], column, row)
-                    if low < high:
-                        tiles[pair], of[pair] = row * across + column, i
-                        spans[pair, 0], spans[pair, 1] = low, high
-                        pair += 1
-        ends[i] = pair
+def _most_pairs(splat, across, down):
+    """How many pairs a splat has at most: the tiles of its box."""
+    left, right = _columns(splat, across)
+    reach = splat[7] + SLACK
+    top, bottom = _span(splat[1] - reach, splat[1] + reach, TILE_HEIGHT, down)
+    return max(0, right - left) * max(0, bottom - top)
 
 
 @kernel(parallel=True)
-def _rooms(parts, means, alphas, extents, across, down):
-    """Where each part of the splats begins to write its pairs (parts + 1,)."""
-    rooms, count = np.zeros(parts + 1, np.int64), means.shape[0]
+def _pack(means, conics, alphas, extents, splats):
+    """Copies what binning reads of each splat side by side in memory.
+
+    `splats` (N, 8) gets mean (2), conic (3), the exponent at which the splat ends (negative where
+    it is not drawn), extents (2).
+    """
+    for i in numba.prange(splats.shape[0]):
+        splat = splats[i]
+        splat[0], splat[1] = means[i, 0], means[i, 1]
+        splat[2], splat[3], splat[4] = conics[i, 0], conics[i, 1], conics[i, 2]
+        splat[5] = log(alphas[i] * np.float32(1 / MIN_ALPHA)) if alphas[i] > 0 else -1.0
+        splat[6], splat[7] = extents[i, 0], extents[i, 1]
+
+
+@kernel(parallel=True)
+def _sort(parts, order, splats, across, down, ordered):
+    """Copies packed splats front to back, in a loop without branches that wait for memory.
+
+    Returns:
+        Where each part of the sorted splats begins to write its pairs (parts + 1,).
+    """
+    rooms, count = np.zeros(parts + 1, np.int64), order.size
     for part in numba.prange(parts):
-        first, end = part * count // parts, (part + 1) * count // parts
-        rooms[part + 1] = _most_pairs(means, alphas, extents, across, down, first, end)
+        room = 0
+        for k in range(part * count // parts, (part + 1) * count // parts):
+            splat = ordered[k]
+            for j in range(8):
+                splat[j] = splats[order[k], j]
+            room += _most_pairs(splat, across, down) if splat[5] >= 0 else 0
+        rooms[part + 1] = room
     return rooms.cumsum()
 
 
+@kernel()
+def _reach(tip, discriminant, room, b, low, high):
+    """Range of 2q·v in the ellipse p·u² + b·u·v + q·v² ≤ cut, given that u lies in [low, high].
+
+    Args:
+        tip: The u at which v is greatest.
+        discriminant: b² − 4pq.
+        room: 4q·cut.
+        b: As in the formula.
+        low: Least u.
+        high: Greatest u.
+
+    Returns:
+        Least and greatest 2q·v; least > greatest where nothing is left.
+    """
+    top, bottom = min(max(tip, low), high), min(max(-tip, low), high)
+    under_top = discriminant * top * top + room
+    under_bottom = discriminant * bottom * bottom + room
+    if under_top < 0 or under_bottom < 0:
+        return 1.0, -1.0
+    return -b * bottom - sqrt(under_bottom), -b * top + sqrt(under_top)
+
+
+@kernel()
+def _list(splat, number, across, down, pair, counts, pairs):
+    """Lists the tiles of a splat and the rows it touches there, from pair `pair` on.
+
+    Returns:
+        The number behind the last pair.
+    """
+    x, y, p, b, q = splat[0] - 0.5, splat[1] - 0.5, 0.5 * splat[2], 1.0 * splat[3], 0.5 * splat[4]
+    tip, scale = -0.5 * b / p * splat[7], 0.5 / q
+    discriminant, room = b * b - 4 * p * q, 4 * q * splat[5]
+    left, right = _columns(splat, across)
+    for column in range(left, right):
+        low = column * TILE_WIDTH - x - SLACK
+        high = low + TILE_WIDTH - 1 + 2 * SLACK
+        top, bottom = _reach(tip, discriminant, room, b, low, high)
+        first = max(0, floor(y + scale * top - SLACK) + 1)
+        end = min(down * TILE_HEIGHT, floor(y + scale * bottom + SLACK) + 1)
+        if first < end:
+            for row in range(first // TILE_HEIGHT, (end - 1) // TILE_HEIGHT + 1):
+                above = row * TILE_HEIGHT
+                tile = row * across + column
+                counts[tile] += 1
+                pairs[pair, 0], pairs[pair, 1] = tile, number
+                pairs[pair, 2] = pack_rows(max(first - above, 0), min(end - above, TILE_HEIGHT))
+                pair += 1
+    return pair
+
+
 @kernel(parallel=True)
-def _list_all(rooms, means, conics, alphas, extents, across, down, starts, ends, tiles, spans, of):
-    """Lists all splats' tiles, each part of the splats by one thread."""
-    parts, count = rooms.size - 1, means.shape[0]
+def _list_all(rooms, order, ordered, across, down, starts, ends, counts, pairs):
+    """Lists the tiles of all splats, front to back, each part of the splats by one thread.
+
+    `counts` (parts, tiles) gets the number of pairs in each tile, `pairs` (P, 3) tile, splat, rows.
+
+    Returns:
+        Where each part's pairs end (parts,).
+    """
+    parts, count = rooms.size - 1, order.size
+    behind = np.empty(parts, np.int64)
     for part in numba.prange(parts):
-        first, end, pair = part * count // parts, (part + 1) * count // parts, rooms[part]
-        _list(
-            *(means, conics, alphas, extents, across, down),
-            *(first, end, pair, starts, ends, tiles, spans, of),
-        )
+        pair = rooms[part]
+        for k in range(part * count // parts, (part + 1) * count // parts):
+            starts[k] = pair
+            if ordered[k, 5] >= 0:
+                pair = _list(ordered[k], order[k], across, down, pair, counts[part], pairs)
+            ends[k] = pair
+        behind[part] = pair
+    return behind
 
 
 @kernel()
@@ -217,20 +236,26 @@ def _order(depths):
 
 
 @kernel()
-def _fill(order, starts, ends, tiles, first_entry):
-    """The pairs by tile, front to back; writes where a tile's begin."""
-    for i in range(starts.shape[0]):
-        for pair in range(starts[i], ends[i]):
-            first_entry[tiles[pair] + 1] += 1
-    for tile in range(first_entry.shape[0] - 1):
-        first_entry[tile + 1] += first_entry[tile]
-    following, pairs = first_entry.copy(), np.empty(first_entry[-1], np.int32)
-    for k in range(order.shape[0]):
-        i = order[k]
-        for pair in range(starts[i], ends[i]):
-            pairs[following[tiles[pair]]] = pair
-            following[tiles[pair]] += 1
-    return pairs
+def _first_entries(counts, first_entry):
+    """Finds where a tile's entries begin, and in place of `counts` where those of each part do."""
+    total = 0
+    for tile in range(counts.shape[1]):
+        first_entry[tile] = total
+        for part in range(counts.shape[0]):
+            counts[part, tile], total = total, total + counts[part, tile]
+    first_entry[counts.shape[1]] = total
+
+
+@kernel(parallel=True)
+def _fill(rooms, behind, pairs, following, entries):
+    """Sorts pairs, which lie front to back, into tiles; `following` is where the next ones go."""
+    for part in numba.prange(behind.size):
+        for pair in range(rooms[part], behind[part]):
+            tile = pairs[pair, 0]
+            entry = following[part, tile]
+            following[part, tile] += 1
+            entries[entry, 0], entries[entry, 1] = pairs[pair, 1], pairs[pair, 2]
+            entries[entry, 2] = pair
 
 
 def bin_splats(
@@ -257,14 +282,16 @@ def bin_splats(
         The tiles.
     """
     across, down = tiles_across(width), -(-height // TILE_HEIGHT)
-    rooms = _rooms(PARTS, means2d, alphas, extents, across, down)
-    most, count = rooms[-1], len(means2d)
-    tiles, splats = np.empty(most, np.int32), np.empty(most, np.int32)
-    spans = np.empty((most, 2), np.int32)
+    order, count = _order(depths), len(means2d)
+    splats, ordered = np.empty((count, 8), np.float32), np.empty((count, 8), np.float32)
+    _pack(means2d, conics, alphas, extents, splats)
+    rooms = _sort(PARTS, order, splats, across, down, ordered)
+    pairs = np.empty((rooms[-1], 3), np.int32)
     starts, ends = np.empty(count, np.int32), np.empty(count, np.int32)
-    _list_all(
-        rooms, means2d, conics, alphas, extents, across, down, starts, ends, tiles, spans, splats
-    )
-    first_entry = np.zeros(across * down + 1, np.int32)
-    pairs = _fill(_order(depths), starts, ends, tiles, first_entry)
-    return Tiles(width, height, starts, ends, spans, splats, first_entry, pairs)
+    counts = np.zeros((PARTS, across * down), np.int32)
+    behind = _list_all(rooms, order, ordered, across, down, starts, ends, counts, pairs)
+    first_entry = np.empty(across * down + 1, np.int32)
+    _first_entries(counts, first_entry)
+    entries = np.empty((first_entry[-1], 3), np.int32)
+    _fill(rooms, behind, pairs, counts, entries)
+    return Tiles(width, height, order, starts, ends, len(pairs), first_entry, entries)
