@@ -10,7 +10,7 @@ from ico3d.capture.capture import Capture
 from ico3d.errors import CaptureError, SettingsError
 from ico3d.head.basis import update_basis
 from ico3d.head.density import HeadDensity, Sampled, bound_scales
-from ico3d.head.expressions import ExpressionTrack
+from ico3d.head.expressions import ExpressionTrack, turn_of, turned
 from ico3d.head.loss import HeadLoss
 from ico3d.head.model import HeadModel
 from ico3d.head.settings import SGD_GAINS, HeadSettings
@@ -33,6 +33,9 @@ FEW_FRAMES = 100
 SAMPLES = 16
 """Number of views that density control samples."""
 
+MEAN_EVERY = 10
+"""Steps between two values of the mean of the last steps."""
+
 ATTENTION_FACTOR = 5
 ATTENTION_WEIGHT_DECAY = 1e-4
 
@@ -49,6 +52,7 @@ class HeadTrainer:
         pictures: Reads the recorded pictures.
         views: The views to learn from, frame by frame.
         poses: Hash of the capture's head poses, which identifies the canonical head space.
+        turn: How far the head turns in the training frames; None if the model ignores that.
     """
 
     def __init__(
@@ -67,6 +71,7 @@ class HeadTrainer:
             SettingsError: If the model is to be compiled and there is no compiler.
         """
         self.model, self.track, self.adaptor = model, track, adaptor
+        self._capture = capture
         self._settings, self._seed = settings, seed
         self.pictures = PictureCache(capture, settings.cache_gib, settings.cache_dir)
         self.views = self.pictures.views(capture.split.train, LEAST_TOLD)
@@ -76,6 +81,8 @@ class HeadTrainer:
         few = FEW_FRAMES / len(capture.split.train)
         self._weight_decay = settings.rates.basis_weight_decay * few**4
         self.poses = poses_digest(capture)
+        frames = sorted({view.frame for view in self.views})
+        self.turn = turn_of(capture, frames) if model.shape.turns else None
         self._loss = HeadLoss(settings, model.device)
         self._optimiser = Optimiser(settings.optimiser)
         self._density = HeadDensity(settings.density, seed)
@@ -107,7 +114,7 @@ class HeadTrainer:
         view = self.pictures.readable(self.views, self._epochs.at(index))
         picture = self.pictures.picture(view, self.model.device)
         background, target = self._staged(view, picture, index)
-        expression = self._expression(view)  # (B,)
+        expression = self.expression(view)  # (B,)
         features = self._features(expression)  # (N, w)
         gaussians = self.model.gaussians(self._decode(features, expression))
         gaussians = gaussians.up_to_degree(index // self._settings.sh_every)
@@ -118,8 +125,16 @@ class HeadTrainer:
         self._density.observe(rendering.info, index)
         self._update(expression, features, index)
         self._density.adapt(self.model, self._optimiser, self._sampled, index)
+        self._average(index)
         psnr = tensor_psnr(rendering.rgb[0], target)
         return {"loss": float(loss.detach()), "psnr": psnr, "gaussians": len(self.model)}
+
+    def expression(self, view: View) -> Tensor:
+        """The expression (B,) of a view's frame and how the head is turned, on its device."""
+        expression = self.track.at(view.frame)
+        if self.turn is not None:
+            expression = turned(expression, self.turn, self._capture, view.frame)  # (B + 3,)
+        return expression.to(self.model.device)
 
     def __len__(self) -> int:
         """The number of Gaussians."""
@@ -185,10 +200,6 @@ class HeadTrainer:
         plate = self.pictures.background(view, picture.image.device)
         return staged(picture, plate, torch.from_numpy(rng.random(3)))
 
-    def _expression(self, view: View) -> Tensor:
-        """The expression (B,) of a view's frame, on the model's device."""
-        return self.track.at(view.frame).to(self.model.device)
-
     def _features(self, expression: Tensor) -> Tensor:
         """Blended features that keep their gradient: the basis learns from it."""
         features = self.model.blended(expression)
@@ -214,6 +225,7 @@ class HeadTrainer:
             features.grad,
             rates["basis"],
             self._weight_decay,
+            self._settings.basis_optimiser == "rmsprop",
         )
         for name, parameter in self.model.named_parameters():
             if parameter.grad is not None:
@@ -222,6 +234,22 @@ class HeadTrainer:
                 parameter.grad = None
         bound_scales(self.model)
         self._update_adaptor(rates["adaptor"])
+
+    def _average(self, index: int) -> None:
+        """Averages the parameters over the last steps, as each of them sees only one picture."""
+        steps = self._settings.steps
+        fixed = min(self._settings.density.until, steps)
+        first = max(round((1 - self._settings.mean) * steps), fixed)
+        count, rest = divmod(index - first, MEAN_EVERY)
+        parameters = dict(self.model.named_parameters())
+        if self.adaptor is not None:
+            named = self.adaptor.named_parameters()
+            parameters |= {f"adaptor.{name}": parameter for name, parameter in named}
+        for name, parameter in parameters.items():
+            if index >= first and rest == 0:
+                self._optimiser.keep_mean(name, parameter, count)
+            if first < steps and index == steps - 1:
+                self._optimiser.take_mean(name, parameter)
 
     def _update_adaptor(self, rate: float) -> None:
         """The adaptor's step; its attention learns faster and decays (as in SyncTalk)."""
@@ -247,7 +275,7 @@ class HeadTrainer:
         chosen = rng.choice(len(self.views), size=min(SAMPLES, len(self.views)), replace=False)
         opacities, given = [], []
         for view in (self.views[i] for i in chosen):
-            gaussians = self.model(self._expression(view))
+            gaussians = self.model(self.expression(view))
             opacities.append(gaussians.opacities)
             given.append(contributions(gaussians, [view.camera])[0])
         return Sampled(torch.stack(opacities).amax(0), torch.stack(given).amax(0))
