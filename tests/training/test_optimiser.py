@@ -48,13 +48,3 @@ def test_rate_decays_exponentially():
     rate = Rate(1.0, 0.01)
     assert [rate.at(p) for p in (0.0, 1.0)] == [1.0, 0.01]
     assert abs(rate.at(0.5) - 0.1) < 1e-12
-
-
-def test_a_running_mean_is_the_mean_of_all_values():
-    optimiser, value = Optimiser(), torch.zeros(3)
-    for count, number in enumerate([1.0, 5.0, 9.0]):
-        value.fill_(number)
-        optimiser.keep_mean("x", value, count)
-    assert list(optimiser.moments) == ["x.mean"]
-    optimiser.take_mean("x", value)
-    torch.testing.assert_close(value, torch.full((3,), 5.0))

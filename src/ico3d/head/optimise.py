@@ -33,9 +33,6 @@ FEW_FRAMES = 100
 SAMPLES = 16
 """Number of views that density control samples."""
 
-MEAN_EVERY = 10
-"""Steps between two values of the mean of the last steps."""
-
 ATTENTION_FACTOR = 5
 ATTENTION_WEIGHT_DECAY = 1e-4
 
@@ -125,7 +122,6 @@ class HeadTrainer:
         self._density.observe(rendering.info, index)
         self._update(expression, features, index)
         self._density.adapt(self.model, self._optimiser, self._sampled, index)
-        self._average(index)
         psnr = tensor_psnr(rendering.rgb[0], target)
         return {"loss": float(loss.detach()), "psnr": psnr, "gaussians": len(self.model)}
 
@@ -234,22 +230,6 @@ class HeadTrainer:
                 parameter.grad = None
         bound_scales(self.model)
         self._update_adaptor(rates["adaptor"])
-
-    def _average(self, index: int) -> None:
-        """Averages the parameters over the last steps, as each of them sees only one picture."""
-        steps = self._settings.steps
-        fixed = min(self._settings.density.until, steps)
-        first = max(round((1 - self._settings.mean) * steps), fixed)
-        count, rest = divmod(index - first, MEAN_EVERY)
-        parameters = dict(self.model.named_parameters())
-        if self.adaptor is not None:
-            named = self.adaptor.named_parameters()
-            parameters |= {f"adaptor.{name}": parameter for name, parameter in named}
-        for name, parameter in parameters.items():
-            if index >= first and rest == 0:
-                self._optimiser.keep_mean(name, parameter, count)
-            if first < steps and index == steps - 1:
-                self._optimiser.take_mean(name, parameter)
 
     def _update_adaptor(self, rate: float) -> None:
         """The adaptor's step; its attention learns faster and decays (as in SyncTalk)."""

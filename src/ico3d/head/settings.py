@@ -170,9 +170,6 @@ class HeadSettings:
             multiples of usual gradients, because the paper's rates are Adam's (docs/choices.md).
         basis_optimiser: What the basis learns by under Adam: Adam, or RMSProp, which keeps one
             second moment for each row of a Gaussian's basis and nothing else.
-        mean: Share of the steps, 0 to 1, counted from the end, over which parameters are averaged
-            for the result, while Gaussians neither multiply nor die; 0 takes those of the last
-            step.
         sh_degree: Degree of the spherical harmonics, 0 to 3, by which colours depend on the
             direction of view; bundles keep degree 0.
         sh_every: Steps between two increases of the degree that is trained, which starts at 0.
@@ -194,7 +191,6 @@ class HeadSettings:
     turns: bool = False
     optimiser: Literal["adam", "sgd"] = "adam"
     basis_optimiser: Literal["adam", "rmsprop"] = "adam"
-    mean: float = 0.0
     sh_degree: int = 0
     sh_every: int = 1_000
     checkpoint_every: int = 1_000
@@ -216,7 +212,6 @@ PRESETS: dict[PresetName, HeadSettings] = {
         checkpoint_every=500,
         turns=True,
         basis_optimiser="rmsprop",
-        mean=0.25,
         loss=Loss(perceptual=0.0, torso=0.5, alpha=0.1, squares=8.0),
         rates=Rates(
             position=2.5e-3,

@@ -28,7 +28,7 @@ class Optimiser:
     Attributes:
         kind: `adam` or `sgd`.
         moments: By name: NAME.first and NAME.second are shaped like the parameter NAME; NAME.steps
-            counts the parameter's updates; NAME.mean is its mean over some of them (`keep_mean`).
+            counts the parameter's updates.
     """
 
     def __init__(self, kind: str = "adam"):
@@ -65,17 +65,6 @@ class Optimiser:
             adam_kernel(*arguments, np.float32(rate), *corrections)  # type: ignore[call-arg]
         else:
             adam_reference(value, first, second, gradient, rate, corrections)
-
-    @torch.no_grad()
-    def keep_mean(self, name: str, value: Tensor, count: int) -> None:
-        """Adds a parameter's value to its running mean NAME.mean, so far one of `count` values."""
-        mean = self.moments.setdefault(f"{name}.mean", value.detach().clone())
-        mean.lerp_(value.detach(), 1 / (count + 1))
-
-    @torch.no_grad()
-    def take_mean(self, name: str, value: Tensor) -> None:
-        """Replaces a parameter's value, in place, by its running mean (`keep_mean`)."""
-        value.copy_(self.moments[f"{name}.mean"])
 
     def _moments(self, name: str, value: Tensor) -> tuple[Tensor, Tensor, tuple]:
         """Both moments and the bias corrections of this, the next update."""

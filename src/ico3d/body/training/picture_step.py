@@ -163,15 +163,20 @@ class Learner:
         if maps is not None and maps.requires_grad:
             camera_colors.center(maps, self._cameras)
 
+    @torch.no_grad()
     def keep_mean(self, count: int) -> None:
         """Adds the canonical Gaussians to their running mean, so far one of `count` steps."""
+        moments = self.optimiser.moments
         for name in self.model.canonical_names:
-            self.optimiser.keep_mean(name, self.model.gaussians[name], count)
+            value = self.model.gaussians[name].detach()
+            mean = moments.setdefault(f"{name}.mean", value.clone())
+            mean.lerp_(value, 1 / (count + 1))
 
+    @torch.no_grad()
     def take_mean(self) -> None:
         """Replaces the canonical Gaussians by their running mean (`keep_mean`)."""
         for name in self.model.canonical_names:
-            self.optimiser.take_mean(name, self.model.gaussians[name])
+            self.model.gaussians[name].copy_(self.optimiser.moments[f"{name}.mean"])
 
     def tensors(self) -> dict[str, Tensor]:
         """Parameters, and moments of the optimiser."""
