@@ -42,15 +42,18 @@ def test_kernel_gradients_equal_the_reference():
         torch.testing.assert_close(kernel, reference, rtol=1e-4, atol=1e-3)
 
 
-@pytest.mark.parametrize("kind", ["adam", "sgd"])
-def test_rank_one_update_equals_the_reference(kind):
+@pytest.mark.parametrize(
+    ("kind", "rmsprop"), [("adam", False), ("adam", True), ("sgd", False)], ids=str
+)
+def test_rank_one_update_equals_the_reference(kind, rmsprop):
     found = []
     for dtype in (torch.float32, torch.float64):
         basis, weights, gradient = _case(dtype)
         optimiser = Optimiser(kind)
         for step in range(4):
             active = weights * (torch.arange(ROWS) != step)
-            update_basis(optimiser, basis, active, gradient * (1 + step), 0.01, weight_decay=0.3)
+            pulled = gradient * (1 + step)
+            update_basis(optimiser, basis, active, pulled, 0.01, 0.3, rmsprop=rmsprop)
         found.append(basis.double())
     torch.testing.assert_close(found[0], found[1], rtol=1e-5, atol=1e-5)
 
@@ -70,3 +73,15 @@ def test_rank_one_update_equals_a_dense_one_and_leaves_unused_rows_alone():
     Optimiser().update("x", dense, weights[:, None, None] * gradient, 0.01)
     torch.testing.assert_close(basis, dense)
     assert torch.equal(basis[1], before[1])
+
+
+def test_the_first_step_of_rmsprop_is_the_rate_times_the_gradient_of_unit_mean_square():
+    basis, weights, gradient = _case(torch.float64)
+    gradient[3] = 0  # a Gaussian that the picture does not show
+    before, optimiser = basis.clone(), Optimiser()
+    update_basis(optimiser, basis, weights, gradient, 0.01, rmsprop=True)
+    unit = gradient / gradient.square().mean(1, keepdim=True).sqrt().clamp_min(1e-9)
+    expected = -0.01 * weights.sign()[:, None, None] * unit
+    torch.testing.assert_close(basis - before, expected, rtol=1e-5, atol=1e-7)
+    assert optimiser.moments["basis.second"].shape == (ROWS, COUNT)
+    assert "basis.first" not in optimiser.moments

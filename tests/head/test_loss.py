@@ -50,6 +50,15 @@ def test_l1_ssim_and_alpha_are_weighted():
     torch.testing.assert_close(loss, expected)
 
 
+def test_squared_differences_are_weighted():
+    image, target = _images()
+    settings = changed(PAPER, {"steps": 10, "loss.ssim": 0.0, "loss.squares": 3.0})
+    rendering, picture = _rendering(image, torch.ones(16, 20)), Picture(target, None, None)
+    away = image - target
+    expected = 0.8 * away.abs().mean() + 3 * away.square().mean()
+    torch.testing.assert_close(HeadLoss(settings, CPU)(rendering, target, picture, 0), expected)
+
+
 def test_a_torso_counts_by_its_weight():
     image, target = _images()
     image.requires_grad_()

@@ -30,6 +30,18 @@ def test_the_basis_has_a_row_per_expression_value_and_one_for_the_bias(variant, 
     assert _model(variant).basis.shape == basis
 
 
+def test_a_head_that_follows_its_rotation_is_drawn_at_the_mean_one_without():
+    shape = head_shape(2, features=8, hidden=6, frequencies=2, turns=True)
+    model = HeadModel(shape, 5)
+    model.basis.data = torch.randn(model.basis.shape)
+    assert model.basis.shape == (2 + 3 + 1, 5, 8)
+    expression, still = torch.tensor([0.3, -1.0]), torch.zeros(3)
+    assert torch.equal(model.logits(expression), model.logits(torch.cat([expression, still])))
+    turned = torch.cat([expression, torch.tensor([0.0, 0.5, 0.0])])
+    moved = model.blended(turned) - model.blended(expression)
+    torch.testing.assert_close(moved, 0.5 * model.basis[3].detach())
+
+
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_a_new_head_is_faint_whatever_the_expression(variant):
     model = HeadModel(head_shape(3, variant), 4)

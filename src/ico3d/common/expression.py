@@ -1,4 +1,4 @@
-"""What the expression vector of a speech-driven head holds: speech values, then eye values."""
+"""What drives a head: speech values, then eye values; and how the head is turned."""
 
 from dataclasses import dataclass
 
@@ -17,6 +17,9 @@ EYE_NAMES = (
     "eyeBlinkRight",
 )
 """ARKit names of the seven eye and brow values, 0 to 1, at the end of the expression vector."""
+
+TURN_SIZE = 3
+"""Number of values that tell how a head is turned, after the expression vector."""
 
 LIDS = [i for i, name in enumerate(EYE_NAMES) if "Blink" in name]
 """Indices of the eyelids in `EYE_NAMES`."""

@@ -8,9 +8,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ico3d.head.kernels import adam_rank_one, blend_rows, row_products
+from ico3d.head.kernels import adam_rank_one, blend_rows, rmsprop_rank_one, row_products
 from ico3d.training.finite import check_gradient
-from ico3d.training.optimiser import Optimiser, adam_reference, bias_corrections
+from ico3d.training.optimiser import BETA2, EPSILON, Optimiser, adam_reference, bias_corrections
 
 
 def blend(basis: Tensor, weights: Tensor) -> Tensor:
@@ -66,6 +66,7 @@ def update_basis(
     gradient: Tensor,
     rate: float,
     weight_decay: float = 0.0,
+    rmsprop: bool = False,
 ) -> None:
     """One step on the basis, in place, with the gradient weights ⊗ gradient.
 
@@ -79,6 +80,8 @@ def update_basis(
         gradient: (N, w) gradient of the loss by the blended features.
         rate: Learning rate.
         weight_decay: Factor by which each row except the bias is added to its gradient (L2).
+        rmsprop: Take a step of RMSProp instead of Adam: without first moments, and with one second
+            moment for all features of a Gaussian in a row.
 
     Raises:
         NotFiniteError: If the gradient holds NaN or infinity; then nothing is changed.
@@ -91,6 +94,9 @@ def update_basis(
     if optimiser.kind == "sgd":
         pulled = pulls[rows, None, None] * basis[rows]
         basis[rows] -= rate * (weights[rows, None, None] * gradient + pulled)
+        return
+    if rmsprop:
+        _rmsprop(optimiser, basis, weights, gradient, rate, pulls)
         return
     first, second, counts = _moments(optimiser, basis)
     counts[rows.cpu()] += 1
@@ -112,6 +118,42 @@ def update_basis(
         pulled = weights[row] * gradient + pulls[row] * basis[row]
         parts = (basis[row], first[row], second[row], pulled)
         adam_reference(*parts, rate, bias_corrections(int(counts[row])))
+
+
+def _rmsprop(
+    optimiser: Optimiser,
+    basis: Tensor,
+    weights: Tensor,
+    gradient: Tensor,
+    rate: float,
+    pulls: Tensor,
+) -> None:
+    """A step of RMSProp; `pulls` (R,) is the weight decay of each row."""
+    moments = optimiser.moments
+    if "basis.second" not in moments:
+        moments["basis.second"] = basis.new_zeros(basis.shape[:2])  # (R, N)
+        moments["basis.steps"] = torch.zeros(basis.shape[0], dtype=torch.int64)
+    second, counts = moments["basis.second"], moments["basis.steps"]
+    rows = torch.nonzero(weights)[:, 0]  # (active,)
+    counts[rows.cpu()] += 1
+    roots = np.array([bias_corrections(max(int(n), 1))[1] for n in counts])  # (R,)
+    if _has_kernel(basis):
+        rmsprop_rank_one(
+            _rows(basis),
+            second.numpy(),
+            weights.contiguous().numpy(),
+            gradient.contiguous().view(-1).numpy(),
+            rows.numpy(),
+            np.float32(rate),
+            roots,
+            pulls.numpy(),
+        )
+        return
+    for row in rows.tolist():
+        pulled = weights[row] * gradient + pulls[row] * basis[row]  # (N, w)
+        second[row].mul_(BETA2).add_(pulled.square().mean(1), alpha=1.0 - BETA2)
+        root = second[row].sqrt() * float(roots[row]) + EPSILON  # (N,)
+        basis[row] -= rate * pulled / root[:, None]
 
 
 def _moments(optimiser: Optimiser, basis: Tensor) -> tuple[Tensor, Tensor, Tensor]:

@@ -1,22 +1,31 @@
-"""The expression of each frame of a capture."""
+"""The expression of each frame of a capture, and how the head is turned."""
 
 import logging
+from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 import torch
+from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from ico3d.capture.capture import Capture
 from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE
 from ico3d.errors import CaptureError
+from ico3d.head.views import head_pose
 from ico3d.speech.encoder import FrozenEncoder
 from ico3d.speech.network import SpeechAdaptor, feature_windows
 
 FEATURE_RATE = 25.0
 """Rows of speech features per second; other rates are resampled by time."""
+
+TURN_WEIGHT = 0.4
+"""Largest value of a head's rotation: it is learnt as fast as usual blendshapes of this size."""
+LEAST_TURN = 0.02
+"""Angle in radians up to which a head counts as still: less is an error of its tracking."""
 
 log = logging.getLogger(__name__)
 
@@ -154,3 +163,46 @@ def speech_features(capture: Capture, encoder: FrozenEncoder, device: torch.devi
             f"{capture.path} has no sound: train with --inputs blendshapes, or add a recording."
         )
     return encoder.features(sound.samples, sound.rate, device)
+
+
+@dataclass(frozen=True)
+class TurnRange:
+    """How far the head of one person turned while it was recorded.
+
+    Lamps stand still in a room. So what a head's surface looks like changes as the head turns.
+
+    Attributes:
+        mean: (4,) mean rotation of the head in the world, a unit quaternion, xyzw.
+        most: (3,) largest angles in radians seen about the three axes of the world, from the mean.
+    """
+
+    mean: tuple[float, ...]
+    most: tuple[float, ...]
+
+    def values(self, rotation: np.ndarray) -> np.ndarray:
+        """(3,) float32 values of a head's rotation (3, 3) in the world; 0 at the mean rotation.
+
+        A head model is undefined outside of what it was trained with. So angles beyond the largest
+        seen count as the largest.
+        """
+        away = (Rotation.from_matrix(rotation) * Rotation.from_quat(self.mean).inv()).as_rotvec()
+        shares = np.clip(away / np.maximum(self.most, LEAST_TURN), -1, 1)
+        return (TURN_WEIGHT * shares).astype(np.float32)
+
+
+def turn_of(capture: Capture, frames: Iterable[int]) -> TurnRange:
+    """How far the head turns in some frames, each of which has a head pose."""
+    poses = [head_pose(capture, frame)[:3, :3] for frame in frames]
+    rotations = Rotation.from_matrix(np.stack(poses))  # T of them
+    mean = rotations.mean()
+    most = np.abs((rotations * mean.inv()).as_rotvec()).max(axis=0)  # (3,)
+    return TurnRange(
+        tuple(round(float(value), 6) for value in mean.as_quat()),
+        tuple(round(float(value), 6) for value in most),
+    )
+
+
+def turned(expression: Tensor, turn: TurnRange, capture: Capture, frame: int) -> Tensor:
+    """An expression (B,) followed by the values (3,) of the head's rotation in a frame."""
+    values = turn.values(head_pose(capture, frame)[:3, :3])  # (3,)
+    return torch.cat([expression, torch.from_numpy(values)])

@@ -70,6 +70,7 @@ def initial_head(
         box_center=tuple(((low + high) / 2).tolist()),
         box_size=float((high - low).max() / 2),
         sh_degree=settings.sh_degree,
+        turns=settings.turns and variant in ("full", "no-mlp") and capture.shows == "head",
     )
     model = HeadModel(shape, len(points))
     model.means.data = torch.from_numpy(points).float()

@@ -1,4 +1,4 @@
-"""Numba kernels of the latent basis: blending, its gradients and a rank-one Adam step.
+"""Numba kernels of the latent basis: blending, its gradients and rank-one steps.
 
 All kernels take the basis as (R, S): R rows, one for each expression value and one for the bias,
 and S = N·w numbers, w for each Gaussian. Work is cut into blocks of S that stay in the first-level
@@ -66,3 +66,41 @@ def adam_rank_one(basis, first, second, weights, gradient, rows, steps, roots, p
                 m[i] = beta1 * m[i] + rest1 * d
                 v[i] = beta2 * v[i] + rest2 * d * d
                 value[i] -= step * m[i] / (np.sqrt(v[i]) * root + epsilon)
+
+
+@njit(parallel=True, fastmath=True, cache=True)
+def rmsprop_rank_one(basis, second, weights, gradient, rows, rate, roots, pulls):
+    """One RMSProp step, in place, with the gradient weights ⊗ gradient, which is never stored.
+
+    The w numbers of a Gaussian in a row share one second moment: the mean of their squares.
+
+    Args:
+        basis: (R, S).
+        second: (R, N) second moments.
+        weights: (R,) row weights.
+        gradient: (S,) gradient of the blended features.
+        rows: Indices of the rows to update.
+        rate: Learning rate.
+        roots: (R,) correction of the root of the second moment.
+        pulls: (R,) weight decay: factor by which each row is added to its gradient (L2).
+    """
+    count = second.shape[1]
+    width = gradient.size // count
+    beta2, epsilon = np.float32(BETA2), np.float32(EPSILON)
+    share = np.float32((1.0 - BETA2) / width)
+    together = BLOCK // width + 1
+    for block in prange((count + together - 1) // together):
+        for r in rows:
+            weight, root, pull = weights[r], roots[r], pulls[r]
+            for n in range(block * together, min((block + 1) * together, count)):
+                g = gradient[n * width : (n + 1) * width]
+                value = basis[r, n * width : (n + 1) * width]
+                total = np.float32(0)
+                for i in range(width):
+                    d = weight * g[i] + pull * value[i]
+                    total += d * d
+                v = beta2 * second[r, n] + share * total
+                second[r, n] = v
+                step = rate / (np.sqrt(v) * root + epsilon)
+                for i in range(width):
+                    value[i] -= step * (weight * g[i] + pull * value[i])

@@ -17,7 +17,7 @@ log = logging.getLogger(__name__)
 
 
 class HeadLoss:
-    """λ_1·L1 + λ_s·(1 − SSIM) + λ_p·VGG, plus a term on alpha where the capture has masks.
+    """λ_1·L1 + λ_s·(1 − SSIM) + λ_p·VGG, and terms on squared differences and on alpha.
 
     Attributes:
         settings: The settings; the perceptual term is off if VGG's weights are not installed.
@@ -72,6 +72,8 @@ class HeadLoss:
             image = image + ignored * (target - image)
         loss = weights.l1 * l1(image, target[None])
         loss = loss + weights.ssim * (1 - ssim(image, target[None]))
+        if weights.squares:
+            loss = loss + weights.squares * (image - target).square().mean()
         if weights.alpha and picture.mask is not None:
             away = rendering.alpha[0] - picture.mask  # (H, W)
             if weights.torso == 0 and picture.torso is not None:

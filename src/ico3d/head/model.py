@@ -9,6 +9,7 @@ from typing import Literal
 import torch
 from torch import Tensor, nn
 
+from ico3d.common.expression import TURN_SIZE
 from ico3d.errors import ModelError
 from ico3d.head.basis import blend
 from ico3d.splat import harmonics
@@ -40,6 +41,8 @@ class HeadShape:
         box_size: Half of the box's longest edge in metres.
         sh_degree: Degree of the spherical harmonics by which colours depend on the direction of
             view; 0 for colours that do not.
+        turns: Whether the basis has rows for the head's rotation, too, by which its shading
+            follows lamps that stand still (`TurnRange`).
     """
 
     expression_size: int
@@ -51,6 +54,7 @@ class HeadShape:
     box_center: tuple[float, float, float] = (0.0, 0.0, 0.0)
     box_size: float = 1.0
     sh_degree: int = 0
+    turns: bool = False
 
     @property
     def outputs(self) -> int:
@@ -69,8 +73,9 @@ class HeadShape:
 
     @property
     def rows(self) -> int:
-        """R, number of rows of the basis, the bias f_0 included."""
-        return (self.expression_size if self.blends else 0) + 1
+        """R, number of rows of the basis, those of rotation and the bias f_0 included."""
+        turning = TURN_SIZE if self.turns else 0
+        return (self.expression_size + turning if self.blends else 0) + 1
 
     @property
     def width(self) -> int:
@@ -98,7 +103,8 @@ class HeadModel(nn.Module):
         means: (N, 3) metres.
         quats: (N, 4) wxyz, not normalised.
         log_scales: (N, 3) log of metres.
-        basis: (R, N, w) latent basis F; the last row is the bias f_0.
+        basis: (R, N, w) latent basis F: rows of the expression, of the head's rotation, if it
+            counts, and of the bias f_0.
     """
 
     def __init__(self, shape: HeadShape, num_gaussians: int):
@@ -144,7 +150,8 @@ class HeadModel(nn.Module):
         """The Gaussians for an expression.
 
         Args:
-            expression: (B,), on any device; sounds and captures give expressions on the CPU.
+            expression: (B,), on any device; sounds and captures give expressions on the CPU. The
+                values (3,) of the head's rotation may follow; without them it is the mean one.
 
         Returns:
             Gaussians in canonical head space.
@@ -160,9 +167,12 @@ class HeadModel(nn.Module):
         return blend(self.basis, self.row_weights(expression))
 
     def row_weights(self, expression: Tensor) -> Tensor:
-        """(R,) weights of the basis rows: the expression (B,), then 1 for the bias."""
+        """(R,) weights of the basis rows: the expression, the head's rotation, 1 for the bias."""
         one = torch.ones(1, dtype=self.basis.dtype, device=self.device)
-        return torch.cat([expression.to(self.device), one]) if self.shape.blends else one
+        if not self.shape.blends:
+            return one
+        turned = one.new_zeros(self.shape.rows - 1 - len(expression))  # (3,) or (0,)
+        return torch.cat([expression.to(self.device), turned, one])
 
     def decode(self, features: Tensor, expression: Tensor) -> Tensor:
         """The MLP φ: features (N, w) and expression (B,) to values (N, V)."""

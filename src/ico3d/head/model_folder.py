@@ -9,10 +9,16 @@ import numpy as np
 import torch
 
 from ico3d.capture.capture import Capture
-from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE, EyeRange
+from ico3d.common.expression import EYE_NAMES, SPEECH_SIZE, TURN_SIZE, EyeRange
 from ico3d.common.files import write_atomic
 from ico3d.errors import ModelError
-from ico3d.head.expressions import BlendshapeTrack, ExpressionTrack, SpeechTrack, speech_features
+from ico3d.head.expressions import (
+    BlendshapeTrack,
+    ExpressionTrack,
+    SpeechTrack,
+    TurnRange,
+    speech_features,
+)
 from ico3d.head.model import HeadModel
 from ico3d.head.views import poses_digest
 from ico3d.speech.encoder import load_encoder
@@ -41,6 +47,7 @@ class TrainedHead:
         landmarks: (68, 3) Multi-PIE landmarks in canonical head space, metres, by which the head is
             placed on a body; None where the capture has none.
         eyes: How far eyes and brows moved in the recording; used where `inputs` is `speech`.
+        turn: How far the head turned in the recording; None if the model ignores that.
     """
 
     model: HeadModel
@@ -52,6 +59,7 @@ class TrainedHead:
     summary: dict
     landmarks: np.ndarray | None = None
     eyes: EyeRange = field(default_factory=EyeRange)
+    turn: TurnRange | None = None
 
     def to(self, device: torch.device) -> "TrainedHead":
         """Moves the Gaussians to a device and returns this head; the adaptor stays on the CPU."""
@@ -130,6 +138,7 @@ class TrainedHead:
             "summary": self.summary,
             "landmarks": None if self.landmarks is None else self.landmarks.round(6).tolist(),
             "eyes": asdict(self.eyes),
+            "turn": None if self.turn is None else asdict(self.turn),
         }
         write_atomic(folder / ABOUT, json.dumps(about, indent=1).encode())
 
@@ -146,14 +155,14 @@ class TrainedHead:
             inputs, names = about["inputs"], tuple(about["blendshape_names"])
             encoder = about["encoder"], about["encoder_sha256"]
             summary, landmarks = about["summary"], _landmarks(about.get("landmarks"))
-            eyes = _eyes(about.get("eyes"))
+            eyes, turn = _eyes(about.get("eyes")), _turn(about.get("turn"))
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ModelError(
                 f"{folder} holds no trained head ({error}): train one with ico3d train head."
             ) from error
         adaptor = _load_adaptor(folder / "adaptor.safetensors") if inputs == "speech" else None
         model = HeadModel.load(folder / "model.safetensors")
-        return cls(model, inputs, names, *encoder, adaptor, summary, landmarks, eyes)
+        return cls(model, inputs, names, *encoder, adaptor, summary, landmarks, eyes, turn)
 
 
 def _landmarks(values: list | None) -> np.ndarray | None:
@@ -184,6 +193,22 @@ def _eyes(values: dict | None) -> EyeRange:
     if not seven or (rows[1] < rows[0]).any():
         raise ValueError("eyes must be seven values at rest, and seven that are not lower")
     return EyeRange(tuple(rows[0].tolist()), tuple(rows[1].tolist()))
+
+
+def _turn(values: dict | None) -> TurnRange | None:
+    """Heads of earlier versions say nothing of it.
+
+    Raises:
+        ValueError: If it is something else.
+        KeyError, TypeError: If values are missing or no lists.
+    """
+    if values is None:
+        return None
+    mean, most = np.array(values["mean"], np.float64), np.array(values["most"], np.float64)
+    whole = mean.shape == (4,) and most.shape == (TURN_SIZE,) and np.isfinite(most).all()
+    if not whole or not abs(np.linalg.norm(mean) - 1) < 1e-3:
+        raise ValueError("turn must be a unit quaternion, and three angles")
+    return TurnRange(tuple(mean.tolist()), tuple(most.tolist()))
 
 
 def _load_adaptor(path: Path) -> SpeechAdaptor:

@@ -10,7 +10,7 @@ from ico3d.capture.capture import Capture
 from ico3d.errors import CaptureError, SettingsError
 from ico3d.head.basis import update_basis
 from ico3d.head.density import HeadDensity, Sampled, bound_scales
-from ico3d.head.expressions import ExpressionTrack
+from ico3d.head.expressions import ExpressionTrack, turn_of, turned
 from ico3d.head.loss import HeadLoss
 from ico3d.head.model import HeadModel
 from ico3d.head.settings import SGD_GAINS, HeadSettings
@@ -49,6 +49,7 @@ class HeadTrainer:
         pictures: Reads the recorded pictures.
         views: The views to learn from, frame by frame.
         poses: Hash of the capture's head poses, which identifies the canonical head space.
+        turn: How far the head turns in the training frames; None if the model ignores that.
     """
 
     def __init__(
@@ -67,6 +68,7 @@ class HeadTrainer:
             SettingsError: If the model is to be compiled and there is no compiler.
         """
         self.model, self.track, self.adaptor = model, track, adaptor
+        self._capture = capture
         self._settings, self._seed = settings, seed
         self.pictures = PictureCache(capture, settings.cache_gib, settings.cache_dir)
         self.views = self.pictures.views(capture.split.train, LEAST_TOLD)
@@ -76,6 +78,8 @@ class HeadTrainer:
         few = FEW_FRAMES / len(capture.split.train)
         self._weight_decay = settings.rates.basis_weight_decay * few**4
         self.poses = poses_digest(capture)
+        frames = sorted({view.frame for view in self.views})
+        self.turn = turn_of(capture, frames) if model.shape.turns else None
         self._loss = HeadLoss(settings, model.device)
         self._optimiser = Optimiser(settings.optimiser)
         self._density = HeadDensity(settings.density, seed)
@@ -107,7 +111,7 @@ class HeadTrainer:
         view = self.pictures.readable(self.views, self._epochs.at(index))
         picture = self.pictures.picture(view, self.model.device)
         background, target = self._staged(view, picture, index)
-        expression = self._expression(view)  # (B,)
+        expression = self.expression(view)  # (B,)
         features = self._features(expression)  # (N, w)
         gaussians = self.model.gaussians(self._decode(features, expression))
         gaussians = gaussians.up_to_degree(index // self._settings.sh_every)
@@ -120,6 +124,13 @@ class HeadTrainer:
         self._density.adapt(self.model, self._optimiser, self._sampled, index)
         psnr = tensor_psnr(rendering.rgb[0], target)
         return {"loss": float(loss.detach()), "psnr": psnr, "gaussians": len(self.model)}
+
+    def expression(self, view: View) -> Tensor:
+        """The expression (B,) of a view's frame and how the head is turned, on its device."""
+        expression = self.track.at(view.frame)
+        if self.turn is not None:
+            expression = turned(expression, self.turn, self._capture, view.frame)  # (B + 3,)
+        return expression.to(self.model.device)
 
     def __len__(self) -> int:
         """The number of Gaussians."""
@@ -185,10 +196,6 @@ class HeadTrainer:
         plate = self.pictures.background(view, picture.image.device)
         return staged(picture, plate, torch.from_numpy(rng.random(3)))
 
-    def _expression(self, view: View) -> Tensor:
-        """The expression (B,) of a view's frame, on the model's device."""
-        return self.track.at(view.frame).to(self.model.device)
-
     def _features(self, expression: Tensor) -> Tensor:
         """Blended features that keep their gradient: the basis learns from it."""
         features = self.model.blended(expression)
@@ -214,6 +221,7 @@ class HeadTrainer:
             features.grad,
             rates["basis"],
             self._weight_decay,
+            self._settings.basis_optimiser == "rmsprop",
         )
         for name, parameter in self.model.named_parameters():
             if parameter.grad is not None:
@@ -247,7 +255,7 @@ class HeadTrainer:
         chosen = rng.choice(len(self.views), size=min(SAMPLES, len(self.views)), replace=False)
         opacities, given = [], []
         for view in (self.views[i] for i in chosen):
-            gaussians = self.model(self._expression(view))
+            gaussians = self.model(self.expression(view))
             opacities.append(gaussians.opacities)
             given.append(contributions(gaussians, [view.camera])[0])
         return Sampled(torch.stack(opacities).amax(0), torch.stack(given).amax(0))

@@ -37,6 +37,8 @@ class Loss:
             In recordings of the whole body always 0.
         alpha: Weight of the L1 difference of rendered alpha and mask, where the capture has masks.
             Not in the paper.
+        squares: Weight of the mean squared difference of rendered and recorded picture, which PSNR
+            measures. Not in the paper.
     """
 
     l1: float = 0.8
@@ -45,6 +47,7 @@ class Loss:
     perceptual_from: int = 10_000
     torso: float = 1.0
     alpha: float = 0.0
+    squares: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -160,8 +163,13 @@ class HeadSettings:
 
     Attributes:
         steps: Optimisation steps, one picture each.
+        turns: Let the basis also follow the head's rotation, because lamps stand still while a head
+            turns; bundles and avatars are shaded as at the mean rotation. Where the recording shows
+            the whole body, never. Not in the paper.
         optimiser: Adam, or stochastic gradient descent as the paper says; then learning rates count
             multiples of usual gradients, because the paper's rates are Adam's (docs/choices.md).
+        basis_optimiser: What the basis learns by under Adam: Adam, or RMSProp, which keeps one
+            second moment for each row of a Gaussian's basis and nothing else.
         sh_degree: Degree of the spherical harmonics, 0 to 3, by which colours depend on the
             direction of view; bundles keep degree 0.
         sh_every: Steps between two increases of the degree that is trained, which starts at 0.
@@ -180,7 +188,9 @@ class HeadSettings:
     """
 
     steps: int = 50_000
+    turns: bool = False
     optimiser: Literal["adam", "sgd"] = "adam"
+    basis_optimiser: Literal["adam", "rmsprop"] = "adam"
     sh_degree: int = 0
     sh_every: int = 1_000
     checkpoint_every: int = 1_000
@@ -200,7 +210,9 @@ PRESETS: dict[PresetName, HeadSettings] = {
     "cpu": HeadSettings(
         steps=2_500,
         checkpoint_every=500,
-        loss=Loss(perceptual=0.0, torso=0.5, alpha=0.1),
+        turns=True,
+        basis_optimiser="rmsprop",
+        loss=Loss(perceptual=0.0, torso=0.5, alpha=0.1, squares=8.0),
         rates=Rates(
             position=2.5e-3,
             rotation=2e-2,

@@ -114,7 +114,7 @@ def train_head(
     landmarks = canonical_landmarks(capture)
     eyes = _eyes(capture, track)
     head = TrainedHead(
-        trainer.model, job.inputs, names, *encoder, adaptor, summary, landmarks, eyes
+        trainer.model, job.inputs, names, *encoder, adaptor, summary, landmarks, eyes, trainer.turn
     )
     head.save(folder)
     run.finish({"train_seconds": seconds, "num_gaussians": len(trainer.model)})

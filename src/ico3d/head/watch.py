@@ -70,8 +70,8 @@ class WatchedHead:
 
     @torch.no_grad()
     def _expression(self, frame: int) -> Tensor:
-        """(B,)."""
-        return self._trainer.track.at(self._views[frame].frame)
+        """(B,), or (B + 3,) where the model follows the head's rotation."""
+        return self._trainer.expression(self._views[frame]).cpu()
 
     def _found_sliders(self) -> list[Slider]:
         """Sliders for the inputs that move in the recording, those that move most first."""

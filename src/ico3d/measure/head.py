@@ -15,7 +15,7 @@ from ico3d.common.camera import Camera
 from ico3d.common.psnr import psnr
 from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
-from ico3d.head.expressions import ExpressionTrack
+from ico3d.head.expressions import ExpressionTrack, turned
 from ico3d.head.model_folder import TrainedHead
 from ico3d.head.views import GREY, Picture, PictureCache, View, staged, view_of
 from ico3d.measure.faces.comparison import METRICS, FaceComparison
@@ -40,7 +40,7 @@ class HeadRenderer:
 
     def __init__(self, head: TrainedHead, capture: Capture):
         """Takes the head and the capture that drives it."""
-        self._head = head
+        self._head, self._capture = head, capture
         self._track: ExpressionTrack = head.track(capture)
         self.watch = Stopwatch(head.model.device)
 
@@ -48,6 +48,8 @@ class HeadRenderer:
     def picture(self, view: View, behind: Tensor) -> np.ndarray:
         """(H, W, 3) the head over a picture (H, W, 3) or a colour (3,), limited to [0, 1]."""
         expression = self._track.at(view.frame)
+        if self._head.turn is not None:
+            expression = turned(expression, self._head.turn, self._capture, view.frame)
         with self.watch.picture():
             rendering = render(
                 self._head.model(expression), [view.camera], behind.to(self._head.model.device)
