@@ -29,6 +29,7 @@ class Interrupted:
 
     Attributes:
         cpu_seconds: Processor seconds at a stretch, without imports.
+        peak_mib: Largest memory of the GPU at a stretch, MiB; 0 without one.
         train_seconds: Seconds of its steps.
         num_gaussians: Gaussians at a stretch.
         tensors: Number of tensors in its models.
@@ -38,6 +39,7 @@ class Interrupted:
     """
 
     cpu_seconds: float
+    peak_mib: float
     train_seconds: float
     num_gaussians: int
     tensors: int
@@ -88,30 +90,35 @@ def train_twice(
 
     # Kernels compiled at different times may round differently: both runs load one set.
     run_verb(words("first"), told)
-    seconds = run_verb(words("whole"), told)
+    seconds, peak = run_verb(words("whole"), told)
     _kill(words("parts"), told, out / f"{verb}-parts")
     run_verb(words("parts"), told)
     whole = out / f"{verb}-whole"
     finished = json.loads((whole / "finished.json").read_text())
     compared = _compared(whole, out / f"{verb}-parts")
-    return Interrupted(seconds, finished["train_seconds"], finished["num_gaussians"], *compared)
+    return Interrupted(
+        seconds, peak, finished["train_seconds"], finished["num_gaussians"], *compared
+    )
 
 
-def run_verb(words: list[str], environment: Mapping[str, str]) -> float:
-    """Runs a verb in a process of its own; its processor seconds, without imports.
+def run_verb(words: list[str], environment: Mapping[str, str]) -> tuple[float, float]:
+    """Runs a verb in a process of its own.
+
+    Returns:
+        Its processor seconds without imports, and the largest memory of the GPU in MiB.
 
     Raises:
         ModelError: If it fails.
     """
     process, received = _started(words, environment)
     try:
-        seconds = received.recv()
+        used = received.recv()
     except EOFError:
-        seconds = None
+        used = None
     process.join()
-    if process.exitcode or seconds is None:
+    if process.exitcode or used is None:
         raise ModelError(f"ico3d {' '.join(words[:3])} ended with status {process.exitcode}.")
-    return seconds
+    return used
 
 
 def _started(words: list[str], environment: Mapping[str, str]) -> tuple[BaseProcess, Connection]:
@@ -128,7 +135,8 @@ def _verb(words: list[str], environment: dict[str, str], sender: Connection) -> 
     """What the process does."""
     os.environ.update(environment)
     status = main(words)
-    sender.send(time.process_time())
+    peak = torch.cuda.max_memory_allocated() if torch.cuda.is_initialized() else 0
+    sender.send((time.process_time(), peak / 2**20))
     sys.exit(status)
 
 

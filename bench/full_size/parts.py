@@ -21,6 +21,7 @@ TRAINING = (
     Column("num_gaussians", "Gaussians", 0),
     Column("train_seconds", "steps, s", 1),
     Column("cpu_seconds", "processor, s", 1),
+    Column("peak_mib", "memory of the GPU, MiB", 0),
     Column("tensors", "tensors", 0),
     Column("alike", "the same, bit for bit", 0),
     Column("greatest", "greatest difference", 8),
@@ -208,7 +209,8 @@ class Parts:
             def trained(verb: str = verb) -> Mapping[str, Value]:
                 recording = self._recording("head" if verb == "head" else "body", size)
                 options = paper_options(verb, steps, self._name)
-                return asdict(train_twice(verb, recording, self.out, options, self.models))
+                found = train_twice(verb, recording, self.out, options, self.models)
+                return asdict(found) | {"peak_mib": found.peak_mib or None}
 
             rows.append(row_of({"static": "scene"}.get(verb, verb), trained))
         text = (
