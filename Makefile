@@ -58,7 +58,7 @@ bench: install ## long quality and speed runs; figures go to docs/benchmarks.md
 	$(PY) bench/bake.py $(RESULTS)/head/whole-method/seed0 $(RESULTS)/capture --json $(RESULTS)/bake.json
 	$(if $(OPPONENT),ico3d bench raster --against $(OPPONENT) --json $(RESULTS)/raster.json)
 	$(PY) bench/step.py $(RESULTS)/capture --json $(RESULTS)/step.json
-	$(PY) bench/gpu.py --json $(RESULTS)/gpu.json --capture $(RESULTS)/capture
+	$(PY) bench/gpu.py --out $(RESULTS)/gpu
 	$(PY) bench/files.py src/ico3d/chat/data/demo.ico3d --json $(RESULTS)/files.json
 	$(if $(filter %.npz,$(SUBJECT)),$(PY) bench/stress.py $(SUBJECT) --json $(RESULTS)/stress.json)
 	ico3d bench chat --json $(RESULTS)/chat.json

@@ -4,13 +4,16 @@ import shutil
 
 import pytest
 
+from ico3d.body.model_folder import TrainedBody
 from ico3d.body.settings import ONE_WINDOW, SKINNED, settings_for
 from ico3d.body.training.finetune_window import FineTuner
-from ico3d.body.training.needs import needs_of_body
 from ico3d.body.training.optimise_window import BodyTrainer
 from ico3d.body.training.train_clip import BodyJob, plan_windows, train_body
+from ico3d.cli import main
+from ico3d.splat.device import device_name
 from support.bodies.tiny_training import TINY
 from support.bodies.tracked_capture import TrackedCapture
+from support.captures import open_with
 from support.pretended_cuda import assert_same_run
 from support.settings import changed
 
@@ -22,8 +25,7 @@ DEATHS = {BodyTrainer: 8, FineTuner: 4}
 
 def _job(method: str, **changes) -> BodyJob:
     small = TINY | {"steps_per_frame": 2, "checkpoint_every": 3, "color_correction": True}
-    device = changes.pop("device", "auto")
-    return BodyJob(method, 0, changed(settings_for("cpu", method), small | changes), device=device)
+    return BodyJob(method, 0, changed(settings_for("cpu", method), small | changes))
 
 
 @pytest.fixture(scope="module")
@@ -70,9 +72,15 @@ def test_an_interrupted_run_goes_on_there(cuda, begun, tmp_path, method, monkeyp
         assert_same_run(ours.gaussians, theirs.gaussians)
 
 
-def test_a_dry_run_trains_there(cuda, tmp_path):
+def test_the_verb_trains_there(cuda, tmp_path, monkeypatch, capsys):
     """With maps of the cameras' colours and with harmonics, as the paper's settings may have."""
-    capture = TrackedCapture(tmp_path / "capture", 12.0)
-    job = _job("4dgs", sh_degree=2, sh_every=1, device="cuda")
-    needs = needs_of_body(capture, tmp_path / "dry", job)
-    assert needs.end.gaussians == 90 and needs.device_memory > 0
+    open_with(monkeypatch, lambda _: TrackedCapture(tmp_path / "capture", 12.0))
+    words = ["train", "body", "capture", tmp_path / "body", "--method", "4dgs", "--device", "cuda"]
+    words += ["--steps", 2, "--warmup-steps", 0, "--sh-degree", 2, "--sh-every", 1]
+    words += ["--color-correction", "--encoder.space", 4, "--mlp.width", 8]
+    words += ["--initial.gaussians", 60, "--density.max-gaussians", 90]
+    assert main([*map(str, words), "--dry-run"]) == 0
+    assert "memory of the GPU" in capsys.readouterr().out
+    assert main([*map(str, words)]) == 0
+    (made,) = TrainedBody.load(tmp_path / "body").summary["made"]["environments"]
+    assert made["device"] == device_name(cuda)

@@ -1,21 +1,21 @@
 """Heads are trained, and go on being trained, where CUDA is."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import torch
 from safetensors.torch import save_file
 
+from ico3d.cli import main
 from ico3d.head.expressions import BlendshapeTrack
 from ico3d.head.initial_gaussians import initial_head
 from ico3d.head.optimise import HeadTrainer
 from ico3d.head.perceptual import CHANNELS, WEIGHTS, vgg_layers
 from ico3d.head.settings import PRESETS
-from ico3d.head.train_head import HeadJob, needs_of_head, train_head
+from ico3d.head.train_head import HeadJob, train_head
 from ico3d.head.watch import WatchedHead
 from ico3d.training.watch import _side_by_side
-from support.pretended_cuda import assert_same_run, is_on_cuda
+from support.captures import open_with
+from support.pretended_cuda import assert_same_run, drawn, is_on_cuda
 from support.settings import changed
 
 pytestmark = pytest.mark.slow
@@ -102,8 +102,12 @@ def test_the_papers_switches_work_there(cuda, vgg, tiny, tmp_path):
     assert head.summary["made"]["used"]["sh_degree"] == 3
 
 
-def test_a_dry_run_trains_there(cuda, tiny):
-    needs = needs_of_head(tiny, _job(steps=1), "cuda")
-    assert needs.end.gaussians == 400 and needs.device_memory > 0
-    assert any("memory of the GPU" in line for line in needs.lines(Path()))
-    assert needs_of_head(tiny, _job(steps=1), "cpu").device_memory == 0
+def test_the_verb_tells_where(cuda, tiny, tmp_path, monkeypatch, capsys):
+    """A dry run takes the way of a training, and tells of the GPU's memory."""
+    open_with(monkeypatch, lambda _: tiny)
+    words = ["train", "head", "capture", tmp_path / "head", "--inputs", "blendshapes", "--steps", 1]
+    words += ["--initial.gaussians", 200, "--density.max-gaussians", 400, "--dry-run"]
+    for device, told in (("cuda", True), ("cpu", False)):
+        with drawn(monkeypatch) as pictures:
+            assert main([*map(str, words), "--device", device]) == 0
+        assert bool(pictures) == told == ("memory of the GPU" in capsys.readouterr().out)

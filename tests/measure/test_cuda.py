@@ -5,13 +5,20 @@ import json
 
 import numpy as np
 import pytest
+import torch
 
 from ico3d.body.training.train_clip import train_body
 from ico3d.cli import main
 from ico3d.measure.body import evaluate_body
 from ico3d.measure.head import evaluate_head
 from ico3d.measure.pictures import lpips as room
+from ico3d.measure.pictures.ms_ssim import ms_ssim
 from ico3d.measure.scene import evaluate_scene
+from ico3d.measure.sync import detectors
+from ico3d.measure.sync.mfcc import mfcc
+from ico3d.measure.sync.network import SyncNet
+from ico3d.measure.sync.pipeline import lip_features, sound_features
+from ico3d.measure.sync.s3fd import S3fd
 from ico3d.splat.device import device_name
 from support.bodies.moving_capture import MovingCapture
 from support.bodies.tiny_training import job
@@ -19,6 +26,7 @@ from support.captures import open_with
 from support.heads.offset_head import OffsetHead, offset_head
 from support.pretended_cuda import drawn
 from support.scenes.offset_scene import OffsetScene, offset_scene
+from support.weights.sync import made_up, made_up_faces, made_up_sound
 
 pytestmark = pytest.mark.slow
 
@@ -73,6 +81,30 @@ def test_lpips_looks_there(cuda, lpips_weights, look_again, monkeypatch):
     monkeypatch.setenv("ICO3D_MODELS", str(lpips_weights[0]))
     a, b = np.random.default_rng(1).random((2, 32, 40, 3)).astype(np.float32)
     assert room.lpips(a, b, "vgg", cuda) == pytest.approx(room.lpips(a, b), rel=1e-5)
+
+
+def test_ms_ssim_looks_there(cuda):
+    a, b = np.random.default_rng(1).random((2, 180, 180, 3)).astype(np.float32)
+    assert ms_ssim(a, b, cuda) == pytest.approx(ms_ssim(a, b), rel=1e-5)
+
+
+def test_syncnet_looks_and_listens_there(cuda):
+    network = SyncNet()
+    network.load_state_dict(made_up(network, 1))
+    faces, sound = made_up_faces(6), mfcc(made_up_sound(8 / 25))
+
+    def features():
+        return lip_features(network, faces), sound_features(network, sound, 1)
+
+    here, there = features(), (network.to(cuda), features())[1]
+    for ours, theirs in zip(there, here, strict=True):
+        assert torch.allclose(ours, theirs, rtol=1e-3, atol=1e-5)
+
+
+def test_the_finder_of_its_faces_looks_there(cuda, monkeypatch):
+    monkeypatch.setattr(detectors, "load_s3fd", S3fd)  # of random weights
+    finder = detectors.S3fdDetector(cuda)
+    assert finder.boxes(np.zeros((400, 400, 3), np.uint8)).shape[1] == 4
 
 
 @pytest.mark.parametrize("device", ["auto", "cuda", "cpu"])

@@ -2,9 +2,13 @@
 
 import pytest
 
+from ico3d.cli import main
+from ico3d.scene.model_folder import TrainedScene
 from ico3d.scene.optimise import SceneTrainer
 from ico3d.scene.settings import settings_for
-from ico3d.scene.train_scene import SceneJob, needs_of_scene, train_scene
+from ico3d.scene.train_scene import SceneJob, train_scene
+from ico3d.splat.device import device_name
+from support.captures import open_with
 from support.pretended_cuda import assert_same_run, is_on_cuda
 from support.settings import changed
 
@@ -44,7 +48,12 @@ def test_an_interrupted_run_goes_on_there(cuda, still, tmp_path, strategy, monke
     assert_same_run(resumed.scene.parameters, whole.scene.parameters)
 
 
-def test_a_dry_run_trains_there(cuda, still):
-    job = SceneJob("person", "all", "default", 0, changed(settings_for("cpu", "default"), SMALL))
-    needs = needs_of_scene(still(3), job, "cuda")
-    assert needs.end.gaussians == 120 and needs.device_memory > 0
+def test_the_verb_trains_there(cuda, still, tmp_path, monkeypatch, capsys):
+    open_with(monkeypatch, lambda _: still(3))
+    words = ["train", "static", "capture", tmp_path / "scene", "--steps", 2, "--device", "cuda"]
+    words += ["--initial.gaussians", 80, "--density.max-gaussians", 120]
+    assert main([*map(str, words), "--dry-run"]) == 0
+    assert "memory of the GPU" in capsys.readouterr().out
+    assert main([*map(str, words)]) == 0
+    (made,) = TrainedScene.load(tmp_path / "scene").summary["made"]["environments"]
+    assert made["device"] == device_name(cuda)

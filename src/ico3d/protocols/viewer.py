@@ -144,14 +144,14 @@ def frame_rate(
 
 
 def viewer_rows(
-    shown: Staged, sizes: Sequence[tuple[int, int]], pictures: int
+    shown: Staged, sizes: Sequence[tuple[int, int]] | None = None, pictures: int | None = None
 ) -> list[dict[str, float | str | None]]:
     """A row for each combination of parts that there is.
 
     Args:
         shown: The parts.
-        sizes: Widths and heights of the pictures in pixels.
-        pictures: Number of pictures of each size that are timed.
+        sizes: Widths and heights of the pictures in pixels; `SIZES` if None.
+        pictures: Number of pictures of each size that are timed; `PICTURES` if None.
 
     Raises:
         ModelError: If there is neither body nor head.
@@ -166,8 +166,10 @@ def viewer_rows(
         row: dict[str, float | str | None] = {"name": " + ".join(present)}
         if shown.device.type == "cuda":
             torch.cuda.reset_peak_memory_stats(shown.device)
-        for width, height in sizes:
-            cameras = orbit(ring_around(places), places, pictures + WARM, width, height)
+        for width, height in sizes or SIZES:
+            cameras = orbit(
+                ring_around(places), places, (pictures or PICTURES) + WARM, width, height
+            )
             parts = [shown.parts[name] for name in present]
             found = frame_rate(parts, cameras, shown.seconds, shown.device)
             row["gaussians"] = found.pop("gaussians")
@@ -191,7 +193,7 @@ def measure_viewer(model: Path, out: Path, background: Path | None, device: torc
         The report, which has been written.
     """
     shown = staged(model, background, device)
-    rows = viewer_rows(shown, SIZES, PICTURES)
+    rows = viewer_rows(shown)
     text = (
         f"Medians of {PICTURES} pictures, each of another moment of the clip and by another camera "
         "of an orbit, from the moment's Gaussians to the finished picture. The paper's viewer "

@@ -179,11 +179,13 @@ def test_without_raft_it_is_dis(monkeypatch):
         best_method()
 
 
-def test_raft_is_taken_where_its_weights_are(monkeypatch, tmp_path):
+@pytest.mark.parametrize("place", ["cpu", "cuda"])
+def test_raft_is_taken_where_its_weights_are(monkeypatch, tmp_path, place, request):
+    device = request.getfixturevalue("cuda") if place == "cuda" else place
     install_torchvision(monkeypatch, tmp_path)
-    assert best_method().name == "dis"
+    assert best_method(device).name == "dis"
     write_raft(tmp_path, 2.0)
-    method = best_method()
+    method = best_method(device)
     assert method.name == NAME
     before = np.zeros((150, 90, 3), np.uint8)
     after = before.copy()
