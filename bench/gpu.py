@@ -45,12 +45,21 @@ class Bench:
         return int(failed)
 
 
-if __name__ == "__main__":
+def _run() -> int:
+    """Runs with what is installed, or again with the packages of the wheels that words name."""
     from full_size.wheels import run_with_wheels
 
-    status = run_with_wheels(sys.argv)  # before anything is imported that wheels may bring
-    if status is None:
+    status = run_with_wheels(sys.argv)
+    if status is not None:
+        return status
+    try:
         from ico3d.cli import run_script
 
-        status = run_script(Bench)
-    sys.exit(status)
+        return run_script(Bench)
+    except ModuleNotFoundError as error:
+        print(f"{error.name} is not installed: --wheels DIR brings it along.", file=sys.stderr)
+        return 1
+
+
+if __name__ == "__main__":
+    sys.exit(_run())

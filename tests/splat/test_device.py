@@ -1,14 +1,17 @@
 """Which device is computed on, for every kind of broken installation."""
 
+import importlib
 import re
 import sys
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 import torch
 
+from ico3d.cli import VERBS
 from ico3d.errors import SettingsError
 from ico3d.splat import convention, device
 from ico3d.splat.device import computing_device, cuda_fault
@@ -103,3 +106,24 @@ def test_the_extra_brings_the_versions_that_are_taken():
     oldest, newest = (".".join(map(str, version)) for version in convention.GSPLAT)
     wanted = project["project"]["optional-dependencies"]["cuda"]
     assert wanted == [f"gsplat>={oldest},<{newest}"]
+
+
+def test_every_verb_that_takes_a_device_is_tested_on_cuda():
+    """By its words, by the name of its class, or by the function to which it hands all."""
+    handed = {
+        "assemble": "assemble(",
+        "capture portrait": "track_portrait(",
+        "measure ablations": "measure_ablations(",
+    }
+    tests = Path(__file__).parents[1]
+    files = [path.read_text("utf-8") for path in tests.rglob("test_*.py") if path != Path(__file__)]
+    written = "\n".join(text for text in files if "(cuda" in text)
+    missing = []
+    for verb, entry in VERBS.items():
+        kind = getattr(importlib.import_module(entry.module), entry.name)
+        if verb == "measure all" or "device" not in {field.name for field in fields(kind)}:
+            continue  # the first runs the others
+        words = ", ".join(f'"{word}"' for word in verb.split())
+        if not any(name in written for name in (words, f"{entry.name}(", handed.get(verb, words))):
+            missing.append(verb)
+    assert missing == []
