@@ -192,7 +192,8 @@ def measure_ablations(terms: AblationTerms) -> Report:
 def _below(columns: Sequence[Column], rows: Sequence[Mapping[str, Value]]) -> Section:
     """How much the whole method is above each ablation."""
     whole = rows[0]
-    kept = [replace(c, better="neither") for c in columns if c not in SHARED]
+    judged = [c for c in columns if c not in SHARED and c.better != "neither"]
+    kept = [replace(c, better="neither") for c in judged]
     apart: list[dict[str, Value]] = []
     for row in rows[1:]:
         line: dict[str, Value] = {"name": row["name"]}
