@@ -102,14 +102,14 @@ def _most_pairs(splat, across, down):
     return max(0, right - left) * max(0, bottom - top)
 
 
-@kernel(parallel=True)
+@kernel()
 def _pack(means, conics, alphas, extents, splats):
     """Copies what binning reads of each splat side by side in memory.
 
     `splats` (N, 8) gets mean (2), conic (3), the exponent at which the splat ends (negative where
     it is not drawn), extents (2).
     """
-    for i in numba.prange(splats.shape[0]):
+    for i in range(splats.shape[0]):
         splat = splats[i]
         splat[0], splat[1] = means[i, 0], means[i, 1]
         splat[2], splat[3], splat[4] = conics[i, 0], conics[i, 1], conics[i, 2]
