@@ -47,7 +47,7 @@ class Tiles:
         order: (N,) uint32, the splats front to back.
         first_pair: (N,) int32, number of the first pair of each splat in `order`.
         end_pair: (N,) int32, number behind its last pair.
-        room: Number behind the last pair of all.
+        room: Number behind the last pair of all; some before it stand for no pair.
         first_entry: (tiles + 1,) int32, index into `entries` at which a tile's begin.
         entries: (P, 3) int32, the pairs tile by tile, front to back: splat, the rows of the tile
             that it touches (from `pack_rows`), number of the pair.
@@ -70,7 +70,7 @@ def tiles_across(width: int) -> int:
 
 @kernel()
 def pack_rows(first, end):
-    """First and end row of a tile in one number, which halves the memory that pairs take."""
+    """First and end row of a tile in one number, which saves memory."""
     return first * ROWS + end
 
 
