@@ -8,6 +8,7 @@ import torch
 
 from ico3d.errors import MissingExtraError
 from ico3d.splat import cuda
+from ico3d.splat.cpu.forward import power_of_two
 from ico3d.splat.cpu.rasterise import Project, bin_views, camera_numbers
 from ico3d.splat.cpu.tiles import TILE_HEIGHT, unpack_rows
 from ico3d.splat.gaussians import Gaussians
@@ -182,6 +183,12 @@ def test_broken_numbers_do_no_harm_to_memory(cameras, name, value):
         assert view.first_entry[-1] == len(pairs) <= view.room
         spans = [unpack_rows(packed) for packed in rows]
         assert all(0 <= first < end <= TILE_HEIGHT for first, end in spans)
+
+
+def test_powers_of_two_are_right_to_a_millionth():
+    exponents = np.linspace(-8, 0, 999, dtype=np.float32)
+    found = np.array([power_of_two(exponent) for exponent in exponents])
+    np.testing.assert_allclose(found, np.exp2(exponents.astype(np.float64)), rtol=1e-6)
 
 
 def broken_projection(gaussians, cameras):

@@ -47,7 +47,7 @@ class Tiles:
         order: (N,) uint32, the splats front to back.
         first_pair: (N,) int32, number of the first pair of each splat in `order`.
         end_pair: (N,) int32, number behind its last pair.
-        room: Number behind the last pair of all.
+        room: Number behind the last pair of all; some before it stand for no pair.
         first_entry: (tiles + 1,) int32, index into `entries` at which a tile's begin.
         entries: (P, 3) int32, the pairs tile by tile, front to back: splat, the rows of the tile
             that it touches (from `pack_rows`), number of the pair.
@@ -70,7 +70,7 @@ def tiles_across(width: int) -> int:
 
 @kernel()
 def pack_rows(first, end):
-    """First and end row of a tile in one number, which halves the memory that pairs take."""
+    """First and end row of a tile in one number, which saves memory."""
     return first * ROWS + end
 
 
@@ -102,14 +102,14 @@ def _most_pairs(splat, across, down):
     return max(0, right - left) * max(0, bottom - top)
 
 
-@kernel(parallel=True)
+@kernel()
 def _pack(means, conics, alphas, extents, splats):
     """Copies what binning reads of each splat side by side in memory.
 
     `splats` (N, 8) gets mean (2), conic (3), the exponent at which the splat ends (negative where
     it is not drawn), extents (2).
     """
-    for i in numba.prange(splats.shape[0]):
+    for i in range(splats.shape[0]):
         splat = splats[i]
         splat[0], splat[1] = means[i, 0], means[i, 1]
         splat[2], splat[3], splat[4] = conics[i, 0], conics[i, 1], conics[i, 2]
