@@ -75,7 +75,11 @@ HEADS: Mapping[str, HeadChange] = {
     "no weight decay": HeadChange(
         lambda s: replace(s, rates=replace(s.rates, basis_weight_decay=0.0))
     ),
-    "SGD": HeadChange(lambda s: replace(s, optimiser="sgd")),
+    "SGD, no squares": HeadChange(  # SGD's gains were measured without squared differences
+        lambda s: replace(s, optimiser="sgd", loss=replace(s.loss, squares=0.0))
+    ),
+    "no squares": HeadChange(lambda s: replace(s, loss=replace(s.loss, squares=0.0))),
+    "no turns": HeadChange(lambda s: replace(s, turns=False)),
 }
 BODIES: Mapping[str, BodyChange] = {
     WHOLE: BodyChange(),
