@@ -39,8 +39,8 @@ page: src/ico3d/chat/static/index.html
 	cd viewer && $(ASIDE) npm run --silent check && $(ASIDE) npm run --silent test
 
 unit: $(VENV)/.develop $(VENV)/.kernels src/ico3d/chat/static/index.html
-	# three files at a time on two cores: talking with an avatar is mostly waiting
-	$(PY) -m pytest -n 3 --dist loadfile --no-loadscope-reorder --durations 15
+	# four files at a time on two cores: talking with an avatar is mostly waiting
+	$(PY) -m pytest -n 4 --dist loadfile --no-loadscope-reorder --durations 15
 
 e2e: e2e-beside e2e-alone ## the page in a real browser
 
