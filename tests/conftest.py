@@ -5,6 +5,11 @@ import os
 from multiprocessing import forkserver
 
 import pytest
+from hypothesis import HealthCheck, settings
+
+# A busy machine makes examples slow, not wrong.
+settings.register_profile("tests", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("tests")
 
 # Threads of tiny kernels wait for one another far longer than they work. Whatever computes reads
 # this once, when it is imported; what tests start inherits it.

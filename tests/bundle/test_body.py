@@ -24,9 +24,7 @@ from support.bundles.random_body import (
 )
 from support.bundles.random_bundle import random_head, random_manifest
 
-RELAXED = settings(
-    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+RELAXED = settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 WINDOWS = random_windows()
 MANIFEST = body_manifest(WINDOWS)
 BODY = MANIFEST.body

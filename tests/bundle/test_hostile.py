@@ -19,9 +19,7 @@ from ico3d.errors import BundleError
 
 pytestmark = pytest.mark.slow
 
-RELAXED = settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+RELAXED = settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def refused(path: Path, message: str | None = None) -> None:

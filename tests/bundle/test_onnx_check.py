@@ -88,14 +88,14 @@ def test_other_inputs_and_outputs_are_refused(model, part):
     refused(model, "'mel' to 'expression'")
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.binary(max_size=60) | st.integers(0, len(GRAPH) - 1).map(lambda n: GRAPH[:n]))
 def test_garbage_is_refused(data):
     with pytest.raises(BundleError, match=r"speech\.onnx"):
         check(data)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.integers(0, 300), st.integers(1, 255))
 def test_damage_is_refused_or_harmless(place, change):
     data = bytearray(GRAPH)

@@ -96,7 +96,7 @@ def _near(animation, place):
     return np.abs(turning_places(animation) - place).min() <= CLOSE
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.data(), animations(), st.floats(0, 40), st.integers(0, 2**32), st.booleans())
 def test_a_plan_ends_at_rest_with_the_speech(data, animation, seconds, seed, gestures):
     start = data.draw(starts(animation))
@@ -115,7 +115,7 @@ def test_a_long_way_home_is_not_taken_too_slowly():
         assert points[-1] == (pytest.approx(4.7, abs=1 / 15), pytest.approx(3.0))
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.data(), animations(), st.integers(0, 2**32), st.sampled_from([0.0, 1.0]))
 def test_a_growing_plan_never_takes_back_a_point(data, animation, seed, overrun):
     start, at = data.draw(starts(animation)), data.draw(st.floats(0, 1))
@@ -211,7 +211,7 @@ def test_the_speed_for_a_time_takes_that_time(way, speed):
         assert (np.diff(times) > 0).all() and (np.diff(places) > -CLOSE).all()
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.data())
 def test_a_wanted_action_is_the_next_that_is_visited(data):
     animation = data.draw(animations().filter(lambda a: a.actions))

@@ -153,7 +153,7 @@ def test_a_background_that_is_too_large_is_refused(monkeypatch):
         check_background(ply(), "background.ply")
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.sampled_from([spz(), ply()]), st.data())
 def test_a_damaged_background_is_refused_or_as_good(good, data):
     at = data.draw(st.integers(0, len(good) - 1))
@@ -165,9 +165,7 @@ def test_a_damaged_background_is_refused_or_as_good(good, data):
             assert str(error).startswith(name)
 
 
-@settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_a_flipped_byte_never_passes_as_another_person(tmp_path, data):
     path = tmp_path / "a.ico3d"

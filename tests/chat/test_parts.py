@@ -44,7 +44,7 @@ def test_playback_stands_still_while_the_page_is_away():
     assert playback.position(60.5) == 1.5
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.lists(st.integers(1, 30_000), min_size=1, max_size=5), st.booleans())
 def test_pieces_are_gapless_and_hold_100_to_200_ms(bundle, sizes, moving):
     info = bundle.manifest.head

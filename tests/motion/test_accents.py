@@ -129,7 +129,7 @@ def test_a_listener_nods_in_pauses_only_and_not_too_often():
 
 
 @given(st.integers(0, 1000), st.sampled_from([16_000, 22_050, 24_000]))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_loudness_is_the_same_in_whatever_pieces_sound_comes(seed, rate):
     random = np.random.default_rng(seed)
     samples = random.normal(size=rate) * np.repeat(random.uniform(0, 0.3, 10), rate // 10)[:rate]

@@ -36,7 +36,7 @@ def clips() -> dict[str, Clip]:
     }
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 10_000), st.floats(0.05, 5.0))
 def test_few_keys_and_16_bits_keep_the_tolerance(seed, tolerance):
     motion = wavy(seed)

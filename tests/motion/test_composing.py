@@ -62,7 +62,7 @@ def sides(cue: Cue, clips) -> set[str]:
     return {other[limb] if cue.mirror else limb for limb in limbs(clips[cue.name])}
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(st.integers(0, 10_000), st.sampled_from([0.2, 0.5, 1.0]))
 def test_strokes_fall_on_accents_and_none_is_cut_off(clips, seed, step):
     words, _ = speech(seed)
@@ -171,7 +171,7 @@ def test_a_wave_goes_round_in_its_hold(clips):
     np.testing.assert_array_equal(weight(clip, cue, release, np.array([1.0, 2.0, 9.0])), [0, 1, 0])
 
 
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=3)
 @given(st.integers(0, 10_000))
 def test_bodies_move_smoothly_within_limits_over_feet_that_stay(clips, rest, seed):
     performer = Performer(rest, clips)

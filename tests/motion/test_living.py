@@ -59,7 +59,7 @@ def test_it_never_repeats(somebody):
         assert np.abs(root[shift : shift + 60] - first).max() > 5e-4
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.integers(0, 2**32 - 1), st.floats(0, 1e5))
 def test_any_seed_at_any_time_is_calm_and_the_same_again(seed, start):
     times = start + np.arange(0, 2, 0.02)

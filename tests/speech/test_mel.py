@@ -99,7 +99,7 @@ def test_a_short_sound_has_rows_too(count):
     assert np.isfinite(windows).all()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 20000), st.lists(st.integers(0, 4000), max_size=8))
 def test_pieces_give_the_windows_of_the_whole(count, pieces):
     samples = noise(count)

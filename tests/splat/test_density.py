@@ -74,7 +74,7 @@ def test_contributions_add_up_to_alpha_and_see_what_hides():
     assert given[0, 0] > 100 and given[0, 1] < 0.1 and given[0, 2] == 0
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 40), st.integers(1, 60), st.integers(0, 2**31))
 def test_the_cap_holds_and_nobody_is_lost(count, cap, seed):
     random = np.random.default_rng(seed)

@@ -53,7 +53,7 @@ def observe(strategy, gradients) -> None:
     strategy.observe(RenderInfo(radii, means2d, 2, 2), 0)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.floats(1e-4, 0.999), st.integers(1, MAX_COPIES))
 def test_copies_together_are_as_opaque_and_as_wide_as_their_source(opacity, count):
     """Against the definition, integrated numerically in float64."""
@@ -77,7 +77,7 @@ def test_relocation_at_the_ends():
     assert opacities[2] == pytest.approx(1 - 0.5 ** (1 / MAX_COPIES), rel=1e-5)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(1, 60), st.integers(1, 60), st.sampled_from(["default", "mcmc"]), st.integers())
 def test_the_budget_is_never_exceeded(count, cap, name, seed):
     random = np.random.default_rng(abs(seed))

@@ -151,7 +151,7 @@ def test_damaged_files_are_read_or_refused(tmp_path, whole):
         check(path)
 
     @given(damages())
-    @settings(max_examples=EXAMPLES, deadline=None, derandomize=True, database=None)
+    @settings(max_examples=EXAMPLES, derandomize=True, database=None)
     def run(damage):
         for kind, path in paths.items():
             path.write_bytes(damage(whole[kind]))
@@ -168,7 +168,7 @@ def _suffix(kind):
 @pytest.mark.parametrize("begin", [b"", b"ply\n", b"ply\nformat ascii 1.0\n", b"\x1f\x8b", b"NGSP"])
 def test_noise_is_refused(tmp_path, begin):
     @given(st.binary(max_size=3000))
-    @settings(max_examples=20, deadline=None, derandomize=True, database=None)
+    @settings(max_examples=20, derandomize=True, database=None)
     def run(noise):
         (tmp_path / "noise").write_bytes(begin + noise)
         check(tmp_path / "noise")

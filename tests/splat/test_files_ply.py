@@ -33,7 +33,7 @@ def files(draw):
 
 
 @given(files())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_what_is_read_and_written_again_is_the_same_to_the_last_bit(tmp_path_factory, file):
     degree, count, data = file
     folder = tmp_path_factory.mktemp("ply")

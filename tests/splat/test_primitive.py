@@ -14,7 +14,7 @@ from support.splats import reference
 from support.splats.reference import camera_at
 
 SEEDS = st.integers(0, 10_000)
-FEW = settings(max_examples=15, deadline=None)
+FEW = settings(max_examples=15)
 
 
 def random_scene(seed, count=40, coefficients=0):

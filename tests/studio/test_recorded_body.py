@@ -122,7 +122,7 @@ _number = st.floats(-1, 1, allow_nan=False)
 _vector = st.tuples(_number, _number, _number).map(np.array)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(start=_vector, way=_vector, pole=_vector)
 def test_two_bones_end_where_they_are_to_reach(start, way, pole):
     length, sideways = np.linalg.norm(way), np.linalg.norm(np.cross(way, pole))
@@ -141,7 +141,7 @@ def test_two_bones_end_where_they_are_to_reach(start, way, pole):
     assert np.cross(bend.upper[0], bend.lower[0]) @ bend.hinge[0] > 0
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(axis=_vector, angle=st.floats(-3, 3), bone=_vector)
 def test_swing_and_twist_make_the_rotation(axis, angle, bone):
     if min(np.linalg.norm(axis), np.linalg.norm(bone)) < 0.1:

@@ -86,7 +86,7 @@ def test_a_thread_comes_to_hang_straight_down():
     np.testing.assert_array_equal(still[0], points[0])
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 2**31))
 def test_springs_and_viscosity_keep_the_momentum(seed):
     random = np.random.default_rng(seed)
@@ -103,7 +103,7 @@ def test_springs_and_viscosity_keep_the_momentum(seed):
     np.testing.assert_allclose(masses @ points, middle, atol=1e-12)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 2**31))
 def test_a_limb_pushes_points_to_its_surface(seed):
     random = np.random.default_rng(seed)

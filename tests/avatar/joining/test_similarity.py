@@ -35,7 +35,6 @@ def sim3(rng):
     return matrix
 
 
-@settings(deadline=None)
 @given(seeds, st.integers(3, 20))
 def test_any_similarity_is_found(seed, count):
     """To 1e-9, from three points on, flat ones included."""
@@ -46,7 +45,6 @@ def test_any_similarity_is_found(seed, count):
     np.testing.assert_allclose(found, truth, atol=1e-9 * max(1, np.abs(truth).max()))
 
 
-@settings(deadline=None)
 @given(seeds)
 def test_it_never_mirrors(seed):
     """The best turn to a mirrored face is a turn, though nothing fits."""
@@ -68,7 +66,7 @@ def test_a_line_tells_no_turn():
         canonical_from_head(line, line)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seeds)
 def test_a_fifth_of_the_landmarks_may_be_wrong(seed):
     """By centimetres: the rest decides. What moves with the face does not count at all."""
@@ -84,7 +82,7 @@ def test_a_fifth_of_the_landmarks_may_be_wrong(seed):
     assert rest < 1e-9 * max(1, size)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(seeds)
 def test_the_composition_across_setups(seed):
     """W_{i,2}·G is C_2⁻¹·A_{i,2}·A_{0,1}⁻¹·C_1 with absolute poses A; checked to 1e-12."""
@@ -107,7 +105,7 @@ def test_one_setup_is_the_identity():
     found, _ = canonical_from_head(face(), face())
     np.testing.assert_allclose(found, np.eye(4), atol=1e-12)
 
-    @settings(max_examples=50, deadline=None)
+    @settings(max_examples=50)
     @given(seeds)
     def gives_the_frame_back(seed):
         rng = np.random.default_rng(seed)

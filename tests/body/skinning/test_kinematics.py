@@ -24,7 +24,7 @@ def in_torch(rig: Rig, rotations: np.ndarray, root: np.ndarray):
     return (rig.parents, *(torch.from_numpy(np.array(n, np.float64)) for n in numbers))
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.integers(0, 10_000), st.integers(1, 40))
 def test_it_agrees_with_the_rig(seed, joints):
     """Places, rotations and matrices are those of numpy, for any tree."""
@@ -41,7 +41,7 @@ def test_it_agrees_with_the_rig(seed, joints):
     np.testing.assert_allclose(table[:, 9:12], expected[:, :3, 3], atol=1e-9)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.integers(0, 10_000))
 def test_signs_agree_with_the_parents(seed):
     """No quaternion points away from its parent's, so that both can be blended."""

@@ -45,7 +45,7 @@ def test_the_edge_of_a_shadow_is_soft():
     assert half == pytest.approx(end, abs=TEXEL)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 1000))
 def test_the_kernels_do_what_torch_does(seed):
     """In any direction, on both sides of where the map repeats."""

@@ -152,7 +152,7 @@ def test_poses_do_not_follow_the_network():
     assert whole[1].abs().max() > 0 and not whole[[0, 2]].any()
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.integers(0, 10_000))
 def test_coefficients_of_any_pose_stay_in_the_trained_range(seed):
     """However far the pose is from all that was trained."""

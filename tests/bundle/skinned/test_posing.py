@@ -116,7 +116,7 @@ def test_motion_is_continuous(frame):
     assert np.abs(a.root - b.root).max() < 1e-3
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.integers(0, 10_000))
 def test_coefficients_of_any_pose_are_those_that_training_interpolates(seed):
     """The same as torch, also for a pose far from all known ones."""

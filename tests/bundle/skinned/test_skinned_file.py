@@ -29,9 +29,7 @@ from support.bundles.random_skinned import random_skinned, skinned_manifest, wri
 from support.recorded import body_of, made_still
 from support.rigs import rig_of
 
-RELAXED = settings(
-    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+RELAXED = settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 BAKED = random_skinned()
 DATA = BAKED.to_bytes()
 VALID = json.loads(skinned_manifest(BAKED).to_json())

@@ -201,7 +201,7 @@ def read_everything(path) -> None:
     capture.smplx(0), capture.keypoints_3d(0), capture.inspect()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(data=st.data(), which=st.sampled_from(("", "_annots")))
 def test_files_cut_anywhere_are_one_sentence(sound, tmp_path_factory, data, which):
     folder = tmp_path_factory.mktemp("cut")

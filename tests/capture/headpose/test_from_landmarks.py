@@ -36,7 +36,7 @@ def test_canonical_head_space():
     assert np.linalg.det(track.world_from_head[0, :3, :3]) == pytest.approx(1)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.integers(0, 10_000), st.floats(0, 2.5))
 def test_any_turn_is_exact_without_noise(seed, turn):
     poses = faces.motion(12, 15, turn=turn)

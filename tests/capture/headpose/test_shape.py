@@ -23,7 +23,7 @@ def _face(random, count=40):
     return random.normal(0, [0.05, 0.07, 0.03], (count, 3))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 999))
 def test_fits_are_exact(seed):
     random = np.random.default_rng(seed)

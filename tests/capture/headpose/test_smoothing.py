@@ -24,7 +24,7 @@ def test_windows_last_a_third_of_a_second_at_every_frame_rate():
     assert [window_of(30, count) for count in (4, 5, 8, 9)] == [1, 5, 5, 9]
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 999), st.sampled_from([5.0, 15.0, 30.0]))
 def test_parabolas_and_steady_turns_pass_unchanged(seed, fps):
     """No lag and no flattening: also at the first and the last frames."""

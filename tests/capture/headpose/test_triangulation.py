@@ -34,7 +34,7 @@ def _seen(cameras, points, noise=None):
     return sightings(cameras, pixels if noise is None else pixels + noise)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(2, 7), st.integers(0, 99))
 def test_points_are_exact_whatever_the_weights(count, seed):
     cameras, points = _ring(count), _face(seed)
@@ -66,7 +66,7 @@ def test_the_mean_of_noisy_cameras_is_weighted():
     assert misses(seen, found)[1:, 0] == pytest.approx([0.0005, 0.0015], rel=1e-3)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.sets(st.integers(0, 5), max_size=3), st.integers(0, 99))
 def test_cameras_that_show_another_face_do_not_agree(wrong, seed):
     random = np.random.default_rng(seed)

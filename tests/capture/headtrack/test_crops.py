@@ -19,7 +19,7 @@ def test_pixels_of_a_part_are_those_of_the_picture():
         np.testing.assert_allclose(part.whole(middle), [[216, 66]], atol=0.3)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(-90, 90), st.integers(-90, 90), st.integers(8, 120))
 def test_what_lies_outside_the_picture_is_black(left, top, side):
     shown = Part(left, top, side).cut(np.ones((50, 40, 3), np.float32))
@@ -36,7 +36,7 @@ def test_a_part_around_a_head_shows_so_many_metres():
     assert around(camera, np.array([2.0, 1.5, 0])) is None  # beside the picture
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.tuples(st.integers(0, 120), st.integers(0, 150), st.integers(20, 80)),
     st.tuples(st.floats(0, 1), st.floats(0, 1)),

@@ -278,7 +278,7 @@ def scene(tmp_path_factory):
     return root
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(data=st.data(), kind=st.sampled_from(("bin", "txt")))
 def test_models_cut_or_changed_anywhere_are_one_sentence(scene, tmp_path_factory, data, kind):
     root = tmp_path_factory.mktemp("cut") / kind
@@ -295,7 +295,7 @@ def test_models_cut_or_changed_anywhere_are_one_sentence(scene, tmp_path_factory
         assert "\n" not in str(error) and not (root.parent / "out").exists()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_transforms_cut_or_changed_anywhere_are_one_sentence(tmp_path_factory, data):
     root = tmp_path_factory.mktemp("cut")

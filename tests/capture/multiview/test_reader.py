@@ -203,7 +203,7 @@ def test_pickled_points_are_refused(folder):
     fails(lambda: open_capture(folder).world_points(), "000000.npy", "damaged")
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_descriptions_cut_or_changed_anywhere_are_one_sentence(tmp_path_factory, data):
     folder = multiview_folders.write_folder(tmp_path_factory.mktemp("cut"), 1, 1)

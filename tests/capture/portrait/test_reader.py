@@ -62,7 +62,7 @@ def _rigid(turn, move):
     return pose
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(pose=poses)
 def test_any_pose_survives_the_layout(pose, tmp_path_factory):
     np.testing.assert_allclose(camera_to_world(pose) @ pose, np.eye(4), atol=1e-12)

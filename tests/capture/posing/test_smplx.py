@@ -237,7 +237,7 @@ def content() -> tuple[bytes, list[int]]:
     return stream.getvalue(), heads
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 7), st.integers(0, 200), st.integers(1, 255), st.floats(0.2, 2))
 @example(1, 133, 1, 2.0)  # brackets of an array's header that do not match
 def test_damaged_files_are_one_sentence_or_a_model(tmp_path_factory, array, place, flip, part):

@@ -213,7 +213,7 @@ def read_everything(path) -> None:
     capture.flame(0), capture.landmarks_3d(0), capture.audio(), capture.inspect()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(data=st.data(), which=st.sampled_from(("_raw", "_anno")))
 def test_files_cut_anywhere_are_one_sentence(sound, tmp_path_factory, data, which):
     folder = tmp_path_factory.mktemp("cut")

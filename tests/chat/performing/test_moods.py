@@ -36,7 +36,7 @@ def test_it_ends_with_the_utterance_and_eases_to_another_before():
     assert not moods.values(rows(25, 2.0)).any()
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(st.sampled_from(list(BROWS)), st.integers(0, 20)), max_size=12))
 def test_moods_never_jump_however_they_are_cut(changes):
     moods, made, at = Moods(), [np.zeros((1, 7))], 0

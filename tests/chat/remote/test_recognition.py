@@ -85,7 +85,7 @@ async def test_an_upload_that_tells_no_length_is_not_kept():
     assert answer.status_code == 413 and "larger than 1 MB" in answer.json()["error"]["message"]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     rate=st.one_of(st.integers(0, 2**32 - 1), st.integers(4000, 48_000)),
     channels=st.one_of(st.integers(0, 65_535), st.integers(1, 4)),

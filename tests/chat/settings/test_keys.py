@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from fastapi import FastAPI, Request
 from fastapi.responses import RedirectResponse, Response
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from pipecat.frames.frames import LLMContextFrame
 from pipecat.processors.aggregators.llm_context import LLMContext
@@ -185,7 +185,6 @@ URLS = st.builds(
 )
 
 
-@settings(deadline=None)
 @given(url=URLS, named=st.booleans())
 @example("http://localhost#@evil.com/v1", True)
 @example("http://[::ffff:127.0.0.1]/v1", True)

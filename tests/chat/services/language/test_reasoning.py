@@ -6,7 +6,7 @@ import itertools
 
 import httpx
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pipecat.frames.frames import LLMContextFrame, LLMTextFrame
 from pipecat.processors.aggregators.llm_context import LLMContext
@@ -272,7 +272,6 @@ def streamed(text, cuts, opened):
     return "".join(thoughts.push(piece).said for piece in pieces) + thoughts.finish().said
 
 
-@settings(deadline=None)
 @given(
     mark=st.sampled_from(MARKS),
     thought=CLEAN,
@@ -295,7 +294,6 @@ def marks_of(mark):
     return mark[:middle], mark[middle + 1 :]
 
 
-@settings(deadline=None)
 @given(text=st.text(max_size=80), cuts=st.lists(st.integers(0, 100), max_size=20))
 def test_a_text_without_marks_is_said_as_it_is(text, cuts):
     assert streamed("A" + text, cuts, False) == "A" + text

@@ -1,7 +1,7 @@
 """How an answer is cut while it is being written."""
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from pipecat.frames.frames import (
     AggregatedTextFrame,
@@ -77,7 +77,6 @@ async def test_abbreviations_are_those_of_the_language():
 ODD = st.sampled_from(list(".,;:!?…—–-*_#`|()[]\"'«» \n\t123aBé你。，、สم،हि।😀❤\ufe0f\u200d"))
 
 
-@settings(deadline=None)
 @given(st.one_of(st.text(), st.lists(ODD).map("".join)), st.integers(1, 7))
 @example("a b,\u2003c", 1)
 async def test_nothing_is_lost_and_the_deltas_make_no_difference(text, size):
