@@ -31,7 +31,7 @@ def decoded(source: Path | bytes, what: str) -> np.ndarray:
         if picture.mode[0] in "IF":
             raise CaptureError(f"{what} has more than 8 bits per value: convert it to 8 bits.")
         wanted = "RGBA" if _is_clear(picture) else "RGB"
-        return np.array(picture if picture.mode == wanted else picture.convert(wanted))
+        return np.asarray(picture if picture.mode == wanted else picture.convert(wanted))
 
 
 def size_of(source: Path | bytes, what: str) -> tuple[int, int]:

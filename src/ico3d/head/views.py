@@ -2,7 +2,7 @@
 
 import hashlib
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from torch import Tensor
 from ico3d.capture.capture import Capture
 from ico3d.capture.decoding import to_bytes
 from ico3d.capture.pictures import View as View
-from ico3d.capture.reading.layer_cache import LayerCache
+from ico3d.capture.reading.layer_cache import LayerCache, ReadAhead
 from ico3d.capture.reading.memory import Gib
 from ico3d.capture.reading.spill import Layers
 from ico3d.common.spread import spread
@@ -103,14 +103,14 @@ def view_of(capture: Capture, camera: int, frame: int) -> View:
     return View(camera, frame, moved)
 
 
-class PictureCache:
+class PictureCache(ReadAhead):
     """Pictures of a capture, kept in memory as bytes up to a limit, otherwise read at each use."""
 
     def __init__(self, capture: Capture, cache: Gib, folder: str = ""):
         """Sets the limit of memory, GiB or `auto`, and where to keep what does not fit in it."""
         self._capture = capture
         self._backgrounds: dict[int, Tensor | None] = {}
-        self._cache = LayerCache(self._read, cache, folder)
+        super().__init__(LayerCache(self._read, cache, folder))
 
     def views(self, frames: Sequence[int], least: float = 0.0) -> list[View]:
         """All recorded views of some frames, frame by frame.
@@ -150,18 +150,6 @@ class PictureCache:
         if plate is not None and plate.device != device:  # every step wants it there
             plate = self._backgrounds[index] = plate.to(device)
         return plate
-
-    def expect(self, steps: range, view: Callable[[int], View]) -> None:
-        """Begins to read what coming steps need, as `LayerCache.expect`."""
-        self._cache.expect(steps, view)
-
-    def readable(self, views: Sequence[View], place: int) -> View:
-        """The view at a place, or the next that can be read, as `LayerCache.readable`."""
-        return self._cache.readable(views, place)
-
-    def needs(self, count: int) -> tuple[int, int]:
-        """Bytes of `count` views' pictures, and how many of them memory keeps."""
-        return self._cache.needs(count)
 
     def picture(self, view: View, device: torch.device) -> Picture:
         """The picture and masks of a recorded view, on `device`.
@@ -210,5 +198,4 @@ class PictureCache:
 
 
 def _as_floats(picture: np.ndarray, device: torch.device) -> Tensor:
-    owned = np.require(picture, requirements="W")  # torch warns of others
-    return torch.from_numpy(owned).to(device).float() / 255
+    return torch.from_numpy(picture).to(device).float() / 255

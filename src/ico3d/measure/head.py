@@ -177,7 +177,7 @@ def _faces(
         return dict.fromkeys(METRICS)
     camera = most_frontal_camera(capture, frames)
     found = FaceComparison(reader.rigidity)
-    for frame, rendered in _rendered(renderer, capture, camera, frames, "faces"):
+    for frame, rendered in rendered_frames(renderer, capture, camera, frames, "faces"):
         picture = capture.image(camera, frame)
         true = None if picture is None else reader.face(picture)
         found.add(reader.face(rendered), true, capture.landmarks(camera, frame))
@@ -195,7 +195,7 @@ def _sync(
     else:
         camera = most_frontal_camera(capture, frames)
         begin = round(frames[0] / capture.fps * sound.rate)
-        shown = _rendered(renderer, capture, camera, frames, "lips and sound")
+        shown = rendered_frames(renderer, capture, camera, frames, "lips and sound")
         scores = sync_or_none(
             (picture for _, picture in shown),
             capture.fps,
@@ -204,18 +204,24 @@ def _sync(
         )
     if scores is None:
         return dict.fromkeys(("sync_c", "sync_d", "sync_offset", "sync_faces_by"))
-    return {
-        "sync_c": scores.confidence,
-        "sync_d": scores.distance,
-        "sync_offset": scores.offset,
-        "sync_faces_by": scores.detector,
-    }
+    return dict(scores.figures())
 
 
-def _rendered(
+def rendered_frames(
     renderer: HeadRenderer, capture: Capture, camera: int, frames: Sequence[int], what: str
 ) -> Iterator[tuple[int, np.ndarray]]:
-    """Frames as a camera would see the head, before the clean plate or grey."""
+    """Frames as a camera would see the head, before what is behind it there, or grey.
+
+    Args:
+        renderer: Draws the head.
+        capture: The recording that drives it.
+        camera: Index of the camera.
+        frames: Frames to draw.
+        what: Label of the progress bar.
+
+    Yields:
+        Number and picture (H, W, 3) of each frame.
+    """
     for frame in track(frames, what, transient=True):
         plate = capture.behind(camera, frame)
         behind = torch.full((3,), GREY) if plate is None else torch.from_numpy(plate)

@@ -7,6 +7,7 @@ import numpy as np
 import torch
 from PIL import Image
 
+from ico3d.capture.decoding import to_bytes
 from ico3d.capture.pictures import View
 from ico3d.common.psnr import psnr
 from ico3d.measure.pictures.lpips import lpips
@@ -62,4 +63,4 @@ def write_pictures(
             continue
         path = folder / part / view.camera.name / f"{view.frame:06d}.png"
         path.parent.mkdir(parents=True, exist_ok=True)
-        Image.fromarray((picture * 255 + 0.5).astype(np.uint8)).save(path)
+        Image.fromarray(to_bytes(picture)).save(path)

@@ -5,12 +5,13 @@ from pathlib import Path
 from typing import get_args
 
 import numpy as np
+from rich.console import Console
 
 from ico3d.body.model_folder import TrainedBody
 from ico3d.body.settings import Method
 from ico3d.capture.capture import Capture
 from ico3d.measure.body import BodyRenderer, BodyTruth
-from ico3d.measure.methods.bench import OURS, Terms, Trial, open_clip, summary
+from ico3d.measure.methods.bench import OURS, Terms, Trial, open_clip, run_trials, summary
 from ico3d.protocols.charts import draw_lines, draw_quality, draw_strip
 from ico3d.protocols.facts import facts_of
 from ico3d.protocols.report import Column, Picture, Report, Section, Table, Value
@@ -35,6 +36,26 @@ PAPER = (
     ("HuGS", 18.954, 25.04, 0.9404, 0.1118),
 )
 """The paper's figures on six sequences of DNA-Rendering: PSNR-M, PSNR, SSIM, LPIPS."""
+
+
+def measure_body(
+    terms: Terms, methods: Sequence[Method], seeds: Sequence[int], jobs: int, out: Path
+) -> Report:
+    """Trains and measures what is missing, and writes the report.
+
+    Args:
+        terms: What all trainings have in common.
+        methods: Methods to train.
+        seeds: Seeds of the trainings of each method.
+        jobs: Number of trainings at a time.
+        out: Folder of the report.
+    """
+    trials = [Trial(method, seed, terms) for seed in seeds for method in methods]
+    console = Console()
+    results = run_trials(trials, jobs, lambda trial, found: console.print(trial.line(found)))
+    report = body_report(results, trials, out)
+    report.write(out)
+    return report
 
 
 def body_report(results: Mapping[Method, list[dict]], trials: Sequence[Trial], out: Path) -> Report:

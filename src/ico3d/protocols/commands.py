@@ -192,17 +192,15 @@ class MeasureBody(BodyPreset):
         Raises:
             SettingsError: If a number makes no sense.
         """
-        from rich.console import Console
-
         from ico3d.errors import SettingsError
-        from ico3d.measure.methods import bench
-        from ico3d.protocols.body import body_report
+        from ico3d.measure.methods.bench import terms_for
+        from ico3d.protocols.body import measure_body
         from ico3d.splat.device import decided
 
         if self.jobs < 1 or (self.frames or 2) < 2:
             raise SettingsError("--jobs must be at least 1, and --frames at least 2.")
         seeds = _seeds(self.seeds)
-        terms = bench.terms_for(
+        terms = terms_for(
             self.capture,
             self.frames,
             self.out,
@@ -212,13 +210,7 @@ class MeasureBody(BodyPreset):
             self.unseen,
             self.preset,
         )
-        trials = [bench.Trial(method, seed, terms) for seed in seeds for method in self.methods]
-        console = Console()
-        results = bench.run_trials(
-            trials, self.jobs, lambda trial, found: console.print(trial.line(found))
-        )
-        report = body_report(results, trials, self.out)
-        report.write(self.out)
+        report = measure_body(terms, self.methods, seeds, self.jobs, self.out)
         _say(report.sections[0].markdown(1), self.out)
 
 

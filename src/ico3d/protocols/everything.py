@@ -4,19 +4,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import rmtree
+from typing import TypeVar
 
 from rich.console import Console
 
 from ico3d.body.settings import BodySettings, Method
+from ico3d.capture.capture import Capture
 from ico3d.capture.formats import open_capture
 from ico3d.common.device import DeviceName
 from ico3d.common.presets import PresetName
 from ico3d.errors import Ico3dError
 from ico3d.head.settings import PRESETS, HeadSettings
-from ico3d.measure.methods import bench
+from ico3d.measure.methods.bench import terms_for
 from ico3d.measure.methods.settings import OURS, preset
 from ico3d.protocols.ablations import AblationTerms, Model, measure_ablations
-from ico3d.protocols.body import body_report
+from ico3d.protocols.body import measure_body
 from ico3d.protocols.facts import facts_of
 from ico3d.protocols.portrait import PortraitTerms, measure_portrait
 from ico3d.protocols.report import MARKDOWN, Report, Section
@@ -25,6 +27,8 @@ from ico3d.splat.device import computing_device, decided
 from ico3d.studio.layouts.portrait import write_portrait
 from ico3d.studio.layouts.smc import write_dna
 from ico3d.studio.recording import Recording, record
+
+Settings = TypeVar("Settings", HeadSettings, BodySettings)
 
 
 @dataclass(frozen=True)
@@ -96,13 +100,7 @@ class AllTerms:
             until = min(settings.density.until, 2 * size.head_steps // 3)
             density = replace(settings.density, begin=until // 4, until=until)
             settings = replace(settings, steps=size.head_steps, density=density)
-        if size.gaussians is None:
-            return settings
-        return replace(
-            settings,
-            initial=replace(settings.initial, gaussians=2 * size.gaussians // 3),
-            density=replace(settings.density, max_gaussians=size.gaussians),
-        )
+        return self._limited(settings)
 
     def body(self) -> BodySettings:
         """Settings of SWinGS++."""
@@ -116,12 +114,17 @@ class AllTerms:
                 warmup_steps=warm,
                 density=replace(settings.density, begin=warm),
             )
-        if size.gaussians is None:
+        return self._limited(settings)
+
+    def _limited(self, settings: Settings) -> Settings:
+        """Settings with as many Gaussians as the size allows."""
+        most = self.size.gaussians
+        if most is None:
             return settings
         return replace(
             settings,
-            initial=replace(settings.initial, gaussians=2 * size.gaussians // 3),
-            density=replace(settings.density, max_gaussians=size.gaussians),
+            initial=replace(settings.initial, gaussians=2 * most // 3),
+            density=replace(settings.density, max_gaussians=most),
         )
 
 
@@ -200,13 +203,8 @@ def _portrait(terms: AllTerms, path: Path, out: Path) -> Report:
 
 def _body(terms: AllTerms, path: Path, out: Path) -> Report:
     device = decided(terms.device)
-    of_all = bench.terms_for(path, None, out, terms.body(), False, device, preset=terms.preset)
-    trials = [bench.Trial(method, seed, of_all) for seed in terms.seeds for method in METHODS]
-    console = Console()
-    results = bench.run_trials(trials, 1, lambda trial, found: console.print(trial.line(found)))
-    report = body_report(results, trials, out)
-    report.write(out)
-    return report
+    of_all = terms_for(path, None, out, terms.body(), False, device, preset=terms.preset)
+    return measure_body(of_all, METHODS, terms.seeds, 1, out)
 
 
 def _ablations(terms: AllTerms, model: Model, path: Path, out: Path) -> Report:
@@ -236,61 +234,56 @@ def other_words(terms: AllTerms) -> Path:
 
 def synthetic_body(terms: AllTerms) -> Path:
     """A whole person who does not exist, in the layout of DNA-Rendering."""
-    size, written = terms.size, terms.out / "recordings" / "body"
-    if not written.is_dir():
-        studio = _recorded(
-            terms,
-            Recording(
-                subject=terms.subject,
-                rig="body",
-                cameras=size.body_cameras,
-                frames=size.body_frames,
-                fps=15.0,
-                views_per_frame=size.body_cameras,
-                size=size.body_pixels,
-                text="",
-                seed=0,
-                lively=True,
-                light="studio",
-                motion="showcase",
-            ),
-            "studio-body",
-        )
-        _whole(written, lambda to: write_dna(open_capture(studio), to, "0000_00"))
-    return written
+    size = terms.size
+    recording = Recording(
+        subject=terms.subject,
+        rig="body",
+        cameras=size.body_cameras,
+        frames=size.body_frames,
+        fps=15.0,
+        views_per_frame=size.body_cameras,
+        size=size.body_pixels,
+        text="",
+        seed=0,
+        lively=True,
+        light="studio",
+        motion="showcase",
+    )
+    return _synthetic(
+        terms, "body", recording, lambda capture, to: write_dna(capture, to, "0000_00")
+    )
 
 
 def _portrait_of(terms: AllTerms, name: str, text: str, seed: int, frames: int) -> Path:
-    size, written = terms.size, terms.out / "recordings" / name
-    if not written.is_dir():
-        studio = _recorded(
-            terms,
-            Recording(
-                subject=terms.subject,
-                rig="head",
-                cameras=1,
-                frames=frames,
-                fps=25.0,
-                views_per_frame=1,
-                size=size.head_pixels,
-                text=text,
-                seed=seed,
-                lively=True,
-                light="studio",
-                motion="talk",
-            ),
-            f"studio-{name}",
-        )
-        _whole(written, lambda to: write_portrait(open_capture(studio), to))
+    recording = Recording(
+        subject=terms.subject,
+        rig="head",
+        cameras=1,
+        frames=frames,
+        fps=25.0,
+        views_per_frame=1,
+        size=terms.size.head_pixels,
+        text=text,
+        seed=seed,
+        lively=True,
+        light="studio",
+        motion="talk",
+    )
+    return _synthetic(terms, name, recording, write_portrait)
+
+
+def _synthetic(
+    terms: AllTerms, name: str, recording: Recording, write: Callable[[Capture, Path], Path]
+) -> Path:
+    """A recording in a data set's layout, made now unless it is there."""
+    folder = terms.out / "recordings"
+    studio, written = folder / f"studio-{name}", folder / name
+    if written.is_dir():
+        return written
+    if not (studio / "capture.json").is_file():
+        record(recording, studio, 2)
+    _whole(written, lambda to: write(open_capture(studio), to))
     return written
-
-
-def _recorded(terms: AllTerms, recording: Recording, name: str) -> Path:
-    """The studio's recording, made now unless it is there."""
-    folder = terms.out / "recordings" / name
-    if not (folder / "capture.json").is_file():
-        record(recording, folder, 2)
-    return folder
 
 
 def _whole(folder: Path, write: Callable[[Path], Path]) -> None:

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import torch
 from PIL import Image
 
 from ico3d.capture.capture import Capture, Sound
@@ -18,8 +17,12 @@ from ico3d.errors import CaptureError
 from ico3d.head.model_folder import TrainedHead
 from ico3d.head.settings import HeadSettings
 from ico3d.head.train_head import HeadJob, train_head
-from ico3d.head.views import GREY, view_of
-from ico3d.measure.head import HeadRenderer, evaluate_head, most_frontal_camera
+from ico3d.measure.head import (
+    HeadRenderer,
+    evaluate_head,
+    most_frontal_camera,
+    rendered_frames,
+)
 from ico3d.protocols.charts import draw_training
 from ico3d.protocols.cross_driven import CrossDriven
 from ico3d.protocols.facts import facts_of
@@ -183,7 +186,6 @@ def _cross(
     return [Section("Cross-driven", text, Table(columns, rows, "driven by"))]
 
 
-@torch.no_grad()
 def _driven(
     terms: PortraitTerms, head: TrainedHead, seed: int, capture: Capture, path: Path
 ) -> dict[str, Value]:
@@ -196,10 +198,8 @@ def _driven(
     renderer, folder = HeadRenderer(head, driven), terms.out / f"seed{seed}" / f"to-{path.stem}"
     folder.mkdir(parents=True, exist_ok=True)
     camera = most_frontal_camera(capture, capture.split.test)
-    for frame in range(driven.num_frames):
-        plate = driven.behind(camera, frame)
-        behind = torch.full((3,), GREY) if plate is None else torch.from_numpy(plate)
-        picture = renderer.picture(view_of(driven, camera, frame), behind)
+    frames = range(driven.num_frames)
+    for frame, picture in rendered_frames(renderer, driven, camera, frames, path.stem):
         Image.fromarray(to_bytes(picture)).save(folder / f"{frame:06d}.png")
     recorded = Recorded(folder, capture.fps, None, sound, None)
     return sync_row(folder, recorded, computing_device(terms.device))

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -149,13 +150,7 @@ def sync_row(pictures: Path, recorded: Recorded, device: torch.device) -> dict[s
         return {}
     shown = pictures_of(pictures, recorded.fps)
     scores = sync_or_none(shown, recorded.fps, recorded.sound, device)
-    if scores is None:
-        return {}
-    return {
-        "sync_c": scores.confidence,
-        "sync_d": scores.distance,
-        "sync_offset": scores.offset,
-    }
+    return {} if scores is None else dict(scores.figures())
 
 
 def lip_gaps(pictures: Path, fps: float, reader: LandmarkReader) -> Iterator[float | None]:
@@ -167,13 +162,12 @@ def lip_gaps(pictures: Path, fps: float, reader: LandmarkReader) -> Iterator[flo
 
 def render_pictures(out: Path, recorded: Recorded, rendered: dict[str, Path]) -> list[Picture]:
     """Draws a strip of one picture, and the lips over time where faces can be read."""
-    truths = list(pictures_of(recorded.pictures, recorded.fps))
-    middle = len(truths) // 2
-    drawn = {
-        name: next(p for k, p in enumerate(pictures_of(path, recorded.fps)) if k == middle)
-        for name, path in rendered.items()
-    }
-    draw_strip(out / "strip.png", truths[middle], drawn)
+    middle = sum(1 for _ in pictures_of(recorded.pictures, recorded.fps)) // 2
+    truth, *shots = (
+        next(islice(pictures_of(path, recorded.fps), middle, None))
+        for path in (recorded.pictures, *rendered.values())
+    )
+    draw_strip(out / "strip.png", truth, dict(zip(rendered, shots, strict=True)))
     shown = [Picture("strip.png", f"Picture {middle}, and its errors")]
     reader = landmark_reader()
     if reader is None:

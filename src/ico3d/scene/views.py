@@ -1,6 +1,6 @@
 """The pictures on which a static scene is trained and measured."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,7 +11,7 @@ from torch import Tensor
 from ico3d.capture.capture import Capture
 from ico3d.capture.decoding import to_bytes
 from ico3d.capture.pictures import View
-from ico3d.capture.reading.layer_cache import LayerCache
+from ico3d.capture.reading.layer_cache import LayerCache, ReadAhead
 from ico3d.capture.reading.memory import Gib
 from ico3d.capture.reading.spill import Layers
 from ico3d.common.camera import Camera
@@ -48,7 +48,7 @@ class Example:
         return Example(*(None if part is None else part.to(device) for part in parts))  # type: ignore[arg-type]
 
 
-class SceneViews:
+class SceneViews(ReadAhead):
     """The pictures of a capture for a static scene.
 
     The scene of a person with known head poses lies in canonical head space, so that movements of
@@ -84,7 +84,7 @@ class SceneViews:
         self._plates = only == "background" and capture.background(0) is not None
         follows = only == "person" and capture.world_from_head(0) is not None
         self.space: Space = "head" if follows else "world"
-        self._cache = LayerCache(self._read, cache, folder)
+        super().__init__(LayerCache(self._read, cache, folder))
         self._known_plates: dict[int, Tensor | None] = {}
         if frames == "all" and capture.split.train and capture.split.test and not self._plates:
             self.train = self._views(capture.split.train)
@@ -93,18 +93,6 @@ class SceneViews:
             self.train, self.test = _every_eighth(self._views(self._moment(frames)))
         if not self.train:
             raise CaptureError(f"{capture.path} has no picture among its training frames.")
-
-    def expect(self, steps: range, view: Callable[[int], View]) -> None:
-        """Begins to read what coming steps need, as `LayerCache.expect`."""
-        self._cache.expect(steps, view)
-
-    def readable(self, views: Sequence[View], place: int) -> View:
-        """The view at a place, or the next that can be read, as `LayerCache.readable`."""
-        return self._cache.readable(views, place)
-
-    def needs(self, count: int) -> tuple[int, int]:
-        """Bytes of `count` views' pictures, and how many of them memory keeps."""
-        return self._cache.needs(count)
 
     def layers(self, view: View) -> tuple[Tensor, Tensor | None]:
         """Picture (H, W, 3) and mask (H, W) of a view, on the CPU.
@@ -115,7 +103,7 @@ class SceneViews:
         found = self._cache.layers(view.camera_index, view.frame)
         if found is None:
             raise CaptureError(f"{self._where(view)} has vanished.")
-        image, mask = (None if layer is None else _as_floats(layer) for layer in found)
+        image, mask = (None if layer is None else torch.from_numpy(layer) / 255 for layer in found)
         assert image is not None
         return image, mask
 
@@ -205,7 +193,3 @@ def _every_eighth(views: tuple[View, ...]) -> tuple[tuple[View, ...], tuple[View
         return views, ()
     kept = tuple(view for place, view in enumerate(views) if place % TEST_EVERY)
     return kept, views[::TEST_EVERY]
-
-
-def _as_floats(picture: np.ndarray) -> Tensor:
-    return torch.from_numpy(np.require(picture, requirements="W")) / 255  # torch warns of others

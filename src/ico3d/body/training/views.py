@@ -1,7 +1,7 @@
 """The pictures that a body is trained on: the person cut out, with a small margin."""
 
 import logging
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from ico3d.capture.box import Box
 from ico3d.capture.capture import Capture
 from ico3d.capture.decoding import to_bytes
 from ico3d.capture.pictures import View, train_cameras
-from ico3d.capture.reading.layer_cache import LayerCache, go_on_without, read_in_turn
+from ico3d.capture.reading.layer_cache import LayerCache, ReadAhead, go_on_without, read_in_turn
 from ico3d.capture.reading.memory import Gib
 from ico3d.capture.reading.spill import Layers
 from ico3d.errors import CaptureError
@@ -45,7 +45,7 @@ class Example:
     color: Tensor
 
 
-class BodyViews:
+class BodyViews(ReadAhead):
     """Pictures of some frames by a capture's training cameras, cropped to the person.
 
     All pictures of a camera have the same crop, which holds the person in every frame, so that a
@@ -70,7 +70,7 @@ class BodyViews:
         """
         self._capture = capture
         self._plates: dict[int, np.ndarray | None] = {}
-        self._cache = LayerCache(self._read, cache, folder)
+        super().__init__(LayerCache(self._read, cache, folder))
         self._masks: dict[tuple[int, int], np.ndarray] = {}
         frames = list(frames)
         tight = self._find_person([(c, f) for c in train_cameras(capture) for f in frames])
@@ -96,18 +96,6 @@ class BodyViews:
         person, mask = (torch.from_numpy(part).to(device).float() / 255 for part in layers)  # type: ignore[arg-type]
         behind = torch.from_numpy(color).to(device).float()
         return Example(person + (1 - mask[..., None]) * behind, mask, behind)
-
-    def expect(self, steps: range, view: Callable[[int], View]) -> None:
-        """Begins to read what coming steps need, as `LayerCache.expect`."""
-        self._cache.expect(steps, view)
-
-    def readable(self, views: Sequence[View], place: int) -> View:
-        """The view at a place, or the next that can be read, as `LayerCache.readable`."""
-        return self._cache.readable(views, place)
-
-    def needs(self, count: int) -> tuple[int, int]:
-        """Bytes of `count` views' pictures, and how many of them memory keeps."""
-        return self._cache.needs(count)
 
     def _find_person(self, keys: Sequence[tuple[int, int]]) -> dict[tuple[int, int], Box]:
         """The boxes around the person, by camera and frame, where the person is seen.

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ico3d.capture.decoding import to_bytes
 from ico3d.capture.formats import open_capture
 from ico3d.capture.headpose.track_file import NAME as TRACK
 from ico3d.capture.headpose.track_file import track_file
@@ -71,10 +72,10 @@ def _write_view(capture: ResizedCapture, work: Path, camera: int, frame: int) ->
     if image is None:
         return 0
     name = capture.cameras[camera].name
-    save_picture(work / "images" / name / f"{frame:06d}.jpg", _bytes(image))
+    save_picture(work / "images" / name / f"{frame:06d}.jpg", to_bytes(image))
     mask = capture.mask(camera, frame)
     if mask is not None:
-        save_picture(work / "masks" / name / f"{frame:06d}.png", _bytes(mask))
+        save_picture(work / "masks" / name / f"{frame:06d}.png", to_bytes(mask))
     return 1
 
 
@@ -86,7 +87,7 @@ def _write_rest(capture: ResizedCapture, work: Path) -> None:
         (work / "images" / camera.name).mkdir(parents=True, exist_ok=True)
         plate = capture.background(index)
         if plate is not None:
-            save_picture(work / "backgrounds" / f"{camera.name}.png", _bytes(plate))
+            save_picture(work / "backgrounds" / f"{camera.name}.png", to_bytes(plate))
     sound = capture.audio()
     if sound is not None:
         soundfile.write(work / "audio.wav", sound.samples, sound.rate)
@@ -101,7 +102,3 @@ def _write_rest(capture: ResizedCapture, work: Path) -> None:
         if points is not None:
             (work / "points").mkdir(exist_ok=True)
             np.save(work / "points" / f"{frame:06d}.npy", points.astype(np.float32))
-
-
-def _bytes(picture: np.ndarray) -> np.ndarray:
-    return (picture * 255 + 0.5).astype(np.uint8)

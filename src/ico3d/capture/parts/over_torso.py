@@ -24,13 +24,14 @@ class HeadOverTorso(WrappedCapture):
             CaptureError: If the capture has no clean plate, or no pictures of a torso.
         """
         super().__init__(capture)
-        seen = [frame for frame in range(capture.num_frames) if capture.has_image(0, frame)]
-        if capture.background(0) is None or not seen or capture.torso(0, seen[0]) is None:
+        frames = range(capture.num_frames)
+        first = next((frame for frame in frames if capture.has_image(0, frame)), None)
+        self._plate = capture.background(0)
+        if self._plate is None or first is None or capture.torso(0, first) is None:
             raise CaptureError(
                 f"{capture.path} is no portrait with a clean plate (bc.jpg) and pictures of the "
                 "torso (torso_imgs): train the whole person."
             )
-        self._plate = capture.background(0)
 
     def mask(self, camera: int, frame: int) -> np.ndarray | None:
         """The mask of the head."""

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from ico3d.capture.capture import Capture
+from ico3d.capture.decoding import to_bytes
 from ico3d.errors import CaptureError
 
 
@@ -37,7 +38,7 @@ def fingerprint(capture: Capture) -> str:
         digest.update(np.round(camera.world_to_camera, 4).astype("<f4").tobytes())
     first = _first_picture(capture)
     if first is not None:
-        digest.update((first * 255 + 0.5).astype(np.uint8).tobytes())
+        digest.update(to_bytes(first).tobytes())
     return digest.hexdigest()
 
 

@@ -8,6 +8,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
+
 from ico3d.capture.pictures import View
 from ico3d.capture.reading.memory import Budget, Gib
 from ico3d.capture.reading.spill import Layers, Spill, Stored, size_of
@@ -152,16 +154,25 @@ class LayerCache:
     def _load(self, camera: int, frame: int) -> Layers | None:
         """The layers from the disk, or read now and written there if memory does not keep them."""
         if self._spill is None:
-            return self._read(camera, frame)
+            return self._read_now(camera, frame)
         stored = self._stored.get((camera, frame))
         if stored is not None:
             return self._spill.read(stored)
-        layers = self._read(camera, frame)
+        layers = self._read_now(camera, frame)
         if layers is not None and size_of(layers) * (1 + len(self._coming)) > self.budget.left():
             stored = self._spill.write(layers)
             if stored is not None:
                 self._stored[camera, frame] = stored
         return layers
+
+    def _read_now(self, camera: int, frame: int) -> Layers | None:
+        """The layers, decoded now; torch warns of arrays that cannot be written to."""
+        layers = self._read(camera, frame)
+        if layers is None:
+            return None
+        return tuple(
+            None if layer is None else np.require(layer, requirements="W") for layer in layers
+        )
 
     def _lose(self, key: Key, error: CaptureError, total: int) -> None:
         """Goes on without a picture.
@@ -171,6 +182,26 @@ class LayerCache:
         """
         self._lost.add(key)
         go_on_without(error, len(self._lost), total)
+
+
+class ReadAhead:
+    """Pictures of views that a `LayerCache` reads ahead of the steps of a training."""
+
+    def __init__(self, cache: LayerCache):
+        """Takes the cache, which knows how pictures are read."""
+        self._cache = cache
+
+    def expect(self, steps: range, view: Callable[[int], View]) -> None:
+        """Begins to read what coming steps need, as `LayerCache.expect`."""
+        self._cache.expect(steps, view)
+
+    def readable(self, views: Sequence[View], place: int) -> View:
+        """The view at a place, or the next that can be read, as `LayerCache.readable`."""
+        return self._cache.readable(views, place)
+
+    def needs(self, count: int) -> tuple[int, int]:
+        """Bytes of `count` views' pictures, and how many of them memory keeps."""
+        return self._cache.needs(count)
 
 
 def go_on_without(error: CaptureError, lost: int, total: int) -> None:

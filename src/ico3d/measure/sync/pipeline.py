@@ -11,6 +11,7 @@ from PIL import Image
 from torch import Tensor
 
 from ico3d.capture.capture import Sound
+from ico3d.capture.decoding import to_bytes
 from ico3d.capture.sound import mono
 from ico3d.capture.video import open_video, read_sound
 from ico3d.errors import CaptureError, MissingModelError
@@ -116,7 +117,7 @@ def _looked_at(
     pictures, faces = [], []
     for frame in frames:
         if frame.dtype != np.uint8:
-            frame = (np.clip(frame, 0, 1) * 255 + 0.5).astype(np.uint8)
+            frame = to_bytes(np.clip(frame, 0, 1))
         target = io.BytesIO()
         Image.fromarray(frame).save(target, "JPEG", quality=QUALITY, subsampling=0)
         pictures.append(target.getvalue())

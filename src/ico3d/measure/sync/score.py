@@ -30,6 +30,15 @@ class SyncScores:
     frames: int
     detector: str
 
+    def figures(self) -> dict[str, float | int | str]:
+        """The scores by the names of metrics (docs/architecture.md, "Metrics")."""
+        return {
+            "sync_c": self.confidence,
+            "sync_d": self.distance,
+            "sync_offset": self.offset,
+            "sync_faces_by": self.detector,
+        }
+
 
 def mean_distances(lips: Tensor, sound: Tensor) -> Tensor:
     """Mean distance of lips and sound at each shift of the sound.

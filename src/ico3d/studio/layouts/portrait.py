@@ -13,6 +13,7 @@ import soundfile
 from rich.progress import track
 
 from ico3d.capture.capture import EYE_NAMES, Capture
+from ico3d.capture.decoding import to_bytes
 from ico3d.capture.face.expressions import BLENDSHAPES
 from ico3d.capture.portrait import parsing
 from ico3d.capture.portrait.files import (
@@ -52,7 +53,7 @@ def write_portrait(capture: Capture, folder: Path, camera: int = 0) -> Path:
     """
     frames = list(range(capture.num_frames))
     plate = _needed(capture.background(camera), capture, "clean plate", camera, 0)
-    save_picture(folder / "bc.jpg", _bytes(plate))
+    save_picture(folder / "bc.jpg", to_bytes(np.clip(plate, 0, 1)))
     poses = np.stack([_pose(capture, camera, frame) for frame in frames])  # (F, 4, 4)
     for frame in track(frames, "writing", transient=True):
         _write_frame(capture, folder, camera, frame)
@@ -72,7 +73,7 @@ def _write_frame(capture: Capture, folder: Path, camera: int, frame: int) -> Non
     recorded = _needed(capture.image(camera, frame), capture, "picture", camera, frame)
     mask = _needed(capture.mask(camera, frame), capture, "mask", camera, frame)
     landmarks = _needed(capture.landmarks(camera, frame), capture, "landmarks", camera, frame)
-    image, parts = _bytes(recorded), parted(mask, landmarks)
+    image, parts = to_bytes(np.clip(recorded, 0, 1)), parted(mask, landmarks)
     torso = mask * parsing.is_class(parts, parsing.NECK, parsing.CLOTH)
     for name in ("ori_imgs", "gt_imgs"):
         save_picture(folder / name / f"{frame}.jpg", image)
@@ -139,7 +140,3 @@ def _needed(
             "it in every frame."
         )
     return found
-
-
-def _bytes(picture: np.ndarray) -> np.ndarray:
-    return (np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8)

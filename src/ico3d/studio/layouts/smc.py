@@ -15,6 +15,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from ico3d.capture.capture import Capture
+from ico3d.capture.decoding import to_bytes
 from ico3d.capture.renderme.flame import VERTICES
 from ico3d.capture.renderme.landmarks import MULTI_PIE, POINTS
 from ico3d.common.camera import Camera
@@ -122,9 +123,9 @@ def _write_view(
     """A picture and its mask, where the camera took one."""
     image, person = capture.image(camera, frame), capture.mask(camera, frame)
     if image is not None:
-        main[to] = _encoded(_bytes(image), "JPEG")
+        main[to] = _encoded(to_bytes(np.clip(image, 0, 1)), "JPEG")
     if image is not None and person is not None:
-        notes[mask] = _encoded(np.repeat(_bytes(person)[..., None], 3, -1), "PNG")
+        notes[mask] = _encoded(np.repeat(to_bytes(np.clip(person, 0, 1))[..., None], 3, -1), "PNG")
 
 
 def _write_calibration(file: h5py.File, inside: str, camera: Camera) -> None:
@@ -138,10 +139,6 @@ def _face(capture: Capture, frame: int) -> np.ndarray:
     pose, marks = capture.world_from_head(frame), capture.landmarks_3d(frame)
     assert pose is not None and marks is not None, "a synthetic capture knows its head"
     return marks @ pose[:3, :3].T + pose[:3, 3]
-
-
-def _bytes(picture: np.ndarray) -> np.ndarray:
-    return (np.clip(picture, 0, 1) * 255 + 0.5).astype(np.uint8)
 
 
 def _encoded(picture: np.ndarray, kind: str) -> np.ndarray:
