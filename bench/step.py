@@ -30,7 +30,7 @@ PARTS = {
     "drawing": ("Draw",),
     "projection backward": ("ProjectBackward",),
     "drawing backward": ("DrawBackward",),
-    "SSIM": ("_CpuSsim",),
+    "loss": ("_CpuPhotometric",),
     "blending": ("_Blend",),
     "MLP": ("aten::mm", "aten::addmm"),
 }

@@ -58,9 +58,23 @@ def test_equal_images_cost_nothing():
 def test_photometric_weighs_its_parts():
     x, y = (image.float() for image in images(16, 20, 3))
     expected = 0.7 * (x - y).abs().mean() + 0.3 * (1 - losses.ssim(x, y))
-    assert losses.photometric(x, y, 0.3).item() == pytest.approx(expected.item(), rel=1e-5)
+    assert losses.photometric(x, y, l1_weight=0.7, ssim_weight=0.3).item() == pytest.approx(
+        expected.item(), rel=1e-5
+    )
+
+
+def test_the_fused_loss_is_that_of_torch_with_its_gradient():
+    x, y = images(2, 21, 30, 3)
+    y[0, 3:9] = x[0, 3:9]  # where pictures agree L1 has no slope
+    exact, fused = x.clone().requires_grad_(), x.float().requires_grad_()
+    expected = losses._photometric_by_torch(exact, y, 0.3, 0.9, 8.0)
+    value = losses.photometric(fused, y.float(), l1_weight=0.9, ssim_weight=0.3, squares_weight=8.0)
+    assert value.item() == pytest.approx(expected.item(), rel=1e-5)
+    expected.backward()
+    value.backward()
+    assert (fused.grad - exact.grad).abs().max() < 1e-4 * exact.grad.abs().max()
 
 
 def test_differing_shapes_are_refused():
-    with pytest.raises(ValueError, match="SSIM of"):
+    with pytest.raises(ValueError, match="comparing pictures of"):
         losses.ssim(torch.zeros(4, 5, 3), torch.zeros(5, 4, 3))

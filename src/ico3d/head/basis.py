@@ -136,7 +136,7 @@ def _rmsprop(
     second, counts = moments["basis.second"], moments["basis.steps"]
     rows = torch.nonzero(weights)[:, 0]  # (active,)
     counts[rows.cpu()] += 1
-    roots = np.array([bias_corrections(max(int(n), 1))[1] for n in counts])  # (R,)
+    roots = np.array([bias_corrections(max(int(n), 1))[1] for n in counts], np.float32)  # (R,)
     if _has_kernel(basis):
         rmsprop_rank_one(
             _rows(basis),

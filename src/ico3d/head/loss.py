@@ -10,7 +10,7 @@ from torch import Tensor
 from ico3d.errors import MissingModelError, ModelError
 from ico3d.head.settings import HeadSettings
 from ico3d.head.views import Picture
-from ico3d.splat.losses import l1, ssim
+from ico3d.splat.losses import photometric
 from ico3d.splat.rendering import Rendering
 
 log = logging.getLogger(__name__)
@@ -70,10 +70,13 @@ class HeadLoss:
         if weights.torso != 1 and picture.torso is not None:
             ignored = ((1 - weights.torso) * picture.torso)[..., None]  # (H, W, 1)
             image = image + ignored * (target - image)
-        loss = weights.l1 * l1(image, target[None])
-        loss = loss + weights.ssim * (1 - ssim(image, target[None]))
-        if weights.squares:
-            loss = loss + weights.squares * (image - target).square().mean()
+        loss = photometric(
+            image,
+            target[None],
+            l1_weight=weights.l1,
+            ssim_weight=weights.ssim,
+            squares_weight=weights.squares,
+        )
         if weights.alpha and picture.mask is not None:
             away = rendering.alpha[0] - picture.mask  # (H, W)
             if weights.torso == 0 and picture.torso is not None:

@@ -4,7 +4,7 @@ import json
 import math
 from dataclasses import KW_ONLY, asdict, dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import torch
 from torch import Tensor, nn
@@ -182,25 +182,29 @@ class HeadModel(nn.Module):
 
     def branches(self, hidden: Tensor) -> Tensor:
         """The last layer of φ: activations (N, hidden) to values (N, V)."""
-        parts = [self.color_branch(hidden), self.opacity_branch(hidden)]
+        layers = [self.color_branch, self.opacity_branch]
         if self.shape.sh_degree:
-            parts.append(self.harmonics_branch(hidden))
-        return torch.cat(parts, 1)  # (N, V)
+            layers.append(self.harmonics_branch)
+        weight = torch.cat([layer.weight for layer in layers])  # (V, hidden)
+        return nn.functional.linear(hidden, weight, torch.cat([layer.bias for layer in layers]))
 
     def hidden(self, features: Tensor, expression: Tensor) -> Tensor:
         """Input (N, hidden) of the last layer of φ; arguments as for `decode`."""
-        parts = [features, self.encoded_positions()]
+        parts = [features, *self._positions()]
         if not self.shape.blends:
             parts.append(expression.to(self.device).expand(len(self), -1))  # (N, B)
         return nn.functional.leaky_relu(self.trunk(torch.cat(parts, 1)), 0.01)  # (N, hidden)
 
     def encoded_positions(self) -> Tensor:
         """γ(μ), (N, 3 + 6·L): positions relative to the head's box, their sines and cosines."""
+        return torch.cat(self._positions(), 1)
+
+    def _positions(self) -> tuple[Tensor, Tensor]:
+        """The parts of γ(μ): positions (N, 3), their sines and cosines (N, 6·L)."""
         center = self.means.new_tensor(self.shape.box_center)
         positions = (self.means - center) / self.shape.box_size  # (N, 3), about −1 … 1
-        octaves = math.pi * 2.0 ** torch.arange(self.shape.frequencies).to(positions)  # (L,)
-        angles = (positions[:, None] * octaves[:, None]).flatten(1)  # (N, 3·L)
-        return torch.cat([positions, angles.sin(), angles.cos()], 1)
+        waves: Tensor = _Waves.apply(positions, self.shape.frequencies)  # type: ignore[assignment]
+        return positions, waves
 
     def gaussians(self, logits: Tensor) -> Gaussians:
         """Renderable Gaussians with the given values (N, V)."""
@@ -239,3 +243,30 @@ class HeadModel(nn.Module):
                 f"{path} does not hold a head model: {json.dumps(str(error))}."
             ) from error
         return model
+
+
+class _Waves(torch.autograd.Function):
+    """Sines and cosines (N, 6·L) of positions (N, 3) in L octaves.
+
+    Each is the derivative of the other but for sign and frequency, so the backward pass needs no
+    second look at the angles.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, positions: Tensor, octaves: int) -> Tensor:
+        rates = math.pi * 2.0 ** torch.arange(octaves).to(positions)  # (L,)
+        angles = (positions[:, None] * rates[:, None]).flatten(1)  # (N, 3·L)
+        waves = angles.new_empty(len(angles), 2 * angles.shape[1])  # (N, 6·L)
+        sines, cosines = waves.chunk(2, 1)
+        torch.sin(angles, out=sines)
+        torch.cos(angles, out=cosines)
+        ctx.save_for_backward(waves, rates)
+        return waves
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, None]:
+        waves, rates = ctx.saved_tensors
+        sines, cosines = waves.chunk(2, 1)  # (N, 3·L) each
+        by_sine, by_cosine = gradients[0].chunk(2, 1)
+        by_angle = by_sine * cosines - by_cosine * sines  # (N, 3·L)
+        return torch.einsum("nlx,l->nx", by_angle.unflatten(1, (-1, 3)), rates), None

@@ -146,7 +146,8 @@ class SceneTrainer:
         image, target = rendering.rgb, example.target[None]  # (1, H, W, 3)
         if example.weight is not None:
             image = target + example.weight[..., None] * (image - target)
-        return photometric(image, target, self._settings.loss.ssim)
+        weight = self._settings.loss.ssim
+        return photometric(image, target, l1_weight=1 - weight, ssim_weight=weight)
 
     def _update(self, index: int) -> None:
         """One optimiser step on every parameter that has a gradient."""

@@ -36,18 +36,40 @@ def ssim(rgb: Tensor, target: Tensor) -> Tensor:
     Raises:
         ValueError: If the shapes differ or the last dimension is not 3.
     """
+    return 1 - photometric(rgb, target, l1_weight=0, ssim_weight=1)
+
+
+def photometric(
+    rgb: Tensor,
+    target: Tensor,
+    *,
+    l1_weight: float = 0.8,
+    ssim_weight: float = 0.2,
+    squares_weight: float = 0.0,
+) -> Tensor:
+    """λ_1·L1 + λ_s·(1 − SSIM) + λ_2·(mean squared difference), differentiable in `rgb` only.
+
+    Args:
+        rgb: (..., H, W, 3) in [0, 1].
+        target: Shaped as `rgb`.
+        l1_weight: λ_1.
+        ssim_weight: λ_s; SSIM as `ssim` defines it.
+        squares_weight: λ_2.
+
+    Returns:
+        A scalar.
+
+    Raises:
+        ValueError: If the shapes differ or the last dimension is not 3.
+    """
     if rgb.shape != target.shape or rgb.shape[-1] != 3:
-        raise ValueError(f"SSIM of {tuple(rgb.shape)} and {tuple(target.shape)}")
+        raise ValueError(f"comparing pictures of {tuple(rgb.shape)} and {tuple(target.shape)}")
     images = rgb.reshape(-1, *rgb.shape[-3:])  # (C, H, W, 3)
     targets = target.detach().reshape(-1, *target.shape[-3:])
+    weights = ssim_weight, l1_weight, squares_weight
     if rgb.is_cuda:
-        return _ssim_by_convolution(images, targets)
-    return _CpuSsim.apply(images.float(), targets.float())
-
-
-def photometric(rgb: Tensor, target: Tensor, ssim_weight: float = 0.2) -> Tensor:
-    """(1 − λ)·L1 + λ·(1 − SSIM) with λ = `ssim_weight`; other arguments as for `ssim`."""
-    return (1 - ssim_weight) * l1(rgb, target) + ssim_weight * (1 - ssim(rgb, target))
+        return _photometric_by_torch(images, targets, *weights)
+    return _CpuPhotometric.apply(images.float(), targets.float(), *weights)
 
 
 def tensor_psnr(rgb: Tensor, target: Tensor, weight: Tensor | None = None) -> float:
@@ -58,22 +80,26 @@ def tensor_psnr(rgb: Tensor, target: Tensor, weight: Tensor | None = None) -> fl
         target: (H, W, 3) in [0, 1].
         weight: (H, W) weight of each pixel in [0, 1]; all pixels count fully by default.
     """
-    squares = (rgb.detach() - target).square().mean(-1)  # (H, W)
+    squares = (rgb.detach() - target).square()  # (H, W, 3)
     if weight is None:
         return decibels(float(squares.mean()))
+    squares = squares.mean(-1)  # (H, W)
     return decibels(float((squares * weight).sum() / weight.sum().clamp_min(1)))
 
 
-class _CpuSsim(torch.autograd.Function):
+class _CpuPhotometric(torch.autograd.Function):
     """The fused kernel; the gradient is made along with the value."""
 
     @staticmethod
-    def forward(ctx: Any, images: Tensor, targets: Tensor) -> Tensor:
-        from ico3d.splat.cpu.ssim import ssim_with_gradient
+    def forward(
+        ctx: Any, images: Tensor, targets: Tensor, ssim: float, l1: float, squares: float
+    ) -> Tensor:
+        from ico3d.splat.cpu.ssim import photometric_with_gradient
 
         pairs = zip(images.detach().contiguous(), targets.contiguous(), strict=True)
         values, gradients = zip(
-            *(ssim_with_gradient(x.numpy(), y.numpy()) for x, y in pairs), strict=True
+            *(photometric_with_gradient(x.numpy(), y.numpy(), ssim, l1, squares) for x, y in pairs),
+            strict=True,
         )
         stacked = [torch.from_numpy(gradient) for gradient in gradients]
         ctx.gradient = torch.stack(stacked) / len(values)  # (C, H, W, 3)
@@ -81,8 +107,17 @@ class _CpuSsim(torch.autograd.Function):
 
     @staticmethod
     @once_differentiable
-    def backward(ctx: Any, g_value: Tensor) -> tuple[Tensor, None]:
-        return ctx.gradient * g_value, None
+    def backward(ctx: Any, g_value: Tensor) -> tuple[Tensor, None, None, None, None]:
+        return ctx.gradient * g_value, None, None, None, None
+
+
+def _photometric_by_torch(
+    images: Tensor, targets: Tensor, ssim: float, l1: float, squares: float
+) -> Tensor:
+    """What the fused kernel computes, on any device."""
+    away = images - targets
+    loss = ssim * (1 - _ssim_by_convolution(images, targets))
+    return loss + l1 * away.abs().mean() + squares * away.square().mean()
 
 
 def _blur(images: Tensor) -> Tensor:

@@ -85,7 +85,8 @@ def _fitted(
         view = views[which]
         example = pictures.example(view, rng.random(3), pose["root"].device)
         seen = render(motion.posed(values, **pose), [view.camera], example.color)
-        loss = photometric(seen.rgb, example.target[None], weights.ssim)
+        target = example.target[None]  # (1, H, W, 3)
+        loss = photometric(seen.rgb, target, l1_weight=1 - weights.ssim, ssim_weight=weights.ssim)
         (loss + weights.mask * l1(seen.alpha[0], example.mask)).backward()
         for name, part in pose.items():
             assert part.grad is not None  # the body is in the picture

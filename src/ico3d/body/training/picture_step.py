@@ -137,7 +137,8 @@ class Learner:
     def loss(self, rendering: Rendering, example: Example) -> Tensor:
         """λ_1·L1 + λ_s·(1 − SSIM) + λ_m·L1 of the masks (paper, loss of the body)."""
         weights = self._settings.loss
-        picture = photometric(rendering.rgb, example.target[None], weights.ssim)
+        shown, target = rendering.rgb, example.target[None]  # (1, H, W, 3)
+        picture = photometric(shown, target, l1_weight=1 - weights.ssim, ssim_weight=weights.ssim)
         return picture + weights.mask * l1(rendering.alpha[0], example.mask)
 
     def update(self, progress: float) -> None:

@@ -1,4 +1,4 @@
-"""SSIM and its gradient in one kernel: separable blurs over rows of interleaved RGB."""
+"""SSIM, L1 and squares of two pictures with their gradient: blurs over rows of interleaved RGB."""
 
 # pyright: reportMissingParameterType=false, reportUnknownParameterType=false
 # pyright: reportUnknownArgumentType=false, reportUnknownVariableType=false
@@ -111,6 +111,19 @@ def _combine(x, y, by_mean, by_xx, by_xy, scale, out):
         out[i] = scale * (by_mean[i] + TWO * x[i] * by_xx[i] + y[i] * by_xy[i])
 
 
+@kernel()
+def _add_differences(x, y, by_absolute, by_square, out):
+    """Sums of |x − y| and (x − y)² over a row; adds their weighted derivatives to `out`."""
+    absolute, square = np.float32(0), np.float32(0)
+    for i in range(out.size):
+        away = x[i] - y[i]
+        sign = np.float32(away > 0) - np.float32(away < 0)
+        absolute += abs(away)
+        square += away * away
+        out[i] += by_absolute * sign + by_square * away
+    return absolute, square
+
+
 @kernel(parallel=True)
 def _blur_moments(x, y, maps):
     for row in numba.prange(x.shape[0]):
@@ -120,13 +133,13 @@ def _blur_moments(x, y, maps):
 
 @kernel(parallel=True)
 def _compare(maps, sums, derivatives):
-    for row in numba.prange(sums.size):
+    for row in numba.prange(sums.shape[0]):
         width = maps.shape[2]
         stats = np.empty((5, width), np.float32)
         by_mean = np.empty(width, np.float32)
         for k in range(5):
             _blur_column(maps[row : row + 11, k], stats[k])
-        sums[row] = _similarity(stats, by_mean)
+        sums[row, 0] = _similarity(stats, by_mean)
         padded = np.zeros(width + 2 * PAD, np.float32)
         inner = padded[PAD : PAD + width]
         _copy(by_mean, inner)
@@ -138,12 +151,14 @@ def _compare(maps, sums, derivatives):
 
 
 @kernel(parallel=True)
-def _pull_back(x, y, derivatives, scale, gradient):
+def _pull_back(x, y, derivatives, scales, sums, gradient):
     for row in numba.prange(x.shape[0]):
         blurred = np.empty((3, x.shape[1]), np.float32)
         for k in range(3):
             _blur_column(derivatives[row : row + 11, k], blurred[k])
-        _combine(x[row], y[row], blurred[0], blurred[1], blurred[2], scale, gradient[row])
+        out = gradient[row]
+        _combine(x[row], y[row], blurred[0], blurred[1], blurred[2], scales[0], out)
+        sums[row, 1], sums[row, 2] = _add_differences(x[row], y[row], scales[1], scales[2], out)
 
 
 def _padded_rows(height: int, maps: int, width: int) -> np.ndarray:
@@ -154,21 +169,29 @@ def _padded_rows(height: int, maps: int, width: int) -> np.ndarray:
     return rows
 
 
-def ssim_with_gradient(x: np.ndarray, y: np.ndarray) -> tuple[float, np.ndarray]:
-    """Mean SSIM of two pictures and its gradient.
+def photometric_with_gradient(
+    x: np.ndarray, y: np.ndarray, similarity: float, l1: float, squares: float
+) -> tuple[float, np.ndarray]:
+    """The weighted sum of 1 − SSIM, mean |x − y| and mean (x − y)², and its gradient.
 
     Args:
         x: (H, W, 3) float32 in [0, 1].
         y: (H, W, 3) float32 in [0, 1].
+        similarity: Weight of 1 − SSIM.
+        l1: Weight of the mean absolute difference.
+        squares: Weight of the mean squared difference.
 
     Returns:
-        Mean SSIM, and its gradient (H, W, 3) with respect to x.
+        The sum, and its gradient (H, W, 3) with respect to x.
     """
     height, width = x.shape[0], x.shape[1] * CHANNELS
     x, y = x.reshape(height, width), y.reshape(height, width)
     maps, derivatives = _padded_rows(height, 5, width), _padded_rows(height, 3, width)
-    sums, gradient = np.empty(height, np.float32), np.empty_like(x)
+    sums, gradient = np.empty((height, 3), np.float32), np.empty_like(x)
+    scales = np.array([-similarity, l1, 2 * squares]).astype(np.float32) / np.float32(x.size)
     _blur_moments(x, y, maps)
     _compare(maps, sums, derivatives)
-    _pull_back(x, y, derivatives, np.float32(1 / x.size), gradient)
-    return float(sums.sum(dtype=np.float64) / x.size), gradient.reshape(height, -1, CHANNELS)
+    _pull_back(x, y, derivatives, scales, sums, gradient)
+    alike, absolute, square = sums.sum(0, dtype=np.float64) / x.size
+    value = similarity * (1 - alike) + l1 * absolute + squares * square
+    return float(value), gradient.reshape(height, -1, CHANNELS)
