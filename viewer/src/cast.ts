@@ -4,7 +4,7 @@ import { readBakedSkinned } from './body/skinned/baked.ts';
 import { SkinnedBody } from './body/skinned/body.ts';
 import { Timeline } from './body/timeline.ts';
 import { readBakedWindow } from './body/window.ts';
-import { BundleFiles, GESTURES, SKINNED } from './bundle/load.ts';
+import { GESTURES, SKINNED, type BundleFiles } from './bundle/load.ts';
 import { bodyOf, type AnyBody, type BodyInfo, type HeadInfo, type Manifest, type SkinnedInfo } from './bundle/manifest.ts';
 import { BodyLanguage } from './gesture/performing/body-language.ts';
 import { readRepertoire } from './gesture/repertoire.ts';
@@ -29,8 +29,6 @@ export interface Cast {
 export interface CastPorts {
   /** What is heard now. */
   heard(): Spoken | null;
-  /** Bytes of a file have come. */
-  loaded(bytes: number): void;
   /** A window could not be fetched. */
   failed(error: unknown): void;
 }
@@ -40,10 +38,9 @@ export interface CastPorts {
  *
  * @param calm the visitor wants little motion: only faces move
  */
-export async function makeCast(manifest: Manifest, stage: Stage, calm: boolean, ports: CastPorts): Promise<Cast> {
+export async function makeCast(manifest: Manifest, files: BundleFiles, stage: Stage, calm: boolean, ports: CastPorts): Promise<Cast> {
   const { head } = manifest;
   const body = bodyOf(manifest);
-  const files = new BundleFiles(manifest.files, ports.loaded);
   const backdrop = await makeBackdrop(files);
   if (backdrop) stage.add(backdrop);
   if (head && body) return makePerson(files, manifest, head, body, stage, calm, ports);

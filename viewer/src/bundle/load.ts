@@ -1,4 +1,5 @@
 import { PageError } from '../errors.ts';
+import type { Server } from '../server.ts';
 import { checkAnimation, type AnimationInfo } from './animation.ts';
 import { readBakedHead, type BakedHead } from './baked-head.ts';
 import { checkManifest, type AnyBody, type HeadInfo, type Manifest } from './manifest.ts';
@@ -14,7 +15,6 @@ export interface HeadFiles {
 /** The names that splats behind a person may have. */
 const BACKGROUNDS = ['background.spz', 'background.ply'];
 
-const ROOT = 'bundle/';
 const HEAD_FILES = ['head.safetensors', 'head_poses.safetensors'] as const;
 const ANIMATION = 'animation.json';
 
@@ -24,12 +24,12 @@ export const SKINNED = 'body/skinned.safetensors';
 /** What such a body can do besides what was recorded. */
 export const GESTURES = 'body/gestures.safetensors';
 
-/** The thumbnail's address. */
-export const THUMBNAIL = `${ROOT}thumbnail.png`;
+/** A picture of the avatar. */
+export const THUMBNAIL = 'thumbnail.png';
 
 /** Fetches and checks the manifest. */
-export async function loadManifest(): Promise<Manifest> {
-  const response = await get('manifest.json');
+export async function loadManifest(server: Server, signal?: AbortSignal): Promise<Manifest> {
+  const response = await get(server, 'manifest.json', signal);
   return checkManifest(await response.json().catch(() => null));
 }
 
@@ -45,16 +45,21 @@ export function bytesToFirstSight({ head, body, skinned, files }: Manifest): num
 
 /** The files of a bundle, fetched when they are asked for; each must be as long as promised, and have the promised hash. */
 export class BundleFiles {
+  private readonly server: Server;
   private readonly promised: Manifest['files'];
   private readonly onBytes: (n: number) => void;
+  private readonly signal: AbortSignal | undefined;
 
   /**
    * @param promised size and hash of each file
    * @param onBytes called with the number of bytes that came
+   * @param signal ends the fetching
    */
-  constructor(promised: Manifest['files'], onBytes: (n: number) => void = () => {}) {
+  constructor(server: Server, promised: Manifest['files'], onBytes: (n: number) => void = () => {}, signal?: AbortSignal) {
+    this.server = server;
     this.promised = promised;
     this.onBytes = onBytes;
+    this.signal = signal;
   }
 
   /** A head, ready for the GPU. */
@@ -91,7 +96,7 @@ export class BundleFiles {
   private async bytes(name: string): Promise<ArrayBuffer> {
     const entry = this.promised[name];
     if (!entry) throw new PageError(`manifest.json does not list ${name}.`);
-    const reader = (await get(name)).body!.getReader();
+    const reader = (await get(this.server, name, this.signal)).body!.getReader();
     const bytes = new Uint8Array(entry.size);
     let at = 0;
     for (let part = await reader.read(); !part.done; part = await reader.read()) {
@@ -114,11 +119,12 @@ function parseJson(text: string): unknown {
   }
 }
 
-async function get(name: string): Promise<Response> {
+async function get(server: Server, name: string, signal?: AbortSignal): Promise<Response> {
   let response: Response;
   try {
-    response = await fetch(ROOT + name);
+    response = await fetch(server.file(name), { signal });
   } catch {
+    signal?.throwIfAborted();
     throw new PageError(`The server does not answer, so ${name} could not be loaded; reload the page.`);
   }
   if (!response.ok) throw new PageError(`The server has no ${name} (status ${response.status}).`);

@@ -32,6 +32,7 @@ export class Orbit {
   private bounds: Bounds | null = null; // none while the camera is being placed
   private moved = false; // by the visitor
   private changed = true;
+  private readonly ending = new AbortController();
 
   constructor(canvas: HTMLCanvasElement, subject: Subject, onChange: () => void) {
     this.subject = subject;
@@ -39,8 +40,15 @@ export class Orbit {
     this.camera.up.set(...subject.up); // the controls take it over once
     this.controls = this.control(canvas, onChange);
     this.home();
-    canvas.addEventListener('keydown', (event) => this.key(event));
-    canvas.addEventListener('dblclick', () => this.home());
+    const { signal } = this.ending;
+    canvas.addEventListener('keydown', (event) => this.key(event), { signal });
+    canvas.addEventListener('dblclick', () => this.home(), { signal });
+  }
+
+  /** Stops listening to the visitor. */
+  dispose(): void {
+    this.ending.abort();
+    this.controls.dispose();
   }
 
   /** Lets the camera glide on; true if it moved. */
@@ -102,7 +110,7 @@ export class Orbit {
       this.changed = true;
       onChange();
     });
-    listenToZooming(canvas, {
+    listenToZooming(canvas, this.ending.signal, {
       zoom: (at, factor) => this.zoom(this.under(at), factor),
       pull: (from, to) => this.move(this.under(from).sub(this.under(to))),
     });

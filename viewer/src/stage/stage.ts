@@ -25,6 +25,7 @@ export class Stage {
   private lastTick = 0; // s, on the grid of ticks
   private lastTime = 0; // s, when it really was
   private dirty = true;
+  private readonly resizing = new ResizeObserver(() => this.fit());
 
   constructor(canvas: HTMLCanvasElement, manifest: Manifest) {
     this.canvas = canvas;
@@ -35,7 +36,7 @@ export class Stage {
     this.spark = makeSpark(this.renderer, () => (this.dirty = true));
     this.scene.add(this.spark);
     this.orbit = new Orbit(canvas, wholeBody(manifest), () => (this.dirty = true));
-    new ResizeObserver(() => this.fit()).observe(canvas);
+    this.resizing.observe(canvas);
     this.fit();
   }
 
@@ -76,6 +77,16 @@ export class Stage {
     for (const actor of this.actors) actor.drawing?.(performance.now());
     this.renderer.render(this.scene, this.orbit.camera);
     this.frames++;
+  }
+
+  /** Stops drawing and gives all memory of the GPU back. */
+  dispose(): void {
+    this.renderer.setAnimationLoop(null);
+    this.resizing.disconnect();
+    this.orbit.dispose();
+    this.spark.dispose();
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
   }
 
   private async sorted(): Promise<void> {

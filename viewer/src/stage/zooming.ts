@@ -15,7 +15,7 @@ const LINE = 16; // pixels
 const LONGEST = 300; // pixels of one step: free-running wheels
 
 /** Hears wheel and two-finger gestures on a canvas. */
-export function listenToZooming(canvas: HTMLCanvasElement, { zoom, pull }: Zooming): void {
+export function listenToZooming(canvas: HTMLCanvasElement, signal: AbortSignal, { zoom, pull }: Zooming): void {
   const placeOf = ({ clientX, clientY }: MouseEvent): Place => {
     const { left, top, width, height } = canvas.getBoundingClientRect();
     return [(2 * (clientX - left)) / width - 1, 1 - (2 * (clientY - top)) / height];
@@ -26,7 +26,7 @@ export function listenToZooming(canvas: HTMLCanvasElement, { zoom, pull }: Zoomi
     const bounded = Math.max(-LONGEST, Math.min(LONGEST, pixels));
     zoom(placeOf(event), Math.exp(bounded * (event.ctrlKey ? PADS : WHEEL)));
   };
-  canvas.addEventListener('wheel', wheel, { passive: false });
+  canvas.addEventListener('wheel', wheel, { passive: false, signal });
 
   const fingers = new Map<number, PointerEvent>();
   const move = (event: PointerEvent) => {
@@ -40,12 +40,13 @@ export function listenToZooming(canvas: HTMLCanvasElement, { zoom, pull }: Zoomi
     zoom(to!, apart(before) / Math.max(1, apart(after)));
   };
   const lift = ({ pointerId }: PointerEvent) => fingers.delete(pointerId);
-  canvas.addEventListener('pointerdown', (event) => {
+  const touch = (event: PointerEvent) => {
     if (event.pointerType === 'touch') fingers.set(event.pointerId, event);
-  });
+  };
+  canvas.addEventListener('pointerdown', touch, { signal });
   // Touches belong to the canvas until they end; a mouse does not matter here.
-  canvas.ownerDocument.addEventListener('pointermove', move);
-  for (const end of ['pointerup', 'pointercancel'] as const) canvas.ownerDocument.addEventListener(end, lift);
+  canvas.ownerDocument.addEventListener('pointermove', move, { signal });
+  for (const end of ['pointerup', 'pointercancel'] as const) canvas.ownerDocument.addEventListener(end, lift, { signal });
 }
 
 function middle(places: Place[]): Place {

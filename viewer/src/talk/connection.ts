@@ -100,6 +100,16 @@ export class Connection {
     this.socket?.close(1000); // on purpose: the server gives the place away at once
   }
 
+  /** Leaves for good. */
+  close(): void {
+    clearTimeout(this.retry);
+    this.welcomed = false;
+    if (!this.socket) return;
+    this.socket.onopen = this.socket.onmessage = this.socket.onclose = null;
+    this.socket.close(1000);
+    this.socket = null;
+  }
+
   private receive(frame: string | ArrayBuffer): void {
     const message = decode(frame);
     if (message.type === 'welcome') this.welcome(message);
@@ -166,12 +176,4 @@ export class Connection {
     this.wait = Math.min(Math.max(first, 2 * this.wait), longest);
     this.retry = setTimeout(() => this.open(), this.wait);
   }
-}
-
-/** The server's WebSocket beside this page. */
-export function socketUrl(page: Location): string {
-  const url = new URL('ws', page.href);
-  url.protocol = page.protocol === 'https:' ? 'wss:' : 'ws:';
-  url.search = url.hash = '';
-  return url.href;
 }

@@ -74,6 +74,7 @@ export class Conversation {
     error: ({ message }) => this.view.notice(message),
   };
   private state: StateMessage['state'] = 'idle'; // of the server
+  private readonly reporting: ReturnType<typeof setInterval>;
 
   constructor(url: string, view: ConversationView) {
     this.view = view;
@@ -89,7 +90,7 @@ export class Conversation {
     this.voice.onSound = (pcm) => this.acting?.listen(pcm);
     this.player.onStart = (_, delay) => this.answerStarts(performance.now() + 1000 * delay);
     this.player.onFinish = (utterance, seconds) => this.report(utterance, seconds);
-    setInterval(() => this.reportHeard(), CLOCK_PERIOD);
+    this.reporting = setInterval(() => this.reportHeard(), CLOCK_PERIOD);
   }
 
   /** Connects, at first or after an ending; call it when sound may play. */
@@ -133,6 +134,15 @@ export class Conversation {
 
   release(): void {
     this.voice.release();
+  }
+
+  /** Hangs up for good: nothing is heard, said or sent any more. */
+  dispose(): void {
+    clearInterval(this.reporting);
+    this.voice.end();
+    this.connection.close();
+    this.silence();
+    void this.player.context.close();
   }
 
   private welcome(message: WelcomeMessage, replaced: boolean): void {

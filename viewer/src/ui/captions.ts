@@ -2,9 +2,15 @@ import { byId } from './elements.ts';
 
 /** What the visitor asked and the sentence that the avatar says, as text. */
 export class Captions {
-  private readonly root = byId('captions');
-  private readonly asked = byId('question');
-  private readonly answered = byId('answer');
+  private readonly root: HTMLElement;
+  private readonly asked: HTMLElement;
+  private readonly answered: HTMLElement;
+
+  constructor(root: ParentNode) {
+    this.root = byId(root, 'captions');
+    this.asked = byId(root, 'question');
+    this.answered = byId(root, 'answer');
+  }
 
   question(text: string, final: boolean): void {
     this.root.hidden = false;

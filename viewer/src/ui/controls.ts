@@ -11,18 +11,31 @@ const TITLES: Record<MicrophoneState, string> = {
 
 /** Text box, microphone, button to talk, send and stop: what the visitor does. */
 export class Controls {
-  private readonly form = byId<HTMLFormElement>('composer');
-  private readonly input = byId<HTMLInputElement>('text');
-  private readonly microphone = byId<HTMLButtonElement>('microphone');
-  private readonly talk = byId<HTMLButtonElement>('talk');
-  private readonly stop = byId<HTMLButtonElement>('stop');
+  private readonly root: HTMLElement;
+  private readonly signal: AbortSignal;
+  private readonly form: HTMLFormElement;
+  private readonly input: HTMLInputElement;
+  private readonly microphone: HTMLButtonElement;
+  private readonly talk: HTMLButtonElement;
+  private readonly stop: HTMLButtonElement;
 
-  constructor() {
+  /**
+   * @param root what keys are heard in
+   * @param signal ends the hearing
+   */
+  constructor(root: HTMLElement, signal: AbortSignal) {
+    this.root = root;
+    this.signal = signal;
+    this.form = byId(root, 'composer');
+    this.input = byId(root, 'text');
+    this.microphone = byId(root, 'microphone');
+    this.talk = byId(root, 'talk');
+    this.stop = byId(root, 'stop');
     this.microphone.append(icon('microphone'));
     this.talk.append(icon('talk'));
     this.stop.prepend(icon('stop'));
-    byId('send').append(icon('send'));
-    byId('panel-button').append(icon('chart'));
+    byId(root, 'send').append(icon('send'));
+    byId(root, 'panel-button').append(icon('chart'));
   }
 
   /** Shows itself and lets the visitor act on a conversation. */
@@ -37,7 +50,7 @@ export class Controls {
     this.microphone.onclick = () => void conversation.toggleMicrophone();
     this.stop.onclick = () => conversation.interrupt();
     this.bindTalk(conversation);
-    document.addEventListener('keydown', (event) => {
+    this.hear('keydown', (event) => {
       if (event.key === 'Escape') conversation.interrupt();
       if (event.key === '/' && this.takesSlash(event)) {
         event.preventDefault();
@@ -56,13 +69,17 @@ export class Controls {
     };
     this.talk.onlostpointercapture = release;
     this.talk.oncontextmenu = (event) => event.preventDefault(); // a long touch
-    document.addEventListener('keydown', (event) => {
+    this.hear('keydown', (event) => {
       if (event.key !== ' ' || !this.takesSpace(event.target)) return;
       event.preventDefault();
       if (!event.repeat) press();
     });
-    document.addEventListener('keyup', (event) => event.key === ' ' && release());
-    addEventListener('blur', release);
+    this.hear('keyup', (event) => event.key === ' ' && release());
+    addEventListener('blur', release, { signal: this.signal });
+  }
+
+  private hear(type: 'keydown' | 'keyup', act: (event: KeyboardEvent) => void): void {
+    this.root.addEventListener(type, act, { signal: this.signal });
   }
 
   private takesSpace(target: EventTarget | null): boolean {

@@ -1,26 +1,30 @@
+import { atEnd } from '../lifetime.ts';
 import { byId } from './elements.ts';
 
 /**
  * Tells how many pixels at the lower edge the controls and captions cover, whenever they cover more
- * than before in a window of this size: what was there once comes again, and the picture must not
+ * than before in a picture of this size: what was there once comes again, and the picture must not
  * jump each time. Notices do not count; they go.
  */
-export function watchCover(changed: (pixels: number) => void): void {
-  const main = document.querySelector('main')!;
+export function watchCover(root: ParentNode, signal: AbortSignal, changed: (pixels: number) => void): void {
+  const main = root.querySelector('main')!;
+  const picture = byId(root, 'stage');
   let size = '';
   let most = 0;
   const measure = () => {
     const before = size;
-    size = `${innerWidth}x${innerHeight}`;
+    const { width, height, bottom } = picture.getBoundingClientRect();
+    size = `${width}x${height}`;
     const tops = [...main.children].filter(isCover).map((child) => child.getBoundingClientRect().top);
-    const covered = Math.max(0, innerHeight - Math.min(innerHeight, ...tops));
+    const covered = Math.max(0, bottom - Math.min(bottom, ...tops));
     if (size === before && covered <= most) return;
     most = covered;
     changed(most);
   };
   const observer = new ResizeObserver(measure);
   for (const child of main.children) observer.observe(child);
-  observer.observe(byId('stage'));
+  observer.observe(picture);
+  atEnd(signal, () => observer.disconnect());
 }
 
 /** Whether an element is seen and lies in the row of the face, not beside it. */

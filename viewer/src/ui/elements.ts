@@ -1,6 +1,6 @@
-/** The element with an id; the page is wrong if there is none. */
-export function byId<T extends HTMLElement>(id: string): T {
-  const element = document.getElementById(id);
+/** The element with an id under a root; the page is wrong if there is none. */
+export function byId<T extends HTMLElement>(root: ParentNode, id: string): T {
+  const element = root.querySelector<T>(`#${id}`);
   if (!element) throw new Error(`the page has no #${id}`);
-  return element as T;
+  return element;
 }

@@ -1,4 +1,4 @@
-import { THUMBNAIL } from '../bundle/load.ts';
+import { atEnd } from '../lifetime.ts';
 import type { Ending } from '../talk/connection.ts';
 import { byId } from './elements.ts';
 
@@ -7,15 +7,31 @@ export type Choice = 'voice' | 'typing';
 
 /** The first screen: picture, progress, the button that lets sound play, or what went wrong and a way on. */
 export class Overlay {
-  private readonly root = byId('overlay');
-  private readonly bar = byId<HTMLProgressElement>('progress');
-  private readonly thumbnail = byId<HTMLImageElement>('thumbnail');
-  private readonly waiting = byId('overlay-wait');
+  private readonly page: HTMLElement;
+  private readonly root: HTMLElement;
+  private readonly bar: HTMLProgressElement;
+  private readonly thumbnail: HTMLImageElement;
+  private readonly waiting: HTMLElement;
+  private readonly reload: () => void;
   private counting: ReturnType<typeof setTimeout> | undefined;
 
-  greet(name: string): void {
-    byId('overlay-name').textContent = name;
-    this.thumbnail.src = THUMBNAIL;
+  /**
+   * @param page what the overlay covers
+   * @param reload loads everything anew
+   */
+  constructor(page: HTMLElement, signal: AbortSignal, reload: () => void) {
+    this.page = page;
+    this.root = byId(page, 'overlay');
+    this.bar = byId(page, 'progress');
+    this.thumbnail = byId(page, 'thumbnail');
+    this.waiting = byId(page, 'overlay-wait');
+    this.reload = reload;
+    atEnd(signal, () => clearTimeout(this.counting));
+  }
+
+  greet(name: string, thumbnail: string): void {
+    byId(this.root, 'overlay-name').textContent = name;
+    this.thumbnail.src = thumbnail;
     this.thumbnail.onload = () => (this.thumbnail.hidden = false);
   }
 
@@ -26,12 +42,12 @@ export class Overlay {
   /** Resolves when the visitor chooses; browsers play sound only after such a click. */
   choose(): Promise<Choice> {
     this.bar.hidden = true;
-    byId('choices').hidden = false;
-    const start = byId<HTMLButtonElement>('start');
+    byId(this.root, 'choices').hidden = false;
+    const start = byId<HTMLButtonElement>(this.root, 'start');
     start.focus();
     return new Promise((resolve) => {
       start.onclick = () => resolve('voice');
-      byId('start-typing').onclick = () => resolve('typing');
+      byId(this.root, 'start-typing').onclick = () => resolve('typing');
     });
   }
 
@@ -46,7 +62,7 @@ export class Overlay {
 
   /** The page cannot go on; only loading it anew may help. */
   fail(sentence: string): void {
-    this.say(sentence, 'Reload the page', () => location.reload());
+    this.say(sentence, 'Reload the page', () => this.reload());
   }
 
   /**
@@ -64,10 +80,10 @@ export class Overlay {
   }
 
   private say(sentence: string, label: string, act: () => void): void {
-    this.bar.hidden = byId('choices').hidden = true;
-    const text = byId('overlay-error');
+    this.bar.hidden = byId(this.root, 'choices').hidden = true;
+    const text = byId(this.root, 'overlay-error');
     if (text.textContent !== sentence) text.textContent = sentence; // what is said again need not be read aloud again
-    const button = byId<HTMLButtonElement>('again');
+    const button = byId<HTMLButtonElement>(this.root, 'again');
     button.textContent = label;
     button.onclick = act;
     text.hidden = button.hidden = false;
@@ -88,7 +104,7 @@ export class Overlay {
 
   /** Whether the overlay is all that a keyboard reaches. */
   private cover(covered: boolean): void {
-    for (const element of document.body.children) {
+    for (const element of this.page.children) {
       (element as HTMLElement).inert = (element === this.root) !== covered;
     }
   }

@@ -25,28 +25,33 @@ export interface Page {
   talk(conversation: Conversation): void;
 }
 
-/** Everything on the page around the picture. */
-export function makePage(overlay: Overlay, frames: () => number): Page {
-  const captions = new Captions();
-  const controls = new Controls();
-  const panel = new Panel(frames);
+/**
+ * Everything on the page around the picture.
+ *
+ * @param root what the page lies in
+ * @param signal ends all of it
+ */
+export function makePage(root: HTMLElement, overlay: Overlay, frames: () => number, signal: AbortSignal): Page {
+  const captions = new Captions(root);
+  const controls = new Controls(root, signal);
+  const panel = new Panel(root, frames, signal);
   let choose: (offer: Offer) => void = () => {};
   let again = () => {};
-  const sheet = new ServiceSheet((offer) => choose(offer));
+  const sheet = new ServiceSheet(root, (offer) => choose(offer));
   const view: ConversationView = {
     state(state) {
-      document.body.dataset.state = state;
-      byId('state').textContent = STATES[state];
+      root.dataset.state = state;
+      byId(root, 'state').textContent = STATES[state];
       controls.setSpeaking(state === 'speaking');
     },
     question: (text, final) => captions.question(text, final),
     answer: (sentence) => captions.answer(sentence),
     services(services, offers) {
-      showStandIns(services);
+      showStandIns(root, services);
       sheet.show(services, offers);
     },
-    notice: showNotice,
-    sharesVoice: (shared) => (byId('shared-voice').hidden = !shared),
+    notice: (sentence) => showNotice(root, sentence),
+    sharesVoice: (shared) => (byId(root, 'shared-voice').hidden = !shared),
     microphone: (state) => controls.setMicrophone(state),
     talking: (held) => controls.setTalking(held),
     latency: (milliseconds) => panel.latency(milliseconds),
@@ -55,7 +60,7 @@ export function makePage(overlay: Overlay, frames: () => number): Page {
     ended: (ending) => overlay.end(ending, () => again()),
   };
   const talk = (conversation: Conversation) => {
-    byId('state-line').hidden = false;
+    byId(root, 'state-line').hidden = false;
     controls.bind(conversation);
     choose = (offer) => conversation.choose(offer);
     again = () => conversation.start();
@@ -65,19 +70,19 @@ export function makePage(overlay: Overlay, frames: () => number): Page {
 }
 
 /** Says plainly which services are the small offline ones. */
-function showStandIns(services: Services): void {
+function showStandIns(root: ParentNode, services: Services): void {
   const names = Object.entries(services)
     .filter(([, service]) => service.stand_in)
     .map(([role, service]) => `${role} (${service.name})`);
-  const note = byId('stand-ins');
+  const note = byId(root, 'stand-ins');
   note.hidden = names.length === 0;
   note.textContent = `Offline stand-ins in use: ${names.join(', ')}`;
 }
 
 /** Shows a sentence for some seconds. */
-export function showNotice(sentence: string): void {
+export function showNotice(root: ParentNode, sentence: string): void {
   const item = document.createElement('p');
   item.textContent = sentence;
-  byId('notices').append(item);
+  byId(root, 'notices').append(item);
   setTimeout(() => item.remove(), NOTICE_TIME);
 }

@@ -1,3 +1,4 @@
+import { every } from '../lifetime.ts';
 import { LATENCY_PARTS } from '../shared.ts';
 import { Latencies } from '../talk/latency.ts';
 import { byId } from './elements.ts';
@@ -17,23 +18,25 @@ const NAMES: Record<(typeof LATENCY_PARTS)[number], string> = {
 /** The small panel with figures: frame rate, latency and its parts. */
 export class Panel {
   private readonly rows = new Map<string, HTMLElement>();
-  private readonly list = byId('figures');
-  private readonly table = byId<HTMLTableElement>('latencies');
+  private readonly list: HTMLElement;
+  private readonly table: HTMLTableElement;
   private readonly latencies = new Latencies();
   private lastFrames = 0;
 
   /** @param frames frames drawn so far */
-  constructor(frames: () => number) {
-    const button = byId<HTMLButtonElement>('panel-button');
-    const panel = byId('panel');
+  constructor(root: ParentNode, frames: () => number, signal: AbortSignal) {
+    this.list = byId(root, 'figures');
+    this.table = byId(root, 'latencies');
+    const button = byId(root, 'panel-button');
+    const panel = byId(root, 'panel');
     button.onclick = () => {
       panel.hidden = !panel.hidden;
       button.setAttribute('aria-expanded', String(!panel.hidden));
     };
-    setInterval(() => {
+    every(PERIOD, signal, () => {
       this.set('frames', `${frames() - this.lastFrames} /s`);
       this.lastFrames = frames();
-    }, PERIOD);
+    });
   }
 
   /** Shows the time from the end of the question to the first sound of the answer. */

@@ -1,3 +1,4 @@
+import { every } from '../lifetime.ts';
 import type { Seen } from '../motion/motion.ts';
 import type { Playback } from '../motion/playback.ts';
 import { byId } from './elements.ts';
@@ -9,13 +10,18 @@ const REFRESH = 100; // ms
 export class PlayerBar {
   private readonly body: { readonly shown: Seen | null };
   private readonly playback: Playback;
-  private readonly button = byId<HTMLButtonElement>('play');
-  private readonly scrub = byId<HTMLInputElement>('scrub');
-  private readonly clock = byId<HTMLOutputElement>('clock');
+  private readonly root: HTMLElement;
+  private readonly button: HTMLButtonElement;
+  private readonly scrub: HTMLInputElement;
+  private readonly clock: HTMLOutputElement;
   private resumes = false; // once the slider is let go
 
   /** @param frame s between two frames of the recording: a step of the arrow keys */
-  constructor(body: PlayerBar['body'], playback: Playback, frame: number) {
+  constructor(page: ParentNode, body: PlayerBar['body'], playback: Playback, frame: number, signal: AbortSignal) {
+    this.root = byId(page, 'player');
+    this.button = byId(page, 'play');
+    this.scrub = byId(page, 'scrub');
+    this.clock = byId(page, 'clock');
     this.body = body;
     this.playback = playback;
     this.scrub.max = String(playback.duration);
@@ -25,9 +31,9 @@ export class PlayerBar {
     this.scrub.onkeydown = (event) => this.key(event, frame);
     this.scrub.onpointerdown = () => this.hold();
     this.scrub.onpointerup = this.scrub.onpointercancel = () => this.release();
-    byId('stage').addEventListener('keydown', (event) => this.space(event));
-    byId('player').hidden = false;
-    setInterval(() => this.refresh(), REFRESH);
+    byId(page, 'stage').addEventListener('keydown', (event) => this.space(event), { signal });
+    this.root.hidden = false;
+    every(REFRESH, signal, () => this.refresh());
     this.refresh();
   }
 
@@ -69,7 +75,7 @@ export class PlayerBar {
     this.scrub.value = String(playback.time);
     this.scrub.setAttribute('aria-valuetext', `${playback.time.toFixed(1)} seconds`);
     this.clock.textContent = `${label(playback.time)} / ${label(playback.duration)}`;
-    byId('player').setAttribute('aria-busy', String(this.body.shown?.waiting ?? true));
+    this.root.setAttribute('aria-busy', String(this.body.shown?.waiting ?? true));
     const plays = playback.playing || this.resumes;
     const name = plays ? 'Pause' : 'Play';
     if (this.button.title === name) return;

@@ -6,12 +6,14 @@ const JOBS = { recognition: 'Listens', language: 'Thinks', voice: 'Speaks' } as 
 
 /** Which services there are, which one serves, and what the better ones need. */
 export class ServiceSheet {
-  private readonly button = byId<HTMLButtonElement>('services-button');
-  private readonly sheet = byId('services');
+  private readonly button: HTMLButtonElement;
+  private readonly sheet: HTMLElement;
   private readonly choose: (offer: Offer) => void;
 
   /** @param choose what happens when the visitor wants another one */
-  constructor(choose: (offer: Offer) => void) {
+  constructor(root: ParentNode, choose: (offer: Offer) => void) {
+    this.button = byId(root, 'services-button');
+    this.sheet = byId(root, 'services');
     this.choose = choose;
     this.button.append(icon('sliders'));
     this.button.onclick = () => {

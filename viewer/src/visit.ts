@@ -1,0 +1,150 @@
+import type { Body } from './body/body.ts';
+import type { SkinnedBody } from './body/skinned/body.ts';
+import { bytesToFirstSight, BundleFiles, loadManifest, THUMBNAIL } from './bundle/load.ts';
+import { blinkIndices, bodyOf, type HeadInfo, type Manifest } from './bundle/manifest.ts';
+import { makeCast, type Cast } from './cast.ts';
+import { PageError, sentenceOf } from './errors.ts';
+import { Face } from './face/face.ts';
+import { IdleFace } from './face/idle.ts';
+import { atEnd } from './lifetime.ts';
+import type { Server } from './server.ts';
+import { Stage } from './stage/stage.ts';
+import { Conversation } from './talk/conversation.ts';
+import { watchCover } from './ui/cover.ts';
+import { byId } from './ui/elements.ts';
+import { Overlay } from './ui/overlay.ts';
+import { makePage, showNotice, type Page } from './ui/page.ts';
+import { PlayerBar } from './ui/player.ts';
+
+/** Who is there, once they can be seen. */
+export interface Presence extends Cast {
+  stage: Stage;
+  conversation?: Conversation; // none of a body alone
+}
+
+/** What a visit needs of the page around it. */
+export interface VisitPorts {
+  /** The avatar's name is known. */
+  named(name: string): void;
+  /** Everybody can be seen; nobody talks yet. */
+  entered(presence: Presence): void;
+  /** Loads everything anew, where nothing else helps. */
+  reload(): void;
+}
+
+/**
+ * A visit to an avatar: loads it, shows it and talks, in one element and without a trace outside of it.
+ *
+ * Several visits may be on one page, each in an element of its own.
+ */
+export class Visit {
+  private readonly root: HTMLElement;
+  private readonly server: Server;
+  private readonly ports: VisitPorts;
+  private readonly calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
+  private readonly ending = new AbortController();
+  private readonly overlay: Overlay;
+
+  /** @param root what holds the elements of `index.html` */
+  constructor(root: HTMLElement, server: Server, ports: VisitPorts) {
+    this.root = root;
+    this.server = server;
+    this.ports = ports;
+    this.overlay = new Overlay(root, this.ending.signal, () => ports.reload());
+    this.run().catch((error: unknown) => this.fail(error));
+  }
+
+  /** Ends everything that the visit began: sound, connection, picture and listeners. */
+  dispose(): void {
+    this.ending.abort();
+  }
+
+  private async run(): Promise<void> {
+    const { root, server } = this;
+    const { signal } = this.ending;
+    const manifest = await loadManifest(server, signal);
+    const name = manifest.persona.name || manifest.name;
+    byId(root, 'name').textContent = name;
+    root.style.setProperty('--backdrop', cssColour(manifest.background));
+    this.overlay.greet(name, server.file(THUMBNAIL));
+    this.ports.named(name);
+
+    const stage = new Stage(byId<HTMLCanvasElement>(root, 'stage'), manifest);
+    atEnd(signal, () => stage.dispose());
+    watchCover(root, signal, (pixels) => stage.keepClear(pixels));
+    const page = makePage(root, this.overlay, () => stage.frames, signal);
+    const conversation = manifest.head ? this.converse(page) : undefined;
+    const presence: Presence = { stage, conversation, ...(await this.enter(manifest, stage, conversation)) };
+    const { playback } = presence;
+    const moving = presence.body ?? presence.skinned;
+    if (moving && playback) new PlayerBar(root, moving, playback, 1 / bodyOf(manifest)!.fps, signal);
+    this.ports.entered(presence);
+    if (conversation) await this.prepare(conversation, presence, manifest.head!, moving);
+    this.overlay.hide();
+    if (conversation) page.talk(conversation);
+    else byId(root, 'play').focus();
+  }
+
+  private converse(page: Page): Conversation {
+    const conversation = new Conversation(this.server.socket(), page.view);
+    atEnd(this.ending.signal, () => conversation.dispose());
+    return conversation;
+  }
+
+  /** Brings everybody on stage and waits until they can be seen. */
+  private async enter(manifest: Manifest, stage: Stage, conversation?: Conversation): Promise<Cast> {
+    const { signal } = this.ending;
+    const total = bytesToFirstSight(manifest);
+    let loaded = 0;
+    const more = (bytes: number) => this.overlay.progress(Math.min(1, (loaded += bytes) / total));
+    const files = new BundleFiles(this.server, manifest.files, more, signal);
+    const cast = await makeCast(manifest, files, stage, this.calm, {
+      heard: () => conversation?.player.heard() ?? null,
+      failed: (error) => signal.aborted || showNotice(this.root, sentenceOf(error)),
+    });
+    signal.throwIfAborted();
+    stage.start();
+    await cast.body?.ready();
+    signal.throwIfAborted();
+    return cast;
+  }
+
+  /** Joins the conversation to who is on stage, and waits until sound may play. */
+  private async prepare(
+    conversation: Conversation,
+    { head, director, acting }: Presence,
+    info: HeadInfo,
+    moving?: Body | SkinnedBody,
+  ): Promise<void> {
+    head!.director = makeFace(info, conversation);
+    conversation.bodyTime = () => moving?.time ?? 0;
+    conversation.gestures = director ?? null;
+    conversation.acting = acting?.language ?? null;
+    await this.mayTalk(conversation);
+    this.ending.signal.throwIfAborted();
+  }
+
+  /** Waits for the click without which browsers play no sound. */
+  private async mayTalk(conversation: Conversation): Promise<void> {
+    const { context } = conversation.player;
+    if (context.state === 'running') return;
+    const choice = await this.overlay.choose();
+    await context.resume();
+    if (choice === 'voice') void conversation.toggleMicrophone();
+  }
+
+  private fail(error: unknown): void {
+    if (this.ending.signal.aborted) return;
+    if (!(error instanceof PageError)) console.error(error);
+    this.overlay.fail(sentenceOf(error));
+  }
+}
+
+function makeFace(info: HeadInfo, conversation: Conversation): Face {
+  const idle = new IdleFace(Float32Array.from(info.idle_expression), blinkIndices(info));
+  return new Face(info.expression_size, idle, () => conversation.player.heard());
+}
+
+function cssColour(rgb: readonly number[]): string {
+  return `rgb(${rgb.map((value) => Math.round(255 * value)).join(' ')})`;
+}
