@@ -1,6 +1,8 @@
 import { THUMBNAIL } from '../bundle/load.ts';
+import type { PlaceMessage } from '../protocol.ts';
 import type { Ending } from '../talk/connection.ts';
 import { byId } from './elements.ts';
+import { inWords } from './queue.ts';
 
 /** How the visitor wants to talk. */
 export type Choice = 'voice' | 'typing';
@@ -11,6 +13,7 @@ export class Overlay {
   private readonly bar = byId<HTMLProgressElement>('progress');
   private readonly thumbnail = byId<HTMLImageElement>('thumbnail');
   private readonly waiting = byId('overlay-wait');
+  private readonly button = byId<HTMLButtonElement>('again');
   private counting: ReturnType<typeof setTimeout> | undefined;
 
   greet(name: string): void {
@@ -56,26 +59,39 @@ export class Overlay {
    */
   end({ sentence, again: mayBegin, wait }: Ending, again: () => void): void {
     if (!mayBegin) return this.fail(sentence);
-    this.say(sentence, 'Try again', () => {
+    this.say(sentence, wait === null ? 'Talk again' : 'Try again', () => {
       this.count(0);
       again();
     });
     if (wait !== null) this.count(Math.round(wait / 1000));
   }
 
+  /** All places are taken: the visitor waits, and the talk begins by itself. */
+  queue(place: PlaceMessage): void {
+    this.show(inWords(place));
+    this.button.hidden = true;
+    this.waiting.hidden = false;
+    this.waiting.textContent = 'All places are taken. Leave this page open: it goes on by itself.';
+  }
+
   private say(sentence: string, label: string, act: () => void): void {
+    this.show(sentence);
+    this.waiting.hidden = true;
+    this.button.textContent = label;
+    this.button.onclick = act;
+    this.button.hidden = false;
+    this.button.focus();
+  }
+
+  /** Covers the page with a sentence. */
+  private show(sentence: string): void {
     this.bar.hidden = byId('choices').hidden = true;
     const text = byId('overlay-error');
     if (text.textContent !== sentence) text.textContent = sentence; // what is said again need not be read aloud again
-    const button = byId<HTMLButtonElement>('again');
-    button.textContent = label;
-    button.onclick = act;
-    text.hidden = button.hidden = false;
+    text.hidden = byId('check').hidden = false;
     clearTimeout(this.counting);
-    this.waiting.hidden = true;
     this.root.classList.remove('gone');
     this.cover(true);
-    button.focus();
   }
 
   /** Shows the seconds until the next try; at 0 it is made. */

@@ -15,6 +15,7 @@ const STATES = {
   listening: 'Listening',
   thinking: 'Thinking',
   speaking: 'Speaking',
+  queued: 'Waiting for a place',
   ended: 'Ended',
 } as const;
 
@@ -51,6 +52,7 @@ export function makePage(overlay: Overlay, frames: () => number): Page {
     talking: (held) => controls.setTalking(held),
     latency: (milliseconds) => panel.latency(milliseconds),
     metrics: (name, values) => panel.metrics(name, values),
+    queued: (place) => overlay.queue(place),
     connected: () => overlay.isShown && (overlay.hide(), controls.focus()),
     ended: (ending) => overlay.end(ending, () => again()),
   };
