@@ -4,7 +4,7 @@ import { afterEach, beforeAll, expect, inject, test } from 'vitest';
 import type { Browser } from '../support/browser/browser.ts';
 import { pauseDrawing } from '../support/browser/drawing.ts';
 import { runPython } from '../support/python.ts';
-import { microphones } from '../support/browser/recorder.ts';
+import { microphones, readRecord } from '../support/browser/recorder.ts';
 import { scratchFolder } from '../support/scratch.ts';
 import { ChatServer } from '../support/servers/server.ts';
 import { slowness } from '../support/slowness.ts';
@@ -14,7 +14,7 @@ const folder = scratchFolder();
 const silence = join(folder, 'silence.wav');
 const { talking, talkingUrl } = inject('shared');
 const IDLE = /^Nothing was said for [\d.]+ min/;
-const FULL = /^all places are taken/;
+const QUEUED = /^You are next/;
 
 const opened: { close(): Promise<void> }[] = [];
 
@@ -67,17 +67,21 @@ test('whoever falls silent makes room; who waits for a place gets it, and both m
   expect(await microphones(first.page)).toEqual(['live']);
 
   const second = await visit(url);
-  await says(second, FULL);
-  await first.page.evaluate((asking) => clearInterval(asking), asking);
-  expect(await focused(second)).toBe('again');
-  expect(await second.page.textContent('#overlay-wait')).toMatch(/^(Trying again in \d+ s|Connecting …)$/);
+  await says(second, QUEUED);
+  expect(await second.page.textContent('#overlay-wait')).toMatch(/^All places are taken/);
+  expect(await second.page.isHidden('#again')).toBe(true);
   for (let i = 0; i < 3; i++) {
     await second.page.keyboard.press('Tab'); // behind the overlay nothing can be reached
-    expect(await focused(second)).toMatch(/^(again)?$/);
+    expect(await focused(second)).toMatch(/^(check)?$/);
   }
+  await second.page.evaluate(() => window.record!.sockets.at(-1)!.close(4000)); // a short drop
+  await until(second, ({ received }) => received.filter(({ type }) => type === 'place').length >= 2, 30_000);
+  const places = (await readRecord(second.page)).received.filter(({ type }) => type === 'place');
+  expect(new Set(places.map(({ session }) => session)).size).toBe(1);
+  await first.page.evaluate((asking) => clearInterval(asking), asking);
 
   await says(first, IDLE);
-  expect(await first.page.textContent('#again')).toBe('Try again');
+  expect(await first.page.textContent('#again')).toBe('Talk again');
   expect(await focused(first)).toBe('again');
   expect(await first.page.isHidden('#overlay-wait')).toBe(true); // nobody may be there
   expect(await pressed(first)).toBe('false');
@@ -90,7 +94,7 @@ test('whoever falls silent makes room; who waits for a place gets it, and both m
   await until(second, ({ received }) => received.some(({ text }) => text === 'I am Stella.'), 30_000);
 
   await first.page.keyboard.press('Enter');
-  await says(first, FULL);
+  await says(first, QUEUED);
   await says(second, IDLE);
   await goes(first);
   expect(await pressed(first)).toBe('false');

@@ -1,7 +1,6 @@
 // Written by `python -m ico3d.chat.generating`. Edit src/ico3d/chat/wire/protocol.py instead.
-import { floatFromHalf } from "./half.ts";
 
-export const VERSION = 5;
+export const VERSION = 6;
 export const MICROPHONE_RATE = 16000; // Hz
 export const MICROPHONE_CHUNK = 512; // samples of a message
 export const SPEECH_RATE = 24000; // Hz
@@ -12,6 +11,16 @@ export const MAX_RATE = 100; // messages per second
 export const MAX_BURST = 200; // messages
 export const RESUME_SECONDS = 30;
 export const MAX_AHEAD_SECONDS = 2;
+
+/** A matrix in row order. */
+export interface Matrix {
+  rows: number;
+  columns: number;
+  values: Float32Array;
+}
+
+/** An array in the payload of a binary message. */
+export type Tensor = readonly [field: string, kind: "int16" | "float16"];
 
 /** One of the three services that make the conversation. */
 export interface Service {
@@ -80,7 +89,7 @@ export interface HelloMessage {
   type: "hello";
   /** Protocol version of the page. */
   version: number;
-  /** Id of the session to resume after a lost connection; null for a new one. */
+  /** Id of the session or place in the queue to go on with; null for a new session. */
   session: string | null;
   /** `index` of the last speech message that arrived; -1 for a new session. */
   last_index: number;
@@ -168,6 +177,17 @@ export interface WelcomeMessage {
   dictation: Dictation | null;
   /** Services to choose from; empty where strangers may be talking. */
   offers: Offer[];
+}
+
+/** All places are taken: the page is in a queue, and `welcome` follows when it is its turn. */
+export interface PlaceMessage {
+  type: "place";
+  /** Id by which the page takes its place in the queue again after a lost connection. */
+  session: string;
+  /** Position in the queue; 1 is the front. */
+  position: number;
+  /** Estimate of the time until it is this page's turn; null if nothing is known. */
+  seconds: number | null;
 }
 
 /** Number of binary frames of this connection that have arrived, whether used or not. Neither page nor browser can otherwise tell what a network still holds. A page sends sound only slightly ahead of what is acknowledged, so that no old sound arrives after a stall. */
@@ -303,6 +323,7 @@ export type ClientMessage =
 
 export type ServerMessage =
   | WelcomeMessage
+  | PlaceMessage
   | AckMessage
   | StateMessage
   | TranscriptMessage
@@ -317,82 +338,10 @@ export type ServerMessage =
   | MetricsMessage
   | ErrorMessage;
 
-const SERVER_TYPES = ["welcome", "ack", "state", "transcript", "answer", "speech", "timeline", "cues", "end", "stop", "pause", "resume", "metrics", "error"];
+export const SERVER_TYPES = ["welcome", "place", "ack", "state", "transcript", "answer", "speech", "timeline", "cues", "end", "stop", "pause", "resume", "metrics", "error"];
 
-const TENSORS: Record<string, readonly Tensor[]> = {
+/** The arrays of binary messages, in order. */
+export const TENSORS: Record<string, readonly Tensor[]> = {
   audio: [["pcm", "int16"]],
   speech: [["pcm", "int16"], ["expressions", "float16"]],
 };
-
-/** A matrix in row order. */
-export interface Matrix {
-  rows: number;
-  columns: number;
-  values: Float32Array;
-}
-
-/** What is done with each of some messages: the compiler misses none. */
-export type Handlers<M extends ServerMessage> = {
-  [Type in M["type"]]: (message: Extract<M, { type: Type }>) => void;
-};
-
-/** Does what there is to be done with a message. */
-export function handle<M extends ServerMessage>(message: M, handlers: Handlers<M>): void {
-  (handlers[message.type as M["type"]] as (message: M) => void)(message);
-}
-
-type Header = { type: string } & Record<string, unknown>;
-type Tensor = readonly [field: string, kind: "int16" | "float16"];
-
-/** A message as a WebSocket frame. */
-export function encode(message: ClientMessage): string | ArrayBuffer {
-  const header: Header = { ...message };
-  const tensors = TENSORS[message.type];
-  if (!tensors) return JSON.stringify(header);
-  const parts: Int16Array[] = [];
-  for (const [field] of tensors) {
-    const values = header[field] as Int16Array;
-    parts.push(values);
-    header[field] = [values.length];
-  }
-  return joinFrame(new TextEncoder().encode(JSON.stringify(header)), parts);
-}
-
-function joinFrame(header: Uint8Array, parts: Int16Array[]): ArrayBuffer {
-  const length = parts.reduce((sum, part) => sum + part.byteLength, 4 + header.byteLength);
-  const frame = new Uint8Array(length);
-  new DataView(frame.buffer).setUint32(0, header.byteLength, true);
-  frame.set(header, 4);
-  let at = 4 + header.byteLength;
-  for (const part of parts) {
-    frame.set(new Uint8Array(part.buffer, part.byteOffset, part.byteLength), at);
-    at += part.byteLength;
-  }
-  return frame.buffer;
-}
-
-/** A frame as a message; throws an Error on one that is not from this protocol. */
-export function decode(frame: string | ArrayBuffer): ServerMessage {
-  if (typeof frame === "string") return known(JSON.parse(frame) as Header);
-  const length = new DataView(frame).getUint32(0, true);
-  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(frame, 4, length))) as Header;
-  let at = 4 + length;
-  for (const [field, kind] of TENSORS[header.type] ?? []) {
-    const shape = header[field] as number[];
-    const bytes = 2 * shape.reduce((product, size) => product * size, 1);
-    const words = new Uint16Array(frame.slice(at, at + bytes));
-    header[field] = kind === "int16" ? new Int16Array(words.buffer) : matrix(shape, words);
-    at += bytes;
-  }
-  return known(header);
-}
-
-function known(header: Header): ServerMessage {
-  if (!SERVER_TYPES.includes(header.type)) throw new Error(`unknown message ${header.type}`);
-  return header as unknown as ServerMessage;
-}
-
-function matrix(shape: number[], words: Uint16Array): Matrix {
-  const [rows = 0, columns = 0] = shape;
-  return { rows, columns, values: Float32Array.from(words, floatFromHalf) };
-}

@@ -1,14 +1,28 @@
 """Sessions: resume after a drop, no leaks, no more than there is room for."""
 
 import asyncio
+import contextlib
 import threading
 from dataclasses import replace
+from unittest import mock
 
 import pytest
 from websockets.asyncio.client import connect
 
+from ico3d.chat.serving.sessions import FULL
 from ico3d.chat.wire.codec import decode_server, encode
-from ico3d.chat.wire.protocol import VERSION, Answer, Error, Hello, Speech, State, Stop, Text
+from ico3d.chat.wire.protocol import (
+    VERSION,
+    Answer,
+    Error,
+    Hello,
+    Place,
+    Speech,
+    State,
+    Stop,
+    Text,
+    Welcome,
+)
 from ico3d.measure.talking.page import open_page
 from support.chat.serving import TYPED, serving
 
@@ -123,26 +137,42 @@ async def test_an_expired_session_starts_anew(bundle):
         await again.close()
 
 
-async def refusal(url, session=None):
-    """What a page is told that finds no place, and the code that closes its connection."""
-    async with connect(url.replace("http", "ws") + "ws") as wire:
-        await wire.send(encode(Hello(VERSION, session, -1)))
-        error = decode_server(await asyncio.wait_for(wire.recv(), 10))
-        await wire.wait_closed()
-    assert isinstance(error, Error) and error.fatal and error.again
-    return error.message, wire.close_code
+@contextlib.asynccontextmanager
+async def wire(url, session=None):
+    """A connection that has said hello."""
+    async with connect(url.replace("http", "ws") + "ws") as socket:
+        await socket.send(encode(Hello(VERSION, session, -1)))
+        yield socket
+
+
+async def told(socket):
+    """The next message."""
+    return decode_server(await asyncio.wait_for(socket.recv(), 40))
+
+
+async def placed(socket, position):
+    """The message that tells a page this position in the queue."""
+    while not isinstance(place := await told(socket), Place) or place.position != position:
+        pass
+    return place
+
+
+async def admitted(socket):
+    """The message that ends the wait in the queue."""
+    while isinstance(message := await told(socket), Place):
+        pass
+    assert isinstance(message, Welcome) and not message.resumed
+    return message
 
 
 async def test_a_dropped_visitor_keeps_his_place(bundle):
     async with serving(bundle, replace(TYPED, max_sessions=2)) as (url, sessions):
         (first, welcome), (second, _) = [await open_page(url, microphone=False) for _ in "12"]
-        assert await refusal(url) == ("all places are taken: try again in a minute.", 1013)
         await dropped(first)
-        await asyncio.sleep(0.2)
-        for _ in range(3):
-            assert (await refusal(url))[1] == 1013
-        again, resumed = await open_page(url, welcome.session, -1, microphone=False)
-        assert resumed.resumed and len(sessions) == 2
+        async with wire(url) as other:
+            assert await told(other) == Place(mock.ANY, 1, None)
+            again, resumed = await open_page(url, welcome.session, -1, microphone=False)
+            assert resumed.resumed and len(sessions) == 2
         await asyncio.gather(again.close(), second.close())
 
 
@@ -153,13 +183,65 @@ async def test_a_place_is_kept_for_so_long_and_then_given_away(bundle):
         await dropped(page)
         await emptied(sessions)
         other, _ = await open_page(url, microphone=False)
-        message, code = await refusal(url, welcome.session)
-        assert "kept for 0.3 s and then given away" in message and code == 1013
-        await other.close()
-        await emptied(sessions)
-        again, begun = await open_page(url, welcome.session, -1, microphone=False)
-        assert not begun.resumed
-        await again.close()
+        async with wire(url, welcome.session) as late:
+            assert (await told(late)).position == 1  # like everybody else
+            await other._socket.close(1000)
+            await other.close()
+            begun = await told(late)
+            assert isinstance(begun, Welcome) and not begun.resumed
+
+
+async def test_visitors_of_a_full_house_wait_in_order_and_join_by_themselves(bundle):
+    async with serving(bundle, replace(TYPED, max_sessions=1)) as (url, sessions):
+        page, _ = await open_page(url, microphone=False)
+        await asyncio.sleep(60)
+        async with wire(url) as second:
+            place = await told(second)
+            assert place.position == 1 and place.seconds is None
+            async with wire(url) as third, wire(url) as fourth:
+                assert (await placed(third, 2)).session != place.session
+                await placed(fourth, 3)
+                third.transport.abort()
+                await page._socket.close(1000)
+                await page.close()
+                assert (await admitted(second)).session == place.session
+                estimate = await placed(fourth, 2)  # the third one is only away
+                assert estimate.seconds == pytest.approx(120, abs=3)
+        async with asyncio.timeout(5):
+            while len(sessions.line) > 1:  # who closed the page is forgotten at once
+                await asyncio.sleep(0.02)
+
+
+async def test_a_dropped_page_takes_its_place_in_the_queue_again(bundle):
+    async with serving(bundle, replace(TYPED, max_sessions=1)) as (url, _):
+        page, _ = await open_page(url, microphone=False)
+        async with wire(url) as first, wire(url) as last:
+            place = await told(first)
+            await placed(last, 2)
+            first.transport.abort()
+            await asyncio.sleep(20)
+            async with wire(url, place.session) as again:
+                assert (await told(again)).session == place.session
+                await page._socket.close(1000)
+                await page.close()
+                assert (await admitted(again)).session == place.session
+                await placed(last, 1)
+
+
+async def test_the_queue_has_an_end(bundle):
+    async with serving(bundle, replace(TYPED, max_sessions=1)) as (url, sessions):
+        page, _ = await open_page(url, microphone=False)
+        sessions.line._most = 1
+        async with wire(url) as first, wire(url) as second:
+            await told(first)
+            assert await told(second) == Error(FULL, fatal=True, again=True)
+            await second.wait_closed()
+            assert second.close_code == 1013
+            await first.send(encode(Text("is it my turn?")))  # who waits has nothing to say
+            while isinstance(message := await told(first), Place):
+                pass
+            assert isinstance(message, Error) and message.fatal and len(sessions.line) == 0
+        await page.close()
 
 
 async def test_who_leaves_makes_room_at_once(bundle):

@@ -25,8 +25,8 @@ class Guest:
 
     @classmethod
     async def enter(cls, sessions, hello=None):
-        outbox = Outbox()
-        session, resumed = await sessions.enter(hello or Hello(VERSION, None, -1), outbox)
+        outbox, hello = Outbox(), hello or Hello(VERSION, None, -1)
+        session, resumed = await sessions.enter(hello, outbox, sessions.line_up(hello))
         if not resumed:
             await session.conversation.greet()
         return cls(sessions, session, outbox)

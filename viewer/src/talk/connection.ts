@@ -1,21 +1,21 @@
 import {
-  decode,
-  encode,
   RESUME_SECONDS,
   VERSION,
   type AckMessage,
   type ClientMessage,
   type ErrorMessage,
+  type PlaceMessage,
   type ServerMessage,
   type WelcomeMessage,
 } from '../protocol.ts';
 import { SoundQueue } from './sound-queue.ts';
+import { decode, encode } from './wire.ts';
 
 const FIRST_RETRY = 300; // ms; the next waits are twice as long each
 const LONGEST_RETRY = 5000; // while the session may still be resumed
-const FIRST_VISIT = 5000; // ms until a full server is asked again
+const FIRST_VISIT = 5000; // ms until a server whose queue is full is asked again
 const LONGEST_VISIT = 60_000;
-const FULL = 1013; // close code
+const FULL = 1013; // close code: the queue is full, too
 const UNREACHABLE = 'The connection to the server was lost.';
 
 /** The session is over. */
@@ -28,7 +28,7 @@ export interface Ending {
 }
 
 /** What the server says once the line is up: all but what keeps the line itself. */
-export type SessionMessage = Exclude<ServerMessage, WelcomeMessage | AckMessage>;
+export type SessionMessage = Exclude<ServerMessage, WelcomeMessage | PlaceMessage | AckMessage>;
 
 /** What a connection tells its owner. */
 export interface ConnectionEvents {
@@ -42,6 +42,8 @@ export interface ConnectionEvents {
   welcome(message: WelcomeMessage, replaced: boolean): void;
   /** The line is down; the session is resumed as soon as it is up again. */
   lost(): void;
+  /** All places are taken; the server keeps one in a queue, and the line stays up for it. */
+  queued(place: PlaceMessage): void;
   /** The line loses sound, or carries it again. */
   stalled(stalls: boolean): void;
   ended(ending: Ending): void;
@@ -51,6 +53,7 @@ export interface ConnectionEvents {
 export class Connection {
   private socket: WebSocket | null = null;
   private session: string | null = null;
+  private place: string | null = null; // in the queue, until the session begins
   private lastIndex = -1;
   private wishes: Record<string, string> = {};
   private wait = 0; // before the latest retry, ms
@@ -77,7 +80,8 @@ export class Connection {
     const socket = new WebSocket(this.url);
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => {
-      const { session, lastIndex: last_index, wishes } = this;
+      const { lastIndex: last_index, wishes } = this;
+      const session = this.place ?? this.session;
       socket.send(encode({ type: 'hello', version: VERSION, session, last_index, wishes }));
     };
     socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.receive(event.data);
@@ -113,6 +117,7 @@ export class Connection {
   private receive(frame: string | ArrayBuffer): void {
     const message = decode(frame);
     if (message.type === 'welcome') this.welcome(message);
+    else if (message.type === 'place') this.queue(message);
     else if (message.type === 'ack') this.sound.acknowledge(message.frames);
     else if (message.type === 'error' && message.fatal) this.hangUp(message);
     else if (message.type !== 'speech') this.events.message(message);
@@ -127,14 +132,23 @@ export class Connection {
       const sentence = 'The server speaks another version of the protocol.';
       return this.hangUp({ type: 'error', message: sentence, fatal: true, again: false });
     }
-    const replaced = this.session !== null && !message.resumed;
+    const replaced = this.session !== null && this.session !== message.session;
     this.session = message.session;
+    this.place = null;
     if (!message.resumed) this.lastIndex = -1;
     this.wait = 0;
     this.over = false;
     this.sound.reset();
     this.welcomed = true;
     this.events.welcome(message, replaced);
+  }
+
+  private queue(place: PlaceMessage): void {
+    this.place = place.session;
+    this.lastIndex = -1;
+    this.wait = 0;
+    this.over = false;
+    this.events.queued(place);
   }
 
   /** The session ends when the socket has closed: its code tells more. */
@@ -146,7 +160,7 @@ export class Connection {
 
   private closed(code: number): void {
     const now = performance.now();
-    if (this.welcomed) this.lastUp = now;
+    if (this.welcomed || (this.place !== null && this.wait === 0)) this.lastUp = now;
     this.welcomed = false;
     this.socket = null;
     if (this.fatal) this.end(this.fatal, code === FULL);
@@ -168,7 +182,7 @@ export class Connection {
   }
 
   private forget(): void {
-    this.session = null;
+    this.session = this.place = null;
     this.lastIndex = -1;
   }
 

@@ -1,8 +1,9 @@
 import { Player } from '../audio/player.ts';
-import { handle, type Cue, type Handlers, type Offer, type Release, type Services, type StateMessage, type WelcomeMessage } from '../protocol.ts';
+import type { Cue, Offer, PlaceMessage, Release, Services, StateMessage, WelcomeMessage } from '../protocol.ts';
 import { Connection, type Ending, type SessionMessage } from './connection.ts';
 import { TurnTimer } from './latency.ts';
 import { VoiceInput, type VoiceView } from './voice-input.ts';
+import { handle, type Handlers } from './wire.ts';
 
 /** Who moves the body while it speaks. */
 export interface Gestures {
@@ -31,12 +32,14 @@ const REPLACED = 'The conversation of before is over; a new one begins.';
 
 /** What the page shows of a conversation. */
 export interface ConversationView extends VoiceView {
-  state(state: StateMessage['state'] | 'connecting' | 'ended'): void;
+  state(state: StateMessage['state'] | 'connecting' | 'queued' | 'ended'): void;
   question(text: string, final: boolean): void;
   answer(sentence: string): void;
   services(services: Services, offers: readonly Offer[]): void;
   latency(milliseconds: number): void;
   metrics(name: string, values: Record<string, number>): void;
+  /** The visitor waits in the server's queue. */
+  queued(place: PlaceMessage): void;
   /** A session has begun or goes on. */
   connected(): void;
   ended(ending: Ending): void;
@@ -81,6 +84,7 @@ export class Conversation {
     this.connection = new Connection(url, {
       message: (message) => handle(message, this.handlers),
       welcome: (message, replaced) => this.welcome(message, replaced),
+      queued: (place) => this.queued(place),
       lost: () => view.state('connecting'),
       stalled: (stalls) => this.stalled(stalls),
       ended: (ending) => this.ended(ending),
@@ -156,6 +160,13 @@ export class Conversation {
     this.view.services(message.services, message.offers);
     this.show('idle');
     for (const notice of message.notices) this.view.notice(notice);
+  }
+
+  private queued(place: PlaceMessage): void {
+    this.voice.end(); // a session of before is over, and nobody listens yet
+    this.silence();
+    this.view.state('queued');
+    this.view.queued(place);
   }
 
   private stalled(stalls: boolean): void {

@@ -1,6 +1,8 @@
 import { atEnd } from '../lifetime.ts';
+import type { PlaceMessage } from '../protocol.ts';
 import type { Ending } from '../talk/connection.ts';
 import { byId } from './elements.ts';
+import { inWords } from './queue.ts';
 
 /** How the visitor wants to talk. */
 export type Choice = 'voice' | 'typing';
@@ -12,6 +14,7 @@ export class Overlay {
   private readonly bar: HTMLProgressElement;
   private readonly thumbnail: HTMLImageElement;
   private readonly waiting: HTMLElement;
+  private readonly button: HTMLButtonElement;
   private readonly reload: () => void;
   private counting: ReturnType<typeof setTimeout> | undefined;
 
@@ -25,6 +28,7 @@ export class Overlay {
     this.bar = byId(page, 'progress');
     this.thumbnail = byId(page, 'thumbnail');
     this.waiting = byId(page, 'overlay-wait');
+    this.button = byId(page, 'again');
     this.reload = reload;
     atEnd(signal, () => clearTimeout(this.counting));
   }
@@ -72,26 +76,39 @@ export class Overlay {
    */
   end({ sentence, again: mayBegin, wait }: Ending, again: () => void): void {
     if (!mayBegin) return this.fail(sentence);
-    this.say(sentence, 'Try again', () => {
+    this.say(sentence, wait === null ? 'Talk again' : 'Try again', () => {
       this.count(0);
       again();
     });
     if (wait !== null) this.count(Math.round(wait / 1000));
   }
 
+  /** All places are taken: the visitor waits, and the talk begins by itself. */
+  queue(place: PlaceMessage): void {
+    this.show(inWords(place));
+    this.button.hidden = true;
+    this.waiting.hidden = false;
+    this.waiting.textContent = 'All places are taken. Leave this page open: it goes on by itself.';
+  }
+
   private say(sentence: string, label: string, act: () => void): void {
+    this.show(sentence);
+    this.waiting.hidden = true;
+    this.button.textContent = label;
+    this.button.onclick = act;
+    this.button.hidden = false;
+    this.button.focus();
+  }
+
+  /** Covers the page with a sentence. */
+  private show(sentence: string): void {
     this.bar.hidden = byId(this.root, 'choices').hidden = true;
     const text = byId(this.root, 'overlay-error');
     if (text.textContent !== sentence) text.textContent = sentence; // what is said again need not be read aloud again
-    const button = byId<HTMLButtonElement>(this.root, 'again');
-    button.textContent = label;
-    button.onclick = act;
-    text.hidden = button.hidden = false;
+    text.hidden = byId(this.root, 'check').hidden = false;
     clearTimeout(this.counting);
-    this.waiting.hidden = true;
     this.root.classList.remove('gone');
     this.cover(true);
-    button.focus();
   }
 
   /** Shows the seconds until the next try; at 0 it is made. */

@@ -15,6 +15,7 @@ const STATES = {
   listening: 'Listening',
   thinking: 'Thinking',
   speaking: 'Speaking',
+  queued: 'Waiting for a place',
   ended: 'Ended',
 } as const;
 
@@ -56,6 +57,7 @@ export function makePage(root: HTMLElement, overlay: Overlay, frames: () => numb
     talking: (held) => controls.setTalking(held),
     latency: (milliseconds) => panel.latency(milliseconds),
     metrics: (name, values) => panel.metrics(name, values),
+    queued: (place) => overlay.queue(place),
     connected: () => overlay.isShown && (overlay.hide(), controls.focus()),
     ended: (ending) => overlay.end(ending, () => again()),
   };

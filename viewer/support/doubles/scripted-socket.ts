@@ -36,9 +36,15 @@ export class ScriptedSocket {
     this.onmessage!({ data: JSON.stringify(message) });
   }
 
+  /** Opens, if it has not, and gets a place in the queue. */
+  queue(position: number, seconds: number | null): void {
+    if (this.of('hello').length === 0) this.onopen!();
+    this.says({ type: 'place', session: 'place', position, seconds });
+  }
+
   /** Opens and is welcomed. */
   welcome(more: Record<string, unknown> = {}): void {
-    this.onopen!();
+    if (this.of('hello').length === 0) this.onopen!();
     const name = { name: 'scripted', stand_in: false };
     const services = { recognition: name, language: name, voice: name };
     const welcome = { type: 'welcome', version: VERSION, session: 'first', resumed: false, services, notices: [], dictation: null, offers: [] };

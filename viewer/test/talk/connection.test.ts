@@ -2,7 +2,7 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 import { Connection, type ConnectionEvents, type Ending } from '../../src/talk/connection.ts';
 import { ScriptedSocket } from '../../support/doubles/scripted-socket.ts';
 
-const FULL = 'all places are taken: try again in a minute.';
+const FULL = 'all places are taken, and so are those in the queue: try again in a minute.';
 
 beforeEach(() => {
   vi.useFakeTimers({ now: 0, toFake: ['setTimeout', 'clearTimeout', 'performance'] });
@@ -21,6 +21,7 @@ function connect() {
     message: () => {},
     welcome: ({ resumed }, replaced) => told.push(`welcome, resumed ${resumed}, replaced ${replaced}`),
     lost: () => told.push('lost'),
+    queued: ({ position, seconds }) => told.push(`place ${position}, ${seconds} s`),
     stalled: () => {},
     ended: (ending) => endings.push(ending),
   };
@@ -39,7 +40,7 @@ function nextTry(): number | null {
   return performance.now() - began;
 }
 
-test('a full server is asked again, less and less often, until there is a place', () => {
+test('a server whose queue is full is asked again, less and less often, until there is a place', () => {
   const { connection, endings, told } = connect();
   for (const wait of [5000, 10_000, 20_000, 40_000, 60_000, 60_000]) {
     ScriptedSocket.last.hangUp(FULL, 1013, true);
@@ -143,4 +144,52 @@ test('other services mean another session, which replaces none', () => {
   ScriptedSocket.last.welcome({ session: 'second' });
   expect(ScriptedSocket.last.of('hello')).toMatchObject([{ session: null, wishes: { voice: 'kokoro' } }]);
   expect(told.at(-1)).toBe('welcome, resumed false, replaced false');
+});
+
+test('who has a place in the queue joins by himself, and keeps it through a drop', () => {
+  const { connection, endings, told } = connect();
+  ScriptedSocket.last.queue(2, null);
+  expect(connection.send({ type: 'text', text: 'Is it my turn?' })).toBe(false);
+  vi.advanceTimersByTime(600_000); // others talk for long
+  ScriptedSocket.last.queue(1, 30);
+  for (const wait of [300, 600, 1200]) {
+    ScriptedSocket.last.drop();
+    expect(nextTry()).toBe(wait);
+  }
+  ScriptedSocket.last.queue(1, 20);
+  expect(ScriptedSocket.last.of('hello')).toMatchObject([{ session: 'place', last_index: -1 }]);
+  ScriptedSocket.last.welcome({ session: 'place' });
+  expect(connection.send({ type: 'text', text: 'At last!' })).toBe(true);
+  expect(endings).toEqual([]);
+  expect(told).toEqual(['place 2, null s', 'place 1, 30 s', 'lost', 'lost', 'lost', 'place 1, 20 s', 'welcome, resumed false, replaced false']);
+  ScriptedSocket.last.drop();
+  nextTry();
+  ScriptedSocket.last.welcome({ session: 'place', resumed: true });
+  expect(ScriptedSocket.last.of('hello')).toMatchObject([{ session: 'place' }]);
+});
+
+test('whose session is lost while all places are taken waits, and is told that another one begins', () => {
+  const { told } = connect();
+  ScriptedSocket.last.welcome();
+  ScriptedSocket.last.drop();
+  nextTry();
+  ScriptedSocket.last.queue(1, null);
+  ScriptedSocket.last.welcome({ session: 'place' });
+  expect(told.at(-1)).toBe('welcome, resumed false, replaced true');
+});
+
+test('a place in the queue that the server has forgotten is no reason to give up', () => {
+  const { endings } = connect();
+  ScriptedSocket.last.queue(3, null);
+  for (let waited = 0; endings.length === 0; ) {
+    ScriptedSocket.last.drop();
+    if (endings.length === 0) waited += nextTry()!;
+    expect(waited).toBeLessThan(60_000);
+  }
+  expect(endings).toEqual([{ sentence: 'The connection to the server was lost.', again: true, wait: 10_000 }]);
+  nextTry();
+  ScriptedSocket.last.queue(5, null);
+  expect(ScriptedSocket.last.of('hello')).toMatchObject([{ session: null }]);
+  ScriptedSocket.last.drop();
+  expect(nextTry()).toBe(300);
 });

@@ -31,7 +31,7 @@ class Talk {
       welcome: nothing,
       lost: nothing,
       ended: nothing,
-      stalled: (stalls) => this.stalls.push([performance.now(), stalls]),
+      queued: () => {}, stalled: (stalls) => this.stalls.push([performance.now(), stalls]),
     });
     this.connection.open();
     ScriptedSocket.last.welcome();

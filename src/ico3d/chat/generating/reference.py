@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ico3d.chat.serving import connection, limits
+from ico3d.chat.serving import connection, limits, waiting
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import tensors_of
 from ico3d.chat.wire.marks import Length, Range
@@ -41,7 +41,7 @@ def values() -> dict[str, Any]:
     """Replacements for the names in the prose."""
     constants = {
         name: f"{value:,}" if isinstance(value, int) else f"{value:g}"
-        for module in (connection, limits, protocol)
+        for module in (connection, limits, waiting, protocol)
         for name, value in vars(module).items()
         if name.isupper() and isinstance(value, int | float)
     }

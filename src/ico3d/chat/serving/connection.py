@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+from asyncio import FIRST_COMPLETED
 
 from fastapi import WebSocket, WebSocketDisconnect
 from loguru import logger
@@ -9,7 +10,8 @@ from loguru import logger
 from ico3d.chat.observing.failures import cause
 from ico3d.chat.page import Outbox
 from ico3d.chat.serving.limits import ConnectionLimits, Inlet
-from ico3d.chat.serving.sessions import BROKEN_OFF, FullError, Session, Sessions
+from ico3d.chat.serving.sessions import BROKEN_OFF, FULL, Session, Sessions
+from ico3d.chat.serving.waiting import FullError, Ticket
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import OversizedError, decode_client, encode
 from ico3d.chat.wire.protocol import Ack, Error, Hello, Welcome
@@ -18,6 +20,7 @@ from ico3d.errors import Ico3dError, ProtocolError
 HELLO_SECONDS = 10  # that a page may take to say hello
 GOING, BROKEN, TOO_BIG, FAILED, BUSY = 1000, 1008, 1009, 1011, 1013  # WebSocket close codes
 GONE = (1000, 1001)  # what pages send that will not come back: the visitor left, or loads it anew
+REFRESH = 15.0  # s after which a waiting page is told a new estimate
 UNREADY = "the avatar cannot talk now: something on the server does not start. Try again later."
 
 
@@ -77,16 +80,51 @@ class Connection:
 
     async def _enter(self, hello: Hello) -> tuple[Session, bool]:
         """The page's session, or a sentence on why there is none."""
+        ticket = await self._admission(hello)
         try:
-            return await self._sessions.enter(hello, self._outbox)
-        except FullError as error:
-            self._sessions.monitor.failed("full")
-            raise Hangup(BUSY, str(error), again=True) from error
+            return await self._sessions.enter(hello, self._outbox, ticket)
         except Exception as error:
             own = isinstance(error, Ico3dError)
             self._sessions.monitor.failed("start", str(error) if own else cause(error))
             told = str(error) if own and self._sessions.at_home else UNREADY
             raise Hangup(FAILED, told, again=True) from error
+
+    async def _admission(self, hello: Hello) -> Ticket | None:
+        """Waits in the queue until there is a place; the ticket is None for a resumed session."""
+        try:
+            ticket = self._sessions.line_up(hello)
+        except FullError as error:
+            self._sessions.monitor.failed("full")
+            raise Hangup(BUSY, FULL, again=True) from error
+        if ticket is None:
+            return None
+        try:
+            await self._wait(ticket)
+        except BaseException as error:
+            left = isinstance(error, WebSocketDisconnect) and error.code in GONE
+            self._sessions.line.leave(ticket, left or isinstance(error, Hangup))
+            raise
+        return ticket
+
+    async def _wait(self, ticket: Ticket) -> None:
+        """Tells the page its place in the queue until it is its turn; it has nothing to say."""
+        if ticket.admitted:
+            return
+        spoken = asyncio.create_task(self._receive())
+        try:
+            while not ticket.admitted:
+                await self._socket.send_text(str(encode(self._sessions.place(ticket))))
+                moved = asyncio.create_task(ticket.changed.wait())
+                await asyncio.wait({spoken, moved}, timeout=REFRESH, return_when=FIRST_COMPLETED)
+                moved.cancel()
+                ticket.changed.clear()
+                if ticket.replaced:
+                    raise Hangup(GOING, "the page has another connection.", again=True)
+                if spoken.done():
+                    spoken.result()
+                    raise Hangup(BROKEN, "a page that waits for its turn sends nothing.")
+        finally:
+            spoken.cancel()
 
     async def _hello(self) -> Hello:
         try:

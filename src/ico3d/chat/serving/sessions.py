@@ -11,28 +11,25 @@ from ico3d.chat.page import Outbox, Page
 from ico3d.chat.parts import Avatar, Parts
 from ico3d.chat.services.offers import wished
 from ico3d.chat.serving.freeing import give_back
-from ico3d.chat.wire.protocol import RESUME_SECONDS, Error, Hello, Offer
+from ico3d.chat.serving.waiting import Stays, Ticket, WaitingLine
+from ico3d.chat.wire.protocol import RESUME_SECONDS, Error, Hello, Offer, Place
 from ico3d.errors import ServiceError
 
 IDLE = "Nothing was said for {:g} min, so this conversation has ended."
 BROKEN_OFF = "The conversation broke off because of a fault in the server."
-FULL = "all places are taken: try again in a minute."
-LATE = "your place was kept for {:g} s and then given away, and all places are taken: " + (
-    "try again in a minute."
-)
+FULL = "all places are taken, and so are those in the queue: try again in a minute."
 STARTING = 30.0  # s that a conversation may take to start: a model may be loaded, a server asked
-
-
-class FullError(Exception):
-    """The server has as many visitors as it accepts; the sentence is for the page."""
 
 
 class Session:
     """One visitor: a page and a conversation, separate from all others."""
 
-    def __init__(self, avatar: Avatar, visitor: Visitor, ended: Callable[["Session"], None]):
+    def __init__(
+        self, id: str, avatar: Avatar, visitor: Visitor, ended: Callable[["Session"], None]
+    ):
         """Creates a session; `ended` is called if its conversation breaks off."""
-        self.id = secrets.token_urlsafe(16)
+        self.id = id
+        self.began = asyncio.get_running_loop().time()
         self.page = Page()
         seed = secrets.randbits(32)  # no two visitors see the same blinks and gestures
         self.conversation = Conversation(avatar, self.page, visitor, lambda: ended(self), seed)
@@ -68,31 +65,61 @@ class Sessions:
         self.monitor = monitor or Monitor()
         self._open: dict[str, Session] = {}
         self._closing: set[asyncio.Task] = set()
+        self.line = WaitingLine(self._free, kept=resume_seconds)
+        """Visitors for whom there is no place yet."""
+        self._stays = Stays()
 
     def __len__(self) -> int:
         """Visitors at this moment, those included that may come back."""
         return len(self._open)
 
-    async def enter(self, hello: Hello, outbox: Outbox) -> tuple[Session, bool]:
-        """Resumes a session or opens a new one; `outbox` receives its messages.
+    def line_up(self, hello: Hello) -> Ticket | None:
+        """Puts a page in the queue, which it passes at once while there are places.
+
+        Returns:
+            Its ticket; None if the page has a session, which needs no new place.
+
+        Raises:
+            FullError: If the queue is full; sessions whose page is away count as taken places.
+        """
+        if self._resumable(hello):
+            return None
+        return self.line.join(hello.session)
+
+    def place(self, ticket: Ticket) -> Place:
+        """What a waiting page is told."""
+        now = asyncio.get_running_loop().time()
+        position = self.line.position(ticket)
+        stays = [now - session.began for session in self._open.values()]
+        return Place(ticket.id, position, self._stays.until_free(position, stays))
+
+    async def enter(
+        self, hello: Hello, outbox: Outbox, ticket: Ticket | None
+    ) -> tuple[Session, bool]:
+        """Resumes a session or, with an admitted ticket, opens a new one.
+
+        Args:
+            hello: The page's first message.
+            outbox: Receives the messages of the session.
+            ticket: What `line_up` returned.
 
         Returns:
             The session, and whether it was resumed.
 
         Raises:
-            FullError: If there is no room; sessions whose page is away count, too.
             Ico3dError: If the conversation does not start, or not in time.
         """
-        session = self._open.get(hello.session or "")
-        if session is not None and session.parts is not None:
+        if ticket is None:
+            session = self._open[hello.session or ""]
             self._cancel_expiry(session)
             session.page.attach(outbox)
             session.page.replay(hello.last_index)  # before anything new can get in between
             session.conversation.release()
             return session, True
-        if len(self._open) >= self._avatar.settings.max_sessions:
-            raise FullError(LATE.format(self._resume_seconds) if hello.session else FULL)
-        return await self._begin(hello, outbox), False
+        try:
+            return await self._begin(hello, outbox, ticket), False
+        finally:
+            self.line.leave(ticket)  # if it did not even begin
 
     def leave(self, session: Session, outbox: Outbox, for_good: bool = False) -> None:
         """Handles a closed connection: ends the session if `for_good`, else keeps it a while."""
@@ -111,15 +138,24 @@ class Sessions:
             self._close_soon(session, "server")
         await asyncio.gather(*self._closing, return_exceptions=True)
 
+    def _resumable(self, hello: Hello) -> bool:
+        session = self._open.get(hello.session or "")
+        return session is not None and session.parts is not None
+
+    def _free(self) -> int:
+        return self._avatar.settings.max_sessions - len(self._open)
+
     def _wished(self, hello: Hello) -> Avatar:
         avatar = self._avatar
         voices = avatar.persona.voice
         services = wished(avatar.services, avatar.settings, voices, hello.wishes, self.offers)
         return replace(avatar, services=services)
 
-    async def _begin(self, hello: Hello, outbox: Outbox) -> Session:
-        session = Session(self._wished(hello), self.monitor.visitor(), self._broke_off)
+    async def _begin(self, hello: Hello, outbox: Outbox, ticket: Ticket) -> Session:
+        avatar = self._wished(hello)
+        session = Session(ticket.id, avatar, self.monitor.visitor(), self._broke_off)
         self._open[session.id] = session
+        self.line.leave(ticket)  # the session has the place that was kept for the ticket
         session.page.attach(outbox)
         try:
             async with asyncio.timeout(self._starting):
@@ -157,6 +193,8 @@ class Sessions:
         if self._open.pop(session.id, None) is None:
             return
         self.monitor.left(why)
+        self._stays.end(asyncio.get_running_loop().time() - session.began)
+        self.line.move_up()
         self._cancel_expiry(session)
         if session.idle_check is not None:
             session.idle_check.cancel()

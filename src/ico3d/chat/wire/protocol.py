@@ -24,7 +24,7 @@ from ico3d.chat.wire.marks import (
 from ico3d.chat.wire.protocol_gestures import MAX_CUES, Cue, Release
 from ico3d.chat.wire.protocol_services import Dictation, Offer, Service, Services
 
-VERSION = 5
+VERSION = 6
 MICROPHONE_RATE = 16_000  # Hz, PCM16 mono from the page
 MICROPHONE_CHUNK = 512  # samples of a message: what Silero judges at once, so that none waits
 SPEECH_RATE = 24_000  # Hz, PCM16 mono to the page
@@ -44,7 +44,7 @@ class Hello:
 
     Attributes:
         version: Protocol version of the page.
-        session: Id of the session to resume after a lost connection; null for a new one.
+        session: Id of the session or place in the queue to go on with; null for a new session.
         last_index: `index` of the last speech message that arrived; -1 for a new session.
         wishes: Services wished for in a new session: keys of offers, by kind; only offered ones are
             used.
@@ -174,6 +174,21 @@ class Welcome:
     notices: Annotated[list[Words], Length(0, 8)]
     dictation: Dictation | None
     offers: Annotated[list[Offer], Length(0, 64)] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Place:
+    """All places are taken: the page is in a queue, and `welcome` follows when it is its turn.
+
+    Attributes:
+        session: Id by which the page takes its place in the queue again after a lost connection.
+        position: Position in the queue; 1 is the front.
+        seconds: Estimate of the time until it is this page's turn; null if nothing is known.
+    """
+
+    session: Annotated[str, Length(1, 64)]
+    position: Count
+    seconds: Seconds | None
 
 
 @dataclass(frozen=True)
@@ -364,6 +379,7 @@ class Error:
 ClientMessage = Hello | Audio | Text | Interrupt | Clock | Talk | Heard | Deaf
 ServerMessage = (
     Welcome
+    | Place
     | Ack
     | State
     | Transcript
