@@ -22,6 +22,7 @@ from ico3d.chat.performing.face import open_face
 from ico3d.chat.services import choose
 from ico3d.chat.services.offers import offers
 from ico3d.chat.serving.connection import Connection
+from ico3d.chat.serving.echo import echo
 from ico3d.chat.serving.guard import LOOPBACK, Guard
 from ico3d.chat.serving.network.certificates import Certificate
 from ico3d.chat.serving.page_files import PageFiles
@@ -104,6 +105,7 @@ def make_app(
 
     if avatar is not None and sessions is not None:
         add_conversation(app, avatar, sessions)
+    app.add_api_websocket_route("/echo", echo)
     add_page(app)
     return Guard(app, host, names)
 
