@@ -11,11 +11,11 @@ export default defineConfig({
     outDir: '../src/ico3d/chat/static',
     emptyOutDir: true,
     target: 'es2023',
-    rolldownOptions: { checks: { pluginTimings: false } }, // to compress well takes its time
+    rolldownOptions: { input: ['index.html', 'check.html'], checks: { pluginTimings: false } }, // to compress well takes its time
     chunkSizeWarningLimit: 4000, // three and Spark (with its sort worker) in one file
   },
   server: {
-    proxy: { '/bundle': SERVER, '/health': SERVER, '/ws': { target: SERVER, ws: true } },
+    proxy: { '/bundle': SERVER, '/health': SERVER, '/echo': { target: SERVER, ws: true }, '/ws': { target: SERVER, ws: true } },
   },
   test: {
     globalSetup: 'support/scratch.ts',

@@ -51,6 +51,7 @@ export class Visit {
     this.server = server;
     this.ports = ports;
     this.overlay = new Overlay(root, this.ending.signal, () => ports.reload());
+    byId<HTMLAnchorElement>(root, 'check').href = server.check();
     this.run().catch((error: unknown) => this.fail(error));
   }
 

@@ -20,7 +20,7 @@ const ORDER = [
   ['body', 'stage', 'audio'],
   ['talk'],
   ['ui', 'cast.ts'],
-  ['visit.ts'],
+  ['visit.ts', 'check'],
   ['main.ts'],
 ];
 

@@ -19,7 +19,8 @@ class Serve:
 
     Attributes:
         bundle: The avatar: NAME.ico3d or its folder; `demo` is the avatar of the package.
-        host: Address to listen on; with 127.0.0.1 other machines cannot reach the server.
+        host: Address to listen on; with 127.0.0.1 other machines cannot reach the server, with
+            0.0.0.0 all can that are in the same networks.
         port: Port to listen on; 0 takes any free port.
         settings: TOML or JSON file that chooses services and timing.
         persona: TOML or JSON file that says who the avatar is; by default that of the bundle.
@@ -27,6 +28,12 @@ class Serve:
         log: File to which a line of JSON is appended for each turn, with times and counts but no
             words.
         verbose: Print all log messages, including what visitors say.
+        tls: Serve by HTTPS, as browsers demand before they give the microphone to another machine's
+            page, with a certificate that this machine makes, keeps and renews.
+        tls_cert: PEM file of a certificate to serve by HTTPS with, and of its chain.
+        tls_key: PEM file of its private key.
+        name: Host names, besides this machine's addresses, under which visitors come, such as those
+            of a proxy, a tunnel or `machine.local`.
     """
 
     bundle: Annotated[Path, tyro.conf.Positional]
@@ -37,6 +44,10 @@ class Serve:
     open: bool = False
     log: Path | None = None
     verbose: bool = False
+    tls: bool = False
+    tls_cert: Path | None = None
+    tls_key: Path | None = None
+    name: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
 
     def run(self) -> None:
         """Serves until interrupted.
@@ -52,21 +63,24 @@ class Serve:
         from ico3d.chat.parts import make_parts, warm_up
         from ico3d.chat.services.offers import offers
         from ico3d.chat.serving import server
+        from ico3d.chat.serving.network.reach import find_reach
         from ico3d.chat.serving.sessions import Sessions
         from ico3d.chat.settings.conversation import read_settings
 
         settings = read_settings(self.settings)
         persona = read_persona(self.persona) if self.persona else None
         monitor = Monitor(TurnLog.open(self.log) if self.log else None)
+        reach = find_reach(self.host, self.name, self.tls, self.tls_cert, self.tls_key)
         listener = server.bind(self.host, self.port)
         bundle = Bundle.open(self.bundle)
         avatar = server.open_avatar(bundle, settings, persona) if bundle.manifest.head else None
         sessions = Sessions(avatar, monitor=monitor) if avatar else None
         parts = make_parts(avatar) if avatar else None  # loads what they need, too
-        app = server.make_app(bundle, avatar, self.host, sessions)
-        url = server.address(listener)
+        app = server.make_app(bundle, avatar, self.host, sessions, reach.answered)
+        url = server.address(listener, reach.scheme)
         listener.listen()  # whoever reads the address and comes at once is served in a moment
         print(f"{(persona or bundle.manifest.persona).name} is at {url} (Ctrl+C ends)")
+        print("\n".join(reach.told(listener.getsockname()[1])))
         if avatar and parts:
             warm_up(parts)
             offered = offers(settings, avatar.persona.voice)
@@ -76,7 +90,7 @@ class Serve:
         sys.stdout.flush()
         if self.open:
             webbrowser.open(url)
-        server.make_server(app).run(sockets=[listener])
+        server.make_server(app, reach.certificate).run(sockets=[listener])
 
 
 @dataclass(frozen=True)

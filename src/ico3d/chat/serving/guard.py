@@ -5,6 +5,7 @@ Host. If an attacker lets a name point to this machine, that name appears in Hos
 """
 
 import ipaddress
+from collections.abc import Collection
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -40,10 +41,11 @@ HEADERS = {
 class Guard:
     """ASGI middleware: 403 for a foreign Origin or Host, security headers on every response."""
 
-    def __init__(self, app: ASGIApp, host: str):
-        """Wraps `app`, which is bound to the address `host`."""
+    def __init__(self, app: ASGIApp, host: str, names: Collection[str] = ()):
+        """Wraps `app`, which is bound to the address `host` and has further host names."""
         self._app = app
         self._host = host
+        self._names = frozenset(names)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Handles or refuses one request or WebSocket handshake."""
@@ -51,7 +53,7 @@ class Guard:
             await self._app(scope, receive, send)
             return
         headers = Headers(scope=scope)
-        if not is_own(headers.get("host"), headers.get("origin"), self._host):
+        if not is_own(headers.get("host"), headers.get("origin"), self._host, self._names):
             await self._refuse(scope, receive, send)
             return
 
@@ -71,16 +73,17 @@ class Guard:
         await PlainTextResponse(text, 403)(scope, receive, send)
 
 
-def is_own(host: str | None, origin: str | None, bound: str) -> bool:
+def is_own(host: str | None, origin: str | None, bound: str, names: Collection[str] = ()) -> bool:
     """Whether Host names this server and Origin is this server's page or missing.
 
     Args:
         host: The Host header.
         origin: The Origin header; programs other than browsers send none.
         bound: The address to which the server is bound.
+        names: Further names of the server, in lower case.
     """
     name, port = split_host(host)
-    if name is None or not is_own_name(name, bound):
+    if name is None or not (name in names or is_own_name(name, bound)):
         return False
     if origin is None:
         return True

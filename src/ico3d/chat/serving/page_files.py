@@ -34,7 +34,7 @@ class PageFiles(StaticFiles):
     """Serves a folder that Vite has built."""
 
     def __init__(self, folder: Path):
-        """Serves the files of `folder`; the path / gives `index.html`."""
+        """Serves the files of `folder`; / gives `index.html`, /NAME also `NAME.html`."""
         super().__init__(directory=folder, html=True)
         self._hashed = folder.resolve() / HASHED
 
@@ -42,7 +42,10 @@ class PageFiles(StaticFiles):
         """Finds a file; compressed variants cannot be requested by name."""
         if path.endswith(tuple(ENCODINGS.values())):
             return "", None
-        return super().lookup_path(path)
+        full, stat = super().lookup_path(path)
+        if stat is None and not Path(path).suffix:
+            return super().lookup_path(f"{path}.html")
+        return full, stat
 
     def file_response(
         self,

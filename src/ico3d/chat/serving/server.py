@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import gc
 import socket
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +22,9 @@ from ico3d.chat.performing.face import open_face
 from ico3d.chat.services import choose
 from ico3d.chat.services.offers import offers
 from ico3d.chat.serving.connection import Connection
+from ico3d.chat.serving.echo import echo
 from ico3d.chat.serving.guard import LOOPBACK, Guard
+from ico3d.chat.serving.network.certificates import Certificate
 from ico3d.chat.serving.page_files import PageFiles
 from ico3d.chat.serving.sessions import Sessions
 from ico3d.chat.settings.conversation import ChatSettings
@@ -58,7 +60,11 @@ def open_avatar(bundle: Bundle, settings: ChatSettings, persona: Persona | None 
 
 
 def make_app(
-    bundle: Bundle, avatar: Avatar | None, host: str, sessions: Sessions | None = None
+    bundle: Bundle,
+    avatar: Avatar | None,
+    host: str,
+    sessions: Sessions | None = None,
+    names: Collection[str] = (),
 ) -> Guard:
     """The application of the server.
 
@@ -67,10 +73,13 @@ def make_app(
         avatar: What the sessions share; None for a body without a head, which cannot talk.
         host: Address to which the server is bound.
         sessions: Manages the sessions; by default a new object.
+        names: Further host names of the server, under which strangers may come.
     """
     if avatar is not None:
         sessions = Sessions(avatar) if sessions is None else sessions
-        sessions.at_home = host in LOOPBACK  # it may cost money, and tells of the machine
+        sessions.at_home = (
+            host in LOOPBACK and not names
+        )  # it may cost money, and tells of the machine
         if sessions.at_home:
             sessions.offers = offers(avatar.settings, avatar.persona.voice)
 
@@ -96,8 +105,9 @@ def make_app(
 
     if avatar is not None and sessions is not None:
         add_conversation(app, avatar, sessions)
+    app.add_api_websocket_route("/echo", echo)
     add_page(app)
-    return Guard(app, host)
+    return Guard(app, host, names)
 
 
 def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
@@ -171,15 +181,17 @@ def bind(host: str, port: int) -> socket.socket:
     return listener
 
 
-def address(listener: socket.socket) -> str:
-    """The URL under which the page can be opened."""
+def address(listener: socket.socket, scheme: str = "http") -> str:
+    """The URL under which the page can be opened on this machine."""
     host, port = listener.getsockname()[:2]
     shown = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)
-    return f"http://{shown}:{port}/"
+    return f"{scheme}://{shown}:{port}/"
 
 
-def make_server(app: Guard) -> uvicorn.Server:
-    """A server for `app`; run it with `server.run(sockets=[listener])`.
+def make_server(app: Guard, certificate: Certificate | None = None) -> uvicorn.Server:
+    """A server for `app`, by HTTPS if there is a certificate.
+
+    Run it with `server.run(sockets=[listener])`.
 
     From then on numpy multiplies matrices in one thread. The server's matrices are small, and
     further threads would busily wait on cores that conversations need.
@@ -193,5 +205,7 @@ def make_server(app: Guard) -> uvicorn.Server:
         ws_per_message_deflate=False,  # sound hardly shrinks, and a core has better things to do
         timeout_graceful_shutdown=2,
         server_header=False,
+        ssl_certfile=certificate and certificate.file,
+        ssl_keyfile=certificate and certificate.key,
     )
     return uvicorn.Server(config)

@@ -1,0 +1,114 @@
+"""Who can reach a server, and what its operator is told about it."""
+
+import ipaddress
+import socket
+from types import SimpleNamespace
+
+import psutil
+import pytest
+
+from ico3d.chat.serving.guard import is_own
+from ico3d.chat.serving.network import addresses, reach
+from ico3d.chat.serving.network.reach import Reach, checked_name, find_reach, machine_names, qr_code
+from ico3d.errors import SettingsError
+
+
+def interface(family, address):
+    return SimpleNamespace(family=family, address=address)
+
+
+@pytest.fixture
+def interfaces(monkeypatch):
+    """A machine with a network cable, a wireless network, and others that lead nowhere."""
+    four, six = socket.AF_INET, socket.AF_INET6
+    entries = {
+        "lo": [interface(four, "127.0.0.1"), interface(six, "::1")],
+        "eth0": [interface(four, "10.0.0.7"), interface(six, "fe80::1%eth0")],
+        "wlan0": [interface(four, "192.168.1.20"), interface(six, "2001:db8::20")],
+        "usb0": [interface(four, "169.254.3.4")],
+        "off0": [interface(four, "172.16.0.1")],
+    }
+    stats = {name: SimpleNamespace(isup=name != "off0") for name in entries}
+    monkeypatch.setattr(psutil, "net_if_addrs", lambda: entries)
+    monkeypatch.setattr(psutil, "net_if_stats", lambda: stats)
+    monkeypatch.setattr(addresses, "_outward", {four: "192.168.1.20", six: None}.get)
+    monkeypatch.setattr(socket, "gethostname", lambda: "Box.lan")
+
+
+@pytest.mark.usefixtures("interfaces")
+def test_addresses_are_those_that_others_can_use():
+    assert addresses.machine_addresses("0.0.0.0") == ["192.168.1.20", "10.0.0.7"]
+    assert addresses.machine_addresses("::") == ["192.168.1.20", "10.0.0.7", "2001:db8::20"]
+    assert addresses.machine_addresses("10.0.0.7") == ["10.0.0.7"]
+
+
+def test_the_addresses_of_this_machine_are_addresses():
+    for address in addresses.machine_addresses("0.0.0.0"):
+        assert ipaddress.ip_address(address).version == 4
+
+
+@pytest.mark.usefixtures("interfaces")
+def test_a_phone_is_told_an_address_that_the_certificate_and_the_server_accept(tmp_path):
+    found = find_reach("0.0.0.0", ["Avatar.example.org."], True, None, None, tmp_path)
+    assert found.urls(8765) == [
+        "https://avatar.example.org:8765/",
+        "https://192.168.1.20:8765/",
+        "https://10.0.0.7:8765/",
+        "https://box.local:8765/",
+        "https://box:8765/",
+    ]
+    assert found.certificate is not None
+    assert set(found.certificate.names) == {"avatar.example.org", "localhost", "box.local", "box"}
+    for url in found.urls(8765):
+        host = url.split("/")[2]
+        assert is_own(host, url.rstrip("/"), "0.0.0.0", found.answered)
+    assert not is_own("evil.example:8765", None, "0.0.0.0", found.answered)
+    assert not is_own("box:8765", "https://evil.example:8765", "0.0.0.0", found.answered)
+    told = "\n".join(found.told(8765))
+    assert "no password" in told and found.certificate.fingerprint in told
+    assert all(url in told for url in found.urls(8765))
+    assert "\n".join(qr_code("https://avatar.example.org:8765/")) in told
+
+
+@pytest.mark.usefixtures("interfaces")
+def test_the_operator_is_told_who_can_reach_the_server():
+    (alone,) = find_reach("127.0.0.1", [], False, None, None).told(8765)
+    assert alone.startswith("Only this machine reaches it")
+    tunnel = find_reach("127.0.0.1", ["avatar.example.org"], False, None, None)
+    assert "tunnel lets through as avatar.example.org" in " ".join(tunnel.told(8765))
+    assert tunnel.answered == ("avatar.example.org",) and tunnel.urls(8765) == []
+    open_ = " ".join(find_reach("0.0.0.0", [], False, None, None).told(8765))
+    assert "Everybody" in open_ and "can only type" in open_ and "fingerprint" not in open_
+
+
+def test_a_given_certificate_brings_its_names_and_no_question(tmp_path):
+    own = find_reach("127.0.0.1", ["avatar.example.org"], True, None, None, tmp_path)
+    assert own.certificate is not None
+    file = own.certificate.file
+    given = find_reach("127.0.0.1", [], False, file, file)
+    assert given.names == ("avatar.example.org",) and given.scheme == "https"
+    assert "fingerprint" not in " ".join(given.told(8765))
+    with pytest.raises(SettingsError, match="both or neither"):
+        find_reach("127.0.0.1", [], False, file, None)
+
+
+@pytest.mark.parametrize("name", ["", "https://a.example", "a.example:80", "10.0.0.1", "-a", "a b"])
+def test_what_is_no_host_name_is_refused(name):
+    with pytest.raises(SettingsError, match="host name alone"):
+        checked_name(name)
+
+
+def test_names_of_a_machine():
+    assert machine_names("Box.lan") == ("box.local", "box")
+    assert machine_names("localhost") == machine_names("my_box") == ()
+
+
+def test_a_qr_code_is_a_square_of_half_blocks_with_a_quiet_zone():
+    lines = qr_code("https://192.168.1.20:8765/")
+    assert {len(line) for line in lines} == {25 + 2 * reach.QUIET_ZONE}
+    assert len(lines) == (25 + 2 * reach.QUIET_ZONE + 1) // 2
+    assert set("".join(lines)) == set(" ▀▄█") and set(lines[0]) == {"█"}
+
+
+def test_addresses_of_ipv6_are_written_as_in_urls():
+    assert Reach("2001:db8::20").urls(80) == ["http://[2001:db8::20]:80/"]

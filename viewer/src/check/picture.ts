@@ -1,0 +1,108 @@
+import { bad, fair, good, none, type Finding } from './finding.ts';
+
+const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
+const ACCELERATE = 'Turn hardware acceleration on in the settings of the browser, and update it and the driver of the graphics card.';
+const SPRITES = 20_000; // about as much to draw as the first sight of an avatar
+const SIDE = 480; // pixels
+const DURATION = 1500; // ms
+const PATIENCE = 10_000; // ms: pages in the background draw nothing
+const SMOOTH = 30; // frames per second
+const BEARABLE = 12;
+
+const VERTEX = `#version 300 es
+uniform float time;
+out vec2 at;
+void main() {
+  at = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
+  float turn = float(gl_InstanceID) * 2.399963 + time;
+  float far = sqrt(float(gl_InstanceID) / ${SPRITES}.0);
+  gl_Position = vec4(0.9 * far * vec2(cos(turn), sin(turn)) + 0.02 * at, 0.0, 1.0);
+}`;
+const FRAGMENT = `#version 300 es
+precision mediump float;
+in vec2 at;
+out vec4 colour;
+void main() {
+  float alpha = 0.3 * exp(-4.0 * dot(at, at));
+  colour = vec4(0.9, 0.7, 0.5, 1.0) * alpha;
+}`;
+
+/** Whether there is WebGL 2, and who draws. */
+export function checkGraphics(): Finding {
+  const gl = document.createElement('canvas').getContext('webgl2');
+  if (!gl) return bad('This browser draws no WebGL 2, so no avatar can be shown.', ACCELERATE);
+  const more = gl.getExtension('WEBGL_debug_renderer_info');
+  const name = String(gl.getParameter(more ? more.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+  gl.getExtension('WEBGL_lose_context')?.loseContext();
+  return judgeRenderer(name);
+}
+
+/** @param name how the browser calls who draws */
+export function judgeRenderer(name: string): Finding {
+  if (SOFTWARE.test(name)) return fair(`The processor draws, not a graphics card (${name}): expect few frames per second.`, ACCELERATE);
+  return good(`WebGL 2, drawn by ${name}.`);
+}
+
+/** Draws soft sprites for a moment and counts. */
+export async function checkFrames(): Promise<Finding> {
+  const canvas = document.createElement('canvas');
+  canvas.width = canvas.height = SIDE;
+  const gl = canvas.getContext('webgl2', { antialias: false });
+  if (!gl) return none('Nothing to count without WebGL 2.');
+  try {
+    const rate = await countFrames(gl);
+    return rate === null
+      ? fair('This page was in the background, where browsers draw nothing.', 'Load this page again and leave it in front.')
+      : judgeRate(rate);
+  } finally {
+    gl.getExtension('WEBGL_lose_context')?.loseContext();
+  }
+}
+
+/** @param rate frames per second of the small scene */
+export function judgeRate(rate: number): Finding {
+  const words = `${Math.round(rate)} frames per second in a small scene.`;
+  if (rate >= SMOOTH) return good(words);
+  const advice = `${ACCELERATE} Close other programs, and plug a laptop in.`;
+  return rate >= BEARABLE ? fair(words, advice) : bad(words, advice);
+}
+
+/** Frames per second; null if the browser draws none. */
+function countFrames(gl: WebGL2RenderingContext): Promise<number | null> {
+  const program = link(gl);
+  const time = gl.getUniformLocation(program, 'time');
+  const pixel = new Uint8Array(4);
+  gl.useProgram(program);
+  gl.enable(gl.BLEND);
+  gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+  return new Promise((resolve) => {
+    const late = setTimeout(() => resolve(null), PATIENCE);
+    let [began, frames] = [0, -1]; // the first one compiles the shader
+    const draw = (now: number) => {
+      gl.clear(gl.COLOR_BUFFER_BIT);
+      gl.uniform1f(time, now / 1000);
+      gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, SPRITES);
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel); // waits until it is drawn
+      if (++frames === 0) began = now;
+      if (frames === 0 || now - began < DURATION) return void requestAnimationFrame(draw);
+      clearTimeout(late);
+      resolve((1000 * frames) / (now - began));
+    };
+    requestAnimationFrame(draw);
+  });
+}
+
+function link(gl: WebGL2RenderingContext): WebGLProgram {
+  const program = gl.createProgram();
+  for (const [kind, source] of [
+    [gl.VERTEX_SHADER, VERTEX],
+    [gl.FRAGMENT_SHADER, FRAGMENT],
+  ] as const) {
+    const shader = gl.createShader(kind)!;
+    gl.shaderSource(shader, source);
+    gl.compileShader(shader);
+    gl.attachShader(program, shader);
+  }
+  gl.linkProgram(program);
+  return program;
+}
