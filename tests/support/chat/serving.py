@@ -22,7 +22,12 @@ def free_port():
 
 @contextlib.asynccontextmanager
 async def serving(
-    bundle, settings=None, resume_seconds=30.0, persona=None, adapt=lambda avatar: avatar
+    bundle,
+    settings=None,
+    resume_seconds=30.0,
+    persona=None,
+    adapt=lambda avatar: avatar,
+    sites=None,
 ):
     """Yields the URL and the sessions of a running server; by default the offline one.
 
@@ -33,7 +38,7 @@ async def serving(
     if bundle.manifest.head:
         avatar = adapt(server.open_avatar(bundle, settings or OFFLINE, persona))
         sessions = Sessions(avatar, resume_seconds)
-    running = server.make_server(server.make_app(bundle, avatar, "127.0.0.1", sessions))
+    running = server.make_server(server.make_app(bundle, avatar, "127.0.0.1", sessions, sites))
     task = asyncio.create_task(running.serve(sockets=[listener]))
     while not running.started:
         await asyncio.sleep(0.01)

@@ -25,6 +25,7 @@ from ico3d.chat.serving.connection import Connection
 from ico3d.chat.serving.guard import LOOPBACK, Guard
 from ico3d.chat.serving.page_files import PageFiles
 from ico3d.chat.serving.sessions import Sessions
+from ico3d.chat.serving.sites import Sites, add_tokens
 from ico3d.chat.settings.conversation import ChatSettings
 from ico3d.chat.wire import protocol
 from ico3d.errors import BundleError, SettingsError
@@ -58,7 +59,11 @@ def open_avatar(bundle: Bundle, settings: ChatSettings, persona: Persona | None 
 
 
 def make_app(
-    bundle: Bundle, avatar: Avatar | None, host: str, sessions: Sessions | None = None
+    bundle: Bundle,
+    avatar: Avatar | None,
+    host: str,
+    sessions: Sessions | None = None,
+    sites: Sites | None = None,
 ) -> Guard:
     """The application of the server.
 
@@ -67,6 +72,7 @@ def make_app(
         avatar: What the sessions share; None for a body without a head, which cannot talk.
         host: Address to which the server is bound.
         sessions: Manages the sessions; by default a new object.
+        sites: Other sites that may embed the avatar; by default none.
     """
     if avatar is not None:
         sessions = Sessions(avatar) if sessions is None else sessions
@@ -96,8 +102,10 @@ def make_app(
 
     if avatar is not None and sessions is not None:
         add_conversation(app, avatar, sessions)
+    sites = sites or Sites()
+    add_tokens(app, sites)
     add_page(app)
-    return Guard(app, host)
+    return Guard(app, host, sites)
 
 
 def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
