@@ -11,7 +11,13 @@ export default defineConfig({
     outDir: '../src/ico3d/chat/static',
     emptyOutDir: true,
     target: 'es2023',
-    rolldownOptions: { input: ['index.html', 'check.html'], checks: { pluginTimings: false } }, // to compress well takes its time
+    rolldownOptions: {
+      input: { index: 'index.html', check: 'check.html', embed: 'src/embed/served.ts' },
+      preserveEntrySignatures: 'exports-only', // of what other sites import
+      // Other sites write its address into their pages: it stays, and imports what changes.
+      output: { entryFileNames: ({ name }) => (name === 'embed' ? 'embed.js' : 'assets/[name]-[hash].js') },
+      checks: { pluginTimings: false }, // to compress well takes its time
+    },
     chunkSizeWarningLimit: 4000, // three and Spark (with its sort worker) in one file
   },
   server: {

@@ -63,6 +63,7 @@ VERBS: dict[str, Verb] = {
     "render": Verb("ico3d.avatar.film.command", "Render", "film a person who talks or moves"),
     "convert": Verb("ico3d.splat.commands", "Convert", "convert files of 3D Gaussians"),
     "serve": Verb("ico3d.chat.commands", "Serve", "serve a bundle and talk with it"),
+    "token": Verb("ico3d.chat.commands", "Token", "make a token for pages that embed an avatar"),
     "weights list": Verb(
         "ico3d.common.downloads.commands", "ListWeights", "weights that can be used"
     ),

@@ -41,7 +41,7 @@ export interface CastPorts {
 export async function makeCast(manifest: Manifest, files: BundleFiles, stage: Stage, calm: boolean, ports: CastPorts): Promise<Cast> {
   const { head } = manifest;
   const body = bodyOf(manifest);
-  const backdrop = await makeBackdrop(files);
+  const backdrop = stage.transparent ? null : await makeBackdrop(files);
   if (backdrop) stage.add(backdrop);
   if (head && body) return makePerson(files, manifest, head, body, stage, calm, ports);
   if (head) return { head: await makeHead(files, head, stage, rows(0, calm ? 0 : head.num_poses - 1), calm ? () => 0 : sway(head)) };

@@ -15,6 +15,7 @@ declare global {
 }
 
 const visit: Visit = new Visit(document.body, new Server(new URL(location.href)), {
+  emit: () => {},
   named: (name) => (document.title = name),
   entered: (presence) => {
     window.ico3d = { ...presence, visit, splats: (generator) => readSplats(presence.stage, generator) };

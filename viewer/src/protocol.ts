@@ -117,6 +117,13 @@ export interface TextMessage {
   text: string;
 }
 
+/** A text that the avatar is to say as it is, instead of what it was saying. Servers refuse it unless their settings allow it (`say` in `[embedding]`). */
+export interface SayMessage {
+  type: "say";
+  /** The text. */
+  text: string;
+}
+
 /** The visitor asks the avatar to be silent. */
 export interface InterruptMessage {
   type: "interrupt";
@@ -261,6 +268,15 @@ export interface CuesMessage {
   releases: Release[];
 }
 
+/** The language model calls a function: a tool of the settings, a gesture or a mood. */
+export interface CallMessage {
+  type: "call";
+  /** Name of the function. */
+  name: string;
+  /** Arguments as a JSON object; `{}` if they would be too long. */
+  arguments: string;
+}
+
 /** All sound of an utterance has been sent. */
 export interface EndMessage {
   type: "end";
@@ -315,6 +331,7 @@ export type ClientMessage =
   | HelloMessage
   | AudioMessage
   | TextMessage
+  | SayMessage
   | InterruptMessage
   | ClockMessage
   | TalkMessage
@@ -331,6 +348,7 @@ export type ServerMessage =
   | SpeechMessage
   | TimelineMessage
   | CuesMessage
+  | CallMessage
   | EndMessage
   | StopMessage
   | PauseMessage
@@ -338,7 +356,7 @@ export type ServerMessage =
   | MetricsMessage
   | ErrorMessage;
 
-export const SERVER_TYPES = ["welcome", "place", "ack", "state", "transcript", "answer", "speech", "timeline", "cues", "end", "stop", "pause", "resume", "metrics", "error"];
+export const SERVER_TYPES = ["welcome", "place", "ack", "state", "transcript", "answer", "speech", "timeline", "cues", "call", "end", "stop", "pause", "resume", "metrics", "error"];
 
 /** The arrays of binary messages, in order. */
 export const TENSORS: Record<string, readonly Tensor[]> = {

@@ -10,9 +10,11 @@ import { atEnd } from './lifetime.ts';
 import type { Server } from './server.ts';
 import { Stage } from './stage/stage.ts';
 import { Conversation } from './talk/conversation.ts';
+import type { Emit } from './talk/events.ts';
+import { telling } from './talk/telling.ts';
 import { watchCover } from './ui/cover.ts';
-import { byId } from './ui/elements.ts';
-import { Overlay } from './ui/overlay.ts';
+import { byId, focusOn } from './ui/elements.ts';
+import { Overlay, type Choice } from './ui/overlay.ts';
 import { makePage, showNotice, type Page } from './ui/page.ts';
 import { PlayerBar } from './ui/player.ts';
 
@@ -24,10 +26,18 @@ export interface Presence extends Cast {
 
 /** What a visit needs of the page around it. */
 export interface VisitPorts {
+  /** The avatar alone is drawn, on what is behind the element. */
+  transparent?: boolean;
+  /** How the visitor wants to talk, if it is known. */
+  choice?: Choice;
+  /** Takes what happens in the conversation. */
+  emit: Emit;
   /** The avatar's name is known. */
   named(name: string): void;
   /** Everybody can be seen; nobody talks yet. */
   entered(presence: Presence): void;
+  /** The avatar cannot be shown. */
+  failed?(sentence: string): void;
   /** Loads everything anew, where nothing else helps. */
   reload(): void;
 }
@@ -63,14 +73,15 @@ export class Visit {
   private async run(): Promise<void> {
     const { root, server } = this;
     const { signal } = this.ending;
-    const manifest = await loadManifest(server, signal);
+    const locate = server.file.bind(server);
+    const manifest = await loadManifest(locate, signal);
     const name = manifest.persona.name || manifest.name;
     byId(root, 'name').textContent = name;
     root.style.setProperty('--backdrop', cssColour(manifest.background));
     this.overlay.greet(name, server.file(THUMBNAIL));
     this.ports.named(name);
 
-    const stage = new Stage(byId<HTMLCanvasElement>(root, 'stage'), manifest);
+    const stage = new Stage(byId<HTMLCanvasElement>(root, 'stage'), manifest, this.ports.transparent);
     atEnd(signal, () => stage.dispose());
     watchCover(root, signal, (pixels) => stage.keepClear(pixels));
     const page = makePage(root, this.overlay, () => stage.frames, signal);
@@ -83,11 +94,11 @@ export class Visit {
     if (conversation) await this.prepare(conversation, presence, manifest.head!, moving);
     this.overlay.hide();
     if (conversation) page.talk(conversation);
-    else byId(root, 'play').focus();
+    else focusOn(byId(root, 'play'));
   }
 
   private converse(page: Page): Conversation {
-    const conversation = new Conversation(this.server.socket(), page.view);
+    const conversation = new Conversation(() => this.server.socket(), telling(page.view, this.ports.emit), this.ports.emit);
     atEnd(this.ending.signal, () => conversation.dispose());
     return conversation;
   }
@@ -98,7 +109,7 @@ export class Visit {
     const total = bytesToFirstSight(manifest);
     let loaded = 0;
     const more = (bytes: number) => this.overlay.progress(Math.min(1, (loaded += bytes) / total));
-    const files = new BundleFiles(this.server, manifest.files, more, signal);
+    const files = new BundleFiles(this.server.file.bind(this.server), manifest.files, more, signal);
     const cast = await makeCast(manifest, files, stage, this.calm, {
       heard: () => conversation?.player.heard() ?? null,
       failed: (error) => signal.aborted || showNotice(this.root, sentenceOf(error)),
@@ -128,9 +139,9 @@ export class Visit {
   /** Waits for the click without which browsers play no sound. */
   private async mayTalk(conversation: Conversation): Promise<void> {
     const { context } = conversation.player;
-    if (context.state === 'running') return;
-    const choice = await this.overlay.choose();
-    await context.resume();
+    const allowed = context.state === 'running';
+    const choice = allowed ? this.ports.choice : await this.overlay.choose();
+    if (!allowed) await context.resume();
     if (choice === 'voice') void conversation.toggleMicrophone();
   }
 
@@ -138,6 +149,7 @@ export class Visit {
     if (this.ending.signal.aborted) return;
     if (!(error instanceof PageError)) console.error(error);
     this.overlay.fail(sentenceOf(error));
+    this.ports.failed?.(sentenceOf(error));
   }
 }
 

@@ -3,14 +3,17 @@
 import itertools
 import sys
 import webbrowser
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from ico3d.bundle import packaged
 from ico3d.chat.observing.operator_log import set_up_log
+
+if TYPE_CHECKING:
+    from ico3d.chat.settings.embedding import Embedding
 
 
 @dataclass(frozen=True)
@@ -24,6 +27,7 @@ class Serve:
         port: Port to listen on; 0 takes any free port.
         settings: TOML or JSON file that chooses services and timing.
         persona: TOML or JSON file that says who the avatar is; by default that of the bundle.
+        allow_origin: Sites whose pages may embed the avatar, such as https://example.org.
         open: Open the page in a browser.
         log: File to which a line of JSON is appended for each turn, with times and counts but no
             words.
@@ -41,6 +45,7 @@ class Serve:
     port: int = 8765
     settings: Path | None = None
     persona: Path | None = None
+    allow_origin: tuple[str, ...] = ()
     open: bool = False
     log: Path | None = None
     verbose: bool = False
@@ -65,9 +70,11 @@ class Serve:
         from ico3d.chat.serving import server
         from ico3d.chat.serving.network.reach import find_reach
         from ico3d.chat.serving.sessions import Sessions
+        from ico3d.chat.serving.sites import open_sites
         from ico3d.chat.settings.conversation import read_settings
 
         settings = read_settings(self.settings)
+        sites = open_sites(with_origins(settings.embedding, self.allow_origin))
         persona = read_persona(self.persona) if self.persona else None
         monitor = Monitor(TurnLog.open(self.log) if self.log else None)
         reach = find_reach(self.host, self.name, self.tls, self.tls_cert, self.tls_key)
@@ -76,7 +83,7 @@ class Serve:
         avatar = server.open_avatar(bundle, settings, persona) if bundle.manifest.head else None
         sessions = Sessions(avatar, monitor=monitor) if avatar else None
         parts = make_parts(avatar) if avatar else None  # loads what they need, too
-        app = server.make_app(bundle, avatar, self.host, sessions, reach.answered)
+        app = server.make_app(bundle, avatar, self.host, sessions, sites, reach.answered)
         url = server.address(listener, reach.scheme)
         listener.listen()  # whoever reads the address and comes at once is served in a moment
         print(f"{(persona or bundle.manifest.persona).name} is at {url} (Ctrl+C ends)")
@@ -91,6 +98,34 @@ class Serve:
         if self.open:
             webbrowser.open(url)
         server.make_server(app, reach.certificate).run(sockets=[listener])
+
+
+@dataclass(frozen=True)
+class Token:
+    """Prints a token that admits pages to a server whose settings name a key for tokens.
+
+    Attributes:
+        settings: The server's settings file; its [embedding] names the key's variable.
+        origin: Site whose pages the token admits; by default those of the server itself.
+        allow_origin: Sites that the server was started with, besides those of the settings.
+    """
+
+    settings: Annotated[Path, tyro.conf.Positional]
+    origin: str = ""
+    allow_origin: tuple[str, ...] = ()
+
+    def run(self) -> None:
+        """Prints the token.
+
+        Raises:
+            SettingsError: If there is no key, or the site may not embed the avatar.
+        """
+        from ico3d.chat.serving.sites import open_sites
+        from ico3d.chat.settings.conversation import read_settings
+
+        embedding = with_origins(read_settings(self.settings).embedding, self.allow_origin)
+        token, _ = open_sites(embedding).token(self.origin)
+        print(token)
 
 
 @dataclass(frozen=True)
@@ -122,6 +157,11 @@ class Demo:
         demo = Path(packaged.NAME)
         where = (self.host, self.port, self.settings, self.persona)
         Serve(demo, *where, open=self.open, verbose=self.verbose).run()
+
+
+def with_origins(embedding: "Embedding", origins: tuple[str, ...]) -> "Embedding":
+    """Settings with further sites that may embed the avatar."""
+    return replace(embedding, origins=(*embedding.origins, *origins))
 
 
 def described(services, offers) -> list[str]:

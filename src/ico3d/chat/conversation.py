@@ -54,6 +54,7 @@ from ico3d.chat.wire.protocol import (
     Heard,
     Hello,
     Interrupt,
+    Say,
     Talk,
     Text,
 )
@@ -161,6 +162,17 @@ class Conversation:
             raise ProtocolError("text: is empty.")
         self.activity.touch()
         await self._input.ask(question)
+
+    @handle.register
+    async def _say(self, message: Say) -> None:
+        text = message.text.strip()
+        if not self._avatar.settings.embedding.say:
+            raise ProtocolError("say: this server's settings do not allow it.")
+        if not text:
+            raise ProtocolError("say: is empty.")
+        self.activity.touch()
+        await self._input.interrupt()
+        await self._input.say(text)
 
     @handle.register
     async def _interrupt(self, message: Interrupt) -> None:

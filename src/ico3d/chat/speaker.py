@@ -6,8 +6,10 @@ page schedules them, and its `clock` messages tell when the avatar has really fa
 """
 
 import asyncio
+import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from pipecat.frames.frames import (
     BotStartedSpeakingFrame,
@@ -28,7 +30,17 @@ from ico3d.chat.performing.cueing import Cueing
 from ico3d.chat.performing.gestures import Gestures
 from ico3d.chat.playback import Playback
 from ico3d.chat.turns.echo import SentSound
-from ico3d.chat.wire.protocol import Answer, Clock, End, Pause, Resume, Stop
+from ico3d.chat.wire.marks import LONGEST_NAME
+from ico3d.chat.wire.protocol import (
+    MAX_ARGUMENTS,
+    Answer,
+    Call,
+    Clock,
+    End,
+    Pause,
+    Resume,
+    Stop,
+)
 
 SOONEST = 0.005  # s between two looks at the clock
 
@@ -116,6 +128,8 @@ class Speaker(FrameProcessor):
             self._page.show("thinking" if self._calls else "idle")
         elif isinstance(frame, FunctionCallsStartedFrame):
             self._calls.update(call.tool_call_id for call in frame.function_calls)
+            for call in frame.function_calls:
+                self._page.send(tool_call(call.function_name, call.arguments))
         elif isinstance(frame, FunctionCallResultFrame | FunctionCallCancelFrame):
             self._called(frame)
         await self.push_frame(frame, direction)
@@ -186,3 +200,9 @@ class Speaker(FrameProcessor):
             except TimeoutError:
                 pass
             left = seconds()
+
+
+def tool_call(name: str, arguments: Mapping[str, Any]) -> Call:
+    """What the page is told of a function that the language model calls."""
+    text = json.dumps(arguments, ensure_ascii=False, default=str)
+    return Call(name[:LONGEST_NAME], text if len(text) <= MAX_ARGUMENTS else "{}")

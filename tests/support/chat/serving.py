@@ -28,6 +28,7 @@ async def serving(
     persona=None,
     adapt=lambda avatar: avatar,
     certificate=None,
+    sites=None,
 ):
     """Yields the URL and the sessions of a running server; by default the offline one.
 
@@ -38,7 +39,7 @@ async def serving(
     if bundle.manifest.head:
         avatar = adapt(server.open_avatar(bundle, settings or OFFLINE, persona))
         sessions = Sessions(avatar, resume_seconds)
-    app = server.make_app(bundle, avatar, "127.0.0.1", sessions)
+    app = server.make_app(bundle, avatar, "127.0.0.1", sessions, sites)
     running = server.make_server(app, certificate)
     task = asyncio.create_task(running.serve(sockets=[listener]))
     while not running.started:

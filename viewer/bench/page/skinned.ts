@@ -1,12 +1,11 @@
 /** In the page: the body on a skeleton that moves, and the same splats at rest. */
 import { loadManifest } from '../../src/bundle/load.ts';
-import { Server } from '../../src/server.ts';
 import { putToRest } from './at-rest.ts';
 import { drawFrames } from './drawing.ts';
 
 const STEP = 0.1; // s
 const { stage, skinned } = window.ico3d!;
-const { fps, num_frames } = (await loadManifest(new Server(new URL(location.href)))).skinned!;
+const { fps, num_frames } = (await loadManifest((name) => `bundle/${name}`)).skinned!;
 const rest = skinned!.generator.skeleton.empty();
 skinned!.strike(rest.rotations, rest.root);
 await stage.still();

@@ -1,5 +1,4 @@
 import { PageError } from '../errors.ts';
-import type { Server } from '../server.ts';
 import { checkAnimation, type AnimationInfo } from './animation.ts';
 import { readBakedHead, type BakedHead } from './baked-head.ts';
 import { checkManifest, type AnyBody, type HeadInfo, type Manifest } from './manifest.ts';
@@ -27,9 +26,12 @@ export const GESTURES = 'body/gestures.safetensors';
 /** A picture of the avatar. */
 export const THUMBNAIL = 'thumbnail.png';
 
+/** Gives the address of a file of a bundle. */
+export type Locate = (name: string) => string;
+
 /** Fetches and checks the manifest. */
-export async function loadManifest(server: Server, signal?: AbortSignal): Promise<Manifest> {
-  const response = await get(server, 'manifest.json', signal);
+export async function loadManifest(locate: Locate, signal?: AbortSignal): Promise<Manifest> {
+  const response = await get(locate, 'manifest.json', signal);
   return checkManifest(await response.json().catch(() => null));
 }
 
@@ -45,7 +47,7 @@ export function bytesToFirstSight({ head, body, skinned, files }: Manifest): num
 
 /** The files of a bundle, fetched when they are asked for; each must be as long as promised, and have the promised hash. */
 export class BundleFiles {
-  private readonly server: Server;
+  private readonly locate: Locate;
   private readonly promised: Manifest['files'];
   private readonly onBytes: (n: number) => void;
   private readonly signal: AbortSignal | undefined;
@@ -55,8 +57,8 @@ export class BundleFiles {
    * @param onBytes called with the number of bytes that came
    * @param signal ends the fetching
    */
-  constructor(server: Server, promised: Manifest['files'], onBytes: (n: number) => void = () => {}, signal?: AbortSignal) {
-    this.server = server;
+  constructor(locate: Locate, promised: Manifest['files'], onBytes: (n: number) => void = () => {}, signal?: AbortSignal) {
+    this.locate = locate;
     this.promised = promised;
     this.onBytes = onBytes;
     this.signal = signal;
@@ -96,7 +98,7 @@ export class BundleFiles {
   private async bytes(name: string): Promise<ArrayBuffer> {
     const entry = this.promised[name];
     if (!entry) throw new PageError(`manifest.json does not list ${name}.`);
-    const reader = (await get(this.server, name, this.signal)).body!.getReader();
+    const reader = (await get(this.locate, name, this.signal)).body!.getReader();
     const bytes = new Uint8Array(entry.size);
     let at = 0;
     for (let part = await reader.read(); !part.done; part = await reader.read()) {
@@ -119,14 +121,15 @@ function parseJson(text: string): unknown {
   }
 }
 
-async function get(server: Server, name: string, signal?: AbortSignal): Promise<Response> {
+async function get(locate: Locate, name: string, signal?: AbortSignal): Promise<Response> {
   let response: Response;
   try {
-    response = await fetch(server.file(name), { signal });
+    response = await fetch(locate(name), { signal });
   } catch {
     signal?.throwIfAborted();
-    throw new PageError(`The server does not answer, so ${name} could not be loaded; reload the page.`);
+    throw new PageError(`The server does not answer this site, so ${name} could not be loaded; reload the page.`);
   }
+  if (response.status === 401) throw new PageError('This page is not admitted, or no longer: its token is missing or has expired.');
   if (!response.ok) throw new PageError(`The server has no ${name} (status ${response.status}).`);
   return response;
 }

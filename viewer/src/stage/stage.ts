@@ -17,6 +17,9 @@ export class Stage {
   readonly scene = new THREE.Scene();
   readonly spark: SparkRenderer;
   readonly orbit: Orbit;
+  readonly transparent: boolean;
+  /** Enters VR or AR; null where nobody offers it. */
+  enterXr: (() => Promise<void>) | null = null;
   frames = 0; // drawn so far
   private covered = 0; // pixels at the lower edge that controls lie on
   private readonly canvas: HTMLCanvasElement;
@@ -27,12 +30,15 @@ export class Stage {
   private dirty = true;
   private readonly resizing = new ResizeObserver(() => this.fit());
 
-  constructor(canvas: HTMLCanvasElement, manifest: Manifest) {
+  /** @param transparent what is behind the canvas is seen around the avatar */
+  constructor(canvas: HTMLCanvasElement, manifest: Manifest, transparent = false) {
     this.canvas = canvas;
     this.manifest = manifest;
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: false, powerPreference: 'high-performance' });
+    this.transparent = transparent;
+    this.renderer = new THREE.WebGLRenderer({ canvas, alpha: transparent, antialias: false, powerPreference: 'high-performance' });
     // Both sRGB: colours of the bundle are display values and are blended as they are.
-    this.renderer.setClearColor(new THREE.Color().setRGB(...manifest.background, THREE.SRGBColorSpace));
+    const background = new THREE.Color().setRGB(...manifest.background, THREE.SRGBColorSpace);
+    this.renderer.setClearColor(background, transparent ? 0 : 1);
     this.spark = makeSpark(this.renderer, () => (this.dirty = true));
     this.scene.add(this.spark);
     this.orbit = new Orbit(canvas, wholeBody(manifest), () => (this.dirty = true));
@@ -55,6 +61,11 @@ export class Stage {
   keepClear(pixels: number): void {
     this.covered = pixels;
     this.fit();
+  }
+
+  /** Draws anew with the next frame, though no actor says so. */
+  invalidate(): void {
+    this.dirty = true;
   }
 
   /** Starts drawing what the actors do. */

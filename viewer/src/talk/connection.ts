@@ -63,10 +63,11 @@ export class Connection {
   private fatal: ErrorMessage | null = null; // the server's last word
   private over = false; // the session is, and no other one has begun
   private readonly sound: SoundQueue;
-  private readonly url: string;
+  private readonly url: () => string;
   private readonly events: ConnectionEvents;
 
-  constructor(url: string, events: ConnectionEvents) {
+  /** @param url gives the address anew for each try: what admits to it may expire */
+  constructor(url: () => string, events: ConnectionEvents) {
     this.url = url;
     this.events = events;
     this.sound = new SoundQueue((message) => this.socket!.send(encode(message)), events.stalled);
@@ -77,7 +78,7 @@ export class Connection {
     clearTimeout(this.retry);
     if (this.socket) return;
     this.lastUp ??= performance.now();
-    const socket = new WebSocket(this.url);
+    const socket = new WebSocket(this.url());
     socket.binaryType = 'arraybuffer';
     socket.onopen = () => {
       const { lastIndex: last_index, wishes } = this;

@@ -1,6 +1,7 @@
 import { Player } from '../audio/player.ts';
 import type { Cue, Offer, PlaceMessage, Release, Services, StateMessage, WelcomeMessage } from '../protocol.ts';
 import { Connection, type Ending, type SessionMessage } from './connection.ts';
+import { Speaking, type Emit } from './events.ts';
 import { TurnTimer } from './latency.ts';
 import { VoiceInput, type VoiceView } from './voice-input.ts';
 import { handle, type Handlers } from './wire.ts';
@@ -53,6 +54,8 @@ export class Conversation {
   gestures: Gestures | null = null;
   acting: Acting | null = null;
   private readonly view: ConversationView;
+  private readonly emit: Emit;
+  private readonly speaking: Speaking;
   private readonly connection: Connection;
   private readonly voice: VoiceInput;
   private readonly timer = new TurnTimer();
@@ -62,10 +65,15 @@ export class Conversation {
     answer: ({ text }) => this.view.answer(text),
     speech: (message) => this.player.play(message),
     timeline: ({ utterance, points }) => this.gestures?.plan(utterance, points),
-    cues: ({ utterance, cues, releases }) => this.acting?.plan(utterance, [...cues, ...releases]),
+    cues: ({ utterance, cues, releases }) => {
+      this.acting?.plan(utterance, [...cues, ...releases]);
+      for (const { name, mirror, begin, stroke } of cues) this.emit('gesture', { utterance, name, mirror, begin, stroke });
+    },
+    call: ({ name, arguments: given }) => this.emit('tool-call', { name, arguments: JSON.parse(given) }),
     end: ({ utterance, samples }) => this.player.end(utterance, samples),
     stop: ({ utterance }) => {
       this.player.stop(utterance);
+      this.speaking.stop(utterance);
       this.acting?.stop(utterance);
     },
     pause: ({ utterance }) => {
@@ -74,13 +82,22 @@ export class Conversation {
     },
     resume: ({ utterance }) => this.player.resume(utterance),
     metrics: ({ name, values }) => this.view.metrics(name, values),
-    error: ({ message }) => this.view.notice(message),
+    error: ({ message }) => {
+      this.view.notice(message);
+      this.emit('error', { message, fatal: false });
+    },
   };
   private state: StateMessage['state'] = 'idle'; // of the server
   private readonly reporting: ReturnType<typeof setInterval>;
 
-  constructor(url: string, view: ConversationView) {
+  /**
+   * @param url gives the address of the server's WebSocket
+   * @param emit takes what others than the view want to know
+   */
+  constructor(url: () => string, view: ConversationView, emit: Emit = () => {}) {
     this.view = view;
+    this.emit = emit;
+    this.speaking = new Speaking(emit);
     this.connection = new Connection(url, {
       message: (message) => handle(message, this.handlers),
       welcome: (message, replaced) => this.welcome(message, replaced),
@@ -92,8 +109,14 @@ export class Conversation {
     const send = this.connection.send.bind(this.connection);
     this.voice = new VoiceInput(send, (at) => this.player.heard(at), view);
     this.voice.onSound = (pcm) => this.acting?.listen(pcm);
-    this.player.onStart = (_, delay) => this.answerStarts(performance.now() + 1000 * delay);
-    this.player.onFinish = (utterance, seconds) => this.report(utterance, seconds);
+    this.player.onStart = (utterance, delay) => {
+      this.answerStarts(performance.now() + 1000 * delay);
+      this.speaking.start(utterance);
+    };
+    this.player.onFinish = (utterance, seconds) => {
+      this.report(utterance, seconds);
+      this.speaking.finish(utterance);
+    };
     this.reporting = setInterval(() => this.reportHeard(), CLOCK_PERIOD);
   }
 
@@ -113,22 +136,41 @@ export class Conversation {
     return sent;
   }
 
+  /** Has the avatar say a text as it is, if the server allows it; false while there is no connection. */
+  say(text: string): boolean {
+    return this.connection.send({ type: 'say', text });
+  }
+
   /** Starts anew with another service. */
   choose(offer: Offer): void {
     this.player.reset();
+    this.speaking.stop();
     this.connection.restart({ [offer.kind]: offer.key });
   }
 
   /** Silences the avatar at once. */
   interrupt(): void {
     const utterance = this.player.current;
-    if (utterance !== null) this.player.stop(utterance);
+    if (utterance !== null) {
+      this.player.stop(utterance);
+      this.speaking.stop(utterance);
+    }
     this.connection.send({ type: 'interrupt', utterance });
   }
 
   /** Opens or closes the microphone; what hinders it is shown as a notice. */
   toggleMicrophone(): Promise<void> {
     return this.voice.toggle();
+  }
+
+  /** Opens or closes the microphone, unless it is so already. */
+  async setMicrophone(open: boolean): Promise<void> {
+    if (this.voice.isOpen !== open) await this.voice.toggle();
+  }
+
+  /** How loud the avatar is, from 0 to 1. */
+  set volume(volume: number) {
+    this.player.output.gain.value = Math.min(1, Math.max(0, volume));
   }
 
   /** Push to talk: from here to `release` all that the microphone hears is one turn. */
@@ -184,6 +226,7 @@ export class Conversation {
   /** Utterances are counted from the start again. */
   private silence(): void {
     this.player.reset();
+    this.speaking.stop();
     this.gestures?.reset();
     this.acting?.reset();
   }

@@ -51,6 +51,11 @@ export class VoiceInput {
     return this.meter.lastVoice;
   }
 
+  /** Whether the microphone is on, or about to be. */
+  get isOpen(): boolean {
+    return this.state !== 'closed';
+  }
+
   /** Opens or closes the microphone; what hinders it is shown as a notice. */
   async toggle(): Promise<void> {
     if (this.ended || this.state === 'opening') return;

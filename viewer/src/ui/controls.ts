@@ -1,6 +1,6 @@
 import type { Conversation } from '../talk/conversation.ts';
 import type { MicrophoneState } from '../talk/voice-input.ts';
-import { byId } from './elements.ts';
+import { byId, focusOn } from './elements.ts';
 import { icon } from './icons.ts';
 
 const TITLES: Record<MicrophoneState, string> = {
@@ -41,7 +41,7 @@ export class Controls {
   /** Shows itself and lets the visitor act on a conversation. */
   bind(conversation: Conversation): void {
     this.form.hidden = false;
-    this.input.focus();
+    focusOn(this.input);
     this.form.onsubmit = (event) => {
       event.preventDefault();
       const text = this.input.value.trim();
@@ -89,7 +89,7 @@ export class Controls {
 
   /** Lets the visitor type at once. */
   focus(): void {
-    this.input.focus();
+    focusOn(this.input);
   }
 
   /** Whether a slash leads to the text box: everywhere but inside a text that is being typed. */

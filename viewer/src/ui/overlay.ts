@@ -1,7 +1,7 @@
 import { atEnd } from '../lifetime.ts';
 import type { PlaceMessage } from '../protocol.ts';
 import type { Ending } from '../talk/connection.ts';
-import { byId } from './elements.ts';
+import { byId, focusOn } from './elements.ts';
 import { inWords } from './queue.ts';
 
 /** How the visitor wants to talk. */
@@ -35,6 +35,7 @@ export class Overlay {
 
   greet(name: string, thumbnail: string): void {
     byId(this.root, 'overlay-name').textContent = name;
+    this.thumbnail.crossOrigin = 'anonymous'; // it may be another server's
     this.thumbnail.src = thumbnail;
     this.thumbnail.onload = () => (this.thumbnail.hidden = false);
   }
@@ -48,7 +49,7 @@ export class Overlay {
     this.bar.hidden = true;
     byId(this.root, 'choices').hidden = false;
     const start = byId<HTMLButtonElement>(this.root, 'start');
-    start.focus();
+    focusOn(start);
     return new Promise((resolve) => {
       start.onclick = () => resolve('voice');
       byId(this.root, 'start-typing').onclick = () => resolve('typing');
@@ -97,7 +98,7 @@ export class Overlay {
     this.button.textContent = label;
     this.button.onclick = act;
     this.button.hidden = false;
-    this.button.focus();
+    focusOn(this.button);
   }
 
   /** Covers the page with a sentence. */

@@ -25,7 +25,7 @@ function connect() {
     stalled: () => {},
     ended: (ending) => endings.push(ending),
   };
-  const connection = new Connection('ws://server/ws', events);
+  const connection = new Connection(() => 'ws://server/ws', events);
   connection.open();
   return { connection, endings, told };
 }

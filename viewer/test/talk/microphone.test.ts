@@ -22,7 +22,7 @@ beforeEach(() => {
     notice: (sentence) => notices.push(sentence),
   };
   const others = { get: (known: object, name: string) => Reflect.get(known, name) ?? (() => {}) };
-  conversation = new Conversation('ws://server/ws', new Proxy(view, others) as ConversationView);
+  conversation = new Conversation(() => 'ws://server/ws', new Proxy(view, others) as ConversationView);
   conversation.start();
   ScriptedSocket.last.welcome();
 });

@@ -26,7 +26,7 @@ class Talk {
 
   constructor() {
     const nothing = () => {};
-    this.connection = new Connection('ws://server/ws', {
+    this.connection = new Connection(() => 'ws://server/ws', {
       message: nothing,
       welcome: nothing,
       lost: nothing,

@@ -1,7 +1,8 @@
-"""Protects a local server from other web pages, and limits what the server's page may load.
+"""Protects a server from other web pages, and limits what the server's page may load.
 
 Any page in a browser can send requests to local ports, but it cannot forge the headers Origin and
-Host. If an attacker lets a name point to this machine, that name appears in Host.
+Host. If an attacker lets a name point to this machine, that name appears in Host. Sites that may
+embed the avatar are exceptions (`sites.py`).
 """
 
 import ipaddress
@@ -11,6 +12,8 @@ from urllib.parse import urlsplit
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from ico3d.chat.serving.sites import Sites
 
 LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
 CONTENT_POLICY = "; ".join(
@@ -25,26 +28,39 @@ CONTENT_POLICY = "; ".join(
         "object-src 'none'",
         "base-uri 'none'",
         "form-action 'none'",
-        "frame-ancestors 'none'",
     ]
 )
 HEADERS = {
-    "Content-Security-Policy": CONTENT_POLICY,
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Permissions-Policy": "microphone=(self), camera=(), geolocation=()",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
 }
+FOREIGN = "This server answers only its own pages: open it under the address it printed.\n"
+NO_TOKEN = "The page's token is missing or has expired.\n"
 
 
 class Guard:
-    """ASGI middleware: 403 for a foreign Origin or Host, security headers on every response."""
+    """ASGI middleware: 403 for a foreign Origin or Host, security headers on every response.
 
-    def __init__(self, app: ASGIApp, host: str, names: Collection[str] = ()):
-        """Wraps `app`, which is bound to the address `host` and has further host names."""
+    Sites that may embed the avatar load what they need; a missing token is answered with 401.
+    """
+
+    def __init__(
+        self, app: ASGIApp, host: str, sites: Sites | None = None, names: Collection[str] = ()
+    ):
+        """Wraps `app`, which is bound to the address `host`.
+
+        Args:
+            app: What is guarded.
+            host: Address to which it is bound.
+            sites: Sites that may embed the avatar; by default none.
+            names: Further host names of the server.
+        """
         self._app = app
         self._host = host
+        self._sites = sites or Sites()
         self._names = frozenset(names)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -53,24 +69,37 @@ class Guard:
             await self._app(scope, receive, send)
             return
         headers = Headers(scope=scope)
-        if not is_own(headers.get("host"), headers.get("origin"), self._host, self._names):
-            await self._refuse(scope, receive, send)
+        origin, path = headers.get("origin"), scope["path"]
+        site = origin if self._sites.permits(origin, path) else None
+        if not is_own(headers.get("host"), None if site else origin, self._host, self._names):
+            await self._refuse(403, FOREIGN, scope, receive, send)
             return
 
         async def with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
-                MutableHeaders(scope=message).update(HEADERS)
+                policy = f"{CONTENT_POLICY}; frame-ancestors {self._sites.ancestors}"
+                own = HEADERS | {"Content-Security-Policy": policy}
+                answer = MutableHeaders(scope=message)
+                for name, value in (own | self._sites.headers(origin, path)).items():
+                    if name == "Vary":
+                        answer.add_vary_header(value)
+                    else:
+                        answer[name] = value
             await send(message)
 
+        if not self._sites.admits(scope, site):
+            await self._refuse(401, NO_TOKEN, scope, receive, with_headers)
+            return
         await self._app(scope, receive, with_headers)
 
-    async def _refuse(self, scope: Scope, receive: Receive, send: Send) -> None:
+    async def _refuse(
+        self, status: int, sentence: str, scope: Scope, receive: Receive, send: Send
+    ) -> None:
         if scope["type"] == "websocket":
             await receive()
             await send({"type": "websocket.close", "code": 1008})  # before accepting: HTTP 403
             return
-        text = "This server answers only its own pages: open it under the address it printed.\n"
-        await PlainTextResponse(text, 403)(scope, receive, send)
+        await PlainTextResponse(sentence, status)(scope, receive, send)
 
 
 def is_own(host: str | None, origin: str | None, bound: str, names: Collection[str] = ()) -> bool:

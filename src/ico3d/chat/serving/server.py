@@ -27,6 +27,7 @@ from ico3d.chat.serving.guard import LOOPBACK, Guard
 from ico3d.chat.serving.network.certificates import Certificate
 from ico3d.chat.serving.page_files import PageFiles
 from ico3d.chat.serving.sessions import Sessions
+from ico3d.chat.serving.sites import Sites, add_tokens
 from ico3d.chat.settings.conversation import ChatSettings
 from ico3d.chat.wire import protocol
 from ico3d.errors import BundleError, SettingsError
@@ -64,6 +65,7 @@ def make_app(
     avatar: Avatar | None,
     host: str,
     sessions: Sessions | None = None,
+    sites: Sites | None = None,
     names: Collection[str] = (),
 ) -> Guard:
     """The application of the server.
@@ -73,6 +75,7 @@ def make_app(
         avatar: What the sessions share; None for a body without a head, which cannot talk.
         host: Address to which the server is bound.
         sessions: Manages the sessions; by default a new object.
+        sites: Other sites that may embed the avatar; by default none.
         names: Further host names of the server, under which strangers may come.
     """
     if avatar is not None:
@@ -106,8 +109,10 @@ def make_app(
     if avatar is not None and sessions is not None:
         add_conversation(app, avatar, sessions)
     app.add_api_websocket_route("/echo", echo)
+    sites = sites or Sites()
+    add_tokens(app, sites)
     add_page(app)
-    return Guard(app, host, names)
+    return Guard(app, host, sites, names)
 
 
 def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:

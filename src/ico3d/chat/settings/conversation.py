@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
 
+from ico3d.chat.settings.embedding import Embedding
 from ico3d.chat.settings.keys import check_key
 from ico3d.chat.settings.tools import Tool, check_tools
 from ico3d.common.typed import NAMES, Kind, Rules, fill, kind_of
@@ -168,6 +169,7 @@ class ChatSettings:
             never.
         gestures: Whether the body gestures during speech; otherwise it stays at rest.
         memory: How much of the conversation is remembered.
+        embedding: Who may put the avatar into pages of their own ([more](embedding.md)).
         tools: Functions over HTTP that the language model may call.
         allow: Hosts that tools may call, such as `api.example.org` or `127.0.0.1:9000`; private
             addresses must be listed as such.
@@ -183,6 +185,7 @@ class ChatSettings:
     idle_minutes: float = 10.0
     gestures: bool = True
     memory: Memory = Memory()
+    embedding: Embedding = Embedding()
     tools: tuple[Tool, ...] = ()
     allow: tuple[str, ...] = ()
 

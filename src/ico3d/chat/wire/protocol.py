@@ -35,6 +35,7 @@ MAX_RATE = 100  # messages per second a client may send for long
 MAX_BURST = 200  # messages it may send at once
 RESUME_SECONDS = 30  # how long a session waits for its page to come back
 MAX_AHEAD_SECONDS = 2.0  # how far speech may run ahead of its playback
+MAX_ARGUMENTS = 4000  # characters of a function's arguments
 MAX_POINTS = 500  # of a timeline in one message
 
 
@@ -81,6 +82,19 @@ class Text:
 
     Attributes:
         text: The question.
+    """
+
+    text: Annotated[str, Length(1, 2000)]
+
+
+@dataclass(frozen=True)
+class Say:
+    """A text that the avatar is to say as it is, instead of what it was saying.
+
+    Servers refuse it unless their settings allow it (`say` in `[embedding]`).
+
+    Attributes:
+        text: The text.
     """
 
     text: Annotated[str, Length(1, 2000)]
@@ -301,6 +315,19 @@ class Cues:
 
 
 @dataclass(frozen=True)
+class Call:
+    """The language model calls a function: a tool of the settings, a gesture or a mood.
+
+    Attributes:
+        name: Name of the function.
+        arguments: Arguments as a JSON object; `{}` if they would be too long.
+    """
+
+    name: Name
+    arguments: Annotated[str, Length(2, MAX_ARGUMENTS)]
+
+
+@dataclass(frozen=True)
 class End:
     """All sound of an utterance has been sent.
 
@@ -376,7 +403,7 @@ class Error:
     again: bool = False
 
 
-ClientMessage = Hello | Audio | Text | Interrupt | Clock | Talk | Heard | Deaf
+ClientMessage = Hello | Audio | Text | Say | Interrupt | Clock | Talk | Heard | Deaf
 ServerMessage = (
     Welcome
     | Place
@@ -387,6 +414,7 @@ ServerMessage = (
     | Speech
     | Timeline
     | Cues
+    | Call
     | End
     | Stop
     | Pause

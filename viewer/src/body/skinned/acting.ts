@@ -19,6 +19,8 @@ export class ActingBody implements Actor {
   private readonly visitor: () => Vector;
   /** The current pose in the world. */
   pose: RigPose;
+  /** A pose to keep instead of acting; null to act. */
+  held: RigPose | null = null;
 
   /**
    * @param frame frame of the recording whose place and direction the person keeps
@@ -39,7 +41,7 @@ export class ActingBody implements Actor {
   tick(step: number): boolean {
     this.language.look(this.placement.toRest(this.visitor()));
     this.language.advance(step);
-    this.pose = this.placement.place(this.language.pose());
+    this.pose = this.held ?? this.placement.place(this.language.pose());
     this.body.strike(this.pose.rotations.flat(), this.pose.root);
     return true;
   }

@@ -27,9 +27,9 @@ export class BodyLanguage {
   private readonly gaze = new Gaze();
   private readonly listener: Listener;
   private readonly loudness = new Loudness(MICROPHONE_RATE);
-  private readonly own: Clock = { offset: 0 }; // clock of nods, which the page itself decides on
+  private readonly own: Clock = { offset: 0 }; // clock of gestures that the page itself decides on
   private clocks = new Map<number, Clock>(); // clock of each utterance
-  private nods = 0; // number of nods so far
+  private made = 0; // number of such gestures so far
   private now = 0; // time of the page, s
 
   /**
@@ -68,7 +68,7 @@ export class BodyLanguage {
 
   /** Takes sound of the visitor (int16 at MICROPHONE_RATE); after phrases the person may nod, unless speaking. */
   listen(pcm: Int16Array): void {
-    for (const [, name] of this.listener.hear(this.loudness.push(pcm))) if (!this.heard()) this.nod(name);
+    for (const [, name] of this.listener.hear(this.loudness.push(pcm))) if (!this.heard()) this.make(name);
   }
 
   /** Advances the time of the page by `step` seconds. */
@@ -103,12 +103,13 @@ export class BodyLanguage {
     }
   }
 
-  /** Makes a gesture from now on, at the pace of its clip. */
-  private nod(name: string): void {
+  /** Makes a gesture from now on, at the pace of its clip; false if there is none of that name. */
+  make(name: string): boolean {
     const clip = this.performer.clip(name);
-    if (!clip) return;
-    const cue: Cue = { number: this.nods++, name, mirror: false, begin: this.now, stroke: this.now + clip.marks.stroke, skip: 0 };
+    if (!clip) return false;
+    const cue: Cue = { number: this.made++, name, mirror: false, begin: this.now, stroke: this.now + clip.marks.stroke, skip: 0 };
     const release = { number: cue.number, time: roundedRelease(clip, cue, cue.stroke) };
     this.performer.follow([cue, release], this.own);
+    return true;
   }
 }

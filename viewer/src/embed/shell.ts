@@ -1,0 +1,37 @@
+import page from '../../index.html?raw';
+import pageStyle from '../style.css?inline';
+import { icon } from '../ui/icons.ts';
+import frameStyle from './frame.css?inline';
+
+const ROOT_SIZE = 16; // px: sizes are those of the page, whatever the font size of the page around it
+
+/** What an embedded avatar is made of. */
+export interface Shell {
+  launcher: HTMLButtonElement; // of the floating mode
+  /** Holds the elements of `index.html`. */
+  page: HTMLElement;
+}
+
+/** Builds an embedded avatar in a shadow root. */
+export function buildShell(root: ShadowRoot): Shell {
+  const style = document.createElement('style');
+  style.textContent = (pageStyle + frameStyle).replace(/([\d.]+)rem\b/g, (_, size) => `${ROOT_SIZE * Number(size)}px`);
+  const launcher = document.createElement('button');
+  launcher.id = 'launcher';
+  launcher.setAttribute('aria-label', 'Talk with the avatar');
+  launcher.setAttribute('aria-controls', 'page');
+  launcher.append(icon('talk'));
+  const holder = document.createElement('section');
+  holder.id = 'page';
+  holder.className = 'page';
+  holder.tabIndex = -1; // keeps the focus while its contents change
+  holder.setAttribute('aria-label', 'Avatar');
+  root.replaceChildren(style, holder, launcher);
+  return { launcher, page: holder };
+}
+
+/** Fills the page anew, as nobody has touched it. */
+export function fillPage(holder: HTMLElement): void {
+  holder.replaceChildren(...new DOMParser().parseFromString(page, 'text/html').body.children);
+  delete holder.dataset.state;
+}
