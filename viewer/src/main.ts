@@ -22,3 +22,5 @@ const visit: Visit = new Visit(document.body, new Server(new URL(location.href))
   },
   reload: () => location.reload(),
 });
+
+addEventListener('pagehide', ({ persisted }) => persisted || visit.dispose());

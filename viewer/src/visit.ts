@@ -17,6 +17,7 @@ import { byId, focusOn } from './ui/elements.ts';
 import { Overlay, type Choice } from './ui/overlay.ts';
 import { makePage, showNotice, type Page } from './ui/page.ts';
 import { PlayerBar } from './ui/player.ts';
+import { makeViewBar } from './ui/views.ts';
 
 /** Who is there, once they can be seen. */
 export interface Presence extends Cast {
@@ -83,10 +84,12 @@ export class Visit {
 
     const stage = new Stage(byId<HTMLCanvasElement>(root, 'stage'), manifest, this.ports.transparent);
     atEnd(signal, () => stage.dispose());
+    stage.onGone = () => this.overlay.fail('The browser cannot show the picture any more.');
     watchCover(root, signal, (pixels) => stage.keepClear(pixels));
     const page = makePage(root, this.overlay, () => stage.frames, signal);
     const conversation = manifest.head ? this.converse(page) : undefined;
     const presence: Presence = { stage, conversation, ...(await this.enter(manifest, stage, conversation)) };
+    root.querySelector('.figures')!.append(makeViewBar(stage.orbit, root, signal));
     const { playback } = presence;
     const moving = presence.body ?? presence.skinned;
     if (moving && playback) new PlayerBar(root, moving, playback, 1 / bodyOf(manifest)!.fps, signal);

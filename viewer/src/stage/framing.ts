@@ -11,11 +11,24 @@ export interface Picture {
 /** Where the camera stands for a picture. */
 export type Framing = (picture: Picture) => StartCamera;
 
-const EYE_LINE = 0.3; // of the height, from above, where the eyes are on a free picture
-const TABLE = 0.62; // m of height: head and chest, as one sees somebody across a table
-const SHOULDERS = 0.4; // m of width
+/** How much of somebody a visitor sees, from the nearest to the farthest. */
+export const VIEWS = ['face', 'half', 'whole'] as const;
+export type View = (typeof VIEWS)[number];
+
+/** What a picture of somebody's upper part shows. */
+interface Shot {
+  line: number; // of the height, from above, where the eyes are on a free picture
+  height: number; // m
+  width: number; // m, where that makes the picture higher
+}
+
+const ACROSS_A_TABLE: Shot = { line: 0.3, height: 0.62, width: 0.4 }; // head and chest
+const CLOSE: Shot = { line: 0.42, height: 0.32, width: 0.26 };
 const FACE = 0.24; // m of width that are always seen
 const ABOVE = 0.03; // m over the head
+const GROUND = 0.06; // m under the feet
+const MARGIN = 0.04; // of the height, over a whole figure
+const ARMS = 0.9; // m of width of a whole figure
 const CHIN = 0.15; // m down from the eyes to under the chin
 
 /**
@@ -25,10 +38,23 @@ const CHIN = 0.15; // m down from the eyes to under the chin
  * @param fov degrees, from top to bottom
  */
 export function portrait(sitter: Sitter, fov: number): Framing {
+  return upperPart(sitter, fov, ACROSS_A_TABLE);
+}
+
+/**
+ * Frames the face alone, clear of all controls.
+ *
+ * @param fov degrees, from top to bottom
+ */
+export function closeUp(sitter: Sitter, fov: number): Framing {
+  return upperPart(sitter, fov, CLOSE);
+}
+
+function upperPart(sitter: Sitter, fov: number, shot: Shot): Framing {
   const slope = Math.tan(THREE.MathUtils.degToRad(fov) / 2);
   const { eyes, toward, up } = sitter;
   return (picture) => {
-    const { tilt, distance } = composition(sitter, slope, picture);
+    const { tilt, distance } = composition(sitter, shot, slope, picture);
     const eye = eyes.clone().addScaledVector(toward, distance);
     const upright = up.clone().projectOnPlane(toward).normalize();
     const target = eyes.clone().addScaledVector(upright, -tilt * distance);
@@ -41,9 +67,14 @@ export function portrait(sitter: Sitter, fov: number): Framing {
  *
  * @param slope of the picture's upper edge against its middle
  */
-function composition({ crown, lowest }: Sitter, slope: number, { aspect, free }: Picture): { tilt: number; distance: number } {
+function composition(
+  { crown, lowest }: Sitter,
+  { line: wantedLine, height, width }: Shot,
+  slope: number,
+  { aspect, free }: Picture,
+): { tilt: number; distance: number } {
   const above = crown + ABOVE;
-  const line = Math.min(EYE_LINE, (free * above) / (above + CHIN));
+  const line = Math.min(wantedLine, (free * above) / (above + CHIN));
   const tilt = (1 - 2 * line) * slope;
   // Angles between the ray to the eyes and those to the edges.
   const [edge, down] = [Math.atan(slope), Math.atan(tilt)];
@@ -53,9 +84,28 @@ function composition({ crown, lowest }: Sitter, slope: number, { aspect, free }:
     CHIN / Math.tan(toControls),
     FACE / (2 * aspect * slope * Math.cos(down)),
   );
-  const wanted = Math.max(TABLE, SHOULDERS / aspect) / (2 * slope);
+  const wanted = Math.max(height, width / aspect) / (2 * slope);
   const nothingUnder = toBottom < Math.PI / 2 ? lowest / Math.tan(toBottom) : 0;
   return { tilt, distance: Math.max(least, Math.min(wanted, nothingUnder)) };
+}
+
+/**
+ * Frames somebody from crown to feet, level, between the upper edge and the controls.
+ *
+ * @param fov degrees, from top to bottom
+ */
+export function figure({ eyes, toward, up, crown, lowest }: Sitter, fov: number): Framing {
+  const slope = Math.tan(THREE.MathUtils.degToRad(fov) / 2);
+  const level = toward.clone().projectOnPlane(up).normalize();
+  return ({ aspect, free }) => {
+    const length = crown + ABOVE + lowest + GROUND;
+    const height = Math.max(length / (free - MARGIN), ARMS / aspect);
+    const room = free * height - length; // over the head and under the feet
+    const middle = crown + ABOVE + room / 2 - height / 2; // over the eyes
+    const target = eyes.clone().addScaledVector(up, middle);
+    const eye = target.clone().addScaledVector(level, height / (2 * slope));
+    return { eye: eye.toArray(), target: target.toArray(), up: up.toArray(), fov_y: fov };
+  };
 }
 
 /** The bundle's own camera, which sees everybody whole; the view widens where the sides would be cut off. */

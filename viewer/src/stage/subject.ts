@@ -1,7 +1,7 @@
 import * as THREE from 'three';
 import { bodyOf, type Manifest } from '../bundle/manifest.ts';
 import { boundsOf, boundsOfBody } from './bounds.ts';
-import { portrait, whole } from './framing.ts';
+import { closeUp, figure, portrait, whole } from './framing.ts';
 import type { Subject } from './orbit.ts';
 import type { Sitter } from './sitter.ts';
 
@@ -16,7 +16,8 @@ export function wholeBody(manifest: Manifest): Subject {
   const box = new THREE.Box3(low, high);
   return {
     up: camera.up,
-    framing: whole(camera, NARROWEST),
+    framings: { whole: whole(camera, NARROWEST) },
+    home: 'whole',
     bounds: () => boundsOfBody(box, camera),
     sideways: Infinity,
     face: null,
@@ -26,9 +27,12 @@ export function wholeBody(manifest: Manifest): Subject {
 /** Somebody with a face. */
 export function person(manifest: Manifest, sitter: Sitter): Subject {
   const { camera } = manifest;
+  const fov = camera.fov_y;
+  const views = { face: closeUp(sitter, fov), half: portrait(sitter, fov) };
   return {
     up: camera.up,
-    framing: portrait(sitter, camera.fov_y),
+    framings: bodyOf(manifest) ? { ...views, whole: figure(sitter, fov) } : views,
+    home: 'half',
     bounds: (start) => boundsOf(sitter, start, camera),
     sideways: bodyOf(manifest) ? Infinity : FRONT,
     face: sitter.eyes,

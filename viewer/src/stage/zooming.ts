@@ -14,12 +14,15 @@ const PADS = 0.01; // two fingers on a touch pad, which send far smaller steps
 const LINE = 16; // pixels
 const LONGEST = 300; // pixels of one step: free-running wheels
 
-/** Hears wheel and two-finger gestures on a canvas. */
+/** Where on a canvas a pointer is. */
+export function placeOn(canvas: HTMLCanvasElement, { clientX, clientY }: MouseEvent): Place {
+  const { left, top, width, height } = canvas.getBoundingClientRect();
+  return [(2 * (clientX - left)) / width - 1, 1 - (2 * (clientY - top)) / height];
+}
+
+/** Hears wheel and two-finger gestures on a canvas, until the signal. */
 export function listenToZooming(canvas: HTMLCanvasElement, signal: AbortSignal, { zoom, pull }: Zooming): void {
-  const placeOf = ({ clientX, clientY }: MouseEvent): Place => {
-    const { left, top, width, height } = canvas.getBoundingClientRect();
-    return [(2 * (clientX - left)) / width - 1, 1 - (2 * (clientY - top)) / height];
-  };
+  const placeOf = (event: MouseEvent) => placeOn(canvas, event);
   const wheel = (event: WheelEvent) => {
     event.preventDefault();
     const pixels = event.deltaY * [1, LINE, LONGEST][event.deltaMode]!;

@@ -37,6 +37,11 @@ export class FakeCanvas extends EventTarget {
     this.send(this, 'keydown', { key });
   }
 
+  /** A double click with the mouse. */
+  doubleClick(x: number, y: number): void {
+    this.send(this, 'dblclick', { clientX: x, clientY: y });
+  }
+
   /** Two fingers from one pair of places to another. */
   pinch(from: [number, number][], to: [number, number][], steps = 20): void {
     const finger = (id: number, [x, y]: [number, number]) => ({

@@ -1,7 +1,7 @@
 import { Box3, MathUtils, PerspectiveCamera, Vector3 } from 'three';
 import { describe, expect, test } from 'vitest';
 import type { StartCamera } from '../../src/bundle/manifest.ts';
-import { portrait, whole } from '../../src/stage/framing.ts';
+import { closeUp, figure, portrait, whole } from '../../src/stage/framing.ts';
 import type { Sitter } from '../../src/stage/sitter.ts';
 import { random } from '../../support/random.ts';
 
@@ -101,6 +101,38 @@ describe('the first view of somebody', () => {
 
   test('is level with the eyes of somebody with a body', () => {
     expect(portrait(adult, 30)({ aspect: 1, free: 0.8 }).eye[1]).toBeCloseTo(1.55, 9);
+  });
+});
+
+describe('the other views of somebody', () => {
+  const next = random(8);
+  const cases = Array.from({ length: 300 }, () => {
+    const sitter = someone(next);
+    const level = sitter.toward.clone().projectOnPlane(sitter.up).normalize();
+    return { sitter: { ...sitter, toward: level }, fov: 8 + 50 * next(), aspect: 2 ** (4 * next() - 2), free: 0.4 + 0.6 * next() };
+  });
+
+  test('the whole figure lies between the upper edge and the controls', () => {
+    for (const { sitter, fov, aspect, free } of cases) {
+      const view = figure(sitter, fov)({ aspect, free });
+      const at = (above: number) => place(view, aspect, sitter.eyes.clone().addScaledVector(sitter.up, above));
+      expect(at(sitter.crown)[1]).toBeGreaterThan(0);
+      expect(at(-sitter.lowest)[1]).toBeLessThan(free);
+      expect(at(0)[0]).toBeCloseTo(0.5, 9);
+      const side = sitter.up.clone().cross(sitter.toward).multiplyScalar(0.44);
+      expect(place(view, aspect, sitter.eyes.clone().add(side))[0]).toBeLessThan(1);
+    }
+  });
+
+  test('the face is larger than in the first view, and whole', () => {
+    for (const { sitter, fov, aspect, free } of cases) {
+      const [near, first] = [closeUp, portrait].map((framing) => framing(sitter, fov)({ aspect, free }));
+      const distance = (view: StartCamera) => sitter.eyes.distanceTo(new Vector3(...view.eye));
+      expect(distance(near!) / distance(first!)).toBeLessThan(sitter.crown < 0.12 && sitter.lowest > 0.5 && free > 0.8 ? 0.9 : 1.2);
+      const at = (above: number) => place(near!, aspect, sitter.eyes.clone().addScaledVector(sitter.up, above))[1];
+      expect(at(sitter.crown)).toBeGreaterThan(0);
+      expect(at(-CHIN)).toBeLessThan(free);
+    }
   });
 });
 

@@ -2,7 +2,7 @@ import { Box3, MathUtils, Plane, Raycaster, Vector2, Vector3 } from 'three';
 import { describe, expect, test } from 'vitest';
 import type { StartCamera } from '../../src/bundle/manifest.ts';
 import { boundsOf, boundsOfBody } from '../../src/stage/bounds.ts';
-import { portrait, whole } from '../../src/stage/framing.ts';
+import { closeUp, figure, portrait, whole } from '../../src/stage/framing.ts';
 import { Orbit, type Subject } from '../../src/stage/orbit.ts';
 import type { Sitter } from '../../src/stage/sitter.ts';
 import { FakeCanvas } from '../../support/doubles/canvas.ts';
@@ -20,7 +20,8 @@ const SITTER: Sitter = {
 };
 const PERSON: Subject = {
   up: [0, 1, 0],
-  framing: portrait(SITTER, 30),
+  framings: { face: closeUp(SITTER, 30), half: portrait(SITTER, 30), whole: figure(SITTER, 30) },
+  home: 'half',
   bounds: (start) => boundsOf(SITTER, start, OVERVIEW),
   sideways: Infinity,
   face: SITTER.eyes,
@@ -56,7 +57,7 @@ class Visit {
 
   /** Until nothing glides any more. */
   settle(): void {
-    for (let i = 0; i < 400; i++) this.orbit.update();
+    for (let i = 0; i < 400; i++) this.orbit.update(1 / 60);
   }
 
   /** How many pixels an upright 10 cm at the face are long. */
@@ -139,14 +140,79 @@ describe('zooming', () => {
     for (let i = 0; i < 5; i++) visit.canvas.press('-');
     expect(apart(visit.pixel(SITTER.eyes), face)).toBeLessThan(1e-6);
     visit.canvas.press('Home');
+    visit.settle();
     expect(visit.size).toBeCloseTo(before, 6);
+  });
+});
+
+describe('flying to another view', () => {
+  test('goes there smoothly, without coming near the head, from behind, too', () => {
+    const visit = new Visit();
+    const { camera } = visit.orbit;
+    for (const [view, turn] of [['whole', 0], ['face', 0], ['half', 700]] as const) {
+      if (turn) visit.canvas.drag(turn, 0);
+      visit.settle();
+      const end = new Vector3(...PERSON.framings[view]!({ aspect: WIDTH / HEIGHT, free: 0.8 }).eye);
+      const [start, steps] = [camera.position.clone(), [] as number[]];
+      visit.orbit.show(view);
+      expect(visit.orbit.view).toBe(view);
+      for (let i = 0; i < 60; i++) {
+        const before = camera.position.clone();
+        visit.orbit.update(1 / 60);
+        steps.push(before.distanceTo(camera.position));
+        expect(camera.position.distanceTo(SITTER.eyes)).toBeGreaterThan(0.3);
+      }
+      expect(camera.position.distanceTo(end)).toBeLessThan(1e-6);
+      const way = start.distanceTo(end);
+      expect(way).toBeGreaterThan(0.4);
+      expect(Math.max(...steps)).toBeLessThan(0.1 * Math.max(way, steps.reduce((sum, step) => sum + step, 0)));
+      for (const i of [0, 53]) expect(steps[i]).toBeLessThan(0.01 * way); // at rest when it starts and ends
+    }
+  });
+
+  test('ends where it is when the visitor does something, and jumps for who wants little motion', () => {
+    const visit = new Visit();
+    visit.orbit.show('whole');
+    for (let i = 0; i < 20; i++) visit.orbit.update(1 / 60);
+    visit.canvas.wheel(450, 300, -1);
+    expect(visit.orbit.view).toBe(null);
+    const { position } = visit.orbit.camera;
+    visit.settle();
+    const before = position.clone();
+    visit.settle();
+    expect(position.distanceTo(before)).toBeLessThan(1e-9);
+    expect(position.distanceTo(SITTER.eyes)).toBeLessThan(4);
+    const { matchMedia } = globalThis;
+    globalThis.matchMedia = () => ({ matches: true }) as MediaQueryList;
+    visit.orbit.show('face');
+    globalThis.matchMedia = matchMedia;
+    const { eye } = PERSON.framings.face!({ aspect: WIDTH / HEIGHT, free: 0.8 });
+    expect(position.distanceTo(new Vector3(...eye))).toBeLessThan(1e-9);
+  });
+
+  test('a double click flies to what is under the pointer, one beside everybody goes back', () => {
+    const visit = new Visit();
+    visit.orbit.show('whole');
+    visit.settle();
+    const hand = visit.pixel(new Vector3(0.2, 0.9, 0.1));
+    const before = visit.size;
+    visit.canvas.doubleClick(...hand);
+    visit.settle();
+    expect(visit.size / before).toBeGreaterThan(1.7);
+    expect(apart(visit.pixel(new Vector3(0.2, 0.9, 0)), [WIDTH / 2, HEIGHT / 2])).toBeLessThan(40);
+    expect(visit.orbit.view).toBe(null);
+    visit.canvas.doubleClick(5, 5);
+    visit.settle();
+    expect(visit.orbit.view).toBe('half');
+    expect(visit.size).toBeCloseTo(new Visit().size, 3);
   });
 });
 
 describe('wherever a visitor goes', () => {
   const body: Subject = {
     up: [0, 1, 0],
-    framing: whole(OVERVIEW, 0.45),
+    framings: { whole: whole(OVERVIEW, 0.45) },
+    home: 'whole',
     bounds: () => boundsOfBody(SITTER.box, OVERVIEW),
     sideways: Infinity,
     face: null,
@@ -164,10 +230,12 @@ describe('wherever a visitor goes', () => {
     const any = () => [next() * width, next() * height] as const;
     for (let step = 0; step < 600; step++) {
       const chance = next();
-      if (chance < 0.5) visit.canvas.wheel(...any(), next() < 0.7 ? -1 : 1);
+      if (chance < 0.4) visit.canvas.wheel(...any(), next() < 0.7 ? -1 : 1);
+      else if (chance < 0.45) visit.canvas.doubleClick(...any());
+      else if (chance < 0.5) visit.orbit.show((['face', 'half', 'whole'] as const)[Math.floor(3 * next())]!);
       else if (chance < 0.7) visit.canvas.drag(300 * (next() - 0.5), 300 * (next() - 0.5));
       else visit.canvas.press(['ArrowUp', 'ArrowDown', 'ArrowLeft', '+', '-'][Math.floor(5 * next())]!);
-      visit.orbit.update();
+      visit.orbit.update(0.1);
       const { position } = visit.orbit.camera;
       expect(skin.distanceToPoint(position)).toBeGreaterThan(0);
       expect(position.distanceTo(SITTER.eyes)).toBeGreaterThan(0.25);
@@ -177,7 +245,8 @@ describe('wherever a visitor goes', () => {
       expect(nearest).toBeLessThan(0.6 * Math.max(width, height)); // 25 cm of arm lie beside these
     }
     visit.canvas.press('Home');
-    const start = subject.framing({ aspect: width / height, free: 0.8 });
+    visit.settle();
+    const start = subject.framings[subject.home]!({ aspect: width / height, free: 0.8 });
     expect(visit.orbit.camera.position.distanceTo(new Vector3(...start.eye))).toBeLessThan(1e-6);
   });
 });
@@ -191,7 +260,7 @@ describe('a picture of another shape', () => {
       const picture = { aspect: width / height, free: 0.7 };
       visit.orbit.fit(picture);
       for (let i = 0; i < 5; i++) visit.orbit.update();
-      const { eye } = PERSON.framing(picture);
+      const { eye } = PERSON.framings.half!(picture);
       expect(visit.orbit.camera.position.distanceTo(new Vector3(...eye))).toBeLessThan(1e-9);
     }
   });
@@ -209,9 +278,10 @@ describe('a picture of another shape', () => {
     visit.settle();
     expect(visit.orbit.camera.position.distanceTo(before)).toBeLessThan(1e-6);
     visit.canvas.press('Home');
+    visit.settle();
     expect(MathUtils.radToDeg(visit.orbit.camera.rotation.y)).toBeCloseTo(0, 6);
     visit.orbit.fit({ aspect: 1, free: 0.8 });
-    const { eye } = PERSON.framing({ aspect: 1, free: 0.8 });
+    const { eye } = PERSON.framings.half!({ aspect: 1, free: 0.8 });
     expect(visit.orbit.camera.position.distanceTo(new Vector3(...eye))).toBeLessThan(1e-9);
   });
 
@@ -219,7 +289,7 @@ describe('a picture of another shape', () => {
     const visit = new Visit();
     visit.canvas.drag(0, 0);
     visit.orbit.fit({ aspect: 0.5, free: 0.8 });
-    const { eye } = PERSON.framing({ aspect: 0.5, free: 0.8 });
+    const { eye } = PERSON.framings.half!({ aspect: 0.5, free: 0.8 });
     expect(visit.orbit.camera.position.distanceTo(new Vector3(...eye))).toBeLessThan(1e-9);
   });
 });
