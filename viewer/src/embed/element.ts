@@ -131,7 +131,7 @@ export class AvatarElement extends HTMLElement {
   /** Fills the page anew; the focus stays within. */
   private refill(): void {
     focusOn(this.shell.page);
-    fillPage(this.shell.page);
+    fillPage(this.shell.page, this.address());
   }
 
   /** Shows who is there, and loads them when the visitor wants to talk. */
@@ -152,16 +152,23 @@ export class AvatarElement extends HTMLElement {
 
   /** The server of the attributes, which admits this page. */
   private async reach(signal: AbortSignal): Promise<Server> {
-    const given = this.getAttribute('server') ?? AvatarElement.server;
-    if (given === null) throw new PageError('This <ico3d-avatar> has no server.');
-    const folder = (address: string) => (address.endsWith('/') ? address : `${address}/`);
-    const base = new URL(folder(given), document.baseURI);
-    const avatar = this.getAttribute('avatar');
-    this.server = new Server(avatar ? new URL(folder(encodeURIComponent(avatar)), base) : base);
+    const address = this.address();
+    if (!address) throw new PageError('This <ico3d-avatar> has no address of a server.');
+    this.server = new Server(address);
     this.server.token = this.getAttribute('token') ?? this.server.token;
     const tokens = this.getAttribute('token-url');
     if (tokens) await admit(this.server, new URL(tokens, document.baseURI).href, signal);
     return this.server;
+  }
+
+  /** Where the page of the avatar is; null where no attribute tells it. */
+  private address(): URL | null {
+    const server = this.getAttribute('server') ?? AvatarElement.server;
+    if (server === null || !URL.canParse(server, document.baseURI)) return null;
+    const folder = (address: string) => (address.endsWith('/') ? address : `${address}/`);
+    const base = new URL(folder(server), document.baseURI);
+    const avatar = this.getAttribute('avatar');
+    return avatar ? new URL(folder(encodeURIComponent(avatar)), base) : base;
   }
 
   private begin(choice?: Choice): Promise<void> {

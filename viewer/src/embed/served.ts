@@ -1,6 +1,9 @@
 /** What the server gives out as `/embed.js`: elements without `server` belong to it. */
-import { setServer } from './index.ts';
+import { setServer } from './api.ts';
+import { defineAvatar } from './element.ts';
 
-export * from './index.ts';
+export * from './api.ts';
 
-setServer(new URL('.', import.meta.url));
+const { url } = import.meta; // on its own: bundlers take `new URL` with it for a file of theirs
+setServer(new URL('.', url));
+defineAvatar();

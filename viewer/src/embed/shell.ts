@@ -30,8 +30,13 @@ export function buildShell(root: ShadowRoot): Shell {
   return { launcher, page: holder };
 }
 
-/** Fills the page anew, as nobody has touched it. */
-export function fillPage(holder: HTMLElement): void {
+/**
+ * Fills the page anew, as nobody has touched it.
+ *
+ * @param server address that the page's links are relative to; null if there is none
+ */
+export function fillPage(holder: HTMLElement, server: URL | null): void {
   holder.replaceChildren(...new DOMParser().parseFromString(page, 'text/html').body.children);
   delete holder.dataset.state;
+  for (const link of holder.querySelectorAll('a')) link.href = server ? new URL(link.getAttribute('href')!, server).href : '';
 }
