@@ -178,7 +178,11 @@ def test_the_command_prints_a_token(tmp_path, monkeypatch, capsys):
 async def test_a_sites_backend_gets_tokens_for_the_key(bundle):
     keyed = Sites(Embedding((SITE,)), KEY)
     bearer, manifest = {"Authorization": f"Bearer {KEY}"}, "bundle/manifest.json"
-    async with serving(bundle, TYPED, sites=keyed) as (url, _), httpx.AsyncClient() as client:
+    async with (
+        serving(bundle, TYPED, sites=keyed) as (url, sessions),
+        httpx.AsyncClient() as client,
+    ):
+        assert not sessions.at_home  # strangers may come
         assert (await client.post(f"{url}token")).status_code == 401
         given = await client.post(f"{url}token", params={"origin": SITE}, headers=bearer)
         refused = await client.post(f"{url}token", params={"origin": OTHER}, headers=bearer)

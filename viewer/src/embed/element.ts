@@ -256,6 +256,18 @@ export class AvatarElement extends HTMLElement {
   }
 }
 
+/** All events of the element, with those that every element has. */
+type ElementEvents = Omit<HTMLElementEventMap, keyof AvatarEvents> & { [K in keyof AvatarEvents]: CustomEvent<AvatarEvents[K]> };
+
+type Options = boolean | AddEventListenerOptions;
+
+export interface AvatarElement {
+  addEventListener<K extends keyof ElementEvents>(type: K, listener: (event: ElementEvents[K]) => unknown, options?: Options): void;
+  addEventListener(type: string, listener: EventListenerOrEventListenerObject, options?: Options): void;
+  removeEventListener<K extends keyof ElementEvents>(type: K, listener: (event: ElementEvents[K]) => unknown, options?: Options): void;
+  removeEventListener(type: string, listener: EventListenerOrEventListenerObject, options?: Options): void;
+}
+
 declare global {
   interface HTMLElementTagNameMap {
     'ico3d-avatar': AvatarElement;

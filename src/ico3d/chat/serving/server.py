@@ -78,11 +78,11 @@ def make_app(
         sites: Other sites that may embed the avatar; by default none.
         names: Further host names of the server, under which strangers may come.
     """
+    sites = sites or Sites()
     if avatar is not None:
         sessions = Sessions(avatar) if sessions is None else sessions
-        sessions.at_home = (
-            host in LOOPBACK and not names
-        )  # it may cost money, and tells of the machine
+        # Strangers may not choose services that cost money, nor learn about the machine.
+        sessions.at_home = host in LOOPBACK and not names and not sites.any
         if sessions.at_home:
             sessions.offers = offers(avatar.settings, avatar.persona.voice)
 
@@ -109,7 +109,6 @@ def make_app(
     if avatar is not None and sessions is not None:
         add_conversation(app, avatar, sessions)
     app.add_api_websocket_route("/echo", echo)
-    sites = sites or Sites()
     add_tokens(app, sites)
     add_page(app)
     return Guard(app, host, sites, names)

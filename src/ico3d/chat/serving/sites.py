@@ -41,6 +41,11 @@ class Sites:
         self._embedding, self._key, self._now = embedding or Embedding(), key, now
 
     @property
+    def any(self) -> bool:
+        """Whether some site may embed the avatar, so that strangers may talk with it."""
+        return bool(self._embedding.origins)
+
+    @property
     def ancestors(self) -> str:
         """Sites that may frame the page, for the policy `frame-ancestors`."""
         return " ".join(self._embedding.origins) or "'none'"
