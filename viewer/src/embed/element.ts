@@ -3,6 +3,7 @@ import { PageError, sentenceOf } from '../errors.ts';
 import { Server } from '../server.ts';
 import type { Emit, TalkEvents } from '../talk/events.ts';
 import { focusOn } from '../ui/elements.ts';
+import { icon } from '../ui/icons.ts';
 import { Overlay, type Choice } from '../ui/overlay.ts';
 import type { Presence, Visit } from '../visit.ts';
 import { admit } from './admission.ts';
@@ -126,6 +127,7 @@ export class AvatarElement extends HTMLElement {
   private show(open: boolean): void {
     this.toggleAttribute('open', open && this.floats);
     this.shell.launcher.setAttribute('aria-expanded', String(open));
+    this.shell.launcher.replaceChildren(icon(open ? 'close' : 'talk'));
   }
 
   /** Fills the page anew; the focus stays within. */

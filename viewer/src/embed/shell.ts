@@ -20,7 +20,6 @@ export function buildShell(root: ShadowRoot): Shell {
   launcher.id = 'launcher';
   launcher.setAttribute('aria-label', 'Talk with the avatar');
   launcher.setAttribute('aria-controls', 'page');
-  launcher.append(icon('talk'));
   const holder = document.createElement('section');
   holder.id = 'page';
   holder.className = 'page';

@@ -2,6 +2,7 @@
 const PATHS = {
   microphone: 'M12 3a3 3 0 0 0-3 3v6a3 3 0 0 0 6 0V6a3 3 0 0 0-3-3ZM5.5 11.5a6.5 6.5 0 0 0 13 0M12 18v3',
   talk: 'M4.5 5.5h15v10H11l-4 4v-4H4.5z',
+  close: 'M6.5 6.5l11 11M17.5 6.5l-11 11',
   send: 'M12 19V5M6 11l6-6 6 6',
   stop: 'M7 7h10v10H7z',
   chart: 'M5 19v-6M12 19V5M19 19v-9',
