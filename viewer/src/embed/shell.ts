@@ -1,6 +1,5 @@
 import page from '../../index.html?raw';
 import pageStyle from '../style.css?inline';
-import { icon } from '../ui/icons.ts';
 import frameStyle from './frame.css?inline';
 
 const ROOT_SIZE = 16; // px: sizes are those of the page, whatever the font size of the page around it
