@@ -15,11 +15,12 @@ const LONGEST = 2 ** 31 - 1; // ms, of a timer
 export async function admit(server: Server, url: string, signal: AbortSignal): Promise<void> {
   server.token = await fetchToken(url, signal);
   const expires = 1000 * Number(server.token.split('.')[0]);
-  const wait = SHARE * (expires - Date.now());
-  const timer = setTimeout(
-    () => void admit(server, url, signal).catch(() => {}), // with the next try to connect it is told
-    Math.min(LONGEST, Math.max(SHORTEST, wait || 0)),
-  );
+  renewLater(server, url, SHARE * (expires - Date.now()) || 0, signal);
+}
+
+function renewLater(server: Server, url: string, wait: number, signal: AbortSignal): void {
+  const renew = () => admit(server, url, signal).catch(() => renewLater(server, url, 0, signal));
+  const timer = setTimeout(renew, Math.min(LONGEST, Math.max(SHORTEST, wait)));
   atEnd(signal, () => clearTimeout(timer));
 }
 

@@ -26,12 +26,12 @@ describe('a token', () => {
 
   test('is replaced before it expires, as text or JSON, until the talk ends', async () => {
     const server = new Server(new URL('https://avatar.example/'));
-    given = [`${NOW + 600}.x.y\n`, JSON.stringify({ token: `${NOW + 1200}.x.y` }), 'never'];
+    given = [`${NOW + 600}.x.y\n`, '', JSON.stringify({ token: `${NOW + 1200}.x.y` }), 'never'];
     await admit(server, 'https://site.example/token', ending.signal);
     expect(server.token).toBe(`${NOW + 600}.x.y`);
     await vi.advanceTimersByTimeAsync(479_000);
     expect(server.token).toBe(`${NOW + 600}.x.y`);
-    await vi.advanceTimersByTimeAsync(2000);
+    await vi.advanceTimersByTimeAsync(7000); // the first try to renew it fails
     expect(server.token).toBe(`${NOW + 1200}.x.y`);
     ending.abort();
     await vi.advanceTimersByTimeAsync(3_600_000);

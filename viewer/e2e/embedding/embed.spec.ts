@@ -2,13 +2,13 @@ import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
-import type { mountAvatar } from '../src/embed/api.ts';
-import type { Presence } from '../src/visit.ts';
-import { Browser } from '../support/browser/browser.ts';
-import { REPOSITORY } from '../support/python.ts';
-import { scratchFolder } from '../support/scratch.ts';
-import { ChatServer } from '../support/servers/server.ts';
-import { Site } from '../support/servers/site.ts';
+import type { mountAvatar } from '../../src/embed/api.ts';
+import type { Presence } from '../../src/visit.ts';
+import { Browser } from '../../support/browser/browser.ts';
+import { REPOSITORY } from '../../support/python.ts';
+import { scratchFolder } from '../../support/scratch.ts';
+import { ChatServer } from '../../support/servers/server.ts';
+import { Site } from '../../support/servers/site.ts';
 
 /** What happened on somebody's page. */
 interface Told {
