@@ -32,7 +32,7 @@ export default defineConfig({
         extends: true,
         test: {
           name: 'e2e',
-          include: ['e2e/*.spec.ts'],
+          include: ['e2e/*.spec.ts', 'e2e/talk/*.spec.ts'],
           globalSetup: ['support/scratch.ts', 'support/servers/shared.ts'],
           maxWorkers: 2, // much of a talk is waiting
           sequence: { groupOrder: 1 },
