@@ -44,6 +44,7 @@ export function makePage(root: HTMLElement, overlay: Overlay, frames: () => numb
       root.dataset.state = state;
       byId(root, 'state').textContent = STATES[state];
       controls.setSpeaking(state === 'speaking');
+      if (state === 'connecting') overlay.reconnect();
     },
     question: (text, final) => captions.question(text, final),
     answer: (sentence) => captions.answer(sentence),
@@ -57,6 +58,7 @@ export function makePage(root: HTMLElement, overlay: Overlay, frames: () => numb
     talking: (held) => controls.setTalking(held),
     latency: (milliseconds) => panel.latency(milliseconds),
     metrics: (name, values) => panel.metrics(name, values),
+    silenced: (silent) => (byId(root, 'silenced').hidden = !silent),
     queued: (place) => overlay.queue(place),
     connected: () => overlay.isShown && (overlay.hide(), controls.focus()),
     ended: (ending) => overlay.end(ending, () => again()),
