@@ -17,6 +17,7 @@ import { byId, focusOn } from './ui/elements.ts';
 import { Overlay, type Choice } from './ui/overlay.ts';
 import { makePage, showNotice, type Page } from './ui/page.ts';
 import { PlayerBar } from './ui/player.ts';
+import { makeThemeButton } from './ui/theme.ts';
 import { makeViewBar } from './ui/views.ts';
 
 /** Who is there, once they can be seen. */
@@ -86,10 +87,11 @@ export class Visit {
     atEnd(signal, () => stage.dispose());
     stage.onGone = () => this.overlay.fail('The browser cannot show the picture any more.');
     watchCover(root, signal, (pixels) => stage.keepClear(pixels));
-    const page = makePage(root, this.overlay, () => stage.frames, signal);
+    const page = makePage(root, this.overlay, () => stage.figures, signal);
     const conversation = manifest.head ? this.converse(page) : undefined;
     const presence: Presence = { stage, conversation, ...(await this.enter(manifest, stage, conversation)) };
-    root.querySelector('.figures')!.append(makeViewBar(stage.orbit, root, signal));
+    const corner = root.querySelector('.figures')!;
+    corner.append(makeThemeButton(root, (light) => stage.setBright(light), signal), makeViewBar(stage.orbit, root, signal));
     const { playback } = presence;
     const moving = presence.body ?? presence.skinned;
     if (moving && playback) new PlayerBar(root, moving, playback, 1 / bodyOf(manifest)!.fps, signal);
@@ -120,6 +122,7 @@ export class Visit {
     signal.throwIfAborted();
     stage.start();
     await cast.body?.ready();
+    stage.bytes = loaded;
     signal.throwIfAborted();
     return cast;
   }
