@@ -6,14 +6,14 @@ export ICO3D_PYTHON := $(CURDIR)/$(PY)
 # importing takes three times as long where every process compiles what it imports
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test quick quick-unit install viewer lint page unit e2e e2e-beside e2e-alone bench clean
+.PHONY: demo test quick quick-unit install viewer lint strict page unit e2e e2e-beside e2e-alone bench clean
 
 demo: $(VENV)/.serve src/ico3d/chat/static/index.html ## talk with the packaged avatar
 	$(VENV)/bin/ico3d demo
 
 test: ## everything CI runs
 	$(MAKE) --no-print-directory -j 2 install # Python's packages and the page's, side by side
-	$(MAKE) --no-print-directory -j 3 e2e-alone lint page $(VENV)/.kernels # all but the first give way
+	$(MAKE) --no-print-directory -j 3 e2e-alone $(VENV)/.kernels page strict lint # all but the first give way
 	$(MAKE) --no-print-directory -j 2 unit e2e-beside # browsers mostly wait for speech
 
 quick: $(VENV)/.kernels src/ico3d/chat/static/index.html ## what one runs while working: checks, and the tests that take no time
@@ -32,8 +32,11 @@ ASIDE := nice -n 19
 
 lint: $(VENV)/.develop
 	ruff check . && ruff format --check .
+	$(ASIDE) pyrefly check
+	$(ASIDE) lint-imports
+
+strict: $(VENV)/.develop # rooms in which no type may be unknown, which pyright alone can tell
 	NODE_OPTIONS=--max-semi-space-size=64 $(ASIDE) pyright # a tenth of its time would go into small collections
-	lint-imports
 
 page: src/ico3d/chat/static/index.html
 	cd viewer && $(ASIDE) npm run --silent check && $(ASIDE) npm run --silent test

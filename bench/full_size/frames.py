@@ -4,7 +4,7 @@ import numpy as np
 import torch
 
 from full_size.models import SPEECH, backdrop, random_body, random_head
-from ico3d.protocols.viewer import Staged
+from ico3d.protocols.viewer import Part, Staged
 from ico3d.splat.gaussians import Gaussians
 
 SECONDS = 1.0
@@ -34,5 +34,8 @@ def random_person(behind: int, of_body: int, of_head: int, device: torch.device)
     def moving(seconds: float) -> Gaussians:
         return body.at(seconds / SECONDS)
 
-    parts = {"background": lambda _: wall, "body": moving, "head": speaking}
+    def still(_: float) -> Gaussians:
+        return wall
+
+    parts: dict[str, Part] = {"background": still, "body": moving, "head": speaking}
     return Staged(parts, SECONDS, device)

@@ -43,7 +43,7 @@ def measure(
         raise CaptureError(f"{out} is not empty: name a new folder.")
     out.mkdir(parents=True, exist_ok=True)
     device = computing_device(wanted)
-    known = {"command": " ".join(["python", *sys.argv]), "sizes": asdict(sizes)}
+    known: dict[str, object] = {"command": " ".join(["python", *sys.argv]), "sizes": asdict(sizes)}
     if device.type == "cpu":
         known["no CUDA"] = cuda_fault()
     facts, measure_part = facts_of(device, **known), Parts(out, sizes, device, _weights(out))

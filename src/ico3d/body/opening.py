@@ -28,7 +28,7 @@ def motion_from(about: dict) -> Motion:
     if kind == "deformation":
         grid = fields.pop("encoder")
         if grid is not None:
-            grid = EncoderShape(**{**grid, "space": tuple(grid["space"])})
+            grid = EncoderShape(tuple(grid.pop("space")), **grid)
         middle, half = (tuple(float(x) for x in fields.pop(name)) for name in ("middle", "half"))
         return Deformation(middle, half, MlpShape(**fields.pop("mlp")), grid, **fields)  # type: ignore[arg-type]
     raise ValueError(f"there is no motion of the kind '{kind}'")

@@ -4,7 +4,7 @@ import json
 import math
 import types
 import typing
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Sized
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
 from typing import Annotated, Any, Literal, TypeVar, cast
@@ -63,11 +63,39 @@ def required(kind: type) -> tuple[str, ...]:
     )
 
 
+@dataclass(frozen=True)
+class Range:
+    """A mark: limits of a number, both included."""
+
+    low: float
+    high: float
+
+    def fault(self, value: float) -> str | None:
+        """What must hold and does not, as the end of a sentence; None if the number is within."""
+        if self.low <= value <= self.high:
+            return None
+        return f"must lie in [{self.low:g}, {self.high:g}]."
+
+
+@dataclass(frozen=True)
+class Length:
+    """A mark: limits of the number of characters or items, both included."""
+
+    low: int
+    high: int
+
+    def fault(self, value: Sized) -> str | None:
+        """What must hold and does not, as the end of a sentence; None if the number is within."""
+        if self.low <= len(value) <= self.high:
+            return None
+        return f"must have {self.low} to {self.high} items or characters."
+
+
 class Rules:
     """How strict the conversion is, and how its error messages are worded.
 
     A place says where a value stands in the parsed data. In this class a place is a text;
-    subclasses may use another type, which `field` and `entry` then extend.
+    subclasses may use another type, which `field` then extends, and name no entries.
     """
 
     defaults = False
@@ -76,6 +104,8 @@ class Rules:
     """Whether null is accepted where the type is `T | None`."""
     finite = True
     """Whether every number must be finite; marks of an annotation may restrict it further."""
+    entries = True
+    """Whether errors say which entry of a list or dictionary is wrong."""
 
     def __init__(self, error: Callable[[str], Exception]):
         """Sets the constructor of the error to raise; its argument is one sentence."""
@@ -87,6 +117,8 @@ class Rules:
 
     def entry(self, where: Any, key: int | str) -> Any:
         """The place of an entry, given the place of its list or dictionary."""
+        if not self.entries:
+            return where
         return f"{where}[{key}]" if isinstance(key, int) else f"{where}[{key[:80]!r}]"
 
     def unknown(self, where: Any, name: str, kind: type) -> str:
@@ -112,9 +144,6 @@ class Rules:
     def own(self, kind: Kind, value: Any, where: Any) -> Any:
         """Converts a value of a type that only these rules know; else returns `NotImplemented`."""
         return NotImplemented
-
-    def check(self, value: Any, mark: Any, where: Any) -> None:
-        """Checks a value against one mark of its annotation; raises `error` where it fails."""
 
 
 def fill(kind: type[T], value: Any, where: Any, rules: Rules) -> T:
@@ -160,7 +189,9 @@ def parsed(annotation: Any, value: Any, where: Any, rules: Rules) -> Any:
     if result is NotImplemented:
         result = _parsed(kind, value, where, rules)
     for mark in kind.marks:
-        rules.check(value, mark, where)
+        fault = mark.fault(value) if isinstance(mark, Range | Length) else None
+        if fault is not None:
+            raise rules.error(f"{where}: {fault}")
     return result
 
 

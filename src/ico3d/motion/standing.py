@@ -92,7 +92,7 @@ def _at_rest(person: Person, limb: tuple[str, str, str]) -> Bend:
 def stance_of(person: Person) -> Stance:
     """A stance with feet at their rest positions, moved together if they are too far apart."""
     hips = {side: person.place(f"{side}_hip") for side in SIDES}
-    ankles = {side: person.place(f"{side}_ankle").copy() for side in SIDES}
+    ankles: dict[str, Array] = {side: person.place(f"{side}_ankle").copy() for side in SIDES}
     width = APART * abs(hips["left"][0] - hips["right"][0])
     apart = abs(ankles["left"][0] - ankles["right"][0])
     middle = (ankles["left"][0] + ankles["right"][0]) / 2

@@ -186,8 +186,8 @@ def measure_ablations(terms: AblationTerms) -> Report:
         _below(columns, rows),
         Section("Pictures", pictures=[shown]),
     ]
-    asked = asdict(terms)
-    facts = facts_of(computing_device(asked.pop("device")), **asked)
+    asked = {name: value for name, value in asdict(terms).items() if name != "device"}
+    facts = facts_of(computing_device(terms.device), **asked)
     report = Report(f"What is each part of the {terms.model} worth?", facts, sections, found)
     report.write(terms.out)
     return report

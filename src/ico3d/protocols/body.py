@@ -171,7 +171,7 @@ def _pictures(
     out: Path,
 ) -> list[Picture]:
     """Plots of quality, and a strip of one test picture."""
-    panels = {
+    panels: dict[str, dict[str, list]] = {
         label: {
             method: [(result[key], result["psnr_mask"]) for result in figures[method]["seeds"]]
             for method in methods
@@ -180,7 +180,9 @@ def _pictures(
     }
     draw_quality(out / "quality.png", panels, "PSNR-M (dB)")
     spans = [f"{first}–{last}" for first, last in figures["windows"]]
-    lines = {method: figures[method]["mean"]["psnr_mask_per_window"] for method in methods}
+    lines: dict[str, list] = {
+        method: figures[method]["mean"]["psnr_mask_per_window"] for method in methods
+    }
     shown = [Picture("quality.png", "PSNR-M of every training, by its time and its Gaussians")]
     if len(spans) > 1:
         draw_lines(out / "windows.png", lines, "window", "PSNR-M (dB)")

@@ -93,8 +93,11 @@ def draw_strip(path: Path, truth: np.ndarray, drawn: Mapping[str, np.ndarray]) -
         truth: (H, W, 3) recorded picture in [0, 1].
         drawn: (H, W, 3) pictures of the same view by name.
     """
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
 
+    scale = ScalarMappable(Normalize(0, LARGEST_ERROR), "magma")
     count, shape = len(drawn) + 1, truth.shape[0] / truth.shape[1]
     figure = Figure(figsize=(2.2 * count, 4.4 * shape + 0.5), dpi=120, layout="constrained")
     grid = figure.subplots(2, count, squeeze=False)
@@ -106,6 +109,6 @@ def draw_strip(path: Path, truth: np.ndarray, drawn: Mapping[str, np.ndarray]) -
         grid[0, column].imshow(np.clip(picture, 0, 1))
         grid[0, column].set_title(name, fontsize=9)
         error = np.abs(picture - truth).mean(-1)  # (H, W)
-        shown = grid[1, column].imshow(error, vmin=0, vmax=LARGEST_ERROR, cmap="magma")
-    figure.colorbar(shown, ax=grid[1, 0], location="left", fraction=0.3, label="mean error")
+        grid[1, column].imshow(error, norm=scale.norm, cmap=scale.cmap)
+    figure.colorbar(scale, ax=grid[1, 0], location="left", fraction=0.3, label="mean error")
     save_figure(figure, path)

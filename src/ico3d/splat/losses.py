@@ -107,6 +107,7 @@ class _CpuPhotometric(torch.autograd.Function):
 
     @staticmethod
     @once_differentiable
+    # type: ignore (torch's own takes any number of gradients)
     def backward(ctx: Any, g_value: Tensor) -> tuple[Tensor, None, None, None, None]:
         return ctx.gradient * g_value, None, None, None, None
 

@@ -63,6 +63,7 @@ def address():
     patch = pytest.MonkeyPatch()
     patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
     patch.setenv("RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "0")  # Ray's way to say: loopback only
+    patch.setenv("RAY_worker_niceness", "0")  # else whatever else is tested takes all cores first
     ray_cluster = pytest.importorskip("ray.cluster_utils", reason="ray is not installed")
     small = {"num_cpus": 1, "object_store_memory": 80 * 2**20, "include_log_monitor": False}
     with tempfile.TemporaryDirectory(prefix="ray", ignore_cleanup_errors=True) as folder:

@@ -103,7 +103,7 @@ class TrainedPerson:
     @property
     def facing(self) -> np.ndarray | None:
         """(3,) direction in the world in which the face looks; None for a body alone."""
-        return self.avatar and self.avatar.placement.facing
+        return self.avatar.placement.facing if self.avatar else None
 
     @property
     def has_head(self) -> bool:
@@ -113,7 +113,7 @@ class TrainedPerson:
     @property
     def poseable(self) -> Poseable | None:
         """The person in any pose of the skeleton; None unless trained with --method skinned."""
-        frame = self.animation and self.animation.rest.end
+        frame = self.animation.rest.end if self.animation else None
         return poseable_of(self.avatar or self.body, frame, self.cuts)
 
     @property
@@ -169,7 +169,8 @@ class BakedPerson:
     @property
     def poseable(self) -> Poseable | None:
         """The person in any pose of the bundle's skeleton; None without a skeleton or gestures."""
-        return poseable_of(self.bundle, self.animation and self.animation.rest.end)
+        frame = self.animation.rest.end if self.animation else None
+        return poseable_of(self.bundle, frame)
 
     @property
     def idle(self) -> np.ndarray:

@@ -102,7 +102,8 @@ def bundle_actor(bundle: Bundle) -> Actor:
     at = head.eye_offset if head else None
     stage = (manifest.camera, portrait, manifest.background)
     behind = backdrop_gaussians(bundle)
-    poseable = poseable_of(bundle, bundle.animation and bundle.animation.rest.end)
+    frame = bundle.animation.rest.end if bundle.animation else None
+    poseable = poseable_of(bundle, frame)
     return Actor(draw, seconds, *stage, idle, at, lips, bundle.animation, behind, poseable)
 
 
@@ -162,9 +163,9 @@ def _driven(person: Poseable | None, head: TrainedHead) -> Poseable | None:
 
     Without this, it takes expressions as they were recorded (`TrainedHead.recorded` converts them).
     """
-    draw = person and person.head
-    if person is None or draw is None:
+    if person is None or person.head is None:
         return person
+    draw = person.head
     return replace(person, head=lambda moved, driven: draw(moved, head.recorded(driven)))
 
 

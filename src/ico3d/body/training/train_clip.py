@@ -355,7 +355,7 @@ def _save(
 ) -> TrainedBody:
     """Writes the file `about`, which lists the windows' files; returns the body."""
     known = capture.provenance
-    summary = {
+    summary: dict[str, object] = {
         "train_seconds": seconds,
         "capture": tracked(capture).credited(known) if job.method in SKINNED else known,
         "recording": _record(capture, job),
@@ -396,5 +396,5 @@ def _about(capture: Path, window: Window, job: BodyJob) -> dict:
     Settings of fine-tuning are not among them: it can be repeated without training again.
     """
     settings = asdict(job.settings)
-    del settings["finetune"]
+    settings.pop("finetune")
     return job.about(capture) | asdict(window) | {"settings": settings}

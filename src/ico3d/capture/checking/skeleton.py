@@ -50,4 +50,4 @@ def _outline(track: BodyTrack, lens: Camera, frame: int) -> np.ndarray:
     solid = np.asarray(binary_erosion(binary_dilation(np.asarray(covered))))
     rim = solid & ~np.asarray(binary_erosion(solid, border_value=1), bool)
     blocks = rim.reshape(lens.height, SHARP, lens.width, SHARP)
-    return blocks.any((1, 3))
+    return np.any(blocks, (1, 3))

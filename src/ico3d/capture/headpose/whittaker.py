@@ -86,7 +86,8 @@ def _whittaker(values: np.ndarray, precision: np.ndarray, known: np.ndarray) -> 
         return values
     # Everything in units of the noise, or numbers of 1e18 meet such of 1.
     relative = precision * stated
-    return solveh_banded(_bands(relative, noise / motion), relative[:, None] * values)
+    smooth = solveh_banded(_bands(relative, noise / motion), relative[:, None] * values)
+    return np.asarray(smooth)
 
 
 def _mean_square(values: np.ndarray, known: np.ndarray, order: int) -> float:

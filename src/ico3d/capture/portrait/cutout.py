@@ -135,15 +135,8 @@ def cut(image: np.ndarray, landmarks: np.ndarray, models: Models) -> np.ndarray:
     same = np.abs(small.astype(np.int16) - models.plate).max(-1) < 12
     labels[models.known & same & (labels != cv2.GC_FGD)] = cv2.GC_BGD
     person, background = models.person.copy(), models.background.copy()
-    cv2.grabCut(
-        small,
-        labels,
-        None,  # type: ignore (its stub forgets that masks need no rectangle)
-        background,
-        person,
-        1,
-        cv2.GC_EVAL_FREEZE_MODEL,
-    )
+    # type: ignore (its stub forgets that masks need no rectangle)
+    cv2.grabCut(small, labels, None, background, person, 1, cv2.GC_EVAL_FREEZE_MODEL)
     rough = _largest(_inside(labels)).astype(np.float32)
     rough = cv2.resize(rough, image.shape[1::-1], interpolation=cv2.INTER_LINEAR)
     return _soft(image, rough)

@@ -66,7 +66,7 @@ class OperatorLog:
             exception = record["exception"]
             self.write(
                 record["level"].name,
-                _line(f"{name}.{record['function']}", said, exception and exception.value),
+                _line(f"{name}.{record['function']}", said, exception.value if exception else None),
             )
 
 

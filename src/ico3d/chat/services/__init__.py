@@ -42,7 +42,8 @@ class Chosen:
         if not isinstance(options, browser.Settings):
             return None
         listener = browser.fallback(recognition.ON_SERVER, options)
-        return protocol.Dictation(options.language, listener and listener.provider.title)
+        title = listener.provider.title if listener else None
+        return protocol.Dictation(options.language, title)
 
 
 def choose(settings: ChatSettings, voices: Mapping[str, str] | None = None) -> Chosen:

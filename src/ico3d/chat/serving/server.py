@@ -209,7 +209,7 @@ def make_server(app: Guard, certificate: Certificate | None = None) -> uvicorn.S
         ws_per_message_deflate=False,  # sound hardly shrinks, and a core has better things to do
         timeout_graceful_shutdown=2,
         server_header=False,
-        ssl_certfile=certificate and certificate.file,
-        ssl_keyfile=certificate and certificate.key,
+        ssl_certfile=certificate.file if certificate else None,
+        ssl_keyfile=certificate.key if certificate else None,
     )
     return uvicorn.Server(config)

@@ -252,15 +252,11 @@ class Setting:
 class SettingsRules(Rules):
     """Rules for settings: they may be left out, and errors list what exists."""
 
-    defaults, null, finite = True, False, False
+    defaults, null, finite, entries = True, False, False, False
 
     def field(self, where: Setting, name: str, kind: Kind) -> Setting:
         """The place of a setting in a table."""
         return Setting(where.inner, name, kind.bare)
-
-    def entry(self, where: Setting, key: int | str) -> Setting:
-        """The place of the whole list or table: entries are not distinguished."""
-        return where
 
     def unknown(self, where: Setting, name: str, kind: type) -> str:
         """The sentence for a name that is no setting."""

@@ -4,22 +4,22 @@ import json
 import math
 import struct
 import typing
-from dataclasses import is_dataclass
+from dataclasses import is_dataclass, make_dataclass
 from functools import cache
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from ico3d.chat.wire import protocol
-from ico3d.chat.wire.marks import Length, Range, Tensor
+from ico3d.chat.wire.marks import Tensor
 from ico3d.chat.wire.protocol import ClientMessage, ServerMessage
 from ico3d.common.typed import (
     Kind,
+    Range,
     Rules,
     field_types,
     fill_fields,
     kind_of,
-    parsed,
     plain,
     refuse_constant,
 )
@@ -47,7 +47,7 @@ def encode(message: ClientMessage | ServerMessage) -> str | bytes:
     arrays = {n: np.ascontiguousarray(getattr(message, n), t.dtype) for n, t in tensors.items()}
     header = plain(message)
     header.update({n: list(array.shape) for n, array in arrays.items()})
-    fill_fields(kind, header, name, RULES)
+    check_header(kind, header, name)
     header = {"type": name, **header}
     text = json.dumps(header, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     if not arrays:
@@ -94,7 +94,7 @@ def decode(frame: str | bytes, known: tuple[type, ...]) -> Any:
         kind = "binary" if tensors else "text"
         raise ProtocolError(f"{name}: this message travels in a {kind} frame.")
     name = typing.cast(str, name)
-    values = fill_fields(message_type, header, name, RULES)
+    values = check_header(message_type, header, name)
     if payload is not None:
         values.update(read_tensors(tensors, header, payload, name))
     return message_type(**values)
@@ -176,14 +176,21 @@ def tensors_of(message: type) -> dict[str, Tensor]:
     return {name: kind.marks[0] for name, kind in kinds.items() if kind.bare is np.ndarray}
 
 
+@cache
+def header_of(message: type) -> type:
+    """The dataclass of a message's header: the message with shapes in the place of arrays."""
+    notes, tensors = field_types(message), tensors_of(message)
+    shapes = {
+        name: list[Annotated[int, Range(0, tensor.max_size)]] for name, tensor in tensors.items()
+    }
+    return make_dataclass(message.__name__, (notes | shapes).items(), kw_only=True)
+
+
 class WireRules(Rules):
     """Rules for messages: all fields are required, no others allowed, and marks limit values."""
 
     finite = False  # the ranges say so
-
-    def entry(self, where: str, key: int | str) -> str:
-        """The place of the whole list: entries are not distinguished."""
-        return where
+    entries = False
 
     def unknown(self, where: str, name: str, kind: type) -> str:
         """The sentence for a name that is no field."""
@@ -205,44 +212,27 @@ class WireRules(Rules):
         name = "dict" if is_dataclass(wanted) else wanted.__name__
         return f"{where}: must be {name}, not {type(value).__name__}."
 
-    def own(self, kind: Kind, value: Any, where: str) -> Any:
-        """Converts the shape of an array, which the header contains in its field."""
-        if kind.bare is not np.ndarray:
-            return NotImplemented
-        check_shape(value, kind.marks[0], where)
-        return value
-
-    def check(self, value: Any, mark: Any, where: str) -> None:
-        """Checks a value against a mark of its field."""
-        check_limit(value, mark, where)
-
 
 RULES = WireRules(ProtocolError)
 
 
-def check_shape(value: Any, tensor: Tensor, where: str) -> None:
-    """Checks the shape that the header states for an array.
+def check_header(message: type, header: dict[str, Any], name: str) -> dict[str, Any]:
+    """Checks the header of a message against the annotations and marks of its fields.
+
+    Returns:
+        The fields by name, an array's shape in its place.
 
     Raises:
-        ProtocolError: If the shape has other dimensions or too many elements.
+        ProtocolError: If a value does not fit, or an array has other dimensions or is too large.
     """
-    for size in parsed(list[int], value, where, RULES):
-        check_limit(size, Range(0, tensor.max_size), where)
-    if len(value) != tensor.dims:
-        raise ProtocolError(f"{where}: must have {tensor.dims} dimensions.")
-    check_limit(math.prod(value), Range(0, tensor.max_size), where)
-
-
-def check_limit(value: Any, mark: Any, where: str) -> None:
-    """Checks a value against a `Range` or `Length`.
-
-    Raises:
-        ProtocolError: If the value violates the limit.
-    """
-    if isinstance(mark, Range) and not mark.low <= value <= mark.high:
-        raise ProtocolError(f"{where}: must lie in [{mark.low:g}, {mark.high:g}].")
-    if isinstance(mark, Length) and not mark.low <= len(value) <= mark.high:
-        raise ProtocolError(f"{where}: must have {mark.low} to {mark.high} items or characters.")
+    values = fill_fields(header_of(message), header, name, RULES)
+    for field, tensor in tensors_of(message).items():
+        if len(values[field]) != tensor.dims:
+            raise ProtocolError(f"{name}.{field}: must have {tensor.dims} dimensions.")
+        fault = Range(0, tensor.max_size).fault(math.prod(values[field]))
+        if fault is not None:
+            raise ProtocolError(f"{name}.{field}: {fault}")
+    return values
 
 
 def short(value: Any) -> str:

@@ -3,24 +3,10 @@
 from dataclasses import dataclass
 from typing import Annotated
 
+from ico3d.common.typed import Length, Range
+
 MAX_EXACT = 2**53  # largest whole number JavaScript holds
 LONGEST_NAME = 200
-
-
-@dataclass(frozen=True)
-class Range:
-    """Limits of a number, both included."""
-
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class Length:
-    """Limits of the number of characters or items, both included."""
-
-    low: int
-    high: int
 
 
 @dataclass(frozen=True)

@@ -138,7 +138,7 @@ async def shares(url: str, said: Sayings, turns: int, results: Results, told: To
     async with trials.visit(url) as page:
         for number in range(turns):
             question = await trials.ask(page, broken_off(nth(said.questions, number)))
-            results.shares.append(question and share(question))
+            results.shares.append(share(question) if question else None)
             if question and not question.is_disturbed:
                 results.undisturbed.append(share(question))
             await trials.peace(page)

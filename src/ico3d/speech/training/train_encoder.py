@@ -55,9 +55,8 @@ class EncoderTraining:
         """
         torch.manual_seed(settings.seed)
         self.settings = settings
-        self.network = BuiltinEncoder(normalise=True).to(
-            memory_format=torch.channels_last  # type: ignore (missing in its stub)
-        )
+        # type: ignore (missing in its stub)
+        self.network = BuiltinEncoder(normalise=True).to(memory_format=torch.channels_last)
         self.readout = Readout()
         parameters = [*self.network.parameters(), *self.readout.parameters()]
         self._optimiser = torch.optim.AdamW(parameters, settings.learning_rate, weight_decay=0.01)

@@ -62,6 +62,7 @@ class Project(torch.autograd.Function):
 
     @staticmethod
     @once_differentiable
+    # type: ignore (torch's own takes any number of gradients)
     def backward(
         ctx: Any, g_means2d: Tensor, g_conics: Tensor, g_alphas: Tensor, g_depths: Tensor, _: Tensor
     ) -> tuple[Tensor | None, ...]:
@@ -120,6 +121,7 @@ class Draw(torch.autograd.Function):
 
     @staticmethod
     @once_differentiable
+    # type: ignore (torch's own takes any number of gradients)
     def backward(ctx: Any, g_images: Tensor, g_lights: Tensor) -> tuple[Tensor | None, ...]:
         """Gradients of means2d, conics, alphas and colors."""
         wanted = ctx.absolute is not None

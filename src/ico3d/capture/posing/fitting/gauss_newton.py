@@ -217,7 +217,7 @@ class _Shared:
         self._kinematics = kinematics
         shapes, marks, nodes = len(body.shape), body.offsets.size, len(body.off_skin)
         self._shapes, self._marks = shapes, marks
-        self._own = {
+        self._own: dict[type, np.ndarray] = {
             LandmarkTerm: shapes + np.arange(marks),
             Surface: shapes + marks + np.arange(nodes),
         }

@@ -89,6 +89,7 @@ class CompatibleModel(OpenAILLMService):
             _summarising.reset(token)
         return text and without_thoughts(text)
 
+    # type: ignore (whoever reads the stream asks it for no more than chunks)
     async def get_chat_completions(
         self, context: LLMContext
     ) -> AsyncGenerator[ChatCompletionChunk, None]:
