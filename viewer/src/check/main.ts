@@ -31,7 +31,7 @@ function lineOf(id: string, title: string): { line: Line; found: (finding: Findi
 function write(): void {
   const known = [...findings.values()].filter((finding) => finding !== null);
   byId(document, 'summary').textContent = summary(known);
-  const screen = `${innerWidth} × ${innerHeight} points of ${devicePixelRatio} pixels`;
+  const screen = `Window: ${innerWidth} × ${innerHeight}, ${devicePixelRatio} pixels per point`;
   text.value = report(findings, [navigator.userAgent, screen]);
 }
 

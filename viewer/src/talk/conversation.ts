@@ -1,9 +1,11 @@
+import { SoundGuard } from '../audio/interruption.ts';
 import { Player } from '../audio/player.ts';
 import type { Cue, Offer, PlaceMessage, Release, Services, StateMessage, WelcomeMessage } from '../protocol.ts';
 import { Connection, type Ending, type SessionMessage } from './connection.ts';
 import { Speaking, type Emit } from './events.ts';
 import { TurnTimer } from './latency.ts';
 import { VoiceInput, type VoiceView } from './voice-input.ts';
+import { WakeLock } from './wake-lock.ts';
 import { handle, type Handlers } from './wire.ts';
 
 /** Who moves the body while it speaks. */
@@ -41,6 +43,8 @@ export interface ConversationView extends VoiceView {
   metrics(name: string, values: Record<string, number>): void;
   /** The visitor waits in the server's queue. */
   queued(place: PlaceMessage): void;
+  /** The system has stopped the sound until the visitor taps or types, or it goes on. */
+  silenced(silent: boolean): void;
   /** A session has begun or goes on. */
   connected(): void;
   ended(ending: Ending): void;
@@ -88,6 +92,9 @@ export class Conversation {
     },
   };
   private state: StateMessage['state'] = 'idle'; // of the server
+  private up = false; // a session is going on
+  private readonly wake: WakeLock;
+  private readonly ending = new AbortController();
   private readonly reporting: ReturnType<typeof setInterval>;
 
   /**
@@ -107,7 +114,11 @@ export class Conversation {
       ended: (ending) => this.ended(ending),
     });
     const send = this.connection.send.bind(this.connection);
-    this.voice = new VoiceInput(send, (at) => this.player.heard(at), view);
+    const { signal } = this.ending;
+    this.voice = new VoiceInput(send, (at) => this.player.heard(at), view, signal);
+    this.voice.onChange = () => this.settleWake();
+    this.wake = new WakeLock(signal);
+    new SoundGuard(this.player.context, (silent) => view.silenced(silent), signal);
     this.voice.onSound = (pcm) => this.acting?.listen(pcm);
     this.player.onStart = (utterance, delay) => {
       this.answerStarts(performance.now() + 1000 * delay);
@@ -185,9 +196,9 @@ export class Conversation {
   /** Hangs up for good: nothing is heard, said or sent any more. */
   dispose(): void {
     clearInterval(this.reporting);
-    this.voice.end();
+    this.close();
+    this.ending.abort();
     this.connection.close();
-    this.silence();
     void this.player.context.close();
   }
 
@@ -197,6 +208,7 @@ export class Conversation {
       this.voice.close(); // what is said was meant for somebody who knew what was said before
       this.view.notice(REPLACED);
     }
+    this.up = true;
     this.voice.welcome(message);
     this.view.connected();
     this.view.services(message.services, message.offers);
@@ -205,8 +217,7 @@ export class Conversation {
   }
 
   private queued(place: PlaceMessage): void {
-    this.voice.end(); // a session of before is over, and nobody listens yet
-    this.silence();
+    this.close(); // of a session of before; nobody listens yet
     this.view.state('queued');
     this.view.queued(place);
   }
@@ -217,8 +228,7 @@ export class Conversation {
   }
 
   private ended(ending: Ending): void {
-    this.voice.end();
-    this.silence();
+    this.close();
     this.view.state('ended');
     this.view.ended(ending);
   }
@@ -234,6 +244,20 @@ export class Conversation {
   private show(state: StateMessage['state']): void {
     this.state = state;
     this.view.state(state);
+    this.settleWake();
+  }
+
+  /** The screen stays on while somebody talks or may. */
+  private settleWake(): void {
+    this.wake.want(this.up && (this.voice.listens || this.state !== 'idle'));
+  }
+
+  /** The session is over. */
+  private close(): void {
+    this.up = false;
+    this.voice.end();
+    this.silence();
+    this.settleWake();
   }
 
   private transcript(text: string, final: boolean): void {

@@ -3,7 +3,9 @@ import type { Heard } from '../face/face.ts';
 import type { ClientMessage, WelcomeMessage } from '../protocol.ts';
 import { VoiceMeter } from './latency.ts';
 import { Listening, type ListeningView } from './listening.ts';
+import { Recovery } from './recovery.ts';
 
+const AGAIN = 'The microphone is on again.';
 const KEPT_OPEN = 20_000; // ms after talking by the button: opening a microphone costs the first words
 
 export type MicrophoneState = 'closed' | 'opening' | 'open';
@@ -18,11 +20,14 @@ export interface VoiceView extends ListeningView {
 export class VoiceInput {
   /** Takes the visitor's sound while it is sent. */
   onSound: (pcm: Int16Array) => void = () => {};
+  /** Called when it may listen, or not any more. */
+  onChange: () => void = () => {};
   private readonly send: (message: ClientMessage) => boolean;
   private readonly heard: (at: number) => Heard | null;
   private readonly view: VoiceView;
   private readonly microphone: Microphone;
   private readonly listening: Listening;
+  private readonly recovery: Recovery;
   private readonly meter = new VoiceMeter();
   private ended = false; // the session is: nothing opens
   private sample = 0; // since the microphone opened
@@ -32,7 +37,12 @@ export class VoiceInput {
   private closing: ReturnType<typeof setTimeout> | undefined;
 
   /** @param heard what leaves the loudspeaker at a moment of the performance clock */
-  constructor(send: (message: ClientMessage) => boolean, heard: (at: number) => Heard | null, view: VoiceView) {
+  constructor(
+    send: (message: ClientMessage) => boolean,
+    heard: (at: number) => Heard | null,
+    view: VoiceView,
+    signal: AbortSignal,
+  ) {
     this.send = send;
     this.heard = heard;
     this.view = view;
@@ -40,10 +50,13 @@ export class VoiceInput {
     this.microphone = new Microphone(
       (pcm, end) => this.hear(pcm, end),
       (error) => {
+        const wanted = this.state === 'open';
         this.close();
         view.notice(error.message);
+        if (wanted) this.recovery.lost();
       },
     );
+    this.recovery = new Recovery({ isOpen: () => this.state === 'open', reopen: () => this.reopen() }, signal);
   }
 
   /** When the visitor last spoke, ms on the performance clock. */
@@ -56,9 +69,15 @@ export class VoiceInput {
     return this.state !== 'closed';
   }
 
+  /** Whether what the visitor says is sent. */
+  get listens(): boolean {
+    return this.state === 'open' || this.talking;
+  }
+
   /** Opens or closes the microphone; what hinders it is shown as a notice. */
   async toggle(): Promise<void> {
     if (this.ended || this.state === 'opening') return;
+    this.recovery.cancel();
     if (this.state === 'open') this.show('closed');
     else {
       this.show('opening');
@@ -88,6 +107,7 @@ export class VoiceInput {
 
   /** Closes the microphone. */
   close(): void {
+    this.recovery.cancel();
     this.release();
     this.microphone.stop();
     this.show('closed');
@@ -108,21 +128,38 @@ export class VoiceInput {
     this.listening.welcome(message);
   }
 
-  private async start(): Promise<boolean> {
+  private async start(notice = (sentence: string) => this.view.notice(sentence)): Promise<boolean> {
     clearTimeout(this.closing);
     if (this.microphone.open) return true;
     this.sample = 0;
     try {
-      return await this.microphone.start();
+      const open = await this.microphone.start();
+      if (open) void this.recovery.opened();
+      return open;
     } catch (error) {
-      this.view.notice((error as Error).message);
+      notice((error as Error).message);
       return false;
     }
+  }
+
+  /** Opens the microphone as the visitor had it; true also where there is nothing to do. */
+  private async reopen(): Promise<boolean> {
+    if (this.ended || this.talking || this.state === 'opening') return true;
+    this.microphone.stop();
+    this.listening.close();
+    this.show('opening');
+    const open = await this.start(() => {}); // why it closed was told
+    if ((this.state as MicrophoneState) !== 'opening') return true; // closed meanwhile
+    this.show(open ? 'open' : 'closed');
+    this.settle(0);
+    if (open) this.view.notice(AGAIN);
+    return open;
   }
 
   private show(state: MicrophoneState): void {
     this.state = state;
     this.view.microphone(state);
+    this.onChange();
   }
 
   /**
@@ -132,6 +169,7 @@ export class VoiceInput {
    */
   private settle(kept: number): void {
     this.view.talking(this.talking);
+    this.onChange();
     clearTimeout(this.closing);
     const track = this.state === 'open' || this.talking ? this.microphone.track : null;
     if (track) this.listening.open(track);

@@ -57,6 +57,7 @@ export function makePage(root: HTMLElement, overlay: Overlay, frames: () => numb
     talking: (held) => controls.setTalking(held),
     latency: (milliseconds) => panel.latency(milliseconds),
     metrics: (name, values) => panel.metrics(name, values),
+    silenced: (silent) => (byId(root, 'silenced').hidden = !silent),
     queued: (place) => overlay.queue(place),
     connected: () => overlay.isShown && (overlay.hide(), controls.focus()),
     ended: (ending) => overlay.end(ending, () => again()),

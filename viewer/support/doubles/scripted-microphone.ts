@@ -22,13 +22,24 @@ export class ScriptedAudio {
   readonly contexts: ScriptedContext[] = [];
   readonly nodes: ScriptedNode[] = [];
 
-  /** What stands for the browser's own classes and `navigator`. */
+  /** What is connected; `plug` changes it. */
+  private inputs = [{ kind: 'audioinput', deviceId: 'default', groupId: 'built in' }];
+  private readonly devices = Object.assign(new EventTarget(), {
+    getUserMedia: () => this.ask(),
+    enumerateDevices: async () => this.inputs,
+  });
+  /** How often the screen was kept on, and whether it is. */
+  readonly wake = { asked: 0, held: false };
+  readonly page = Object.assign(new EventTarget(), { visibilityState: 'visible' });
+
+  /** What stands for the browser's own classes, `navigator` and `document`. */
   readonly globals: Record<string, unknown>;
 
   constructor() {
     const audio = this;
     this.globals = {
-      navigator: { mediaDevices: { getUserMedia: () => this.ask() } },
+      navigator: { mediaDevices: this.devices, wakeLock: { request: async () => this.lock() } },
+      document: this.page,
       AudioContext: class extends ScriptedContext {
         constructor(options?: object) {
           super(audio, options !== undefined);
@@ -56,6 +67,19 @@ export class ScriptedAudio {
     };
   }
 
+  /** Another device becomes the system's default. */
+  plug(groupId: string): void {
+    this.inputs = [{ kind: 'audioinput', deviceId: 'default', groupId }];
+    this.devices.dispatchEvent(new Event('devicechange'));
+  }
+
+  /** The page is looked at, or not any more; then browsers give up the lock on the screen. */
+  look(visible: boolean): void {
+    this.page.visibilityState = visible ? 'visible' : 'hidden';
+    if (!visible) this.wake.held = false;
+    this.page.dispatchEvent(new Event('visibilitychange'));
+  }
+
   /** Whether the browser shows that it records. */
   get records(): boolean {
     return this.streams.some(({ tracks }) => tracks.some(({ readyState }) => readyState === 'live'));
@@ -74,6 +98,18 @@ export class ScriptedAudio {
 
   step(step: Step): void {
     if (this.fault === step) throw new DOMException('scripted', 'InvalidStateError');
+  }
+
+  private lock(): { released: boolean; release(): Promise<void> } {
+    const { wake } = this;
+    wake.asked++;
+    wake.held = true;
+    return {
+      get released() {
+        return !wake.held;
+      },
+      release: async () => void (wake.held = false),
+    };
   }
 
   private ask(): Promise<ScriptedStream> {

@@ -155,7 +155,7 @@ test('turning the microphone off leaves the button to talk what it needs', async
 test.each([
   ['is pulled out', () => audio.streams[0]!.tracks[0]!.vanish(), 0],
   ['has a worklet that breaks', () => audio.nodes[0]!.onprocessorerror!(), 0],
-  ['gives no sound any more', () => (audio.fault = 'sound'), 6000],
+  ['gives no sound any more', () => (audio.fault = 'sound'), 5500],
 ])('a microphone that %s is shown as closed', async (_, happens, within) => {
   await open();
   await sound(5000);
