@@ -1,9 +1,9 @@
 import { join } from 'node:path';
 import { afterEach, beforeAll, expect, inject, test } from 'vitest';
-import type { Browser } from '../support/browser/browser.ts';
+import { Browser } from '../support/browser/browser.ts';
 import { pauseDrawing } from '../support/browser/drawing.ts';
-import { microphones } from '../support/browser/recorder.ts';
-import { openPage, until } from '../support/browser/talk.ts';
+import { microphones, recordWire } from '../support/browser/recorder.ts';
+import { until } from '../support/browser/talk.ts';
 import { runPython } from '../support/python.ts';
 import { scratchFolder } from '../support/scratch.ts';
 
@@ -21,10 +21,10 @@ beforeAll(() => void runPython('sound/voice.py', silence, '60'));
 afterEach(() => browser.close());
 
 test('sound and microphone that the system takes away come back, and the screen stays on only while somebody talks', async () => {
-  browser = await openPage(talkingUrl, { microphone: silence });
+  browser = await Browser.launch({ microphone: silence });
   const { page } = browser;
-  await pauseDrawing(page);
-  await page.evaluate(() => {
+  await recordWire(browser.context);
+  await browser.context.addInitScript(() => {
     window.locks = [];
     const { request } = WakeLock.prototype;
     WakeLock.prototype.request = async function (type) {
@@ -33,6 +33,8 @@ test('sound and microphone that the system takes away come back, and the screen 
       return lock;
     };
   });
+  await browser.open(talkingUrl);
+  await pauseDrawing(page);
   const sound = () => page.evaluate(() => window.ico3d!.conversation!.player.context.state);
   const opened = () => page.waitForFunction(() => document.getElementById('microphone')!.ariaPressed === 'true');
 
