@@ -87,7 +87,7 @@ class Serve:
         url = server.address(listener, reach.scheme)
         listener.listen()  # whoever reads the address and comes at once is served in a moment
         print(f"{(persona or bundle.manifest.persona).name} is at {url} (Ctrl+C ends)")
-        print("\n".join(reach.told(listener.getsockname()[1])))
+        print("\n".join(reach.told(listener.getsockname()[1], sites.asks_for_tokens)))
         if avatar and parts:
             warm_up(parts)
             offered = offers(settings, avatar.persona.voice)

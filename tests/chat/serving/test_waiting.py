@@ -1,6 +1,7 @@
 """The queue of a full server, without a server: who is next, and how long that takes."""
 
 import asyncio
+import contextlib
 
 import pytest
 from hypothesis import given
@@ -105,8 +106,9 @@ def test_no_place_is_given_twice_and_none_stays_empty(steps):
         tickets, inside = [], 0
         for step, index in steps:
             ticket = tickets[index % len(tickets)] if tickets else None
-            if step == "j" and (len(house.line) < 5 or house.free > 0):
-                tickets.append(house.line.join(None))
+            if step == "j":
+                with contextlib.suppress(FullError):
+                    tickets.append(house.line.join(None))
             elif step in "ld" and ticket and not ticket.admitted:
                 house.line.leave(ticket, for_good=step == "l")
             elif step == "b" and ticket and ticket.admitted:

@@ -16,6 +16,7 @@ export class Overlay {
   private readonly waiting: HTMLElement;
   private readonly button: HTMLButtonElement;
   private readonly reload: () => void;
+  private queued = false;
   private counting: ReturnType<typeof setTimeout> | undefined;
 
   /**
@@ -61,6 +62,7 @@ export class Overlay {
   }
 
   hide(): void {
+    this.queued = false;
     this.root.classList.add('gone');
     this.cover(false);
   }
@@ -90,6 +92,12 @@ export class Overlay {
     this.button.hidden = true;
     this.waiting.hidden = false;
     this.waiting.textContent = 'All places are taken. Leave this page open: it goes on by itself.';
+    this.queued = true;
+  }
+
+  /** The line is down; a place in the queue is kept for a while. */
+  reconnect(): void {
+    if (this.queued) this.waiting.textContent = 'The connection was lost. Your place is kept while it comes back …';
   }
 
   private say(sentence: string, label: string, act: () => void): void {
@@ -108,6 +116,7 @@ export class Overlay {
     if (text.textContent !== sentence) text.textContent = sentence; // what is said again need not be read aloud again
     text.hidden = byId(this.root, 'check').hidden = false;
     clearTimeout(this.counting);
+    this.queued = false;
     this.root.classList.remove('gone');
     this.cover(true);
   }

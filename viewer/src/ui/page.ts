@@ -44,6 +44,7 @@ export function makePage(root: HTMLElement, overlay: Overlay, frames: () => numb
       root.dataset.state = state;
       byId(root, 'state').textContent = STATES[state];
       controls.setSpeaking(state === 'speaking');
+      if (state === 'connecting') overlay.reconnect();
     },
     question: (text, final) => captions.question(text, final),
     answer: (sentence) => captions.answer(sentence),

@@ -24,7 +24,7 @@ beforeEach(async () => {
     silenced: (silent) => silenced.push(silent),
   };
   const others = { get: (known: object, name: string) => Reflect.get(known, name) ?? (() => {}) };
-  conversation = new Conversation('ws://server/ws', new Proxy(view, others) as ConversationView);
+  conversation = new Conversation(() => 'ws://server/ws', new Proxy(view, others) as ConversationView);
   conversation.start();
   ScriptedSocket.last.welcome();
   await pass();

@@ -113,11 +113,11 @@ class Connection:
         spoken = asyncio.create_task(self._receive())
         try:
             while not ticket.admitted:
+                ticket.changed.clear()
                 await self._socket.send_text(str(encode(self._sessions.place(ticket))))
                 moved = asyncio.create_task(ticket.changed.wait())
                 await asyncio.wait({spoken, moved}, timeout=REFRESH, return_when=FIRST_COMPLETED)
                 moved.cancel()
-                ticket.changed.clear()
                 if ticket.replaced:
                     raise Hangup(GOING, "the page has another connection.", again=True)
                 if spoken.done():

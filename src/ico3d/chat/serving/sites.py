@@ -50,6 +50,11 @@ class Sites:
         """Sites that may frame the page, for the policy `frame-ancestors`."""
         return " ".join(self._embedding.origins) or "'none'"
 
+    @property
+    def asks_for_tokens(self) -> bool:
+        """Whether only pages with a token may talk."""
+        return bool(self._key)
+
     def permits(self, origin: str | None, path: str) -> bool:
         """Whether pages of another site may load a path."""
         return origin in self._embedding.origins and _is_below(path, EMBEDDED)

@@ -76,9 +76,14 @@ def test_the_operator_is_told_who_can_reach_the_server():
     assert alone.startswith("Only this machine reaches it")
     tunnel = find_reach("127.0.0.1", ["avatar.example.org"], False, None, None)
     assert "tunnel lets through as avatar.example.org" in " ".join(tunnel.told(8765))
+    assert "who has a token can talk" in " ".join(tunnel.told(8765, asks_for_tokens=True))
     assert tunnel.answered == ("avatar.example.org",) and tunnel.urls(8765) == []
     open_ = " ".join(find_reach("0.0.0.0", [], False, None, None).told(8765))
-    assert "Everybody" in open_ and "can only type" in open_ and "fingerprint" not in open_
+    assert (
+        "everybody can talk: no password" in open_
+        and "can only type" in open_
+        and "fingerprint" not in open_
+    )
 
 
 def test_a_given_certificate_brings_its_names_and_no_question(tmp_path):

@@ -58,13 +58,14 @@ class Reach:
         hosts = [*self.names, *machine_addresses(self.host), *self.own_names]
         return [f"{self.scheme}://{f'[{h}]' if ':' in h else h}:{port}/" for h in hosts]
 
-    def told(self, port: int) -> list[str]:
+    def told(self, port: int, asks_for_tokens: bool = False) -> list[str]:
         """Sentences for the operator: who can reach the server, and what they have to know."""
+        admission = "who has a token can talk" if asks_for_tokens else "can talk: no password"
         lines = []
         if self.host in LOOPBACK and self.names:
             lines.append(
                 "This machine reaches it, and so does everybody whom a proxy or tunnel lets "
-                f"through as {' or '.join(self.names)}: there is no password."
+                f"through as {' or '.join(self.names)}; everybody {admission}."
             )
         elif self.host in LOOPBACK:
             lines.append(
@@ -73,8 +74,8 @@ class Reach:
         else:
             urls = self.urls(port)
             lines.append(
-                "Everybody who reaches this machine over a network can open it and talk: there is "
-                "no password. On other devices it is at"
+                f"All devices in this machine's networks reach it; everybody {admission}. "
+                "On other devices it is at"
             )
             lines += [f"  {url}" for url in urls]
             if urls:

@@ -1,14 +1,14 @@
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { afterEach, beforeAll, expect, inject, test } from 'vitest';
-import type { Browser } from '../support/browser/browser.ts';
-import { pauseDrawing } from '../support/browser/drawing.ts';
-import { runPython } from '../support/python.ts';
-import { microphones, readRecord } from '../support/browser/recorder.ts';
-import { scratchFolder } from '../support/scratch.ts';
-import { ChatServer } from '../support/servers/server.ts';
-import { slowness } from '../support/slowness.ts';
-import { openPage, until } from '../support/browser/talk.ts';
+import type { Browser } from '../../support/browser/browser.ts';
+import { pauseDrawing } from '../../support/browser/drawing.ts';
+import { runPython } from '../../support/python.ts';
+import { microphones, readRecord } from '../../support/browser/recorder.ts';
+import { scratchFolder } from '../../support/scratch.ts';
+import { ChatServer } from '../../support/servers/server.ts';
+import { slowness } from '../../support/slowness.ts';
+import { openPage, until } from '../../support/browser/talk.ts';
 
 const folder = scratchFolder();
 const silence = join(folder, 'silence.wav');
@@ -75,6 +75,7 @@ test('whoever falls silent makes room; who waits for a place gets it, and both m
     expect(await focused(second)).toMatch(/^(check)?$/);
   }
   await second.page.evaluate(() => window.record!.sockets.at(-1)!.close(4000)); // a short drop
+  await second.page.waitForFunction(() => document.getElementById('overlay-wait')!.textContent!.startsWith('The connection was lost. Your place is kept'));
   await until(second, ({ received }) => received.filter(({ type }) => type === 'place').length >= 2, 30_000);
   const places = (await readRecord(second.page)).received.filter(({ type }) => type === 'place');
   expect(new Set(places.map(({ session }) => session)).size).toBe(1);

@@ -1,14 +1,14 @@
 import { join } from 'node:path';
 import { afterAll, beforeAll, expect, inject, test } from 'vitest';
-import { MICROPHONE_CHUNK, MICROPHONE_RATE } from '../src/protocol.ts';
-import type { Browser } from '../support/browser/browser.ts';
-import { pauseDrawing } from '../support/browser/drawing.ts';
-import { readRecord, type Heard } from '../support/browser/recorder.ts';
-import { scratchFolder } from '../support/scratch.ts';
-import { StallingLine } from '../support/servers/stalling.ts';
-import { slowness } from '../support/slowness.ts';
-import { quantile } from '../support/statistics.ts';
-import { finished, makeVoice, openPage, until } from '../support/browser/talk.ts';
+import { MICROPHONE_CHUNK, MICROPHONE_RATE } from '../../src/protocol.ts';
+import type { Browser } from '../../support/browser/browser.ts';
+import { pauseDrawing } from '../../support/browser/drawing.ts';
+import { readRecord, type Heard } from '../../support/browser/recorder.ts';
+import { scratchFolder } from '../../support/scratch.ts';
+import { StallingLine } from '../../support/servers/stalling.ts';
+import { slowness } from '../../support/slowness.ts';
+import { quantile } from '../../support/statistics.ts';
+import { finished, makeVoice, openPage, until } from '../../support/browser/talk.ts';
 
 const STALL = 8000; // ms: more than a server takes at once of sound that comes late
 

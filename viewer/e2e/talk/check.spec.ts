@@ -1,8 +1,8 @@
 import { join } from 'node:path';
 import { afterEach, beforeAll, expect, inject, test } from 'vitest';
-import { Browser } from '../support/browser/browser.ts';
-import { runPython } from '../support/python.ts';
-import { scratchFolder } from '../support/scratch.ts';
+import { Browser } from '../../support/browser/browser.ts';
+import { runPython } from '../../support/python.ts';
+import { scratchFolder } from '../../support/scratch.ts';
 
 const voice = join(scratchFolder(), 'check.wav');
 const { talkingUrl } = inject('shared');

@@ -1,11 +1,11 @@
 import { join } from 'node:path';
 import { afterEach, beforeAll, expect, inject, test } from 'vitest';
-import { Browser } from '../support/browser/browser.ts';
-import { pauseDrawing } from '../support/browser/drawing.ts';
-import { microphones, recordWire } from '../support/browser/recorder.ts';
-import { until } from '../support/browser/talk.ts';
-import { runPython } from '../support/python.ts';
-import { scratchFolder } from '../support/scratch.ts';
+import { Browser } from '../../support/browser/browser.ts';
+import { pauseDrawing } from '../../support/browser/drawing.ts';
+import { microphones, recordWire } from '../../support/browser/recorder.ts';
+import { until } from '../../support/browser/talk.ts';
+import { runPython } from '../../support/python.ts';
+import { scratchFolder } from '../../support/scratch.ts';
 
 const silence = join(scratchFolder(), 'interrupted.wav');
 const { talkingUrl } = inject('shared');
