@@ -209,9 +209,10 @@ def _all_have_the_key(path):
         assert options.url == f"http://127.0.0.1:{port}/v1"
 
 
-def test_a_proxy_that_passes_host_and_origin_is_let_in_under_the_servers_own_name_only():
+def test_a_proxy_that_passes_host_and_origin_is_let_in_under_the_servers_names_only():
     name, origin = "talk.example.org", "https://talk.example.org"
-    assert is_own(name, origin, name)
+    assert is_own(name, origin, name) and is_own(name, origin, "127.0.0.1", [name])
+    assert not is_own(name, "https://elsewhere.example.org", "127.0.0.1", [name])
     assert not is_own(name, origin, "127.0.0.1") and not is_own(name, origin, "0.0.0.0")
     assert is_own("127.0.0.1:9001", None, "0.0.0.0") and not is_own(name, None, "0.0.0.0")
 

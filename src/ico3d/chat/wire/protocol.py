@@ -5,24 +5,23 @@ them, and `python -m ico3d.chat.generating` generates `viewer/src/protocol.ts` a
 `docs/protocol.md`.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
 import numpy as np
 
 from ico3d.chat.wire.marks import (
-    MAX_EXACT,
     Count,
     Length,
     Milliseconds,
     Name,
-    Range,
     Seconds,
     Tensor,
     Words,
 )
 from ico3d.chat.wire.protocol_gestures import MAX_CUES, Cue, Release
 from ico3d.chat.wire.protocol_services import Dictation, Offer, Service, Services
+from ico3d.chat.wire.protocol_visits import Error, Hello, Place, Welcome
 
 VERSION = 6
 MICROPHONE_RATE = 16_000  # Hz, PCM16 mono from the page
@@ -37,24 +36,6 @@ RESUME_SECONDS = 30  # how long a session waits for its page to come back
 MAX_AHEAD_SECONDS = 2.0  # how far speech may run ahead of its playback
 MAX_ARGUMENTS = 4000  # characters of a function's arguments
 MAX_POINTS = 500  # of a timeline in one message
-
-
-@dataclass(frozen=True)
-class Hello:
-    """First message of every connection.
-
-    Attributes:
-        version: Protocol version of the page.
-        session: Id of the session or place in the queue to go on with; null for a new session.
-        last_index: `index` of the last speech message that arrived; -1 for a new session.
-        wishes: Services wished for in a new session: keys of offers, by kind; only offered ones are
-            used.
-    """
-
-    version: Count
-    session: Annotated[str, Length(1, 64)] | None
-    last_index: Annotated[int, Range(-1, MAX_EXACT)]
-    wishes: Annotated[dict[str, Name], Length(0, 3)] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,44 +146,6 @@ class Deaf:
     """
 
     reason: Annotated[str, Length(0, 200)]
-
-
-@dataclass(frozen=True)
-class Welcome:
-    """Answer to `hello`.
-
-    Attributes:
-        version: Protocol version of the server.
-        session: Id of the session, needed to resume it.
-        resumed: True if the session is the one that `hello` named.
-        services: The services of the conversation.
-        notices: Sentences that the page shows once, on what this avatar cannot do.
-        dictation: How the browser is to recognise speech; null if the server does.
-        offers: Services to choose from; empty where strangers may be talking.
-    """
-
-    version: Count
-    session: Annotated[str, Length(1, 64)]
-    resumed: bool
-    services: Services
-    notices: Annotated[list[Words], Length(0, 8)]
-    dictation: Dictation | None
-    offers: Annotated[list[Offer], Length(0, 64)] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class Place:
-    """All places are taken: the page is in a queue, and `welcome` follows when it is its turn.
-
-    Attributes:
-        session: Id by which the page takes its place in the queue again after a lost connection.
-        position: Position in the queue; 1 is the front.
-        seconds: Estimate of the time until it is this page's turn; null if nothing is known.
-    """
-
-    session: Annotated[str, Length(1, 64)]
-    position: Count
-    seconds: Seconds | None
 
 
 @dataclass(frozen=True)
@@ -386,21 +329,6 @@ class Metrics:
 
     name: Name
     values: Annotated[dict[str, Milliseconds], Length(0, 32)]
-
-
-@dataclass(frozen=True)
-class Error:
-    """Something went wrong.
-
-    Attributes:
-        message: One sentence for the visitor.
-        fatal: True if the session is over and the server closes the connection.
-        again: After a fatal error: whether a new session may succeed, so that the page offers one.
-    """
-
-    message: Words
-    fatal: bool
-    again: bool = False
 
 
 ClientMessage = Hello | Audio | Text | Say | Interrupt | Clock | Talk | Heard | Deaf
