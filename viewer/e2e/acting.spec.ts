@@ -78,6 +78,7 @@ function visitorAt(yaw: number): Vector {
 describe('a whole person on a skeleton in a conversation', () => {
   test('stands where it was recorded, breathes, and its feet stay', async () => {
     await until(browser, finished(0), 60_000); // the greeting
+    await page.waitForFunction(() => window.samples.length > 10);
     for (const side of ['left', 'right']) {
       const ankles = await places(`${side}_ankle`);
       expect(ankles.length).toBeGreaterThan(10);

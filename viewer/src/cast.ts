@@ -1,3 +1,4 @@
+import type { Actor } from './actor.ts';
 import { Body } from './body/body.ts';
 import { ActingBody } from './body/skinned/acting.ts';
 import { readBakedSkinned } from './body/skinned/baked.ts';
@@ -17,6 +18,7 @@ import type { Stage } from './stage/stage.ts';
 
 /** Who is on stage: a head, a body that plays, or a whole person whose body a director moves. */
 export interface Cast {
+  backdrop?: Actor;
   head?: Head;
   body?: Body; // of windows
   skinned?: SkinnedBody; // or on a skeleton
@@ -39,10 +41,14 @@ export interface CastPorts {
  * @param calm the visitor wants little motion: only faces move
  */
 export async function makeCast(manifest: Manifest, files: BundleFiles, stage: Stage, calm: boolean, ports: CastPorts): Promise<Cast> {
+  const backdrop = stage.transparent ? undefined : ((await makeBackdrop(files)) ?? undefined);
+  if (backdrop) stage.add(backdrop);
+  return { backdrop, ...(await makePeople(manifest, files, stage, calm, ports)) };
+}
+
+async function makePeople(manifest: Manifest, files: BundleFiles, stage: Stage, calm: boolean, ports: CastPorts): Promise<Cast> {
   const { head } = manifest;
   const body = bodyOf(manifest);
-  const backdrop = stage.transparent ? null : await makeBackdrop(files);
-  if (backdrop) stage.add(backdrop);
   if (head && body) return makePerson(files, manifest, head, body, stage, calm, ports);
   if (head) return { head: await makeHead(files, head, stage, rows(0, calm ? 0 : head.num_poses - 1), calm ? () => 0 : sway(head)) };
   const playback = new Playback((body!.frames - 1) / body!.fps, !calm);

@@ -86,7 +86,7 @@ export class Visit {
     atEnd(signal, () => stage.dispose());
     stage.onGone = () => this.overlay.fail('The browser cannot show the picture any more.');
     watchCover(root, signal, (pixels) => stage.keepClear(pixels));
-    const page = makePage(root, this.overlay, () => stage.frames, signal);
+    const page = makePage(root, this.overlay, () => stage.figures, signal);
     const conversation = manifest.head ? this.converse(page) : undefined;
     const presence: Presence = { stage, conversation, ...(await this.enter(manifest, stage, conversation)) };
     root.querySelector('.figures')!.append(makeViewBar(stage.orbit, root, signal));
@@ -120,6 +120,7 @@ export class Visit {
     signal.throwIfAborted();
     stage.start();
     await cast.body?.ready();
+    stage.bytes = loaded;
     signal.throwIfAborted();
     return cast;
   }

@@ -21,6 +21,7 @@ const ORDER = [
   ['talk'],
   ['ui', 'cast.ts'],
   ['visit.ts', 'check'],
+  ['bench.ts'],
   ['main.ts', 'embed'],
 ];
 

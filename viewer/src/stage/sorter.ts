@@ -1,5 +1,6 @@
 import { SparkRenderer } from '@sparkjsdev/spark';
 import type { WebGLRenderer } from 'three';
+import { keepUnchanged } from './reuse.ts';
 
 const LEAST_ALPHA = 1 / 255; // a splat ends where its alpha falls under this
 
@@ -22,6 +23,7 @@ export class Sorter extends SparkRenderer {
       minSortIntervalMs: 50, // people move little in that time, and each sort costs a picture drawn twice
       enableLod: false,
     });
+    keepUnchanged(this);
   }
 
   /** Spark calls this when a sort has ended, among others. */

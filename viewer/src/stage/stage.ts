@@ -1,16 +1,19 @@
 import * as THREE from 'three';
 import type { Actor } from '../actor.ts';
 import type { HeadFiles } from '../bundle/load.ts';
-import type { Manifest } from '../bundle/manifest.ts';
+import { bodyOf, type Manifest } from '../bundle/manifest.ts';
 import { atEnd } from '../lifetime.ts';
 import { watchContext } from './context.ts';
-import { Orbit } from './orbit.ts';
+import { Mean, type Figures } from './figures.ts';
+import { Orbit } from './camera/orbit.ts';
+import { Scenery } from './scenery.ts';
+import { ladder, Quality } from './quality.ts';
 import { watchSight } from './sight.ts';
-import { sitterOf } from './sitter.ts';
+import { sitterOf } from './camera/sitter.ts';
 import { CurrentSorter, Sorter } from './sorter.ts';
-import { person, wholeBody } from './subject.ts';
+import { groundOf, groundUnder, person, wholeBody } from './camera/subject.ts';
 
-export const TICK = 1 / 30; // s between changes
+const MOST_PIXELS = 2; // along a side, for one of the page
 const LEAST_FREE = 0.4; // of the height: what covers more lies over the face
 
 /** Canvas, camera and actors: draws what changed and nothing else, and nothing while nobody can see it. */
@@ -21,19 +24,24 @@ export class Stage {
   readonly transparent: boolean;
   /** Enters VR or AR; null where nobody offers it. */
   enterXr: (() => Promise<void>) | null = null;
+  readonly scenery: Scenery;
   frames = 0; // drawn so far
+  bytes = 0; // of the bundle that came before there was somebody to see
   /** Called when the browser takes the picture away and does not give it back. */
   onGone: () => void = () => {};
   /** When Spark sorted last, whichever renderer that was. */
   readonly sorter = new CurrentSorter(this);
+  private readonly quality = new Quality(ladder({ backdrop: false, gaussians: false }));
   private covered = 0; // pixels at the lower edge that controls lie on
   private readonly canvas: HTMLCanvasElement;
   private readonly manifest: Manifest;
   private readonly actors: Actor[] = [];
-  private lastTick = 0; // s, on the grid of ticks
-  private lastTime = 0; // s, when it really was; 0 after a rest
   private lastFrame = 0; // s, 0 after a rest
   private dirty = true;
+  private size: readonly [number, number] | null = null; // of pictures, else the canvas's own
+  private drew = false; // in the last frame
+  private readonly evaluation = new Mean(); // ms
+  private readonly drawing = new Mean(); // ms
   private running = false; // between `start` and `still`
   private seen = true;
   private current: Sorter;
@@ -46,6 +54,10 @@ export class Stage {
     this.transparent = transparent;
     this.renderer = new THREE.WebGLRenderer({ canvas, alpha: transparent, antialias: false, powerPreference: 'high-performance' });
     this.current = this.prepare();
+    this.scenery = new Scenery(manifest.background);
+    if (!transparent) this.scene.add(this.scenery);
+    const ground = groundOf(manifest);
+    if (ground) this.scenery.stand(ground);
     this.orbit = new Orbit(canvas, wholeBody(manifest), () => (this.dirty = true));
     const { signal } = this.ending;
     const ports = { lost: () => this.lose(), restored: () => this.restore(), gone: () => this.onGone() };
@@ -65,12 +77,58 @@ export class Stage {
   /** Adds an actor; before the start only, or Spark would hold its picture until it has sorted anew. */
   add(actor: Actor): void {
     this.actors.push(actor);
+    if (actor.thin) this.scenery.removeFromParent(); // there is a room
     for (const object of actor.objects) this.scene.add(object);
+    this.quality.reset(ladder({
+      backdrop: this.actors.some(({ thin }) => thin),
+      gaussians: this.actors.some(({ limit }) => limit),
+    }));
+  }
+
+  /** What drawing takes now. */
+  get figures(): Figures {
+    const { domElement } = this.renderer;
+    return {
+      frames: this.frames,
+      evaluation: this.evaluation.value,
+      sort: this.spark.sortTook,
+      draw: this.drawing.value,
+      gaussians: this.spark.activeSplats,
+      level: this.quality.index + 1,
+      levels: this.quality.count,
+      pixels: [domElement.width, domElement.height],
+      bytes: this.bytes,
+    };
+  }
+
+  /** Keeps to a level of quality whatever it costs. */
+  holdQuality(index: number): void {
+    const before = this.quality.index;
+    this.quality.hold(index);
+    if (index !== before) this.applyQuality();
+  }
+
+  /** Draws as much of everything as the level of quality says. */
+  private applyQuality(): void {
+    const { backdrop, gaussians } = this.quality.level;
+    for (const actor of this.actors) {
+      actor.limit?.(gaussians);
+      actor.thin?.(backdrop);
+    }
+    this.fit();
   }
 
   /** Points the camera at somebody whose head rests at these rows of its poses. */
   face(head: HeadFiles, resting: readonly number[]): void {
-    this.orbit.face(person(this.manifest, sitterOf(this.manifest, head, resting)));
+    const sitter = sitterOf(this.manifest, head, resting);
+    this.orbit.face(person(this.manifest, sitter));
+    if (bodyOf(this.manifest)) this.scenery.stand(groundUnder(sitter));
+  }
+
+  /** Shows a bright room, or a dark one. */
+  setBright(bright: boolean): void {
+    this.scenery.setBright(bright);
+    this.dirty = true;
   }
 
   /** Keeps faces clear of so many pixels at the lower edge. */
@@ -82,6 +140,12 @@ export class Stage {
   /** Draws anew with the next frame, though no actor says so. */
   invalidate(): void {
     this.dirty = true;
+  }
+
+  /** Draws pictures of a size in pixels, or of the canvas's own again. */
+  drawAt(size: readonly [number, number] | null): void {
+    this.size = size;
+    this.fit();
   }
 
   /** Starts drawing what the actors do. */
@@ -97,14 +161,16 @@ export class Stage {
     this.ending.abort();
     this.orbit.dispose();
     this.current.dispose();
+    this.scenery.dispose();
     this.renderer.dispose();
     this.renderer.forceContextLoss();
   }
 
-  /** Stops the loop and draws one still, well sorted: for measurements and thumbnails. */
+  /** Stops the loop and draws one still, well sorted, of the best quality, which stays: for measurements and thumbnails. */
   async still(): Promise<void> {
     this.running = false;
     this.loop();
+    this.holdQuality(0);
     this.orbit.update();
     await this.sorted(); // a sort of the picture before may still run
     await this.spark.update({ scene: this.scene, camera: this.orbit.camera });
@@ -115,7 +181,9 @@ export class Stage {
   /** Draws now; what the canvas holds may be read until the current task ends. */
   draw(): void {
     for (const actor of this.actors) actor.drawing?.(performance.now());
+    const before = performance.now();
     this.renderer.render(this.scene, this.orbit.camera);
+    this.drawing.add(performance.now() - before);
     this.frames++;
   }
 
@@ -156,35 +224,43 @@ export class Stage {
   /** Runs or rests; time that nobody saw did not pass. */
   private loop(): void {
     const runs = this.running && this.seen && !this.renderer.getContext().isContextLost();
-    this.lastTime = this.lastFrame = 0;
+    this.lastFrame = 0;
+    this.quality.rest();
     this.dirty = true;
     this.renderer.setAnimationLoop(runs ? (now) => this.frame(now / 1000) : null);
   }
 
+  /**
+   * One refresh of the screen. Everybody is evaluated for this very picture: that costs less than the
+   * drawing by far (`docs/benchmarks.md`), and lips are where the sound is.
+   */
   private frame(now: number): void {
     const step = this.lastFrame && now - this.lastFrame;
     this.lastFrame = now;
-    if (now - this.lastTick >= TICK * 0.98) this.tick(now); // 0.98: a 60-Hz screen jitters
+    if (step && this.drew && this.quality.picture(step)) this.applyQuality();
+    this.advance(step);
     if (this.orbit.update(step)) this.dirty = true;
+    this.drew = this.dirty;
     if (!this.dirty) return;
     this.dirty = false;
     this.draw();
   }
 
-  private tick(now: number): void {
-    const step = this.lastTime && now - this.lastTime;
-    this.lastTime = now;
-    // Ticks stay on their grid, or a 144-Hz screen would turn 30 Hz into 28.8.
-    this.lastTick = now - this.lastTick > 2 * TICK ? now : this.lastTick + TICK;
+  /** Everybody goes on by some seconds. */
+  advance(step: number): void {
+    const before = performance.now();
     for (const actor of this.actors) if (actor.tick(step)) this.dirty = true;
+    this.evaluation.add(performance.now() - before);
   }
 
   private fit(): void {
-    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const { clientWidth, clientHeight } = this.canvas;
+    const [width, height] = this.size ?? [clientWidth, clientHeight];
     if (!width || !height) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    const ratio = this.size ? 1 : Math.min(devicePixelRatio, MOST_PIXELS) * this.quality.level.pixels;
+    this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(width, height, false);
-    this.orbit.fit({ aspect: width / height, free: Math.max(LEAST_FREE, 1 - this.covered / height) });
+    this.orbit.fit({ aspect: width / height, free: Math.max(LEAST_FREE, 1 - this.covered / (clientHeight || height)) });
     this.dirty = true;
   }
 }

@@ -1,4 +1,5 @@
 import type { Offer, Services } from '../protocol.ts';
+import type { Figures } from '../stage/figures.ts';
 import type { Conversation, ConversationView } from '../talk/conversation.ts';
 import { Captions } from './captions.ts';
 import { Controls } from './controls.ts';
@@ -32,10 +33,10 @@ export interface Page {
  * @param root what the page lies in
  * @param signal ends all of it
  */
-export function makePage(root: HTMLElement, overlay: Overlay, frames: () => number, signal: AbortSignal): Page {
+export function makePage(root: HTMLElement, overlay: Overlay, figures: () => Figures, signal: AbortSignal): Page {
   const captions = new Captions(root);
   const controls = new Controls(root, signal);
-  const panel = new Panel(root, frames, signal);
+  const panel = new Panel(root, figures, signal);
   let choose: (offer: Offer) => void = () => {};
   let again = () => {};
   const sheet = new ServiceSheet(root, (offer) => choose(offer));

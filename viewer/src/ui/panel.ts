@@ -1,6 +1,7 @@
 import { every } from '../lifetime.ts';
 import { LATENCY_PARTS } from '../shared.ts';
 import { Latencies } from '../talk/latency.ts';
+import type { Figures } from '../stage/figures.ts';
 import { byId } from './elements.ts';
 
 const PERIOD = 1000; // ms between updates
@@ -21,10 +22,10 @@ export class Panel {
   private readonly list: HTMLElement;
   private readonly table: HTMLTableElement;
   private readonly latencies = new Latencies();
-  private lastFrames = 0;
+  private frames = 0;
 
-  /** @param frames frames drawn so far */
-  constructor(root: ParentNode, frames: () => number, signal: AbortSignal) {
+  /** @param figures what drawing takes now */
+  constructor(root: ParentNode, figures: () => Figures, signal: AbortSignal) {
     this.list = byId(root, 'figures');
     this.table = byId(root, 'latencies');
     const button = byId(root, 'panel-button');
@@ -33,10 +34,19 @@ export class Panel {
       panel.hidden = !panel.hidden;
       button.setAttribute('aria-expanded', String(!panel.hidden));
     };
-    every(PERIOD, signal, () => {
-      this.set('frames', `${frames() - this.lastFrames} /s`);
-      this.lastFrames = frames();
-    });
+    every(PERIOD, signal, () => this.figures(figures()));
+  }
+
+  private figures(now: Figures): void {
+    this.set('frames', `${now.frames - this.frames} /s`);
+    this.frames = now.frames;
+    this.set('evaluate', `${now.evaluation.toFixed(1)} ms`);
+    this.set('draw', `${now.draw.toFixed(1)} ms`);
+    this.set('sort', `${now.sort.toFixed(0)} ms`);
+    this.set('Gaussians', now.gaussians.toLocaleString('en'));
+    this.set('pixels', now.pixels.join(' × '));
+    this.set('quality', `${now.levels - now.level + 1} of ${now.levels}`);
+    this.set('to first sight', `${(now.bytes / 1e6).toFixed(1)} MB`);
   }
 
   /** Shows the time from the end of the question to the first sound of the answer. */

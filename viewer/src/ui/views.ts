@@ -1,5 +1,5 @@
-import { VIEWS, type View } from '../stage/framing.ts';
-import type { Orbit } from '../stage/orbit.ts';
+import { VIEWS, type View } from '../stage/camera/framing.ts';
+import type { Orbit } from '../stage/camera/orbit.ts';
 import { icon } from './icons.ts';
 
 const NAMES: Record<View, string> = { face: 'Face', half: 'Head and chest', whole: 'Whole figure' };

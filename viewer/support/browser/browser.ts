@@ -93,6 +93,7 @@ export class Browser {
   async open(url: string): Promise<Page> {
     await this.page.goto(url, { timeout: 60_000 });
     await this.page.waitForFunction(() => window.ico3d !== undefined, undefined, { timeout: 60_000 });
+    await this.page.evaluate(() => window.ico3d!.stage.holdQuality(0)); // software rendering is slow
     return this.page;
   }
 

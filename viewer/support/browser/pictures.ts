@@ -29,13 +29,14 @@ export async function lookAsBundled(page: Page, folder: string): Promise<void> {
   await page.evaluate((view) => window.ico3d!.stage.orbit.look(view), camera);
 }
 
-/** Draws what is on stage and reads it back: (H, W, 3), top row first. */
+/** Draws what is on stage, before a plain colour as in Python, and reads it back: (H, W, 3), top row first. */
 export async function takePixels(page: Page): Promise<Uint8Array> {
   const { width, height, encoded } = await page.evaluate(() => {
     const { stage } = window.ico3d!;
     const { width, height } = stage.renderer.domElement;
     const rgba = new Uint8Array(4 * width * height);
     const gl = stage.renderer.getContext();
+    stage.scenery.visible = false;
     stage.draw();
     gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, rgba);
     return { width, height, encoded: btoa(rgba.reduce((text, value) => text + String.fromCharCode(value), '')) };

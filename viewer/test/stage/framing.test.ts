@@ -1,8 +1,8 @@
 import { Box3, MathUtils, PerspectiveCamera, Vector3 } from 'three';
 import { describe, expect, test } from 'vitest';
 import type { StartCamera } from '../../src/bundle/manifest.ts';
-import { closeUp, figure, portrait, whole } from '../../src/stage/framing.ts';
-import type { Sitter } from '../../src/stage/sitter.ts';
+import { closeUp, figure, portrait, whole } from '../../src/stage/camera/framing.ts';
+import type { Sitter } from '../../src/stage/camera/sitter.ts';
 import { random } from '../../support/random.ts';
 
 const CHIN = 0.12; // m under the eyes

@@ -1,10 +1,10 @@
 import { Box3, MathUtils, Plane, Raycaster, Vector2, Vector3 } from 'three';
 import { describe, expect, test } from 'vitest';
 import type { StartCamera } from '../../src/bundle/manifest.ts';
-import { boundsOf, boundsOfBody } from '../../src/stage/bounds.ts';
-import { closeUp, figure, portrait, whole } from '../../src/stage/framing.ts';
-import { Orbit, type Subject } from '../../src/stage/orbit.ts';
-import type { Sitter } from '../../src/stage/sitter.ts';
+import { boundsOf, boundsOfBody } from '../../src/stage/camera/bounds.ts';
+import { closeUp, figure, portrait, whole } from '../../src/stage/camera/framing.ts';
+import { Orbit, type Subject } from '../../src/stage/camera/orbit.ts';
+import type { Sitter } from '../../src/stage/camera/sitter.ts';
 import { FakeCanvas } from '../../support/doubles/canvas.ts';
 import { random } from '../../support/random.ts';
 

@@ -4,7 +4,7 @@ import type { HeadFiles } from '../../src/bundle/load.ts';
 import type { HeadInfo, Manifest } from '../../src/bundle/manifest.ts';
 import type { BakedHead } from '../../src/bundle/baked-head.ts';
 import { eyesOf } from '../../src/head/eyes.ts';
-import { sitterOf } from '../../src/stage/sitter.ts';
+import { sitterOf } from '../../src/stage/camera/sitter.ts';
 import { random } from '../../support/random.ts';
 
 const COUNT = 3000;

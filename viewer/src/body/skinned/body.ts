@@ -50,6 +50,10 @@ export class SkinnedBody implements Actor {
     this.generator.pose(this.pose);
   }
 
+  limit(share: number): void {
+    this.generator.limit(Math.ceil(share * this.generator.numSplats));
+  }
+
   /** Continues with the recorded motion. */
   release(): void {
     this.posing = false;

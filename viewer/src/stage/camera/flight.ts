@@ -1,5 +1,5 @@
 import * as THREE from 'three';
-import type { StartCamera } from '../bundle/manifest.ts';
+import type { StartCamera } from '../../bundle/manifest.ts';
 
 const DURATION = 0.9; // s
 const SAME = 0.02; // of a distance: less is no coming nearer

@@ -1,6 +1,6 @@
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
-import type { StartCamera } from '../bundle/manifest.ts';
+import type { StartCamera } from '../../bundle/manifest.ts';
 import { confine, freeScale, type Bounds } from './bounds.ts';
 import { Flight, directionOf } from './flight.ts';
 import type { Framing, Picture, View } from './framing.ts';

@@ -1,8 +1,8 @@
 import * as THREE from 'three';
-import type { HeadFiles } from '../bundle/load.ts';
-import { bodyOf, type Manifest } from '../bundle/manifest.ts';
-import { eyesOf } from '../head/eyes.ts';
-import { Poses } from '../head/poses.ts';
+import type { HeadFiles } from '../../bundle/load.ts';
+import { bodyOf, type Manifest } from '../../bundle/manifest.ts';
+import { eyesOf } from '../../head/eyes.ts';
+import { Poses } from '../../head/poses.ts';
 
 /** Somebody to take a picture of, world space, m. */
 export interface Sitter {

@@ -1,5 +1,5 @@
 import * as THREE from 'three';
-import type { StartCamera } from '../bundle/manifest.ts';
+import type { StartCamera } from '../../bundle/manifest.ts';
 import type { Sitter } from './sitter.ts';
 
 /** The shape of the picture that is to be filled. */

@@ -1,9 +1,10 @@
 import * as THREE from 'three';
-import { bodyOf, type Manifest } from '../bundle/manifest.ts';
+import { bodyOf, type Manifest } from '../../bundle/manifest.ts';
 import { boundsOf, boundsOfBody } from './bounds.ts';
 import { closeUp, figure, portrait, whole } from './framing.ts';
 import type { Subject } from './orbit.ts';
-import type { Sitter } from './sitter.ts';
+import type { Ground } from '../scenery.ts';
+import { corners, type Sitter } from './sitter.ts';
 
 const FRONT = THREE.MathUtils.degToRad(75); // to either side: heads are recorded from the front
 const NARROWEST = 0.45; // width / height that still holds a whole body
@@ -37,4 +38,26 @@ export function person(manifest: Manifest, sitter: Sitter): Subject {
     sideways: bodyOf(manifest) ? Infinity : FRONT,
     face: sitter.eyes,
   };
+}
+
+/** Where somebody with a face and a body stands. */
+export function groundUnder({ eyes, toward, up, lowest, box }: Sitter): Ground {
+  const level = toward.clone().projectOnPlane(up).normalize();
+  const floor = eyes.dot(up) - lowest;
+  const middle = box.getCenter(new THREE.Vector3()).projectOnPlane(up); // arms reach out, heads lean: between both
+  const foot = eyes.clone().projectOnPlane(up).lerp(middle, 0.5).addScaledVector(up, floor);
+  return { foot, up, toward: level };
+}
+
+/** Where a body whose head is nowhere told stands; null if there is no body. */
+export function groundOf(manifest: Manifest): Ground | null {
+  const body = bodyOf(manifest);
+  if (!body) return null;
+  const { camera } = manifest;
+  const up = new THREE.Vector3(...camera.up).normalize();
+  const box = new THREE.Box3(new THREE.Vector3(...body.low), new THREE.Vector3(...body.high));
+  const floor = Math.min(...corners(box).map((corner) => corner.dot(up)));
+  const foot = box.getCenter(new THREE.Vector3()).projectOnPlane(up).addScaledVector(up, floor);
+  const toward = new THREE.Vector3(...camera.eye).sub(foot).projectOnPlane(up).normalize();
+  return { foot, up, toward };
 }

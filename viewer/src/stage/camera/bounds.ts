@@ -1,5 +1,5 @@
 import * as THREE from 'three';
-import type { StartCamera } from '../bundle/manifest.ts';
+import type { StartCamera } from '../../bundle/manifest.ts';
 import { corners, type Sitter } from './sitter.ts';
 
 /** What keeps a camera from ending inside somebody, or where there is nobody to see. */

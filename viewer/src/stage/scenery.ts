@@ -1,0 +1,99 @@
+import * as THREE from 'three';
+
+/** Where somebody stands, world space. */
+export interface Ground {
+  foot: THREE.Vector3; // on the floor, under the middle of the body
+  up: THREE.Vector3; // of the world, of length 1
+  toward: THREE.Vector3; // where the person faces, level, of length 1
+}
+
+const SHADOW = new THREE.Vector2(0.3, 0.22); // m to the side and to the front where it has faded to a third
+
+/**
+ * A wall and a floor that go over into each other, and a soft shadow under the feet, behind all
+ * Gaussians. Where heads are, the colour is that on which the person was trained: edges stay clean.
+ */
+export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMaterial> {
+  /** @param colour of the bundle's background, display values */
+  constructor(colour: readonly [number, number, number]) {
+    const uniforms = {
+      clipToWorld: { value: new THREE.Matrix4() },
+      base: { value: new THREE.Vector3(...colour) },
+      bright: { value: 0 },
+      foot: { value: new THREE.Vector3() },
+      up: { value: new THREE.Vector3(0, 1, 0) },
+      front: { value: new THREE.Vector3(0, 0, 1) },
+      shadow: { value: SHADOW },
+    };
+    const material = new THREE.ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, uniforms, transparent: true });
+    material.depthTest = material.depthWrite = false;
+    super(new THREE.PlaneGeometry(2, 2), material);
+    this.frustumCulled = false;
+    this.renderOrder = -1;
+    this.visible = false; // until somebody stands there
+  }
+
+  /** Puts the floor under somebody. */
+  stand({ foot, up, toward }: Ground): void {
+    const { uniforms } = this.material;
+    uniforms.foot!.value.copy(foot);
+    uniforms.up!.value.copy(up);
+    uniforms.front!.value.copy(toward);
+    this.visible = true;
+  }
+
+  /** Shows a bright room, or a dark one. */
+  setBright(bright: boolean): void {
+    this.material.uniforms.bright!.value = bright ? 1 : 0;
+  }
+
+  dispose(): void {
+    this.geometry.dispose();
+    this.material.dispose();
+  }
+
+  override onBeforeRender: THREE.Mesh['onBeforeRender'] = (_renderer, _scene, camera) => {
+    const { value } = this.material.uniforms.clipToWorld!;
+    value.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse).invert();
+  };
+}
+
+const VERTEX = `
+  uniform mat4 clipToWorld;
+  varying vec3 ray;
+  void main() {
+    vec4 far = clipToWorld * vec4(position.xy, 1.0, 1.0);
+    ray = far.xyz / far.w - cameraPosition;
+    gl_Position = vec4(position.xy, 1.0, 1.0);
+  }
+`;
+
+// Colours are display values, as Gaussians are blended; noise of half a level hides the steps between them.
+const FRAGMENT = `
+  uniform vec3 base, foot, up, front;
+  uniform vec2 shadow;
+  uniform float bright;
+  varying vec3 ray;
+
+  vec3 shade(float dark, float light) {
+    return bright > 0.5 ? mix(base, vec3(1.0), light) : base * dark;
+  }
+
+  void main() {
+    vec3 way = normalize(ray);
+    float rise = dot(way, up);
+    vec3 colour = mix(base, shade(0.66, 0.5), smoothstep(0.12, 0.6, rise));
+    float height = dot(cameraPosition - foot, up);
+    if (height > 0.0 && rise < -1e-4) {
+      vec3 place = cameraPosition - way * height / rise - foot;
+      float far = length(place);
+      vec3 ground = mix(shade(1.06, 0.3), shade(0.72, 0.12), smoothstep(0.0, 2.2, far));
+      colour = mix(ground, base, smoothstep(1.2, 5.0, far));
+      vec2 aside = vec2(dot(place, cross(up, front)), dot(place, front)) / shadow;
+      float near = dot(aside, aside);
+      colour *= 1.0 - 0.34 * exp(-near) - 0.22 * exp(-6.0 * near);
+    }
+    float noise = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715)))) - 0.5;
+    gl_FragColor = vec4(colour + noise / 255.0, 1.0);
+  }
+`;
