@@ -19,7 +19,8 @@ const visit: Visit = new Visit(document.body, new Server(new URL(location.href))
   named: (name) => (document.title = name),
   entered: (presence) => {
     window.ico3d = { ...presence, visit, splats: (generator) => readSplats(presence.stage, generator) };
-    if (new URLSearchParams(location.search).has('bench')) void import('./bench.ts').then(({ bench }) => bench(presence));
+    const seconds = new URL(location.href).searchParams.get('bench');
+    if (seconds !== null) void import('./bench.ts').then(({ bench }) => bench(presence, Number(seconds) || undefined));
   },
   reload: () => location.reload(),
 });

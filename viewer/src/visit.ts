@@ -17,6 +17,7 @@ import { byId, focusOn } from './ui/elements.ts';
 import { Overlay, type Choice } from './ui/overlay.ts';
 import { makePage, showNotice, type Page } from './ui/page.ts';
 import { PlayerBar } from './ui/player.ts';
+import { makeThemeButton } from './ui/theme.ts';
 import { makeViewBar } from './ui/views.ts';
 
 /** Who is there, once they can be seen. */
@@ -89,7 +90,8 @@ export class Visit {
     const page = makePage(root, this.overlay, () => stage.figures, signal);
     const conversation = manifest.head ? this.converse(page) : undefined;
     const presence: Presence = { stage, conversation, ...(await this.enter(manifest, stage, conversation)) };
-    root.querySelector('.figures')!.append(makeViewBar(stage.orbit, root, signal));
+    const corner = root.querySelector('.figures')!;
+    corner.append(makeThemeButton(root, (light) => stage.setBright(light), signal), makeViewBar(stage.orbit, root, signal));
     const { playback } = presence;
     const moving = presence.body ?? presence.skinned;
     if (moving && playback) new PlayerBar(root, moving, playback, 1 / bodyOf(manifest)!.fps, signal);

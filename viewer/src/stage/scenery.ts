@@ -87,7 +87,7 @@ const FRAGMENT = `
     if (height > 0.0 && rise < -1e-4) {
       vec3 place = cameraPosition - way * height / rise - foot;
       float far = length(place);
-      vec3 ground = mix(shade(1.06, 0.3), shade(0.72, 0.12), smoothstep(0.0, 2.2, far));
+      vec3 ground = mix(shade(1.06, 0.3), shade(0.78, 0.12), smoothstep(0.0, 2.2, far));
       colour = mix(ground, base, smoothstep(1.2, 5.0, far));
       vec2 aside = vec2(dot(place, cross(up, front)), dot(place, front)) / shadow;
       float near = dot(aside, aside);

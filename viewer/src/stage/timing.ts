@@ -10,8 +10,7 @@ export interface Timing {
 }
 
 const STEP = 1 / 30; // s of what happens between two pictures
-const PICTURES = 120;
-const LONGEST = 4000; // ms
+const PICTURES = 120; // at most
 const LEAST = 5; // pictures
 const FIRST = 2; // pictures that do not count: programs are compiled
 
@@ -21,13 +20,14 @@ const FIRST = 2; // pictures that do not count: programs are compiled
  *
  * @param all objects on stage
  * @param seen those of which pictures are drawn
+ * @param seconds after which it is enough
  */
-export async function timePictures(stage: Stage, all: readonly Object3D[], seen: readonly Object3D[]): Promise<Timing> {
+export async function timePictures(stage: Stage, all: readonly Object3D[], seen: readonly Object3D[], seconds: number): Promise<Timing> {
   for (const object of all) object.visible = seen.includes(object);
   await stage.still();
   const gl = stage.renderer.getContext();
   const [evaluations, pictures]: [number[], number[]] = [[], []];
-  const end = performance.now() + LONGEST;
+  const end = performance.now() + 1000 * seconds;
   for (let i = -FIRST; i < LEAST || (i < PICTURES && performance.now() < end); i++) {
     await new Promise((resolve) => setTimeout(resolve)); // lets sorts and windows arrive
     const before = performance.now();
