@@ -140,6 +140,108 @@ test('keys and buttons fly to face, half and whole figure; a text takes the keys
   expect(await view()).toEqual({ shown: null, pressed: [] });
 });
 
+test('somebody stands on a floor with a shadow, bright or dark; behind the head is the plain colour', async () => {
+  const colours = () =>
+    page.evaluate(() => {
+      const { stage, head, body } = window.ico3d!;
+      const { camera } = stage.orbit;
+      const gl = stage.renderer.getContext();
+      for (const object of [...head!.objects, ...body!.objects]) object.visible = false;
+      stage.orbit.show('whole');
+      for (let i = 0; i < 10; i++) stage.orbit.update(0.1);
+      stage.scene.add(stage.scenery); // the room of this person's own has none
+      stage.scene.traverse((node) => void (node.visible = node === stage.scene || node === stage.scenery));
+      stage.renderer.render(stage.scene, camera);
+      const foot = stage.scenery.material.uniforms.foot!.value.clone();
+      const at = (x: number, y: number, z: number) => {
+        const place = foot.clone();
+        place.add({ x, y, z }).project(camera);
+        const rgba = new Uint8Array(4);
+        const { width, height } = stage.renderer.domElement;
+        gl.readPixels(((1 + place.x) * width) / 2, ((1 + place.y) * height) / 2, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, rgba);
+        return rgba[1]!;
+      };
+      const seen = { shadow: at(0, 0, 0), beside: at(0.75, 0, 0), head: at(0, 1.2, 0) };
+      stage.scene.traverse((node) => void (node.visible = true));
+      stage.scenery.removeFromParent();
+      return seen;
+    });
+  const plain = await page.evaluate(async () => Math.round(255 * (await (await fetch('bundle/manifest.json')).json()).background[1]));
+  await page.evaluate(() => window.ico3d!.stage.setBright(false));
+  const dark = await colours();
+  await page.evaluate(() => window.ico3d!.stage.setBright(true));
+  const bright = await colours();
+  for (const seen of [dark, bright]) {
+    expect(Math.abs(seen.head - plain)).toBeLessThan(3);
+    expect(seen.shadow).toBeLessThan(0.75 * seen.beside);
+  }
+  expect(bright.beside).toBeGreaterThan(dark.beside);
+});
+
+test('the page is light or dark as the system is, then as the visitor chooses', async () => {
+  const theme = () => page.evaluate(() => document.body.dataset.theme);
+  await page.emulateMedia({ colorScheme: 'light' });
+  await expect.poll(theme).toBe('light');
+  const ink = () => page.evaluate(() => getComputedStyle(document.querySelector('#name')!).color);
+  const onLight = await ink();
+  await page.emulateMedia({ colorScheme: 'dark' });
+  await expect.poll(theme).toBe('dark');
+  expect(await ink()).not.toBe(onLight);
+  await page.getByRole('button', { name: 'Make it light' }).click();
+  expect(await theme()).toBe('light');
+  expect(await ink()).toBe(onLight);
+});
+
+test('where pictures take too long, the backdrop goes first, then pixels; the figures say so', async () => {
+  const asked = await page.evaluate(() => {
+    const { stage, backdrop } = window.ico3d!;
+    const shares: number[] = [];
+    const thin = backdrop!.thin!.bind(backdrop);
+    backdrop!.thin = (share) => (shares.push(share), thin(share));
+    const { width } = stage.renderer.domElement;
+    for (const index of [1, 2, 4]) stage.holdQuality(index);
+    return { shares, pixels: stage.renderer.domElement.width / width };
+  });
+  expect(asked.shares).toEqual([0.5, 0.2, 0.2]);
+  expect(asked.pixels).toBeCloseTo(0.65, 2);
+  await page.getByRole('button', { name: 'Figures' }).click();
+  await expect.poll(() => page.locator('#figures').innerText()).toMatch(/quality\s+2 of 6/);
+  expect(await page.locator('#figures').innerText()).toMatch(/evaluate\s+[\d.]+ ms\s+draw\s+[\d.]+ ms\s+sort\s+\d+ ms\s+Gaussians\s+[\d,]+/);
+});
+
+test('thinned out, the backdrop’s largest splats stay; what stands still is made once', async () => {
+  const active = (index: number) =>
+    page.evaluate(async (index) => {
+      const { stage, head, body, backdrop } = window.ico3d!;
+      for (const object of [...head!.objects, ...body!.objects]) object.visible = false;
+      if (index === 0) await stage.still();
+      else {
+        stage.holdQuality(index);
+        await stage.spark.update({ scene: stage.scene, camera: stage.orbit.camera });
+        while (stage.spark.sorting || stage.spark.sortDirty) await new Promise((resolve) => setTimeout(resolve, 5));
+      }
+      return { count: stage.spark.activeSplats, version: backdrop!.objects[0] && (backdrop!.objects[0] as { version?: number }).version };
+    }, index);
+  const [all, half, few] = [await active(0), await active(1), await active(2)];
+  console.log(`${all.count}, ${half.count} and ${few.count} splats behind the person`);
+  expect(Math.abs(half.count / all.count - 0.5)).toBeLessThan(0.1);
+  expect(Math.abs(few.count / all.count - 0.2)).toBeLessThan(0.1);
+  expect((await active(2)).version).toBe(few.version);
+});
+
+test('?bench measures each part and all of them, in two sizes', async () => {
+  await page.goto(`${server.url}?bench=0.01`);
+  const table = page.locator('.bench');
+  await expect.poll(() => table.textContent(), { timeout: 60_000 }).toContain('Done.');
+  const rows = (await table.textContent())!.split('\n').filter((line) => / ms \|$/.test(line)).map((line) => line.split('|').map((cell) => cell.trim()));
+  expect(rows.map(([, part]) => part)).toEqual(['background', 'body', 'head', 'all', 'background', 'body', 'head', 'all']);
+  expect(rows.map(([, , pixels]) => pixels)).toEqual([...Array(4).fill('512 × 512'), ...Array(4).fill('160 × 200')]);
+  const [behind, body, head, all] = rows.map(([, , , gaussians]) => Number(gaussians));
+  expect(behind! + body! + head!).toBe(all);
+  for (const [, , , , rate] of rows) expect(Number(rate)).toBeGreaterThan(0);
+  await page.waitForFunction(() => window.ico3d !== undefined);
+});
+
 test('what the GPU holds goes back when the stage is taken down', async () => {
   const left = await page.evaluate(async () => {
     const { stage } = window.ico3d!;

@@ -4,6 +4,8 @@ import type { BundleFiles } from '../bundle/load.ts';
 import { PageError } from '../errors.ts';
 
 const LEAST = 1e-9; // m, of a scale
+const HASH = 2654435769;
+const APART = 1e-3; // by which splats of one size differ, each by a share of its own: else all of them would go at once
 
 /** The splats behind the person, which stand still. */
 class Backdrop implements Actor {
@@ -18,7 +20,9 @@ class Backdrop implements Actor {
     this.objects = [mesh];
     this.least = least;
     const sizes: number[] = [];
-    mesh.forEachSplat((_, __, { x, y, z }, ___, opacity) => sizes.push((opacity * x * y * z) / Math.max(LEAST, Math.min(x, y, z))));
+    mesh.forEachSplat((index, _, { x, y, z }, __, opacity) => {
+      sizes.push(((opacity * x * y * z) / Math.max(LEAST, Math.min(x, y, z))) * (1 + (APART * (Math.imul(index, HASH) >>> 8)) / 2 ** 24));
+    });
     this.sizes = Float32Array.from(sizes).sort();
   }
 
@@ -59,7 +63,9 @@ function thinner(least: { value: number }): NonNullable<SplatMesh['objectModifie
           ${outputs.gsplat} = ${inputs.gsplat};
           vec3 scales = ${inputs.gsplat}.scales;
           float thinnest = max(min(scales.x, min(scales.y, scales.z)), 1e-9);
-          if (${inputs.gsplat}.rgba.a * scales.x * scales.y * scales.z / thinnest < backdropLeast) ${outputs.gsplat}.flags = 0u;
+          float size = ${inputs.gsplat}.rgba.a * scales.x * scales.y * scales.z / thinnest;
+          size *= 1.0 + ${APART} * float((uint(${inputs.gsplat}.index) * ${HASH}u) >> 8u) / 16777216.0;
+          if (size < backdropLeast) ${outputs.gsplat}.flags = 0u;
         `),
         uniforms: { backdropLeast: least },
       }),
