@@ -223,7 +223,8 @@ export class Stage {
 
   /** Runs or rests; time that nobody saw did not pass. */
   private loop(): void {
-    const runs = this.running && this.seen && !this.renderer.getContext().isContextLost();
+    const { xr } = this.renderer;
+    const runs = this.running && (this.seen || xr.isPresenting) && !this.renderer.getContext().isContextLost();
     this.lastFrame = 0;
     this.quality.rest();
     this.dirty = true;
