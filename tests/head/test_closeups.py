@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from ico3d.head.closeups import CloseUps
+from ico3d.head.closeups import CloseUp, CloseUps
 from ico3d.head.expressions import FASTEST, USUAL, BlendshapeTrack, evening_rates
 from ico3d.head.settings import PRESETS
 from ico3d.head.train_head import HeadJob, trainer_of
@@ -32,11 +32,16 @@ def _views(capture, camera=0) -> list[View]:
     return [view_of(capture, camera, frame) for frame in range(3)]
 
 
+def _close_up(capture) -> CloseUp:
+    views = _views(capture)
+    return CloseUps(capture, views, 0).about(views[0])
+
+
 def test_a_close_up_is_a_square_about_the_mouth(tmp_path):
     capture = Mouthed(tmp_path)
     found = CloseUps(capture, _views(capture), 0)
     assert len(found) == 3
-    box = found.at(0).box
+    box = found.about(found.views[0]).box
     half = 0.75 * WIDTH * 1.25 * SIZE / 0.8  # 11.25 pixels
     place = np.array([SIZE / 2, SIZE / 2 + 0.05 * 1.25 * SIZE / 0.8])
     np.testing.assert_array_equal([box.left, box.top], np.floor(place - half))
@@ -45,7 +50,7 @@ def test_a_close_up_is_a_square_about_the_mouth(tmp_path):
 
 def test_the_part_of_a_view_shows_the_same_places_as_the_whole(tmp_path):
     capture = Mouthed(tmp_path)
-    close = CloseUps(capture, _views(capture), 0).at(0)
+    close = _close_up(capture)
     point = np.array([[0.03, -0.06, 0.2]])
     whole, part = (view.camera.project(point)[0] for view in (close.view, close.part))
     np.testing.assert_allclose(part, whole - [[close.box.left, close.box.top]])
@@ -54,7 +59,7 @@ def test_the_part_of_a_view_shows_the_same_places_as_the_whole(tmp_path):
 
 def test_only_gaussians_at_the_mouth_or_near_it_are_shown(tmp_path):
     capture = Mouthed(tmp_path)
-    close = CloseUps(capture, _views(capture), 0).at(0)
+    close = _close_up(capture)
     edge = WIDTH * 0.75
     beside = [[0, -0.05, 0.2], [1.1 * edge, -0.05, 0.2], [1.5 * edge, -0.05, 0.2], [0, 0, 1.5]]
     assert close.shown(torch.tensor(beside)).tolist() == [0, 1]
@@ -74,7 +79,7 @@ def test_a_close_up_teaches_the_basis_of_the_gaussians_it_shows_alone(tmp_path):
     settings = changed(PRESETS["cpu"], {"close_ups": 1, "initial.gaussians": 200})
     trainer, _ = trainer_of(capture, HeadJob("blendshapes", "full", "builtin", 0, settings), "cpu")
     before = {name: value.detach().clone() for name, value in trainer.model.named_parameters()}
-    close = CloseUps(capture, trainer.views, 0).at(0)
+    close = _close_up(capture)
     trainer.look_closer(close, 0)
     after = dict(trainer.model.named_parameters())
     moved = (after["basis"] != before["basis"]).any(2).any(0)  # (N,)
@@ -88,5 +93,5 @@ def test_a_close_up_teaches_the_basis_of_the_gaussians_it_shows_alone(tmp_path):
 def test_small_blendshapes_learn_faster_and_unused_ones_as_usual(tmp_path):
     capture = TinyCapture(tmp_path)
     capture._weights[:] = [0.6, 0.001, 0.0]
-    track = BlendshapeTrack(capture, capture.blendshape_names)
+    track = BlendshapeTrack(capture, ("redden", "pale", "unused"))
     assert evening_rates(track, range(5)).tolist() == pytest.approx([USUAL / 0.6, FASTEST, 1.0])

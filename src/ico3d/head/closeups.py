@@ -15,7 +15,6 @@ from ico3d.capture.box import Box
 from ico3d.capture.capture import Capture
 from ico3d.capture.face.canonical import canonical_landmarks
 from ico3d.capture.face.region import MOUTH
-from ico3d.common.camera import Camera
 from ico3d.head.views import SHOWS_MOUTH, View, squareness
 from ico3d.training.epochs import Epochs
 
@@ -55,45 +54,46 @@ class CloseUp:
 
 
 class CloseUps:
-    """The close-ups of some views that training takes up, in an order that depends on the seed."""
+    """Close-ups of the mouth in some views, in an order that depends on the seed.
+
+    Attributes:
+        views: The views that show the mouth, and not too small.
+    """
 
     def __init__(self, capture: Capture, views: Sequence[View], seed: int):
-        """Finds the mouth in all views that show it, by the landmarks' mean places in head space.
+        """Finds the mouth in all views, by the landmarks' mean places in head space.
 
         Args:
             capture: The recording. Without landmarks there is no close-up.
             views: Views in canonical head space.
             seed: Seed of the order.
         """
-        landmarks = canonical_landmarks(capture)
-        self._all = [] if landmarks is None else _close_ups(landmarks[MOUTH], views)
-        self._epochs = Epochs([seed, 3], max(len(self._all), 1))
+        landmarks = canonical_landmarks(capture) if views else None
+        self._mouth = None if landmarks is None else landmarks[MOUTH]  # (20, 3)
+        self.views = [] if self._mouth is None else [v for v in views if self._shows_mouth(v)]
+        self._epochs = Epochs([seed, 3], max(len(self.views), 1))
 
     def __len__(self) -> int:
         """The number of close-ups."""
-        return len(self._all)
+        return len(self.views)
 
-    def at(self, index: int) -> CloseUp:
-        """The close-up that is taken up as number `index`."""
-        return self._all[self._epochs.at(index)]
+    def place(self, number: int) -> int:
+        """The index in `views` of the view that is taken up as this number."""
+        return self._epochs.at(number)
 
+    def about(self, view: View) -> CloseUp:
+        """The close-up of a view: the square about the mouth, as far as the picture shows it."""
+        assert self._mouth is not None
+        camera, width = view.camera, float(np.ptp(self._mouth[:, 0]))
+        middle, depth = camera.project(self._mouth.mean(0))  # (2,), ()
+        half = REACH * width * camera.intrinsics[0, 0] / float(depth)
+        most = (camera.width, camera.height)
+        low = np.floor(np.clip(middle - half, 0, most)).astype(int)
+        high = np.ceil(np.clip(middle + half, 0, most)).astype(int)
+        return CloseUp(view, Box(*low.tolist(), *(high - low).tolist()))
 
-def _close_ups(mouth: np.ndarray, views: Sequence[View]) -> list[CloseUp]:
-    """Close-ups of a mouth (20, 3) that are not too small."""
-    seen = [view for view in views if squareness(view.camera) > SHOWS_MOUTH]
-    boxes = [_box(mouth, view.camera) for view in seen]
-    return [
-        CloseUp(view, box)
-        for view, box in zip(seen, boxes, strict=True)
-        if min(box.width, box.height) >= LEAST_SIDE
-    ]
-
-
-def _box(mouth: np.ndarray, camera: Camera) -> Box:
-    """The square about a mouth (20, 3), as far as it lies in the picture."""
-    width = float(np.ptp(mouth[:, 0]))
-    place, depth = camera.project(mouth.mean(0))  # (2,), ()
-    half = REACH * width * camera.intrinsics[0, 0] / float(depth)
-    low = np.floor(np.clip(place - half, 0, (camera.width, camera.height))).astype(int)
-    high = np.ceil(np.clip(place + half, 0, (camera.width, camera.height))).astype(int)
-    return Box(int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1]))
+    def _shows_mouth(self, view: View) -> bool:
+        if squareness(view.camera) <= SHOWS_MOUTH:
+            return False
+        box = self.about(view).box
+        return min(box.width, box.height) >= LEAST_SIDE

@@ -129,7 +129,9 @@ class HeadTrainer:
         self._density.observe(rendering.info, index)
         self._update(expression, features, index)
         for number in range(self._settings.close_ups if self._close_ups else 0):
-            self.look_closer(self._close_ups.at(self._settings.close_ups * index + number), index)
+            place = self._close_ups.place(self._settings.close_ups * index + number)
+            seen = self.pictures.readable(self._close_ups.views, place)
+            self.look_closer(self._close_ups.about(seen), index)
         self._density.adapt(self.model, self._optimiser, self._sampled, index)
         psnr = tensor_psnr(rendering.rgb[0], target)
         return {"loss": float(loss.detach()), "psnr": psnr, "gaussians": len(self.model)}
@@ -196,7 +198,8 @@ class HeadTrainer:
         """The view that is taken up as this number: each step's picture, then its close-ups."""
         index, place = divmod(number, 1 + self._settings.close_ups)
         if place and self._close_ups:
-            return self._close_ups.at(self._settings.close_ups * index + place - 1).view
+            chosen = self._close_ups.place(self._settings.close_ups * index + place - 1)
+            return self._close_ups.views[chosen]
         return self.views[self._epochs.at(index)]
 
     def _staged(
