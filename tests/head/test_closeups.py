@@ -61,7 +61,8 @@ def test_only_gaussians_at_the_mouth_or_near_it_are_shown(tmp_path):
     capture = Mouthed(tmp_path)
     close = _close_up(capture)
     edge = WIDTH * 0.75
-    beside = [[0, -0.05, 0.2], [1.1 * edge, -0.05, 0.2], [1.5 * edge, -0.05, 0.2], [0, 0, 1.5]]
+    beside = [[0, -0.05, 0.2], [1.1 * edge, -0.05, 0.2], [1.5 * edge, -0.05, 0.2]]
+    beside += [[0, -0.05, -0.1], [0, 0, 1.5]]  # the back of the head, and behind the camera
     assert close.shown(torch.tensor(beside)).tolist() == [0, 1]
 
 

@@ -22,6 +22,8 @@ REACH = 0.75
 """Half of a crop's side, relative to the width of the mouth."""
 LEAST_SIDE = 16
 """Least width and height in pixels of a crop: SSIM looks at 11 pixels."""
+DEPTH = 1.25
+"""How far before and behind the mouth Gaussians are drawn, relative to its width."""
 MARGIN = 0.15
 """How far beyond a crop Gaussians are drawn, relative to its longer side."""
 
@@ -33,10 +35,12 @@ class CloseUp:
     Attributes:
         view: The whole view.
         box: The part of its picture, in pixels.
+        depths: Least and largest depth in metres of Gaussians that belong to the part.
     """
 
     view: View
     box: Box
+    depths: tuple[float, float]
 
     @property
     def part(self) -> View:
@@ -49,7 +53,8 @@ class CloseUp:
         low = np.array([self.box.left, self.box.top], float)
         size = np.array([self.box.width, self.box.height], float)
         away = np.abs(places - (low + size / 2)) - size / 2  # (N, 2) pixels beyond the part
-        near = (away < MARGIN * size.max()).all(1) & (depths > 0)
+        nearest, farthest = self.depths
+        near = (away < MARGIN * size.max()).all(1) & (depths > nearest) & (depths < farthest)
         return torch.from_numpy(np.flatnonzero(near))
 
 
@@ -85,12 +90,14 @@ class CloseUps:
         """The close-up of a view: the square about the mouth, as far as the picture shows it."""
         assert self._mouth is not None
         camera, width = view.camera, float(np.ptp(self._mouth[:, 0]))
-        middle, depth = camera.project(self._mouth.mean(0))  # (2,), ()
-        half = REACH * width * camera.intrinsics[0, 0] / float(depth)
+        middle, depths = camera.project(self._mouth.mean(0))  # (2,), ()
+        depth = float(depths)
+        half = REACH * width * camera.intrinsics[0, 0] / depth
         most = (camera.width, camera.height)
         low = np.floor(np.clip(middle - half, 0, most)).astype(int)
         high = np.ceil(np.clip(middle + half, 0, most)).astype(int)
-        return CloseUp(view, Box(*low.tolist(), *(high - low).tolist()))
+        box = Box(*low.tolist(), *(high - low).tolist())
+        return CloseUp(view, box, (depth - DEPTH * width, depth + DEPTH * width))
 
     def _shows_mouth(self, view: View) -> bool:
         if squareness(view.camera) <= SHOWS_MOUTH:
