@@ -2,7 +2,8 @@
 
     python bench/step.py CAPTURE --json step.json
 
-Blendshapes, the CPU preset, as many Gaussians as `--gaussians`, from the first step on. Run it with
+Blendshapes, the CPU preset, as many Gaussians as `--gaussians`, from the first step on; with
+`--close-ups 2` the two crops of the mouth that the preset has, too. Run it with
 PYTHONPATH at another version of the sources to compare. Parts are self times of the named kernels;
 what is left is the basis' optimiser, which torch does not see, and small operations.
 """
@@ -43,12 +44,14 @@ class Bench:
     Attributes:
         capture: Capture with blendshapes.
         gaussians: Gaussians of the head.
+        close_ups: Crops of the mouth in each step.
         steps: Steps that are timed.
         json: Where to write the figures.
     """
 
     capture: tyro.conf.Positional[Path]
     gaussians: int = 12_000
+    close_ups: int = 0
     steps: int = 100
     json: Path | None = None
 
@@ -72,7 +75,8 @@ class Bench:
         capture = open_capture(self.capture)
         settings = PRESETS["cpu"]
         density = replace(settings.density, max_gaussians=self.gaussians)
-        settings = replace(settings, initial=Initial(self.gaussians), density=density)
+        initial = Initial(self.gaussians)
+        settings = replace(settings, initial=initial, density=density, close_ups=self.close_ups)
         track = BlendshapeTrack(capture, capture.blendshape_names or ())
         torch.manual_seed(0)
         model = initial_head(capture, settings, "full", track.size, np.random.default_rng(0))

@@ -24,6 +24,10 @@ FEATURE_RATE = 25.0
 
 TURN_WEIGHT = 0.4
 """Largest value of a head's rotation: it is learnt as fast as usual blendshapes of this size."""
+USUAL = 0.3
+"""Root mean square of a blendshape that is learnt as fast as `rates.basis` says."""
+FASTEST = 4.0
+"""Largest factor by which a row of the basis learns faster because its blendshape is small."""
 LEAST_TURN = 0.02
 """Angle in radians up to which a head counts as still: less is an error of its tracking."""
 
@@ -82,6 +86,21 @@ class BlendshapeTrack:
                 "look at it with ico3d capture check."
             )
         return torch.from_numpy(np.asarray(values, np.float32)[self._columns])  # (B,)
+
+
+def evening_rates(track: ExpressionTrack, frames: Iterable[int]) -> Tensor:
+    """Factors (B,) of the learning rates of the basis' rows, by which small blendshapes keep up.
+
+    A step of Adam or RMSProp moves all rows alike, however large their blendshapes are. So what a
+    row does in the pictures is learnt with the square of its blendshape's size. A factor is the
+    reciprocal of the root mean square over the frames, relative to `USUAL`, and at most `FASTEST`.
+    It is 1 where the expression is learnt, too, and for blendshapes that never move.
+    """
+    if not isinstance(track, BlendshapeTrack):
+        return torch.ones(track.size)
+    sizes = torch.stack([track.at(frame) for frame in frames]).square().mean(0).sqrt()  # (B,)
+    factors = USUAL / sizes.clamp_min(USUAL / FASTEST)  # (B,)
+    return torch.where(sizes > 0, factors, 1.0)
 
 
 class SpeechTrack:

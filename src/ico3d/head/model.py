@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from ico3d.common.expression import TURN_SIZE
 from ico3d.errors import ModelError
-from ico3d.head.basis import blend
+from ico3d.head.blending.basis import blend
 from ico3d.splat import harmonics
 from ico3d.splat.gaussians import Gaussians
 from ico3d.training.checkpoint import load_tensors, save_tensors
@@ -146,17 +146,20 @@ class HeadModel(nn.Module):
             size[axis] = num_gaussians
             setattr(self, name, nn.Parameter(old.new_empty(size), old.requires_grad))
 
-    def forward(self, expression: Tensor) -> Gaussians:
+    def forward(self, expression: Tensor, features: Tensor | None = None) -> Gaussians:
         """The Gaussians for an expression.
 
         Args:
             expression: (B,), on any device; sounds and captures give expressions on the CPU. The
                 values (3,) of the head's rotation may follow; without them it is the mean one.
+            features: (N, w) features that the basis was already blended to; None to blend them.
 
         Returns:
             Gaussians in canonical head space.
         """
-        return self.gaussians(self.logits(expression))
+        if features is None:
+            features = self.blended(expression)
+        return self.gaussians(self.decode(features, expression))
 
     def logits(self, expression: Tensor) -> Tensor:
         """(N, V) values of the Gaussians for an expression (B,) on any device."""

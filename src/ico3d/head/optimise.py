@@ -1,22 +1,26 @@
 """Optimising a head: one picture per step (paper, head model and implementation details)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import torch
 from torch import Tensor
+from torch.func import functional_call
 
+from ico3d.capture.box import Box
 from ico3d.capture.capture import Capture
 from ico3d.errors import CaptureError, SettingsError
-from ico3d.head.basis import update_basis
+from ico3d.head.blending.basis import blend_of, update_basis
+from ico3d.head.closeups import CloseUp, CloseUps
 from ico3d.head.density import HeadDensity, Sampled, bound_scales
-from ico3d.head.expressions import ExpressionTrack, turn_of, turned
+from ico3d.head.expressions import ExpressionTrack, evening_rates, turn_of, turned
 from ico3d.head.loss import HeadLoss
 from ico3d.head.model import HeadModel
 from ico3d.head.settings import SGD_GAINS, HeadSettings
 from ico3d.head.views import Picture, PictureCache, View, poses_digest, staged
 from ico3d.speech.network import SpeechAdaptor
 from ico3d.splat.density import contributions
+from ico3d.splat.gaussians import Gaussians
 from ico3d.splat.losses import tensor_psnr
 from ico3d.splat.render import render
 from ico3d.training.acceleration import accelerated
@@ -80,6 +84,8 @@ class HeadTrainer:
         self.poses = poses_digest(capture)
         frames = sorted({view.frame for view in self.views})
         self.turn = turn_of(capture, frames) if model.shape.turns else None
+        self._evening = self._row_factors(frames).to(model.device)  # (R,)
+        self._close_ups = CloseUps(capture, self.views if settings.close_ups else [], seed)
         self._loss = HeadLoss(settings, model.device)
         self._optimiser = Optimiser(settings.optimiser)
         self._density = HeadDensity(settings.density, seed)
@@ -107,7 +113,8 @@ class HeadTrainer:
 
     def step(self, index: int) -> Mapping[str, float]:
         """Renders one picture and updates the parameters; returns the loss and other numbers."""
-        self.pictures.expect(range(index, self._settings.steps), self._view)
+        each = 1 + self._settings.close_ups
+        self.pictures.expect(range(each * index, each * self._settings.steps), self._view)
         view = self.pictures.readable(self.views, self._epochs.at(index))
         picture = self.pictures.picture(view, self.model.device)
         background, target = self._staged(view, picture, index)
@@ -121,6 +128,10 @@ class HeadTrainer:
         loss.backward()
         self._density.observe(rendering.info, index)
         self._update(expression, features, index)
+        for number in range(self._settings.close_ups if self._close_ups else 0):
+            place = self._close_ups.place(self._settings.close_ups * index + number)
+            seen = self.pictures.readable(self._close_ups.views, place)
+            self.look_closer(self._close_ups.about(seen), index)
         self._density.adapt(self.model, self._optimiser, self._sampled, index)
         psnr = tensor_psnr(rendering.rgb[0], target)
         return {"loss": float(loss.detach()), "psnr": psnr, "gaussians": len(self.model)}
@@ -183,17 +194,25 @@ class HeadTrainer:
         box = [*map(float, shape.box_center), float(shape.box_size)]
         return {"box": box, "poses": self.poses}
 
-    def _view(self, index: int) -> View:
-        """The view of a step."""
+    def _view(self, number: int) -> View:
+        """The view that is taken up as this number: each step's picture, then its close-ups."""
+        index, place = divmod(number, 1 + self._settings.close_ups)
+        if place and self._close_ups:
+            chosen = self._close_ups.place(self._settings.close_ups * index + place - 1)
+            return self._close_ups.views[chosen]
         return self.views[self._epochs.at(index)]
 
-    def _staged(self, view: View, picture: Picture, index: int) -> tuple[Tensor, Tensor]:
+    def _staged(
+        self, view: View, picture: Picture, index: int, box: Box | None = None
+    ) -> tuple[Tensor, Tensor]:
         """The background to render over, and the recorded picture over that background.
 
         Where there is no clean plate, it is a random colour: no Gaussian can pass for background.
         """
         rng = np.random.default_rng([self._seed, index, 1])
         plate = self.pictures.background(view, picture.image.device)
+        if plate is not None and box is not None:
+            plate = plate[box.cut]
         return staged(picture, plate, torch.from_numpy(rng.random(3)))
 
     def _features(self, expression: Tensor) -> Tensor:
@@ -206,23 +225,10 @@ class HeadTrainer:
 
     def _update(self, expression: Tensor, features: Tensor, index: int) -> None:
         """One optimiser step on everything."""
-        progress = index / self._settings.steps
-        groups = self._settings.rates.by_parameter(self.model.shape.has_mlp)
-        rates = {name: rate.at(progress) for name, rate in groups.items()}
-        rates["means"] *= self.model.shape.box_size
-        if self._settings.optimiser == "sgd":
-            rates = {name: rate * SGD_GAINS[name] for name, rate in rates.items()}
+        rates = self._rates(index)
         weights = self.model.row_weights(expression)
         assert features.grad is not None
-        update_basis(
-            self._optimiser,
-            self.model.basis,
-            weights,
-            features.grad,
-            rates["basis"],
-            self._weight_decay,
-            self._settings.basis_optimiser == "rmsprop",
-        )
+        self._update_basis(weights, features.grad, rates["basis"])
         for name, parameter in self.model.named_parameters():
             if parameter.grad is not None:
                 rate = rates[name if name in GEOMETRY else "mlp"]
@@ -230,6 +236,54 @@ class HeadTrainer:
                 parameter.grad = None
         bound_scales(self.model)
         self._update_adaptor(rates["adaptor"])
+
+    def look_closer(self, close_up: CloseUp, index: int) -> None:
+        """One step on the basis of the Gaussians that a close-up shows, and on nothing else."""
+        model, part = self.model, close_up.part
+        picture = self.pictures.picture(part, model.device, close_up.box)
+        background, target = self._staged(part, picture, index, close_up.box)
+        expression = self.expression(part).detach()  # (B,)
+        chosen = close_up.shown(model.means).to(model.device)  # (n,)
+        weights = model.row_weights(expression)
+        features = blend_of(model.basis, weights, chosen).requires_grad_()  # (n, w)
+        fixed = {name: value.detach() for name, value in model.named_parameters()}
+        fixed |= {name: fixed[name][chosen] for name in GEOMETRY}  # (n, ...)
+        gaussians: Gaussians = functional_call(model, fixed, (expression, features))
+        rendering = render(gaussians, [part.camera], background)
+        self._loss(rendering, target, picture, index).backward()
+        assert features.grad is not None
+        self._update_basis(weights, features.grad, self._rates(index)["basis"], chosen)
+
+    def _rates(self, index: int) -> dict[str, float]:
+        """The learning rates of a step."""
+        groups = self._settings.rates.by_parameter(self.model.shape.has_mlp)
+        rates = {name: rate.at(index / self._settings.steps) for name, rate in groups.items()}
+        rates["means"] *= self.model.shape.box_size
+        if self._settings.optimiser == "sgd":
+            rates = {name: rate * SGD_GAINS[name] for name, rate in rates.items()}
+        return rates
+
+    def _row_factors(self, frames: Sequence[int]) -> Tensor:
+        """(R,) factors of the rows' learning rates."""
+        factors = torch.ones(self.model.shape.rows)
+        if self._settings.even_rows and self.model.shape.blends:
+            factors[: self.track.size] = evening_rates(self.track, frames)
+        return factors
+
+    def _update_basis(
+        self, weights: Tensor, gradient: Tensor, rate: float, chosen: Tensor | None = None
+    ) -> None:
+        """One step on the basis, or on that of the chosen Gaussians."""
+        update_basis(
+            self._optimiser,
+            self.model.basis,
+            weights,
+            gradient,
+            rate * self._evening,
+            self._weight_decay,
+            self._settings.basis_optimiser == "rmsprop",
+            chosen,
+        )
 
     def _update_adaptor(self, rate: float) -> None:
         """The adaptor's step; its attention learns faster and decays (as in SyncTalk)."""

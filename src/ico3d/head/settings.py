@@ -170,6 +170,12 @@ class HeadSettings:
             multiples of usual gradients, because the paper's rates are Adam's (docs/choices.md).
         basis_optimiser: What the basis learns by under Adam: Adam, or RMSProp, which keeps one
             second moment for each row of a Gaussian's basis and nothing else.
+        even_rows: Let the basis' rows of blendshapes that are small in most frames learn as much
+            faster, at most four times, as those that are usually large learn more slowly. Not in
+            the paper.
+        close_ups: Further pictures per step, cropped about the mouth, from which the basis of the
+            Gaussians there learns, and nothing else; none where the recording has no landmarks.
+            Not in the paper.
         sh_degree: Degree of the spherical harmonics, 0 to 3, by which colours depend on the
             direction of view; bundles keep degree 0.
         sh_every: Steps between two increases of the degree that is trained, which starts at 0.
@@ -191,6 +197,8 @@ class HeadSettings:
     turns: bool = False
     optimiser: Literal["adam", "sgd"] = "adam"
     basis_optimiser: Literal["adam", "rmsprop"] = "adam"
+    even_rows: bool = False
+    close_ups: int = 0
     sh_degree: int = 0
     sh_every: int = 1_000
     checkpoint_every: int = 1_000
@@ -212,6 +220,8 @@ PRESETS: dict[PresetName, HeadSettings] = {
         checkpoint_every=500,
         turns=True,
         basis_optimiser="rmsprop",
+        even_rows=True,
+        close_ups=2,
         loss=Loss(perceptual=0.0, torso=0.5, alpha=0.1, squares=8.0),
         rates=Rates(
             position=2.5e-3,

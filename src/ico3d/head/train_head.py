@@ -95,7 +95,7 @@ def train_head(
     if run.finished() is not None:
         return TrainedHead.load(folder)
     recording, capture = capture, head_in(training_part(capture, job.hold_out), job.over_torso)
-    trainer, encoder = _trainer(capture, job, device)
+    trainer, encoder = trainer_of(capture, job, device)
     track, adaptor = trainer.track, trainer.adaptor
     note_environment(folder, trainer.model.device)
     every = job.settings.checkpoint_every
@@ -127,7 +127,7 @@ def needs_of_head(capture: Capture, job: HeadJob, device: DeviceName = "auto") -
     Raises:
         Ico3dError: As for `train_head`.
     """
-    trainer, _ = _trainer(
+    trainer, _ = trainer_of(
         head_in(training_part(capture, job.hold_out), job.over_torso), job, device
     )
     settings, views = job.settings, trainer.views
@@ -137,7 +137,7 @@ def needs_of_head(capture: Capture, job: HeadJob, device: DeviceName = "auto") -
     return needs_of(trainer, settings.steps, most, settings.steps, 1, pictures)
 
 
-def _trainer(
+def trainer_of(
     capture: Capture, job: HeadJob, device: DeviceName
 ) -> tuple[HeadTrainer, tuple[str, str]]:
     """The trainee before its first step, and the speech encoder's name and sha256."""

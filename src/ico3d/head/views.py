@@ -9,12 +9,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ico3d.capture.box import Box, cut_out
 from ico3d.capture.capture import Capture
 from ico3d.capture.decoding import to_bytes
 from ico3d.capture.pictures import View as View
 from ico3d.capture.reading.layer_cache import LayerCache, ReadAhead
 from ico3d.capture.reading.memory import Gib
 from ico3d.capture.reading.spill import Layers
+from ico3d.common.camera import Camera
 from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 
@@ -24,6 +26,10 @@ COMPARED = 16
 """Number of head poses that are hashed to identify a head space."""
 GREY = 0.5
 """Background of a person who is cut out to be measured or shown."""
+FACING = np.array([0.0, 0.0, 1.0])
+"""Viewing direction of the face in canonical head space."""
+SHOWS_MOUTH = float(np.cos(np.radians(75.0)))
+"""Least cosine of the angle to the face at which a camera sees the mouth well enough."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +109,12 @@ def view_of(capture: Capture, camera: int, frame: int) -> View:
     return View(camera, frame, moved)
 
 
+def squareness(camera: Camera) -> float:
+    """Cosine of the angle between the face's and a camera's direction, in canonical head space."""
+    center = camera.camera_to_world[:3, 3]
+    return float(center @ FACING / np.linalg.norm(center))
+
+
 class PictureCache(ReadAhead):
     """Pictures of a capture, kept in memory as bytes up to a limit, otherwise read at each use."""
 
@@ -151,8 +163,8 @@ class PictureCache(ReadAhead):
             plate = self._backgrounds[index] = plate.to(device)
         return plate
 
-    def picture(self, view: View, device: torch.device) -> Picture:
-        """The picture and masks of a recorded view, on `device`.
+    def picture(self, view: View, device: torch.device, box: Box | None = None) -> Picture:
+        """The picture and masks of a recorded view, or a part of them, on `device`.
 
         Raises:
             CaptureError: If the view was not recorded.
@@ -164,7 +176,7 @@ class PictureCache(ReadAhead):
                 f"{view.camera_index} has vanished."
             )
         image, mask, torso, behind = (
-            None if layer is None else _as_floats(layer, device) for layer in layers
+            None if layer is None else _as_floats(cut_out(layer, box), device) for layer in layers
         )
         assert image is not None
         return Picture(image, mask, torso, behind)

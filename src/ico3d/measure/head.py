@@ -11,13 +11,21 @@ from rich.progress import track
 from torch import Tensor
 
 from ico3d.capture.capture import Capture, Sound
-from ico3d.common.camera import Camera
 from ico3d.common.psnr import psnr
 from ico3d.common.spread import spread
 from ico3d.errors import CaptureError
 from ico3d.head.expressions import ExpressionTrack, turned
 from ico3d.head.model_folder import TrainedHead
-from ico3d.head.views import GREY, Picture, PictureCache, View, staged, view_of
+from ico3d.head.views import (
+    GREY,
+    SHOWS_MOUTH,
+    Picture,
+    PictureCache,
+    View,
+    squareness,
+    staged,
+    view_of,
+)
 from ico3d.measure.faces.comparison import METRICS, FaceComparison
 from ico3d.measure.lips import LandmarkReader, landmark_reader
 from ico3d.measure.metrics import psnr_mouth
@@ -26,11 +34,6 @@ from ico3d.measure.scores import Scores, add_picture, write_pictures
 from ico3d.measure.stopwatch import Stopwatch
 from ico3d.measure.sync.pipeline import sync_or_none
 from ico3d.splat.render import render
-
-FACING = np.array([0.0, 0.0, 1.0])
-"""Viewing direction of the face in canonical head space."""
-SHOWS_MOUTH = float(np.cos(np.radians(75.0)))
-"""Least cosine of the angle to the face at which a camera sees the mouth well enough."""
 
 log = logging.getLogger(__name__)
 
@@ -146,12 +149,6 @@ def _say_why(result: dict[str, float | int | str | None], capture: Capture) -> N
             "%s: not measured: %s, as too few pictures of these frames show a face, recorded and "
             "rendered.", capture.path, ", ".join(lacking),
         )  # fmt: skip
-
-
-def squareness(camera: Camera) -> float:
-    """Cosine of the angle between the face's and a camera's direction, in canonical head space."""
-    center = camera.camera_to_world[:3, 3]
-    return float(center @ FACING / np.linalg.norm(center))
 
 
 def most_frontal_camera(capture: Capture, frames: Sequence[int]) -> int:

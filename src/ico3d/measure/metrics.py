@@ -4,10 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ico3d.capture.face.region import MOUTH
 from ico3d.common.psnr import psnr
-
-MOUTH = slice(48, 68)
-"""Indices of the mouth among the 68 landmarks."""
 
 MOTION = 25 / 255
 """Change of a colour channel between two frames above which a pixel counts as moving."""

@@ -7,8 +7,8 @@ import numpy as np
 from ico3d.errors import ModelError
 
 CHIN, JAW_CORNERS, JAW_ENDS, BROWS, BRIDGE = 8, (4, 12), (0, 16), slice(17, 27), 27
-JAW = slice(2, 15)
-"""Indices of Multi-PIE landmarks along the jaw; the names above are such indices, too."""
+JAW, MOUTH = slice(2, 15), slice(48, 68)
+"""Indices of Multi-PIE landmarks along the jaw and about the mouth; so are the names above."""
 BELOW_JAW = 0.2
 """How far below the jaw line the head's region ends: a chin goes down as a mouth opens.
 

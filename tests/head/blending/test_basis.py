@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from ico3d.head.basis import blend, update_basis
+from ico3d.head.blending.basis import blend, blend_of, update_basis
 from ico3d.training.optimiser import Optimiser
 
 ROWS, COUNT, WIDTH = 5, 700, 32  # more than one kernel block
@@ -85,3 +85,44 @@ def test_the_first_step_of_rmsprop_is_the_rate_times_the_gradient_of_unit_mean_s
     torch.testing.assert_close(basis - before, expected, rtol=1e-5, atol=1e-7)
     assert optimiser.moments["basis.second"].shape == (ROWS, COUNT)
     assert "basis.first" not in optimiser.moments
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64], ids=str)
+def test_blending_some_gaussians_gives_their_part_of_the_whole(dtype):
+    basis, weights, _ = _case(dtype)
+    chosen = torch.tensor([0, 3, 64, 65, 699])
+    torch.testing.assert_close(blend_of(basis, weights, chosen), blend(basis, weights)[chosen])
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64], ids=str)
+@pytest.mark.parametrize(
+    ("kind", "rmsprop"), [("adam", False), ("adam", True), ("sgd", False)], ids=str
+)
+def test_updating_some_gaussians_is_updating_a_basis_of_those_alone(kind, rmsprop, dtype):
+    basis, weights, gradient = _case(dtype)
+    chosen = torch.arange(0, COUNT, 3)
+    alone, before = basis[:, chosen].clone(), basis.clone()
+    whole, part = Optimiser(kind), Optimiser(kind)
+    for size in (1.0, -3.0):
+        pulled = size * gradient[chosen]
+        update_basis(whole, basis, weights, pulled, 0.01, 0.3, rmsprop, chosen)
+        update_basis(part, alone, weights, pulled, 0.01, 0.3, rmsprop)
+    torch.testing.assert_close(basis[:, chosen], alone, rtol=1e-5, atol=1e-6)
+    others = torch.ones(COUNT, dtype=torch.bool)
+    others[chosen] = False
+    assert torch.equal(basis[:, others], before[:, others])
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64], ids=str)
+@pytest.mark.parametrize(
+    ("kind", "rmsprop"), [("adam", False), ("adam", True), ("sgd", False)], ids=str
+)
+def test_a_rate_for_each_row_scales_its_step(kind, rmsprop, dtype):
+    steps = []
+    for rate in (0.01, 0.01 * torch.tensor([1.0, 1.0, 4.0, 0.5, 1.0], dtype=dtype)):
+        basis, weights, gradient = _case(dtype)
+        before = basis.clone()
+        update_basis(Optimiser(kind), basis, weights, gradient, rate, rmsprop=rmsprop)
+        steps.append(basis - before)
+    factors = torch.tensor([1.0, 1.0, 4.0, 0.5, 1.0], dtype=dtype)[:, None, None]
+    torch.testing.assert_close(steps[1], factors * steps[0], rtol=1e-4, atol=1e-5)

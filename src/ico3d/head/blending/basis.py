@@ -8,7 +8,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ico3d.head.kernels import adam_rank_one, blend_rows, rmsprop_rank_one, row_products
+from ico3d.head.blending.kernels import (
+    adam_rank_one,
+    blend_rows,
+    blend_some,
+    rmsprop_rank_one,
+    row_products,
+)
 from ico3d.training.finite import check_gradient
 from ico3d.training.optimiser import BETA2, EPSILON, Optimiser, adam_reference, bias_corrections
 
@@ -59,14 +65,35 @@ def _weight_gradient(basis: Tensor, gradient: Tensor) -> Tensor:
     return out
 
 
+def blend_of(basis: Tensor, weights: Tensor, chosen: Tensor) -> Tensor:
+    """As `blend`, of some Gaussians alone, and without gradients.
+
+    Args:
+        basis: (R, N, w).
+        weights: (R,) the expression with 1 appended.
+        chosen: (n,) int64 numbers of the Gaussians.
+
+    Returns:
+        (n, w) features.
+    """
+    basis, weights = basis.detach(), weights.detach()
+    if not _has_kernel(basis):
+        return torch.einsum("rnw,r->nw", basis[:, chosen], weights)
+    out = torch.empty(len(chosen), basis.shape[2])  # (n, w)
+    values = weights.contiguous().numpy()
+    blend_some(_rows(basis), values, np.flatnonzero(values), chosen.numpy(), out.numpy())
+    return out
+
+
 def update_basis(
     optimiser: Optimiser,
     basis: Tensor,
     weights: Tensor,
     gradient: Tensor,
-    rate: float,
+    rate: float | Tensor,
     weight_decay: float = 0.0,
     rmsprop: bool = False,
+    chosen: Tensor | None = None,
 ) -> None:
     """One step on the basis, in place, with the gradient weights ⊗ gradient.
 
@@ -77,30 +104,59 @@ def update_basis(
         optimiser: Holds the moments under the name "basis".
         basis: (R, N, w).
         weights: (R,) the expression with 1 appended.
-        gradient: (N, w) gradient of the loss by the blended features.
-        rate: Learning rate.
+        gradient: (N, w) gradient of the loss by the blended features; (n, w) where some Gaussians
+            are chosen.
+        rate: Learning rate, or (R,) that of each row.
         weight_decay: Factor by which each row except the bias is added to its gradient (L2).
         rmsprop: Take a step of RMSProp instead of Adam: without first moments, and with one second
             moment for all features of a Gaussian in a row.
+        chosen: (n,) int64 numbers of the only Gaussians to update; None for all.
 
     Raises:
         NotFiniteError: If the gradient holds NaN or infinity; then nothing is changed.
     """
     basis, weights, gradient = basis.detach(), weights.detach(), gradient.detach()
     check_gradient("basis", gradient)
-    rows = torch.nonzero(weights)[:, 0]  # (active,)
+    rates = torch.as_tensor(rate, dtype=basis.dtype).expand(len(weights))  # (R,)
     pulls = torch.full_like(weights, weight_decay)  # (R,)
     pulls[-1] = 0
     if optimiser.kind == "sgd":
-        pulled = pulls[rows, None, None] * basis[rows]
-        basis[rows] -= rate * (weights[rows, None, None] * gradient + pulled)
-        return
-    if rmsprop:
-        _rmsprop(optimiser, basis, weights, gradient, rate, pulls)
-        return
+        _sgd(basis, weights, gradient, rates, pulls, chosen)
+    elif rmsprop:
+        _rmsprop(optimiser, basis, weights, gradient, rates, pulls, chosen)
+    else:
+        _adam(optimiser, basis, weights, gradient, rates, pulls, chosen)
+
+
+def _sgd(
+    basis: Tensor,
+    weights: Tensor,
+    gradient: Tensor,
+    rates: Tensor,
+    pulls: Tensor,
+    chosen: Tensor | None,
+) -> None:
+    """A step of plain descent."""
+    part = _all_or(chosen)
+    for row in torch.nonzero(weights)[:, 0].tolist():
+        pulled = weights[row] * gradient + pulls[row] * basis[row, part]  # (N or n, w)
+        basis[row, part] -= float(rates[row]) * pulled
+
+
+def _adam(
+    optimiser: Optimiser,
+    basis: Tensor,
+    weights: Tensor,
+    gradient: Tensor,
+    rates: Tensor,
+    pulls: Tensor,
+    chosen: Tensor | None,
+) -> None:
+    """A step of Adam; `rates` and `pulls` (R,) are the learning rate and weight decay by row."""
+    rows = torch.nonzero(weights)[:, 0]  # (active,)
     first, second, counts = _moments(optimiser, basis)
     counts[rows.cpu()] += 1
-    if _has_kernel(basis):
+    if _has_kernel(basis) and chosen is None:
         corrections = np.array([bias_corrections(max(int(n), 1)) for n in counts])  # (R, 2)
         adam_rank_one(
             _rows(basis),
@@ -109,15 +165,18 @@ def update_basis(
             weights.contiguous().numpy(),
             gradient.contiguous().view(-1).numpy(),
             rows.numpy(),
-            np.float32(rate) * corrections[:, 0],
+            rates.numpy() * corrections[:, 0],
             corrections[:, 1].copy(),
             pulls.numpy(),
         )
         return
+    part = _all_or(chosen)
     for row in rows.tolist():
-        pulled = weights[row] * gradient + pulls[row] * basis[row]
-        parts = (basis[row], first[row], second[row], pulled)
-        adam_reference(*parts, rate, bias_corrections(int(counts[row])))
+        value, m, v = basis[row, part], first[row, part], second[row, part]  # (N or n, w) each
+        pulled = weights[row] * gradient + pulls[row] * value
+        adam_reference(value, m, v, pulled, float(rates[row]), bias_corrections(int(counts[row])))
+        if chosen is not None:  # then they are copies
+            basis[row, part], first[row, part], second[row, part] = value, m, v
 
 
 def _rmsprop(
@@ -125,10 +184,11 @@ def _rmsprop(
     basis: Tensor,
     weights: Tensor,
     gradient: Tensor,
-    rate: float,
+    rates: Tensor,
     pulls: Tensor,
+    chosen: Tensor | None,
 ) -> None:
-    """A step of RMSProp; `pulls` (R,) is the weight decay of each row."""
+    """A step of RMSProp; `rates` and `pulls` (R,) are the learning rate and weight decay by row."""
     moments = optimiser.moments
     if "basis.second" not in moments:
         moments["basis.second"] = basis.new_zeros(basis.shape[:2])  # (R, N)
@@ -138,22 +198,31 @@ def _rmsprop(
     counts[rows.cpu()] += 1
     roots = np.array([bias_corrections(max(int(n), 1))[1] for n in counts], np.float32)  # (R,)
     if _has_kernel(basis):
+        numbers = torch.arange(basis.shape[1]) if chosen is None else chosen  # (N or n,)
         rmsprop_rank_one(
             _rows(basis),
             second.numpy(),
             weights.contiguous().numpy(),
-            gradient.contiguous().view(-1).numpy(),
+            gradient.contiguous().numpy(),
             rows.numpy(),
-            np.float32(rate),
+            rates.contiguous().numpy(),
             roots,
             pulls.numpy(),
+            numbers.numpy(),
         )
         return
+    part = _all_or(chosen)
     for row in rows.tolist():
-        pulled = weights[row] * gradient + pulls[row] * basis[row]  # (N, w)
-        second[row].mul_(BETA2).add_(pulled.square().mean(1), alpha=1.0 - BETA2)
-        root = second[row].sqrt() * float(roots[row]) + EPSILON  # (N,)
-        basis[row] -= rate * pulled / root[:, None]
+        pulled = weights[row] * gradient + pulls[row] * basis[row, part]  # (N or n, w)
+        mean = BETA2 * second[row, part] + (1.0 - BETA2) * pulled.square().mean(1)  # (N or n,)
+        second[row, part] = mean
+        root = mean.sqrt() * float(roots[row]) + EPSILON
+        basis[row, part] -= float(rates[row]) * pulled / root[:, None]
+
+
+def _all_or(chosen: Tensor | None) -> Tensor | slice:
+    """The index of the chosen Gaussians, or of all."""
+    return slice(None) if chosen is None else chosen
 
 
 def _moments(optimiser: Optimiser, basis: Tensor) -> tuple[Tensor, Tensor, Tensor]:

@@ -28,6 +28,23 @@ def blend_rows(basis, weights, rows, out):
 
 
 @njit(parallel=True, fastmath=True, cache=True)
+def blend_some(basis, weights, rows, chosen, out):
+    """As `blend_rows`, of some Gaussians: those numbered in `chosen`, to out (n, w)."""
+    width = out.shape[1]
+    together = BLOCK // width + 1
+    for block in prange((chosen.size + together - 1) // together):
+        low, high = block * together, min((block + 1) * together, chosen.size)
+        out[low:high] = 0
+        for r in rows:
+            weight = weights[r]
+            for n in range(low, high):
+                source = basis[r, chosen[n] * width : (chosen[n] + 1) * width]
+                target = out[n]
+                for i in range(width):
+                    target[i] += weight * source[i]
+
+
+@njit(parallel=True, fastmath=True, cache=True)
 def row_products(basis, gradient, out):
     """Writes basis · gradient to out (R,), which is the gradient of the row weights."""
     for r in prange(basis.shape[0]):
@@ -69,7 +86,7 @@ def adam_rank_one(basis, first, second, weights, gradient, rows, steps, roots, p
 
 
 @njit(parallel=True, fastmath=True, cache=True)
-def rmsprop_rank_one(basis, second, weights, gradient, rows, rate, roots, pulls):
+def rmsprop_rank_one(basis, second, weights, gradient, rows, rates, roots, pulls, chosen):
     """One RMSProp step, in place, with the gradient weights ⊗ gradient, which is never stored.
 
     The w numbers of a Gaussian in a row share one second moment: the mean of their squares.
@@ -78,22 +95,23 @@ def rmsprop_rank_one(basis, second, weights, gradient, rows, rate, roots, pulls)
         basis: (R, S).
         second: (R, N) second moments.
         weights: (R,) row weights.
-        gradient: (S,) gradient of the blended features.
+        gradient: (n, w) gradient of the blended features of the chosen Gaussians.
         rows: Indices of the rows to update.
-        rate: Learning rate.
+        rates: (R,) learning rates.
         roots: (R,) correction of the root of the second moment.
         pulls: (R,) weight decay: factor by which each row is added to its gradient (L2).
+        chosen: (n,) numbers of the Gaussians to update.
     """
-    count = second.shape[1]
-    width = gradient.size // count
+    count, width = gradient.shape
     beta2, epsilon = np.float32(BETA2), np.float32(EPSILON)
     share = np.float32((1.0 - BETA2) / width)
     together = BLOCK // width + 1
     for block in prange((count + together - 1) // together):
         for r in rows:
-            weight, root, pull = weights[r], roots[r], pulls[r]
-            for n in range(block * together, min((block + 1) * together, count)):
-                g = gradient[n * width : (n + 1) * width]
+            weight, rate, root, pull = weights[r], rates[r], roots[r], pulls[r]
+            for k in range(block * together, min((block + 1) * together, count)):
+                n = chosen[k]
+                g = gradient[k]
                 value = basis[r, n * width : (n + 1) * width]
                 total = np.float32(0)
                 for i in range(width):
