@@ -114,6 +114,7 @@ class Loss:
     Attributes:
         ssim: Weight λ_s of 1 − SSIM; the L1 difference has the weight λ_1 = 1 − λ_s.
         mask: Weight λ_m of the L1 difference of rendered alpha and mask.
+        squares: Weight of the mean squared difference of the pictures. Not in the paper.
         smoothness: Weight of the squared second differences of the encoder's planes. Not in the
             paper.
         stillness: Weight of how far the encoder's planes along time are from 1, the value at which
@@ -124,6 +125,7 @@ class Loss:
 
     ssim: float = 0.2
     mask: float = 0.1
+    squares: float = 0.0
     smoothness: float = 0.0
     stillness: float = 0.0
     joints: float = 1.0
@@ -289,6 +291,9 @@ class BodySettings:
             window the same number, --steps.
         warmup_steps: Number of first steps of a window that learn from its middle frame alone,
             without motion.
+        unfolding: Share of a window's steps, 0 to 1, after the warm-up, in which its frames join
+            from the middle one outwards, each with the encoder's features of its neighbour; 0 lets
+            all frames join at once. Not in the paper.
         sh_degree: Degree of the spherical harmonics, 0 to 3, by which colours depend on the
             direction of view in the world; bundles keep degree 0. Not on a skeleton.
         sh_every: Steps between two increases of the degree that is trained, which starts at 0.
@@ -313,6 +318,7 @@ class BodySettings:
     steps: int = 30_000
     steps_per_frame: int = 0
     warmup_steps: int = 1_000
+    unfolding: float = 0.0
     sh_degree: int = 0
     sh_every: int = 1_000
     color_correction: bool = False
@@ -343,8 +349,10 @@ PRESETS: dict[PresetName, BodySettings] = {
     "cpu": BodySettings(
         steps=2_150,
         warmup_steps=200,
+        unfolding=0.3,
         checkpoint_every=500,
         encoder=Encoder(space=32),
+        loss=Loss(squares=8.0),
         rates=Rates(
             position=1e-3,
             position_decay=0.03,
@@ -364,8 +372,6 @@ PRESETS: dict[PresetName, BodySettings] = {
 
 STEPS_PER_FRAME = 150
 """Steps per frame of skinned bodies in the preset `cpu`: their one window may have any length."""
-
-
 SEGMENT = 45
 """Frames of a segment of Spacetime Gaussians in the preset `paper`: more did not fit into memory.
 
@@ -377,7 +383,7 @@ def settings_for(preset: PresetName, method: Method) -> BodySettings:
     """The settings of a preset for a method; other methods differ as their own papers do."""
     settings = PRESETS[preset]
     if method == "swings":
-        return replace(settings, mlp=replace(settings.mlp, depth=4))
+        return replace(settings, mlp=replace(settings.mlp, depth=4), unfolding=0.0)
     if method == "spacetime" and preset == "paper":
         windows = replace(settings.windows, segment=SEGMENT)
         return replace(settings.without_finetuning(), windows=windows)

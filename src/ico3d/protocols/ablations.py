@@ -88,7 +88,9 @@ BODIES: Mapping[str, BodyChange] = {
     "one window": BodyChange(method="4dgs"),
     "no motion": BodyChange(method="static"),
     "no warm-up": BodyChange(lambda s: replace(s, warmup_steps=0)),
+    "no unfolding": BodyChange(lambda s: replace(s, unfolding=0.0)),
     "no SSIM": BodyChange(lambda s: replace(s, loss=replace(s.loss, ssim=0.0))),
+    "no squares": BodyChange(lambda s: replace(s, loss=replace(s.loss, squares=0.0))),
 }
 HEAD_COLUMNS = (
     Column("psnr", "PSNR", 2, "more"),

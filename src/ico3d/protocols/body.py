@@ -96,13 +96,14 @@ def body_report(results: Mapping[Method, list[dict]], trials: Sequence[Trial], o
 def _how(capture: Capture, terms: Terms) -> str:
     train = len(capture.cameras) - len(capture.split.test_cameras)
     first = capture.cameras[0]
+    alike = "drawn in a picture" if terms.equal_drawn else "summed over windows"
     return (
         f"{train} cameras train, {len(capture.split.test_cameras)} test, in all "
         f"{capture.num_frames} frames; the first camera's pictures have {first.width} × "
         f"{first.height} pixels. Pictures are compared whole, uncropped, before the clean plate "
         "or, without one, with the person cut out on black: PSNR and SSIM depend on how much of a "
         "picture is empty, PSNR-M, on the recorded mask alone, does not. Means over pictures, then "
-        "over seeds. All methods have equal steps and, summed over windows, equal Gaussians (on a "
+        f"over seeds. All methods have equal steps and, {alike}, equal Gaussians (on a "
         "skeleton those of one window), the same losses and the same density control; settings "
         "that were given apply to all. The presets of the others were tuned less than ours "
         f"(docs/choices.md). The clip is cut into {len(terms.windows)} windows."

@@ -1,7 +1,7 @@
 """The verbs `ico3d measure …`: protocols that train, measure and write a report."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal, get_args
@@ -161,6 +161,8 @@ class MeasureBody(BodyPreset):
             poses of the body track, others stay as they were in the last trained frame.
         finetune: Fine-tune SWinGS++ at the end and measure before and after; the table shows the
             state before.
+        equal_drawn: Give methods of a single window only as many Gaussians as one window of
+            SWinGS++ has: all draw equally many per picture, and take equally long.
         device: Where to compute: by default CUDA where that works, else the CPU.
         jobs: Number of trainings at a time, which share the cores.
         settings: How SWinGS++ is trained. The other methods are trained in the same way, except
@@ -174,6 +176,7 @@ class MeasureBody(BodyPreset):
     frames: int | None = None
     unseen: bool = False
     finetune: bool = False
+    equal_drawn: bool = False
     device: DeviceName = "auto"
     jobs: int = 1
     settings: Annotated[BodySettings, tyro.conf.arg(name="")] = field(
@@ -210,6 +213,7 @@ class MeasureBody(BodyPreset):
             self.unseen,
             self.preset,
         )
+        terms = replace(terms, equal_drawn=self.equal_drawn)
         report = measure_body(terms, self.methods, seeds, self.jobs, self.out)
         _say(report.sections[0].markdown(1), self.out)
 

@@ -33,7 +33,7 @@ def trained_apart(capture):
     """Two windows."""
     trained = []
     for window, seed in ((BEFORE, 0), (AFTER, 1)):
-        trainer = trainer_of(capture, seed=seed, window=window)
+        trainer = trainer_of(capture, seed=seed, window=window, unfolding=0.0)
         for index in range(150):
             trainer.step(index)
         trained.append(trainer.model)

@@ -87,6 +87,18 @@ def test_the_warm_up_moves_nothing(capture):
     assert not torch.equal(before["mlp.weight2"], trainer.model.shared["mlp.weight2"])
 
 
+def test_a_frame_that_joins_begins_where_its_neighbour_is(capture):
+    """Its rows of the time planes are those of the frame nearer to the middle, then learn."""
+    trainer = trainer_of(capture, unfolding=0.5)  # frames 4 to 8, 250 steps
+    planes = trainer.model.shared
+    with torch.no_grad():
+        planes["grid.xt0"][1] = 3.0
+    for index in range(20, 84):
+        trainer._unfold(index)
+    assert planes["grid.xt0"][[0, 1, 3, 4]].unique().tolist() == [1.0]  # all from the middle
+    assert trainer._views(20)[0].frame in (5, 6, 7)
+
+
 @pytest.mark.slow
 def test_alpha_follows_density_control(capture):
     """Blending weights begin as the flow's mask and are cloned along with their Gaussians."""
@@ -99,9 +111,10 @@ def test_alpha_follows_density_control(capture):
     assert len(trainer.model) > 250 and len(trainer.model.gaussians["alpha"]) == len(trainer.model)
 
 
-def test_the_loss_is_the_papers(capture):
-    """λ_1·L1 + λ_s·(1 − SSIM) + λ_m·|M_r − M_gt|."""
-    trainer = trainer_of(capture)
+@pytest.mark.parametrize("squares", [0.0, 3.0])
+def test_the_loss_is_the_papers_and_squares(capture, squares):
+    """λ_1·L1 + λ_s·(1 − SSIM) + λ_m·|M_r − M_gt|, and squared differences where they count."""
+    trainer = trainer_of(capture, **{"loss.squares": squares})
     learner = trainer._learner
     view = learner.views[3]
     example = learner.example(view, 0)
@@ -111,6 +124,7 @@ def test_the_loss_is_the_papers(capture):
         0.8 * (image - target).abs().mean()
         + 0.2 * (1 - ssim(image, target))
         + 0.1 * (rendering.alpha[0] - example.mask).abs().mean()
+        + squares * (image - target).square().mean()
     )
     torch.testing.assert_close(learner.loss(rendering, example), expected)
 

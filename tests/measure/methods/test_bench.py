@@ -52,6 +52,17 @@ def test_a_skeleton_has_as_many_steps_but_the_gaussians_of_one_window(changes):
         assert settings.finetune.steps == 0
 
 
+def test_one_window_can_draw_as_many_gaussians_as_one_of_many_does():
+    """Then all methods have equally many in a picture, and as many steps as before."""
+    terms = Terms(
+        Path("c"), None, Path("f"), WINDOWS, preset("swings++"), finetune=False, equal_drawn=True
+    )
+    for method in METHODS:
+        assert terms.settings(method).density.max_gaussians == 7_000
+        assert terms.settings(method).initial.gaussians == 4_000
+    assert terms.settings("4dgs").steps == 3 * 2_150
+
+
 def test_only_swings_plus_plus_is_fine_tuned_and_elsewhere_than_without():
     terms = Terms(Path("c"), None, Path("f"), WINDOWS, preset("swings++"), finetune=True)
     tuned = {method for method in METHODS if terms.settings(method).finetune.steps}

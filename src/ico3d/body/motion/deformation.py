@@ -91,6 +91,21 @@ class Deformation:
         times = means.new_full((len(means), 1), tau)
         return positional_encoding(torch.cat([inside, times], 1), self.bands)  # (N, inputs)
 
+    @torch.no_grad()
+    def continue_time(self, shared: Mapping[str, Tensor], row: int, neighbour: int) -> None:
+        """Gives one node of time the encoder's features of another; nothing without an encoder.
+
+        Args:
+            shared: The shared tensors by name, which are changed in place.
+            row: The node of time.
+            neighbour: The node whose features it takes over.
+        """
+        scales = () if self.encoder is None else range(len(self.encoder.space))
+        for scale in scales:
+            for plane in TIME_PLANES:
+                values = shared[f"{GRID}{plane}{scale}"]  # (T, S, C)
+                values[row] = values[neighbour]
+
     def about(self) -> dict:
         """Kind and fields of this motion, for `motion_from`."""
         return {"kind": "deformation", **asdict(self)}

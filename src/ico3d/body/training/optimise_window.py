@@ -8,6 +8,7 @@ from ico3d.body.companion import Companion
 from ico3d.body.motion.deformation import GRID, Deformation
 from ico3d.body.motion.encoder import space_smoothness, time_change, time_smoothness
 from ico3d.body.motion.window_model import WindowModel
+from ico3d.body.planning.unfolding import Unfolding
 from ico3d.body.planning.windows import Window
 from ico3d.body.settings import BodySettings, Method
 from ico3d.body.skinning.skinned import Skinned, without_residual
@@ -63,12 +64,22 @@ class BodyTrainer(WindowTrainee):
         self._strategy = density_control(method, settings, self._steps, seed, extent)
         deforms = isinstance(model.motion, Deformation)
         self._warmup = settings.warmup_steps if deforms else 0
-        self._center = [v for v in self._learner.views if v.frame == window.center]
+        self._by_frame: dict[int, list[View]] = {}
+        for view in self._learner.views:
+            self._by_frame.setdefault(view.frame, []).append(view)
+        self._center = self._by_frame.get(window.center, [])
+        self._unfolding: Unfolding | None = None
+        if deforms and settings.unfolding:
+            self._unfolding = Unfolding(
+                window, tuple(self._by_frame), self._warmup, self._steps, settings.unfolding, seed
+            )
+        self._first = window.first
 
     def step(self, index: int) -> Mapping[str, float]:
         """Renders one recorded view, learns from the difference, and controls density."""
         learner = self._learner
         still = self._is_still(index)
+        self._unfold(index)
         learner.expect(range(index, self._steps), self._views)
         view = learner.view(self._views(index), index)
         example = learner.example(view, index)
@@ -99,7 +110,20 @@ class BodyTrainer(WindowTrainee):
 
     def _views(self, index: int) -> Sequence[View]:
         """The views among which a step chooses."""
-        return self._center if self._is_still(index) else self._learner.views
+        if self._is_still(index):
+            return self._center
+        if self._unfolding is None or index < self._warmup:
+            return self._learner.views
+        return self._by_frame[self._unfolding.frame(index)]
+
+    def _unfold(self, index: int) -> None:
+        """Lets frames that join at a step begin with the features of their neighbours."""
+        motion = self.model.motion
+        if self._unfolding is None or not isinstance(motion, Deformation):
+            return
+        for frame, neighbour in self._unfolding.joining(index):
+            rows = frame - self._first, neighbour - self._first
+            motion.continue_time(self.model.shared, *rows)
 
     def _moved(self, view: View, index: int) -> Gaussians:
         """Gaussians at the time of a view; on a skeleton at random without residual shapes."""

@@ -135,11 +135,16 @@ class Learner:
             self._pruning.carry_out(self.model, self.population)
 
     def loss(self, rendering: Rendering, example: Example) -> Tensor:
-        """λ_1·L1 + λ_s·(1 − SSIM) + λ_m·L1 of the masks (paper, loss of the body)."""
-        weights = self._settings.loss
-        shown, target = rendering.rgb, example.target[None]  # (1, H, W, 3)
-        picture = photometric(shown, target, l1_weight=1 - weights.ssim, ssim_weight=weights.ssim)
-        return picture + weights.mask * l1(rendering.alpha[0], example.mask)
+        """λ_1·L1 + λ_s·(1 − SSIM) + λ_m·L1 of the masks (paper), and squared differences."""
+        weights, target = self._settings.loss, example.target[None]  # (1, H, W, 3)
+        loss = photometric(
+            rendering.rgb,
+            target,
+            l1_weight=1 - weights.ssim,
+            ssim_weight=weights.ssim,
+            squares_weight=weights.squares,
+        )
+        return loss + weights.mask * l1(rendering.alpha[0], example.mask)
 
     def update(self, progress: float) -> None:
         """One optimiser step on every tensor that has a gradient.

@@ -48,6 +48,8 @@ class Terms:
         device: Where to compute.
         unseen: Whether frames after the trained ones are measured, too.
         preset: The preset from which all methods' settings come.
+        equal_drawn: Whether a method of one window has only as many Gaussians as SWinGS++ has in
+            one window, so that all draw equally many per picture.
     """
 
     capture: Path
@@ -59,19 +61,21 @@ class Terms:
     device: DeviceName = "auto"
     unseen: bool = False
     preset: PresetName = "cpu"
+    equal_drawn: bool = False
 
     def settings(self, method: Method) -> BodySettings:
         """The settings of a method.
 
         A method that takes the clip as one window gets the steps of all windows together and the
-        Gaussians of all windows together; on a skeleton it gets those of one window.
+        Gaussians of all windows together; on a skeleton, or with `equal_drawn`, it gets those of
+        one window.
         """
         settings = changed_alike(method, self.ours, self.preset)
         if not (self.finetune and method == OURS):
             settings = settings.without_finetuning()
         if method not in ONE_WINDOW:
             return settings
-        count = 1 if method in SKINNED else len(self.windows)
+        count = 1 if self.equal_drawn or method in SKINNED else len(self.windows)
         initial, density = settings.initial, settings.density
         return replace(
             settings,
