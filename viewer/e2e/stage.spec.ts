@@ -23,7 +23,7 @@ let page: Page;
 
 beforeAll(async () => {
   server = await servePage(makePerson({ gaussians: '300,450' }).folder);
-  browser = await Browser.launch({ width: 160, height: 200 });
+  browser = await Browser.launch({ width: 160, height: 200, hertz: 60 });
   page = await browser.open(server.url);
 });
 

@@ -49,6 +49,7 @@ export interface BrowserOptions {
   height?: number;
   calm?: boolean; // the visitor wants little motion: the head does not sway
   microphone?: string; // WAV that plays as the microphone, once
+  hertz?: 30 | 60; // how often the screen is refreshed; each further picture takes the processor from what is tested
 }
 
 /** Chromium without and with a microphone; each process of tests starts them once, they end with it. */
@@ -60,6 +61,27 @@ function start(hasMicrophone: boolean): Promise<Chromium> {
     headless: false, // the flag says it: playwright's own switch picks another build
     args: hasMicrophone ? [...FLAGS, ...MICROPHONE] : FLAGS,
   });
+}
+
+/** Makes a screen of 60 Hz one of 30 Hz. */
+function halveRefreshRate(): void {
+  const request = requestAnimationFrame.bind(window);
+  const cancel = cancelAnimationFrame.bind(window);
+  const due = new Map<number, number>(); // what the page asked for, and what the browser was asked for
+  let count = 0;
+  window.requestAnimationFrame = (draw) => {
+    const id = ++count;
+    const shown = (now: number) => {
+      due.delete(id);
+      draw(now);
+    };
+    due.set(id, request(() => due.set(id, request(shown))));
+    return id;
+  };
+  window.cancelAnimationFrame = (id) => {
+    cancel(due.get(id) ?? 0);
+    due.delete(id);
+  };
 }
 
 /** A visitor's browser, software-rendered, with one page; nobody else's cookies, cache or permissions. */
@@ -77,7 +99,7 @@ export class Browser {
   }
 
   static async launch(options: BrowserOptions = {}): Promise<Browser> {
-    const { width = 320, height = 240, calm = false, microphone } = options;
+    const { width = 320, height = 240, calm = false, microphone, hertz = 30 } = options;
     if (microphone) copyFileSync(microphone, HEARD);
     const kind = microphone !== undefined;
     if (!running.has(kind)) running.set(kind, start(kind));
@@ -86,6 +108,7 @@ export class Browser {
       deviceScaleFactor: 1,
       reducedMotion: calm ? 'reduce' : 'no-preference',
     });
+    if (hertz === 30) await context.addInitScript(halveRefreshRate);
     return new Browser(context, await context.newPage());
   }
 
