@@ -1,3 +1,4 @@
+import { Vector3 } from 'three';
 import type { Actor } from './actor.ts';
 import { Body } from './body/body.ts';
 import { ActingBody } from './body/skinned/acting.ts';
@@ -93,7 +94,7 @@ async function makeActing(
   const rig = body.generator.skeleton.rig;
   const repertoire = readRepertoire(file, GESTURES, manifest.skinned!.names.length);
   const language = new BodyLanguage(rig, repertoire, Math.floor(2 ** 32 * Math.random()), heard);
-  const acting = new ActingBody(body, language, rig, repertoire.figure, frame, () => stage.orbit.camera.position.toArray());
+  const acting = new ActingBody(body, language, rig, repertoire.figure, frame, () => stage.camera.getWorldPosition(new Vector3()).toArray());
   stage.add(acting);
   return acting;
 }

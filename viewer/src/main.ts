@@ -3,6 +3,7 @@ import './style.css';
 import { Server } from './server.ts';
 import { readSplats, type Splats } from './stage/readback.ts';
 import { Visit, type Presence } from './visit.ts';
+import { xrSettings } from './xr/settings.ts';
 
 declare global {
   interface Window {
@@ -14,12 +15,14 @@ declare global {
   }
 }
 
+const parameters = new URL(location.href).searchParams;
 const visit: Visit = new Visit(document.body, new Server(new URL(location.href)), {
+  xr: xrSettings((name) => parameters.get(name)),
   emit: () => {},
   named: (name) => (document.title = name),
   entered: (presence) => {
     window.ico3d = { ...presence, visit, splats: (generator) => readSplats(presence.stage, generator) };
-    const seconds = new URL(location.href).searchParams.get('bench');
+    const seconds = parameters.get('bench');
     if (seconds !== null) void import('./bench.ts').then(({ bench }) => bench(presence, Number(seconds) || undefined));
   },
   reload: () => location.reload(),

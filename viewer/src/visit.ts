@@ -19,6 +19,8 @@ import { makePage, showNotice, type Page } from './ui/page.ts';
 import { PlayerBar } from './ui/player.ts';
 import { makeThemeButton } from './ui/theme.ts';
 import { makeViewBar } from './ui/views.ts';
+import { offerXr } from './xr/offer.ts';
+import { xrSettings, type XrSettings } from './xr/settings.ts';
 
 /** Who is there, once they can be seen. */
 export interface Presence extends Cast {
@@ -32,6 +34,8 @@ export interface VisitPorts {
   transparent?: boolean;
   /** How the visitor wants to talk, if it is known. */
   choice?: Choice;
+  /** What headsets draw. */
+  xr?: XrSettings;
   /** Takes what happens in the conversation. */
   emit: Emit;
   /** The avatar's name is known. */
@@ -90,8 +94,10 @@ export class Visit {
     const page = makePage(root, this.overlay, () => stage.figures, signal);
     const conversation = manifest.head ? this.converse(page) : undefined;
     const presence: Presence = { stage, conversation, ...(await this.enter(manifest, stage, conversation)) };
-    const corner = root.querySelector('.figures')!;
+    const corner = root.querySelector<HTMLElement>('.figures')!;
     corner.append(makeThemeButton(root, (light) => stage.setBright(light), signal), makeViewBar(stage.orbit, root, signal));
+    const xr = { stage, conversation, head: presence.head, root, settings: this.ports.xr ?? xrSettings(() => null), signal };
+    void offerXr(corner, xr, (sentence) => showNotice(root, sentence));
     const { playback } = presence;
     const moving = presence.body ?? presence.skinned;
     if (moving && playback) new PlayerBar(root, moving, playback, 1 / bodyOf(manifest)!.fps, signal);

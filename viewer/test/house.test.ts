@@ -20,6 +20,7 @@ const ORDER = [
   ['body', 'stage', 'audio'],
   ['talk'],
   ['ui', 'cast.ts'],
+  ['xr'],
   ['visit.ts', 'check'],
   ['bench.ts'],
   ['main.ts', 'embed'],

@@ -21,6 +21,13 @@ export class Player {
     this.output.connect(this.context.destination);
   }
 
+  /** Lets all sound go through a node on its way to the loudspeaker, or straight there again. */
+  through(node: AudioNode | null): void {
+    this.output.disconnect();
+    this.output.connect(node ?? this.context.destination);
+    node?.connect(this.context.destination);
+  }
+
   /** Schedules a piece; pieces of a stopped utterance are dropped. */
   play(piece: Piece): void {
     if (piece.utterance <= this.lastDropped) return;

@@ -6,6 +6,7 @@ import { focusOn } from '../ui/elements.ts';
 import { icon } from '../ui/icons.ts';
 import { Overlay, type Choice } from '../ui/overlay.ts';
 import type { Presence, Visit } from '../visit.ts';
+import { xrSettings } from '../xr/settings.ts';
 import { admit } from './admission.ts';
 import { buildShell, fillPage, type Shell } from './shell.ts';
 
@@ -215,6 +216,7 @@ export class AvatarElement extends HTMLElement {
     return {
       transparent: this.hasAttribute('transparent'),
       choice,
+      xr: xrSettings((name) => this.getAttribute(name)),
       emit,
       named: (given: string) => void (name = given),
       entered: (presence: Presence) => {

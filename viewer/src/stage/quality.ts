@@ -12,8 +12,8 @@ export interface Savings {
 }
 
 const LEAST = 28.5; // pictures/s: 30 but for jitter
-const SLOW = 20; // pictures/s under which two steps are taken at once
-const AMPLE = 45; // pictures/s from which a better picture is tried
+const SLOW = 0.7; // of the least rate: under it, two steps are taken at once
+const AMPLE = 1.58; // of the least rate: from it on, a better picture is tried
 const NEARLY = 0.95; // of the best rate that was ever seen: a screen may be no faster
 const WINDOW = 1; // s of pictures that are judged together
 const SETTLING = 2; // windows after a change, or the start, that are not judged
@@ -31,7 +31,7 @@ export function ladder({ backdrop, gaussians }: Savings): Level[] {
 }
 
 /**
- * Chooses what is drawn so that at least 30 pictures per second are.
+ * Chooses what is drawn so that at least 30 pictures per second are, in headsets more.
  *
  * It goes down after two slow seconds, up after some of ample speed. A better picture that turns out
  * too slow makes it wait twice as long before the next try, so that it does not go to and fro.
@@ -48,6 +48,7 @@ export class Quality {
   private wait = WAIT;
   private sinceRise = Infinity; // s
   private fastest = 0; // pictures/s
+  private least = LEAST; // pictures/s
 
   constructor(levels: readonly Level[]) {
     this.levels = levels;
@@ -71,6 +72,14 @@ export class Quality {
   reset(levels: readonly Level[]): void {
     this.levels = levels;
     if (!this.isHeld) this.index = 0;
+    this.rest();
+  }
+
+  /** Pictures go to another screen from now on, on which so many per second are needed at least; by default to the page. */
+  aim(least = LEAST): void {
+    this.least = least;
+    this.fastest = 0;
+    this.wait = WAIT;
     this.rest();
   }
 
@@ -105,11 +114,12 @@ export class Quality {
 
   private judge(rate: number, time: number): boolean {
     this.fastest = Math.max(this.fastest, rate);
-    const slow = rate < LEAST;
-    const surely = slow && (this.slowBefore || rate < SLOW);
+    const slow = rate < this.least;
+    const verySlow = rate < SLOW * this.least;
+    const surely = slow && (this.slowBefore || verySlow);
     this.slowBefore = slow;
-    if (surely) return this.fall(rate < SLOW ? 2 : 1);
-    this.ample = !slow && rate >= Math.min(AMPLE, NEARLY * this.fastest) ? this.ample + time : 0;
+    if (surely) return this.fall(verySlow ? 2 : 1);
+    this.ample = !slow && rate >= Math.min(AMPLE * this.least, NEARLY * this.fastest) ? this.ample + time : 0;
     return this.ample >= this.wait && this.rise();
   }
 

@@ -24,6 +24,8 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
       up: { value: new THREE.Vector3(0, 1, 0) },
       front: { value: new THREE.Vector3(0, 0, 1) },
       shadow: { value: SHADOW },
+      depth: { value: 1 },
+      alone: { value: 0 },
     };
     const material = new THREE.ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, uniforms, transparent: true });
     material.depthTest = material.depthWrite = false;
@@ -33,13 +35,23 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
     this.visible = false; // until somebody stands there
   }
 
-  /** Puts the floor under somebody. */
-  stand({ foot, up, toward }: Ground): void {
+  /**
+   * Puts the floor under somebody.
+   *
+   * @param feet whether somebody's feet cast a shadow on it
+   */
+  stand({ foot, up, toward }: Ground, feet = true): void {
     const { uniforms } = this.material;
     uniforms.foot!.value.copy(foot);
     uniforms.up!.value.copy(up);
     uniforms.front!.value.copy(toward);
+    uniforms.depth!.value = feet ? 1 : 0;
     this.visible = true;
+  }
+
+  /** Draws the shadow alone, on what is behind the picture. */
+  setShadowAlone(alone: boolean): void {
+    this.material.uniforms.alone!.value = alone ? 1 : 0;
   }
 
   /** Shows a bright room, or a dark one. */
@@ -72,7 +84,7 @@ const VERTEX = `
 const FRAGMENT = `
   uniform vec3 base, foot, up, front;
   uniform vec2 shadow;
-  uniform float bright;
+  uniform float bright, depth, alone;
   varying vec3 ray;
 
   vec3 shade(float dark, float light) {
@@ -83,6 +95,7 @@ const FRAGMENT = `
     vec3 way = normalize(ray);
     float rise = dot(way, up);
     vec3 colour = mix(base, shade(0.66, 0.5), smoothstep(0.12, 0.6, rise));
+    float dark = 0.0;
     float height = dot(cameraPosition - foot, up);
     if (height > 0.0 && rise < -1e-4) {
       vec3 place = cameraPosition - way * height / rise - foot;
@@ -91,9 +104,9 @@ const FRAGMENT = `
       colour = mix(ground, base, smoothstep(1.2, 5.0, far));
       vec2 aside = vec2(dot(place, cross(up, front)), dot(place, front)) / shadow;
       float near = dot(aside, aside);
-      colour *= 1.0 - 0.34 * exp(-near) - 0.22 * exp(-6.0 * near);
+      dark = depth * (0.34 * exp(-near) + 0.22 * exp(-6.0 * near));
     }
     float noise = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715)))) - 0.5;
-    gl_FragColor = vec4(colour + noise / 255.0, 1.0);
+    gl_FragColor = alone > 0.5 ? vec4(vec3(0.0), dark) : vec4(colour * (1.0 - dark) + noise / 255.0, 1.0);
   }
 `;

@@ -1,17 +1,20 @@
 import * as THREE from 'three';
 import type { Actor } from '../actor.ts';
 import type { HeadFiles } from '../bundle/load.ts';
+import { eyesOf } from '../head/eyes.ts';
 import { bodyOf, type Manifest } from '../bundle/manifest.ts';
 import { atEnd } from '../lifetime.ts';
 import { watchContext } from './context.ts';
 import { Mean, type Figures } from './figures.ts';
+import { meetingOf, meetingOfBody, type Meeting } from './camera/meeting.ts';
 import { Orbit } from './camera/orbit.ts';
-import { Scenery } from './scenery.ts';
+import type { Presentation } from './presentation.ts';
 import { ladder, Quality } from './quality.ts';
+import { Scenery } from './scenery.ts';
 import { watchSight } from './sight.ts';
 import { sitterOf } from './camera/sitter.ts';
 import { CurrentSorter, Sorter } from './sorter.ts';
-import { groundOf, groundUnder, person, wholeBody } from './camera/subject.ts';
+import { groundOf, person, wholeBody } from './camera/subject.ts';
 
 const MOST_PIXELS = 2; // along a side, for one of the page
 const LEAST_FREE = 0.4; // of the height: what covers more lies over the face
@@ -25,6 +28,8 @@ export class Stage {
   /** Enters VR or AR; null where nobody offers it. */
   enterXr: (() => Promise<void>) | null = null;
   readonly scenery: Scenery;
+  /** Who is met by those who come in; null before there is anybody. */
+  meeting: Meeting | null = null;
   frames = 0; // drawn so far
   bytes = 0; // of the bundle that came before there was somebody to see
   /** Called when the browser takes the picture away and does not give it back. */
@@ -40,6 +45,7 @@ export class Stage {
   private dirty = true;
   private size: readonly [number, number] | null = null; // of pictures, else the canvas's own
   private drew = false; // in the last frame
+  private presentation: Presentation | null = null; // instead of the page
   private readonly evaluation = new Mean(); // ms
   private readonly drawing = new Mean(); // ms
   private running = false; // between `start` and `still`
@@ -55,9 +61,9 @@ export class Stage {
     this.renderer = new THREE.WebGLRenderer({ canvas, alpha: transparent, antialias: false, powerPreference: 'high-performance' });
     this.current = this.prepare();
     this.scenery = new Scenery(manifest.background);
-    if (!transparent) this.scene.add(this.scenery);
-    const ground = groundOf(manifest);
-    if (ground) this.scenery.stand(ground);
+    const body = groundOf(manifest);
+    if (body) this.meeting = meetingOfBody(body.ground, body.height);
+    this.arrange();
     this.orbit = new Orbit(canvas, wholeBody(manifest), () => (this.dirty = true));
     const { signal } = this.ending;
     const ports = { lost: () => this.lose(), restored: () => this.restore(), gone: () => this.onGone() };
@@ -77,8 +83,8 @@ export class Stage {
   /** Adds an actor; before the start only, or Spark would hold its picture until it has sorted anew. */
   add(actor: Actor): void {
     this.actors.push(actor);
-    if (actor.thin) this.scenery.removeFromParent(); // there is a room
     for (const object of actor.objects) this.scene.add(object);
+    this.arrange();
     this.quality.reset(ladder({
       backdrop: this.actors.some(({ thin }) => thin),
       gaussians: this.actors.some(({ limit }) => limit),
@@ -120,9 +126,40 @@ export class Stage {
 
   /** Points the camera at somebody whose head rests at these rows of its poses. */
   face(head: HeadFiles, resting: readonly number[]): void {
-    const sitter = sitterOf(this.manifest, head, resting);
+    const local = new THREE.Vector3(...eyesOf(head.baked, head.info));
+    const sitter = sitterOf(this.manifest, head, resting, local);
     this.orbit.face(person(this.manifest, sitter));
-    if (bodyOf(this.manifest)) this.scenery.stand(groundUnder(sitter));
+    this.meeting = meetingOf(sitter, local, bodyOf(this.manifest) !== undefined);
+    this.arrange();
+  }
+
+  /** What the visitor looks with. */
+  get camera(): THREE.PerspectiveCamera {
+    return this.presentation?.camera ?? this.orbit.camera;
+  }
+
+  /** Is seen in a headset from now on, or on the page again. */
+  present(presentation: Presentation | null): void {
+    this.presentation = presentation;
+    this.quality.aim(presentation?.rate);
+    this.arrange();
+    this.loop();
+    this.fit();
+  }
+
+  /** Puts up what is around people: a room, or in somebody's own room their shadow alone. */
+  private arrange(): void {
+    const { presentation, scenery, meeting } = this;
+    const through = presentation?.passthrough ?? false;
+    const rooms = this.actors.filter(({ thin }) => thin);
+    for (const object of rooms.flatMap(({ objects }) => objects)) object.visible = !through;
+    scenery.setShadowAlone(through);
+    const place = presentation ?? (meeting?.stands ? meeting : null);
+    scenery.visible = place !== null;
+    if (place) scenery.stand(place.ground, place.stands);
+    const shown = presentation ? through || rooms.length === 0 : !this.transparent && rooms.length === 0;
+    if (shown) this.scene.add(scenery);
+    else scenery.removeFromParent();
   }
 
   /** Shows a bright room, or a dark one. */
@@ -182,9 +219,17 @@ export class Stage {
   draw(): void {
     for (const actor of this.actors) actor.drawing?.(performance.now());
     const before = performance.now();
-    this.renderer.render(this.scene, this.orbit.camera);
+    this.spark.autoUpdate = !this.presentation;
+    if (this.presentation) this.gather();
+    this.renderer.render(this.scene, this.camera);
     this.drawing.add(performance.now() - before);
     this.frames++;
+  }
+
+  /** In headsets Spark would take what people look like after the picture, for the next one: late by one. */
+  private gather(): void {
+    this.scene.updateMatrixWorld();
+    void this.spark.update({ scene: this.scene, camera: this.camera });
   }
 
   private async sorted(): Promise<void> {
@@ -228,7 +273,9 @@ export class Stage {
     this.lastFrame = 0;
     this.quality.rest();
     this.dirty = true;
-    this.renderer.setAnimationLoop(runs ? (now) => this.frame(now / 1000) : null);
+    const frame = runs ? (now: number) => this.frame(now / 1000) : null;
+    if (xr.isPresenting) xr.setAnimationLoop(frame); // the page's own would run beside it
+    else this.renderer.setAnimationLoop(frame);
   }
 
   /**
@@ -239,8 +286,9 @@ export class Stage {
     const step = this.lastFrame && now - this.lastFrame;
     this.lastFrame = now;
     if (step && this.drew && this.quality.picture(step)) this.applyQuality();
+    this.presentation?.frame(step, this.quality.level.pixels);
     this.advance(step);
-    if (this.orbit.update(step)) this.dirty = true;
+    if (this.presentation || this.orbit.update(step)) this.dirty = true; // a headset wants each picture
     this.drew = this.dirty;
     if (!this.dirty) return;
     this.dirty = false;
@@ -257,7 +305,7 @@ export class Stage {
   private fit(): void {
     const { clientWidth, clientHeight } = this.canvas;
     const [width, height] = this.size ?? [clientWidth, clientHeight];
-    if (!width || !height) return;
+    if (!width || !height || this.renderer.xr.isPresenting) return;
     const ratio = this.size ? 1 : Math.min(devicePixelRatio, MOST_PIXELS) * this.quality.level.pixels;
     this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(width, height, false);

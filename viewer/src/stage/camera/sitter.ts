@@ -26,12 +26,18 @@ const LEVEL = 0.5; // of a direction's length: what is steeper does not say wher
  * with a body was recorded from all around and is met face to face.
  *
  * @param rows of the head's poses, where the head is at rest
+ * @param local the point between the eyes in the head's own space
  */
-export function sitterOf(manifest: Manifest, files: HeadFiles, rows: readonly number[]): Sitter {
+export function sitterOf(
+  manifest: Manifest,
+  files: HeadFiles,
+  rows: readonly number[],
+  local = new THREE.Vector3(...eyesOf(files.baked, files.info)),
+): Sitter {
   const { camera } = manifest;
   const body = bodyOf(manifest);
   const up = new THREE.Vector3(...camera.up).normalize();
-  const [eyes, forward] = faceOf(files, rows);
+  const [eyes, forward] = faceOf(files, rows, local);
   const start = new THREE.Vector3(...camera.eye);
   const recorded = start.clone().sub(body ? new THREE.Vector3(...camera.target) : eyes).normalize();
   const toward = body ? (level(forward, up) ?? level(recorded, up) ?? recorded) : recorded;
@@ -49,8 +55,7 @@ export function corners({ min, max }: THREE.Box3): THREE.Vector3[] {
 }
 
 /** Means over the poses: the point between the eyes, and where the face looks. */
-function faceOf({ baked, info, poses }: HeadFiles, rows: readonly number[]): [THREE.Vector3, THREE.Vector3] {
-  const local = new THREE.Vector3(...eyesOf(baked, info));
+function faceOf({ poses }: HeadFiles, rows: readonly number[], local: THREE.Vector3): [THREE.Vector3, THREE.Vector3] {
   const [eyes, forward] = [new THREE.Vector3(), new THREE.Vector3()];
   const [track, head] = [new Poses(poses), new THREE.Object3D()];
   for (const row of rows) {

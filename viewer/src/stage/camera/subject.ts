@@ -49,15 +49,16 @@ export function groundUnder({ eyes, toward, up, lowest, box }: Sitter): Ground {
   return { foot, up, toward: level };
 }
 
-/** Where a body whose head is nowhere told stands; null if there is no body. */
-export function groundOf(manifest: Manifest): Ground | null {
+/** Where a body whose head is nowhere told stands, and how high it is in m; null if there is no body. */
+export function groundOf(manifest: Manifest): { ground: Ground; height: number } | null {
   const body = bodyOf(manifest);
   if (!body) return null;
   const { camera } = manifest;
   const up = new THREE.Vector3(...camera.up).normalize();
   const box = new THREE.Box3(new THREE.Vector3(...body.low), new THREE.Vector3(...body.high));
-  const floor = Math.min(...corners(box).map((corner) => corner.dot(up)));
+  const heights = corners(box).map((corner) => corner.dot(up));
+  const floor = Math.min(...heights);
   const foot = box.getCenter(new THREE.Vector3()).projectOnPlane(up).addScaledVector(up, floor);
   const toward = new THREE.Vector3(...camera.eye).sub(foot).projectOnPlane(up).normalize();
-  return { foot, up, toward };
+  return { ground: { foot, up, toward }, height: Math.max(...heights) - floor };
 }
