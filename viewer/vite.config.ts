@@ -1,12 +1,13 @@
 import { defineConfig } from 'vitest/config';
 import { compressed } from './compression.ts';
+import { preloaded } from './preloading.ts';
 
 // `npm run dev` shows the page against a running `ico3d serve … --port 8700`.
 const SERVER = process.env.ICO3D_SERVER ?? 'http://127.0.0.1:8700';
 
 export default defineConfig({
   base: './',
-  plugins: [compressed()],
+  plugins: [compressed(), preloaded('index.html', 'theatre')],
   build: {
     outDir: '../src/ico3d/chat/static',
     emptyOutDir: true,
@@ -15,10 +16,19 @@ export default defineConfig({
       input: { index: 'index.html', check: 'check.html', embed: 'src/embed/served.ts' },
       preserveEntrySignatures: 'exports-only', // of what other sites import
       // Other sites write its address into their pages: it stays, and imports what changes.
-      output: { entryFileNames: ({ name }) => (name === 'embed' ? 'embed.js' : 'assets/[name]-[hash].js') },
+      output: {
+        entryFileNames: ({ name }) => (name === 'embed' ? 'embed.js' : 'assets/[name]-[hash].js'),
+        // Side by side, and kept by browsers when only the page itself has changed.
+        codeSplitting: {
+          groups: [
+            { name: 'three', test: /node_modules\/three\// },
+            { name: 'spark', test: /node_modules\/@sparkjsdev\// },
+          ],
+        },
+      },
       checks: { pluginTimings: false }, // to compress well takes its time
     },
-    chunkSizeWarningLimit: 4000, // three and Spark (with its sort worker) in one file
+    chunkSizeWarningLimit: 3000, // Spark, with its sort worker
   },
   server: {
     proxy: { '/bundle': SERVER, '/health': SERVER, '/echo': { target: SERVER, ws: true }, '/ws': { target: SERVER, ws: true } },

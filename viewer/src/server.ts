@@ -10,9 +10,15 @@ export class Server {
     this.token = base.searchParams.get('token') ?? '';
   }
 
-  /** Address of a file of the bundle. */
-  file(name: string): string {
-    return this.address(`bundle/${name}`).href;
+  /**
+   * Address of a file of the bundle.
+   *
+   * @param sha256 names the content, which browsers may then keep for ever
+   */
+  file(name: string, sha256?: string): string {
+    const url = this.address(`bundle/${name}`);
+    if (sha256) url.searchParams.set('sha256', sha256);
+    return url.href;
   }
 
   /** Address of the page that checks the visitor's device. */

@@ -1,14 +1,14 @@
 import type { Body } from './body/body.ts';
 import type { SkinnedBody } from './body/skinned/body.ts';
-import { bytesToFirstSight, BundleFiles, loadManifest, THUMBNAIL } from './bundle/load.ts';
+import { BundleFiles, filesToFirstSight, loadManifest, THUMBNAIL } from './bundle/load.ts';
 import { blinkIndices, bodyOf, type HeadInfo, type Manifest } from './bundle/manifest.ts';
-import { makeCast, type Cast } from './cast.ts';
+import type { Cast } from './cast.ts';
 import { PageError, sentenceOf } from './errors.ts';
 import { Face } from './face/face.ts';
 import { IdleFace } from './face/idle.ts';
 import { atEnd } from './lifetime.ts';
 import type { Server } from './server.ts';
-import { Stage } from './stage/stage.ts';
+import type { Stage } from './stage/stage.ts';
 import { Conversation } from './talk/conversation.ts';
 import type { Emit } from './talk/events.ts';
 import { telling } from './talk/telling.ts';
@@ -18,7 +18,6 @@ import { Overlay, type Choice } from './ui/overlay.ts';
 import { makePage, showNotice, type Page } from './ui/page.ts';
 import { PlayerBar } from './ui/player.ts';
 import { makeThemeButton } from './ui/theme.ts';
-import { makeViewBar } from './ui/views.ts';
 import { offerXr } from './xr/offer.ts';
 import { xrSettings, type XrSettings } from './xr/settings.ts';
 
@@ -27,6 +26,8 @@ export interface Presence extends Cast {
   stage: Stage;
   conversation?: Conversation; // none of a body alone
 }
+
+type Theatre = typeof import('./theatre.ts');
 
 /** What a visit needs of the page around it. */
 export interface VisitPorts {
@@ -79,23 +80,27 @@ export class Visit {
   private async run(): Promise<void> {
     const { root, server } = this;
     const { signal } = this.ending;
-    const locate = server.file.bind(server);
-    const manifest = await loadManifest(locate, signal);
+    const coming = import('./theatre.ts'); // meanwhile the first files are asked for
+    coming.catch(() => {}); // heard of below
+    const manifest = await loadManifest(server.file.bind(server), signal);
+    const files = this.ask(manifest);
     const name = manifest.persona.name || manifest.name;
     byId(root, 'name').textContent = name;
     root.style.setProperty('--backdrop', cssColour(manifest.background));
-    this.overlay.greet(name, server.file(THUMBNAIL));
+    this.overlay.greet(name, server.file(THUMBNAIL, manifest.files[THUMBNAIL]?.sha256));
     this.ports.named(name);
 
-    const stage = new Stage(byId<HTMLCanvasElement>(root, 'stage'), manifest, this.ports.transparent);
+    const theatre = await coming;
+    signal.throwIfAborted();
+    const stage = new theatre.Stage(byId<HTMLCanvasElement>(root, 'stage'), manifest, this.ports.transparent);
     atEnd(signal, () => stage.dispose());
     stage.onGone = () => this.overlay.fail('The browser cannot show the picture any more.');
     watchCover(root, signal, (pixels) => stage.keepClear(pixels));
     const page = makePage(root, this.overlay, () => stage.figures, signal);
     const conversation = manifest.head ? this.converse(page) : undefined;
-    const presence: Presence = { stage, conversation, ...(await this.enter(manifest, stage, conversation)) };
+    const presence: Presence = { stage, conversation, ...(await this.enter(theatre, manifest, files, stage, conversation)) };
     const corner = root.querySelector<HTMLElement>('.figures')!;
-    corner.append(makeThemeButton(root, (light) => stage.setBright(light), signal), makeViewBar(stage.orbit, root, signal));
+    corner.append(makeThemeButton(root, (light) => stage.setBright(light), signal), theatre.makeViewBar(stage.orbit, root, signal));
     const xr = { stage, conversation, head: presence.head, root, settings: this.ports.xr ?? xrSettings(() => null), signal };
     void offerXr(corner, xr, (sentence) => showNotice(root, sentence));
     const { playback } = presence;
@@ -114,21 +119,27 @@ export class Visit {
     return conversation;
   }
 
+  /** Asks for the files without which there is nobody to see. */
+  private ask(manifest: Manifest): BundleFiles {
+    const first = filesToFirstSight(manifest, this.ports.transparent);
+    const total = first.reduce((sum, name) => sum + manifest.files[name]!.size, 0);
+    const more = () => this.overlay.progress(Math.min(1, files.loaded / total));
+    const files: BundleFiles = new BundleFiles(this.server.file.bind(this.server), manifest.files, more, this.ending.signal);
+    files.ask(first);
+    return files;
+  }
+
   /** Brings everybody on stage and waits until they can be seen. */
-  private async enter(manifest: Manifest, stage: Stage, conversation?: Conversation): Promise<Cast> {
+  private async enter(theatre: Theatre, manifest: Manifest, files: BundleFiles, stage: Stage, conversation?: Conversation): Promise<Cast> {
     const { signal } = this.ending;
-    const total = bytesToFirstSight(manifest);
-    let loaded = 0;
-    const more = (bytes: number) => this.overlay.progress(Math.min(1, (loaded += bytes) / total));
-    const files = new BundleFiles(this.server.file.bind(this.server), manifest.files, more, signal);
-    const cast = await makeCast(manifest, files, stage, this.calm, {
+    const cast = await theatre.makeCast(manifest, files, stage, this.calm, {
       heard: () => conversation?.player.heard() ?? null,
       failed: (error) => signal.aborted || showNotice(this.root, sentenceOf(error)),
     });
     signal.throwIfAborted();
     stage.start();
     await cast.body?.ready();
-    stage.bytes = loaded;
+    stage.bytes = files.loaded;
     signal.throwIfAborted();
     return cast;
   }

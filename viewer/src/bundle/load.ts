@@ -26,42 +26,58 @@ export const GESTURES = 'body/gestures.safetensors';
 /** A picture of the avatar. */
 export const THUMBNAIL = 'thumbnail.png';
 
-/** Gives the address of a file of a bundle. */
-export type Locate = (name: string) => string;
+/** Gives the address of a file of a bundle; with its hash, one whose content never changes. */
+export type Locate = (name: string, sha256?: string) => string;
 
 /** Fetches and checks the manifest. */
 export async function loadManifest(locate: Locate, signal?: AbortSignal): Promise<Manifest> {
-  const response = await get(locate, 'manifest.json', signal);
+  const response = await get(locate('manifest.json'), 'manifest.json', signal);
   return checkManifest(await response.json().catch(() => null));
 }
 
-/** Bytes that must come before there is somebody to see. */
-export function bytesToFirstSight({ head, body, skinned, files }: Manifest): number {
-  const behind = BACKGROUNDS.filter((name) => name in files);
-  const names: string[] = [...behind, ...(head ? HEAD_FILES : [])];
-  if (body) names.push(body.windows[0]!.file);
-  if (skinned) names.push(SKINNED, ...(GESTURES in files ? [GESTURES] : []));
+/**
+ * What must come before there is somebody to see, the face first.
+ *
+ * @param alone nothing is shown behind them
+ */
+export function filesToFirstSight({ head, body, skinned, files }: Manifest, alone = false): string[] {
+  const names: string[] = head ? [...HEAD_FILES] : [];
   if (head && (body || skinned)) names.push(ANIMATION);
-  return names.reduce((sum, name) => sum + (files[name]?.size ?? 0), 0);
+  if (body) names.push(body.windows[0]!.file);
+  if (skinned) names.push(SKINNED, GESTURES);
+  if (!alone) names.push(...BACKGROUNDS);
+  return names.filter((name) => name in files);
 }
 
 /** The files of a bundle, fetched when they are asked for; each must be as long as promised, and have the promised hash. */
 export class BundleFiles {
+  /** Bytes that came so far. */
+  loaded = 0;
   private readonly locate: Locate;
   private readonly promised: Manifest['files'];
-  private readonly onBytes: (n: number) => void;
+  private readonly onBytes: () => void;
   private readonly signal: AbortSignal | undefined;
+  private readonly asked = new Map<string, Promise<ArrayBuffer>>(); // ahead of their use
 
   /**
    * @param promised size and hash of each file
-   * @param onBytes called with the number of bytes that came
+   * @param onBytes called when some bytes came
    * @param signal ends the fetching
    */
-  constructor(locate: Locate, promised: Manifest['files'], onBytes: (n: number) => void = () => {}, signal?: AbortSignal) {
+  constructor(locate: Locate, promised: Manifest['files'], onBytes: () => void = () => {}, signal?: AbortSignal) {
     this.locate = locate;
     this.promised = promised;
     this.onBytes = onBytes;
     this.signal = signal;
+  }
+
+  /** Asks for files that are going to be used, in this order; each is handed out once. */
+  ask(names: readonly string[]): void {
+    for (const name of names) {
+      const coming = this.fetch(name);
+      coming.catch(() => {}); // whoever uses the file hears of it
+      this.asked.set(name, coming);
+    }
   }
 
   /** A head, ready for the GPU. */
@@ -95,17 +111,24 @@ export class BundleFiles {
     return parseSafetensors(await this.bytes(name), name);
   }
 
-  private async bytes(name: string): Promise<ArrayBuffer> {
+  private bytes(name: string): Promise<ArrayBuffer> {
+    const coming = this.asked.get(name) ?? this.fetch(name);
+    this.asked.delete(name);
+    return coming;
+  }
+
+  private async fetch(name: string): Promise<ArrayBuffer> {
     const entry = this.promised[name];
     if (!entry) throw new PageError(`manifest.json does not list ${name}.`);
-    const reader = (await get(this.locate, name, this.signal)).body!.getReader();
+    const reader = (await get(this.locate(name, entry.sha256), name, this.signal)).body!.getReader();
     const bytes = new Uint8Array(entry.size);
     let at = 0;
     for (let part = await reader.read(); !part.done; part = await reader.read()) {
       if (at + part.value.length > entry.size) throw new PageError(`${name} is longer than manifest.json says.`);
       bytes.set(part.value, at);
       at += part.value.length;
-      this.onBytes(part.value.length);
+      this.loaded += part.value.length;
+      this.onBytes();
     }
     if (at !== entry.size) throw new PageError(`${name} is shorter than manifest.json says.`);
     await checkHash(bytes, entry.sha256, name);
@@ -121,10 +144,10 @@ function parseJson(text: string): unknown {
   }
 }
 
-async function get(locate: Locate, name: string, signal?: AbortSignal): Promise<Response> {
+async function get(address: string, name: string, signal?: AbortSignal): Promise<Response> {
   let response: Response;
   try {
-    response = await fetch(locate(name), { signal });
+    response = await fetch(address, { signal });
   } catch {
     signal?.throwIfAborted();
     throw new PageError(`The server does not answer this site, so ${name} could not be loaded; reload the page.`);

@@ -56,7 +56,7 @@ export interface AvatarHandle {
 /** Shows the avatar of a bundle in an element. */
 export async function mount(element: HTMLElement, { bundle, transparent = false, calm = false }: MountOptions): Promise<AvatarHandle> {
   const folder = new URL(String(bundle).replace(/\/?$/, '/'), document.baseURI);
-  const locate = (name: string) => new URL(name, folder).href;
+  const locate = (name: string, sha256?: string) => new URL(sha256 ? `${name}?sha256=${sha256}` : name, folder).href;
   const manifest = await loadManifest(locate);
   const canvas = makeCanvas(manifest.persona.name || manifest.name);
   element.append(canvas);

@@ -5,7 +5,6 @@ import contextlib
 import gc
 import socket
 from collections.abc import AsyncIterator, Collection
-from dataclasses import replace
 from pathlib import Path
 
 import uvicorn
@@ -14,13 +13,13 @@ from fastapi.responses import JSONResponse, PlainTextResponse
 from threadpoolctl import threadpool_limits
 
 from ico3d.bundle.format import SPEECH, Bundle
-from ico3d.bundle.manifest import MANIFEST
 from ico3d.bundle.persona import Persona
 from ico3d.chat.observing.monitor import CONTENT_TYPE
 from ico3d.chat.parts import Avatar
 from ico3d.chat.performing.face import open_face
 from ico3d.chat.services import choose
 from ico3d.chat.services.offers import offers
+from ico3d.chat.serving.bundle_files import BundleFiles
 from ico3d.chat.serving.connection import Connection
 from ico3d.chat.serving.echo import echo
 from ico3d.chat.serving.guard import LOOPBACK, Guard
@@ -30,12 +29,9 @@ from ico3d.chat.serving.sessions import Sessions
 from ico3d.chat.serving.sites import Sites, add_tokens
 from ico3d.chat.settings.conversation import ChatSettings
 from ico3d.chat.wire import protocol
-from ico3d.errors import BundleError, SettingsError
+from ico3d.errors import SettingsError
 
 STATIC = Path(__file__).parents[1] / "static"
-JSON = "application/json"
-TYPES = {".json": JSON, ".png": "image/png", ".txt": "text/plain; charset=utf-8"}
-FRESH = {"Cache-Control": "no-cache"}
 STILL = "This avatar is driven by blendshapes, not by sound: its lips do not move while it speaks."
 
 
@@ -99,12 +95,11 @@ def make_app(
     async def health() -> JSONResponse:
         return JSONResponse({"ok": True})
 
+    files = BundleFiles(bundle, avatar.persona if avatar else None)
+
     @app.get("/bundle/{name:path}")
     async def bundle_file(name: str, request: Request) -> Response:
-        if name == MANIFEST and avatar is not None:
-            manifest = await asyncio.to_thread(shown_manifest, bundle, avatar.persona)
-            return Response(manifest, headers=FRESH, media_type=JSON)
-        return await asyncio.to_thread(serve_file, bundle, name, request)
+        return await asyncio.to_thread(files.answer, name, request)
 
     if avatar is not None and sessions is not None:
         add_conversation(app, avatar, sessions)
@@ -126,31 +121,6 @@ def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
     @app.get("/metrics")
     async def metrics() -> Response:
         return Response(sessions.monitor.exposition(), headers={"Content-Type": CONTENT_TYPE})
-
-
-def shown_manifest(bundle: Bundle, persona: Persona) -> bytes:
-    """The manifest with the persona's name; a persona file's notes are not sent to the page."""
-    if persona is bundle.manifest.persona:
-        return bundle.read(MANIFEST)
-    return replace(bundle.manifest, persona=Persona(persona.name, persona.greeting)).to_json()
-
-
-def serve_file(bundle: Bundle, name: str, request: Request) -> Response:
-    """Serves a file of the bundle; browsers keep the file as long as its hash is the same."""
-    if name not in bundle.names:
-        return PlainTextResponse(f"The bundle has no file {name[:80]!r}.\n", 404)
-    entry = bundle.manifest.files.get(name)
-    headers = dict(FRESH)
-    if entry is not None:
-        headers["ETag"] = f'"{entry.sha256}"'
-        if request.headers.get("if-none-match") == headers["ETag"]:
-            return Response(status_code=304, headers=headers)
-    try:
-        data = bundle.read(name)
-    except BundleError as error:
-        return PlainTextResponse(f"{error}\n", 500)
-    media_type = TYPES.get(Path(name).suffix, "application/octet-stream")
-    return Response(data, media_type=media_type, headers=headers)
 
 
 def add_page(app: FastAPI) -> None:

@@ -1,0 +1,97 @@
+"""Serves the files of a bundle, compressed where that helps and with caching.
+
+An address with `?sha256=HASH` names one content for ever, so browsers keep that content; at an
+address without a hash they ask again, and get 304 while the file is the same.
+"""
+
+import gzip
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+from fastapi import Request, Response
+from fastapi.responses import PlainTextResponse
+
+from ico3d.bundle.format import Bundle
+from ico3d.bundle.manifest import MANIFEST
+from ico3d.bundle.persona import Persona
+from ico3d.chat.serving.page_files import ASK_AGAIN, FOR_EVER, preferred
+from ico3d.errors import BundleError
+
+TYPES = {
+    ".json": "application/json",
+    ".png": "image/png",
+    ".txt": "text/plain; charset=utf-8",
+}
+GZIP = "gzip"
+WORTHWHILE = 0.97
+"""Largest share of its size that a file may keep if it is to be sent compressed."""
+KEPT_FILES = 32
+"""Number of compressed files that are kept in memory, those that were asked for last."""
+MAX_COMPRESSED = 1 << 24
+"""Largest size in bytes of a file that is compressed."""
+
+
+class BundleFiles:
+    """Answers requests for a bundle's files; it reads and compresses, so it runs in a thread."""
+
+    def __init__(self, bundle: Bundle, persona: Persona | None):
+        """Serves the files of `bundle`, with `persona` in the manifest in place of its own."""
+        self._bundle = bundle
+        self._persona = persona
+        self._compressed = lru_cache(KEPT_FILES)(self._compress)
+
+    def answer(self, name: str, request: Request) -> Response:
+        """The file `name`, or 304 if the browser has it."""
+        if name not in self._bundle.names:
+            return PlainTextResponse(f"The bundle has no file {name[:80]!r}.\n", 404)
+        entry = self._bundle.manifest.files.get(name)
+        try:
+            small = self._compressed(name) if _takes_gzip(request) else None
+            headers = _headers(request, entry.sha256 if entry else None, small is not None)
+            if "ETag" in headers and request.headers.get("if-none-match") == headers["ETag"]:
+                return Response(status_code=304, headers=headers)
+            data = small or self._content(name)
+        except BundleError as error:
+            return PlainTextResponse(f"{error}\n", 500)
+        media_type = TYPES.get(Path(name).suffix, "application/octet-stream")
+        return Response(data, media_type=media_type, headers=headers)
+
+    def _content(self, name: str) -> bytes:
+        """A file as the page gets it: a persona file shows its name, its notes are not sent."""
+        own = self._bundle.manifest.persona
+        if name != MANIFEST or self._persona is None or self._persona is own:
+            return self._bundle.read(name)
+        shown = Persona(self._persona.name, self._persona.greeting)
+        return replace(self._bundle.manifest, persona=shown).to_json()
+
+    def _compress(self, name: str) -> bytes | None:
+        """A file's content by gzip; None where that saves little."""
+        data = self._content(name)
+        if len(data) > MAX_COMPRESSED:
+            return None
+        small = gzip.compress(data, mtime=0)
+        return small if len(small) <= WORTHWHILE * len(data) else None
+
+
+def _takes_gzip(request: Request) -> bool:
+    return preferred(request.headers.get("accept-encoding", ""), [GZIP]) == GZIP
+
+
+def _headers(request: Request, sha256: str | None, compressed: bool) -> dict[str, str]:
+    """Caching and coding of an answer.
+
+    Args:
+        request: What is answered.
+        sha256: The file's hash; None for the manifest, which has none.
+        compressed: Whether the file is sent by gzip.
+    """
+    named = sha256 is not None and request.query_params.get("sha256") == sha256
+    headers = {"Cache-Control": FOR_EVER if named else ASK_AGAIN, "Vary": "Accept-Encoding"}
+    if named and "token" in request.query_params:  # shared caches would not look at the token
+        headers["Cache-Control"] = FOR_EVER.replace("public", "private")
+    if sha256 is not None:
+        headers["ETag"] = f'"{sha256}.gz"' if compressed else f'"{sha256}"'
+    if compressed:
+        headers["Content-Encoding"] = GZIP
+    return headers

@@ -1,0 +1,82 @@
+"""How a bundle's files travel: small where that helps, kept where the address has a hash."""
+
+import gzip
+
+import httpx
+import pytest
+from fastapi import FastAPI, Request
+
+from ico3d.bundle.persona import Persona
+from ico3d.chat.serving.bundle_files import BundleFiles
+
+FOR_EVER = "public, max-age=31536000, immutable"
+HEAD, PICTURE = "head.safetensors", "thumbnail.png"
+
+
+def client(bundle, persona=None):
+    app, files = FastAPI(), BundleFiles(bundle, persona)
+
+    @app.get("/{name:path}")
+    async def answer(name: str, request: Request):
+        return files.answer(name, request)
+
+    return httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://page")
+
+
+async def test_an_address_with_the_hash_is_kept_for_ever(bundle):
+    sha256 = bundle.manifest.files[HEAD].sha256
+    async with client(bundle) as page:
+        named = await page.get(f"/{HEAD}?sha256={sha256}")
+        private = await page.get(f"/{HEAD}?sha256={sha256}&token=a.b")
+        for other in (
+            f"/{HEAD}",
+            f"/{HEAD}?sha256={sha256[1:]}0",
+            f"/manifest.json?sha256={sha256}",
+        ):
+            answer = await page.get(other)
+            assert answer.status_code == 200 and answer.headers["cache-control"] == "no-cache"
+    assert named.content == bundle.read(HEAD)
+    assert named.headers["cache-control"] == FOR_EVER
+    assert private.headers["cache-control"] == FOR_EVER.replace("public", "private")
+
+
+@pytest.mark.parametrize("coding", ["gzip", "identity", "gzip;q=0", ""])
+async def test_files_are_compressed_where_that_helps_and_is_understood(bundle, coding):
+    asked = {"Accept-Encoding": coding}
+    async with client(bundle) as page:
+        async with page.stream("GET", "/manifest.json", headers=asked) as answer:
+            wire = b"".join([part async for part in answer.aiter_raw()])
+        picture = await page.get(f"/{PICTURE}", headers=asked)
+    assert answer.headers["vary"] == "Accept-Encoding"
+    assert ("content-encoding" in answer.headers) == (coding == "gzip")
+    plain = gzip.decompress(wire) if coding == "gzip" else wire
+    assert plain == bundle.read("manifest.json")
+    assert len(wire) < 0.7 * len(plain) or coding != "gzip"
+    assert picture.content == bundle.read(PICTURE)
+
+
+async def test_who_has_a_file_in_its_coding_is_not_sent_it_again(bundle):
+    async with client(bundle) as page:
+        for coding, other in (("gzip", "identity"), ("identity", "gzip")):
+            tag = (await page.get(f"/{HEAD}", headers={"Accept-Encoding": coding})).headers["etag"]
+            asked = {"Accept-Encoding": coding, "If-None-Match": tag}
+            again = await page.get(f"/{HEAD}", headers=asked)
+            assert again.status_code == 304 and not again.content
+            changed = await page.get(f"/{HEAD}", headers=asked | {"Accept-Encoding": other})
+            compressed = "content-encoding" in changed.headers
+            assert changed.status_code == (200 if tag != changed.headers["etag"] else 304)
+            assert compressed == changed.headers["etag"].endswith('.gz"')
+
+
+async def test_a_persona_file_shows_its_name_and_keeps_its_notes(bundle):
+    async with client(bundle, Persona("Ada", "Hello.", ("secret => safe",))) as page:
+        shown = (await page.get("/manifest.json", headers={"Accept-Encoding": "gzip"})).json()
+    assert shown["persona"] == {"name": "Ada", "greeting": "Hello.", "notes": []}
+
+
+async def test_a_file_that_changed_on_disk_is_an_error_in_one_sentence(bundle, monkeypatch):
+    monkeypatch.setattr(bundle, "_archive", type("Archive", (), {"read": lambda *_: b"changed"})())
+    async with client(bundle) as page:
+        answer = await page.get(f"/{HEAD}")
+        assert (await page.get("/nothing")).status_code == 404
+    assert answer.status_code == 500 and answer.text.count("\n") == 1

@@ -1,0 +1,58 @@
+import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
+import { Browser } from '../support/browser/browser.ts';
+import { slowNetwork, type Wire } from '../support/browser/wire.ts';
+import { slowness } from '../support/slowness.ts';
+
+const RATE = 10e6; // bit/s
+const LATENCY = 40; // ms, there and back
+const LONGEST = 6; // s to a face
+const MOST_BYTES = 3e6; // until a face is seen
+const MOST_SCRIPT = 1.2e6; // bytes of it
+const SECOND_VISIT = 30e3; // bytes: the page and the manifest
+const { demoUrl } = inject('shared');
+
+/** Opens the page and gives the seconds until somebody is drawn. */
+async function visit(browser: Browser): Promise<number> {
+  const { page } = browser;
+  const begun = performance.now();
+  await page.goto(demoUrl!);
+  await page.waitForFunction(() => (window.ico3d?.stage.frames ?? 0) > 0, undefined, { timeout: 60_000 });
+  return (performance.now() - begun) / 1000;
+}
+
+describe.skipIf(!demoUrl)('a first visit to the packaged person at 10 Mbit/s (needs src/ico3d/chat/data/demo.ico3d)', () => {
+  let browser: Browser;
+  let wire: Wire;
+  let seconds: number;
+  let first: Wire;
+
+  beforeAll(async () => {
+    browser = await Browser.launch({ width: 160, height: 120, calm: true });
+    wire = await slowNetwork(browser.page, RATE, LATENCY);
+    seconds = await visit(browser);
+    first = structuredClone(wire);
+    console.log(`a face after ${seconds.toFixed(2)} s, ${(first.bytes / 1e6).toFixed(2)} MB, ${(first.scripts / 1e6).toFixed(2)} MB of it script`);
+  });
+
+  afterAll(() => browser?.close());
+
+  test('shows a face soon, after few bytes', () => {
+    expect(seconds).toBeLessThan(LONGEST * slowness());
+    expect(first.bytes).toBeLessThan(MOST_BYTES);
+    expect(first.scripts).toBeGreaterThan(0.5e6); // it was counted
+    expect(first.scripts).toBeLessThan(MOST_SCRIPT);
+  });
+
+  test('asks for the face before anything else of the avatar, beside the script', () => {
+    const asked = first.names.filter((name) => name.startsWith('bundle/'));
+    expect(asked.slice(0, 2)).toEqual(['bundle/manifest.json', 'bundle/head.safetensors']);
+    const unused = first.names.filter((name, i) => first.names.indexOf(name) !== i);
+    expect(unused, 'what was asked for twice').toEqual([]);
+  });
+
+  test('keeps all of it but the page and the manifest for the next visit', async () => {
+    const before = wire.bytes;
+    await visit(browser);
+    expect(wire.bytes - before).toBeLessThan(SECOND_VISIT);
+  });
+});
