@@ -17,7 +17,7 @@ import { byId, focusOn } from './ui/elements.ts';
 import { Overlay, type Choice } from './ui/overlay.ts';
 import { makePage, showNotice, type Page } from './ui/page.ts';
 import { PlayerBar } from './ui/player.ts';
-import { makeThemeButton } from './ui/theme.ts';
+import { makeThemeButton, showTheme } from './ui/theme.ts';
 import { makeViewBar } from './ui/views.ts';
 
 /** Who is there, once they can be seen. */
@@ -62,6 +62,7 @@ export class Visit {
     this.root = root;
     this.server = server;
     this.ports = ports;
+    showTheme(root); // until there is a button: who waits, or reads of an error, is not dazzled either
     this.overlay = new Overlay(root, this.ending.signal, () => ports.reload());
     byId<HTMLAnchorElement>(root, 'check').href = server.check();
     this.run().catch((error: unknown) => this.fail(error));
