@@ -16,8 +16,15 @@ afterAll(() => browser?.close());
 test('the sheet shows who serves, and choosing starts anew', async () => {
   const { page } = browser;
   await until(browser, finished(0), 60_000); // the greeting
-  await page.click('#services-button');
   await page.setViewportSize({ width: 420, height: 560 });
+  const views = await page.locator('.views').boundingBox();
+  await page.click('#panel-button');
+  await page.click('#services-button');
+  expect(await page.locator('header section:visible').evaluateAll((open) => open.map(({ id }) => id))).toEqual(['services']);
+  expect(await page.locator('.views').boundingBox()).toEqual(views); // a sheet moves no button
+  const sheet = (await page.locator('#services').boundingBox())!;
+  expect(sheet.x + sheet.width).toBeLessThan(views!.x);
+  expect(sheet.y + sheet.height).toBeLessThan((await page.locator('#composer').boundingBox())!.y);
   await page.evaluate(() => window.draw!());
   const picture = join(folder, 'services.png');
   await page.screenshot({ path: picture });

@@ -17,7 +17,7 @@ import { byId, focusOn } from './ui/elements.ts';
 import { Overlay, type Choice } from './ui/overlay.ts';
 import { makePage, showNotice, type Page } from './ui/page.ts';
 import { PlayerBar } from './ui/player.ts';
-import { makeThemeButton } from './ui/theme.ts';
+import { makeThemeButton, showTheme } from './ui/theme.ts';
 import { offerXr } from './xr/offer.ts';
 import { xrSettings, type XrSettings } from './xr/settings.ts';
 
@@ -67,6 +67,7 @@ export class Visit {
     this.root = root;
     this.server = server;
     this.ports = ports;
+    showTheme(root); // until there is a button: who waits, or reads of an error, is not dazzled either
     this.overlay = new Overlay(root, this.ending.signal, () => ports.reload());
     byId<HTMLAnchorElement>(root, 'check').href = server.check();
     this.run().catch((error: unknown) => this.fail(error));

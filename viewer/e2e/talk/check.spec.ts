@@ -29,6 +29,7 @@ test('each line says what is so; microphone and sound are tried, and the report 
   const scripts = await check(voice);
   const { page } = browser;
   expect(await verdict('secure')).toBe('good');
+  expect(await page.evaluate(() => document.elementFromPoint(60, 200)!.closest('main, body')!.tagName)).toBe('MAIN'); // seen, not only there
   expect([await verdict('graphics'), await words('graphics')]).toEqual(['fair', expect.stringMatching(/SwiftShader|llvmpipe/)]);
   expect(await words('frames')).toMatch(/^\d+ frames per second/);
   expect(await words('socket')).toMatch(/^The server answers within [\d.]+ ms/);

@@ -76,16 +76,17 @@ export function makePage(root: HTMLElement, overlay: Overlay, figures: () => Fig
 
 /** Says plainly which services are the small offline ones. */
 function showStandIns(root: ParentNode, services: Services): void {
-  const names = Object.entries(services)
-    .filter(([, service]) => service.stand_in)
-    .map(([role, service]) => `${role} (${service.name})`);
+  const names = Object.values(services)
+    .filter((service) => service.stand_in)
+    .map((service) => service.name);
   const note = byId(root, 'stand-ins');
   note.hidden = names.length === 0;
-  note.textContent = `Offline stand-ins in use: ${names.join(', ')}`;
+  note.textContent = `Offline stand-ins: ${names.join(', ')}`;
 }
 
-/** Shows a sentence for some seconds. */
+/** Shows a sentence for some seconds; one that is there already stays as it is: many would cover the face. */
 export function showNotice(root: ParentNode, sentence: string): void {
+  if ([...byId(root, 'notices').children].some(({ textContent }) => textContent === sentence)) return;
   const item = document.createElement('p');
   item.textContent = sentence;
   byId(root, 'notices').append(item);

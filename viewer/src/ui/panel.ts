@@ -2,6 +2,7 @@ import { every } from '../lifetime.ts';
 import { LATENCY_PARTS } from '../shared.ts';
 import { Latencies } from '../talk/latency.ts';
 import type { Figures } from '../stage/figures.ts';
+import { makeDisclosure } from './disclosure.ts';
 import { byId } from './elements.ts';
 
 const PERIOD = 1000; // ms between updates
@@ -28,12 +29,7 @@ export class Panel {
   constructor(root: ParentNode, figures: () => Figures, signal: AbortSignal) {
     this.list = byId(root, 'figures');
     this.table = byId(root, 'latencies');
-    const button = byId(root, 'panel-button');
-    const panel = byId(root, 'panel');
-    button.onclick = () => {
-      panel.hidden = !panel.hidden;
-      button.setAttribute('aria-expanded', String(!panel.hidden));
-    };
+    makeDisclosure(byId(root, 'panel-button'), byId(root, 'panel'));
     every(PERIOD, signal, () => this.figures(figures()));
   }
 

@@ -1,4 +1,5 @@
 import type { Offer, Services } from '../protocol.ts';
+import { makeDisclosure } from './disclosure.ts';
 import { byId } from './elements.ts';
 import { icon } from './icons.ts';
 
@@ -16,16 +17,13 @@ export class ServiceSheet {
     this.sheet = byId(root, 'services');
     this.choose = choose;
     this.button.append(icon('sliders'));
-    this.button.onclick = () => {
-      this.sheet.hidden = !this.sheet.hidden;
-      this.button.setAttribute('aria-expanded', String(!this.sheet.hidden));
-    };
+    makeDisclosure(this.button, this.sheet);
   }
 
   /** Shows what a server offers; nothing where it offers nothing. */
   show(services: Services, offers: readonly Offer[]): void {
     this.button.hidden = offers.length === 0;
-    if (offers.length === 0) this.sheet.hidden = true;
+    if (offers.length === 0 && !this.sheet.hidden) this.button.click();
     const groups = Object.entries(JOBS).map(([kind, job]) => {
       const group = document.createElement('fieldset');
       const legend = document.createElement('legend');

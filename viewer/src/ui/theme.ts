@@ -15,8 +15,7 @@ export function makeThemeButton(root: HTMLElement, changed: (light: boolean) => 
   button.type = 'button';
   button.className = 'round quiet theme';
   const show = () => {
-    const light = (chosen() ?? (system.matches ? 'light' : 'dark')) === 'light';
-    root.dataset.theme = light ? 'light' : 'dark';
+    const light = showTheme(root) === 'light';
     button.title = light ? 'Make it dark' : 'Make it light';
     button.setAttribute('aria-label', button.title);
     button.replaceChildren(icon(light ? 'moon' : 'sun'));
@@ -29,6 +28,11 @@ export function makeThemeButton(root: HTMLElement, changed: (light: boolean) => 
   system.addEventListener('change', show, { signal });
   show();
   return button;
+}
+
+/** Makes an element light or dark as the visitor chose, else as their system is; which of them. */
+export function showTheme(root: HTMLElement): string {
+  return (root.dataset.theme = chosen() ?? (matchMedia(LIGHT).matches ? 'light' : 'dark'));
 }
 
 /** What the visitor chose; null where they did not, or the browser keeps nothing. */
