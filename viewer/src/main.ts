@@ -3,6 +3,7 @@ import './style.css';
 import { Server } from './server.ts';
 import { readSplats, type Splats } from './stage/readback.ts';
 import { Visit, type Presence } from './visit.ts';
+import { PageWords } from './words/page-words.ts';
 
 declare global {
   interface Window {
@@ -15,6 +16,7 @@ declare global {
 }
 
 const visit: Visit = new Visit(document.body, new Server(new URL(location.href)), {
+  words: new PageWords(document.documentElement),
   emit: () => {},
   named: (name) => (document.title = name),
   entered: (presence) => {

@@ -19,6 +19,8 @@ import { makePage, showNotice, type Page } from './ui/page.ts';
 import { PlayerBar } from './ui/player.ts';
 import { makeThemeButton } from './ui/theme.ts';
 import { makeViewBar } from './ui/views.ts';
+import type { PageWords } from './words/page-words.ts';
+import { say, type Sentence } from './words/text.ts';
 
 /** Who is there, once they can be seen. */
 export interface Presence extends Cast {
@@ -28,6 +30,8 @@ export interface Presence extends Cast {
 
 /** What a visit needs of the page around it. */
 export interface VisitPorts {
+  /** The words of the page. */
+  words: PageWords;
   /** The avatar alone is drawn, on what is behind the element. */
   transparent?: boolean;
   /** How the visitor wants to talk, if it is known. */
@@ -39,7 +43,7 @@ export interface VisitPorts {
   /** Everybody can be seen; nobody talks yet. */
   entered(presence: Presence): void;
   /** The avatar cannot be shown. */
-  failed?(sentence: string): void;
+  failed?(sentence: Sentence): void;
   /** Loads everything anew, where nothing else helps. */
   reload(): void;
 }
@@ -62,7 +66,7 @@ export class Visit {
     this.root = root;
     this.server = server;
     this.ports = ports;
-    this.overlay = new Overlay(root, this.ending.signal, () => ports.reload());
+    this.overlay = new Overlay(root, ports.words, this.ending.signal, () => ports.reload());
     byId<HTMLAnchorElement>(root, 'check').href = server.check();
     this.run().catch((error: unknown) => this.fail(error));
   }
@@ -74,6 +78,7 @@ export class Visit {
 
   private async run(): Promise<void> {
     const { root, server } = this;
+    const { words } = this.ports;
     const { signal } = this.ending;
     const locate = server.file.bind(server);
     const manifest = await loadManifest(locate, signal);
@@ -85,16 +90,16 @@ export class Visit {
 
     const stage = new Stage(byId<HTMLCanvasElement>(root, 'stage'), manifest, this.ports.transparent);
     atEnd(signal, () => stage.dispose());
-    stage.onGone = () => this.overlay.fail('The browser cannot show the picture any more.');
+    stage.onGone = () => this.overlay.fail(say('error.picture'));
     watchCover(root, signal, (pixels) => stage.keepClear(pixels));
-    const page = makePage(root, this.overlay, () => stage.figures, signal);
+    const page = makePage(root, words, { name, lang: manifest.persona.languages?.[0] ?? '' }, this.overlay, () => stage.figures, signal);
     const conversation = manifest.head ? this.converse(page) : undefined;
     const presence: Presence = { stage, conversation, ...(await this.enter(manifest, stage, conversation)) };
     const corner = root.querySelector('.figures')!;
-    corner.append(makeThemeButton(root, (light) => stage.setBright(light), signal), makeViewBar(stage.orbit, root, signal));
+    corner.append(makeThemeButton(root, words, (light) => stage.setBright(light), signal), makeViewBar(stage.orbit, words, root, signal));
     const { playback } = presence;
     const moving = presence.body ?? presence.skinned;
-    if (moving && playback) new PlayerBar(root, moving, playback, 1 / bodyOf(manifest)!.fps, signal);
+    if (moving && playback) new PlayerBar(root, words, moving, playback, 1 / bodyOf(manifest)!.fps, signal);
     this.ports.entered(presence);
     if (conversation) await this.prepare(conversation, presence, manifest.head!, moving);
     this.overlay.hide();
@@ -117,7 +122,7 @@ export class Visit {
     const files = new BundleFiles(this.server.file.bind(this.server), manifest.files, more, signal);
     const cast = await makeCast(manifest, files, stage, this.calm, {
       heard: () => conversation?.player.heard() ?? null,
-      failed: (error) => signal.aborted || showNotice(this.root, sentenceOf(error)),
+      failed: (error) => signal.aborted || showNotice(this.root, this.ports.words, sentenceOf(error)),
     });
     signal.throwIfAborted();
     stage.start();

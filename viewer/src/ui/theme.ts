@@ -1,6 +1,9 @@
+import { remember, remembered } from '../remembered.ts';
+import type { PageWords } from '../words/page-words.ts';
+import { say } from '../words/text.ts';
 import { icon } from './icons.ts';
 
-const KEY = 'ico3d-theme';
+const KEY = 'theme';
 const LIGHT = '(prefers-color-scheme: light)';
 
 /**
@@ -9,41 +12,29 @@ const LIGHT = '(prefers-color-scheme: light)';
  * @param root what is light or dark (`data-theme`)
  * @param changed is told at once, and whenever it changes
  */
-export function makeThemeButton(root: HTMLElement, changed: (light: boolean) => void, signal: AbortSignal): HTMLButtonElement {
+export function makeThemeButton(
+  root: HTMLElement,
+  words: PageWords,
+  changed: (light: boolean) => void,
+  signal: AbortSignal,
+): HTMLButtonElement {
   const system = matchMedia(LIGHT);
   const button = document.createElement('button');
   button.type = 'button';
   button.className = 'round quiet theme';
-  const show = () => {
-    const light = (chosen() ?? (system.matches ? 'light' : 'dark')) === 'light';
+  const show = (chosen = remembered(KEY)) => {
+    const light = (chosen ?? (system.matches ? 'light' : 'dark')) === 'light';
     root.dataset.theme = light ? 'light' : 'dark';
-    button.title = light ? 'Make it dark' : 'Make it light';
-    button.setAttribute('aria-label', button.title);
+    words.name(button, say(light ? 'theme.dark' : 'theme.light'));
     button.replaceChildren(icon(light ? 'moon' : 'sun'));
     changed(light);
   };
   button.onclick = () => {
-    choose(root.dataset.theme === 'light' ? 'dark' : 'light');
-    show();
+    const theme = root.dataset.theme === 'light' ? 'dark' : 'light';
+    remember(KEY, theme);
+    show(theme);
   };
-  system.addEventListener('change', show, { signal });
+  system.addEventListener('change', () => show(), { signal });
   show();
   return button;
-}
-
-/** What the visitor chose; null where they did not, or the browser keeps nothing. */
-function chosen(): string | null {
-  try {
-    return localStorage.getItem(KEY);
-  } catch {
-    return null;
-  }
-}
-
-function choose(theme: string): void {
-  try {
-    localStorage.setItem(KEY, theme);
-  } catch {
-    // It holds until the page is left.
-  }
 }
