@@ -1,11 +1,18 @@
-/** An error whose message is one sentence that a visitor can read. */
+import { english, say, type Sentence } from './words/text.ts';
+
+/** An error that says in one sentence what a visitor can read; its message is that sentence in English. */
 export class PageError extends Error {
   override name = 'PageError';
+  readonly sentence: Sentence;
+
+  constructor(sentence: Sentence) {
+    super(english(sentence));
+    this.sentence = sentence;
+  }
 }
 
 /** The sentence to show for anything thrown. */
-export function sentenceOf(error: unknown): string {
-  if (error instanceof PageError) return error.message;
-  const detail = error instanceof Error ? error.message : String(error);
-  return `Something went wrong in this page: ${detail}.`;
+export function sentenceOf(error: unknown): Sentence {
+  if (error instanceof PageError) return error.sentence;
+  return say('error.page', { detail: error instanceof Error ? error.message : String(error) });
 }

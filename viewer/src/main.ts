@@ -3,6 +3,7 @@ import './style.css';
 import { Server } from './server.ts';
 import { readSplats, type Splats } from './stage/readback.ts';
 import { Visit, type Presence } from './visit.ts';
+import { PageWords } from './words/page-words.ts';
 import { xrSettings } from './xr/settings.ts';
 
 declare global {
@@ -18,6 +19,7 @@ declare global {
 const parameters = new URL(location.href).searchParams;
 const visit: Visit = new Visit(document.body, new Server(new URL(location.href)), {
   xr: xrSettings((name) => parameters.get(name)),
+  words: new PageWords(document.documentElement),
   emit: () => {},
   named: (name) => (document.title = name),
   entered: (presence) => {

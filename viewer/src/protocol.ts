@@ -1,6 +1,6 @@
 // Written by `python -m ico3d.chat.generating`. Edit src/ico3d/chat/wire/protocol.py instead.
 
-export const VERSION = 6;
+export const VERSION = 7;
 export const MICROPHONE_RATE = 16000; // Hz
 export const MICROPHONE_CHUNK = 512; // samples of a message
 export const SPEECH_RATE = 24000; // Hz
@@ -58,6 +58,14 @@ export interface Offer {
   name: string;
   /** What prevents the service from working and what would help; empty if it works. */
   hindrance: string;
+}
+
+/** A sentence that the page shows once, on what this avatar cannot do. */
+export interface Notice {
+  /** Name of the sentence, by which pages translate it. */
+  code: string;
+  /** The sentence in English. */
+  text: string;
 }
 
 /** A gesture to make; times are seconds of the utterance. */
@@ -178,8 +186,8 @@ export interface WelcomeMessage {
   resumed: boolean;
   /** The services of the conversation. */
   services: Services;
-  /** Sentences that the page shows once, on what this avatar cannot do. */
-  notices: string[];
+  /** What this avatar cannot do. */
+  notices: Notice[];
   /** How the browser is to recognise speech; null if the server does. */
   dictation: Dictation | null;
   /** Services to choose from; empty where strangers may be talking. */
@@ -229,6 +237,19 @@ export interface AnswerMessage {
   first_sample: number;
   /** The sentence. */
   text: string;
+}
+
+/** When the words of a sentence are spoken; it comes once all of the sentence's sound is made. */
+export interface SpokenMessage {
+  type: "spoken";
+  /** Number of the answer. */
+  utterance: number;
+  /** That of the sentence's `answer`, which may come before or after. */
+  first_sample: number;
+  /** Index of each word's first character (code point) in the sentence, ascending. */
+  starts: number[];
+  /** When each word begins, seconds of the utterance, ascending. */
+  times: number[];
 }
 
 /** 100-200 ms of sound with the matching face (binary). Expression row `first_expression` + j belongs to the utterance's time (first_expression + j) / 25 s. */
@@ -319,12 +340,16 @@ export interface MetricsMessage {
 /** Something went wrong. */
 export interface ErrorMessage {
   type: "error";
-  /** One sentence for the visitor. */
+  /** One sentence for the visitor, in English. */
   message: string;
   /** True if the session is over and the server closes the connection. */
   fatal: boolean;
   /** After a fatal error: whether a new session may succeed, so that the page offers one. */
   again: boolean;
+  /** Name of the sentence, by which pages translate it; empty for one without. */
+  code: string;
+  /** Numbers in the sentence, by name. */
+  values: Record<string, number>;
 }
 
 export type ClientMessage =
@@ -345,6 +370,7 @@ export type ServerMessage =
   | StateMessage
   | TranscriptMessage
   | AnswerMessage
+  | SpokenMessage
   | SpeechMessage
   | TimelineMessage
   | CuesMessage
@@ -356,7 +382,7 @@ export type ServerMessage =
   | MetricsMessage
   | ErrorMessage;
 
-export const SERVER_TYPES = ["welcome", "place", "ack", "state", "transcript", "answer", "speech", "timeline", "cues", "call", "end", "stop", "pause", "resume", "metrics", "error"];
+export const SERVER_TYPES = ["welcome", "place", "ack", "state", "transcript", "answer", "spoken", "speech", "timeline", "cues", "call", "end", "stop", "pause", "resume", "metrics", "error"];
 
 /** The arrays of binary messages, in order. */
 export const TENSORS: Record<string, readonly Tensor[]> = {

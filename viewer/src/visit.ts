@@ -18,6 +18,8 @@ import { Overlay, type Choice } from './ui/overlay.ts';
 import { makePage, showNotice, type Page } from './ui/page.ts';
 import { PlayerBar } from './ui/player.ts';
 import { makeThemeButton, showTheme } from './ui/theme.ts';
+import type { PageWords } from './words/page-words.ts';
+import { say, type Sentence } from './words/text.ts';
 import { offerXr } from './xr/offer.ts';
 import { xrSettings, type XrSettings } from './xr/settings.ts';
 
@@ -31,6 +33,8 @@ type Theatre = typeof import('./theatre.ts');
 
 /** What a visit needs of the page around it. */
 export interface VisitPorts {
+  /** The words of the page. */
+  words: PageWords;
   /** The avatar alone is drawn, on what is behind the element. */
   transparent?: boolean;
   /** How the visitor wants to talk, if it is known. */
@@ -44,7 +48,7 @@ export interface VisitPorts {
   /** Everybody can be seen; nobody talks yet. */
   entered(presence: Presence): void;
   /** The avatar cannot be shown. */
-  failed?(sentence: string): void;
+  failed?(sentence: Sentence): void;
   /** Loads everything anew, where nothing else helps. */
   reload(): void;
 }
@@ -68,7 +72,7 @@ export class Visit {
     this.server = server;
     this.ports = ports;
     showTheme(root); // until there is a button: who waits, or reads of an error, is not dazzled either
-    this.overlay = new Overlay(root, this.ending.signal, () => ports.reload());
+    this.overlay = new Overlay(root, ports.words, this.ending.signal, () => ports.reload());
     byId<HTMLAnchorElement>(root, 'check').href = server.check();
     this.run().catch((error: unknown) => this.fail(error));
   }
@@ -80,6 +84,7 @@ export class Visit {
 
   private async run(): Promise<void> {
     const { root, server } = this;
+    const { words } = this.ports;
     const { signal } = this.ending;
     const coming = import('./theatre.ts'); // meanwhile the first files are asked for
     coming.catch(() => {}); // heard of below
@@ -95,18 +100,21 @@ export class Visit {
     signal.throwIfAborted();
     const stage = new theatre.Stage(byId<HTMLCanvasElement>(root, 'stage'), manifest, this.ports.transparent);
     atEnd(signal, () => stage.dispose());
-    stage.onGone = () => this.overlay.fail('The browser cannot show the picture any more.');
+    stage.onGone = () => this.overlay.fail(say('error.picture'));
     watchCover(root, signal, (pixels) => stage.keepClear(pixels));
-    const page = makePage(root, this.overlay, () => stage.figures, signal);
+    const page = makePage(root, words, { name, lang: manifest.persona.languages?.[0] ?? '' }, this.overlay, () => stage.figures, signal);
     const conversation = manifest.head ? this.converse(page) : undefined;
     const presence: Presence = { stage, conversation, ...(await this.enter(theatre, manifest, files, stage, conversation)) };
     const corner = root.querySelector<HTMLElement>('.figures')!;
-    corner.append(makeThemeButton(root, (light) => stage.setBright(light), signal), theatre.makeViewBar(stage.orbit, root, signal));
+    corner.append(
+      makeThemeButton(root, words, (light) => stage.setBright(light), signal),
+      theatre.makeViewBar(stage.orbit, words, root, signal),
+    );
     const xr = { stage, conversation, head: presence.head, root, settings: this.ports.xr ?? xrSettings(() => null), signal };
-    void offerXr(corner, xr, (sentence) => showNotice(root, sentence));
+    void offerXr(corner, xr, (sentence) => showNotice(root, words, sentence));
     const { playback } = presence;
     const moving = presence.body ?? presence.skinned;
-    if (moving && playback) new PlayerBar(root, moving, playback, 1 / bodyOf(manifest)!.fps, signal);
+    if (moving && playback) new PlayerBar(root, words, moving, playback, 1 / bodyOf(manifest)!.fps, signal);
     this.ports.entered(presence);
     if (conversation) await this.prepare(conversation, presence, manifest.head!, moving);
     this.overlay.hide();
@@ -135,7 +143,7 @@ export class Visit {
     const { signal } = this.ending;
     const cast = await theatre.makeCast(manifest, files, stage, this.calm, {
       heard: () => conversation?.player.heard() ?? null,
-      failed: (error) => signal.aborted || showNotice(this.root, sentenceOf(error)),
+      failed: (error) => signal.aborted || showNotice(this.root, this.ports.words, sentenceOf(error)),
     });
     signal.throwIfAborted();
     stage.start();

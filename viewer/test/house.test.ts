@@ -9,7 +9,8 @@ const MOST_FILES = 15; // beside sub-folders
 
 /** The rooms of `src`; each may import those of the lines above its own, none beside it. */
 const ORDER = [
-  ['half.ts', 'splat-shader.ts'],
+  ['half.ts', 'splat-shader.ts', 'remembered.ts'],
+  ['words'],
   ['protocol.ts', 'shared.ts', 'errors.ts', 'actor.ts', 'lifetime.ts', 'server.ts'],
   ['bundle'],
   ['rig'],
@@ -20,7 +21,7 @@ const ORDER = [
   ['body', 'stage', 'audio'],
   ['talk'],
   ['ui', 'cast.ts'],
-  ['xr'],
+  ['xr', 'theatre.ts'],
   ['visit.ts', 'check'],
   ['bench.ts'],
   ['main.ts', 'embed'],

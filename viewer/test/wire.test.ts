@@ -20,7 +20,7 @@ test('frames of the server mean here what they meant there', () => {
     session: 'session',
     resumed: false,
     services: { recognition: service, language: service, voice: { name: 'cloud', stand_in: false } },
-    notices: ['No speech in this avatar, sagt sie – schade.'],
+    notices: [{ code: 'still-lips', text: 'No speech in this avatar, sagt sie – schade.' }],
     dictation: { language: 'de-DE', fallback: null },
     offers: [{ kind: 'voice', key: 'a', name: 'A', hindrance: 'install it.' }],
   });

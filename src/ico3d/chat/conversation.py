@@ -32,6 +32,7 @@ from ico3d.chat.performing.expression import ExpressionProcessor
 from ico3d.chat.performing.face import Face
 from ico3d.chat.performing.gestures import Gestures
 from ico3d.chat.performing.remote_mouth import RemoteMouth
+from ico3d.chat.performing.wording import Wording
 from ico3d.chat.services.voice.clauses import ClauseProcessor
 from ico3d.chat.services.voice.markup import speakable
 from ico3d.chat.settings.conversation import ChatSettings
@@ -43,6 +44,7 @@ from ico3d.chat.turns.detector import VoiceDetector
 from ico3d.chat.turns.echo import EchoGuard
 from ico3d.chat.turns.echo_filter import EchoFilter
 from ico3d.chat.turns.strategies import strategies
+from ico3d.chat.wire.marks import LONGEST_WORDS
 from ico3d.chat.wire.protocol import (
     MICROPHONE_RATE,
     SPEECH_RATE,
@@ -58,6 +60,7 @@ from ico3d.chat.wire.protocol import (
     Talk,
     Text,
 )
+from ico3d.chat.wire.sentences import VOICELESS
 from ico3d.chat.workers import at_once
 from ico3d.errors import ProtocolError
 
@@ -87,6 +90,7 @@ class Conversation:
         self._utterances = Utterances()
         self._input = PageInput()
         self._captions = Captions(page)
+        self._wording = Wording(page)
         gestures = self._body()
         self._echo, self._gestures = EchoGuard(), gestures
         self._speaker = Speaker(page, self._utterances, self._echo.sent, gestures, now)
@@ -282,9 +286,12 @@ class Conversation:
     def _made(self, frame: SpeechFrame | UtteranceEndFrame) -> None:
         if isinstance(self._gestures, Cueing):
             self._gestures.read(frame)
+        if isinstance(frame, SpeechFrame):
+            self._wording.read(frame)
 
-    def _complain(self, sentence: str) -> None:
-        self._page.send(Error(sentence, fatal=False))
+    def _voiceless(self, reason: str) -> None:
+        sentence = f"{VOICELESS.text} ({reason})"[:LONGEST_WORDS]
+        self._page.send(Error(sentence, fatal=False, code=VOICELESS.code))
 
     def _functions(self, language: FrameProcessor, face: Face) -> ToolsSchema | NotGiven:
         settings = self._avatar.settings
@@ -295,7 +302,7 @@ class Conversation:
         """Keeps markup and failures from it, and takes the time at which a piece reaches it."""
         if isinstance(voice, TTSService):
             patience = self._avatar.settings.patience
-            endure(voice, patience.voice, self._apology_language(), self._complain)
+            endure(voice, patience.voice, self._apology_language(), self._voiceless)
             voice.add_text_transformer(speakable)
 
             async def requested(*_):

@@ -22,6 +22,7 @@ class SpeechFrame(DataFrame):
         pcm: (n,) int16 at 24 kHz.
         expressions: (rows, B) float32.
         text: The sentence that starts with this piece, or None.
+        ends_sentence: Whether this is the last piece of its sentence.
     """
 
     utterance: int
@@ -30,6 +31,7 @@ class SpeechFrame(DataFrame):
     pcm: np.ndarray
     expressions: np.ndarray
     text: str | None = None
+    ends_sentence: bool = False
 
 
 @dataclass

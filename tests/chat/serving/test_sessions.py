@@ -9,7 +9,6 @@ from unittest import mock
 import pytest
 from websockets.asyncio.client import connect
 
-from ico3d.chat.serving.sessions import FULL
 from ico3d.chat.wire.codec import decode_server, encode
 from ico3d.chat.wire.protocol import (
     VERSION,
@@ -23,6 +22,7 @@ from ico3d.chat.wire.protocol import (
     Text,
     Welcome,
 )
+from ico3d.chat.wire.sentences import FULL
 from ico3d.measure.talking.page import open_page
 from support.chat.serving import TYPED, serving
 
@@ -233,7 +233,7 @@ async def test_the_queue_has_an_end(bundle):
         sessions.line._most = 1
         async with wire(url) as first, wire(url) as second:
             await told(first)
-            assert await told(second) == Error(FULL, fatal=True, again=True)
+            assert await told(second) == FULL.error(fatal=True, again=True)
             await second.wait_closed()
             assert second.close_code == 1013
             await first.send(encode(Text("is it my turn?")))  # who waits has nothing to say

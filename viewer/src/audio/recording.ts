@@ -1,14 +1,15 @@
 import { PageError } from '../errors.ts';
+import { say, type Key } from '../words/text.ts';
 import type { Chunk } from './mic-worklet.ts';
 import workletUrl from './mic-worklet.ts?worker&url';
 
 const PATIENCE = 10_000; // ms from the permission to the first sound
 const WATCH = 2000; // ms; two of them without sound, and it has ended
 
-const BROKEN = 'The microphone could not be started; try again, or type instead.';
-const SILENT = 'The microphone gives no sound; try again, or type instead.';
-const ENDED = 'The microphone stopped; turn it on again, or type instead.';
-const DISCONNECTED = 'The microphone was disconnected; you can type instead.';
+const BROKEN = say('microphone.broken');
+const SILENT = say('microphone.silent');
+const ENDED = say('microphone.ended');
+const DISCONNECTED = say('microphone.disconnected');
 
 /** Takes a chunk and when its last sample was recorded, ms on the performance clock. */
 export type OnChunk = (pcm: Int16Array, end: number) => void;
@@ -113,19 +114,19 @@ export class Recording {
 
 async function askForMicrophone(): Promise<MediaStream> {
   if (!navigator.mediaDevices) {
-    throw new PageError('Browsers give the microphone only to HTTPS pages and localhost; you can type instead.');
+    throw new PageError(say('microphone.untrusted'));
   }
   try {
     return await navigator.mediaDevices.getUserMedia({
       audio: { channelCount: 1, echoCancellation: true, noiseSuppression: true, autoGainControl: true },
     });
   } catch (error) {
-    throw new PageError(REASONS[(error as DOMException).name] ?? 'The microphone could not be opened; you can type instead.');
+    throw new PageError(say(REASONS[(error as DOMException).name] ?? 'microphone.failed'));
   }
 }
 
-const REASONS: Record<string, string> = {
-  NotAllowedError: 'The microphone is blocked for this page: allow it in the address bar, or type instead.',
-  NotFoundError: 'No microphone was found; plug one in, or type instead.',
-  NotReadableError: 'Another program holds the microphone; close it there, or type instead.',
+const REASONS: Record<string, Key> = {
+  NotAllowedError: 'microphone.blocked',
+  NotFoundError: 'microphone.missing',
+  NotReadableError: 'microphone.held',
 };

@@ -1,4 +1,5 @@
 import { PageError } from '../errors.ts';
+import { say } from '../words/text.ts';
 import { checkAnimation, type AnimationInfo } from './animation.ts';
 import { readBakedHead, type BakedHead } from './baked-head.ts';
 import { checkManifest, type AnyBody, type HeadInfo, type Manifest } from './manifest.ts';
@@ -150,10 +151,10 @@ async function get(address: string, name: string, signal?: AbortSignal): Promise
     response = await fetch(address, { signal });
   } catch {
     signal?.throwIfAborted();
-    throw new PageError(`The server does not answer this site, so ${name} could not be loaded; reload the page.`);
+    throw new PageError(say('error.unanswered', { name }));
   }
-  if (response.status === 401) throw new PageError('This page is not admitted, or no longer: its token is missing or has expired.');
-  if (!response.ok) throw new PageError(`The server has no ${name} (status ${response.status}).`);
+  if (response.status === 401) throw new PageError(say('error.refused'));
+  if (!response.ok) throw new PageError(say('error.missing', { name, status: response.status }));
   return response;
 }
 
@@ -162,5 +163,5 @@ async function checkHash(bytes: Uint8Array<ArrayBuffer>, sha256: string, name: s
   if (!globalThis.crypto?.subtle) return;
   const digest = new Uint8Array(await crypto.subtle.digest('SHA-256', bytes));
   const hex = Array.from(digest, (byte) => byte.toString(16).padStart(2, '0')).join('');
-  if (hex !== sha256) throw new PageError(`${name} differs from what manifest.json promises; reload the page.`);
+  if (hex !== sha256) throw new PageError(say('error.changed', { name }));
 }

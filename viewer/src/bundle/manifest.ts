@@ -77,7 +77,7 @@ export interface Manifest {
   skinned: SkinnedInfo | null; // or on a skeleton
   camera: StartCamera;
   background: [number, number, number];
-  persona: { name: string; greeting: string };
+  persona: { name: string; greeting: string; languages?: readonly string[] };
 }
 
 const MOST_LAYERS = 48; // basis vectors of a window; WebGL2 promises 256 layers of a texture

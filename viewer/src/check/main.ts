@@ -3,6 +3,9 @@ import '../ui/style/buttons.css';
 import './check.css';
 import { Server } from '../server.ts';
 import { byId } from '../ui/elements.ts';
+import { offerLanguages } from '../ui/sheets/languages.ts';
+import { PageWords } from '../words/page-words.ts';
+import { say, type Message } from '../words/text.ts';
 import { report, summary, type Finding } from './finding.ts';
 import { checkHeadset } from './headset.ts';
 import { Line } from './lines.ts';
@@ -12,13 +15,15 @@ import { checkMicrophone, judgeTone, playTone } from './sound.ts';
 
 const LOUD = 0.3; // level at which the meter is full
 
-const findings = new Map<string, Finding | null>();
+const findings = new Map<Message, Finding | null>();
+const words = new PageWords(document.documentElement);
+offerLanguages(byId(document, 'language'), words, new AbortController().signal);
 const list = byId(document, 'lines');
 const text = byId<HTMLTextAreaElement>(document, 'report');
 
 /** Makes a line; what is shown there goes into the report. */
-function lineOf(id: string, title: string): { line: Line; found: (finding: Finding) => void } {
-  const line = new Line(list, id, title);
+function lineOf(id: string, title: Message): { line: Line; found: (finding: Finding) => void } {
+  const line = new Line(list, words, id, title);
   findings.set(title, null);
   const found = (finding: Finding) => {
     findings.set(title, finding);
@@ -30,35 +35,35 @@ function lineOf(id: string, title: string): { line: Line; found: (finding: Findi
 
 function write(): void {
   const known = [...findings.values()].filter((finding) => finding !== null);
-  byId(document, 'summary').textContent = summary(known);
+  words.write(byId(document, 'summary'), summary(known));
   const screen = `Window: ${innerWidth} × ${innerHeight}, ${devicePixelRatio} pixels per point`;
   text.value = report(findings, [navigator.userAgent, screen]);
 }
 
-const security = lineOf('secure', 'Page');
-const graphics = lineOf('graphics', 'Graphics');
-const frames = lineOf('frames', 'Frames');
-const socket = lineOf('socket', 'Connection');
-const sound = lineOf('sound', 'Sound');
-const microphone = lineOf('microphone', 'Microphone');
-const headset = lineOf('headset', 'Headset');
+const security = lineOf('secure', say('check.secure'));
+const graphics = lineOf('graphics', say('check.graphics'));
+const frames = lineOf('frames', say('check.frames'));
+const socket = lineOf('socket', say('check.socket'));
+const sound = lineOf('sound', say('check.sound'));
+const microphone = lineOf('microphone', say('microphone'));
+const headset = lineOf('headset', say('check.headset'));
 
-sound.line.ask('Is it heard what the avatar says?');
-const play = sound.line.button('Play a tone', async () => {
+sound.line.ask(say('check.sound.ask'));
+const play = sound.line.button(say('check.sound.play'), async () => {
   play.disabled = true;
   const failed = await playTone();
   play.disabled = false;
   answers.hidden = failed !== null;
   if (failed) sound.found(failed);
   else {
-    sound.line.ask('Did you hear the tone?');
+    sound.line.ask(say('check.sound.heard'));
     yes.focus();
   }
 });
 const answers = document.createElement('span');
 sound.line.acts.append(answers);
 const [yes, no] = [true, false].map((heard) => {
-  const button = sound.line.button(heard ? 'Yes' : 'No', () => {
+  const button = sound.line.button(say(heard ? 'check.yes' : 'check.no'), () => {
     answers.hidden = true;
     sound.found(judgeTone(heard));
     play.focus();
@@ -70,13 +75,14 @@ no.id = 'unheard';
 yes.id = 'heard';
 answers.hidden = true;
 
-microphone.line.ask('Press the button, allow the microphone, and say something.');
+microphone.line.ask(say('check.microphone.ask'));
 const meter = document.createElement('meter');
-[meter.max, meter.ariaLabel, meter.hidden] = [LOUD, 'Level of the microphone', true];
-const listen = microphone.line.button('Try the microphone', async () => {
+[meter.max, meter.hidden] = [LOUD, true];
+words.write(meter, say('check.microphone.level'), 'label');
+const listen = microphone.line.button(say('check.microphone.try'), async () => {
   listen.disabled = true;
   meter.hidden = false;
-  microphone.line.ask('Listening: say something …');
+  microphone.line.ask(say('check.microphone.listening'));
   microphone.found(await checkMicrophone((level) => (meter.value = level)));
   meter.hidden = true;
   listen.disabled = false;
@@ -86,7 +92,7 @@ microphone.line.acts.append(meter);
 byId(document, 'copy').onclick = ({ target }) => {
   text.select();
   const copied = document.execCommand('copy'); // `navigator.clipboard` is missing where the page is not trusted
-  (target as HTMLButtonElement).textContent = copied ? 'Copied' : 'Selected: copy it now';
+  words.write(target as HTMLButtonElement, say(copied ? 'transcript.copied' : 'check.selected'));
 };
 
 security.found(checkSecurity());

@@ -1,3 +1,4 @@
+import { say, type Message } from '../words/text.ts';
 import { bad, fair, good, type Finding } from './finding.ts';
 
 const TRIPS = 8;
@@ -7,11 +8,8 @@ const APPLE = /iPhone|iPad|Version\/\S+ Safari/;
 
 /** Whether browsers trust the way by which this page came. */
 export function checkSecurity(): Finding {
-  if (isSecureContext) return good('The page is trusted, so it may ask for microphone and headset.');
-  return bad(
-    'The page came by plain HTTP, so browsers give it neither microphone nor headset.',
-    'Open it by https:// (its server needs `ico3d serve --tls`), or on the server’s own machine as localhost.',
-  );
+  if (isSecureContext) return good(say('check.secure.good'));
+  return bad(say('check.secure.bad'), say('check.secure.advice'));
 }
 
 /**
@@ -23,23 +21,21 @@ export async function checkSocket(url: string): Promise<Finding> {
   try {
     return judgeTrips(await roundTrips(url));
   } catch {
-    return bad('No WebSocket reaches the server, so nobody can talk.', socketAdvice(url, navigator.userAgent));
+    return bad(say('check.socket.bad'), socketAdvice(url, navigator.userAgent));
   }
 }
 
 /** @param trips ms there and back, one or more */
 export function judgeTrips(trips: readonly number[]): Finding {
   const middle = trips.toSorted((a, b) => a - b)[Math.floor(trips.length / 2)]!;
-  const words = `The server answers within ${middle < 10 ? middle.toFixed(1) : Math.round(middle)} ms.`;
+  const words = say('check.socket.good', { n: middle < 10 ? Math.round(10 * middle) / 10 : Math.round(middle) });
   if (middle <= QUICK) return good(words);
-  return fair(words, 'Answers come that much later. A cable, a better place for wireless, or a server that is nearer would help.');
+  return fair(words, say('check.socket.slow'));
 }
 
 /** What may keep WebSockets from their server. */
-export function socketAdvice(url: string, agent: string): string {
-  const general = 'Is the server still running? A proxy or firewall on the way has to let WebSockets through.';
-  if (!url.startsWith('wss:') || !APPLE.test(agent)) return general;
-  return `${general} Safari opens none where you accepted a certificate by hand: the server needs one that this device trusts (\`--tls-cert\`).`;
+export function socketAdvice(url: string, agent: string): Message {
+  return say(url.startsWith('wss:') && APPLE.test(agent) ? 'check.socket.safari' : 'check.socket.advice');
 }
 
 function roundTrips(url: string): Promise<number[]> {

@@ -1,7 +1,8 @@
+import { say } from '../words/text.ts';
 import { bad, fair, good, none, type Finding } from './finding.ts';
 
 const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
-const ACCELERATE = 'Turn hardware acceleration on in the settings of the browser, and update it and the driver of the graphics card.';
+const ACCELERATE = say('check.graphics.advice');
 const SPRITES = 20_000; // about as much to draw as the first sight of an avatar
 const SIDE = 480; // pixels
 const DURATION = 1500; // ms
@@ -30,7 +31,7 @@ void main() {
 /** Whether there is WebGL 2, and who draws. */
 export function checkGraphics(): Finding {
   const gl = document.createElement('canvas').getContext('webgl2');
-  if (!gl) return bad('This browser draws no WebGL 2, so no avatar can be shown.', ACCELERATE);
+  if (!gl) return bad(say('check.graphics.none'), ACCELERATE);
   const more = gl.getExtension('WEBGL_debug_renderer_info');
   const name = String(gl.getParameter(more ? more.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
   gl.getExtension('WEBGL_lose_context')?.loseContext();
@@ -39,8 +40,8 @@ export function checkGraphics(): Finding {
 
 /** @param name how the browser calls who draws */
 export function judgeRenderer(name: string): Finding {
-  if (SOFTWARE.test(name)) return fair(`The processor draws, not a graphics card (${name}): expect few frames per second.`, ACCELERATE);
-  return good(`WebGL 2, drawn by ${name}.`);
+  if (SOFTWARE.test(name)) return fair(say('check.graphics.software', { name }), ACCELERATE);
+  return good(say('check.graphics.good', { name }));
 }
 
 /** Draws soft sprites for a moment and counts. */
@@ -48,11 +49,11 @@ export async function checkFrames(): Promise<Finding> {
   const canvas = document.createElement('canvas');
   canvas.width = canvas.height = SIDE;
   const gl = canvas.getContext('webgl2', { antialias: false });
-  if (!gl) return none('Nothing to count without WebGL 2.');
+  if (!gl) return none(say('check.frames.none'));
   try {
     const rate = await countFrames(gl);
     return rate === null
-      ? fair('This page was in the background, where browsers draw nothing.', 'Load this page again and leave it in front.')
+      ? fair(say('check.frames.hidden'), say('check.frames.front'))
       : judgeRate(rate);
   } finally {
     gl.getExtension('WEBGL_lose_context')?.loseContext();
@@ -61,9 +62,9 @@ export async function checkFrames(): Promise<Finding> {
 
 /** @param rate frames per second of the small scene */
 export function judgeRate(rate: number): Finding {
-  const words = `${Math.round(rate)} frames per second in a small scene.`;
+  const words = say('check.frames.rate', { n: Math.round(rate) });
   if (rate >= SMOOTH) return good(words);
-  const advice = `${ACCELERATE} Close other programs, and plug a laptop in.`;
+  const advice = say('check.frames.advice');
   return rate >= BEARABLE ? fair(words, advice) : bad(words, advice);
 }
 

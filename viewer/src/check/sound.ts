@@ -1,6 +1,7 @@
 import { Microphone } from '../audio/microphone.ts';
 import { sentenceOf } from '../errors.ts';
 import { MICROPHONE_RATE } from '../protocol.ts';
+import { say } from '../words/text.ts';
 import { bad, fair, good, type Finding } from './finding.ts';
 
 const PITCH = 440; // Hz
@@ -26,7 +27,7 @@ export async function playTone(): Promise<Finding | null> {
     const played = new Promise<boolean>((resolve) => (source.onended = () => resolve(true)));
     const late = new Promise<boolean>((resolve) => setTimeout(() => resolve(false), 1000 * TONE + PATIENCE));
     if (await Promise.race([played, late])) return null;
-    return bad('The browser plays no sound.', 'Is a loudspeaker or headphone connected? Close other programs that use it, and try again.');
+    return bad(say('check.sound.none'), say('check.sound.free'));
   } finally {
     void context.close();
   }
@@ -34,11 +35,8 @@ export async function playTone(): Promise<Finding | null> {
 
 /** @param heard what the visitor says about the tone */
 export function judgeTone(heard: boolean): Finding {
-  if (heard) return good('You heard the tone.');
-  return bad(
-    'You did not hear the tone.',
-    'Turn the volume up and the mute switch off, look which output the system has chosen, and whether the tab or the site is muted.',
-  );
+  if (heard) return good(say('check.sound.good'));
+  return bad(say('check.sound.bad'), say('check.sound.advice'));
 }
 
 /**
@@ -57,7 +55,7 @@ export async function checkMicrophone(onLevel: (level: number) => void, seconds 
     heard += pcm.length;
     if (heard >= seconds * MICROPHONE_RATE) done(null);
   };
-  const microphone = new Microphone(hear, (error) => done(bad(error.message, REFUSED)));
+  const microphone = new Microphone(hear, (error) => done(bad(sentenceOf(error), REFUSED)));
   try {
     await microphone.start();
     return (await ended) ?? judgeLevel(loudest);
@@ -69,13 +67,13 @@ export async function checkMicrophone(onLevel: (level: number) => void, seconds 
   }
 }
 
-const REFUSED = 'Allow it for this page (the sign beside the address) and in the settings of the system, and try again.';
+const REFUSED = say('check.microphone.refused');
 
 /** @param loudest level of the loudest piece */
 export function judgeLevel(loudest: number): Finding {
-  if (loudest >= VOICE) return good('The microphone hears you.');
-  if (loudest === 0) return bad('The microphone is open but gives nothing but silence.', 'It is muted, by a switch on it or by the system.');
-  return fair('The microphone is open, but nothing as loud as a voice was heard.', 'Speak while it listens, and look whether the system has chosen the right one.');
+  if (loudest >= VOICE) return good(say('check.microphone.good'));
+  if (loudest === 0) return bad(say('check.microphone.muted'), say('check.microphone.unmute'));
+  return fair(say('check.microphone.quiet'), say('check.microphone.louder'));
 }
 
 function levelOf(pcm: Int16Array): number {

@@ -1,6 +1,7 @@
 import { PageError } from '../errors.ts';
 import { atEnd } from '../lifetime.ts';
 import type { Server } from '../server.ts';
+import { say } from '../words/text.ts';
 
 const SHARE = 0.8; // of its time after which a token is replaced
 const SHORTEST = 5000; // ms
@@ -30,7 +31,7 @@ async function fetchToken(url: string, signal: AbortSignal): Promise<string> {
     .catch(() => '');
   signal.throwIfAborted();
   const token = readToken(text);
-  if (!token) throw new PageError('This site could not get a token for the avatar; reload the page.');
+  if (!token) throw new PageError(say('error.token'));
   return token;
 }
 

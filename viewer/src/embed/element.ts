@@ -4,6 +4,7 @@ import { Server } from '../server.ts';
 import type { Emit, TalkEvents } from '../talk/events.ts';
 import { focusOn } from '../ui/elements.ts';
 import { icon } from '../ui/icons.ts';
+import { codeOf, english, say, type Sentence } from '../words/text.ts';
 import { Overlay, type Choice } from '../ui/overlay.ts';
 import type { Presence, Visit } from '../visit.ts';
 import { xrSettings } from '../xr/settings.ts';
@@ -31,7 +32,7 @@ interface Talk {
  * `token` or `token-url` admit the page where the server asks for it.
  */
 export class AvatarElement extends HTMLElement {
-  static readonly observedAttributes = ['token'];
+  static readonly observedAttributes = ['token', 'lang'];
   /** Address of the server of elements without the attribute. */
   static server: string | null = null;
   private readonly shell: Shell;
@@ -56,8 +57,9 @@ export class AvatarElement extends HTMLElement {
     this.end();
   }
 
-  attributeChangedCallback(_: string, __: string | null, token: string | null): void {
-    if (this.server) this.server.token = token ?? '';
+  attributeChangedCallback(name: string, _: string | null, value: string | null): void {
+    if (name === 'lang') this.shell.words.wish(value);
+    else if (this.server) this.server.token = value ?? '';
   }
 
   /**
@@ -111,7 +113,7 @@ export class AvatarElement extends HTMLElement {
    */
   async enterXR(): Promise<void> {
     const enter = this.talk?.presence?.stage.enterXr;
-    if (!enter) throw new PageError('This avatar cannot be entered in VR or AR here.');
+    if (!enter) throw new PageError(say('error.xr'));
     await enter();
   }
 
@@ -134,14 +136,14 @@ export class AvatarElement extends HTMLElement {
   /** Fills the page anew; the focus stays within. */
   private refill(): void {
     focusOn(this.shell.page);
-    fillPage(this.shell.page, this.address());
+    fillPage(this.shell, this.address());
   }
 
   /** Shows who is there, and loads them when the visitor wants to talk. */
   private async invite(): Promise<void> {
     const { signal } = (this.invitation = new AbortController());
     this.refill();
-    const overlay = new Overlay(this.shell.page, signal, () => this.disconnect());
+    const overlay = new Overlay(this.shell.page, this.shell.words, signal, () => this.disconnect());
     try {
       const server = await this.reach(signal);
       const manifest = await loadManifest((name) => server.file(name), signal);
@@ -156,7 +158,7 @@ export class AvatarElement extends HTMLElement {
   /** The server of the attributes, which admits this page. */
   private async reach(signal: AbortSignal): Promise<Server> {
     const address = this.address();
-    if (!address) throw new PageError('This <ico3d-avatar> has no address of a server.');
+    if (!address) throw new PageError(say('error.address'));
     this.server = new Server(address);
     this.server.token = this.getAttribute('token') ?? this.server.token;
     const tokens = this.getAttribute('token-url');
@@ -196,8 +198,8 @@ export class AvatarElement extends HTMLElement {
         talk.visit = new Visit(this.shell.page, server, this.ports(talk, choice, resolve, reject));
       });
     } catch (error) {
-      if (signal.aborted) throw new PageError('The avatar was disconnected.');
-      if (!talk.visit) this.fail(error, new Overlay(this.shell.page, signal, () => this.restart()));
+      if (signal.aborted) throw new PageError(say('error.disconnected'));
+      if (!talk.visit) this.fail(error, new Overlay(this.shell.page, this.shell.words, signal, () => this.restart()));
       throw error;
     }
   }
@@ -214,6 +216,7 @@ export class AvatarElement extends HTMLElement {
     };
     const emit: Emit = (event, detail) => (event === 'connected' ? tell() : this.dispatch(event, detail as never));
     return {
+      words: this.shell.words,
       transparent: this.hasAttribute('transparent'),
       choice,
       xr: xrSettings((name) => this.getAttribute(name)),
@@ -223,8 +226,8 @@ export class AvatarElement extends HTMLElement {
         talk.presence = presence;
         if (!presence.conversation) tell(); // a body alone only moves
       },
-      failed: (sentence: string) => {
-        this.dispatch('error', { message: sentence, fatal: true });
+      failed: (sentence: Sentence) => {
+        this.tell(sentence);
         failed(new PageError(sentence));
       },
       reload: () => this.restart(),
@@ -252,7 +255,11 @@ export class AvatarElement extends HTMLElement {
   private fail(error: unknown, overlay: Overlay): void {
     if (!(error instanceof PageError)) console.error(error);
     overlay.fail(sentenceOf(error));
-    this.dispatch('error', { message: sentenceOf(error), fatal: true });
+    this.tell(sentenceOf(error));
+  }
+
+  private tell(sentence: Sentence): void {
+    this.dispatch('error', { message: english(sentence), code: codeOf(sentence), fatal: true });
   }
 
   private dispatch<K extends keyof AvatarEvents>(name: K, detail: AvatarEvents[K]): void {

@@ -1,6 +1,8 @@
-import page from '../../index.html?raw';
+import html from '../../index.html?raw';
 import pageStyle from '../style.css?inline';
 import frameStyle from './frame.css?inline';
+import { PageWords } from '../words/page-words.ts';
+import { say } from '../words/text.ts';
 
 const ROOT_SIZE = 16; // px: sizes are those of the page, whatever the font size of the page around it
 
@@ -9,6 +11,7 @@ export interface Shell {
   launcher: HTMLButtonElement; // of the floating mode
   /** Holds the elements of `index.html`. */
   page: HTMLElement;
+  words: PageWords;
 }
 
 /** Builds an embedded avatar in a shadow root. */
@@ -17,15 +20,16 @@ export function buildShell(root: ShadowRoot): Shell {
   style.textContent = (pageStyle + frameStyle).replace(/([\d.]+)rem\b/g, (_, size) => `${ROOT_SIZE * Number(size)}px`);
   const launcher = document.createElement('button');
   launcher.id = 'launcher';
-  launcher.setAttribute('aria-label', 'Talk with the avatar');
   launcher.setAttribute('aria-controls', 'page');
   const holder = document.createElement('section');
   holder.id = 'page';
   holder.className = 'page';
   holder.tabIndex = -1; // keeps the focus while its contents change
-  holder.setAttribute('aria-label', 'Avatar');
   root.replaceChildren(style, holder, launcher);
-  return { launcher, page: holder };
+  const words = new PageWords(root);
+  words.write(launcher, say('about.launcher'), 'label');
+  words.write(holder, say('about.avatar'), 'label');
+  return { launcher, page: holder, words };
 }
 
 /**
@@ -33,8 +37,10 @@ export function buildShell(root: ShadowRoot): Shell {
  *
  * @param server address that the page's links are relative to; null if there is none
  */
-export function fillPage(holder: HTMLElement, server: URL | null): void {
-  holder.replaceChildren(...new DOMParser().parseFromString(page, 'text/html').body.children);
+export function fillPage({ page: holder, words }: Shell, server: URL | null): void {
+  holder.replaceChildren(...new DOMParser().parseFromString(html, 'text/html').body.children);
   delete holder.dataset.state;
+  delete holder.dataset.drawer;
+  words.translate();
   for (const link of holder.querySelectorAll('a')) link.href = server ? new URL(link.getAttribute('href')!, server).href : '';
 }

@@ -3,12 +3,13 @@ import {
   VERSION,
   type AckMessage,
   type ClientMessage,
-  type ErrorMessage,
   type PlaceMessage,
   type ServerMessage,
   type WelcomeMessage,
 } from '../protocol.ts';
+import { say, type Sentence } from '../words/text.ts';
 import { SoundQueue } from './sound-queue.ts';
+import { told } from './told.ts';
 import { decode, encode } from './wire.ts';
 
 const FIRST_RETRY = 300; // ms; the next waits are twice as long each
@@ -16,11 +17,10 @@ const LONGEST_RETRY = 5000; // while the session may still be resumed
 const FIRST_VISIT = 5000; // ms until a server whose queue is full is asked again
 const LONGEST_VISIT = 60_000;
 const FULL = 1013; // close code: the queue is full, too
-const UNREACHABLE = 'The connection to the server was lost.';
 
 /** The session is over. */
 export interface Ending {
-  sentence: string;
+  sentence: Sentence;
   /** Whether a new session may succeed; else only loading the page anew helps. */
   again: boolean;
   /** When a new one is tried without being asked for, ms from now; null for never. */
@@ -60,7 +60,7 @@ export class Connection {
   private retry: ReturnType<typeof setTimeout> | undefined;
   private welcomed = false;
   private lastUp: number | null = null; // or the first try; ms on the performance clock
-  private fatal: ErrorMessage | null = null; // the server's last word
+  private fatal: Pick<Ending, 'sentence' | 'again'> | null = null; // the server's last word
   private over = false; // the session is, and no other one has begun
   private readonly sound: SoundQueue;
   private readonly url: () => string;
@@ -120,7 +120,7 @@ export class Connection {
     if (message.type === 'welcome') this.welcome(message);
     else if (message.type === 'place') this.queue(message);
     else if (message.type === 'ack') this.sound.acknowledge(message.frames);
-    else if (message.type === 'error' && message.fatal) this.hangUp(message);
+    else if (message.type === 'error' && message.fatal) this.hangUp(told(message), message.again);
     else if (message.type !== 'speech') this.events.message(message);
     else if (message.index > this.lastIndex) {
       this.lastIndex = message.index; // a resume may repeat what is already here
@@ -130,8 +130,7 @@ export class Connection {
 
   private welcome(message: WelcomeMessage): void {
     if (message.version !== VERSION) {
-      const sentence = 'The server speaks another version of the protocol.';
-      return this.hangUp({ type: 'error', message: sentence, fatal: true, again: false });
+      return this.hangUp(say('version'), false);
     }
     const replaced = this.session !== null && this.session !== message.session;
     this.session = message.session;
@@ -153,8 +152,8 @@ export class Connection {
   }
 
   /** The session ends when the socket has closed: its code tells more. */
-  private hangUp(why: ErrorMessage): void {
-    this.fatal = why;
+  private hangUp(sentence: Sentence, again: boolean): void {
+    this.fatal = { sentence, again };
     this.welcomed = false;
     this.socket!.close();
   }
@@ -166,7 +165,7 @@ export class Connection {
     this.socket = null;
     if (this.fatal) this.end(this.fatal, code === FULL);
     else if (this.over || now - this.lastUp! > 1000 * RESUME_SECONDS) {
-      this.end({ message: UNREACHABLE, again: true }, true);
+      this.end({ sentence: say('unreachable'), again: true }, true);
     } else {
       this.events.lost();
       this.openLater(FIRST_RETRY, LONGEST_RETRY);
@@ -174,12 +173,12 @@ export class Connection {
   }
 
   /** @param bySelf whether a new session is tried without being asked for */
-  private end({ message, again }: Pick<ErrorMessage, 'message' | 'again'>, bySelf: boolean): void {
+  private end({ sentence, again }: Pick<Ending, 'sentence' | 'again'>, bySelf: boolean): void {
     this.fatal = null;
     this.over = true;
     this.forget();
     if (bySelf) this.openLater(FIRST_VISIT, LONGEST_VISIT);
-    this.events.ended({ sentence: message, again, wait: bySelf ? this.wait : null });
+    this.events.ended({ sentence, again, wait: bySelf ? this.wait : null });
   }
 
   private forget(): void {

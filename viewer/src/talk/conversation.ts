@@ -1,9 +1,12 @@
 import { SoundGuard } from '../audio/interruption.ts';
 import { Player } from '../audio/player.ts';
 import type { Cue, Offer, PlaceMessage, Release, Services, StateMessage, WelcomeMessage } from '../protocol.ts';
+import { codeOf, english, say } from '../words/text.ts';
+import { Captioning, type CaptionEvents } from './captioning.ts';
 import { Connection, type Ending, type SessionMessage } from './connection.ts';
 import { Speaking, type Emit } from './events.ts';
 import { TurnTimer } from './latency.ts';
+import { told } from './told.ts';
 import { VoiceInput, type VoiceView } from './voice-input.ts';
 import { WakeLock } from './wake-lock.ts';
 import { handle, type Handlers } from './wire.ts';
@@ -30,11 +33,11 @@ export interface Acting {
 
 const CLOCK_PERIOD = 200; // ms between reports of what has been heard
 
-const STALLED = 'The network has stalled: what you say now may not be heard.';
-const REPLACED = 'The conversation of before is over; a new one begins.';
+const STALLED = say('stalled');
+const REPLACED = say('replaced');
 
 /** What the page shows of a conversation. */
-export interface ConversationView extends VoiceView {
+export interface ConversationView extends VoiceView, CaptionEvents {
   state(state: StateMessage['state'] | 'connecting' | 'queued' | 'ended'): void;
   question(text: string, final: boolean): void;
   answer(sentence: string): void;
@@ -45,8 +48,8 @@ export interface ConversationView extends VoiceView {
   queued(place: PlaceMessage): void;
   /** The system has stopped the sound until the visitor taps or types, or it goes on. */
   silenced(silent: boolean): void;
-  /** A session has begun or goes on. */
-  connected(): void;
+  /** A session has begun, or one goes on. */
+  connected(resumed: boolean): void;
   ended(ending: Ending): void;
 }
 
@@ -60,13 +63,18 @@ export class Conversation {
   private readonly view: ConversationView;
   private readonly emit: Emit;
   private readonly speaking: Speaking;
+  private readonly captioning: Captioning;
   private readonly connection: Connection;
   private readonly voice: VoiceInput;
   private readonly timer = new TurnTimer();
   private readonly handlers: Handlers<SessionMessage> = {
     state: ({ state }) => this.show(state),
     transcript: ({ text, final }) => this.transcript(text, final),
-    answer: ({ text }) => this.view.answer(text),
+    answer: (message) => {
+      this.captioning.answer(message);
+      this.view.answer(message.text);
+    },
+    spoken: (message) => this.captioning.spoken(message),
     speech: (message) => this.player.play(message),
     timeline: ({ utterance, points }) => this.gestures?.plan(utterance, points),
     cues: ({ utterance, cues, releases }) => {
@@ -76,6 +84,7 @@ export class Conversation {
     call: ({ name, arguments: given }) => this.emit('tool-call', { name, arguments: JSON.parse(given) }),
     end: ({ utterance, samples }) => this.player.end(utterance, samples),
     stop: ({ utterance }) => {
+      this.captioning.stop(utterance);
       this.player.stop(utterance);
       this.speaking.stop(utterance);
       this.acting?.stop(utterance);
@@ -86,9 +95,10 @@ export class Conversation {
     },
     resume: ({ utterance }) => this.player.resume(utterance),
     metrics: ({ name, values }) => this.view.metrics(name, values),
-    error: ({ message }) => {
-      this.view.notice(message);
-      this.emit('error', { message, fatal: false });
+    error: (message) => {
+      const sentence = told(message);
+      this.view.notice(sentence);
+      this.emit('error', { message: english(sentence), code: codeOf(sentence), fatal: false });
     },
   };
   private state: StateMessage['state'] = 'idle'; // of the server
@@ -115,6 +125,7 @@ export class Conversation {
     });
     const send = this.connection.send.bind(this.connection);
     const { signal } = this.ending;
+    this.captioning = new Captioning(() => this.player.heard(), view, signal);
     this.voice = new VoiceInput(send, (at) => this.player.heard(at), view, signal);
     this.voice.onChange = () => this.settleWake();
     this.wake = new WakeLock(signal);
@@ -126,6 +137,7 @@ export class Conversation {
     };
     this.player.onFinish = (utterance, seconds) => {
       this.report(utterance, seconds);
+      this.captioning.finish(utterance);
       this.speaking.finish(utterance);
     };
     this.reporting = setInterval(() => this.reportHeard(), CLOCK_PERIOD);
@@ -154,6 +166,7 @@ export class Conversation {
 
   /** Starts anew with another service. */
   choose(offer: Offer): void {
+    this.captioning.reset();
     this.player.reset();
     this.speaking.stop();
     this.connection.restart({ [offer.kind]: offer.key });
@@ -163,6 +176,7 @@ export class Conversation {
   interrupt(): void {
     const utterance = this.player.current;
     if (utterance !== null) {
+      this.captioning.stop(utterance);
       this.player.stop(utterance);
       this.speaking.stop(utterance);
     }
@@ -210,10 +224,10 @@ export class Conversation {
     }
     this.up = true;
     this.voice.welcome(message);
-    this.view.connected();
+    this.view.connected(message.resumed);
     this.view.services(message.services, message.offers);
     this.show('idle');
-    for (const notice of message.notices) this.view.notice(notice);
+    for (const notice of message.notices) this.view.notice(told(notice));
   }
 
   private queued(place: PlaceMessage): void {
@@ -235,6 +249,7 @@ export class Conversation {
 
   /** Utterances are counted from the start again. */
   private silence(): void {
+    this.captioning.reset();
     this.player.reset();
     this.speaking.stop();
     this.gestures?.reset();

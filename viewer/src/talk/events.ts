@@ -14,8 +14,8 @@ export interface TalkEvents {
   gesture: { utterance: number; name: string; mirror: boolean; begin: number; stroke: number };
   /** The language model calls a function of the server. */
   'tool-call': { name: string; arguments: Record<string, unknown> };
-  /** Something went wrong; after a fatal error the conversation is over. */
-  error: { message: string; fatal: boolean };
+  /** Something went wrong; after a fatal error the conversation is over. `code` names the English sentence, if it has a name. */
+  error: { message: string; code: string; fatal: boolean };
 }
 
 /** Tells of an event. */

@@ -1,9 +1,10 @@
 import type { ClientMessage, WelcomeMessage } from '../protocol.ts';
+import { say, type Sentence } from '../words/text.ts';
 import { Dictation, recognitionOf } from './dictation.ts';
 
 /** What the page shows of who listens. */
 export interface ListeningView {
-  notice(sentence: string): void;
+  notice(sentence: Sentence): void;
   /** Whether the browser's maker may receive what is said. */
   sharesVoice(shared: boolean): void;
 }
@@ -67,7 +68,6 @@ export class Listening {
     this.end();
     this.deaf = reason;
     this.send({ type: 'deaf', reason });
-    const instead = this.fallback ? `${this.fallback} on the server listens instead` : 'you can type instead';
-    this.view.notice(`This browser does not recognise speech; ${instead}.`);
+    this.view.notice(this.fallback ? say('dictation.server', { name: this.fallback }) : say('dictation.typing'));
   }
 }

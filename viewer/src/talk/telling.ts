@@ -1,3 +1,4 @@
+import { codeOf, english } from '../words/text.ts';
 import type { ConversationView } from './conversation.ts';
 import type { Emit } from './events.ts';
 
@@ -16,13 +17,13 @@ export function telling(view: ConversationView, emit: Emit): ConversationView {
       view.answer(text);
       emit('avatar-transcript', { text });
     },
-    connected: () => {
-      view.connected();
+    connected: (resumed) => {
+      view.connected(resumed);
       emit('connected', {});
     },
     ended: (ending) => {
       view.ended(ending);
-      emit('error', { message: ending.sentence, fatal: true });
+      emit('error', { message: english(ending.sentence), code: codeOf(ending.sentence), fatal: true });
     },
   };
   return Object.assign(Object.create(view) as ConversationView, telling); // all else is the view's

@@ -1,11 +1,13 @@
 import { Microphone } from '../audio/microphone.ts';
+import { sentenceOf } from '../errors.ts';
 import type { Heard } from '../face/face.ts';
 import type { ClientMessage, WelcomeMessage } from '../protocol.ts';
+import { say, type Sentence } from '../words/text.ts';
 import { VoiceMeter } from './latency.ts';
 import { Listening, type ListeningView } from './listening.ts';
 import { Recovery } from './recovery.ts';
 
-const AGAIN = 'The microphone is on again.';
+const AGAIN = say('microphone.again');
 const KEPT_OPEN = 20_000; // ms after talking by the button: opening a microphone costs the first words
 
 export type MicrophoneState = 'closed' | 'opening' | 'open';
@@ -52,7 +54,7 @@ export class VoiceInput {
       (error) => {
         const wanted = this.state === 'open';
         this.close();
-        view.notice(error.message);
+        view.notice(sentenceOf(error));
         if (wanted) this.recovery.lost();
       },
     );
@@ -128,7 +130,7 @@ export class VoiceInput {
     this.listening.welcome(message);
   }
 
-  private async start(notice = (sentence: string) => this.view.notice(sentence)): Promise<boolean> {
+  private async start(notice = (sentence: Sentence) => this.view.notice(sentence)): Promise<boolean> {
     clearTimeout(this.closing);
     if (this.microphone.open) return true;
     this.sample = 0;
@@ -137,7 +139,7 @@ export class VoiceInput {
       if (open) void this.recovery.opened();
       return open;
     } catch (error) {
-      notice((error as Error).message);
+      notice(sentenceOf(error));
       return false;
     }
   }

@@ -1,17 +1,14 @@
 import type { Conversation } from '../talk/conversation.ts';
 import type { MicrophoneState } from '../talk/voice-input.ts';
+import type { PageWords } from '../words/page-words.ts';
+import { say } from '../words/text.ts';
 import { byId, focusOn } from './elements.ts';
 import { icon } from './icons.ts';
-
-const TITLES: Record<MicrophoneState, string> = {
-  closed: 'Turn the microphone on',
-  opening: 'The microphone is being opened',
-  open: 'Turn the microphone off',
-};
 
 /** Text box, microphone, button to talk, send and stop: what the visitor does. */
 export class Controls {
   private readonly root: HTMLElement;
+  private readonly words: PageWords;
   private readonly signal: AbortSignal;
   private readonly form: HTMLFormElement;
   private readonly input: HTMLInputElement;
@@ -23,8 +20,9 @@ export class Controls {
    * @param root what keys are heard in
    * @param signal ends the hearing
    */
-  constructor(root: HTMLElement, signal: AbortSignal) {
+  constructor(root: HTMLElement, words: PageWords, signal: AbortSignal) {
     this.root = root;
+    this.words = words;
     this.signal = signal;
     this.form = byId(root, 'composer');
     this.input = byId(root, 'text');
@@ -35,7 +33,6 @@ export class Controls {
     this.talk.append(icon('talk'));
     this.stop.prepend(icon('stop'));
     byId(root, 'send').append(icon('send'));
-    byId(root, 'panel-button').append(icon('chart'));
   }
 
   /** Shows itself and lets the visitor act on a conversation. */
@@ -106,7 +103,7 @@ export class Controls {
   setMicrophone(state: MicrophoneState): void {
     this.microphone.setAttribute('aria-pressed', String(state === 'open'));
     this.microphone.setAttribute('aria-busy', String(state === 'opening'));
-    this.microphone.title = TITLES[state];
+    this.words.write(this.microphone, say(`microphone.${state}`), 'title');
   }
 
   setSpeaking(speaking: boolean): void {

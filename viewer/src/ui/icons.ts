@@ -6,6 +6,7 @@ const PATHS = {
   send: 'M12 19V5M6 11l6-6 6 6',
   stop: 'M7 7h10v10H7z',
   chart: 'M5 19v-6M12 19V5M19 19v-9',
+  record: 'M5 5h14M5 10h14M5 15h9M5 20h6',
   sliders: 'M4 8h9M17 8h3M4 16h3M11 16h9M15 5.5v5M9 13.5v5',
   play: 'M8 5.5v13l10.5-6.5z',
   pause: 'M8.5 6v12M15.5 6v12',

@@ -1,6 +1,8 @@
 import { atEnd } from '../lifetime.ts';
 import type { PlaceMessage } from '../protocol.ts';
 import type { Ending } from '../talk/connection.ts';
+import type { PageWords } from '../words/page-words.ts';
+import { say, type Sentence } from '../words/text.ts';
 import { byId, focusOn } from './elements.ts';
 import { inWords } from './queue.ts';
 
@@ -15,6 +17,7 @@ export class Overlay {
   private readonly thumbnail: HTMLImageElement;
   private readonly waiting: HTMLElement;
   private readonly button: HTMLButtonElement;
+  private readonly words: PageWords;
   private readonly reload: () => void;
   private queued = false;
   private counting: ReturnType<typeof setTimeout> | undefined;
@@ -23,8 +26,9 @@ export class Overlay {
    * @param page what the overlay covers
    * @param reload loads everything anew
    */
-  constructor(page: HTMLElement, signal: AbortSignal, reload: () => void) {
+  constructor(page: HTMLElement, words: PageWords, signal: AbortSignal, reload: () => void) {
     this.page = page;
+    this.words = words;
     this.root = byId(page, 'overlay');
     this.bar = byId(page, 'progress');
     this.thumbnail = byId(page, 'thumbnail');
@@ -68,8 +72,8 @@ export class Overlay {
   }
 
   /** The page cannot go on; only loading it anew may help. */
-  fail(sentence: string): void {
-    this.say(sentence, 'Reload the page', () => this.reload());
+  fail(sentence: Sentence): void {
+    this.say(sentence, say('reload'), () => this.reload());
   }
 
   /**
@@ -79,7 +83,7 @@ export class Overlay {
    */
   end({ sentence, again: mayBegin, wait }: Ending, again: () => void): void {
     if (!mayBegin) return this.fail(sentence);
-    this.say(sentence, wait === null ? 'Talk again' : 'Try again', () => {
+    this.say(sentence, say(wait === null ? 'again.talk' : 'again.try'), () => {
       this.count(0);
       again();
     });
@@ -91,29 +95,29 @@ export class Overlay {
     this.show(inWords(place));
     this.button.hidden = true;
     this.waiting.hidden = false;
-    this.waiting.textContent = 'All places are taken. Leave this page open: it goes on by itself.';
+    this.words.write(this.waiting, say('queue.open'));
     this.queued = true;
   }
 
   /** The line is down; a place in the queue is kept for a while. */
   reconnect(): void {
-    if (this.queued) this.waiting.textContent = 'The connection was lost. Your place is kept while it comes back …';
+    if (this.queued) this.words.write(this.waiting, say('queue.kept'));
   }
 
-  private say(sentence: string, label: string, act: () => void): void {
+  private say(sentence: Sentence, label: Sentence, act: () => void): void {
     this.show(sentence);
     this.waiting.hidden = true;
-    this.button.textContent = label;
+    this.words.write(this.button, label);
     this.button.onclick = act;
     this.button.hidden = false;
     focusOn(this.button);
   }
 
   /** Covers the page with a sentence. */
-  private show(sentence: string): void {
+  private show(sentence: Sentence): void {
     this.bar.hidden = byId(this.root, 'choices').hidden = true;
     const text = byId(this.root, 'overlay-error');
-    if (text.textContent !== sentence) text.textContent = sentence; // what is said again need not be read aloud again
+    this.words.write(text, sentence);
     text.hidden = byId(this.root, 'check').hidden = false;
     clearTimeout(this.counting);
     this.queued = false;
@@ -125,7 +129,7 @@ export class Overlay {
   private count(seconds: number): void {
     clearTimeout(this.counting);
     this.waiting.hidden = false;
-    this.waiting.textContent = seconds > 0 ? `Trying again in ${seconds} s` : 'Connecting …';
+    this.words.write(this.waiting, seconds > 0 ? say('again.soon', { n: seconds }) : say('state.connecting'));
     if (seconds > 0) this.counting = setTimeout(() => this.count(seconds - 1), 1000);
   }
 

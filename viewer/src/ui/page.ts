@@ -1,24 +1,18 @@
 import type { Offer, Services } from '../protocol.ts';
 import type { Figures } from '../stage/figures.ts';
 import type { Conversation, ConversationView } from '../talk/conversation.ts';
+import type { PageWords } from '../words/page-words.ts';
+import { say, type Sentence } from '../words/text.ts';
 import { Captions } from './captions.ts';
 import { Controls } from './controls.ts';
 import { byId } from './elements.ts';
 import { Overlay } from './overlay.ts';
-import { Panel } from './panel.ts';
-import { ServiceSheet } from './sheet.ts';
+import { Panel } from './sheets/panel.ts';
+import { Settings } from './sheets/settings.ts';
+import { ServiceSheet } from './sheets/sheet.ts';
+import { Transcript, type Talker } from './sheets/transcript.ts';
 
 const NOTICE_TIME = 9000; // ms
-
-const STATES = {
-  connecting: 'Connecting …',
-  idle: 'Ready',
-  listening: 'Listening',
-  thinking: 'Thinking',
-  speaking: 'Speaking',
-  queued: 'Waiting for a place',
-  ended: 'Ended',
-} as const;
 
 /** What is around the picture. */
 export interface Page {
@@ -33,27 +27,48 @@ export interface Page {
  * @param root what the page lies in
  * @param signal ends all of it
  */
-export function makePage(root: HTMLElement, overlay: Overlay, figures: () => Figures, signal: AbortSignal): Page {
-  const captions = new Captions(root);
-  const controls = new Controls(root, signal);
-  const panel = new Panel(root, figures, signal);
+export function makePage(
+  root: HTMLElement,
+  words: PageWords,
+  talker: Talker,
+  overlay: Overlay,
+  figures: () => Figures,
+  signal: AbortSignal,
+): Page {
+  const captions = new Captions(root, talker.lang);
+  const controls = new Controls(root, words, signal);
+  const panel = new Panel(root, words, figures, signal);
+  const settings = new Settings(root, words, signal);
+  const transcript = new Transcript(root, words, talker, signal);
   let choose: (offer: Offer) => void = () => {};
   let again = () => {};
-  const sheet = new ServiceSheet(root, (offer) => choose(offer));
+  const sheet = new ServiceSheet(root, words, (offer) => choose(offer));
   const view: ConversationView = {
     state(state) {
       root.dataset.state = state;
-      byId(root, 'state').textContent = STATES[state];
+      words.write(byId(root, 'state'), say(`state.${state}`));
       controls.setSpeaking(state === 'speaking');
       if (state === 'connecting') overlay.reconnect();
+      if (state === 'idle' || state === 'ended') transcript.announce(settings.announces);
     },
-    question: (text, final) => captions.question(text, final),
-    answer: (sentence) => captions.answer(sentence),
+    question(text, final) {
+      captions.question(text, final);
+      if (final) transcript.record.asked(text);
+    },
+    answer: () => {}, // it is shown as it is heard
+    heard(progress) {
+      captions.heard(progress);
+      transcript.heard(progress);
+    },
+    over(utterance, interrupted) {
+      captions.over();
+      transcript.record.over(utterance, interrupted);
+    },
     services(services, offers) {
-      showStandIns(root, services);
+      showStandIns(root, words, services);
       sheet.show(services, offers);
     },
-    notice: (sentence) => showNotice(root, sentence),
+    notice: (sentence) => showNotice(root, words, sentence),
     sharesVoice: (shared) => (byId(root, 'shared-voice').hidden = !shared),
     microphone: (state) => controls.setMicrophone(state),
     talking: (held) => controls.setTalking(held),
@@ -61,12 +76,19 @@ export function makePage(root: HTMLElement, overlay: Overlay, figures: () => Fig
     metrics: (name, values) => panel.metrics(name, values),
     silenced: (silent) => (byId(root, 'silenced').hidden = !silent),
     queued: (place) => overlay.queue(place),
-    connected: () => overlay.isShown && (overlay.hide(), controls.focus()),
+    connected(resumed) {
+      transcript.record.begin(resumed);
+      if (!overlay.isShown) return;
+      overlay.hide();
+      controls.focus();
+    },
     ended: (ending) => overlay.end(ending, () => again()),
   };
   const talk = (conversation: Conversation) => {
     byId(root, 'state-line').hidden = false;
     controls.bind(conversation);
+    settings.offerCaptions();
+    transcript.offer();
     choose = (offer) => conversation.choose(offer);
     again = () => conversation.start();
     conversation.start();
@@ -75,20 +97,21 @@ export function makePage(root: HTMLElement, overlay: Overlay, figures: () => Fig
 }
 
 /** Says plainly which services are the small offline ones. */
-function showStandIns(root: ParentNode, services: Services): void {
+function showStandIns(root: ParentNode, words: PageWords, services: Services): void {
   const names = Object.values(services)
     .filter((service) => service.stand_in)
     .map((service) => service.name);
   const note = byId(root, 'stand-ins');
   note.hidden = names.length === 0;
-  note.textContent = `Offline stand-ins: ${names.join(', ')}`;
+  words.write(note, say('stand-ins', { names }));
 }
 
 /** Shows a sentence for some seconds; one that is there already stays as it is: many would cover the face. */
-export function showNotice(root: ParentNode, sentence: string): void {
-  if ([...byId(root, 'notices').children].some(({ textContent }) => textContent === sentence)) return;
+export function showNotice(root: ParentNode, words: PageWords, sentence: Sentence): void {
+  const text = words.text(sentence);
+  if ([...byId(root, 'notices').children].some(({ textContent }) => textContent === text)) return;
   const item = document.createElement('p');
-  item.textContent = sentence;
+  words.write(item, sentence);
   byId(root, 'notices').append(item);
   setTimeout(() => item.remove(), NOTICE_TIME);
 }

@@ -1,6 +1,8 @@
 import { every } from '../lifetime.ts';
 import type { Seen } from '../motion/motion.ts';
 import type { Playback } from '../motion/playback.ts';
+import type { PageWords } from '../words/page-words.ts';
+import { say } from '../words/text.ts';
 import { byId } from './elements.ts';
 import { icon } from './icons.ts';
 
@@ -10,14 +12,17 @@ const REFRESH = 100; // ms
 export class PlayerBar {
   private readonly body: { readonly shown: Seen | null };
   private readonly playback: Playback;
+  private readonly words: PageWords;
   private readonly root: HTMLElement;
   private readonly button: HTMLButtonElement;
   private readonly scrub: HTMLInputElement;
   private readonly clock: HTMLOutputElement;
+  private plays: boolean | null = null; // as the button shows it
   private resumes = false; // once the slider is let go
 
   /** @param frame s between two frames of the recording: a step of the arrow keys */
-  constructor(page: ParentNode, body: PlayerBar['body'], playback: Playback, frame: number, signal: AbortSignal) {
+  constructor(page: ParentNode, words: PageWords, body: PlayerBar['body'], playback: Playback, frame: number, signal: AbortSignal) {
+    this.words = words;
     this.root = byId(page, 'player');
     this.button = byId(page, 'play');
     this.scrub = byId(page, 'scrub');
@@ -73,14 +78,13 @@ export class PlayerBar {
   private refresh(): void {
     const { playback } = this;
     this.scrub.value = String(playback.time);
-    this.scrub.setAttribute('aria-valuetext', `${playback.time.toFixed(1)} seconds`);
+    this.words.write(this.scrub, say('playback.seconds', { n: Math.round(10 * playback.time) / 10 }), 'valuetext');
     this.clock.textContent = `${label(playback.time)} / ${label(playback.duration)}`;
     this.root.setAttribute('aria-busy', String(this.body.shown?.waiting ?? true));
     const plays = playback.playing || this.resumes;
-    const name = plays ? 'Pause' : 'Play';
-    if (this.button.title === name) return;
-    this.button.title = name;
-    this.button.setAttribute('aria-label', name);
+    if (plays === this.plays) return;
+    this.plays = plays;
+    this.words.name(this.button, say(plays ? 'playback.pause' : 'playback.play'));
     this.button.replaceChildren(icon(plays ? 'pause' : 'play'));
   }
 }

@@ -1,6 +1,9 @@
+import { remember, remembered } from '../remembered.ts';
+import type { PageWords } from '../words/page-words.ts';
+import { say } from '../words/text.ts';
 import { icon } from './icons.ts';
 
-const KEY = 'ico3d-theme';
+const KEY = 'theme';
 const LIGHT = '(prefers-color-scheme: light)';
 
 /**
@@ -9,45 +12,38 @@ const LIGHT = '(prefers-color-scheme: light)';
  * @param root what is light or dark (`data-theme`)
  * @param changed is told at once, and whenever it changes
  */
-export function makeThemeButton(root: HTMLElement, changed: (light: boolean) => void, signal: AbortSignal): HTMLButtonElement {
+export function makeThemeButton(
+  root: HTMLElement,
+  words: PageWords,
+  changed: (light: boolean) => void,
+  signal: AbortSignal,
+): HTMLButtonElement {
   const system = matchMedia(LIGHT);
   const button = document.createElement('button');
   button.type = 'button';
   button.className = 'round quiet theme';
-  const show = () => {
-    const light = showTheme(root) === 'light';
-    button.title = light ? 'Make it dark' : 'Make it light';
-    button.setAttribute('aria-label', button.title);
+  const show = (chosen?: string) => {
+    const light = showTheme(root, chosen) === 'light';
+    words.name(button, say(light ? 'theme.dark' : 'theme.light'));
     button.replaceChildren(icon(light ? 'moon' : 'sun'));
     changed(light);
   };
   button.onclick = () => {
-    choose(root.dataset.theme === 'light' ? 'dark' : 'light');
-    show();
+    const theme = root.dataset.theme === 'light' ? 'dark' : 'light';
+    remember(KEY, theme);
+    show(theme);
   };
-  system.addEventListener('change', show, { signal });
+  system.addEventListener('change', () => show(), { signal });
   show();
   return button;
 }
 
-/** Makes an element light or dark as the visitor chose, else as their system is; which of them. */
-export function showTheme(root: HTMLElement): string {
-  return (root.dataset.theme = chosen() ?? (matchMedia(LIGHT).matches ? 'light' : 'dark'));
-}
-
-/** What the visitor chose; null where they did not, or the browser keeps nothing. */
-function chosen(): string | null {
-  try {
-    return localStorage.getItem(KEY);
-  } catch {
-    return null;
-  }
-}
-
-function choose(theme: string): void {
-  try {
-    localStorage.setItem(KEY, theme);
-  } catch {
-    // It holds until the page is left.
-  }
+/**
+ * Makes an element light or dark; which of them.
+ *
+ * @param chosen by default what the visitor chose before; without a choice it is as their system is
+ */
+export function showTheme(root: HTMLElement, chosen = remembered(KEY)): string {
+  const light = chosen ? chosen === 'light' : matchMedia(LIGHT).matches;
+  return (root.dataset.theme = light ? 'light' : 'dark');
 }

@@ -1,22 +1,23 @@
 import { VIEWS, type View } from '../stage/camera/framing.ts';
 import type { Orbit } from '../stage/camera/orbit.ts';
+import type { PageWords } from '../words/page-words.ts';
+import { say } from '../words/text.ts';
 import { icon } from './icons.ts';
-
-const NAMES: Record<View, string> = { face: 'Face', half: 'Head and chest', whole: 'Whole figure' };
+import { isForOthers } from './keys.ts';
 
 /**
  * A button for each view of somebody; their numbers are keys, wherever nothing is typed.
  *
  * @param keys where keys are heard: the page, or a part of it
  */
-export function makeViewBar(orbit: Orbit, keys: EventTarget, signal: AbortSignal): HTMLElement {
+export function makeViewBar(orbit: Orbit, words: PageWords, keys: EventTarget, signal: AbortSignal): HTMLElement {
   const bar = document.createElement('div');
   bar.className = 'views';
   bar.setAttribute('role', 'group');
-  bar.setAttribute('aria-label', 'View');
+  words.write(bar, say('view'), 'label');
   const views = VIEWS.filter((view) => orbit.views.includes(view));
   bar.hidden = views.length < 2;
-  const buttons = views.map((view) => makeButton(view, orbit));
+  const buttons = views.map((view) => makeButton(view, orbit, words));
   bar.append(...buttons);
   const show = (shown: View | null) =>
     views.forEach((view, i) => buttons[i]!.setAttribute('aria-pressed', String(view === shown)));
@@ -30,22 +31,15 @@ export function makeViewBar(orbit: Orbit, keys: EventTarget, signal: AbortSignal
   return bar;
 }
 
-function makeButton(view: View, orbit: Orbit): HTMLButtonElement {
+function makeButton(view: View, orbit: Orbit, words: PageWords): HTMLButtonElement {
   const button = document.createElement('button');
   const key = String(VIEWS.indexOf(view) + 1);
   button.type = 'button';
   button.className = 'round quiet';
-  button.title = `${NAMES[view]} (${key})`;
-  button.setAttribute('aria-label', NAMES[view]);
+  const name = say(`view.${view}`);
+  words.name(button, name, say('keyed', { name, key }));
   button.setAttribute('aria-keyshortcuts', key);
   button.append(icon(view));
   button.onclick = () => orbit.show(view);
   return button;
-}
-
-/** Whether a key is typed into a text, or is meant for the browser. */
-function isForOthers(event: KeyboardEvent): boolean {
-  if (event.ctrlKey || event.metaKey || event.altKey) return true;
-  const target = event.composedPath()[0] as Element;
-  return target.closest?.('textarea, select, [contenteditable], input:not([type=radio], [type=range])') != null;
 }

@@ -1,5 +1,6 @@
 import { sentenceOf } from '../errors.ts';
 import { icon } from '../ui/icons.ts';
+import type { Sentence } from '../words/text.ts';
 import { XR_MODES, type XrMode, type XrPorts } from './ports.ts';
 import { WORDS } from './words.ts';
 
@@ -12,7 +13,7 @@ const ICONS = { 'immersive-vr': 'headset', 'immersive-ar': 'room' } as const;
  * @param bar takes the buttons
  * @param notice shows why it does not work
  */
-export async function offerXr(bar: HTMLElement, ports: XrPorts, notice: (sentence: string) => void): Promise<void> {
+export async function offerXr(bar: HTMLElement, ports: XrPorts, notice: (sentence: Sentence) => void): Promise<void> {
   const { xr } = navigator;
   if (!xr) return;
   const group = document.createElement('div');
@@ -34,7 +35,7 @@ async function offered(xr: XRSystem): Promise<XrMode[]> {
   return XR_MODES.filter((_, i) => answers[i]);
 }
 
-function makeButton(mode: XrMode, ports: XrPorts, notice: (sentence: string) => void): HTMLButtonElement {
+function makeButton(mode: XrMode, ports: XrPorts, notice: (sentence: Sentence) => void): HTMLButtonElement {
   const button = document.createElement('button');
   button.type = 'button';
   button.className = 'pill';

@@ -15,6 +15,7 @@ from ico3d.chat.wire.codec import decode_client, encode
 from ico3d.chat.wire.protocol import (
     Dictation,
     End,
+    Notice,
     Offer,
     Service,
     Services,
@@ -38,7 +39,7 @@ def server_messages() -> list:
             "session",
             False,
             services,
-            [NOTICE],
+            [Notice("still-lips", NOTICE)],
             Dictation("de-DE", None),
             [Offer("voice", "a", "A", "install it.")],
         ),

@@ -3,6 +3,7 @@ import { bad, fair, good, none, report, summary, type Finding } from '../../src/
 import { judgeTrips, socketAdvice } from '../../src/check/network.ts';
 import { judgeRate, judgeRenderer } from '../../src/check/picture.ts';
 import { judgeLevel, judgeTone } from '../../src/check/sound.ts';
+import { english, say } from '../../src/words/text.ts';
 
 test.each([
   [[], 'All that was checked works.'],
@@ -10,11 +11,11 @@ test.each([
   [[good('a'), fair('b', 'c')], 'It works, but something could be better.'],
   [[fair('a', 'b'), bad('c', 'd'), good('e')], 'Something does not work: see below what to do.'],
 ])('the worst finding is what the page says at its top', (findings: Finding[], sentence) => {
-  expect(summary(findings)).toBe(sentence);
+  expect(english(summary(findings))).toBe(sentence);
 });
 
 test('a report tells what was found and what was not tried', () => {
-  const findings = new Map([['Page', good('Fine.')], ['Sound', null]]);
+  const findings = new Map([[say('check.secure'), good('Fine.')], [say('check.sound'), null]]);
   expect(report(findings, ['Browser 1', '360 × 640'])).toBe('Browser 1\n360 × 640\nPage: good – Fine.\nSound: not tried');
 });
 
@@ -27,14 +28,14 @@ test.each([
 ])('%s', (renderer, verdict) => {
   const finding = judgeRenderer(renderer);
   expect(finding.verdict).toBe(verdict);
-  expect(finding.words).toContain(renderer);
+  expect(english(finding.words)).toContain(renderer);
 });
 
 test.each([
   [judgeRate(59.6), 'good', '60 frames'],
   [judgeRate(20), 'fair', '20 frames'],
   [judgeRate(3), 'bad', '3 frames'],
-  [judgeTrips([900, 4, 2.25]), 'good', '4.0 ms'],
+  [judgeTrips([900, 4, 2.25]), 'good', '4 ms'],
   [judgeTrips([200, 400]), 'fair', '400 ms'],
   [judgeLevel(0), 'bad', 'silence'],
   [judgeLevel(0.001), 'fair', 'nothing as loud'],
@@ -43,14 +44,14 @@ test.each([
   [judgeTone(false), 'bad', 'did not hear'],
 ] satisfies [Finding, string, string][])('%o', (finding, verdict, words) => {
   expect(finding.verdict).toBe(verdict);
-  expect(finding.words).toContain(words);
+  expect(english(finding.words)).toContain(words);
   if (verdict !== 'good') expect(finding.advice).toBeTruthy(); // nobody is left alone with what is wrong
 });
 
 test('Safari is known to refuse sockets under certificates that were accepted by hand', () => {
   const iphone = 'Mozilla/5.0 (iPhone; CPU iPhone OS 18_0 like Mac OS X) AppleWebKit/605.1.15 Version/18.0 Mobile Safari/604.1';
   const chrome = 'Mozilla/5.0 (Macintosh; Intel Mac OS X 10_15_7) AppleWebKit/537.36 Chrome/140.0 Safari/537.36';
-  expect(socketAdvice('wss://box/echo', iphone)).toContain('certificate');
-  expect(socketAdvice('ws://box/echo', iphone)).not.toContain('certificate');
-  expect(socketAdvice('wss://box/echo', chrome)).not.toContain('certificate');
+  expect(english(socketAdvice('wss://box/echo', iphone))).toContain('certificate');
+  expect(english(socketAdvice('ws://box/echo', iphone))).not.toContain('certificate');
+  expect(english(socketAdvice('wss://box/echo', chrome))).not.toContain('certificate');
 });

@@ -1,5 +1,6 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 import { Connection, type ConnectionEvents, type Ending } from '../../src/talk/connection.ts';
+import { say } from '../../src/words/text.ts';
 import { ScriptedSocket } from '../../support/doubles/scripted-socket.ts';
 
 const FULL = 'all places are taken, and so are those in the queue: try again in a minute.';
@@ -125,7 +126,7 @@ test('a server that stays away ends the session once it cannot be resumed; tryin
     if (endings.length === 0) waits.push(nextTry());
   }
   expect(waits).toEqual([300, 600, 1200, 2400, 4800, 5000, 5000, 5000, 5000, 5000]);
-  expect(endings).toEqual([{ sentence: 'The connection to the server was lost.', again: true, wait: 10_000 }]);
+  expect(endings).toEqual([{ sentence: say('unreachable'), again: true, wait: 10_000 }]);
   expect(nextTry()).toBe(10_000);
   ScriptedSocket.last.drop();
   expect(endings.at(-1)!.wait).toBe(20_000);
@@ -186,7 +187,7 @@ test('a place in the queue that the server has forgotten is no reason to give up
     if (endings.length === 0) waited += nextTry()!;
     expect(waited).toBeLessThan(60_000);
   }
-  expect(endings).toEqual([{ sentence: 'The connection to the server was lost.', again: true, wait: 10_000 }]);
+  expect(endings).toEqual([{ sentence: say('unreachable'), again: true, wait: 10_000 }]);
   nextTry();
   ScriptedSocket.last.queue(5, null);
   expect(ScriptedSocket.last.of('hello')).toMatchObject([{ session: null }]);

@@ -2,6 +2,7 @@ import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 import type { ClientMessage, Dictation as Offer, WelcomeMessage } from '../../src/protocol.ts';
 import { Dictation, recognitionOf, type Recognition } from '../../src/talk/dictation.ts';
 import { Listening } from '../../src/talk/listening.ts';
+import { english } from '../../src/words/text.ts';
 
 /** A browser's recogniser that says what the test wants. */
 class Scripted extends EventTarget implements Recognition {
@@ -176,7 +177,7 @@ function page(Maker: typeof Scripted | null) {
   const shared: boolean[] = [];
   const listening = new Listening(
     (message) => sent.push(message) > 0,
-    { notice: (sentence) => notices.push(sentence), sharesVoice: (value) => shared.push(value) },
+    { notice: (sentence) => notices.push(english(sentence)), sharesVoice: (value) => shared.push(value) },
     Maker,
   );
   const welcome = (dictation: Offer | null, resumed = false) =>

@@ -2,6 +2,7 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 import { Conversation, type ConversationView } from '../../src/talk/conversation.ts';
 import { ScriptedAudio } from '../../support/doubles/scripted-microphone.ts';
 import { ScriptedSocket } from '../../support/doubles/scripted-socket.ts';
+import { english } from '../../src/words/text.ts';
 
 const AGAIN = 'The microphone is on again.';
 
@@ -20,7 +21,7 @@ beforeEach(async () => {
   [shown, notices, silenced] = [[], [], []];
   const view: Partial<ConversationView> = {
     microphone: (state) => shown.push(state),
-    notice: (sentence) => notices.push(sentence),
+    notice: (sentence) => notices.push(english(sentence)),
     silenced: (silent) => silenced.push(silent),
   };
   const others = { get: (known: object, name: string) => Reflect.get(known, name) ?? (() => {}) };

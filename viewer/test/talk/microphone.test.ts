@@ -2,6 +2,7 @@ import { afterEach, beforeEach, describe, expect, test, vi } from 'vitest';
 import { Conversation, type ConversationView } from '../../src/talk/conversation.ts';
 import { ScriptedAudio, STEPS } from '../../support/doubles/scripted-microphone.ts';
 import { ScriptedSocket } from '../../support/doubles/scripted-socket.ts';
+import { english } from '../../src/words/text.ts';
 
 let audio: ScriptedAudio;
 let shown: string[]; // of the microphone
@@ -19,7 +20,7 @@ beforeEach(() => {
   const view: Partial<ConversationView> = {
     microphone: (state) => shown.push(state),
     talking: (held) => (talking = held),
-    notice: (sentence) => notices.push(sentence),
+    notice: (sentence) => notices.push(english(sentence)),
   };
   const others = { get: (known: object, name: string) => Reflect.get(known, name) ?? (() => {}) };
   conversation = new Conversation(() => 'ws://server/ws', new Proxy(view, others) as ConversationView);

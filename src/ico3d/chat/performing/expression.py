@@ -109,7 +109,7 @@ class ExpressionProcessor(FrameProcessor):
         if self._sentence is None:
             return
         sentence, self._sentence = self._sentence, None
-        await self._push(await self._run(self._due(sentence), sentence.finish))
+        await self._push(await self._run(self._due(sentence), sentence.finish), last=True)
         self._next_row = sentence.next_row
 
     def _due(self, sentence: Sentence) -> float:
@@ -125,15 +125,15 @@ class ExpressionProcessor(FrameProcessor):
             await self._hand_on(UtteranceEndFrame(self._utterance, samples))
         self._reset()
 
-    async def _push(self, pieces: list[Piece]) -> None:
-        for piece in pieces:
+    async def _push(self, pieces: list[Piece], last: bool = False) -> None:
+        for number, piece in enumerate(pieces):
             text, self._text = self._text, None
             row = piece.first_row
             assert self._utterance is not None
             self._utterances.made(self._utterance, row * ROW + len(piece.pcm))
-            await self._hand_on(
-                SpeechFrame(self._utterance, row * ROW, row, piece.pcm, piece.expressions, text)
-            )
+            ends = last and number == len(pieces) - 1
+            face = piece.pcm, piece.expressions
+            await self._hand_on(SpeechFrame(self._utterance, row * ROW, row, *face, text, ends))
 
     async def _hand_on(self, frame: SpeechFrame | UtteranceEndFrame) -> None:
         if self._made is not None:

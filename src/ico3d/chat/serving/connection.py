@@ -10,33 +10,38 @@ from loguru import logger
 from ico3d.chat.observing.failures import cause
 from ico3d.chat.page import Outbox
 from ico3d.chat.serving.limits import ConnectionLimits, Inlet
-from ico3d.chat.serving.sessions import BROKEN_OFF, FULL, Session, Sessions
+from ico3d.chat.serving.sessions import Session, Sessions
 from ico3d.chat.serving.waiting import FullError, Ticket
 from ico3d.chat.wire import protocol
 from ico3d.chat.wire.codec import OversizedError, decode_client, encode
-from ico3d.chat.wire.protocol import Ack, Error, Hello, Welcome
+from ico3d.chat.wire.protocol import Ack, Error, Hello, Notice, Welcome
+from ico3d.chat.wire.sentences import ELSEWHERE, FAULT, FULL, OUTDATED, UNREADY, Sentence
 from ico3d.errors import Ico3dError, ProtocolError
 
 HELLO_SECONDS = 10  # that a page may take to say hello
 GOING, BROKEN, TOO_BIG, FAILED, BUSY = 1000, 1008, 1009, 1011, 1013  # WebSocket close codes
 GONE = (1000, 1001)  # what pages send that will not come back: the visitor left, or loads it anew
 REFRESH = 15.0  # s after which a waiting page is told a new estimate
-UNREADY = "the avatar cannot talk now: something on the server does not start. Try again later."
 
 
 class Hangup(Exception):
     """Raised to close the connection with an error."""
 
-    def __init__(self, code: int, message: str, again: bool = False):
-        """Takes a close code, a sentence for the page, and whether a new session may succeed."""
-        super().__init__(message)
-        self.code, self.again = code, again
+    def __init__(self, code: int, sentence: Sentence | str, again: bool = False, **values: float):
+        """Takes a close code, a sentence for the page, and whether a new session may succeed.
+
+        Sentences without a code are for whoever writes a page; `values` are numbers of one with it.
+        """
+        known = isinstance(sentence, Sentence)
+        self.told = sentence.error(True, again, **values) if known else Error(sentence, True, again)
+        super().__init__(self.told.message)
+        self.code = code
 
 
 class Connection:
     """Reads the messages of a page and writes those of its session."""
 
-    def __init__(self, socket: WebSocket, sessions: Sessions, notices: list[str]):
+    def __init__(self, socket: WebSocket, sessions: Sessions, notices: list[Notice]):
         """A connection.
 
         Args:
@@ -119,7 +124,7 @@ class Connection:
                 await asyncio.wait({spoken, moved}, timeout=REFRESH, return_when=FIRST_COMPLETED)
                 moved.cancel()
                 if ticket.replaced:
-                    raise Hangup(GOING, "the page has another connection.", again=True)
+                    raise Hangup(GOING, ELSEWHERE, again=True)
                 if spoken.done():
                     spoken.result()
                     raise Hangup(BROKEN, "a page that waits for its turn sends nothing.")
@@ -137,11 +142,8 @@ class Connection:
         if not isinstance(message, Hello):
             raise Hangup(BROKEN, "the first message must be hello.")
         if message.version != protocol.VERSION:
-            raise Hangup(
-                BROKEN,
-                f"this page speaks version {message.version} of the protocol, "
-                f"the server version {protocol.VERSION}: reload the page.",
-            )
+            versions = {"page": message.version, "server": protocol.VERSION}
+            raise Hangup(BROKEN, OUTDATED, **versions)
         return message
 
     async def _greet(self, session: Session, resumed: bool) -> None:
@@ -206,13 +208,12 @@ class Connection:
         """A fault of ours: the page is told, and does not come back to the same again."""
         self._sessions.monitor.failed("connection", cause(error))
         logger.opt(exception=error).debug("the connection's fault in full")
-        await self._hang_up(Hangup(FAILED, BROKEN_OFF, again=True))
+        await self._hang_up(Hangup(FAILED, FAULT, again=True))
 
     async def _hang_up(self, hangup: Hangup) -> None:
         logger.debug(f"closing a connection with {hangup.code}: {hangup}")
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
-            error = Error(str(hangup), fatal=True, again=hangup.again)
-            await self._socket.send_text(str(encode(error)))
+            await self._socket.send_text(str(encode(hangup.told)))
             await self._socket.close(hangup.code)
 
 

@@ -29,10 +29,10 @@ from ico3d.chat.serving.sessions import Sessions
 from ico3d.chat.serving.sites import Sites, add_tokens
 from ico3d.chat.settings.conversation import ChatSettings
 from ico3d.chat.wire import protocol
+from ico3d.chat.wire.sentences import STILL_LIPS
 from ico3d.errors import SettingsError
 
 STATIC = Path(__file__).parents[1] / "static"
-STILL = "This avatar is driven by blendshapes, not by sound: its lips do not move while it speaks."
 
 
 def open_avatar(bundle: Bundle, settings: ChatSettings, persona: Persona | None = None) -> Avatar:
@@ -111,7 +111,7 @@ def make_app(
 
 def add_conversation(app: FastAPI, avatar: Avatar, sessions: Sessions) -> None:
     """Adds the WebSocket of conversations and the route of their metrics."""
-    notices = [] if avatar.speech else [STILL]
+    notices = [] if avatar.speech else [STILL_LIPS.notice()]
 
     @app.websocket("/ws")
     async def conversation(socket: WebSocket) -> None:

@@ -12,12 +12,10 @@ from ico3d.chat.parts import Avatar, Parts
 from ico3d.chat.services.offers import wished
 from ico3d.chat.serving.freeing import give_back
 from ico3d.chat.serving.waiting import Stays, Ticket, WaitingLine
-from ico3d.chat.wire.protocol import RESUME_SECONDS, Error, Hello, Offer, Place
+from ico3d.chat.wire.protocol import RESUME_SECONDS, Hello, Offer, Place
+from ico3d.chat.wire.sentences import FAULT, IDLE
 from ico3d.errors import ServiceError
 
-IDLE = "Nothing was said for {:g} min, so this conversation has ended."
-BROKEN_OFF = "The conversation broke off because of a fault in the server."
-FULL = "all places are taken, and so are those in the queue: try again in a minute."
 STARTING = 30.0  # s that a conversation may take to start: a model may be loaded, a server asked
 
 
@@ -173,7 +171,7 @@ class Sessions:
     def _broke_off(self, session: Session) -> None:
         """Ends a session whose pipeline ended by itself: no question would be answered."""
         self.monitor.failed("pipeline", "it ended by itself, and the conversation with it")
-        session.page.end(Error(BROKEN_OFF, fatal=True, again=True))
+        session.page.end(FAULT.error(fatal=True, again=True))
         self._close_soon(session, "broken")
 
     def _check_idle(self, session: Session) -> None:
@@ -186,7 +184,7 @@ class Sessions:
             loop = asyncio.get_running_loop()
             session.idle_check = loop.call_later(left, self._check_idle, session)
             return
-        session.page.end(Error(IDLE.format(minutes), fatal=True, again=True))
+        session.page.end(IDLE.error(fatal=True, again=True, minutes=minutes))
         self._close_soon(session, "idle")
 
     def _close_soon(self, session: Session, why: str) -> None:

@@ -45,7 +45,7 @@ class EnduringVoice:
             patience: Time limit in seconds for a sentence's first sound, and between two pieces of
                 it.
             language: Language code of the apology.
-            complain: Receives a sentence for the page if not even the apology can be spoken.
+            complain: Receives the reason if not even the apology can be spoken.
         """
         self._speak, self._patience = speak, patience
         self._language, self._complain = language, complain
@@ -103,7 +103,7 @@ class EnduringVoice:
             words = apology("voice", self._language)
             spoken = espeak.spoken(words, espeak_voice(self._language), RATE)
         except Ico3dError as error:
-            self._complain(f"The avatar has lost its voice; its captions go on. ({error})"[:4000])
+            self._complain(str(error))
             return silence(text)
         missing = len(silence(text)) - len(spoken)
         return np.pad(spoken, (0, max(0, missing)))  # the caption stays until it is read

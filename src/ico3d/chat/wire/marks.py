@@ -7,6 +7,7 @@ from ico3d.common.typed import Length, Range
 
 MAX_EXACT = 2**53  # largest whole number JavaScript holds
 LONGEST_NAME = 200
+LONGEST_WORDS = 4000
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,6 @@ class Tensor:
 
 Count = Annotated[int, Range(0, MAX_EXACT)]
 Seconds = Annotated[float, Range(0, 1e7)]
-Words = Annotated[str, Length(0, 4000)]
+Words = Annotated[str, Length(0, LONGEST_WORDS)]
 Name = Annotated[str, Length(1, LONGEST_NAME)]
 Milliseconds = Annotated[float, Range(-1e7, 1e7)]

@@ -21,9 +21,9 @@ from ico3d.chat.wire.marks import (
 )
 from ico3d.chat.wire.protocol_gestures import MAX_CUES, Cue, Release
 from ico3d.chat.wire.protocol_services import Dictation, Offer, Service, Services
-from ico3d.chat.wire.protocol_visits import Error, Hello, Place, Welcome
+from ico3d.chat.wire.protocol_visits import Error, Hello, Notice, Place, Welcome
 
-VERSION = 6
+VERSION = 7
 MICROPHONE_RATE = 16_000  # Hz, PCM16 mono from the page
 MICROPHONE_CHUNK = 512  # samples of a message: what Silero judges at once, so that none waits
 SPEECH_RATE = 24_000  # Hz, PCM16 mono to the page
@@ -36,6 +36,7 @@ RESUME_SECONDS = 30  # how long a session waits for its page to come back
 MAX_AHEAD_SECONDS = 2.0  # how far speech may run ahead of its playback
 MAX_ARGUMENTS = 4000  # characters of a function's arguments
 MAX_POINTS = 500  # of a timeline in one message
+MAX_WORDS = 500  # of a sentence that are timed
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,6 +203,23 @@ class Answer:
     text: Words
 
 
+@dataclass(frozen=True)
+class Spoken:
+    """When the words of a sentence are spoken; it comes once all of the sentence's sound is made.
+
+    Attributes:
+        utterance: Number of the answer.
+        first_sample: That of the sentence's `answer`, which may come before or after.
+        starts: Index of each word's first character (code point) in the sentence, ascending.
+        times: When each word begins, seconds of the utterance, ascending.
+    """
+
+    utterance: Count
+    first_sample: Count
+    starts: Annotated[list[Count], Length(0, MAX_WORDS)]
+    times: Annotated[list[Seconds], Length(0, MAX_WORDS)]
+
+
 @dataclass(frozen=True, eq=False)
 class Speech:
     """100-200 ms of sound with the matching face (binary).
@@ -339,6 +357,7 @@ ServerMessage = (
     | State
     | Transcript
     | Answer
+    | Spoken
     | Speech
     | Timeline
     | Cues
@@ -352,5 +371,5 @@ ServerMessage = (
 )
 CLIENT_MESSAGES = get_args(ClientMessage)
 SERVER_MESSAGES = get_args(ServerMessage)
-PARTS = (Service, Services, Dictation, Offer, Cue, Release)
+PARTS = (Service, Services, Dictation, Offer, Notice, Cue, Release)
 """Dataclasses that messages contain."""

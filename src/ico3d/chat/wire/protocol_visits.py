@@ -26,6 +26,19 @@ class Hello:
 
 
 @dataclass(frozen=True)
+class Notice:
+    """A sentence that the page shows once, on what this avatar cannot do.
+
+    Attributes:
+        code: Name of the sentence, by which pages translate it.
+        text: The sentence in English.
+    """
+
+    code: Name
+    text: Words
+
+
+@dataclass(frozen=True)
 class Welcome:
     """Answer to `hello`.
 
@@ -34,7 +47,7 @@ class Welcome:
         session: Id of the session, needed to resume it.
         resumed: True if the session is the one that `hello` named.
         services: The services of the conversation.
-        notices: Sentences that the page shows once, on what this avatar cannot do.
+        notices: What this avatar cannot do.
         dictation: How the browser is to recognise speech; null if the server does.
         offers: Services to choose from; empty where strangers may be talking.
     """
@@ -43,7 +56,7 @@ class Welcome:
     session: Annotated[str, Length(1, 64)]
     resumed: bool
     services: Services
-    notices: Annotated[list[Words], Length(0, 8)]
+    notices: Annotated[list[Notice], Length(0, 8)]
     dictation: Dictation | None
     offers: Annotated[list[Offer], Length(0, 64)] = field(default_factory=list)
 
@@ -68,11 +81,15 @@ class Error:
     """Something went wrong.
 
     Attributes:
-        message: One sentence for the visitor.
+        message: One sentence for the visitor, in English.
         fatal: True if the session is over and the server closes the connection.
         again: After a fatal error: whether a new session may succeed, so that the page offers one.
+        code: Name of the sentence, by which pages translate it; empty for one without.
+        values: Numbers in the sentence, by name.
     """
 
     message: Words
     fatal: bool
     again: bool = False
+    code: Annotated[str, Length(0, 64)] = ""
+    values: Annotated[dict[str, Seconds], Length(0, 8)] = field(default_factory=dict)

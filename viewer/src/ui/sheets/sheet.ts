@@ -1,33 +1,30 @@
-import type { Offer, Services } from '../protocol.ts';
-import { makeDisclosure } from './disclosure.ts';
-import { byId } from './elements.ts';
-import { icon } from './icons.ts';
+import type { Offer, Services } from '../../protocol.ts';
+import type { PageWords } from '../../words/page-words.ts';
+import { say } from '../../words/text.ts';
+import { byId } from '../elements.ts';
 
-const JOBS = { recognition: 'Listens', language: 'Thinks', voice: 'Speaks' } as const;
+const KINDS = ['recognition', 'language', 'voice'] as const;
 
 /** Which services there are, which one serves, and what the better ones need. */
 export class ServiceSheet {
-  private readonly button: HTMLButtonElement;
   private readonly sheet: HTMLElement;
+  private readonly words: PageWords;
   private readonly choose: (offer: Offer) => void;
 
   /** @param choose what happens when the visitor wants another one */
-  constructor(root: ParentNode, choose: (offer: Offer) => void) {
-    this.button = byId(root, 'services-button');
+  constructor(root: ParentNode, words: PageWords, choose: (offer: Offer) => void) {
+    this.words = words;
     this.sheet = byId(root, 'services');
     this.choose = choose;
-    this.button.append(icon('sliders'));
-    makeDisclosure(this.button, this.sheet);
   }
 
   /** Shows what a server offers; nothing where it offers nothing. */
   show(services: Services, offers: readonly Offer[]): void {
-    this.button.hidden = offers.length === 0;
-    if (offers.length === 0 && !this.sheet.hidden) this.button.click();
-    const groups = Object.entries(JOBS).map(([kind, job]) => {
+    this.sheet.hidden = offers.length === 0;
+    const groups = KINDS.map((kind) => {
       const group = document.createElement('fieldset');
       const legend = document.createElement('legend');
-      legend.textContent = job;
+      this.words.write(legend, say(`services.${kind}`));
       const rows = offers
         .filter((offer) => offer.kind === kind)
         .map((offer) => this.row(offer, services[offer.kind].name === offer.name));

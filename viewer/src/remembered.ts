@@ -1,0 +1,17 @@
+/** What the visitor chose; null where they did not, or the browser keeps nothing. */
+export function remembered(key: string): string | null {
+  try {
+    return localStorage.getItem(`ico3d-${key}`);
+  } catch {
+    return null;
+  }
+}
+
+/** Keeps a choice for the next visit, where the browser lets this page. */
+export function remember(key: string, value: string): void {
+  try {
+    localStorage.setItem(`ico3d-${key}`, value);
+  } catch {
+    // It holds until the page is left.
+  }
+}

@@ -1,0 +1,84 @@
+import type { Progress } from './captioning.ts';
+
+/** What somebody said. */
+export interface Entry {
+  who: 'you' | 'avatar';
+  at: Date;
+  text: string;
+  /** Whether the avatar was interrupted before the end. */
+  cut: boolean;
+}
+
+/** What is told of a record. */
+export interface RecordEvents {
+  /** An entry is new, or has changed. */
+  changed(entry: Entry): void;
+  /** All was forgotten; another talk begins. */
+  cleared(): void;
+}
+
+const CUT = ' …';
+const JOINED = /[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]$/; // scripts that put no spaces between sentences
+
+/** All that was said in a talk, as far as it was heard. */
+export class TalkRecord {
+  entries: Entry[] = [];
+  private readonly events: RecordEvents;
+  private answer: { utterance: number; entry: Entry; sentences: Map<number, Progress> } | null = null;
+  private resumed = false; // and nothing new was said
+
+  constructor(events: RecordEvents) {
+    this.events = events;
+  }
+
+  /** The visitor has asked; after a lost connection the server may repeat the last question. */
+  asked(text: string): void {
+    const last = this.entries.findLast(({ who }) => who === 'you');
+    const repeated = this.resumed && last?.text === text;
+    this.resumed = false;
+    if (!repeated && text.trim()) this.add({ who: 'you', at: new Date(), text, cut: false });
+  }
+
+  /** More of a sentence has been heard. */
+  heard(progress: Progress): void {
+    if (this.answer?.utterance !== progress.utterance) {
+      const entry: Entry = { who: 'avatar', at: new Date(), text: '', cut: false };
+      this.answer = { utterance: progress.utterance, entry, sentences: new Map() };
+    }
+    const { entry, sentences } = this.answer;
+    sentences.set(progress.first, progress);
+    entry.text = joined([...sentences.values()].map(({ text, heard }) => text.slice(0, heard).trim()));
+    if (!entry.text) return;
+    if (this.entries.includes(entry)) this.events.changed(entry);
+    else this.add(entry);
+  }
+
+  /** No more of an utterance is heard. */
+  over(utterance: number, interrupted: boolean): void {
+    if (this.answer?.utterance !== utterance) return;
+    const { entry } = this.answer;
+    this.answer = null;
+    if (!interrupted || !entry.text) return;
+    entry.cut = true;
+    entry.text += CUT;
+    this.events.changed(entry);
+  }
+
+  /** A session goes on, or a new one begins. */
+  begin(resumed: boolean): void {
+    this.resumed = resumed;
+    if (resumed) return;
+    this.answer = null;
+    this.entries = [];
+    this.events.cleared();
+  }
+
+  private add(entry: Entry): void {
+    this.entries.push(entry);
+    this.events.changed(entry);
+  }
+}
+
+function joined(sentences: readonly string[]): string {
+  return sentences.filter(Boolean).reduce((text, sentence) => (!text || JOINED.test(text) ? text + sentence : `${text} ${sentence}`), '');
+}
