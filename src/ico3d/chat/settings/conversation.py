@@ -169,7 +169,7 @@ class ChatSettings:
             never.
         gestures: Whether the body gestures during speech; otherwise it stays at rest.
         memory: How much of the conversation is remembered.
-        embedding: Who may put the avatar into pages of their own ([more](conversation/embedding.md)).
+        embedding: Who may put the avatar into their pages ([more](conversation/embedding.md)).
         tools: Functions over HTTP that the language model may call.
         allow: Hosts that tools may call, such as `api.example.org` or `127.0.0.1:9000`; private
             addresses must be listed as such.
