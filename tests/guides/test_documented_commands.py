@@ -93,7 +93,7 @@ def taken(words: list[str]) -> bool:
     if program == "make":
         return set(rest) <= set(TARGETS)
     if program == "npm":
-        return rest[0] in ("ci", "test") or rest[-1] in PACKAGE["scripts"]
+        return rest[0] in ("ci", "pack", "test") or rest[-1] in PACKAGE["scripts"]
     if program == "npx":
         return all((ROOT / "viewer" / word).exists() for word in rest if word.endswith(".ts"))
     if program.endswith("python") and rest[0].startswith("bench/"):
