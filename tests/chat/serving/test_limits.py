@@ -10,7 +10,16 @@ from websockets.exceptions import ConnectionClosed
 
 from ico3d.chat.serving.limits import FORGIVEN, ConnectionLimits, Inlet
 from ico3d.chat.wire.codec import decode_server, encode
-from ico3d.chat.wire.protocol import MICROPHONE_CHUNK, VERSION, Answer, Audio, Error, Hello
+from ico3d.chat.wire.protocol import (
+    MICROPHONE_CHUNK,
+    VERSION,
+    Answer,
+    Audio,
+    Error,
+    Hello,
+    Say,
+    Text,
+)
 from ico3d.errors import ProtocolError
 from ico3d.measure.talking.page import open_page
 
@@ -53,6 +62,19 @@ def test_clumsiness_is_forgotten():
     for _ in range(100):
         assert limits.forgive()
         time.now += 10.0
+
+
+@pytest.mark.parametrize("kind", [Text, Say])
+def test_nobody_types_several_questions_a_second(kind):
+    time = Time()
+    limits = ConnectionLimits(time)
+    for _ in range(10):
+        limits.check_message(kind("who are you"))
+    with pytest.raises(ProtocolError, match="questions"):
+        limits.check_message(kind("who are you"))
+    for _ in range(60):
+        time.now += 1.0
+        limits.check_message(kind("who are you"))
 
 
 def test_rates_are_limited_by_the_clock():

@@ -9,6 +9,7 @@ from loguru import logger
 
 from ico3d.chat.observing.failures import cause
 from ico3d.chat.page import Outbox
+from ico3d.chat.serving.crowd import machine_of
 from ico3d.chat.serving.limits import ConnectionLimits, Inlet
 from ico3d.chat.serving.sessions import Session, Sessions
 from ico3d.chat.serving.waiting import FullError, Ticket
@@ -97,7 +98,7 @@ class Connection:
     async def _admission(self, hello: Hello) -> Ticket | None:
         """Waits in the queue until there is a place; the ticket is None for a resumed session."""
         try:
-            ticket = self._sessions.line_up(hello)
+            ticket = self._sessions.line_up(hello, machine_of(self._socket.scope.get("client")))
         except FullError as error:
             self._sessions.monitor.failed("full")
             raise Hangup(BUSY, FULL, again=True) from error

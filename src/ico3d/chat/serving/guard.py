@@ -13,6 +13,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from ico3d.chat.serving.crowd import Crowd, machine_of
 from ico3d.chat.serving.sites import Sites
 
 LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
@@ -39,12 +40,14 @@ HEADERS = {
 }
 FOREIGN = "This server answers only its own pages: open it under the address it printed.\n"
 NO_TOKEN = "The page's token is missing or has expired.\n"
+TOO_MANY = "This machine has too many connections open.\n"
 
 
 class Guard:
     """ASGI middleware: 403 for a foreign Origin or Host, security headers on every response.
 
-    Sites that may embed the avatar load what they need; a missing token is answered with 401.
+    Sites that may embed the avatar load what they need; a missing token is answered with 401. One
+    machine may have so many WebSockets open and no more.
     """
 
     def __init__(
@@ -62,6 +65,7 @@ class Guard:
         self._host = host
         self._sites = sites or Sites()
         self._names = frozenset(names)
+        self._crowd = Crowd()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Handles or refuses one request or WebSocket handshake."""
@@ -90,7 +94,14 @@ class Guard:
         if not self._sites.admits(scope, site):
             await self._refuse(401, NO_TOKEN, scope, receive, with_headers)
             return
-        await self._app(scope, receive, with_headers)
+        if scope["type"] == "http":
+            await self._app(scope, receive, with_headers)
+            return
+        with self._crowd.one_more(machine_of(scope.get("client"))) as may:
+            if may:
+                await self._app(scope, receive, with_headers)
+            else:
+                await self._refuse(429, TOO_MANY, scope, receive, send)
 
     async def _refuse(
         self, status: int, sentence: str, scope: Scope, receive: Receive, send: Send

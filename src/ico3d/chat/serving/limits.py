@@ -11,12 +11,15 @@ from ico3d.chat.wire.protocol import (
     MICROPHONE_RATE,
     Audio,
     ClientMessage,
+    Say,
     Talk,
+    Text,
 )
 from ico3d.errors import ProtocolError
 
 STALL = 60  # s for which a network may hold back what a microphone makes, and deliver it at once
 AUDIO_RATE = 1.25 * MICROPHONE_RATE  # samples per second for long: clocks differ a little
+QUESTIONS, AT_ONCE = 1.0, 10  # per second for long, and at once: each has a language model begin
 FORGIVEN = 5  # broken rules after which a connection is closed
 FORGOTTEN = 10.0  # s after which one of them is forgotten
 
@@ -58,6 +61,7 @@ class ConnectionLimits:
         self._texts = Bucket(MAX_RATE, MAX_BURST, now)
         self._sounds = Bucket(MAX_RATE, STALL * MICROPHONE_RATE / MICROPHONE_CHUNK, now)
         self._samples = Bucket(AUDIO_RATE, STALL * MICROPHONE_RATE, now)
+        self._questions = Bucket(QUESTIONS, AT_ONCE, now)
         self._forgiveness = Bucket(1 / FORGOTTEN, FORGIVEN - 1, now)
 
     def check_frame(self, frame: str | bytes) -> None:
@@ -70,13 +74,16 @@ class ConnectionLimits:
             raise ProtocolError(f"more than {MAX_RATE} messages per second.")
 
     def check_message(self, message: ClientMessage) -> None:
-        """Counts the sound of a message.
+        """Counts the sound of a message, and typed questions.
 
         Raises:
-            ProtocolError: If more sound arrives than a microphone can record.
+            ProtocolError: If more sound arrives than a microphone can record, or more questions
+                than somebody can type.
         """
         if isinstance(message, Audio) and not self._samples.take(len(message.pcm)):
             raise ProtocolError("more sound than a microphone makes.")
+        if isinstance(message, Text | Say) and not self._questions.take(1):
+            raise ProtocolError("more questions than somebody can type: wait a little.")
 
     def forgive(self) -> bool:
         """Counts a violation; False if there were too many in a short time."""

@@ -71,8 +71,12 @@ class Sessions:
         """Visitors at this moment, those included that may come back."""
         return len(self._open)
 
-    def line_up(self, hello: Hello) -> Ticket | None:
+    def line_up(self, hello: Hello, machine: str = "") -> Ticket | None:
         """Puts a page in the queue, which it passes at once while there are places.
+
+        Args:
+            hello: The page's first message.
+            machine: Machine of the visitor; empty if unknown.
 
         Returns:
             Its ticket; None if the page has a session, which needs no new place.
@@ -82,7 +86,7 @@ class Sessions:
         """
         if self._resumable(hello):
             return None
-        return self.line.join(hello.session)
+        return self.line.join(hello.session, machine)
 
     def place(self, ticket: Ticket) -> Place:
         """What a waiting page is told."""

@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection
 from ico3d.chat.wire.protocol import RESUME_SECONDS
 
 MOST_WAITING = 50  # visitors; each holds an open connection
+SHARE = 0.5  # of the queue that the visitors of one machine may fill
 REMEMBERED = 16  # ended sessions from which waiting times are estimated
 
 
@@ -23,11 +24,12 @@ class Ticket:
         admitted: Whether a place is free for this visitor, and kept until the session begins.
         replaced: Whether another connection has claimed the same place.
         changed: Set when the queue has moved.
+        machine: Machine of the visitor; empty if unknown.
     """
 
-    def __init__(self, id: str):
+    def __init__(self, id: str, machine: str = ""):
         """Waits with its page present."""
-        self.id = id
+        self.id, self.machine = id, machine
         self.admitted = self.replaced = False
         self.changed = asyncio.Event()
         self.expiry: asyncio.TimerHandle | None = None  # while its page is away
@@ -61,16 +63,20 @@ class WaitingLine:
         """How many are waiting, including those whose connection was lost a moment ago."""
         return len(self._waiting)
 
-    def join(self, id: str | None) -> Ticket:
+    def join(self, id: str | None, machine: str = "") -> Ticket:
         """Takes the place with this id again, or the last place of the queue.
 
+        Args:
+            id: Id of a ticket of before, if there was one.
+            machine: Machine of the visitor; empty if unknown.
+
         Raises:
-            FullError: If the queue has as many visitors as it may have.
+            FullError: If the queue has as many visitors as it may have, at all or of this machine.
         """
         before = self._waiting.get(id or "")
-        if before is None and self._spare() == 0 and len(self._waiting) >= self._most:
+        if before is None and self._spare() == 0 and self._is_full(machine):
             raise FullError
-        ticket = Ticket(before.id if before else secrets.token_urlsafe(16))
+        ticket = Ticket(before.id if before else secrets.token_urlsafe(16), machine)
         self._waiting[ticket.id] = ticket  # an id that is known keeps its position
         if before is not None:
             self._cancel_expiry(before)
@@ -109,6 +115,10 @@ class WaitingLine:
     def position(self, ticket: Ticket) -> int:
         """Position of a waiting ticket; 1 is the front."""
         return list(self._waiting).index(ticket.id) + 1
+
+    def _is_full(self, machine: str) -> bool:
+        same = [ticket for ticket in self._waiting.values() if ticket.machine == machine != ""]
+        return len(self._waiting) >= self._most or len(same) >= SHARE * self._most
 
     def _spare(self) -> int:
         return max(0, self._free() - len(self._admitted))

@@ -93,6 +93,14 @@ def test_what_is_damaged_is_made_anew(tmp_path, broken):
     assert stat.S_IMODE(os.stat(file).st_mode) == 0o600
 
 
+def test_a_key_that_others_could_read_is_made_anew(tmp_path):
+    first = own_certificate(tmp_path, HOSTS, NOW)
+    (tmp_path / NAME).chmod(0o644)
+    again = own_certificate(tmp_path, HOSTS, NOW)
+    assert again.fingerprint != first.fingerprint
+    assert stat.S_IMODE(os.stat(tmp_path / NAME).st_mode) == 0o600
+
+
 def test_a_folder_that_cannot_be_written_is_told(tmp_path):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(SettingsError, match=r"cannot be kept in .*XDG_STATE_HOME"):

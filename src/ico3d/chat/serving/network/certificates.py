@@ -133,8 +133,10 @@ def _described(certificate: x509.Certificate, file: Path, key: Path, own: bool) 
 
 
 def _read_own(file: Path) -> x509.Certificate | None:
-    """The certificate of before; None if there is none, or none that works."""
+    """The certificate of before; None if there is none that works, or others could read its key."""
     with contextlib.suppress(OSError, ValueError, ssl.SSLError):
+        if os.name == "posix" and file.stat().st_mode & 0o077:
+            return None
         ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(file, password="")
         return x509.load_pem_x509_certificate(file.read_bytes())
     return None

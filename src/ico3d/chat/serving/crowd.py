@@ -1,0 +1,60 @@
+"""How much of a server one visitor's machine may take."""
+
+import contextlib
+import ipaddress
+from collections import Counter
+from collections.abc import Iterator
+
+MOST_SOCKETS = 64
+"""Open WebSockets of one machine; a classroom or an office may share its address."""
+OWN_NETWORK = 64  # bits of an IPv6 address that tell one household from another
+
+
+class Crowd:
+    """Counts the open WebSockets of each machine."""
+
+    def __init__(self, most: int = MOST_SOCKETS):
+        """Starts without any; `most` is the largest number of one machine."""
+        self._most = most
+        self._open: Counter[str] = Counter()
+
+    @contextlib.contextmanager
+    def one_more(self, machine: str) -> Iterator[bool]:
+        """Counts a socket until it is closed; yields whether it may be opened.
+
+        Args:
+            machine: What `machine_of` returned.
+        """
+        if machine and self._open[machine] >= self._most:
+            yield False
+            return
+        self._open[machine] += 1
+        try:
+            yield True
+        finally:
+            self._open[machine] -= 1
+            if not self._open[machine]:
+                del self._open[machine]
+
+
+def machine_of(client: tuple[str, int] | None) -> str:
+    """The machine, or the household, from which a connection comes.
+
+    Args:
+        client: Address and port of the connection, as in an ASGI scope.
+
+    Returns:
+        An IPv4 address or an IPv6 network. Empty for this machine itself and where the address is
+        unknown: behind a proxy that does not tell them, all visitors would be one.
+    """
+    try:
+        address = ipaddress.ip_address(client[0]) if client else None
+    except ValueError:
+        return ""
+    if isinstance(address, ipaddress.IPv6Address):
+        address = address.ipv4_mapped or address
+    if address is None or address.is_loopback:
+        return ""
+    if isinstance(address, ipaddress.IPv4Address) or address.is_link_local:
+        return str(address)
+    return str(ipaddress.ip_network((address, OWN_NETWORK), strict=False))

@@ -1,0 +1,88 @@
+"""One machine takes neither all connections of a server nor all of its queue."""
+
+import asyncio
+import contextlib
+
+import pytest
+
+from ico3d.chat.serving.crowd import MOST_SOCKETS, Crowd, machine_of
+from ico3d.chat.serving.guard import Guard
+from ico3d.chat.serving.waiting import MOST_WAITING, FullError, WaitingLine
+
+
+@pytest.mark.parametrize(
+    ("address", "machine"),
+    [
+        ("192.168.1.20", "192.168.1.20"),
+        ("::ffff:192.168.1.20", "192.168.1.20"),
+        ("2001:db8:1:2:3::4", "2001:db8:1:2::/64"),
+        ("2001:db8:1:2:ffff::", "2001:db8:1:2::/64"),
+        ("fe80::1", "fe80::1"),  # all neighbours have one prefix
+        ("127.0.0.1", ""),
+        ("::1", ""),
+        ("::ffff:127.0.0.1", ""),
+        ("testclient", ""),
+    ],
+)
+def test_a_machine_is_known_by_its_address_or_its_network(address, machine):
+    assert machine_of((address, 50_000)) == machine
+
+
+def test_nobody_is_nobody():
+    assert machine_of(None) == ""
+
+
+def test_closed_sockets_no_longer_count():
+    crowd = Crowd(most=1)
+    for _ in range(3):
+        with contextlib.ExitStack() as held:
+            machines = ["10.0.0.7", "10.0.0.7", "10.0.0.8", "", ""]
+            may = [held.enter_context(crowd.one_more(machine)) for machine in machines]
+        assert may == [True, False, True, True, True]
+
+
+async def test_silent_sockets_of_one_machine_leave_room_for_others():
+    held = asyncio.Event()
+
+    async def app(scope, receive, send):
+        await send({"type": "websocket.accept"})
+        await held.wait()
+
+    guard = Guard(app, "0.0.0.0")
+
+    async def come(address):
+        sent = []
+
+        async def send(message):
+            sent.append(message["type"])
+
+        async def receive():
+            return {"type": "websocket.connect"}
+
+        headers = [(b"host", b"10.0.0.1:8765")]
+        scope = {"type": "websocket", "path": "/ws", "query_string": b"", "headers": headers}
+        task = asyncio.create_task(guard(scope | {"client": (address, 1)}, receive, send))
+        await asyncio.sleep(0)
+        return task, sent
+
+    many = [await come("10.0.0.7") for _ in range(MOST_SOCKETS)]
+    refused = await come("10.0.0.7")
+    neighbour = await come("10.0.0.8")
+    assert all(sent == ["websocket.accept"] for _, sent in [*many, neighbour])
+    assert refused[1] == ["websocket.close"]
+    held.set()
+    await asyncio.gather(*(task for task, _ in [*many, refused, neighbour]))
+    _, again = await come("10.0.0.7")
+    assert again == ["websocket.accept"]
+
+
+async def test_dropped_pages_of_one_machine_leave_half_of_the_queue():
+    line = WaitingLine(lambda: 0)
+    for _ in range(MOST_WAITING // 2):
+        line.leave(line.join(None, "10.0.0.7"), for_good=False)
+    with pytest.raises(FullError):
+        line.join(None, "10.0.0.7")
+    for number in range(MOST_WAITING // 2):
+        line.join(None, f"10.0.1.{number}")
+    with pytest.raises(FullError):
+        line.join(None, "")
