@@ -1,3 +1,4 @@
+import type { Part } from '../bundle/load.ts';
 import { atEnd } from '../lifetime.ts';
 import type { PlaceMessage } from '../protocol.ts';
 import type { Ending } from '../talk/connection.ts';
@@ -7,11 +8,16 @@ import { inWords } from './queue.ts';
 /** How the visitor wants to talk. */
 export type Choice = 'voice' | 'typing';
 
+/** What is on its way, in words. */
+const COMING: Record<Part, string> = { face: 'The face is coming …', body: 'The body is coming …', place: 'The room is coming …' };
+const READY = 'Nearly there …';
+
 /** The first screen: picture, progress, the button that lets sound play, or what went wrong and a way on. */
 export class Overlay {
   private readonly page: HTMLElement;
   private readonly root: HTMLElement;
   private readonly bar: HTMLProgressElement;
+  private readonly words: HTMLElement;
   private readonly thumbnail: HTMLImageElement;
   private readonly waiting: HTMLElement;
   private readonly button: HTMLButtonElement;
@@ -27,6 +33,7 @@ export class Overlay {
     this.page = page;
     this.root = byId(page, 'overlay');
     this.bar = byId(page, 'progress');
+    this.words = byId(page, 'coming');
     this.thumbnail = byId(page, 'thumbnail');
     this.waiting = byId(page, 'overlay-wait');
     this.button = byId(page, 'again');
@@ -41,13 +48,15 @@ export class Overlay {
     this.thumbnail.onload = () => (this.thumbnail.hidden = false);
   }
 
-  progress(fraction: number): void {
+  /** @param coming what is on its way */
+  progress(fraction: number, coming: Part | null): void {
     this.bar.value = fraction;
+    this.bar.setAttribute('aria-valuetext', this.words.textContent = coming ? COMING[coming] : READY);
   }
 
   /** Resolves when the visitor chooses; browsers play sound only after such a click. */
   choose(): Promise<Choice> {
-    this.bar.hidden = true;
+    this.bar.hidden = this.words.hidden = true;
     byId(this.root, 'choices').hidden = false;
     const start = byId<HTMLButtonElement>(this.root, 'start');
     focusOn(start);
@@ -111,7 +120,7 @@ export class Overlay {
 
   /** Covers the page with a sentence. */
   private show(sentence: string): void {
-    this.bar.hidden = byId(this.root, 'choices').hidden = true;
+    this.bar.hidden = this.words.hidden = byId(this.root, 'choices').hidden = true;
     const text = byId(this.root, 'overlay-error');
     if (text.textContent !== sentence) text.textContent = sentence; // what is said again need not be read aloud again
     text.hidden = byId(this.root, 'check').hidden = false;
