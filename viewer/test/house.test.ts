@@ -9,7 +9,7 @@ const MOST_FILES = 15; // beside sub-folders
 
 /** The rooms of `src`; each may import those of the lines above its own, none beside it. */
 const ORDER = [
-  ['half.ts', 'splat-shader.ts'],
+  ['half.ts', 'splat-shader.ts', 'growth.ts'],
   ['protocol.ts', 'shared.ts', 'errors.ts', 'actor.ts', 'lifetime.ts', 'server.ts'],
   ['bundle'],
   ['rig'],
@@ -20,6 +20,7 @@ const ORDER = [
   ['body', 'stage', 'audio'],
   ['talk'],
   ['ui', 'cast.ts'],
+  ['theatre.ts'],
   ['visit.ts', 'check'],
   ['bench.ts'],
   ['main.ts', 'embed'],
