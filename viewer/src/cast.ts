@@ -2,11 +2,11 @@ import { Vector3 } from 'three';
 import type { Actor } from './actor.ts';
 import { Body } from './body/body.ts';
 import { ActingBody } from './body/skinned/acting.ts';
-import { readBakedSkinned } from './body/skinned/baked.ts';
+import { readBakedSkinned, readSkinnedRows } from './body/skinned/baked.ts';
 import { SkinnedBody } from './body/skinned/body.ts';
 import { Timeline } from './body/timeline.ts';
 import { readBakedWindow } from './body/window.ts';
-import { GESTURES, SKINNED, type BundleFiles } from './bundle/load.ts';
+import { GESTURES, SKINNED, SKINNED_REST, type BundleFiles } from './bundle/load.ts';
 import { bodyOf, type AnyBody, type BodyInfo, type HeadInfo, type Manifest, type SkinnedInfo } from './bundle/manifest.ts';
 import { BodyLanguage } from './gesture/performing/body-language.ts';
 import { readRepertoire } from './gesture/repertoire.ts';
@@ -45,6 +45,14 @@ export async function makeCast(manifest: Manifest, files: BundleFiles, stage: St
   const backdrop = stage.transparent ? undefined : ((await makeBackdrop(files)) ?? undefined);
   if (backdrop) stage.add(backdrop);
   return { backdrop, ...(await makePeople(manifest, files, stage, calm, ports)) };
+}
+
+/** Fetches the less important Gaussians of who is on stage, where they have files of their own, and shows them. */
+export async function refine({ head: info, skinned: body }: Manifest, files: BundleFiles, { head, skinned }: Cast): Promise<void> {
+  if (head && info!.num_rest) head.refine(await files.headRest(info!));
+  if (skinned && body!.num_rest) {
+    skinned.refine(readSkinnedRows(await files.tensors(SKINNED_REST), body!.num_rest, body!, SKINNED_REST));
+  }
 }
 
 async function makePeople(manifest: Manifest, files: BundleFiles, stage: Stage, calm: boolean, ports: CastPorts): Promise<Cast> {

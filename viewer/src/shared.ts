@@ -4,7 +4,7 @@
 export const BUNDLE_FORMAT = "ico3d-bundle";
 
 /** The newest version of a manifest. */
-export const BUNDLE_VERSION = 4;
+export const BUNDLE_VERSION = 5;
 
 /** The oldest version that is read. */
 export const OLDEST_BUNDLE = 1;

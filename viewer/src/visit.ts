@@ -131,8 +131,9 @@ export class Visit {
   /** Asks for the files without which there is nobody to see. */
   private ask(manifest: Manifest): BundleFiles {
     const first = filesToFirstSight(manifest, this.ports.transparent);
-    const total = first.reduce((sum, name) => sum + manifest.files[name]!.size, 0);
-    const more = () => this.overlay.progress(Math.min(1, files.loaded / total));
+    const window = manifest.head && manifest.body?.windows[0]!.file; // the first to come is about as large
+    const total = [...first, ...(window ? [window] : [])].reduce((sum, name) => sum + manifest.files[name]!.size, 0);
+    const more = () => this.overlay.progress(Math.min(1, files.loaded / total), files.fetching);
     const files: BundleFiles = new BundleFiles(this.server.file.bind(this.server), manifest.files, more, this.ending.signal);
     files.ask(first);
     return files;
@@ -141,15 +142,15 @@ export class Visit {
   /** Brings everybody on stage and waits until they can be seen. */
   private async enter(theatre: Theatre, manifest: Manifest, files: BundleFiles, stage: Stage, conversation?: Conversation): Promise<Cast> {
     const { signal } = this.ending;
-    const cast = await theatre.makeCast(manifest, files, stage, this.calm, {
-      heard: () => conversation?.player.heard() ?? null,
-      failed: (error) => signal.aborted || showNotice(this.root, this.ports.words, sentenceOf(error)),
-    });
+    const failed = (error: unknown) => signal.aborted || showNotice(this.root, this.ports.words, sentenceOf(error));
+    const heard = () => conversation?.player.heard() ?? null;
+    const cast = await theatre.makeCast(manifest, files, stage, this.calm, { heard, failed });
     signal.throwIfAborted();
     stage.start();
     await cast.body?.ready();
     stage.bytes = files.loaded;
     signal.throwIfAborted();
+    void theatre.refine(manifest, files, cast).catch(failed);
     return cast;
   }
 

@@ -13,13 +13,13 @@ from ico3d.bundle.animation import ANIMATION, Animation
 from ico3d.bundle.archive import Archive, open_archive, write_zip
 from ico3d.bundle.backdrop import BACKGROUNDS, check_background
 from ico3d.bundle.body import BakedWindow
-from ico3d.bundle.head import HEAD, POSES, BakedHead, poses_from_bytes
+from ico3d.bundle.head import HEAD, HEAD_REST, POSES, BakedHead, poses_from_bytes
 from ico3d.bundle.manifest import MANIFEST, FileEntry, Manifest, check_manifest
 from ico3d.bundle.onnx_check import check_onnx
 from ico3d.bundle.packaged import bundle_path
 from ico3d.bundle.skinned.baked import BakedSkinned
 from ico3d.bundle.skinned.gestures import GESTURES, gestures_from
-from ico3d.bundle.skinned.info import SKINNED
+from ico3d.bundle.skinned.info import SKINNED, SKINNED_REST
 from ico3d.errors import BundleError
 from ico3d.motion.clip import Clip
 from ico3d.motion.recorded.cut import Cut
@@ -27,6 +27,8 @@ from ico3d.motion.recorded.cut import Cut
 SPEECH = "speech.onnx"
 THUMBNAIL = "thumbnail.png"
 LICENSES = "LICENSES.txt"
+FIRST_BYTES = 800_000
+"""Size of what comes first of a large head, and of a large body on a skeleton."""
 
 
 class Bundle:
@@ -130,14 +132,16 @@ class Bundle:
         info = self.manifest.head
         self.head = self.world_from_head = None
         if info is not None:
-            self.head = BakedHead.from_bytes(self.read(HEAD), info)
+            rest = self.read(HEAD_REST) if info.num_rest else b""
+            self.head = BakedHead.from_bytes(self.read(HEAD), info, rest)
             self.world_from_head = poses_from_bytes(self.read(POSES), info.num_poses)
         for index in range(len(self.manifest.body.windows) if self.manifest.body else 0):
             self.window(index)  # not kept: together they may be large
         self.skinned = self.gestures = self.animation = None
         self.cuts, self.hung = (), None
         if self.manifest.skinned is not None:
-            self.skinned = BakedSkinned.from_bytes(self.read(SKINNED), self.manifest.skinned)
+            rest = self.read(SKINNED_REST) if self.manifest.skinned.num_rest else b""
+            self.skinned = BakedSkinned.from_bytes(self.read(SKINNED), self.manifest.skinned, rest)
             if GESTURES in self.manifest.files:
                 found = gestures_from(self.read(GESTURES), self.skinned)
                 self.gestures, self.cuts, self.hung = found.clips, found.cuts, found.hung
@@ -176,6 +180,44 @@ def write_bundle(path: Path | str, manifest: Manifest, files: Mapping[str, bytes
     _check_required(written)
     write_zip(Path(path), {MANIFEST: written.to_json(), **dict(sorted(files.items()))})
     return written
+
+
+def coarse_first(
+    manifest: Manifest, files: Mapping[str, bytes], most: int = FIRST_BYTES
+) -> tuple[Manifest, dict[str, bytes]]:
+    """Divides the files of a head and of a body on a skeleton that are large.
+
+    Then a page shows somebody from the first Gaussians while the others are still coming.
+
+    Args:
+        manifest: The manifest. Gaussians must be sorted by importance.
+        files: Contents by name.
+        most: Size in bytes of first files. One that is larger by less than a half stays whole.
+
+    Returns:
+        The manifest with `num_rest`, and the files.
+    """
+    divided = dict(files)
+    if manifest.head is not None:
+        head = manifest.head
+        first = _first_of(head.num_gaussians, len(files[HEAD]), most)
+        if first < head.num_gaussians:
+            baked = BakedHead.from_bytes(files[HEAD], head)
+            divided[HEAD], divided[HEAD_REST] = baked.split(first)
+            manifest = replace(manifest, head=replace(head, num_rest=head.num_gaussians - first))
+    if manifest.skinned is not None:
+        body = manifest.skinned
+        first = _first_of(body.num_gaussians, len(files[SKINNED]), most)
+        if first < body.num_gaussians:
+            baked = BakedSkinned.from_bytes(files[SKINNED], body)
+            divided[SKINNED], divided[SKINNED_REST] = baked.split(first)
+            manifest = replace(manifest, skinned=replace(body, num_rest=body.num_gaussians - first))
+    return manifest, divided
+
+
+def _first_of(count: int, size: int, most: int) -> int:
+    """Number of Gaussians in a first file of at most `most` bytes, of `count` in `size` bytes."""
+    return count if size <= 1.5 * most else max(1, count * most // size)
 
 
 def read_background(path: Path) -> dict[str, bytes]:
@@ -233,11 +275,11 @@ def _check_required(manifest: Manifest) -> None:
     if manifest.speech:
         required |= {SPEECH}
     if manifest.head:
-        required |= {HEAD, POSES}
+        required |= {HEAD, POSES} | ({HEAD_REST} if manifest.head.num_rest else set())
     if manifest.body:
         required |= {window.file for window in manifest.body.windows}
     if manifest.skinned:
-        required |= {SKINNED}
+        required |= {SKINNED} | ({SKINNED_REST} if manifest.skinned.num_rest else set())
     if manifest.is_whole:
         required |= {ANIMATION}
     for name in sorted(required - set(manifest.files)):

@@ -5,11 +5,27 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ico3d.bundle.manifest import HeadInfo
-from ico3d.bundle.tensors import Spec, decode_tensors, encode_tensors
+from ico3d.bundle.tensors import (
+    Axes,
+    Spec,
+    decode_tensors,
+    encode_tensors,
+    join_tensors,
+    split_tensors,
+)
 from ico3d.errors import BundleError
 
 HEAD = "head.safetensors"
+HEAD_REST = "head_rest.safetensors"
 POSES = "head_poses.safetensors"
+_AXES: Axes = {
+    "means": 0,
+    "quats": 0,
+    "scales": 0,
+    "mean_logits": 0,
+    "basis": 1,
+    "basis_scale": 0,
+}
 _MAX_LOG_SCALE = 10.0
 _MAX_LENGTH = 1e4
 """Metres; anything farther is no person, and overflows when it is squared in a shader."""
@@ -18,6 +34,8 @@ _MAX_LENGTH = 1e4
 @dataclass(frozen=True)
 class BakedHead:
     """N Gaussians in canonical head space; colour and opacity are low-rank in the expression.
+
+    Baked heads have their Gaussians sorted by importance.
 
     Attributes:
         means: (N, 3) float32 metres.
@@ -69,21 +87,45 @@ class BakedHead:
         Raises:
             BundleError: If shapes or dtypes do not fit one another, or a value is out of range.
         """
-        tensors = {f.name: getattr(self, f.name) for f in fields(self)}
-        spec = _head_spec(self.num_gaussians, self.rank, self.hidden, self.expression_size)
-        data = encode_tensors(tensors, spec, HEAD)
+        data = encode_tensors(self._tensors, self._spec, HEAD)
         _check_values(self)
         return data
 
-    @staticmethod
-    def from_bytes(data: bytes, info: HeadInfo) -> "BakedHead":
-        """Reads `head.safetensors` and checks it against the manifest's counts.
+    def split(self, first: int) -> tuple[bytes, bytes]:
+        """Contents of `head.safetensors` with the first Gaussians, and `head_rest.safetensors`.
 
         Raises:
-            BundleError: If the file is malformed or does not fit the manifest.
+            BundleError: If shapes or dtypes do not fit one another, or a value is out of range.
+        """
+        _check_values(self)
+        return split_tensors(self._tensors, self._spec, _AXES, first, (HEAD, HEAD_REST))
+
+    @property
+    def _tensors(self) -> dict[str, np.ndarray]:
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    @property
+    def _spec(self) -> Spec:
+        return _head_spec(self.num_gaussians, self.rank, self.hidden, self.expression_size)
+
+    @staticmethod
+    def from_bytes(data: bytes, info: HeadInfo, rest: bytes = b"") -> "BakedHead":
+        """Reads a head and checks it against the manifest's counts.
+
+        Args:
+            data: Content of `head.safetensors`.
+            info: The manifest's entry.
+            rest: Content of `head_rest.safetensors`, where the entry has `num_rest`.
+
+        Raises:
+            BundleError: If a file is malformed or does not fit the manifest.
         """
         spec = _head_spec(info.num_gaussians, info.rank, info.hidden, info.expression_size)
-        head = BakedHead(**decode_tensors(data, spec, HEAD))
+        if info.num_rest:
+            tensors = join_tensors((data, rest), spec, _AXES, info.num_rest, (HEAD, HEAD_REST))
+        else:
+            tensors = decode_tensors(data, spec, HEAD)
+        head = BakedHead(**tensors)
         _check_values(head)
         return head
 

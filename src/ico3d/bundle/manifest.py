@@ -11,11 +11,13 @@ from ico3d.common.typed import Rules, fill, parse_json, plain
 from ico3d.errors import BundleError
 
 FORMAT = "ico3d-bundle"
-VERSION = 4
+VERSION = 5
 SINCE = {"body": 2, "skinned": 3}
 """Version in which a field appeared; in older manifests that field is read as null."""
 SINCE_CASTERS = 4
 """Version in which a body on a skeleton got `num_casters`; older ones cast no shadow."""
+SINCE_REST = 5
+"""Version in which heads and bodies on a skeleton got `num_rest`; older ones are in one file."""
 OLDEST = 1
 MANIFEST = "manifest.json"
 
@@ -44,6 +46,8 @@ class HeadInfo:
         fps: Head poses per second; on a body the body's frame rate.
         num_poses: F, number of head poses; on a body one for each frame of the body.
         idle_expression: (B,) expression of the neutral face in silence with open eyes.
+        num_rest: Number of the Gaussians in `head_rest.safetensors`, the least important ones; 0
+            where all are in one file.
     """
 
     num_gaussians: int
@@ -56,6 +60,7 @@ class HeadInfo:
     fps: float
     num_poses: int
     idle_expression: tuple[float, ...]
+    num_rest: int = 0
 
 
 @dataclass(frozen=True)
@@ -213,6 +218,12 @@ class Manifest:
             raise BundleError(f"{MANIFEST}: is larger than {limits.MAX_MANIFEST_BYTES} bytes.")
         value = parse_json(data, MANIFEST, BundleError)
         _check_version(value)
+        if value["version"] < SINCE_REST:
+            value |= {
+                part: {"num_rest": 0, **value[part]}
+                for part in ("head", "skinned")
+                if isinstance(value.get(part), dict)
+            }
         missing = {name for name, since in SINCE.items() if value["version"] < since} - set(value)
         if value["version"] < SINCE_CASTERS and isinstance(value.get("skinned"), dict):
             value = {**value, "skinned": {"num_casters": 0, **value["skinned"]}}
@@ -271,6 +282,8 @@ def _check_head(head: HeadInfo) -> None:
     }
     for name, top in ranges.items():
         _require(1 <= getattr(head, name) <= top, f"head.{name}", f"lie between 1 and {top}")
+    inside = 0 <= head.num_rest < head.num_gaussians
+    _require(inside, "head.num_rest", "be less than head.num_gaussians")
     _require(head.inputs in ("speech", "blendshapes"), "head.inputs", "be speech or blendshapes")
     _require(0 < head.fps <= 1000, "head.fps", "lie between 0 and 1000")
     size = head.expression_size

@@ -21,6 +21,8 @@ _MAX_HEADER_BYTES = 1 << 16
 
 Spec = Mapping[str, tuple[str, tuple[int, ...]]]
 """For each tensor that a file must hold, by name: safetensors dtype and shape."""
+Axes = Mapping[str, int]
+"""For each tensor with one row per Gaussian, by name: the axis of these rows."""
 
 
 def encode_tensors(tensors: Mapping[str, np.ndarray], spec: Spec, name: str) -> bytes:
@@ -67,6 +69,68 @@ def decode_tensors(data: bytes, spec: Spec, name: str) -> dict[str, np.ndarray]:
         _check_finite(tensors[key], key, name)
     _check_cover(spans, len(data) - start, name)
     return tensors
+
+
+def split_tensors(
+    tensors: Mapping[str, np.ndarray], spec: Spec, axes: Axes, first: int, names: tuple[str, str]
+) -> tuple[bytes, bytes]:
+    """Serialises tensors as two files, of which the first can be used alone.
+
+    Args:
+        tensors: The tensors.
+        spec: What they are together.
+        axes: The tensors with one row per Gaussian.
+        first: Number of Gaussians in the first file.
+        names: Names of the two files, for errors.
+
+    Returns:
+        The first Gaussians with everything that all share, and the other Gaussians.
+
+    Raises:
+        BundleError: If a tensor does not comply with `spec`.
+    """
+    cut = {key: np.split(tensors[key], [first], axis) for key, axis in axes.items()}
+    head = dict(tensors) | {key: parts[0] for key, parts in cut.items()}
+    rest = {key: parts[1] for key, parts in cut.items()}
+    count = tensors[next(iter(axes))].shape[axes[next(iter(axes))]]
+    own, other = _rows(spec, axes, first), _rows(spec, axes, count - first)
+    return (
+        encode_tensors(head, own, names[0]),
+        encode_tensors(rest, {key: other[key] for key in axes}, names[1]),
+    )
+
+
+def join_tensors(
+    files: tuple[bytes, bytes], spec: Spec, axes: Axes, rest: int, names: tuple[str, str]
+) -> dict[str, np.ndarray]:
+    """Decodes what `split_tensors` has written.
+
+    Args:
+        files: Contents of the two files.
+        spec: What the tensors are together.
+        axes: The tensors with one row per Gaussian.
+        rest: Number of Gaussians in the second file.
+        names: Names of the two files, for errors.
+
+    Raises:
+        BundleError: If a file is malformed or does not comply.
+    """
+    key, axis = next(iter(axes.items()))
+    own = _rows(spec, axes, spec[key][1][axis] - rest)
+    other = _rows(spec, axes, rest)
+    tensors = decode_tensors(files[0], own, names[0])
+    more = decode_tensors(files[1], {key: other[key] for key in axes}, names[1])
+    joined = {key: np.concatenate([tensors[key], more[key]], axis) for key, axis in axes.items()}
+    return tensors | joined
+
+
+def _rows(spec: Spec, axes: Axes, count: int) -> Spec:
+    """The same tensors with `count` Gaussians."""
+    changed = dict(spec)
+    for key, axis in axes.items():
+        dtype, shape = spec[key]
+        changed[key] = dtype, (*shape[:axis], count, *shape[axis + 1 :])
+    return changed
 
 
 def _header(data: bytes, name: str) -> tuple[dict[str, Any], int]:

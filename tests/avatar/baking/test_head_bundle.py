@@ -1,5 +1,7 @@
 """Baking a planted head, from its pictures to the bundle that is opened again."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -51,6 +53,18 @@ def test_a_higher_rank_is_better_and_larger(fitted):
     losses = [head_cost.measure(maker.baked(rank), views) for rank in (1, 4, 16)]
     likeness = [loss.psnr_baked_vs_exact or 0.0 for loss in losses]
     assert likeness[0] + 2 < likeness[1] < likeness[2]
+
+
+def test_what_matters_most_comes_first(fitted):
+    head, capture, plain = fitted
+    importance = np.random.default_rng(0).uniform(0.1, 1, (len(head.model), 4)).astype(np.float32)
+    recorded = expressions(head, capture, capture.split.train)
+    baked = HeadBaker(head.model, recorded, importance, 2, replace(QUICK, steps=1)).baked(2)
+    means = head.model.means.detach().numpy().astype(np.float32)  # (N, 3)
+    order = np.argsort(-importance.sum(1))
+    kept = {tuple(mean) for mean in plain.baked(1).means}
+    expected = [mean for mean in means[order] if tuple(mean) in kept]
+    np.testing.assert_array_equal(baked.means, expected)
 
 
 def test_gaussians_that_are_never_drawn_are_dropped(blendshape_head):

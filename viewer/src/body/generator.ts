@@ -1,6 +1,6 @@
 import { dyno, SplatGenerator, SplatTransformer } from '@sparkjsdev/spark';
 import * as THREE from 'three';
-import { splatGenerator, type Generator } from '../splat-shader.ts';
+import { splatGenerator, type Generator } from '../gaussians/splat-shader.ts';
 import { coefficientPlaces, coefficientTexels, type Capacity, type PackedWindow } from './packed.ts';
 import { coefficientsAt } from './window.ts';
 

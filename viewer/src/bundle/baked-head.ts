@@ -1,8 +1,8 @@
 import type { HeadInfo } from './manifest.ts';
 import { takeTensor, type Tensor } from './safetensors.ts';
 
-/** A baked head (`docs/bundle.md`): N Gaussians, K basis vectors, a small network from B values. */
-export interface BakedHead {
+/** Gaussians of a head: N of them, with K basis vectors. */
+export interface HeadRows {
   count: number; // N
   rank: number; // K
   means: Float32Array; // (N,3) metres
@@ -11,6 +11,10 @@ export interface BakedHead {
   meanLogits: Float32Array; // (N,4) r, g, b, opacity
   basis: Int8Array; // (K,N,4)
   basisScale: Float32Array; // (N,)
+}
+
+/** A baked head (`docs/bundle.md`): its Gaussians, or the most important ones, and a small network from B values. */
+export interface BakedHead extends HeadRows {
   network: Network;
 }
 
@@ -25,9 +29,27 @@ export interface Network {
   b2: Float32Array; // (K,)
 }
 
-/** Takes a head's tensors out of its file, checked against the manifest's counts. */
+/** Takes a head's tensors out of its first file, checked against the manifest's counts. */
 export function readBakedHead(tensors: Map<string, Tensor>, head: HeadInfo, file: string): BakedHead {
-  const { num_gaussians: n, rank: k, hidden: h, expression_size: b } = head;
+  const { num_gaussians: n, num_rest: rest, rank: k, hidden: h, expression_size: b } = head;
+  const take = <T>(name: string, dtype: Tensor['dtype'], shape: number[]): T =>
+    takeTensor(tensors, name, dtype, shape, file).data as T;
+  return {
+    ...readHeadRows(tensors, n - rest, k, file),
+    network: {
+      inputs: b,
+      hidden: h,
+      outputs: k,
+      w1: take('w1', 'F32', [b, h]),
+      b1: take('b1', 'F32', [h]),
+      w2: take('w2', 'F32', [h, k]),
+      b2: take('b2', 'F32', [k]),
+    },
+  };
+}
+
+/** Takes `n` Gaussians of a head with `k` basis vectors out of a file. */
+export function readHeadRows(tensors: Map<string, Tensor>, n: number, k: number, file: string): HeadRows {
   const take = <T>(name: string, dtype: Tensor['dtype'], shape: number[]): T =>
     takeTensor(tensors, name, dtype, shape, file).data as T;
   return {
@@ -39,14 +61,5 @@ export function readBakedHead(tensors: Map<string, Tensor>, head: HeadInfo, file
     meanLogits: take('mean_logits', 'F16', [n, 4]),
     basis: take('basis', 'I8', [k, n, 4]),
     basisScale: take('basis_scale', 'F32', [n]),
-    network: {
-      inputs: b,
-      hidden: h,
-      outputs: k,
-      w1: take('w1', 'F32', [b, h]),
-      b1: take('b1', 'F32', [h]),
-      w2: take('w2', 'F32', [h, k]),
-      b2: take('b2', 'F32', [k]),
-    },
   };
 }

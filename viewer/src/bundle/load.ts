@@ -1,14 +1,14 @@
 import { PageError } from '../errors.ts';
 import { say } from '../words/text.ts';
 import { checkAnimation, type AnimationInfo } from './animation.ts';
-import { readBakedHead, type BakedHead } from './baked-head.ts';
+import { readBakedHead, readHeadRows, type BakedHead, type HeadRows } from './baked-head.ts';
 import { checkManifest, type AnyBody, type HeadInfo, type Manifest } from './manifest.ts';
 import { parseSafetensors, takeTensor, type Tensor } from './safetensors.ts';
 
 /** A head's files, checked and ready for the GPU. */
 export interface HeadFiles {
   info: HeadInfo;
-  baked: BakedHead;
+  baked: BakedHead; // its most important Gaussians, if others have a file of their own
   poses: Float32Array; // (F,4,4) row-major world_from_head
 }
 
@@ -16,10 +16,14 @@ export interface HeadFiles {
 const BACKGROUNDS = ['background.spz', 'background.ply'];
 
 const HEAD_FILES = ['head.safetensors', 'head_poses.safetensors'] as const;
+const HEAD_REST = 'head_rest.safetensors';
 const ANIMATION = 'animation.json';
 
 /** The file of a body on a skeleton. */
 export const SKINNED = 'body/skinned.safetensors';
+
+/** Its less important Gaussians, where they have a file of their own. */
+export const SKINNED_REST = 'body/skinned_rest.safetensors';
 
 /** What such a body can do besides what was recorded. */
 export const GESTURES = 'body/gestures.safetensors';
@@ -37,23 +41,35 @@ export async function loadManifest(locate: Locate, signal?: AbortSignal): Promis
 }
 
 /**
- * What must come before there is somebody to see, the face first.
+ * What must come before there is somebody to see, the face first; of a person's windows, their animation says which.
  *
  * @param alone nothing is shown behind them
  */
 export function filesToFirstSight({ head, body, skinned, files }: Manifest, alone = false): string[] {
   const names: string[] = head ? [...HEAD_FILES] : [];
   if (head && (body || skinned)) names.push(ANIMATION);
-  if (body) names.push(body.windows[0]!.file);
+  if (body && !head) names.push(body.windows[0]!.file);
   if (skinned) names.push(SKINNED, GESTURES);
   if (!alone) names.push(...BACKGROUNDS);
   return names.filter((name) => name in files);
+}
+
+/** What somebody is made of, in the order in which it is told. */
+export const PARTS = ['face', 'body', 'place'] as const;
+export type Part = (typeof PARTS)[number];
+
+/** What a file belongs to. */
+function partOf(name: string): Part {
+  if (name.startsWith('head')) return 'face';
+  return (BACKGROUNDS as readonly string[]).includes(name) ? 'place' : 'body';
 }
 
 /** The files of a bundle, fetched when they are asked for; each must be as long as promised, and have the promised hash. */
 export class BundleFiles {
   /** Bytes that came so far. */
   loaded = 0;
+  /** Files that were asked for and have not come yet. */
+  private readonly coming = new Set<string>();
   private readonly locate: Locate;
   private readonly promised: Manifest['files'];
   private readonly onBytes: () => void;
@@ -91,6 +107,11 @@ export class BundleFiles {
     };
   }
 
+  /** The less important Gaussians of a head, which have a file of their own. */
+  async headRest({ num_rest, rank }: HeadInfo): Promise<HeadRows> {
+    return readHeadRows(await this.tensors(HEAD_REST), num_rest, rank, HEAD_REST);
+  }
+
   /** How a whole person moves. */
   async animation(body: AnyBody): Promise<AnimationInfo> {
     return checkAnimation(parseJson(new TextDecoder().decode(await this.bytes(ANIMATION))), body);
@@ -118,7 +139,22 @@ export class BundleFiles {
     return coming;
   }
 
+  /** What is being fetched, the face before all else; null for nothing. */
+  get fetching(): Part | null {
+    const parts = new Set([...this.coming].map(partOf));
+    return PARTS.find((part) => parts.has(part)) ?? null;
+  }
+
   private async fetch(name: string): Promise<ArrayBuffer> {
+    this.coming.add(name);
+    try {
+      return await this.receive(name);
+    } finally {
+      this.coming.delete(name);
+    }
+  }
+
+  private async receive(name: string): Promise<ArrayBuffer> {
     const entry = this.promised[name];
     if (!entry) throw new PageError(`manifest.json does not list ${name}.`);
     const reader = (await get(this.locate(name, entry.sha256), name, this.signal)).body!.getReader();

@@ -32,6 +32,7 @@ export interface HeadInfo {
   fps: number;
   num_poses: number;
   idle_expression: number[];
+  num_rest: number; // of the Gaussians, in a file of their own
 }
 
 /** A span of the body's frames, both ends inside, with Gaussians of its own. */
@@ -66,6 +67,7 @@ export interface SkinnedInfo {
   low: [number, number, number]; // bounds of what is seen at any time, world space
   high: [number, number, number];
   num_casters: number; // spheres that cast shadows; 0 without a lamp
+  num_rest: number; // of the Gaussians, in a file of their own
 }
 
 /** What the page reads of `manifest.json`; `docs/bundle.md` describes it whole. */
@@ -93,9 +95,10 @@ export function checkManifest(value: unknown): Manifest {
   if (!(manifest.version! >= OLDEST_BUNDLE && manifest.version! <= BUNDLE_VERSION)) {
     throw new PageError(`This avatar has format version ${manifest.version}; the page reads up to ${BUNDLE_VERSION}.`);
   }
-  const { head, camera, background } = manifest;
+  const { camera, background } = manifest;
   const body = manifest.body ?? null; // older manifests do not know of it
-  const skinned = manifest.skinned ? { ...manifest.skinned, num_casters: manifest.skinned.num_casters ?? 0 } : null;
+  const head = manifest.head && { ...manifest.head, num_rest: manifest.head.num_rest ?? 0 };
+  const skinned = manifest.skinned ? withDefaults(manifest.skinned) : null;
   if (!head && !body && !skinned) bad('head');
   if (body && skinned) bad('skinned');
   if (head) checkHead(head);
@@ -106,13 +109,23 @@ export function checkManifest(value: unknown): Manifest {
   for (const key of ['eye', 'target', 'up'] as const) if (!isNumbers(camera?.[key], 3)) bad(`camera.${key}`);
   if (!(camera.fov_y > 0 && camera.fov_y < 180)) bad('camera.fov_y');
   if (!isNumbers(background, 3)) bad('background');
-  return { ...manifest, body, skinned };
+  return { ...manifest, head, body, skinned };
+}
+
+function withDefaults(info: SkinnedInfo): SkinnedInfo {
+  return { ...info, num_casters: info.num_casters ?? 0, num_rest: info.num_rest ?? 0 };
+}
+
+/** Whether so many of all Gaussians may lie in a file of their own. */
+function isRest(rest: number, all: number): boolean {
+  return Number.isInteger(rest) && rest >= 0 && rest < all;
 }
 
 function checkHead(head: HeadInfo): void {
   for (const key of ['num_gaussians', 'rank', 'hidden', 'expression_size', 'num_poses', 'fps'] as const) {
     if (!isPositive(head[key])) bad(`head.${key}`);
   }
+  if (!isRest(head.num_rest, head.num_gaussians)) bad('head.num_rest');
   if (!isNumbers(head.idle_expression, head.expression_size)) bad('head.idle_expression');
 }
 
@@ -147,6 +160,7 @@ function checkSkinned(info: SkinnedInfo): void {
   const most = { num_frames: Infinity, num_gaussians: MAX_GAUSSIANS, num_shapes: MAX_SHAPES, num_moving: names.length, num_known: info.num_frames };
   for (const [key, top] of Object.entries(most)) if (!isCount(info[key as keyof typeof most], top)) bad(`skinned.${key}`);
   if (info.num_frames < 2) bad('skinned.num_frames');
+  if (!isRest(info.num_rest, info.num_gaussians)) bad('skinned.num_rest');
   if (info.num_casters !== 0 && !isCount(info.num_casters, MAX_CASTERS)) bad('skinned.num_casters');
 }
 

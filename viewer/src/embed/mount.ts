@@ -1,7 +1,7 @@
 import { Player } from '../audio/player.ts';
 import { BundleFiles, loadManifest } from '../bundle/load.ts';
 import { blinkIndices, type HeadInfo, type Manifest } from '../bundle/manifest.ts';
-import { makeCast, type Cast } from '../cast.ts';
+import { makeCast, refine, type Cast } from '../cast.ts';
 import { PageError } from '../errors.ts';
 import { Face } from '../face/face.ts';
 import { IdleFace } from '../face/idle.ts';
@@ -107,6 +107,7 @@ class Mounted implements AvatarHandle {
     this.express(null);
     this.stage.start();
     await this.cast.body?.ready();
+    void refine(manifest, files, this.cast).catch(failed);
   }
 
   express(expression: ArrayLike<number> | null): void {

@@ -1,7 +1,7 @@
 import { dyno, SplatGenerator, SplatTransformer } from '@sparkjsdev/spark';
 import * as THREE from 'three';
-import type { BakedHead } from '../bundle/baked-head.ts';
-import { splatGenerator, type Generator } from '../splat-shader.ts';
+import type { BakedHead, HeadRows } from '../bundle/baked-head.ts';
+import { splatGenerator, type Generator } from '../gaussians/splat-shader.ts';
 import { coefficients } from './coefficients.ts';
 
 const WIDTH = 1024; // texels per row: one texel is one Gaussian
@@ -17,13 +17,18 @@ const PACKED = 4; // basis vectors in a texel: a fetch costs far more than takin
 export class HeadGenerator extends SplatGenerator {
   private readonly network: BakedHead['network'];
   private readonly values: Float32Array; // (K,) uniform, shared with the GPU program
+  private readonly texels: Texels;
+  private readonly grown: { value: number }; // share of their opacity that Gaussians have which came later
 
-  constructor(head: BakedHead) {
+  /** @param capacity number of all its Gaussians, of which `head` may have the first only */
+  constructor(head: BakedHead, capacity = head.count) {
     const values = new Float32Array(head.rank);
+    const grown = { value: 0 };
+    const texels = makeTexels(capacity, head.rank);
     const transformer = new SplatTransformer();
     super({
-      numSplats: head.count,
-      generator: makeGenerator(head, values, transformer),
+      numSplats: capacity,
+      generator: makeGenerator(head, texels, { values, grown }, transformer),
       // Without this the program would place the head at infinity.
       update: () => {
         if (transformer.update(this)) this.updateVersion();
@@ -31,6 +36,20 @@ export class HeadGenerator extends SplatGenerator {
     });
     this.network = head.network;
     this.values = values;
+    this.texels = texels;
+    this.grown = grown;
+    fill(texels, head, 0);
+  }
+
+  /** Takes the Gaussians that come after the first ones; they are not seen until `grow`. */
+  complete(rest: HeadRows): void {
+    fill(this.texels, rest, this.numSplats - rest.count);
+  }
+
+  /** Shows the Gaussians that came later with a share of their opacity. */
+  grow(share: number): void {
+    this.grown.value = share;
+    this.updateVersion();
   }
 
   /** Coefficients of the expression shown, (K,). */
@@ -45,11 +64,18 @@ export class HeadGenerator extends SplatGenerator {
   }
 }
 
-function makeGenerator(head: BakedHead, values: Float32Array, transformer: SplatTransformer): Generator {
+interface Moving {
+  values: Float32Array;
+  grown: { value: number };
+}
+
+function makeGenerator(head: BakedHead, { rest, basis }: Texels, { values, grown }: Moving, transformer: SplatTransformer): Generator {
   const uniforms = {
-    headRest: { value: restTexture(head) },
-    headBasis: { value: basisTexture(head) },
+    headRest: { value: rest },
+    headBasis: { value: basis },
     headCoefficients: { value: values },
+    headFirst: { value: head.count },
+    headGrown: grown,
   };
   return splatGenerator(
     { declarations: declarations(head.rank), uniforms, statements: (index, gsplat) => statements(head.rank, index, gsplat) },
@@ -62,6 +88,8 @@ function declarations(rank: number): string {
     uniform sampler2DArray headRest;
     uniform usampler2DArray headBasis;
     uniform float headCoefficients[${rank}];
+    uniform int headFirst;
+    uniform float headGrown;
     vec4 headVector(uvec4 four, int left) {
       return vec4(ivec4(four << left) >> 24);
     }
@@ -79,61 +107,76 @@ function statements(rank: number, index: string, gsplat: string): string[] {
     (_, k) => `headCoefficients[${k}] * headVector(u${Math.floor(k / PACKED)}, ${24 - 8 * (k % PACKED)})`,
   );
   return dyno.unindentLines(`
-    ivec2 texel = ivec2(${index} % ${WIDTH}, ${index} / ${WIDTH});
-    vec4 centreAndScale = texelFetch(headRest, ivec3(texel, 0), 0);
-    ${fetches.join(' ')}
-    vec4 blend = ${terms.join(' + ')};
-    vec4 logits = texelFetch(headRest, ivec3(texel, 3), 0) + centreAndScale.w * blend;
-    ${gsplat}.flags = GSPLAT_FLAG_ACTIVE;
+    ${gsplat}.flags = 0u;
     ${gsplat}.index = ${index};
-    ${gsplat}.center = centreAndScale.xyz;
-    ${gsplat}.quaternion = texelFetch(headRest, ivec3(texel, 1), 0);
-    ${gsplat}.scales = texelFetch(headRest, ivec3(texel, 2), 0).xyz;
-    ${gsplat}.rgba = 1.0 / (1.0 + exp(-logits));
+    float grown = ${index} < headFirst ? 1.0 : headGrown;
+    if (grown > 0.0) {
+      ivec2 texel = ivec2(${index} % ${WIDTH}, ${index} / ${WIDTH});
+      vec4 centreAndScale = texelFetch(headRest, ivec3(texel, 0), 0);
+      ${fetches.join(' ')}
+      vec4 blend = ${terms.join(' + ')};
+      vec4 logits = texelFetch(headRest, ivec3(texel, 3), 0) + centreAndScale.w * blend;
+      ${gsplat}.flags = GSPLAT_FLAG_ACTIVE;
+      ${gsplat}.center = centreAndScale.xyz;
+      ${gsplat}.quaternion = texelFetch(headRest, ivec3(texel, 1), 0);
+      ${gsplat}.scales = texelFetch(headRest, ivec3(texel, 2), 0).xyz;
+      ${gsplat}.rgba = 1.0 / (1.0 + exp(-logits));
+      ${gsplat}.rgba.a *= grown;
+    }
   `);
 }
 
-function restTexture(head: BakedHead): THREE.DataArrayTexture {
-  const { count: n, means, quats, scales, meanLogits, basisScale } = head;
-  const rows = Math.ceil(n / WIDTH);
+/** Textures of a fixed number of Gaussians, one texel each. */
+interface Texels {
+  rest: THREE.DataArrayTexture;
+  basis: THREE.DataArrayTexture; // r, g, b, opacity, each number with a byte of four basis vectors
+}
+
+function makeTexels(capacity: number, rank: number): Texels {
+  const rows = Math.ceil(capacity / WIDTH);
   const layer = 4 * WIDTH * rows;
-  const texels = new Float32Array(REST_LAYERS * layer);
-  for (let i = 0; i < n; i++) {
+  const layers = Math.ceil(rank / PACKED);
+  const rest = new THREE.DataArrayTexture(new Float32Array(REST_LAYERS * layer), WIDTH, rows, REST_LAYERS);
+  rest.type = THREE.FloatType;
+  rest.internalFormat = 'RGBA32F';
+  const basis = new THREE.DataArrayTexture(new Uint32Array(layers * layer), WIDTH, rows, layers);
+  basis.format = THREE.RGBAIntegerFormat;
+  basis.type = THREE.UnsignedIntType;
+  basis.internalFormat = 'RGBA32UI';
+  return { rest, basis };
+}
+
+/** Writes Gaussians from number `begin` on. */
+function fill({ rest, basis }: Texels, rows: HeadRows, begin: number): void {
+  fillRest(rest.image.data as Float32Array, rest.image.height, rows, begin);
+  fillBasis(basis.image.data as Uint32Array, basis.image.height, rows, begin);
+  rest.needsUpdate = basis.needsUpdate = true;
+}
+
+function fillRest(texels: Float32Array, height: number, rows: HeadRows, begin: number): void {
+  const { count, means, quats, scales, meanLogits, basisScale } = rows;
+  const layer = 4 * WIDTH * height;
+  for (let i = 0; i < count; i++) {
     const [w, x, y, z] = quats.subarray(4 * i);
     const s = scales.subarray(3 * i);
-    texels.set([means[3 * i]!, means[3 * i + 1]!, means[3 * i + 2]!, basisScale[i]!], 4 * i);
-    texels.set(normalised(x!, y!, z!, w!), layer + 4 * i); // Spark: xyzw
-    texels.set([Math.exp(s[0]!), Math.exp(s[1]!), Math.exp(s[2]!), 0], 2 * layer + 4 * i);
-    texels.set(meanLogits.subarray(4 * i, 4 * i + 4), 3 * layer + 4 * i);
+    const at = 4 * (begin + i);
+    texels.set([means[3 * i]!, means[3 * i + 1]!, means[3 * i + 2]!, basisScale[i]!], at);
+    texels.set(normalised(x!, y!, z!, w!), layer + at); // Spark: xyzw
+    texels.set([Math.exp(s[0]!), Math.exp(s[1]!), Math.exp(s[2]!), 0], 2 * layer + at);
+    texels.set(meanLogits.subarray(4 * i, 4 * i + 4), 3 * layer + at);
   }
-  const texture = new THREE.DataArrayTexture(texels, WIDTH, rows, REST_LAYERS);
-  texture.type = THREE.FloatType;
-  texture.internalFormat = 'RGBA32F';
-  texture.needsUpdate = true;
-  return texture;
+}
+
+function fillBasis(texels: Uint32Array, height: number, { count, rank, basis }: HeadRows, begin: number): void {
+  const layer = 4 * WIDTH * height;
+  const bytes = new Int8Array(texels.buffer); // little-endian, as every device with WebGL is
+  for (let k = 0; k < rank; k++) {
+    const first = PACKED * (Math.floor(k / PACKED) * layer + 4 * begin) + (k % PACKED);
+    for (let i = 0; i < 4 * count; i++) bytes[first + PACKED * i] = basis[4 * count * k + i]!;
+  }
 }
 
 function normalised(...q: [number, number, number, number]): number[] {
   const length = Math.hypot(...q);
   return q.map((value) => value / length);
-}
-
-/** Layers of texels (r, g, b, opacity), each number with a byte of four basis vectors. */
-function basisTexture(head: BakedHead): THREE.DataArrayTexture {
-  const { count: n, rank, basis } = head;
-  const rows = Math.ceil(n / WIDTH);
-  const layer = 4 * WIDTH * rows;
-  const layers = Math.ceil(rank / PACKED);
-  const texels = new Uint32Array(layers * layer);
-  const bytes = new Int8Array(texels.buffer); // little-endian, as every device with WebGL is
-  for (let k = 0; k < rank; k++) {
-    const begin = PACKED * Math.floor(k / PACKED) * layer + (k % PACKED);
-    for (let i = 0; i < 4 * n; i++) bytes[begin + PACKED * i] = basis[4 * n * k + i]!;
-  }
-  const texture = new THREE.DataArrayTexture(texels, WIDTH, rows, layers);
-  texture.format = THREE.RGBAIntegerFormat;
-  texture.type = THREE.UnsignedIntType;
-  texture.internalFormat = 'RGBA32UI';
-  texture.needsUpdate = true;
-  return texture;
 }

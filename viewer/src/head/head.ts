@@ -1,7 +1,9 @@
 import { Quaternion, Vector3, type Object3D } from 'three';
 import type { Actor } from '../actor.ts';
+import type { HeadRows } from '../bundle/baked-head.ts';
 import type { HeadFiles } from '../bundle/load.ts';
 import type { HeadInfo } from '../bundle/manifest.ts';
+import { Growth } from '../gaussians/growth.ts';
 import type { Quat, Vector } from '../rig/quaternions.ts';
 import { HeadGenerator } from './generator.ts';
 import { backAndForth, Poses } from './poses.ts';
@@ -35,14 +37,16 @@ export class Head implements Actor {
   row = NaN; // of the poses, as shown
   private readonly carrier: Carrier;
   private readonly poses: Poses;
+  private readonly growth: Growth;
 
   constructor({ info, baked, poses }: HeadFiles, carrier: Carrier) {
     this.carrier = carrier;
-    this.generator = new HeadGenerator(baked);
+    this.generator = new HeadGenerator(baked, info.num_gaussians);
     this.objects = [this.generator];
     this.poses = new Poses(poses);
     this.expression = new Float32Array(info.expression_size);
     this.express(info.idle_expression);
+    this.growth = new Growth(info.num_rest === 0);
     this.place(carrier(0));
   }
 
@@ -50,6 +54,17 @@ export class Head implements Actor {
   express(expression: ArrayLike<number>): void {
     this.expression.set(expression);
     this.generator.express(this.expression);
+  }
+
+  /** Whether all of its Gaussians have come. */
+  get whole(): boolean {
+    return this.growth.hasBegun;
+  }
+
+  /** Shows, little by little, the Gaussians that came after the first ones. */
+  refine(rest: HeadRows): void {
+    this.generator.complete(rest);
+    this.growth.begin();
   }
 
   /** Goes to a row of its poses. */
@@ -65,7 +80,9 @@ export class Head implements Actor {
     if (moved) this.place(row);
     const changed = this.director?.expression(this.expression) ?? false;
     if (changed) this.generator.express(this.expression);
-    return changed || moved;
+    const grown = this.growth.advance(step);
+    if (grown !== null) this.generator.grow(grown);
+    return changed || moved || grown !== null;
   }
 }
 

@@ -1,3 +1,4 @@
+import type { Part } from '../bundle/load.ts';
 import { atEnd } from '../lifetime.ts';
 import type { PlaceMessage } from '../protocol.ts';
 import type { Ending } from '../talk/connection.ts';
@@ -14,6 +15,7 @@ export class Overlay {
   private readonly page: HTMLElement;
   private readonly root: HTMLElement;
   private readonly bar: HTMLProgressElement;
+  private readonly coming: HTMLElement;
   private readonly thumbnail: HTMLImageElement;
   private readonly waiting: HTMLElement;
   private readonly button: HTMLButtonElement;
@@ -31,6 +33,7 @@ export class Overlay {
     this.words = words;
     this.root = byId(page, 'overlay');
     this.bar = byId(page, 'progress');
+    this.coming = byId(page, 'coming');
     this.thumbnail = byId(page, 'thumbnail');
     this.waiting = byId(page, 'overlay-wait');
     this.button = byId(page, 'again');
@@ -45,13 +48,17 @@ export class Overlay {
     this.thumbnail.onload = () => (this.thumbnail.hidden = false);
   }
 
-  progress(fraction: number): void {
+  /** @param coming what is on its way */
+  progress(fraction: number, coming: Part | null): void {
     this.bar.value = fraction;
+    const sentence = say(`coming.${coming ?? 'all'}`);
+    this.words.write(this.coming, sentence);
+    this.words.write(this.bar, sentence, 'valuetext');
   }
 
   /** Resolves when the visitor chooses; browsers play sound only after such a click. */
   choose(): Promise<Choice> {
-    this.bar.hidden = true;
+    this.bar.hidden = this.coming.hidden = true;
     byId(this.root, 'choices').hidden = false;
     const start = byId<HTMLButtonElement>(this.root, 'start');
     focusOn(start);
@@ -115,7 +122,7 @@ export class Overlay {
 
   /** Covers the page with a sentence. */
   private show(sentence: Sentence): void {
-    this.bar.hidden = byId(this.root, 'choices').hidden = true;
+    this.bar.hidden = this.coming.hidden = byId(this.root, 'choices').hidden = true;
     const text = byId(this.root, 'overlay-error');
     this.words.write(text, sentence);
     text.hidden = byId(this.root, 'check').hidden = false;

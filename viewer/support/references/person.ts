@@ -18,7 +18,7 @@ export interface PersonReference {
 }
 
 /** Makes the person and draws it with Python at some times. */
-export function makePerson(options: { body?: 'windows' | 'skinned'; gaussians?: string; times?: number[]; pictures?: string } = {}): PersonReference {
+export function makePerson(options: { body?: 'windows' | 'skinned'; gaussians?: string; first?: number; times?: number[]; pictures?: string } = {}): PersonReference {
   const out = scratchFolder();
   const args = Object.entries(options).flatMap(([name, value]) => [`--${name}`, String(value)]);
   runPython('references/person_reference.py', out, ...args);

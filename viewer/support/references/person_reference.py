@@ -25,7 +25,7 @@ from ico3d.avatar.render_bundle import (
     visitor_camera,
 )
 from ico3d.bundle.animation import Action, Animation, Rest
-from ico3d.bundle.format import ANIMATION, Bundle, write_bundle
+from ico3d.bundle.format import ANIMATION, FIRST_BYTES, Bundle, coarse_first, write_bundle
 from ico3d.bundle.head import POSES, poses_to_bytes
 from ico3d.common.camera import Camera
 from ico3d.splat.files.formats import write_gaussians
@@ -66,7 +66,7 @@ def floor() -> Gaussians:
     )
 
 
-def write_person(path: Path, kind: str, on_head: int, on_body: int) -> None:
+def write_person(path: Path, kind: str, on_head: int, on_body: int, first: int) -> None:
     """The body's own head stays: some of its Gaussians lie before the other head, some behind."""
     body_path = path.with_name("body.ico3d")
     if kind == "skinned":
@@ -87,7 +87,7 @@ def write_person(path: Path, kind: str, on_head: int, on_body: int) -> None:
     ground = path.with_name("background.ply")
     write_gaussians(ground, RawGaussians.from_gaussians(floor()))
     files[ground.name] = ground.read_bytes()
-    write_bundle(path, manifest, files)
+    write_bundle(path, *coarse_first(manifest, files, first))
 
 
 def draw(bundle: Bundle, times: list[float], width: int, height: int, out: Path) -> None:
@@ -118,12 +118,13 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--body", default="windows")
     parser.add_argument("--gaussians", default="1500,1500", help="on the head, on the body")
+    parser.add_argument("--first", type=int, default=FIRST_BYTES, help="bytes of first files")
     parser.add_argument("--times", default="")
     parser.add_argument("--pictures", help="WxH")
     arguments = parser.parse_args()
     out = arguments.out
     on_head, on_body = map(int, arguments.gaussians.split(","))
-    write_person(out / "person.ico3d", arguments.body, on_head, on_body)
+    write_person(out / "person.ico3d", arguments.body, on_head, on_body, arguments.first)
     bundle = Bundle.open(out / "person.ico3d")
     for name in bundle.names:
         (out / "bundle" / name).parent.mkdir(parents=True, exist_ok=True)

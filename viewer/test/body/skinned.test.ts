@@ -2,7 +2,7 @@ import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { describe, expect, test } from 'vitest';
 import { readBakedSkinned } from '../../src/body/skinned/baked.ts';
-import { packSkinned } from '../../src/body/skinned/packed.ts';
+import { fillTexels, makeTexels } from '../../src/body/skinned/packed.ts';
 import { Skeleton } from '../../src/body/skinned/skeleton.ts';
 import { SKINNED } from '../../src/bundle/load.ts';
 import { bodyOf, checkManifest } from '../../src/bundle/manifest.ts';
@@ -54,7 +54,9 @@ describe('a body on a skeleton that Python baked', () => {
   });
 
   test('its texels hold what the file holds', () => {
-    const { words, width, rows, layers } = packSkinned(baked);
+    const texels = makeTexels(info);
+    fillTexels(texels, baked, 0);
+    const { words, width, rows, layers } = texels;
     expect({ width, rows, layers }).toEqual({ width: 1024, rows: 1, layers: 6 }); // 96 bytes per Gaussian
     const bytes = new Uint8Array(words.buffer);
     const at = (layer: number, i: number) => 16 * (1024 * layer + i);

@@ -26,7 +26,7 @@ from ico3d.avatar.baking.shader_body import SAMPLES_PER_FRAME, Shape, WindowBake
 from ico3d.avatar.clip_views import At, recorded_views
 from ico3d.avatar.moving import MovingBody
 from ico3d.bundle.body import BakedWindow
-from ico3d.bundle.format import LICENSES, THUMBNAIL, write_bundle
+from ico3d.bundle.format import LICENSES, THUMBNAIL, coarse_first, write_bundle
 from ico3d.bundle.manifest import (
     BodyInfo,
     CameraInfo,
@@ -230,7 +230,7 @@ def write(
         loss=parts.loss,
         provenance=staging.provenance(about, "the body's recording"),
     )
-    return write_bundle(out, manifest, files)
+    return write_bundle(out, *coarse_first(manifest, files))
 
 
 def strip(body: MovingBody, baked: BakedBody, capture: Capture | None) -> np.ndarray:

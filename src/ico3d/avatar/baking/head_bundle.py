@@ -11,7 +11,7 @@ from ico3d.avatar.baking import head_cost
 from ico3d.avatar.baking.samples import Samples
 from ico3d.avatar.baking.shader_head import BakeSettings, HeadBaker, megabytes_per_10k
 from ico3d.avatar.render_bundle import baked_gaussians
-from ico3d.bundle.format import HEAD, LICENSES, POSES, SPEECH, THUMBNAIL, write_bundle
+from ico3d.bundle.format import HEAD, LICENSES, POSES, SPEECH, THUMBNAIL, coarse_first, write_bundle
 from ico3d.bundle.head import BakedHead, poses_to_bytes
 from ico3d.bundle.manifest import (
     HeadInfo,
@@ -178,7 +178,7 @@ def write(
         loss=result.loss,
         provenance=staging.provenance(capture.provenance, str(capture.path)),
     )
-    return write_bundle(out, manifest, files)
+    return write_bundle(out, *coarse_first(manifest, files))
 
 
 def idle_expression(head: TrainedHead, recorded: np.ndarray) -> np.ndarray:

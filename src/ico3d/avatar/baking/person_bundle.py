@@ -25,7 +25,7 @@ from ico3d.avatar.moving import MOMENTS
 from ico3d.avatar.render_bundle import BakedAvatar
 from ico3d.body.planning.windows import Window
 from ico3d.bundle.animation import ANIMATION, Animation
-from ico3d.bundle.format import LICENSES, SPEECH, THUMBNAIL, write_bundle
+from ico3d.bundle.format import LICENSES, SPEECH, THUMBNAIL, coarse_first, write_bundle
 from ico3d.bundle.head import HEAD, POSES, BakedHead, poses_to_bytes
 from ico3d.bundle.manifest import CameraInfo, Loss, Manifest, Persona
 from ico3d.capture.capture import Capture
@@ -263,7 +263,7 @@ def write(
             [staging.provenance(part.get("capture", {}), where) for where, part in parts.items()]
         ),
     )
-    return write_bundle(out, manifest, files)
+    return write_bundle(out, *coarse_first(manifest, files))
 
 
 def standing_camera(

@@ -62,8 +62,10 @@ class HeadBaker:
         """
         chosen = expressions[spread(len(expressions), settings.max_frames)]
         samples = sample_logits(model, chosen)  # (T, N, 4)
-        self._kept = (samples[:, :, 3] > np.log(MIN_ALPHA / (1 - MIN_ALPHA))).any(axis=0)
-        if not self._kept.any():
+        seen = (samples[:, :, 3] > np.log(MIN_ALPHA / (1 - MIN_ALPHA))).any(axis=0)  # (N,)
+        order = np.argsort(-importance.sum(axis=1), kind="stable")  # (N,)
+        self._kept = order[seen[order]]  # (N',) indices, those that matter most first
+        if len(self._kept) == 0:
             raise BundleError("the head has no Gaussian that is ever seen: train it again.")
         self._model, self._weights = model, importance[self._kept]
         flat = _flat(samples[:, self._kept])
@@ -71,8 +73,8 @@ class HeadBaker:
         self._network = self._fit(chosen, settings)
 
     def baked(self, rank: int) -> BakedHead:
-        """The baked head with the first `rank` components."""
-        count = int(self._kept.sum())
+        """The baked head with the first `rank` components, its Gaussians by importance."""
+        count = len(self._kept)
         basis = self._factors.basis[:rank].reshape(rank, count, 4)  # (K, N, 4)
         sizes = np.sqrt(np.square(self._factors.scores[:, :rank]).mean(axis=0))  # (K,)
         rounded = quantise(basis, sizes, self._weights)

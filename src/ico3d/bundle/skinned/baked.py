@@ -5,9 +5,16 @@ from functools import cached_property
 
 import numpy as np
 
-from ico3d.bundle.skinned.info import SKINNED, SkinnedInfo
+from ico3d.bundle.skinned.info import SKINNED, SKINNED_REST, SkinnedInfo
 from ico3d.bundle.skinned.lamp import BakedLamp, fault_of, lamp_spec
-from ico3d.bundle.tensors import Spec, decode_tensors, encode_tensors
+from ico3d.bundle.tensors import (
+    Axes,
+    Spec,
+    decode_tensors,
+    encode_tensors,
+    join_tensors,
+    split_tensors,
+)
 from ico3d.errors import BundleError
 from ico3d.rig.rig import Rig
 
@@ -17,6 +24,18 @@ WEIGHT_UNIT = 255
 """Sum of a Gaussian's four weights."""
 SCALE_UNITS = (1e-3, 1.0)
 """Units of `shape_scales`: those of positions in metres (1 mm), and of colours in logits."""
+_AXES: Axes = {
+    "means": 0,
+    "quats": 0,
+    "log_scales": 0,
+    "color_logits": 0,
+    "opacities": 0,
+    "normals": 0,
+    "joints": 0,
+    "weights": 0,
+    "shapes": 0,
+    "shape_scales": 0,
+}
 _UNEVEN = 1e-2
 """Largest difference of a quaternion's length from 1."""
 _MAX_LENGTH = 1e4
@@ -98,19 +117,35 @@ class BakedSkinned:
         _check_values(self)
         return data
 
+    def split(self, first: int) -> tuple[bytes, bytes]:
+        """Contents of the files with the first Gaussians, which holds all else, and of the others.
+
+        Raises:
+            BundleError: If shapes or dtypes disagree with the manifest's entry, or a value is out
+                of range.
+        """
+        _check_values(self)
+        names = SKINNED, SKINNED_REST
+        return split_tensors(self.tensors, _spec(self.info), _AXES, first, names)
+
     @staticmethod
-    def from_bytes(data: bytes, info: SkinnedInfo) -> "BakedSkinned":
-        """Reads a body from the content of its file.
+    def from_bytes(data: bytes, info: SkinnedInfo, rest: bytes = b"") -> "BakedSkinned":
+        """Reads a body from the content of its file, or of its two files.
 
         Args:
             data: Content of `body/skinned.safetensors`.
             info: The manifest's entry, with whose counts the tensors must agree.
+            rest: Content of `body/skinned_rest.safetensors`, where the entry has `num_rest`.
 
         Raises:
             BundleError: If the file is damaged, shapes or dtypes disagree with the manifest's
                 entry, or a value is out of range.
         """
-        tensors = decode_tensors(data, _spec(info), SKINNED)
+        if info.num_rest:
+            files, names = (data, rest), (SKINNED, SKINNED_REST)
+            tensors = join_tensors(files, _spec(info), _AXES, info.num_rest, names)
+        else:
+            tensors = decode_tensors(data, _spec(info), SKINNED)
         found = {name: tensors.pop(name) for name in lamp_spec(info)}
         baked = BakedSkinned(**tensors, info=info, lamp=BakedLamp(**found) if found else None)
         _check_values(baked)

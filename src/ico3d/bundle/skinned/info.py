@@ -11,6 +11,8 @@ from ico3d.rig.rig import MOST_JOINTS, Rig
 
 SKINNED = "body/skinned.safetensors"
 """Name of the file of a body on a skeleton."""
+SKINNED_REST = "body/skinned_rest.safetensors"
+"""Name of the file with its less important Gaussians, where there is one."""
 LONGEST_NAME = 64
 """Most characters of a joint's name."""
 
@@ -35,6 +37,8 @@ class SkinnedInfo:
         low: Least x, y, z of the Gaussians' centres in the recording, metres.
         high: Greatest x, y, z of the Gaussians' centres in the recording, metres.
         num_casters: Number of spheres that cast shadows; 0 without a lamp.
+        num_rest: Number of the Gaussians in `body/skinned_rest.safetensors`, the least important
+            ones; 0 where all are in one file.
     """
 
     fps: float
@@ -48,6 +52,7 @@ class SkinnedInfo:
     low: tuple[float, float, float]
     high: tuple[float, float, float]
     num_casters: int = 0
+    num_rest: int = 0
 
     @property
     def num_joints(self) -> int:
@@ -82,6 +87,7 @@ def check_skinned(info: SkinnedInfo, require: Require) -> None:
         "num_shapes": (1, limits.MAX_SHAPES),
         "num_moving": (1, min(info.num_joints, MOST_JOINTS)),
         "num_casters": (0, limits.MAX_CASTERS),
+        "num_rest": (0, info.num_gaussians - 1),
         "num_known": (1, min(info.num_frames, limits.MAX_KNOWN_POSES)),
     }
     for name, (least, most) in ranges.items():

@@ -2,9 +2,9 @@ import type { SkinnedInfo } from '../../bundle/manifest.ts';
 import { takeTensor, type Tensor } from '../../bundle/safetensors.ts';
 import { PageError } from '../../errors.ts';
 
-/** A baked body on a skeleton (`docs/bundle.md`): N Gaussians, J joints, K residual shapes, F recorded frames. */
-export interface BakedSkinned {
-  info: SkinnedInfo;
+/** Gaussians of a body on a skeleton: N of them, with K residual shapes. */
+export interface SkinnedRows {
+  count: number; // N
   means: Float32Array; // (N,3) metres at rest
   quats: Int16Array; // (N,4) wxyz · 32767
   logScales: Float32Array; // (N,3) logarithms of metres
@@ -15,6 +15,11 @@ export interface BakedSkinned {
   weights: Uint8Array; // (N,4) weights of these joints · 255
   shapes: Int8Array; // (N,K,6) residual shapes: changes of position and of logits
   shapeScales: Float32Array; // (N,2) millimetres and logits per unit of the shapes
+}
+
+/** A baked body on a skeleton (`docs/bundle.md`): its Gaussians, or the most important ones, J joints, F recorded frames. */
+export interface BakedSkinned extends SkinnedRows {
+  info: SkinnedInfo;
   light: Float32Array; // (8,3) coefficients of spherical harmonics of degrees 1 and 2
   poses: RecordedPoses;
   lamp: BakedLamp | null;
@@ -42,37 +47,25 @@ export interface RecordedPoses {
 }
 
 /**
- * Takes a body's tensors out of its file.
+ * Takes a body's tensors out of its first file.
  *
  * @throws PageError if they do not agree with the manifest's counts, or an index is out of range
  */
 export function readBakedSkinned(tensors: Map<string, Tensor>, info: SkinnedInfo, file: string): BakedSkinned {
-  const { num_gaussians: n, num_shapes: k, num_frames: f, num_moving: m, num_known: p } = info;
+  const { num_shapes: k, num_frames: f, num_moving: m, num_known: p } = info;
   const j = info.names.length;
   const take = <T>(name: string, dtype: Tensor['dtype'], shape: number[]): T =>
     takeTensor(tensors, name, dtype, shape, file).data as T;
-  const joints = take<Uint8Array>('joints', 'U8', [n, 4]);
   const moving = take<Uint8Array>('moving', 'U8', [m]);
   const known = take<Int16Array>('known', 'I16', [p]);
-  const missing = (name: string) => new PageError(`${file}: ${name} names one that is not there.`);
-  if (joints.some((joint) => joint >= j)) throw missing('joints');
-  if (moving.some((joint) => joint >= j)) throw missing('moving');
-  if (known.some((frame) => frame < 0 || frame >= f)) throw missing('known');
+  if (moving.some((joint) => joint >= j)) throw missing('moving', file);
+  if (known.some((frame) => frame < 0 || frame >= f)) throw missing('known', file);
   const [kernelWidth] = take<Float32Array>('kernel_width', 'F32', [1]);
   if (!(kernelWidth! > 0)) throw new PageError(`${file}: kernel_width must be more than 0.`);
   return {
     info,
+    ...readSkinnedRows(tensors, info.num_gaussians - info.num_rest, info, file),
     lamp: info.num_casters ? readLamp(tensors, info, file) : null,
-    joints,
-    means: take('means', 'F32', [n, 3]),
-    quats: take('quats', 'I16', [n, 4]),
-    logScales: take('log_scales', 'F16', [n, 3]),
-    colorLogits: take('color_logits', 'F16', [n, 3]),
-    opacities: take('opacities', 'U8', [n]),
-    normals: take('normals', 'I8', [n, 3]),
-    weights: take('weights', 'U8', [n, 4]),
-    shapes: take('shapes', 'I8', [n, k, 6]),
-    shapeScales: take('shape_scales', 'F16', [n, 2]),
     light: take('light', 'F32', [8, 3]),
     poses: {
       moving,
@@ -85,6 +78,35 @@ export function readBakedSkinned(tensors: Map<string, Tensor>, info: SkinnedInfo
       coefficients: take('coefficients', 'F32', [f, k]),
     },
   };
+}
+
+/**
+ * Takes `n` Gaussians of a body out of a file.
+ *
+ * @throws PageError if they do not agree with the manifest's counts, or one hangs on a joint that is not there
+ */
+export function readSkinnedRows(tensors: Map<string, Tensor>, n: number, info: SkinnedInfo, file: string): SkinnedRows {
+  const take = <T>(name: string, dtype: Tensor['dtype'], shape: number[]): T =>
+    takeTensor(tensors, name, dtype, shape, file).data as T;
+  const joints = take<Uint8Array>('joints', 'U8', [n, 4]);
+  if (joints.some((joint) => joint >= info.names.length)) throw missing('joints', file);
+  return {
+    count: n,
+    joints,
+    means: take('means', 'F32', [n, 3]),
+    quats: take('quats', 'I16', [n, 4]),
+    logScales: take('log_scales', 'F16', [n, 3]),
+    colorLogits: take('color_logits', 'F16', [n, 3]),
+    opacities: take('opacities', 'U8', [n]),
+    normals: take('normals', 'I8', [n, 3]),
+    weights: take('weights', 'U8', [n, 4]),
+    shapes: take('shapes', 'I8', [n, info.num_shapes, 6]),
+    shapeScales: take('shape_scales', 'F16', [n, 2]),
+  };
+}
+
+function missing(name: string, file: string): PageError {
+  return new PageError(`${file}: ${name} names one that is not there.`);
 }
 
 function readLamp(tensors: Map<string, Tensor>, info: SkinnedInfo, file: string): BakedLamp {

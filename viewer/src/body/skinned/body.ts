@@ -1,6 +1,7 @@
 import type { Actor } from '../../actor.ts';
 import type { Motion, Seen } from '../../motion/motion.ts';
-import type { BakedSkinned } from './baked.ts';
+import { Growth } from '../../gaussians/growth.ts';
+import type { BakedSkinned, SkinnedRows } from './baked.ts';
 import { SkinnedGenerator } from './generator.ts';
 import type { Pose } from './skeleton.ts';
 
@@ -13,11 +14,13 @@ export class SkinnedBody implements Actor {
   readonly shown: Seen = { time: 0, waiting: false };
   private readonly fps: number;
   private readonly pose: Pose;
+  private readonly growth: Growth;
   private posing = false; // whether a pose was given by `strike`
 
   constructor(baked: BakedSkinned, motion: Motion) {
     this.motion = motion;
     this.fps = baked.info.fps;
+    this.growth = new Growth(baked.info.num_rest === 0);
     this.generator = new SkinnedGenerator(baked);
     this.objects = [this.generator];
     this.pose = this.generator.skeleton.empty();
@@ -31,9 +34,22 @@ export class SkinnedBody implements Actor {
 
   tick(step: number): boolean {
     this.motion.advance(step, this.shown);
-    if (this.posing || this.motion.time === this.shown.time) return false;
+    const grown = this.growth.advance(step);
+    if (grown !== null) this.generator.grow(grown);
+    if (this.posing || this.motion.time === this.shown.time) return grown !== null;
     this.replay();
     return true;
+  }
+
+  /** Whether all of its Gaussians have come. */
+  get whole(): boolean {
+    return this.growth.hasBegun;
+  }
+
+  /** Shows, little by little, the Gaussians that came after the first ones. */
+  refine(rest: SkinnedRows): void {
+    this.generator.complete(rest);
+    this.growth.begin();
   }
 
   /**

@@ -1,9 +1,9 @@
 import { dyno, SplatGenerator, SplatTransformer } from '@sparkjsdev/spark';
 import * as THREE from 'three';
 import { SHADOW } from '../../shared.ts';
-import { splatGenerator, type Generator } from '../../splat-shader.ts';
-import type { BakedLamp, BakedSkinned } from './baked.ts';
-import { packSkinned, type Texels } from './packed.ts';
+import { splatGenerator, type Generator } from '../../gaussians/splat-shader.ts';
+import type { BakedLamp, BakedSkinned, SkinnedRows } from './baked.ts';
+import { fillTexels, makeTexels, type Texels } from './packed.ts';
 import { SHADOW_DECLARATIONS, ShadowMap } from './shadow.ts';
 import { Skeleton, TABLE_ROW, type Pose } from './skeleton.ts';
 
@@ -16,9 +16,11 @@ export class SkinnedGenerator extends SplatGenerator {
   private readonly most: number; // number of all Gaussians
   private readonly uniforms: Uniforms;
   private readonly shadow: Shadow | null;
+  private readonly texels: Texels;
 
   constructor(baked: BakedSkinned) {
-    const texels = packSkinned(baked);
+    const texels = makeTexels(baked.info);
+    fillTexels(texels, baked, 0);
     const shadow = baked.lamp && makeShadow(baked.lamp, baked.info.names.length);
     const uniforms = { ...makeUniforms(baked, texels), ...shadow?.uniforms };
     const transformer = new SplatTransformer();
@@ -32,6 +34,7 @@ export class SkinnedGenerator extends SplatGenerator {
     });
     this.most = baked.info.num_gaussians;
     this.uniforms = uniforms;
+    this.texels = texels;
     this.shadow = shadow;
     this.skeleton = new Skeleton(baked.info, baked.poses);
   }
@@ -45,6 +48,18 @@ export class SkinnedGenerator extends SplatGenerator {
     this.shadow?.map.draw(table);
     if (this.shadow) this.shadow.texture.needsUpdate = true;
     pose.residual.forEach((value, k) => skinnedResidual.value[k >> 2]!.setComponent(k & 3, value));
+    this.updateVersion();
+  }
+
+  /** Takes the Gaussians that come after the first ones; they are not seen until `grow`. */
+  complete(rest: SkinnedRows): void {
+    fillTexels(this.texels, rest, this.most - rest.count);
+    this.uniforms.skinnedTexels.value.needsUpdate = true;
+  }
+
+  /** Shows the Gaussians that came later with a share of their opacity. */
+  grow(share: number): void {
+    this.uniforms.skinnedGrown.value = share;
     this.updateVersion();
   }
 
@@ -62,9 +77,11 @@ interface Uniforms {
   skinnedResidual: { value: THREE.Vector4[] }; // coefficients of the residual shapes
   skinnedLight: { value: THREE.Vector3[] }; // (8,3) coefficients of spherical harmonics
   skinnedCount: { value: number }; // Gaussians that are drawn
+  skinnedFirst: { value: number }; // Gaussians that came first
+  skinnedGrown: { value: number }; // share of their opacity that the others have
 }
 
-function makeUniforms({ info, light }: BakedSkinned, { width, rows, layers, words }: Texels): Uniforms {
+function makeUniforms({ info, count, light }: BakedSkinned, { width, rows, layers, words }: Texels): Uniforms {
   const texels = new THREE.DataArrayTexture(words, width, rows, layers);
   texels.format = THREE.RGBAIntegerFormat;
   texels.type = THREE.UnsignedIntType;
@@ -79,6 +96,8 @@ function makeUniforms({ info, light }: BakedSkinned, { width, rows, layers, word
     skinnedResidual: { value: [new THREE.Vector4(), new THREE.Vector4()] },
     skinnedLight: { value: Array.from({ length: 8 }, (_, i) => new THREE.Vector3().fromArray(light, 3 * i)) },
     skinnedCount: { value: info.num_gaussians },
+    skinnedFirst: { value: count },
+    skinnedGrown: { value: 0 },
   };
 }
 
@@ -113,6 +132,8 @@ const DECLARATIONS = dyno.unindent(`
   uniform vec4 skinnedResidual[2];
   uniform vec3 skinnedLight[8];
   uniform int skinnedCount;
+  uniform int skinnedFirst;
+  uniform float skinnedGrown;
 
   vec4 skinnedBytes(uint word) {
     return vec4(ivec4(uvec4(word) << uvec4(24u, 16u, 8u, 0u)) >> 24);
@@ -156,7 +177,8 @@ function statements({ width }: Texels, shapes: number, lit: string, index: strin
   return dyno.unindentLines(`
     ${gsplat}.flags = 0u;
     ${gsplat}.index = ${index};
-    if (${index} < skinnedCount) {
+    float grown = ${index} < skinnedFirst ? 1.0 : skinnedGrown;
+    if (${index} < skinnedCount && grown > 0.0) {
       ivec2 texel = ivec2(${index} % ${width}, ${index} / ${width});
       uvec4 a = texelFetch(skinnedTexels, ivec3(texel, 0), 0);
       uvec4 b = texelFetch(skinnedTexels, ivec3(texel, 1), 0);
@@ -186,7 +208,7 @@ function statements({ width }: Texels, shapes: number, lit: string, index: strin
       ${gsplat}.center = centre;
       ${gsplat}.quaternion = rotation.yzwx * inversesqrt(max(dot(rotation, rotation), 1e-12));
       ${gsplat}.scales = exp(vec3(unpackHalf2x16(c.x), between.x));
-      ${gsplat}.rgba = vec4(1.0 / (1.0 + exp(-logits)), float(b.w >> 24u) / 255.0);
+      ${gsplat}.rgba = vec4(1.0 / (1.0 + exp(-logits)), grown * float(b.w >> 24u) / 255.0);
     }
   `);
 }
