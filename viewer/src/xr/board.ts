@@ -8,7 +8,7 @@ const LETTERS = 42; // pixels
 const LINE = 54;
 const EDGE = 36;
 const MOST_LINES = Math.floor((HEIGHT - EDGE) / LINE);
-const WIDE = 0.5; // m, of the board at 1 m
+const WIDE = 0.6; // m, of the board at 1 m
 const UNDER = 0.03; // m at 1 m: between the chin and the board
 const NEARER = 0.75; // of the way from the visitor to the face
 
@@ -26,18 +26,18 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
   /** What is shown now. */
   text = '';
   private readonly page: ParentNode;
-  private readonly hint: string;
+  private hint: string;
   private readonly canvas = document.createElement('canvas');
-  private readonly texture: THREE.CanvasTexture;
+  private readonly texture: THREE.Texture;
   private readonly observer = new MutationObserver(() => this.write());
 
   /**
    * @param page where the captions and notices are
-   * @param hint is shown until there are any
+   * @param hint is shown, too, until it is followed
    */
   constructor(page: ParentNode, hint: string) {
     const canvas = document.createElement('canvas');
-    const texture = new THREE.CanvasTexture(canvas);
+    const texture = new THREE.Texture(canvas);
     texture.colorSpace = THREE.SRGBColorSpace;
     const material = new THREE.MeshBasicMaterial({ map: texture, transparent: true, depthWrite: false });
     super(new THREE.PlaneGeometry(WIDE, (WIDE * HEIGHT) / WIDTH), material);
@@ -50,6 +50,13 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
     for (const id of ['captions', 'notices']) {
       this.observer.observe(byId(page, id), { subtree: true, childList: true, characterData: true, attributes: true });
     }
+    this.write();
+  }
+
+  /** The visitor knows what the hint says. */
+  dropHint(): void {
+    if (!this.hint) return;
+    this.hint = '';
     this.write();
   }
 
@@ -84,14 +91,13 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
     this.texture.needsUpdate = true;
   }
 
-  /** What the page says now: a notice, else the captions, else the hint. */
+  /** What the page says now: a notice, else the captions; and the hint. */
   private read(): Line[] {
     const said = (id: string) => byId(this.page, id).textContent?.trim() ?? '';
     const notice = byId(this.page, 'notices').lastElementChild?.textContent?.trim();
     if (notice) return [{ text: notice, own: true }];
     const captions = byId(this.page, 'captions').hidden ? [] : [{ text: said('question'), own: false }, { text: said('answer'), own: true }];
-    const spoken = captions.filter(({ text }) => text);
-    return spoken.length > 0 ? spoken : [{ text: this.hint, own: false }];
+    return [...captions, { text: this.hint, own: false }].filter(({ text }) => text);
   }
 }
 

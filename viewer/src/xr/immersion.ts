@@ -143,6 +143,7 @@ export class Immersion implements Presentation {
 
   private talk(source: XRInputSource): void {
     this.tools.talking.add(source);
+    this.board.dropHint();
     void this.ports.conversation?.press();
   }
 
