@@ -150,8 +150,7 @@ describe('somebody on a skeleton, met by headset', () => {
     await enter(page, 'View in your room');
     await page.evaluate(() => {
       const { board, rig } = window.immersion();
-      board.visible = rig.visible = false;
-      for (const { objects } of [window.ico3d!.head!, window.ico3d!.skinned!]) for (const object of objects) object.visible = false;
+      board.visible = rig.visible = window.ico3d!.stage.spark.visible = false;
     });
     await drawn(page, 6);
     const { width, height, pixels } = await seen(page);
@@ -160,6 +159,10 @@ describe('somebody on a skeleton, met by headset', () => {
     expect(Math.max(...alphas)).toBeGreaterThan(80);
     expect(Math.max(...alphas)).toBeLessThan(160);
     expect(pixels.every((value, i) => i % 4 === 3 || value === 0)).toBe(true); // it only darkens
+    await page.evaluate(() => void (window.ico3d!.stage.spark.visible = true));
+    await drawn(page, 3);
+    const { pixels: whole } = await seen(page);
+    expect(Math.max(...whole.filter((_, i) => i % 4 === 3))).toBe(255); // she hides what is behind her
     await quit(page);
   });
 
