@@ -47,6 +47,22 @@ function whereabouts(page: Page): Promise<{ apart: number; height: number; ahead
   });
 }
 
+/** Walks a metre aside and waits until the head has turned there, by a third of what it would take at least. */
+async function isLookedAt(page: Page): Promise<void> {
+  await page.evaluate(() => void (window.headset.position.x += 1));
+  await page.waitForFunction(() => {
+    const { head, stage } = window.ico3d!;
+    const { ground, camera } = window.immersion();
+    const looks = ground.toward.clone().set(0, 0, 1).transformDirection(head!.generator.matrixWorld);
+    const way = camera.getWorldPosition(looks.clone()).sub(stage.meeting!.eyes);
+    const side = ground.up.clone().cross(ground.toward);
+    const aside = (at: typeof way) => Math.atan2(at.dot(side), at.dot(ground.toward));
+    const [turned, wanted] = [aside(looks), aside(way)];
+    return Math.abs(wanted) > 0.5 && turned / wanted > 1 / 3;
+  });
+  await page.evaluate(() => void (window.headset.position.x -= 1));
+}
+
 describe('somebody on a skeleton, met by headset', () => {
   let browser: Browser;
   let page: Page;
@@ -89,7 +105,7 @@ describe('somebody on a skeleton, met by headset', () => {
     expect(pixels).toEqual([WIDTH, HEIGHT]);
   });
 
-  test('body and head are of the same moment as the picture', async () => {
+  test('body and head are of the same moment as the picture, and look at the visitor', async () => {
     await enter(page, 'Enter VR');
     const late = await page.evaluate(async (step) => {
       const { stage, acting, skinned, head, splats } = window.ico3d!;
@@ -113,6 +129,7 @@ describe('somebody on a skeleton, met by headset', () => {
     }, STEP);
     console.log(`farthest from where it should be, of body and head: ${late.map((far) => far.toExponential(1)).join(', ')} m`);
     expect(Math.max(...late)).toBeLessThan(1e-3 * STEP);
+    await isLookedAt(page);
     await quit(page);
   });
 
@@ -194,7 +211,7 @@ describe('a talk by headset', () => {
   });
   afterAll(() => browser?.close());
 
-  test('a head alone is as high as that of somebody who sits', async () => {
+  test('a head alone is as high as that of somebody who sits, and looks at the visitor', async () => {
     const { apart, height } = await whereabouts(page);
     expect(apart).toBeCloseTo(APART, 1);
     const eyes = await page.evaluate(() => {
@@ -202,6 +219,7 @@ describe('a talk by headset', () => {
       return eyes.clone().sub(ground.foot).dot(ground.up);
     });
     expect([eyes, height]).toEqual([expect.closeTo(1.2, 4), expect.closeTo(1.5, 4)]);
+    await isLookedAt(page);
   });
 
   test('what is said on the page is read below the face, never over it', async () => {
