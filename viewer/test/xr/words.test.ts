@@ -11,6 +11,11 @@ describe('lines of captions', () => {
     expect(lines).toEqual(['we must find', 'a new home', 'in the stars']);
   });
 
+  test('never begin with a mark that ends a word', () => {
+    expect(linesOf('to turn. It leaves!', 7, width)).toEqual(['to turn.', 'It', 'leaves!']);
+    expect(linesOf('新的家园。星空', 4, width)).toEqual(['新的家园。', '星空']);
+  });
+
   test('break in languages without spaces, too', () => {
     const text = '我们必须在星空中找到新的家园';
     const lines = linesOf(text, 5, width);
