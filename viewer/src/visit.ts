@@ -110,7 +110,7 @@ export class Visit {
       makeThemeButton(root, words, (light) => stage.setBright(light), signal),
       theatre.makeViewBar(stage.orbit, words, root, signal),
     );
-    const xr = { stage, conversation, head: presence.head, root, settings: this.ports.xr ?? xrSettings(() => null), signal };
+    const xr = { stage, conversation, head: presence.head, root, words, settings: this.ports.xr ?? xrSettings(() => null), signal };
     void offerXr(corner, xr, (sentence) => showNotice(root, words, sentence));
     const { playback } = presence;
     const moving = presence.body ?? presence.skinned;

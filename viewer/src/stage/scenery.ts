@@ -28,7 +28,7 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
       alone: { value: 0 },
     };
     const material = new THREE.ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, uniforms, transparent: true });
-    material.depthTest = material.depthWrite = false;
+    material.depthWrite = false; // it is as far away as can be: what is solid lies before it
     super(new THREE.PlaneGeometry(2, 2), material);
     this.frustumCulled = false;
     this.renderOrder = -1;

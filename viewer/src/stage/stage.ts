@@ -129,7 +129,7 @@ export class Stage {
     const local = new THREE.Vector3(...eyesOf(head.baked, head.info));
     const sitter = sitterOf(this.manifest, head, resting, local);
     this.orbit.face(person(this.manifest, sitter));
-    this.meeting = meetingOf(sitter, local, bodyOf(this.manifest) !== undefined);
+    this.meeting = meetingOf(sitter, local, Boolean(bodyOf(this.manifest)));
     this.arrange();
   }
 

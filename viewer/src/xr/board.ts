@@ -8,14 +8,15 @@ const LETTERS = 42; // pixels
 const LINE = 54;
 const EDGE = 36;
 const MOST_LINES = Math.floor((HEIGHT - EDGE) / LINE);
-const WIDE = 0.5; // m, of the board at 1 m
+const WIDE = 0.6; // m, of the board at 1 m
 const UNDER = 0.03; // m at 1 m: between the chin and the board
 const NEARER = 0.75; // of the way from the visitor to the face
 
-/** A line of text, and whether it is the avatar's. */
-interface Line {
+/** A text, whether it is the avatar's, and how many of its letters are seen. */
+interface Said {
   text: string;
   own: boolean;
+  seen: number;
 }
 
 /**
@@ -26,18 +27,18 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
   /** What is shown now. */
   text = '';
   private readonly page: ParentNode;
-  private readonly hint: string;
+  private hint: string;
   private readonly canvas = document.createElement('canvas');
-  private readonly texture: THREE.CanvasTexture;
+  private readonly texture: THREE.Texture;
   private readonly observer = new MutationObserver(() => this.write());
 
   /**
    * @param page where the captions and notices are
-   * @param hint is shown until there are any
+   * @param hint is shown, too, until it is followed
    */
   constructor(page: ParentNode, hint: string) {
     const canvas = document.createElement('canvas');
-    const texture = new THREE.CanvasTexture(canvas);
+    const texture = new THREE.Texture(canvas);
     texture.colorSpace = THREE.SRGBColorSpace;
     const material = new THREE.MeshBasicMaterial({ map: texture, transparent: true, depthWrite: false });
     super(new THREE.PlaneGeometry(WIDE, (WIDE * HEIGHT) / WIDTH), material);
@@ -50,6 +51,13 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
     for (const id of ['captions', 'notices']) {
       this.observer.observe(byId(page, id), { subtree: true, childList: true, characterData: true, attributes: true });
     }
+    this.write();
+  }
+
+  /** The visitor knows what the hint says. */
+  dropHint(): void {
+    if (!this.hint) return;
+    this.hint = '';
     this.write();
   }
 
@@ -74,37 +82,62 @@ export class Board extends THREE.Mesh<THREE.PlaneGeometry, THREE.MeshBasicMateri
 
   private write(): void {
     const texts = this.read();
-    this.text = texts.map(({ text }) => text).join('\n');
+    this.text = texts.map(({ text, seen }) => text.slice(0, seen)).join('\n');
     const context = this.canvas.getContext('2d')!;
     context.font = `${LETTERS}px system-ui, sans-serif`;
     const width = (text: string) => context.measureText(text).width;
-    const lines = texts.flatMap(({ text, own }) => linesOf(text, WIDTH - 2 * EDGE, width).map((line) => ({ text: line, own })));
-    paint(context, lines.slice(-MOST_LINES));
+    const lines = texts.flatMap((said) => seenLines(said, linesOf(said.text, WIDTH - 2 * EDGE, width)));
+    const end = Math.max(MOST_LINES, 1 + lines.findLastIndex(({ seen }) => seen > 0));
+    paint(context, lines.slice(Math.max(0, end - MOST_LINES), end));
     this.visible = lines.length > 0;
     this.texture.needsUpdate = true;
   }
 
-  /** What the page says now: a notice, else the captions, else the hint. */
-  private read(): Line[] {
-    const said = (id: string) => byId(this.page, id).textContent?.trim() ?? '';
-    const notice = byId(this.page, 'notices').lastElementChild?.textContent?.trim();
-    if (notice) return [{ text: notice, own: true }];
-    const captions = byId(this.page, 'captions').hidden ? [] : [{ text: said('question'), own: false }, { text: said('answer'), own: true }];
-    const spoken = captions.filter(({ text }) => text);
-    return spoken.length > 0 ? spoken : [{ text: this.hint, own: false }];
+  /** What the page says now: a notice, else the captions; and the hint. */
+  private read(): Said[] {
+    const [captions, notices] = [byId(this.page, 'captions'), byId(this.page, 'notices')];
+    const notice = notices.lastElementChild?.textContent;
+    const shown = captions.checkVisibility() ? [said(byId(captions, 'question'), false), said(byId(captions, 'answer'), true)] : [];
+    const texts = notice ? [whole(notice, true)] : shown;
+    return [...texts, whole(this.hint, false)].filter(({ text }) => text);
   }
 }
 
-function paint(context: CanvasRenderingContext2D, lines: readonly Line[]): void {
+/** A text in single spaces, so that its lines are parts of it. */
+function tidy(text: string): string {
+  return text.replace(/\s+/g, ' ').trim();
+}
+
+function whole(text: string, own: boolean): Said {
+  return { text: tidy(text), own, seen: Infinity };
+}
+
+/** What an element of the captions says; words that were not heard yet keep their place. */
+function said(element: HTMLElement, own: boolean): Said {
+  const unheard = element.querySelector('.unheard')?.textContent ?? '';
+  const text = element.textContent ?? '';
+  return { text: tidy(text), own, seen: tidy(text.slice(0, text.length - unheard.length)).length };
+}
+
+/** How much of each line of a text is seen. */
+function seenLines({ text, own, seen }: Said, lines: readonly string[]): Said[] {
+  let from = 0;
+  return lines.map((line) => {
+    const begin = text.indexOf(line, from);
+    from = begin + line.length;
+    return { text: line, own, seen: Math.min(line.length, Math.max(0, seen - begin)) };
+  });
+}
+
+function paint(context: CanvasRenderingContext2D, lines: readonly Said[]): void {
   context.clearRect(0, 0, WIDTH, HEIGHT);
   context.fillStyle = '#131416c8';
   context.beginPath();
   context.roundRect(0, 0, WIDTH, lines.length * LINE + EDGE, EDGE);
   context.fill();
-  context.textAlign = 'center';
   context.textBaseline = 'middle';
-  lines.forEach(({ text, own }, i) => {
+  lines.forEach(({ text, own, seen }, i) => {
     context.fillStyle = own ? '#f4f1ec' : '#b9bcc4';
-    context.fillText(text, WIDTH / 2, EDGE / 2 + (i + 0.5) * LINE);
+    context.fillText(text.slice(0, seen), (WIDTH - context.measureText(text).width) / 2, EDGE / 2 + (i + 0.5) * LINE);
   });
 }

@@ -26,10 +26,9 @@ export class Glance {
 
   /** How far the head has turned from where it would be. */
   motion(): RigidMotion {
-    const [, neck, head] = this.gaze.at(this.seconds);
-    const [a, b] = [neck, head].map(([w, x, y, z]) => new THREE.Quaternion(x, y, z, w)) as [THREE.Quaternion, THREE.Quaternion];
+    const turns = this.gaze.at(this.seconds).map(([w, x, y, z]) => new THREE.Quaternion(x, y, z, w)); // chest, neck, head
     const facing = new THREE.Quaternion().setFromRotationMatrix(this.facing);
-    const turn = facing.clone().multiply(a).multiply(b).multiply(facing.invert());
+    const turn = turns.reduce((sum, one) => sum.multiply(one), facing.clone()).multiply(facing.invert());
     const shift = this.pivot.clone().sub(this.pivot.clone().applyQuaternion(turn));
     return [[turn.w, turn.x, turn.y, turn.z], shift.toArray()];
   }

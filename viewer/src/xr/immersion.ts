@@ -2,6 +2,7 @@ import * as THREE from 'three';
 import { PageError } from '../errors.ts';
 import { atEnd } from '../lifetime.ts';
 import type { Presentation } from '../stage/presentation.ts';
+import { say, type Message } from '../words/text.ts';
 import { Arc } from './arc.ts';
 import { Board } from './board.ts';
 import { Glance } from './glance.ts';
@@ -10,7 +11,6 @@ import { Rig } from './rig.ts';
 import { VoiceInSpace } from './sound.ts';
 import { Stick } from './stick.ts';
 import { Tools } from './tools.ts';
-import { WORDS } from './words.ts';
 
 const APART = 1.2; // m between those who talk
 const TURN = Math.PI / 6; // rad, at once: smooth turns make people sick
@@ -52,7 +52,7 @@ export class Immersion implements Presentation {
     const options = { requiredFeatures: ['local-floor'], optionalFeatures: ['hand-tracking', 'layers'] };
     const session = await navigator.xr!.requestSession(mode, options).catch((error: unknown) => {
       console.warn(error);
-      throw new PageError(WORDS.refused);
+      throw new PageError(say('xr.refused'));
     });
     xr.enabled = true;
     xr.setReferenceSpaceType('local-floor');
@@ -66,14 +66,14 @@ export class Immersion implements Presentation {
       console.warn(error);
       xr.enabled = false;
       await session.end().catch(() => {}); // it may have ended by itself
-      throw new PageError(WORDS.impossible);
+      throw new PageError(say('xr.impossible'));
     }
     const immersion = new Immersion(session, mode, ports);
     atEnd(ended.signal, () => immersion.leave());
   }
 
   private constructor(session: XRSession, mode: XrMode, ports: XrPorts) {
-    const { stage, conversation, head, root } = ports;
+    const { stage, conversation, head, root, words } = ports;
     const meeting = stage.meeting!;
     this.session = session;
     this.ports = ports;
@@ -83,7 +83,7 @@ export class Immersion implements Presentation {
     this.rate = HELD * (session.frameRate ?? USUAL_RATE);
     this.rig = new Rig(meeting.ground, meeting.eyes);
     this.camera = this.rig.camera;
-    this.board = new Board(root, conversation ? this.hint() : '');
+    this.board = new Board(root, conversation ? words.text(this.hint()) : '');
     this.voice = conversation ? new VoiceInSpace(conversation.player) : null;
     this.glance = head && !meeting.stands ? new Glance(meeting) : null;
     if (this.glance) head!.motion = () => this.glance!.motion();
@@ -143,6 +143,7 @@ export class Immersion implements Presentation {
 
   private talk(source: XRInputSource): void {
     this.tools.talking.add(source);
+    this.board.dropHint();
     void this.ports.conversation?.press();
   }
 
@@ -214,10 +215,10 @@ export class Immersion implements Presentation {
     return new THREE.Vector3().setFromMatrixPosition(this.head);
   }
 
-  private hint(): string {
+  private hint(): Message {
     const sources = [...this.session.inputSources];
-    if (sources.some(({ hand }) => hand)) return WORDS.hands;
-    if (this.session.interactionMode === 'screen-space') return WORDS.screen;
-    return this.passthrough ? WORDS.controllersInRoom : WORDS.controllers;
+    if (sources.some(({ hand }) => hand)) return say('xr.hands');
+    if (this.session.interactionMode === 'screen-space') return say('xr.screen');
+    return say(this.passthrough ? 'xr.controllers-in-room' : 'xr.controllers');
   }
 }

@@ -1,7 +1,7 @@
 const words = new Intl.Segmenter(undefined, { granularity: 'word' });
 
 /**
- * Breaks a text into lines, in languages with and without spaces. A word that is too wide for a line
+ * Breaks a text, in single spaces, into lines, in languages with and without spaces. A word that is too wide for a line
  * has one of its own.
  *
  * @param most widest line
@@ -10,8 +10,9 @@ const words = new Intl.Segmenter(undefined, { granularity: 'word' });
 export function linesOf(text: string, most: number, width: (text: string) => number): string[] {
   const lines: string[] = [];
   let line = '';
-  for (const { segment } of words.segment(text.replace(/\s+/g, ' ').trim())) {
-    if (line && width((line + segment).trimEnd()) > most) {
+  for (const { segment, isWordLike } of words.segment(text)) {
+    const ends = !isWordLike && !/\s$/.test(line); // a mark stays at its word
+    if (line && !ends && width((line + segment).trimEnd()) > most) {
       lines.push(line.trimEnd());
       line = segment.trimStart();
     } else line += segment;

@@ -1,8 +1,7 @@
 import { sentenceOf } from '../errors.ts';
 import { icon } from '../ui/icons.ts';
-import type { Sentence } from '../words/text.ts';
+import { say, type Sentence } from '../words/text.ts';
 import { XR_MODES, type XrMode, type XrPorts } from './ports.ts';
-import { WORDS } from './words.ts';
 
 const ICONS = { 'immersive-vr': 'headset', 'immersive-ar': 'room' } as const;
 
@@ -39,7 +38,9 @@ function makeButton(mode: XrMode, ports: XrPorts, notice: (sentence: Sentence) =
   const button = document.createElement('button');
   button.type = 'button';
   button.className = 'pill';
-  button.append(icon(ICONS[mode]), WORDS[mode]);
+  const name = document.createElement('span');
+  ports.words.write(name, say(`xr.${mode}`));
+  button.append(icon(ICONS[mode]), name);
   button.onclick = () => enter(mode, ports).catch((error: unknown) => notice(sentenceOf(error)));
   return button;
 }

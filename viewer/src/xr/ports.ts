@@ -1,6 +1,7 @@
 import type { Head } from '../head/head.ts';
 import type { Stage } from '../stage/stage.ts';
 import type { Conversation } from '../talk/conversation.ts';
+import type { PageWords } from '../words/page-words.ts';
 import type { XrSettings } from './settings.ts';
 
 export const XR_MODES = ['immersive-vr', 'immersive-ar'] as const;
@@ -12,6 +13,7 @@ export interface XrPorts {
   conversation?: Pick<Conversation, 'player' | 'press' | 'release'>; // none of a body alone
   head?: Head;
   root: ParentNode; // of the page, whose captions and notices are shown in space, too
+  words: PageWords;
   settings: XrSettings;
   /** Ends the visit. */
   signal: AbortSignal;

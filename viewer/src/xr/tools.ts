@@ -4,10 +4,11 @@ const PLAIN = 0xb9bcc4;
 const TALKING = 0xd9a77c;
 const JOINTS = 25; // of a hand
 const THIN = 0.008; // m, radius of a joint of which the headset tells none
+const HANDLE = [0.018, 0.018, 0.07] as const; // m, radii of a controller, which is long where it points to
 
 /** A controller, or a hand, as it is shown. */
 interface Shown {
-  object: THREE.Mesh<THREE.BufferGeometry, THREE.MeshLambertMaterial>;
+  object: THREE.Mesh<THREE.BufferGeometry, THREE.ShaderMaterial>;
   joints: THREE.InstancedMesh | null; // of a hand; the object itself
 }
 
@@ -19,13 +20,8 @@ export class Tools extends THREE.Group {
   /** Those by which the visitor talks now. */
   readonly talking = new Set<XRInputSource>();
   private readonly shown = new Map<XRInputSource, Shown>();
-  private readonly handle = new THREE.CapsuleGeometry(0.017, 0.09, 4, 16).rotateX(Math.PI / 2); // along the way it points
-  private readonly joint = new THREE.SphereGeometry(1, 12, 8);
-
-  constructor() {
-    super();
-    this.add(new THREE.HemisphereLight(0xffffff, 0x50545c, 3));
-  }
+  private readonly ball = new THREE.SphereGeometry(1, 20, 12);
+  private readonly handle = this.ball.clone().scale(...HANDLE);
 
   /** Goes to where everything is in a frame. */
   update(frame: XRFrame, space: XRReferenceSpace): void {
@@ -33,7 +29,7 @@ export class Tools extends THREE.Group {
     for (const source of this.shown.keys()) if (!sources.includes(source)) this.drop(source);
     for (const source of sources) {
       const shown = this.shown.get(source) ?? this.take(source);
-      shown.object.material.color.set(this.talking.has(source) ? TALKING : PLAIN);
+      (shown.object.material.uniforms.colour!.value as THREE.Color).setHex(this.talking.has(source) ? TALKING : PLAIN, THREE.LinearSRGBColorSpace); // as it is displayed
       shown.object.visible = shown.joints ? showHand(shown.joints, source, frame, space) : hold(shown.object, source, frame, space);
     }
   }
@@ -41,12 +37,13 @@ export class Tools extends THREE.Group {
   dispose(): void {
     for (const source of this.shown.keys()) this.drop(source);
     this.handle.dispose();
-    this.joint.dispose();
+    this.ball.dispose();
   }
 
   private take(source: XRInputSource): Shown {
-    const material = new THREE.MeshLambertMaterial();
-    const joints = source.hand ? new THREE.InstancedMesh(this.joint, material, JOINTS) : null;
+    const uniforms = { colour: { value: new THREE.Color() } };
+    const material = new THREE.ShaderMaterial({ vertexShader: VERTEX, fragmentShader: FRAGMENT, uniforms });
+    const joints = source.hand ? new THREE.InstancedMesh(this.ball, material, JOINTS) : null;
     const object = (joints ?? new THREE.Mesh(this.handle, material)) as Shown['object'];
     object.frustumCulled = object.matrixAutoUpdate = false;
     this.add(object);
@@ -83,3 +80,25 @@ function showHand(mesh: THREE.InstancedMesh, { hand }: XRInputSource, frame: XRF
   mesh.instanceMatrix.needsUpdate = true;
   return poses.every((pose) => pose != null);
 }
+
+// Lit from above where the visitor looks: nothing else on stage needs lamps.
+const VERTEX = `
+  varying vec3 facing;
+  void main() {
+    #ifdef USE_INSTANCING
+      mat4 place = modelViewMatrix * instanceMatrix;
+    #else
+      mat4 place = modelViewMatrix;
+    #endif
+    facing = mat3(place) * normal;
+    gl_Position = projectionMatrix * place * vec4(position, 1.0);
+  }
+`;
+const FRAGMENT = `
+  uniform vec3 colour;
+  varying vec3 facing;
+  void main() {
+    float light = max(0.0, dot(normalize(facing), vec3(0.0, 0.8, 0.6)));
+    gl_FragColor = vec4(colour * (0.45 + 0.55 * light), 1.0);
+  }
+`;

@@ -39,6 +39,17 @@ describe('quality', () => {
     expect(draw(quality, 120, () => (0.98 + 0.04 * next()) / rate)).toEqual([[0, 0]]);
   });
 
+  test('holds the rate that a headset needs, and that of the page afterwards', () => {
+    const quality = new Quality(ALL);
+    const takes = (index: number) => 0.022 * 0.9 ** index; // 45 pictures per second of the best
+    expect(draw(quality, 60, takes)).toEqual([[0, 0]]);
+    quality.aim(61);
+    const levels = draw(quality, 60, takes).map(([, index]) => index);
+    expect(Math.max(...levels)).toBe(3); // the first one with 61 per second
+    quality.aim();
+    expect(draw(quality, 60, takes).at(-1)![1]).toBe(0);
+  });
+
   test('is not lowered by single pictures that take long', () => {
     const quality = new Quality(ALL);
     let pictures = 0;

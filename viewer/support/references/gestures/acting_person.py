@@ -2,10 +2,11 @@
 
 Run: python acting_person.py OUT
 
-Writes OUT/person.ico3d: random Gaussians along the bones of a rig, and a random head on it.
+Writes OUT/person.ico3d, and its files into OUT/bundle: random Gaussians along the bones of a rig, and a random head on it.
 """
 
 import sys
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -65,7 +66,10 @@ def main() -> None:
     files = random_files(head) | gesture_files(body)
     files |= {SKINNED: body.to_bytes(), POSES: poses_to_bytes(poses)}
     files |= {ANIMATION: animation.to_bytes(), "thumbnail.png": thumbnail()}
-    write_bundle(Path(sys.argv[1]) / "person.ico3d", manifest, files)
+    path = Path(sys.argv[1]) / "person.ico3d"
+    write_bundle(path, manifest, files)
+    with zipfile.ZipFile(path) as bundle:
+        bundle.extractall(path.with_name("bundle"))
 
 
 if __name__ == "__main__":
