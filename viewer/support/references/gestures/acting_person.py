@@ -2,7 +2,8 @@
 
 Run: python acting_person.py OUT
 
-Writes OUT/person.ico3d, and its files into OUT/bundle: random Gaussians along the bones of a rig, and a random head on it.
+Writes OUT/person.ico3d, and its files into OUT/bundle: random Gaussians along the bones of a rig,
+and a random head on it.
 """
 
 import sys
