@@ -16,7 +16,7 @@ afterAll(() => browser?.close());
 test('the sheet shows who serves, and choosing starts anew', async () => {
   const { page } = browser;
   await until(browser, finished(0), 60_000); // the greeting
-  await page.click('#services-button');
+  await page.click('#settings-button');
   await page.setViewportSize({ width: 420, height: 560 });
   await page.evaluate(() => window.draw!());
   const picture = join(folder, 'services.png');

@@ -32,8 +32,17 @@ export class Disclosure {
   }
 
   private show(open: boolean): void {
+    if (open) this.closeOthers();
     this.part.hidden = !open;
     this.button.setAttribute('aria-expanded', String(open));
     this.changed(open);
+  }
+
+  /** There is room for one of the parts that lie side by side. */
+  private closeOthers(): void {
+    for (const button of this.button.parentElement!.querySelectorAll<HTMLElement>('[aria-expanded=true]')) {
+      const beside = this.part.parentElement!.querySelector(`:scope > #${button.getAttribute('aria-controls')}`);
+      if (beside && button !== this.button) button.click();
+    }
   }
 }
