@@ -1,51 +1,13 @@
-import { createRequire } from 'node:module';
-import { readFileSync } from 'node:fs';
-import { join } from 'node:path';
-import type { AxeResults } from 'axe-core';
 import type { Page, WebSocketRoute } from 'playwright-core';
 import { afterEach, expect, inject, test } from 'vitest';
+import { judge } from '../../support/browser/axe.ts';
 import { Browser } from '../../support/browser/browser.ts';
 import { pauseDrawing } from '../../support/browser/drawing.ts';
 
-const AXE = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 const { talkingUrl } = inject('shared');
-const DESKTOP = { width: 1280, height: 720 };
-const PHONE = { width: 360, height: 640 };
 
 let browser: Browser;
 afterEach(() => browser?.close());
-
-/** What axe finds that keeps somebody out. */
-async function findings(page: Page, rules?: string[]): Promise<string[]> {
-  if (!(await page.evaluate(() => 'axe' in window))) await page.evaluate(AXE);
-  const { violations } = (await page.evaluate((rules) => {
-    const { axe } = window as unknown as { axe: typeof import('axe-core') };
-    const asked: import('axe-core').RunOptions = rules ? { runOnly: rules } : { rules: { 'target-size': { enabled: true } } };
-    return axe.run(document, { ...asked, resultTypes: ['violations'] });
-  }, rules)) as AxeResults;
-  return violations
-    .filter(({ impact }) => impact === 'serious' || impact === 'critical')
-    .flatMap(({ id, nodes }) => nodes.map(({ target, failureSummary }) => `${id}: ${target.join(' ')} ${failureSummary}`));
-}
-
-/** Looks at a state on a desktop in the dark and on a phone in the light, and at the colours of the other two. */
-async function judge(page: Page, state: string): Promise<void> {
-  for (const [size, colorScheme, rules] of [
-    [DESKTOP, 'dark', undefined],
-    [DESKTOP, 'light', ['color-contrast']],
-    [PHONE, 'dark', ['color-contrast']],
-    [PHONE, 'light', undefined],
-  ] as const) {
-    await page.setViewportSize(size);
-    await page.emulateMedia({ colorScheme, reducedMotion: 'reduce' });
-    await page.waitForFunction((theme) => (document.body.dataset.theme ?? theme) === theme, colorScheme);
-    if (process.env.PICTURES) await page.screenshot({ path: join(process.env.PICTURES, `${state}-${size.width}-${colorScheme}.png`) });
-    const found = await findings(page, rules && [...rules]);
-    expect.soft(found, `${state}, ${size.width} px, ${colorScheme}`).toEqual([]);
-    const wide = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
-    expect.soft(wide, state).toBeLessThanOrEqual(0);
-  }
-}
 
 /** Sound waits for a click, as in browsers that are not tested. */
 function keepSound(page: Page): Promise<unknown> {
@@ -61,7 +23,7 @@ function keepSound(page: Page): Promise<unknown> {
 }
 
 test('axe finds nothing serious in any state of the page', async () => {
-  browser = await Browser.launch({ ...DESKTOP, calm: true });
+  browser = await Browser.launch({ width: 1280, height: 720, calm: true });
   const { page } = browser;
   let line: WebSocketRoute | undefined;
   await page.routeWebSocket(/\/ws/, (socket) => {
@@ -106,7 +68,7 @@ test('axe finds nothing serious in any state of the page', async () => {
 });
 
 test('axe finds nothing serious in the check of the device', async () => {
-  browser = await Browser.launch({ ...DESKTOP, calm: true });
+  browser = await Browser.launch({ width: 1280, height: 720, calm: true });
   const { page } = browser;
   await page.goto(`${talkingUrl}check`);
   await page.waitForSelector('#frames[data-verdict]');
@@ -114,30 +76,4 @@ test('axe finds nothing serious in the check of the device', async () => {
   await page.waitForSelector('#heard:visible');
   await page.click('#unheard');
   await judge(page, 'check');
-});
-
-test('axe finds nothing serious in an embedded avatar', async () => {
-  browser = await Browser.launch({ ...DESKTOP, calm: true });
-  const { page } = browser;
-  await keepSound(page);
-  const html = `<!doctype html><html lang="de"><title>Site</title><main><h1>Site</h1>
-    <ico3d-avatar lang="fr" style="max-width: 100%"></ico3d-avatar><ico3d-avatar mode="floating"></ico3d-avatar></main>
-    <script type="module" src="embed.js"></script></html>`;
-  await page.route(`${talkingUrl}site`, (route) => route.fulfill({ contentType: 'text/html', body: html }));
-  await page.goto(`${talkingUrl}site`);
-  const avatar = page.locator('ico3d-avatar').first();
-  await avatar.locator('#choices').waitFor();
-  expect(await avatar.locator('#start').textContent()).toBe('Commencer à parler'); // as the element says
-  expect(await avatar.locator('#page').getAttribute('lang')).toBe('fr');
-  expect(await page.locator('#launcher').last().getAttribute('aria-label')).toBe('Talk with the avatar');
-  await judge(page, 'embedded-invitation');
-  await avatar.locator('#start-typing').click();
-  await avatar.locator('#drawer-button').click();
-  await page.waitForTimeout(5000); await page.screenshot({path:'/tmp/words/dbg.png'}); console.log(await avatar.evaluate((a) => a.shadowRoot!.querySelector('#page')!.outerHTML.slice(0,300)), await avatar.locator('#record').innerHTML(), await avatar.locator('#overlay').getAttribute('class'));
-  await avatar.locator('#record .avatar').waitFor({timeout:3000});
-  expect(await avatar.locator('#state').textContent()).toMatch(/^(Parle|Prêt)$/);
-  await page.evaluate(() => (document.querySelector('ico3d-avatar')!.lang = 'ja'));
-  expect(await avatar.locator('#drawer h2').textContent()).toBe('会話の記録');
-  expect(await page.evaluate(() => document.documentElement.lang)).toBe('de'); // the site's own
-  await judge(page, 'embedded');
 });
