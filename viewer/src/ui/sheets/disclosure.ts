@@ -38,12 +38,11 @@ export class Disclosure {
     this.changed(open);
   }
 
-  /** Of the parts that lie beside their buttons one is open at a time. */
+  /** There is room for one of the parts that lie side by side. */
   private closeOthers(): void {
-    const { parentElement: group } = this.button;
-    if (this.part.parentElement !== group) return;
-    for (const other of group!.querySelectorAll<HTMLElement>(':scope > [aria-expanded=true]')) {
-      if (group!.querySelector(`:scope > #${other.getAttribute('aria-controls')}`)) other.click();
+    for (const button of this.button.parentElement!.querySelectorAll<HTMLElement>('[aria-expanded=true]')) {
+      const beside = this.part.parentElement!.querySelector(`:scope > #${button.getAttribute('aria-controls')}`);
+      if (beside && button !== this.button) button.click();
     }
   }
 }
