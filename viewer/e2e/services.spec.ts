@@ -16,13 +16,14 @@ afterAll(() => browser?.close());
 test('the sheet shows who serves, and choosing starts anew', async () => {
   const { page } = browser;
   await until(browser, finished(0), 60_000); // the greeting
+  expect(await page.evaluate(() => window.ico3d!.stage.meeting!.stands)).toBe(false); // a head alone has no floor in sight
   await page.setViewportSize({ width: 420, height: 560 });
   const views = await page.locator('.views').boundingBox();
   await page.click('#panel-button');
-  await page.click('#services-button');
-  expect(await page.locator('header section:visible').evaluateAll((open) => open.map(({ id }) => id))).toEqual(['services']);
+  await page.click('#settings-button');
+  expect(await page.locator('header section:visible').evaluateAll((open) => open.map(({ id }) => id))).toEqual(['settings']);
   expect(await page.locator('.views').boundingBox()).toEqual(views); // a sheet moves no button
-  const sheet = (await page.locator('#services').boundingBox())!;
+  const sheet = (await page.locator('#settings').boundingBox())!;
   expect(sheet.x + sheet.width).toBeLessThan(views!.x);
   expect(sheet.y + sheet.height).toBeLessThan((await page.locator('#composer').boundingBox())!.y);
   await page.evaluate(() => window.draw!());

@@ -3,7 +3,7 @@
 import contextlib
 import ipaddress
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Generator
 
 MOST_SOCKETS = 64
 """Open WebSockets of one machine; a classroom or an office may share its address."""
@@ -19,7 +19,7 @@ class Crowd:
         self._open: Counter[str] = Counter()
 
     @contextlib.contextmanager
-    def one_more(self, machine: str) -> Iterator[bool]:
+    def one_more(self, machine: str) -> Generator[bool, None, None]:
         """Counts a socket until it is closed; yields whether it may be opened.
 
         Args:
