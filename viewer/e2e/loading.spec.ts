@@ -55,6 +55,7 @@ describe.skipIf(!demoUrl)('a first visit to the packaged person at 10 Mbit/s (ne
   });
 
   test('keeps all of it but the page and the manifest for the next visit', async () => {
+    await browser.page.waitForLoadState('networkidle'); // windows of the body that come after the first picture
     const before = wire.bytes;
     await visit(browser);
     expect(wire.bytes - before).toBeLessThan(SECOND_VISIT);
