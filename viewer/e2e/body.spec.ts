@@ -209,7 +209,7 @@ describe('a body alone, served by ico3d serve', () => {
   test('a late window: the picture stays until it is there', async () => {
     let release = () => {};
     const held = new Promise<void>((resolve) => (release = resolve));
-    await page.route('**/body/0001.safetensors', async (route) => {
+    await page.route('**/body/0001.safetensors*', async (route) => {
       await held;
       await route.continue();
     });
@@ -218,11 +218,11 @@ describe('a body alone, served by ico3d serve', () => {
     expect(await page.evaluate(() => window.ico3d!.body!.shown)).toMatchObject({ time: 1, window: 0 });
     release();
     await page.waitForFunction(() => window.ico3d!.body!.shown!.window === 1, undefined, { timeout: 30_000 });
-    await page.unroute('**/body/0001.safetensors');
+    await page.unroute('**/body/0001.safetensors*');
   });
 
   test('a damaged window is one sentence on the page', async () => {
-    await page.route('**/body/0000.safetensors', (route) => route.fulfill({ body: 'x'.repeat(100) }));
+    await page.route('**/body/0000.safetensors*', (route) => route.fulfill({ body: 'x'.repeat(100) }));
     await page.reload();
     const sentence = page.locator('#overlay-error');
     await sentence.waitFor();

@@ -150,7 +150,7 @@ describe('a visitor who wants little motion', () => {
   });
 
   test('reads one sentence where the animation is damaged', async () => {
-    await page.route('**/animation.json', (route) => route.fulfill({ body: '{}' }));
+    await page.route('**/animation.json*', (route) => route.fulfill({ body: '{}' }));
     await page.reload();
     const sentence = page.locator('#overlay-error');
     await sentence.waitFor();

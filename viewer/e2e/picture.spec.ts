@@ -56,7 +56,7 @@ describe('what the GPU makes of a bundle', () => {
 
   test('a damaged file is one sentence on the page', async () => {
     const { page } = browser;
-    await page.route('**/head.safetensors', (route) => route.fulfill({ body: 'x'.repeat(100) }));
+    await page.route('**/head.safetensors*', (route) => route.fulfill({ body: 'x'.repeat(100) }));
     await page.reload();
     const sentence = page.locator('#overlay-error');
     await sentence.waitFor();

@@ -89,12 +89,12 @@ describe('a body on a skeleton alone, served by ico3d serve', () => {
   });
 
   test('a damaged file is one sentence on the page', async () => {
-    await page.route('**/body/skinned.safetensors', (route) => route.fulfill({ body: 'x'.repeat(100) }));
+    await page.route('**/body/skinned.safetensors*', (route) => route.fulfill({ body: 'x'.repeat(100) }));
     await page.reload();
     const sentence = page.locator('#overlay-error');
     await sentence.waitFor();
     expect(await sentence.textContent()).toBe('body/skinned.safetensors is shorter than manifest.json says.');
-    await page.unroute('**/body/skinned.safetensors');
+    await page.unroute('**/body/skinned.safetensors*');
   });
 });
 

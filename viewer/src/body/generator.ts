@@ -42,6 +42,11 @@ export class WindowGenerator extends SplatGenerator {
     return this.active;
   }
 
+  /** Whether it takes part in sorting only, and is not to be drawn. */
+  get unseen(): boolean {
+    return this.active && this.uniforms.bodyGate.value === 0;
+  }
+
   /** Puts a window into the slot, asleep. */
   hold(content: PackedWindow): void {
     this.content = content;

@@ -218,6 +218,7 @@ export class Stage {
   /** Draws now; what the canvas holds may be read until the current task ends. */
   draw(): void {
     for (const actor of this.actors) actor.drawing?.(performance.now());
+    this.current.sift();
     const before = performance.now();
     this.spark.autoUpdate = !this.presentation;
     if (this.presentation) this.gather();
