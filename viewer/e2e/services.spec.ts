@@ -19,10 +19,10 @@ test('the sheet shows who serves, and choosing starts anew', async () => {
   await page.setViewportSize({ width: 420, height: 560 });
   const views = await page.locator('.views').boundingBox();
   await page.click('#panel-button');
-  await page.click('#services-button');
-  expect(await page.locator('header section:visible').evaluateAll((open) => open.map(({ id }) => id))).toEqual(['services']);
+  await page.click('#settings-button');
+  expect(await page.locator('header section:visible').evaluateAll((open) => open.map(({ id }) => id))).toEqual(['settings']);
   expect(await page.locator('.views').boundingBox()).toEqual(views); // a sheet moves no button
-  const sheet = (await page.locator('#services').boundingBox())!;
+  const sheet = (await page.locator('#settings').boundingBox())!;
   expect(sheet.x + sheet.width).toBeLessThan(views!.x);
   expect(sheet.y + sheet.height).toBeLessThan((await page.locator('#composer').boundingBox())!.y);
   await page.evaluate(() => window.draw!());

@@ -4,6 +4,7 @@ import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, inject, test } from 'vitest';
 import type { mountAvatar } from '../../src/embed/api.ts';
 import type { Presence } from '../../src/visit.ts';
+import { judge } from '../../support/browser/axe.ts';
 import { Browser } from '../../support/browser/browser.ts';
 import { REPOSITORY } from '../../support/python.ts';
 import { scratchFolder } from '../../support/scratch.ts';
@@ -40,6 +41,9 @@ function pageOf(path: string): string {
     '/example': example,
     '/inline': example.replace(/<ico3d-avatar.*>/, '<ico3d-avatar autoconnect style="width: 320px; height: 240px"></ico3d-avatar>'),
     '/clear': example.replace(/<ico3d-avatar.*>/, `<ico3d-avatar transparent autoconnect style="width: 320px; height: 240px; ${BOARD}"></ico3d-avatar>`),
+    '/french': `<!doctype html><html lang="de"><title>Site</title><main><h1>Site</h1>
+      <ico3d-avatar lang="fr" style="max-width: 100%"></ico3d-avatar><ico3d-avatar mode="floating"></ico3d-avatar></main>
+      <script type="module" src="${server.url}embed.js"></script></html>`,
     '/alone': `<div id="place" style="width: 160px; height: 160px"></div>
       <script type="module">
         import { mountAvatar } from '${server.url}embed.js';
@@ -239,5 +243,24 @@ test('an avatar alone shows the face and speaks the sound that it is given', asy
   }, server.url);
   expect(shown.kept).toEqual(new Array(shown.size).fill(0.5));
   expect(shown).toMatchObject({ gesture: false, left: 0 });
+  await browser.close();
+});
+
+test('axe finds nothing serious in an avatar that speaks the language its site gives it', async () => {
+  const { browser, page } = await visit('/french');
+  const avatar = page.locator('ico3d-avatar').first();
+  await avatar.locator('#choices').waitFor();
+  expect(await avatar.locator('#start').textContent()).toBe('Commencer à parler');
+  expect(await avatar.locator('#page').getAttribute('lang')).toBe('fr');
+  expect(await page.locator('#launcher').last().getAttribute('aria-label')).toBe('Talk with the avatar');
+  await judge(page, 'embedded-invitation');
+  await avatar.locator('#start-typing').click();
+  await avatar.locator('#drawer-button').click();
+  await avatar.locator('#record .avatar').waitFor();
+  expect(await avatar.locator('#state').textContent()).toMatch(/^(Parle|Prêt)$/);
+  await page.evaluate(() => (document.querySelector('ico3d-avatar')!.lang = 'ja'));
+  expect(await avatar.locator('#drawer h2').textContent()).toBe('会話の記録');
+  expect(await page.evaluate(() => document.documentElement.lang)).toBe('de'); // the site's own
+  await judge(page, 'embedded');
   await browser.close();
 });

@@ -56,9 +56,10 @@ export class TalkRecord {
   /** No more of an utterance is heard. */
   over(utterance: number, interrupted: boolean): void {
     if (this.answer?.utterance !== utterance) return;
-    const { entry } = this.answer;
+    const { entry, sentences } = this.answer;
+    const last = [...sentences.values()].at(-1)!;
     this.answer = null;
-    if (!interrupted || !entry.text) return;
+    if (!interrupted || !entry.text || last.heard === last.text.length) return;
     entry.cut = true;
     entry.text += CUT;
     this.events.changed(entry);

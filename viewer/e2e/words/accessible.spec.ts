@@ -1,0 +1,79 @@
+import type { Page, WebSocketRoute } from 'playwright-core';
+import { afterEach, expect, inject, test } from 'vitest';
+import { judge } from '../../support/browser/axe.ts';
+import { Browser } from '../../support/browser/browser.ts';
+import { pauseDrawing } from '../../support/browser/drawing.ts';
+
+const { talkingUrl } = inject('shared');
+
+let browser: Browser;
+afterEach(() => browser?.close());
+
+/** Sound waits for a click, as in browsers that are not tested. */
+function keepSound(page: Page): Promise<unknown> {
+  return page.addInitScript(() => {
+    const state = Object.getOwnPropertyDescriptor(BaseAudioContext.prototype, 'state')!;
+    let clicked = false;
+    addEventListener('click', () => (clicked = true), { capture: true, once: true });
+    const get = function (this: AudioContext) {
+      return clicked ? state.get!.call(this) : 'suspended';
+    };
+    Object.defineProperty(AudioContext.prototype, 'state', { configurable: true, get });
+  });
+}
+
+test('axe finds nothing serious in any state of the page', async () => {
+  browser = await Browser.launch({ width: 1280, height: 720, calm: true });
+  const { page } = browser;
+  let line: WebSocketRoute | undefined;
+  await page.routeWebSocket(/\/ws/, (socket) => {
+    line = socket;
+    socket.connectToServer().onMessage((message) => socket.send(message));
+  });
+  await keepSound(page);
+  let load = () => {};
+  const loading = new Promise<void>((resolve) => (load = resolve));
+  await page.route(/bundle\/.*safetensors/, async (route) => {
+    await loading;
+    await route.continue();
+  });
+  await page.goto(talkingUrl);
+  await page.waitForFunction(() => document.getElementById('overlay-name')!.textContent === 'Stella');
+  await judge(page, 'loading');
+  load();
+  await page.waitForFunction(() => window.ico3d !== undefined, undefined, { timeout: 60_000 });
+  await page.evaluate(() => window.ico3d!.stage.holdQuality(0));
+  await pauseDrawing(page);
+  await page.waitForSelector('#choices:visible');
+  await judge(page, 'invitation');
+  await page.click('#start-typing');
+  await page.waitForFunction(() => document.querySelector('#answer')!.textContent === 'Hello.');
+  await page.fill('#text', 'tell me about yourself');
+  await page.keyboard.press('Enter');
+  await page.waitForFunction(() => /Gaussians/.test(document.querySelector('#answer')!.textContent!));
+  await judge(page, 'talking');
+  await page.click('#settings-button');
+  await judge(page, 'settings');
+  await page.click('#panel-button');
+  expect(await page.isHidden('#settings')).toBe(true); // there is room for one
+  await page.click('#drawer-button');
+  await judge(page, 'drawer');
+  await page.click('#drawer-close');
+  line!.send(JSON.stringify({ type: 'place', session: 'x', position: 3, seconds: 125 }));
+  await page.waitForSelector('#overlay-wait:visible');
+  await judge(page, 'queue');
+  line!.send(JSON.stringify({ type: 'error', message: 'Over.', fatal: true, again: true, code: 'idle', values: { minutes: 5 } }));
+  await page.waitForSelector('#again:visible');
+  await judge(page, 'ended');
+});
+
+test('axe finds nothing serious in the check of the device', async () => {
+  browser = await Browser.launch({ width: 1280, height: 720, calm: true });
+  const { page } = browser;
+  await page.goto(`${talkingUrl}check`);
+  await page.waitForSelector('#frames[data-verdict]');
+  await page.click('#sound button');
+  await page.waitForSelector('#heard:visible');
+  await page.click('#unheard');
+  await judge(page, 'check');
+});
