@@ -18,6 +18,7 @@ const ORDER = [
   ['face'],
   ['motion'],
   ['gesture'],
+  ['soft'],
   ['body', 'stage', 'audio'],
   ['talk'],
   ['ui', 'cast.ts'],
