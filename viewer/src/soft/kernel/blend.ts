@@ -86,8 +86,18 @@ function write(rows: usize, behind: usize, pixels: usize, stride: usize): void {
   }
 }
 
+/** Shows what is behind a tile in which nothing is. */
+function writeEmpty(rows: usize, behind: usize, pixels: usize, stride: usize): void {
+  const opaque = i32x4.splat(0xff << 24);
+  for (let row: usize = 0; row < rows; row++) v128.store(pixels + row * stride, v128.or(v128.load(behind + row * stride), opaque));
+}
+
 /** Draws one tile from its entries; `behind` and `pixels` are RGBA of its first pixel. */
 export function drawTile(entries: usize, end: usize, left: i32, above: i32, rows: usize, behind: usize, pixels: usize, stride: usize): void {
+  if (entries == end) {
+    writeEmpty(rows, behind, pixels, stride);
+    return;
+  }
   clear();
   let until = min(end, entries + 4 * CHECK);
   for (let entry = entries; entry < end; entry = until, until = min(end, until + 4 * CHECK)) {
