@@ -6,6 +6,7 @@ import { webAssembly } from './webassembly.ts';
 /** `npm pack` builds the package with it: the element and the renderer, without three and Spark. */
 export default defineConfig({
   plugins: [webAssembly(), embedded()],
+  worker: { format: 'es', plugins: () => [webAssembly()] },
   build: {
     outDir: 'dist',
     target: 'es2023',

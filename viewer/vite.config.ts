@@ -9,6 +9,7 @@ const SERVER = process.env.ICO3D_SERVER ?? 'http://127.0.0.1:8700';
 export default defineConfig({
   base: './',
   plugins: [webAssembly(), compressed(), preloaded('index.html', 'theatre')],
+  worker: { format: 'es', plugins: () => [webAssembly()] },
   build: {
     outDir: '../src/ico3d/chat/static',
     emptyOutDir: true,

@@ -15,11 +15,6 @@ export interface Kernel {
   seen(): number;
 }
 
-/** Pixels across a tile. */
-export const TILE_WIDTH = 4;
-/** Pixels down a tile. */
-export const TILE_HEIGHT = 64;
-
 /** A new kernel, with memory of its own. */
 export async function makeKernel(): Promise<Kernel> {
   const bytes = Uint8Array.from(atob(encoded), (letter) => letter.charCodeAt(0));

@@ -1,5 +1,6 @@
-import { TILE_HEIGHT, TILE_WIDTH, type Kernel } from './kernel.ts';
+import type { Kernel } from './kernel.ts';
 import type { Source } from './source.ts';
+import { TILE_HEIGHT, TILE_WIDTH } from './tiles.ts';
 
 /** A source as a picture shows it. */
 export interface Placed {

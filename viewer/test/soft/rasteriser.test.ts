@@ -1,6 +1,7 @@
 import { beforeAll, describe, expect, test } from 'vitest';
-import { makeKernel, TILE_WIDTH } from '../../src/soft/kernel.ts';
+import { makeKernel } from '../../src/soft/kernel.ts';
 import { Rasteriser, type Frame } from '../../src/soft/rasteriser.ts';
+import { TILE_WIDTH } from '../../src/soft/tiles.ts';
 import { psnr, worst } from '../../support/browser/pictures.ts';
 import { makeGaussians, type GaussiansReference } from '../../support/references/gaussians/reference.ts';
 
