@@ -11,7 +11,7 @@ const MOST_FILES = 15; // beside sub-folders
 const ORDER = [
   ['half.ts', 'gaussians', 'remembered.ts'],
   ['words'],
-  ['protocol.ts', 'shared.ts', 'errors.ts', 'actor.ts', 'painter.ts', 'lifetime.ts', 'server.ts'],
+  ['protocol.ts', 'shared.ts', 'errors.ts', 'actor.ts', 'lifetime.ts', 'server.ts'],
   ['soft'],
   ['bundle'],
   ['rig'],

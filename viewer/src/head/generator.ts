@@ -47,11 +47,13 @@ export class HeadGenerator extends SplatGenerator {
   /** Takes the Gaussians that come after the first ones; they are not seen until `grow`. */
   complete(rest: HeadRows): void {
     fill(this.texels, rest, this.numSplats - rest.count);
+    this.soft.complete(rest);
   }
 
   /** Shows the Gaussians that came later with a share of their opacity. */
   grow(share: number): void {
     this.grown.value = share;
+    this.soft.show();
     this.updateVersion();
   }
 

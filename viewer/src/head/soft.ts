@@ -1,26 +1,37 @@
-import type { BakedHead } from '../bundle/baked-head.ts';
-import { makeRows, ROW_BYTES, type SoftObject, type Source } from '../soft/source.ts';
+import type { HeadRows } from '../bundle/baked-head.ts';
+import { joined, makeRows, ROW_BYTES, type SoftObject, type Source } from '../soft/source.ts';
 
 /** A head for the processor's path. */
 export class SoftHead implements SoftObject {
-  readonly drawn: number;
+  drawn: number;
   readonly values: Float32Array;
-  private readonly head: BakedHead;
+  private readonly parts: HeadRows[];
   private packed: Source | null = null;
 
   /** @param values coefficients (K,) of the expression that is shown */
-  constructor(head: BakedHead, values: Float32Array) {
-    this.head = head;
+  constructor(head: HeadRows, values: Float32Array) {
+    this.parts = [head];
     this.drawn = head.count;
     this.values = values;
   }
 
   get source(): Source {
-    return (this.packed ??= pack(this.head));
+    return (this.packed ??= joined(this.parts.map(pack)));
+  }
+
+  /** Takes the Gaussians that come after the first ones; they are not seen until `show`. */
+  complete(rest: HeadRows): void {
+    this.parts.push(rest);
+    this.packed = null;
+  }
+
+  /** Draws what came later, too. */
+  show(): void {
+    this.drawn = this.parts.reduce((sum, { count }) => sum + count, 0);
   }
 }
 
-function pack({ count, rank, means, quats, scales, basisScale, meanLogits, basis }: BakedHead): Source {
+function pack({ count, rank, means, quats, scales, basisScale, meanLogits, basis }: HeadRows): Source {
   const stride = ROW_BYTES.head + 4 * rank;
   const { rows, floats } = makeRows(count, stride);
   const bytes = new Int8Array(rows);

@@ -1,5 +1,5 @@
 import { Matrix4, Vector3, type Object3D, type PerspectiveCamera, type Scene } from 'three';
-import type { Backcloth, MakePainter, Painter } from '../painter.ts';
+import type { Backcloth, MakePainter, Painter } from './contract.ts';
 import type { Cloth, Drawn, Order } from './band.ts';
 import { Bands } from './bands.ts';
 import type { Frame, Placed } from './rasteriser.ts';

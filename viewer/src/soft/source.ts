@@ -44,6 +44,17 @@ export interface SoftObject {
   readonly values: Float32Array;
 }
 
+/** One source of several, whose Gaussians follow each other. */
+export function joined(sources: readonly Source[]): Source {
+  const bytes = new Uint8Array(sources.reduce((sum, { rows }) => sum + rows.byteLength, 0));
+  let at = 0;
+  for (const { rows } of sources) {
+    bytes.set(new Uint8Array(rows), at);
+    at += rows.byteLength;
+  }
+  return { ...sources[0]!, count: sources.reduce((sum, { count }) => sum + count, 0), rows: bytes.buffer };
+}
+
 /** New rows, as bytes and as numbers. */
 export function makeRows(count: number, stride: number): { rows: ArrayBuffer; floats: Float32Array; bytes: DataView } {
   const rows = new ArrayBuffer(count * stride);

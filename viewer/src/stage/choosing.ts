@@ -1,4 +1,4 @@
-import type { MakePainter } from '../painter.ts';
+import type { MakePainter } from '../soft/contract.ts';
 
 /** Fetches what draws without WebGL if an address asks for it (`?draw=soft`); undefined for Spark. */
 export async function choosePainter(address: URL): Promise<MakePainter | undefined> {

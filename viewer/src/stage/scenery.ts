@@ -1,5 +1,5 @@
 import * as THREE from 'three';
-import type { Backcloth } from '../painter.ts';
+import type { Backcloth } from '../soft/contract.ts';
 
 /** Where somebody stands, world space. */
 export interface Ground {

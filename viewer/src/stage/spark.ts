@@ -1,6 +1,6 @@
 import * as THREE from 'three';
 import { atEnd } from '../lifetime.ts';
-import type { Painter, PainterPorts } from '../painter.ts';
+import type { Painter, PainterPorts } from '../soft/contract.ts';
 import { watchContext } from './context.ts';
 import { Sorter } from './sorter.ts';
 

@@ -5,7 +5,7 @@ import { eyesOf } from '../head/eyes.ts';
 import { bodyOf, type Manifest } from '../bundle/manifest.ts';
 import { PageError } from '../errors.ts';
 import { atEnd } from '../lifetime.ts';
-import type { MakePainter, Painter } from '../painter.ts';
+import type { MakePainter, Painter } from '../soft/contract.ts';
 import { Mean, type Figures } from './figures.ts';
 import { meetingOf, meetingOfBody, type Meeting } from './camera/meeting.ts';
 import { Orbit } from './camera/orbit.ts';

@@ -59,17 +59,19 @@ export class SkinnedGenerator extends SplatGenerator {
   complete(rest: SkinnedRows): void {
     fillTexels(this.texels, rest, this.most - rest.count);
     this.uniforms.skinnedTexels.value.needsUpdate = true;
+    this.soft.complete(rest);
   }
 
   /** Shows the Gaussians that came later with a share of their opacity. */
   grow(share: number): void {
     this.uniforms.skinnedGrown.value = share;
+    this.soft.show();
     this.updateVersion();
   }
 
   /** Limits the number of Gaussians that are drawn, to the most important ones. */
   limit(count: number): void {
-    this.uniforms.skinnedCount.value = this.soft.drawn = Math.min(count, this.most);
+    this.uniforms.skinnedCount.value = this.soft.limit = Math.min(count, this.most);
     this.updateVersion();
   }
 }

@@ -1,6 +1,6 @@
 import { SHADOW } from '../../shared.ts';
-import { makeRows, ROW_BYTES, type SoftObject, type Source } from '../../soft/source.ts';
-import type { BakedSkinned } from './baked.ts';
+import { joined, makeRows, ROW_BYTES, type SoftObject, type Source } from '../../soft/source.ts';
+import type { BakedSkinned, SkinnedRows } from './baked.ts';
 import type { ShadowMap } from './shadow.ts';
 import { TABLE_ROW } from './skeleton.ts';
 
@@ -11,18 +11,22 @@ const TABLE = RESIDUAL + 8;
 
 /** A body on a skeleton for the processor's path. */
 export class SoftSkinned implements SoftObject {
-  drawn: number;
+  /** Gaussians that are drawn at most. */
+  limit = Infinity;
   readonly values: Float32Array;
-  private readonly baked: BakedSkinned;
+  private readonly info: BakedSkinned['info'];
+  private readonly parts: SkinnedRows[];
+  private shown: number; // Gaussians that came and may be seen
   private readonly map: ShadowMap | null;
   private packed: Source | null = null;
 
   /** @param map what the lamp sees */
   constructor(baked: BakedSkinned, map: ShadowMap | null) {
     const { info, light, lamp } = baked;
-    this.baked = baked;
+    this.info = info;
+    this.parts = [baked];
     this.map = map;
-    this.drawn = info.num_gaussians;
+    this.shown = baked.count;
     const behind = TABLE + TABLE_ROW * info.names.length;
     this.values = new Float32Array(behind + (map?.depths.length ?? 0));
     for (let k = 0; k < 8; k++) this.values.set(light.subarray(3 * k, 3 * k + 3), 4 * k);
@@ -33,7 +37,22 @@ export class SoftSkinned implements SoftObject {
 
   get source(): Source {
     const side = this.map ? SHADOW.side : 0;
-    return (this.packed ??= pack(this.baked, side));
+    return (this.packed ??= joined(this.parts.map((rows) => pack(rows, this.info, side))));
+  }
+
+  get drawn(): number {
+    return Math.min(this.limit, this.shown);
+  }
+
+  /** Takes the Gaussians that come after the first ones; they are not seen until `show`. */
+  complete(rest: SkinnedRows): void {
+    this.parts.push(rest);
+    this.packed = null;
+  }
+
+  /** Draws what came later, too. */
+  show(): void {
+    this.shown = this.parts.reduce((sum, { count }) => sum + count, 0);
   }
 
   /** Takes a pose: the table of joints (J,TABLE_ROW) and the coefficients of the shapes; the shadow map is drawn. */
@@ -44,8 +63,8 @@ export class SoftSkinned implements SoftObject {
   }
 }
 
-function pack(baked: BakedSkinned, side: number): Source {
-  const { num_gaussians: count, num_shapes: shapes, names } = baked.info;
+function pack(baked: SkinnedRows, { num_shapes: shapes, names }: BakedSkinned['info'], side: number): Source {
+  const { count } = baked;
   const stride = ROW_BYTES.skinned + 8 * shapes;
   const { rows, floats } = makeRows(count, stride);
   const bytes = new Uint8Array(rows);

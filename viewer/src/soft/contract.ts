@@ -1,6 +1,6 @@
 import type { PerspectiveCamera, Scene, Vector3 } from 'three';
 
-/** Draws what is on stage: Spark by the GPU (`stage/spark.ts`), or the processor alone (`soft/painter.ts`). */
+/** Draws what is on stage: Spark by the GPU (`stage/spark.ts`), or the processor alone (`painter.ts`). */
 export interface Painter {
   readonly pixels: [width: number, height: number]; // of the picture
   readonly gaussians: number; // drawn last
