@@ -64,7 +64,7 @@ export default defineConfig({
           hookTimeout: 120_000,
         },
       },
-      { extends: true, test: { name: 'bench', include: ['bench/*.ts'], testTimeout: 600_000 } },
+      { extends: true, test: { name: 'bench', include: ['bench/*.ts', 'bench/soft/*.ts'], testTimeout: 600_000 } },
     ],
   },
 });

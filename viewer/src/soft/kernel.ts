@@ -11,7 +11,7 @@ export interface Kernel {
   addWindow(view: number, rows: number, count: number, values: number, positions: number, rotations: number, scales: number, row: number): void;
   addSkinned(view: number, rows: number, count: number, values: number, shapes: number, joints: number, side: number): void;
   bin(): number;
-  draw(behind: number, pixels: number, stride: number): void;
+  draw(behind: number, pixels: number, stride: number, keep: number): number;
   seen(): number;
 }
 

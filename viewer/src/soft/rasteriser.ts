@@ -29,6 +29,9 @@ export class Rasteriser {
   private readonly values: Room;
   private readonly behind: Room;
   private readonly pixels: Room;
+  /** Tiles that were drawn last: the others had their pixels already. */
+  drawnTiles = 0;
+  private shown: { shape: string; behind: Uint32Array } | null = null; // in `pixels`
   private readonly room: { gaussians: number; pairs: number; tiles: number };
 
   /** @param pairs of splat and tile, for which there is room at first */
@@ -50,7 +53,7 @@ export class Rasteriser {
   /**
    * Draws a band.
    *
-   * @param behind RGBA of the band's background
+   * @param behind RGBA of the band's background; the same array for the same colours
    * @returns RGBA of the band, as wide as its tiles; valid until the next call
    */
   draw(frame: Frame, behind: Uint32Array): Uint8Array<ArrayBuffer> {
@@ -58,7 +61,9 @@ export class Rasteriser {
     const [first, end] = frame.band;
     const stride = 4 * TILE_WIDTH * (end - first);
     this.layOut(frame);
-    const under = this.behind.write(behind);
+    const shape = [frame.width, frame.height, first, end].join();
+    const keep = this.shown?.shape === shape && this.shown.behind === behind;
+    const under = keep ? this.behind.at(behind.byteLength) : this.behind.write(behind);
     const pixels = this.pixels.at(stride * frame.height);
     this.project(frame);
     while (!kernel.bin()) {
@@ -67,7 +72,8 @@ export class Rasteriser {
       this.layOut(frame);
       this.project(frame);
     }
-    kernel.draw(under, pixels, stride);
+    this.drawnTiles = kernel.draw(under, pixels, stride, Number(keep));
+    this.shown = { shape, behind };
     return new Uint8Array(kernel.memory.buffer as ArrayBuffer, pixels, stride * frame.height);
   }
 

@@ -1,23 +1,19 @@
-import { beforeAll, describe, expect, test } from 'vitest';
+import { describe, expect, test } from 'vitest';
 import { makeKernel } from '../../src/soft/kernel.ts';
 import { Rasteriser, type Frame } from '../../src/soft/rasteriser.ts';
 import { TILE_WIDTH } from '../../src/soft/tiles.ts';
 import { psnr, worst } from '../../support/browser/pictures.ts';
-import { makeGaussians, type GaussiansReference } from '../../support/references/gaussians/reference.ts';
+import { makeGaussians } from '../../support/references/gaussians/reference.ts';
 
 const WIDTH = 202; // of half a tile more than whole ones
 const HEIGHT = 150;
 const COLUMNS = Math.ceil(WIDTH / TILE_WIDTH);
 
-describe('the rasteriser', () => {
-  let reference: GaussiansReference;
-  let rasteriser: Rasteriser;
-  beforeAll(async () => {
-    reference = makeGaussians({ gaussians: 2000, size: `${WIDTH}x${HEIGHT}` });
-    rasteriser = new Rasteriser(await makeKernel());
-    rasteriser.put(0, reference.source);
-  });
+const reference = makeGaussians({ gaussians: 2000, size: `${WIDTH}x${HEIGHT}` });
+const rasteriser = new Rasteriser(await makeKernel());
+rasteriser.put(0, reference.source);
 
+describe('the rasteriser', () => {
   const frame = (first: number, end: number, drawn = reference.source.count): Frame => ({
     lens: reference.lens,
     width: WIDTH,
@@ -59,6 +55,33 @@ describe('the rasteriser', () => {
     const small = new Rasteriser(await makeKernel(), 100);
     small.put(0, reference.source);
     expect(worst(draw(frame(0, COLUMNS), small), draw(frame(0, COLUMNS)))).toBe(0);
+  });
+
+  test('keeps the pixels of tiles that did not change, and no others', async () => {
+    const behind = new Uint32Array(TILE_WIDTH * COLUMNS * HEIGHT).fill(0x336699);
+    const [keeping, fresh] = [new Rasteriser(await makeKernel()), new Rasteriser(await makeKernel())];
+    for (const one of [keeping, fresh]) one.put(0, reference.source);
+    const tiles = COLUMNS * 3;
+    const near = frame(0, COLUMNS);
+    keeping.draw(near, behind);
+    expect(keeping.drawnTiles).toBe(tiles);
+    keeping.draw(near, behind);
+    expect(keeping.drawnTiles).toBe(0);
+    // One Gaussian after another is left out, comes back, or moves with all others.
+    for (const drawn of [1999, 1990, 1998, 2000]) {
+      const picture = keeping.draw({ ...near, placed: [{ ...near.placed[0]!, drawn }] }, behind);
+      expect(keeping.drawnTiles).toBeLessThan(tiles);
+      expect(worst(picture, fresh.draw({ ...near, placed: [{ ...near.placed[0]!, drawn }] }, behind.slice()))).toBe(0);
+      expect(fresh.drawnTiles).toBe(tiles);
+    }
+    const moved = near.placed[0]!.view.map((value, i) => value + (i === 3 ? 0.01 : 0));
+    const picture = keeping.draw({ ...near, placed: [{ ...near.placed[0]!, view: moved }] }, behind);
+    expect(worst(picture, fresh.draw({ ...near, placed: [{ ...near.placed[0]!, view: moved }] }, behind.slice()))).toBe(0);
+    // Another background, and another shape, are drawn anew.
+    keeping.draw(near, behind.slice());
+    expect(keeping.drawnTiles).toBe(tiles);
+    keeping.draw(frame(0, COLUMNS - 1), behind);
+    expect(keeping.drawnTiles).toBe(tiles - 3);
   });
 
   test('shows the background where nothing is', () => {

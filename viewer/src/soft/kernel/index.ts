@@ -1,5 +1,6 @@
 import { drawTile } from './blend.ts';
 import { addHead, addSkinned, addStill, addWindow } from './evaluate.ts';
+import { digestSplats, forget, keeps, useRoomToKeep } from './keep.ts';
 import { RECORD, TILE_HEIGHT, TILE_WIDTH } from './numbers.ts';
 import { begin as beginProjection, count, useRoom } from './project.ts';
 import { fillTiles, listPairs, sortByDepth } from './tiles.ts';
@@ -33,6 +34,7 @@ export function layOut(gaussians: i32, newMostPairs: u32, tiles: i32): void {
   pairs = reserve(<usize>newMostPairs << 3);
   entries = reserve(<usize>newMostPairs << 2);
   counts = reserve(<usize>tiles << 2);
+  useRoomToKeep(reserve(<usize>gaussians << 3), reserve(<usize>tiles << 3));
 }
 
 /** Begins a picture of which the columns of tiles from `first` to `end` are drawn. */
@@ -53,21 +55,33 @@ export function bin(): bool {
   return true;
 }
 
-/** Draws the band: RGBA, rows of `stride` bytes, over another picture of the same shape. */
-export function draw(behind: usize, pixels: usize, stride: usize): void {
+/**
+ * Draws the band: RGBA, rows of `stride` bytes, over another picture of the same shape.
+ *
+ * @param keep tiles whose splats are those of the picture before keep their pixels
+ * @returns number of the tiles that were drawn
+ */
+export function draw(behind: usize, pixels: usize, stride: usize, keep: bool): i32 {
   const down = (height + TILE_HEIGHT - 1) / TILE_HEIGHT;
   let begin = entries;
   let counter = counts;
+  let drawn = 0;
+  if (!keep) forget((endColumn - firstColumn) * down);
+  digestSplats();
   for (let column = firstColumn; column < endColumn; column++) {
     for (let row = 0; row < down; row++) {
       const end = entries + (<usize>load<u32>(counter) << 2);
       const above = row * TILE_HEIGHT;
       const place = <usize>above * stride + <usize>((column - firstColumn) * 4 * TILE_WIDTH);
-      drawTile(begin, end, column * TILE_WIDTH, above, <usize>min(TILE_HEIGHT, height - above), behind + place, pixels + place, stride);
+      if (!keeps((counter - counts) >> 2, begin, end)) {
+        drawTile(begin, end, column * TILE_WIDTH, above, <usize>min(TILE_HEIGHT, height - above), behind + place, pixels + place, stride);
+        drawn++;
+      }
       begin = end;
       counter += 4;
     }
   }
+  return drawn;
 }
 
 /** Number of the splats that are seen in the band. */
