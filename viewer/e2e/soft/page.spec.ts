@@ -1,9 +1,9 @@
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
-import { Browser } from '../support/browser/browser.ts';
-import { lookAsBundled, psnr } from '../support/browser/pictures.ts';
-import { makePerson } from '../support/references/person.ts';
-import { servePage } from '../support/servers/static.ts';
+import { Browser } from '../../support/browser/browser.ts';
+import { lookAsBundled, psnr } from '../../support/browser/pictures.ts';
+import { makePerson } from '../../support/references/person.ts';
+import { servePage } from '../../support/servers/static.ts';
 
 const WIDTH = 240;
 const HEIGHT = 320;
