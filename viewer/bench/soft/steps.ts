@@ -27,7 +27,7 @@ test('steps of a picture', async () => {
       const columns = Math.ceil(width / TILE_WIDTH);
       const behind = new Uint32Array(columns * TILE_WIDTH * height);
       const placed = [{ id: 0, view, drawn: source.count, values: new Float32Array(0) }];
-      for (let i = 0; i < PICTURES; i++) rasteriser.draw({ lens, width, height, band: [0, columns], placed }, behind);
+      for (let i = 0; i < PICTURES; i++) rasteriser.draw({ lens, width, height, band: [0, columns], placed }, behind.slice()); // another array: no tile keeps its pixels
       const [project, bin, draw] = [times.project, times.bin, times.draw].map((list) => quantile(list, 0.5));
       const all = project! + bin! + draw!;
       const name = 'bundle' in scene ? 'packaged person' : 'random';
