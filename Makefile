@@ -88,5 +88,5 @@ viewer/node_modules/.package-lock.json: viewer/package-lock.json | $(VENV)/.node
 	cd viewer && npm ci --no-audit --no-fund --silent
 
 VIEWER_SOURCES := $(shell find viewer/src viewer/index.html viewer/public -type f 2>/dev/null)
-src/ico3d/chat/static/index.html: viewer/node_modules/.package-lock.json $(VIEWER_SOURCES) viewer/vite.config.ts viewer/compression.ts
+src/ico3d/chat/static/index.html: viewer/node_modules/.package-lock.json $(VIEWER_SOURCES) viewer/vite.config.ts viewer/compression.ts viewer/webassembly.ts
 	cd viewer && npm run --silent build && touch ../$@

@@ -1,10 +1,12 @@
 import { readFile, rm, writeFile } from 'node:fs/promises';
 import { join } from 'node:path';
 import { defineConfig, type Plugin } from 'vite';
+import { webAssembly } from './webassembly.ts';
 
 /** `npm pack` builds the package with it: the element and the renderer, without three and Spark. */
 export default defineConfig({
-  plugins: [embedded()],
+  plugins: [webAssembly(), embedded()],
+  worker: { format: 'es', plugins: () => [webAssembly()] },
   build: {
     outDir: 'dist',
     target: 'es2023',

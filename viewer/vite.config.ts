@@ -1,13 +1,15 @@
 import { defineConfig } from 'vitest/config';
 import { compressed } from './compression.ts';
 import { preloaded } from './preloading.ts';
+import { webAssembly } from './webassembly.ts';
 
 // `npm run dev` shows the page against a running `ico3d serve … --port 8700`.
 const SERVER = process.env.ICO3D_SERVER ?? 'http://127.0.0.1:8700';
 
 export default defineConfig({
   base: './',
-  plugins: [compressed(), preloaded('index.html', 'theatre')],
+  plugins: [webAssembly(), compressed(), preloaded('index.html', 'theatre')],
+  worker: { format: 'es', plugins: () => [webAssembly()] },
   build: {
     outDir: '../src/ico3d/chat/static',
     emptyOutDir: true,
@@ -62,7 +64,7 @@ export default defineConfig({
           hookTimeout: 120_000,
         },
       },
-      { extends: true, test: { name: 'bench', include: ['bench/*.ts'], testTimeout: 600_000 } },
+      { extends: true, test: { name: 'bench', include: ['bench/*.ts', 'bench/soft/*.ts'], testTimeout: 600_000 } },
     ],
   },
 });

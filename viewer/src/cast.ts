@@ -157,7 +157,7 @@ function makeWindows(
     const window = info.windows[index]!;
     return readBakedWindow(await files.tensors(window.file), info, window);
   };
-  const body = new Body(info, new Timeline(info), motion, stage.sorter, { load, failed });
+  const body = new Body(info, new Timeline(info), motion, stage.painter, { load, failed });
   stage.add(body);
   return body;
 }

@@ -8,6 +8,7 @@ import { Face } from './face/face.ts';
 import { IdleFace } from './face/idle.ts';
 import { atEnd } from './lifetime.ts';
 import type { Server } from './server.ts';
+import { choosePainter } from './stage/choosing.ts';
 import type { Stage } from './stage/stage.ts';
 import { Conversation } from './talk/conversation.ts';
 import type { Emit } from './talk/events.ts';
@@ -96,9 +97,10 @@ export class Visit {
     this.overlay.greet(name, server.file(THUMBNAIL, manifest.files[THUMBNAIL]?.sha256));
     this.ports.named(name);
 
+    const painter = this.ports.transparent ? undefined : await choosePainter(new URL(location.href));
     const theatre = await coming;
     signal.throwIfAborted();
-    const stage = new theatre.Stage(byId<HTMLCanvasElement>(root, 'stage'), manifest, this.ports.transparent);
+    const stage = new theatre.Stage(byId<HTMLCanvasElement>(root, 'stage'), manifest, this.ports.transparent, painter);
     atEnd(signal, () => stage.dispose());
     stage.onGone = () => this.overlay.fail(say('error.picture'));
     watchCover(root, signal, (pixels) => stage.keepClear(pixels));
@@ -111,7 +113,7 @@ export class Visit {
       theatre.makeViewBar(stage.orbit, words, root, signal),
     );
     const xr = { stage, conversation, head: presence.head, root, words, settings: this.ports.xr ?? xrSettings(() => null), signal };
-    void offerXr(corner, xr, (sentence) => showNotice(root, words, sentence));
+    if (!painter) void offerXr(corner, xr, (sentence) => showNotice(root, words, sentence));
     const { playback } = presence;
     const moving = presence.body ?? presence.skinned;
     if (moving && playback) new PlayerBar(root, words, moving, playback, 1 / bodyOf(manifest)!.fps, signal);

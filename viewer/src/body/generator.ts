@@ -1,7 +1,9 @@
 import { dyno, SplatGenerator, SplatTransformer } from '@sparkjsdev/spark';
 import * as THREE from 'three';
 import { splatGenerator, type Generator } from '../gaussians/splat-shader.ts';
+import type { SoftObject, Source } from '../soft/source.ts';
 import { coefficientPlaces, coefficientTexels, type Capacity, type PackedWindow } from './packed.ts';
+import { softWindow } from './soft.ts';
 import { coefficientsAt } from './window.ts';
 
 const LEAST_SCALE = '1e-6'; // metres
@@ -14,6 +16,7 @@ const LEAST_SCALE = '1e-6'; // metres
  * windows are asleep and cost next to nothing.
  */
 export class WindowGenerator extends SplatGenerator {
+  readonly soft: SoftObject;
   private readonly capacity: Capacity;
   private readonly uniforms: Uniforms;
   private readonly found: Float32Array; // coefficients of the window at the posed time
@@ -35,6 +38,7 @@ export class WindowGenerator extends SplatGenerator {
     this.capacity = capacity;
     this.uniforms = uniforms;
     this.found = new Float32Array(this.coefficients.length);
+    this.soft = new SoftSlot(uniforms, capacity, () => this.content);
   }
 
   /** Whether the window takes part in sorting. */
@@ -99,6 +103,34 @@ export class WindowGenerator extends SplatGenerator {
   }
 
   private get coefficients(): Float32Array {
+    return this.uniforms.bodyCoefficients.value.image.data as Float32Array;
+  }
+}
+
+/** A slot for the processor's path. */
+class SoftSlot implements SoftObject {
+  private readonly uniforms: Uniforms;
+  private readonly capacity: Capacity;
+  private readonly content: () => PackedWindow | null;
+  private packed: { content: PackedWindow; source: Source } | null = null;
+
+  constructor(uniforms: Uniforms, capacity: Capacity, content: () => PackedWindow | null) {
+    this.uniforms = uniforms;
+    this.capacity = capacity;
+    this.content = content;
+  }
+
+  get source(): Source | null {
+    const content = this.content();
+    if (content && this.packed?.content !== content) this.packed = { content, source: softWindow(content, this.capacity) };
+    return content && this.packed!.source;
+  }
+
+  get drawn(): number {
+    return this.uniforms.bodyGate.value && this.uniforms.bodyCount.value;
+  }
+
+  get values(): Float32Array {
     return this.uniforms.bodyCoefficients.value.image.data as Float32Array;
   }
 }

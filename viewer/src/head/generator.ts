@@ -3,6 +3,7 @@ import * as THREE from 'three';
 import type { BakedHead, HeadRows } from '../bundle/baked-head.ts';
 import { splatGenerator, type Generator } from '../gaussians/splat-shader.ts';
 import { coefficients } from './coefficients.ts';
+import { SoftHead } from './soft.ts';
 
 const WIDTH = 1024; // texels per row: one texel is one Gaussian
 const REST_LAYERS = 4; // centre + basis scale, quaternion, scales, mean logits
@@ -15,6 +16,7 @@ const PACKED = 4; // basis vectors in a texel: a fetch costs far more than takin
  * from one expression to the next instead of holding the old picture until it has sorted anew.
  */
 export class HeadGenerator extends SplatGenerator {
+  readonly soft: SoftHead;
   private readonly network: BakedHead['network'];
   private readonly values: Float32Array; // (K,) uniform, shared with the GPU program
   private readonly texels: Texels;
@@ -34,6 +36,7 @@ export class HeadGenerator extends SplatGenerator {
         if (transformer.update(this)) this.updateVersion();
       },
     });
+    this.soft = new SoftHead(head, values);
     this.network = head.network;
     this.values = values;
     this.texels = texels;
@@ -44,11 +47,13 @@ export class HeadGenerator extends SplatGenerator {
   /** Takes the Gaussians that come after the first ones; they are not seen until `grow`. */
   complete(rest: HeadRows): void {
     fill(this.texels, rest, this.numSplats - rest.count);
+    this.soft.complete(rest);
   }
 
   /** Shows the Gaussians that came later with a share of their opacity. */
   grow(share: number): void {
     this.grown.value = share;
+    this.soft.show();
     this.updateVersion();
   }
 

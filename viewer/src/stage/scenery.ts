@@ -1,4 +1,5 @@
 import * as THREE from 'three';
+import type { Backcloth } from '../soft/contract.ts';
 
 /** Where somebody stands, world space. */
 export interface Ground {
@@ -13,7 +14,8 @@ const SHADOW = new THREE.Vector2(0.3, 0.22); // m to the side and to the front w
  * A wall and a floor that go over into each other, and a soft shadow under the feet, behind all
  * Gaussians. Where heads are, the colour is that on which the person was trained: edges stay clean.
  */
-export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMaterial> {
+export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMaterial> implements Backcloth {
+  version = 0;
   /** @param colour of the bundle's background, display values */
   constructor(colour: readonly [number, number, number]) {
     const uniforms = {
@@ -47,6 +49,7 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
     uniforms.front!.value.copy(toward);
     uniforms.depth!.value = feet ? 1 : 0;
     this.visible = true;
+    this.version++;
   }
 
   /** Draws the shadow alone, on what is behind the picture. */
@@ -57,6 +60,39 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
   /** Shows a bright room, or a dark one. */
   setBright(bright: boolean): void {
     this.material.uniforms.bright!.value = bright ? 1 : 0;
+    this.version++;
+  }
+
+  /** Whether it is on stage. */
+  get shows(): boolean {
+    return this.visible && this.parent !== null;
+  }
+
+  /** The same as the shader, for pictures that are drawn without. */
+  colour(eye: THREE.Vector3, way: THREE.Vector3, out: Float32Array, at: number): void {
+    const { base, foot, up, front } = this.material.uniforms as Record<string, { value: THREE.Vector3 }>;
+    const { bright, depth } = this.material.uniforms as Record<string, { value: number }>;
+    const light = bright!.value > 0.5;
+    const rise = way.dot(up!.value);
+    const height = (eye.x - foot!.value.x) * up!.value.x + (eye.y - foot!.value.y) * up!.value.y + (eye.z - foot!.value.z) * up!.value.z;
+    const sky = smoothstep(0.12, 0.6, rise);
+    let [ground, far, shade] = [0, 1, 1];
+    if (height > 0 && rise < -1e-4) {
+      const place = PLACE.copy(way).multiplyScalar(-height / rise).add(eye).sub(foot!.value);
+      const away = place.length();
+      ground = smoothstep(0, 2.2, away);
+      far = smoothstep(1.2, 5, away);
+      const side = place.dot(SIDE.crossVectors(up!.value, front!.value)) / SHADOW.x;
+      const ahead = place.dot(front!.value) / SHADOW.y;
+      const near = side * side + ahead * ahead;
+      shade = 1 - depth!.value * (0.34 * Math.exp(-near) + 0.22 * Math.exp(-6 * near));
+    }
+    for (let channel = 0; channel < 3; channel++) {
+      const own = base!.value.getComponent(channel);
+      const shaded = (dark: number, bright: number) => (light ? mix(own, 1, bright) : own * dark);
+      const floor = mix(shaded(1.06, 0.3), shaded(0.78, 0.12), ground);
+      out[at + channel] = far < 1 || shade < 1 ? mix(floor, own, far) * shade : mix(own, shaded(0.66, 0.5), sky);
+    }
   }
 
   dispose(): void {
@@ -68,6 +104,17 @@ export class Scenery extends THREE.Mesh<THREE.PlaneGeometry, THREE.ShaderMateria
     const { value } = this.material.uniforms.clipToWorld!;
     value.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse).invert();
   };
+}
+
+const [PLACE, SIDE] = [new THREE.Vector3(), new THREE.Vector3()];
+
+function mix(from: number, to: number, share: number): number {
+  return from + share * (to - from);
+}
+
+function smoothstep(low: number, high: number, value: number): number {
+  const share = Math.min(Math.max((value - low) / (high - low), 0), 1);
+  return share * share * (3 - 2 * share);
 }
 
 const VERTEX = `

@@ -91,20 +91,3 @@ export class Sorter extends SparkRenderer {
     super.setDirty();
   }
 }
-
-/** Tells when Spark sorts, for those who outlive a renderer of it. */
-export class CurrentSorter {
-  private readonly stage: { readonly spark: SparkRenderer };
-
-  constructor(stage: CurrentSorter['stage']) {
-    this.stage = stage;
-  }
-
-  get sorting(): boolean {
-    return this.stage.spark.sorting;
-  }
-
-  get lastSortTime(): number {
-    return this.stage.spark.lastSortTime;
-  }
-}

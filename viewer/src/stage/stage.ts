@@ -3,8 +3,9 @@ import type { Actor } from '../actor.ts';
 import type { HeadFiles } from '../bundle/load.ts';
 import { eyesOf } from '../head/eyes.ts';
 import { bodyOf, type Manifest } from '../bundle/manifest.ts';
+import { PageError } from '../errors.ts';
 import { atEnd } from '../lifetime.ts';
-import { watchContext } from './context.ts';
+import type { MakePainter, Painter } from '../soft/contract.ts';
 import { Mean, type Figures } from './figures.ts';
 import { meetingOf, meetingOfBody, type Meeting } from './camera/meeting.ts';
 import { Orbit } from './camera/orbit.ts';
@@ -13,7 +14,8 @@ import { ladder, Quality } from './quality.ts';
 import { Scenery } from './scenery.ts';
 import { watchSight } from './sight.ts';
 import { sitterOf } from './camera/sitter.ts';
-import { CurrentSorter, Sorter } from './sorter.ts';
+import type { Sorter } from './sorter.ts';
+import { SparkPainter } from './spark.ts';
 import { groundOf, person, wholeBody } from './camera/subject.ts';
 
 const MOST_PIXELS = 2; // along a side, for one of the page
@@ -21,7 +23,6 @@ const LEAST_FREE = 0.4; // of the height: what covers more lies over the face
 
 /** Canvas, camera and actors: draws what changed and nothing else, and nothing while nobody can see it. */
 export class Stage {
-  readonly renderer: THREE.WebGLRenderer;
   readonly scene = new THREE.Scene();
   readonly orbit: Orbit;
   readonly transparent: boolean;
@@ -34,8 +35,8 @@ export class Stage {
   bytes = 0; // of the bundle that came before there was somebody to see
   /** Called when the browser takes the picture away and does not give it back. */
   onGone: () => void = () => {};
-  /** When Spark sorted last, whichever renderer that was. */
-  readonly sorter = new CurrentSorter(this);
+  /** What draws. */
+  readonly painter: Painter;
   private readonly quality = new Quality(ladder({ backdrop: false, gaussians: false }));
   private covered = 0; // pixels at the lower edge that controls lie on
   private readonly canvas: HTMLCanvasElement;
@@ -50,24 +51,34 @@ export class Stage {
   private readonly drawing = new Mean(); // ms
   private running = false; // between `start` and `still`
   private seen = true;
-  private current: Sorter;
   private readonly ending = new AbortController();
 
-  /** @param transparent what is behind the canvas is seen around the avatar */
-  constructor(canvas: HTMLCanvasElement, manifest: Manifest, transparent = false) {
+  /**
+   * @param transparent what is behind the canvas is seen around the avatar
+   * @param makePainter makes what draws, Spark unless something else is given
+   */
+  constructor(canvas: HTMLCanvasElement, manifest: Manifest, transparent = false, makePainter?: MakePainter) {
     this.canvas = canvas;
     this.manifest = manifest;
     this.transparent = transparent;
-    this.renderer = new THREE.WebGLRenderer({ canvas, alpha: transparent, antialias: false, powerPreference: 'high-performance' });
-    this.current = this.prepare();
     this.scenery = new Scenery(manifest.background);
+    const ports = {
+      dirty: () => this.invalidate(),
+      lost: () => this.loop(),
+      restored: () => {
+        this.fit();
+        this.loop();
+      },
+      gone: () => this.onGone(),
+    };
+    this.painter = makePainter
+      ? makePainter(canvas, manifest.background, this.scenery, ports)
+      : new SparkPainter(canvas, this.scene, manifest.background, transparent, ports);
     const body = groundOf(manifest);
     if (body) this.meeting = meetingOfBody(body.ground, body.height);
     this.arrange();
     this.orbit = new Orbit(canvas, wholeBody(manifest), () => (this.dirty = true));
     const { signal } = this.ending;
-    const ports = { lost: () => this.lose(), restored: () => this.restore(), gone: () => this.onGone() };
-    watchContext(canvas, ports, signal);
     watchSight(canvas, (seen) => this.see(seen), signal);
     const observer = new ResizeObserver(() => this.fit());
     observer.observe(canvas);
@@ -75,9 +86,18 @@ export class Stage {
     this.fit();
   }
 
-  /** What draws the Gaussians; another one after the WebGL context was lost. */
+  /** What draws the Gaussians by WebGL; another one after its context was lost. */
   get spark(): Sorter {
-    return this.current;
+    return this.webgl.spark;
+  }
+
+  get renderer(): THREE.WebGLRenderer {
+    return this.webgl.renderer;
+  }
+
+  private get webgl(): SparkPainter {
+    if (this.painter instanceof SparkPainter) return this.painter;
+    throw new PageError('This picture is drawn without WebGL.');
   }
 
   /** Adds an actor; before the start only, or Spark would hold its picture until it has sorted anew. */
@@ -93,16 +113,16 @@ export class Stage {
 
   /** What drawing takes now. */
   get figures(): Figures {
-    const { domElement } = this.renderer;
+    const { painter } = this;
     return {
       frames: this.frames,
       evaluation: this.evaluation.value,
-      sort: this.spark.sortTook,
+      sort: painter.sortTook,
       draw: this.drawing.value,
-      gaussians: this.spark.activeSplats,
+      gaussians: painter.gaussians,
       level: this.quality.index + 1,
       levels: this.quality.count,
-      pixels: [domElement.width, domElement.height],
+      pixels: painter.pixels,
       bytes: this.bytes,
     };
   }
@@ -197,10 +217,8 @@ export class Stage {
     this.loop();
     this.ending.abort();
     this.orbit.dispose();
-    this.current.dispose();
     this.scenery.dispose();
-    this.renderer.dispose();
-    this.renderer.forceContextLoss();
+    this.painter.dispose();
   }
 
   /** Stops the loop and draws one still, well sorted, of the best quality, which stays: for measurements and thumbnails. */
@@ -209,10 +227,9 @@ export class Stage {
     this.loop();
     this.holdQuality(0);
     this.orbit.update();
-    await this.sorted(); // a sort of the picture before may still run
-    await this.spark.update({ scene: this.scene, camera: this.orbit.camera });
-    await this.sorted();
+    await this.painter.settle(this.scene, this.orbit.camera);
     this.draw();
+    await this.painter.shown();
   }
 
   /** Draws now; what the canvas holds may be read until the current task ends. */
@@ -220,45 +237,9 @@ export class Stage {
     for (const actor of this.actors) actor.drawing?.(performance.now());
     this.current.sift();
     const before = performance.now();
-    this.spark.autoUpdate = !this.presentation;
-    if (this.presentation) this.gather();
-    this.renderer.render(this.scene, this.camera);
+    this.painter.paint(this.scene, this.camera, this.presentation !== null);
     this.drawing.add(performance.now() - before);
     this.frames++;
-  }
-
-  /** In headsets Spark would take what people look like after the picture, for the next one: late by one. */
-  private gather(): void {
-    this.scene.updateMatrixWorld();
-    void this.spark.update({ scene: this.scene, camera: this.camera });
-  }
-
-  private async sorted(): Promise<void> {
-    while (this.spark.sorting || this.spark.sortDirty) await new Promise((resolve) => setTimeout(resolve, 5));
-  }
-
-  /** Colours and Spark, for a context that is new. */
-  private prepare(): Sorter {
-    // Both sRGB: colours of the bundle are display values and are blended as they are.
-    const background = new THREE.Color().setRGB(...this.manifest.background, THREE.SRGBColorSpace);
-    this.renderer.setClearColor(background, this.transparent ? 0 : 1);
-    const spark = new Sorter(this.renderer, () => (this.dirty = true));
-    this.scene.add(spark);
-    return spark;
-  }
-
-  /** What Spark had made of the actors is lost with the context, and so is a sort that was reading it. */
-  private lose(): void {
-    this.loop();
-    this.scene.remove(this.current);
-    this.current.dispose();
-  }
-
-  /** Draws on in a new context; the renderer uploads the actors' textures again by itself. */
-  private restore(): void {
-    this.current = this.prepare();
-    this.fit();
-    this.loop();
   }
 
   private see(seen: boolean): void {
@@ -269,14 +250,11 @@ export class Stage {
 
   /** Runs or rests; time that nobody saw did not pass. */
   private loop(): void {
-    const { xr } = this.renderer;
-    const runs = this.running && (this.seen || xr.isPresenting) && !this.renderer.getContext().isContextLost();
+    const runs = this.running && (this.seen || this.painter.presenting) && !this.painter.lost;
     this.lastFrame = 0;
     this.quality.rest();
     this.dirty = true;
-    const frame = runs ? (now: number) => this.frame(now / 1000) : null;
-    if (xr.isPresenting) xr.setAnimationLoop(frame); // the page's own would run beside it
-    else this.renderer.setAnimationLoop(frame);
+    this.painter.loop(runs ? (now) => this.frame(now / 1000) : null);
   }
 
   /**
@@ -284,6 +262,7 @@ export class Stage {
    * drawing by far (`docs/benchmarks.md`), and lips are where the sound is.
    */
   private frame(now: number): void {
+    if (this.painter.busy) return;
     const step = this.lastFrame && now - this.lastFrame;
     this.lastFrame = now;
     if (step && this.drew && this.quality.picture(step)) this.applyQuality();
@@ -306,10 +285,9 @@ export class Stage {
   private fit(): void {
     const { clientWidth, clientHeight } = this.canvas;
     const [width, height] = this.size ?? [clientWidth, clientHeight];
-    if (!width || !height || this.renderer.xr.isPresenting) return;
+    if (!width || !height || this.painter.presenting) return;
     const ratio = this.size ? 1 : Math.min(devicePixelRatio, MOST_PIXELS) * this.quality.level.pixels;
-    this.renderer.setPixelRatio(ratio);
-    this.renderer.setSize(width, height, false);
+    this.painter.fit(width, height, ratio);
     this.orbit.fit({ aspect: width / height, free: Math.max(LEAST_FREE, 1 - this.covered / (clientHeight || height)) });
     this.dirty = true;
   }

@@ -3,15 +3,23 @@ import { join } from 'node:path';
 import { describe, expect, test } from 'vitest';
 import { readBakedSkinned } from '../../src/body/skinned/baked.ts';
 import { fillTexels, makeTexels } from '../../src/body/skinned/packed.ts';
+import { ShadowMap } from '../../src/body/skinned/shadow.ts';
 import { Skeleton } from '../../src/body/skinned/skeleton.ts';
+import { SoftSkinned } from '../../src/body/skinned/soft.ts';
 import { SKINNED } from '../../src/bundle/load.ts';
 import { bodyOf, checkManifest } from '../../src/bundle/manifest.ts';
 import { parseSafetensors, type Tensor } from '../../src/bundle/safetensors.ts';
+import { makeKernel } from '../../src/soft/kernel.ts';
+import { Rasteriser } from '../../src/soft/rasteriser.ts';
+import { TILE_WIDTH } from '../../src/soft/tiles.ts';
+import { psnr } from '../../support/browser/pictures.ts';
+import { viewOf } from '../../support/browser/view.ts';
 import { makeSkinned } from '../../support/references/skinned.ts';
 import { arrayBuffer } from '../../support/references/head.ts';
 
 const TIMES = [0, 0.013, 1, 1.237, 2, 9];
-const reference = makeSkinned({ gaussians: 300, times: TIMES });
+const [WIDTH, HEIGHT] = [160, 200];
+const reference = makeSkinned({ gaussians: 300, times: TIMES, pictures: `${WIDTH}x${HEIGHT}` });
 const read = (name: string) => readFileSync(join(reference.folder, name));
 const manifest = checkManifest(JSON.parse(read('manifest.json').toString()));
 const info = manifest.skinned!;
@@ -50,6 +58,22 @@ describe('a body on a skeleton that Python baked', () => {
       const given = [rotations, root, residual].map((values) => Float64Array.from(values));
       skeleton.table({ rotations: given[0]!, root: given[1]!, residual: given[2]! }, table);
       expect(off(table, expected)).toBeLessThan(1e-6);
+    }
+  });
+
+  test('is drawn without WebGL as Python draws it', async () => {
+    const map = baked.lamp && new ShadowMap(baked.lamp, info.names.length);
+    const soft = new SoftSkinned(baked, map);
+    const rasteriser = new Rasteriser(await makeKernel());
+    rasteriser.put(0, soft.source);
+    const { view, lens } = viewOf(manifest.camera, WIDTH, HEIGHT);
+    const behind = new Uint32Array(WIDTH * HEIGHT).fill(manifest.background.reduce((sum, value, k) => sum | (Math.round(255 * value) << (8 * k)), 0));
+    for (const [i, { table, residual }] of reference.moments.entries()) {
+      map?.draw(Float32Array.from(table));
+      soft.pose(Float32Array.from(table), Float64Array.from(residual));
+      const placed = [{ id: 0, view, drawn: soft.drawn, values: soft.values }];
+      const picture = rasteriser.draw({ lens, width: WIDTH, height: HEIGHT, band: [0, WIDTH / TILE_WIDTH], placed }, behind).filter((_, at) => at % 4 < 3);
+      expect(psnr(picture, reference.pictures!.subarray(i * picture.length, (i + 1) * picture.length)), `moment ${i}`).toBeGreaterThan(50);
     }
   });
 

@@ -6,6 +6,7 @@ import type { BakedLamp, BakedSkinned, SkinnedRows } from './baked.ts';
 import { fillTexels, makeTexels, type Texels } from './packed.ts';
 import { SHADOW_DECLARATIONS, ShadowMap } from './shadow.ts';
 import { Skeleton, TABLE_ROW, type Pose } from './skeleton.ts';
+import { SoftSkinned } from './soft.ts';
 
 const SHAPE_WORDS = 1.5; // 32-bit words of a residual shape: six bytes, three of position and three of logits
 const MILLIMETRE = '1e-3';
@@ -13,6 +14,7 @@ const MILLIMETRE = '1e-3';
 /** A body on a skeleton as a Spark generator: a shader that moves, turns and colours its Gaussians with their joints. */
 export class SkinnedGenerator extends SplatGenerator {
   readonly skeleton: Skeleton;
+  readonly soft: SoftSkinned;
   private readonly most: number; // number of all Gaussians
   private readonly uniforms: Uniforms;
   private readonly shadow: Shadow | null;
@@ -36,6 +38,7 @@ export class SkinnedGenerator extends SplatGenerator {
     this.uniforms = uniforms;
     this.texels = texels;
     this.shadow = shadow;
+    this.soft = new SoftSkinned(baked, shadow?.map ?? null);
     this.skeleton = new Skeleton(baked.info, baked.poses);
   }
 
@@ -47,6 +50,7 @@ export class SkinnedGenerator extends SplatGenerator {
     skinnedJoints.value.needsUpdate = true;
     this.shadow?.map.draw(table);
     if (this.shadow) this.shadow.texture.needsUpdate = true;
+    this.soft.pose(table, pose.residual);
     pose.residual.forEach((value, k) => skinnedResidual.value[k >> 2]!.setComponent(k & 3, value));
     this.updateVersion();
   }
@@ -55,17 +59,19 @@ export class SkinnedGenerator extends SplatGenerator {
   complete(rest: SkinnedRows): void {
     fillTexels(this.texels, rest, this.most - rest.count);
     this.uniforms.skinnedTexels.value.needsUpdate = true;
+    this.soft.complete(rest);
   }
 
   /** Shows the Gaussians that came later with a share of their opacity. */
   grow(share: number): void {
     this.uniforms.skinnedGrown.value = share;
+    this.soft.show();
     this.updateVersion();
   }
 
   /** Limits the number of Gaussians that are drawn, to the most important ones. */
   limit(count: number): void {
-    this.uniforms.skinnedCount.value = Math.min(count, this.most);
+    this.uniforms.skinnedCount.value = this.soft.limit = Math.min(count, this.most);
     this.updateVersion();
   }
 }

@@ -1,0 +1,25 @@
+import { makeRows, ROW_BYTES, type Source } from '../soft/source.ts';
+import { coefficientTexels, type Capacity, type PackedWindow } from './packed.ts';
+
+/** A window in a slot for the processor's path. */
+export function softWindow({ window, rest, colours, basis }: PackedWindow, { width, rows: texelRows, ranks }: Capacity): Source {
+  const count = window.num_gaussians;
+  const layer = 4 * width * texelRows;
+  const vectors = ranks[0] + ranks[1] + ranks[2];
+  const stride = ROW_BYTES.window + 8 * vectors;
+  const { rows, floats, bytes } = makeRows(count, stride);
+  const shorts = new Int16Array(rows);
+  for (let i = 0; i < count; i++) {
+    const [at, texel] = [(i * stride) / 4, 4 * i];
+    floats.set(rest.subarray(texel, texel + 3), at);
+    for (let k = 0; k < 4; k++) floats[at + 3 + k] = basis[texel + k]! / 32767;
+    floats.set(rest.subarray(layer + texel, layer + texel + 3), at + 7);
+    for (let k = 0; k < 4; k++) floats[at + 10 + k] = colours[texel + k]! / 255;
+    bytes.setUint32(i * stride + 56, rest[texel + 3]!, true);
+    for (let k = 0; k < vectors; k++) {
+      const from = (1 + k) * layer + texel;
+      shorts.set(basis.subarray(from, from + 4), (i * stride + ROW_BYTES.window) / 2 + 4 * k);
+    }
+  }
+  return { kind: 'window', count, rows, sizes: [...ranks, 4 * coefficientTexels(ranks)] };
+}

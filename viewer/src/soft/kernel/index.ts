@@ -1,0 +1,90 @@
+import { drawTile } from './blend.ts';
+import { addHead, addSkinned, addStill, addWindow } from './evaluate.ts';
+import { digestSplats, forget, keeps, useRoomToKeep } from './keep.ts';
+import { RECORD, TILE_HEIGHT, TILE_WIDTH } from './numbers.ts';
+import { begin as beginProjection, count, useRoom } from './project.ts';
+import { fillTiles, listPairs, sortByDepth } from './tiles.ts';
+
+/** What the page calls. All addresses are bytes of this module's memory. */
+
+export { addHead, addSkinned, addStill, addWindow };
+
+/** Room for `bytes`, for ever. */
+export function reserve(bytes: usize): usize {
+  return (heap.alloc(bytes + 15) + 15) & ~15;
+}
+
+let order: usize = 0;
+let spare: usize = 0;
+let pairs: usize = 0;
+let entries: usize = 0;
+let counts: usize = 0;
+let mostPairs: u32 = 0;
+
+let firstColumn: i32 = 0;
+let endColumn: i32 = 0;
+let height: i32 = 0;
+
+/** Lays out the memory for pictures of so many Gaussians, pairs of splat and tile, and tiles, at most. */
+export function layOut(gaussians: i32, newMostPairs: u32, tiles: i32): void {
+  useRoom(reserve(<usize>gaussians * RECORD), reserve(<usize>gaussians << 2));
+  order = reserve(<usize>gaussians << 3);
+  spare = reserve(<usize>gaussians << 3);
+  mostPairs = newMostPairs;
+  pairs = reserve(<usize>newMostPairs << 3);
+  entries = reserve(<usize>newMostPairs << 2);
+  counts = reserve(<usize>tiles << 2);
+  useRoomToKeep(reserve(<usize>gaussians << 3), reserve(<usize>tiles << 3));
+}
+
+/** Begins a picture of which the columns of tiles from `first` to `end` are drawn. */
+export function begin(fx: f32, fy: f32, cx: f32, cy: f32, width: i32, newHeight: i32, first: i32, end: i32): void {
+  firstColumn = first;
+  endColumn = end;
+  height = newHeight;
+  beginProjection(fx, fy, cx, cy, <f32>width, <f32>newHeight, <f32>(first * TILE_WIDTH), <f32>min(width, end * TILE_WIDTH));
+}
+
+/** Sorts the splats of this picture into tiles; false where there was no room for all pairs. */
+export function bin(): bool {
+  const down = (height + TILE_HEIGHT - 1) / TILE_HEIGHT;
+  sortByDepth(order, spare);
+  const number = listPairs(spare, pairs, mostPairs, counts, firstColumn, endColumn, down);
+  if (number > mostPairs) return false;
+  fillTiles(pairs, number, counts, (endColumn - firstColumn) * down, entries);
+  return true;
+}
+
+/**
+ * Draws the band: RGBA, rows of `stride` bytes, over another picture of the same shape.
+ *
+ * @param keep tiles whose splats are those of the picture before keep their pixels
+ * @returns number of the tiles that were drawn
+ */
+export function draw(behind: usize, pixels: usize, stride: usize, keep: bool): i32 {
+  const down = (height + TILE_HEIGHT - 1) / TILE_HEIGHT;
+  let begin = entries;
+  let counter = counts;
+  let drawn = 0;
+  if (!keep) forget((endColumn - firstColumn) * down);
+  digestSplats();
+  for (let column = firstColumn; column < endColumn; column++) {
+    for (let row = 0; row < down; row++) {
+      const end = entries + (<usize>load<u32>(counter) << 2);
+      const above = row * TILE_HEIGHT;
+      const place = <usize>above * stride + <usize>((column - firstColumn) * 4 * TILE_WIDTH);
+      if (!keeps((counter - counts) >> 2, begin, end)) {
+        drawTile(begin, end, column * TILE_WIDTH, above, <usize>min(TILE_HEIGHT, height - above), behind + place, pixels + place, stride);
+        drawn++;
+      }
+      begin = end;
+      counter += 4;
+    }
+  }
+  return drawn;
+}
+
+/** Number of the splats that are seen in the band. */
+export function seen(): i32 {
+  return count;
+}

@@ -1,0 +1,62 @@
+/**
+ * What has Gaussians to draw, as the kernel reads them.
+ *
+ * Rows are f32 unless said otherwise, one for each Gaussian: centre (3), rotation wxyz (4), scales in
+ * metres (3), and from byte 40 on
+ *
+ * - `still`: colour (3), opacity.
+ * - `head`: scale of the basis, mean logits (4); from byte 64 the K basis vectors, 4 i8 each.
+ * - `window`: colour (3), opacity, cluster (u32); from byte 64 the P + R + L basis vectors, 4 i16 each.
+ * - `skinned`: colour logits (3), opacity, nothing, normal (3), metres and logits per unit of the
+ *   shapes, joints (4 u8), weights (4 u8); from byte 96 the K shapes, 8 i8 each: position, 0, logits, 0.
+ */
+export interface Source {
+  kind: Kind;
+  count: number; // Gaussians
+  rows: ArrayBuffer;
+  /**
+   * - `head`: K.
+   * - `window`: P, R, L, numbers in a cluster's row of values.
+   * - `skinned`: K, joints, texels along a side of the shadow map or 0.
+   */
+  sizes: number[];
+}
+
+export type Kind = 'still' | 'head' | 'window' | 'skinned';
+
+/** Bytes of a row before basis vectors or shapes. */
+export const ROW_BYTES: Record<Kind, number> = { still: 64, head: 64, window: 64, skinned: 96 };
+
+/** Something on stage that has Gaussians; it moves as its object does. */
+export interface SoftObject {
+  /** The source; another one when other Gaussians are to be drawn. */
+  readonly source: Source | null;
+  /** Number of its first Gaussians that are drawn now. */
+  readonly drawn: number;
+  /**
+   * What changes from picture to picture.
+   *
+   * - `head`: K coefficients.
+   * - `window`: a row for each cluster.
+   * - `skinned`: light (8,4), lamp (5,4), K ≤ 8 coefficients of the shapes in 8 places, table of joints
+   *   (J,16), shadow map.
+   */
+  readonly values: Float32Array;
+}
+
+/** One source of several, whose Gaussians follow each other. */
+export function joined(sources: readonly Source[]): Source {
+  const bytes = new Uint8Array(sources.reduce((sum, { rows }) => sum + rows.byteLength, 0));
+  let at = 0;
+  for (const { rows } of sources) {
+    bytes.set(new Uint8Array(rows), at);
+    at += rows.byteLength;
+  }
+  return { ...sources[0]!, count: sources.reduce((sum, { count }) => sum + count, 0), rows: bytes.buffer };
+}
+
+/** New rows, as bytes and as numbers. */
+export function makeRows(count: number, stride: number): { rows: ArrayBuffer; floats: Float32Array; bytes: DataView } {
+  const rows = new ArrayBuffer(count * stride);
+  return { rows, floats: new Float32Array(rows), bytes: new DataView(rows) };
+}
