@@ -75,6 +75,7 @@ export class SparkPainter implements Painter {
   }
 
   paint(scene: THREE.Scene, camera: THREE.PerspectiveCamera, immersed: boolean): void {
+    this.current.sift();
     this.current.autoUpdate = !immersed;
     if (immersed) this.gather(scene, camera);
     this.renderer.render(scene, camera);

@@ -235,7 +235,6 @@ export class Stage {
   /** Draws now; what the canvas holds may be read until the current task ends. */
   draw(): void {
     for (const actor of this.actors) actor.drawing?.(performance.now());
-    this.current.sift();
     const before = performance.now();
     this.painter.paint(this.scene, this.camera, this.presentation !== null);
     this.drawing.add(performance.now() - before);
