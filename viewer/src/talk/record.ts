@@ -18,6 +18,7 @@ export interface RecordEvents {
 }
 
 const CUT = ' …';
+const ENDED = /[.!?。！？…]["'”’»)]*\s*$/; // answers come clause by clause
 const JOINED = /[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]$/; // scripts that put no spaces between sentences
 
 /** All that was said in a talk, as far as it was heard. */
@@ -59,10 +60,15 @@ export class TalkRecord {
     const { entry, sentences } = this.answer;
     const last = [...sentences.values()].at(-1)!;
     this.answer = null;
-    if (!interrupted || !entry.text || last.heard === last.text.length) return;
+    if (!interrupted || !entry.text || (last.heard === last.text.length && ENDED.test(last.text))) return;
     entry.cut = true;
     entry.text += CUT;
     this.events.changed(entry);
+  }
+
+  /** Whether an answer is being heard. */
+  get isOpen(): boolean {
+    return this.answer !== null;
   }
 
   /** A session goes on, or a new one begins. */

