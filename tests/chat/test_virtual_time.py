@@ -101,7 +101,8 @@ def test_a_session_in_which_nothing_happens_ends_with_a_sentence(bundle, questio
 
     ends, left = run(stay())
     sentence = "Nothing was said for 1 min, so this conversation has ended."
-    assert {error for _, error in ends.values()} == {Error(sentence, fatal=True, again=True)}
+    error = Error(sentence, fatal=True, again=True, code="idle", values={"minutes": 1})
+    assert [told for _, told in ends.values()] == 3 * [error]
     assert ends[2][0] == pytest.approx(10 + 60, abs=0.5)
     assert ends[0][0] == pytest.approx(60 + 10 + 60, abs=0.5)
     assert ends[1][0] == pytest.approx(60 + 10 + 60, abs=3)

@@ -90,7 +90,9 @@ def test_the_packaged_avatar_is_served(installed, tmp_path):
             page = fetched(f"{url[0]}/").decode()
             script = re.search(r'src="\.?/?(assets/[^"]+\.js)"', page)
             assert script is not None, "the page has no script"
-            assert len(fetched(f"{url[0]}/{script[1]}")) > 100_000
+            drawing = re.findall(r'rel="modulepreload"[^>]* href="\.?/?(assets/[^"]+\.js)"', page)
+            scripts = [fetched(f"{url[0]}/{name}") for name in (script[1], *drawing)]
+            assert sum(map(len, scripts)) > 1_000_000, "what draws is missing"
             manifest = json.loads(fetched(f"{url[0]}/bundle/manifest.json"))
             assert manifest["format"] == "ico3d-bundle"
         finally:

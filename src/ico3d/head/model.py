@@ -157,13 +157,13 @@ class HeadModel(nn.Module):
         Returns:
             Gaussians in canonical head space.
         """
+        return self.gaussians(self.logits(expression, features))
+
+    def logits(self, expression: Tensor, features: Tensor | None = None) -> Tensor:
+        """(N, V) values of the Gaussians; arguments as for `forward`."""
         if features is None:
             features = self.blended(expression)
-        return self.gaussians(self.decode(features, expression))
-
-    def logits(self, expression: Tensor) -> Tensor:
-        """(N, V) values of the Gaussians for an expression (B,) on any device."""
-        return self.decode(self.blended(expression), expression)
+        return self.decode(features, expression)
 
     def blended(self, expression: Tensor) -> Tensor:
         """(N, w) blended features f for an expression (B,)."""

@@ -24,13 +24,15 @@ def test_each_frame_joins_once_after_its_inner_neighbour():
 
 def test_no_frame_is_learnt_before_it_joins():
     """The first third knows the middle frame and its neighbours alone."""
-    drawn = [_unfolding().frame(step) for step in range(20, 180)]
+    unfolding = _unfolding()
+    drawn = [unfolding.frame(step) for step in range(20, 180)]
     assert set(drawn) == {11, 12, 13}
 
 
 def test_all_frames_have_had_as_many_steps_in_the_end():
     """Those that join late are drawn more often; in other orders by other seeds."""
-    orders = [[_unfolding(seed=seed).frame(step) for step in range(20, 1_020)] for seed in (0, 1)]
+    unfoldings = [_unfolding(seed=seed) for seed in (0, 1)]
+    orders = [[unfolding.frame(step) for step in range(20, 1_020)] for unfolding in unfoldings]
     for order in orders:
         assert all(abs(count - 1_000 / 6) < 10 for count in Counter(order).values())
     assert orders[0] != orders[1]

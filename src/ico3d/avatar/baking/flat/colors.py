@@ -78,9 +78,9 @@ class FlatHead(HeadModel):
         self.seen: Tensor
         self.register_buffer("seen", seen.to(model.device), persistent=False)  # (N, K − 1)
 
-    def logits(self, expression: Tensor) -> Tensor:
-        """(N, 4) logits of red, green, blue and opacity for an expression (B,) on any device."""
-        values = super().logits(expression)  # (N, V)
+    def logits(self, expression: Tensor, features: Tensor | None = None) -> Tensor:
+        """(N, 4) logits of red, green, blue and opacity; arguments as for `HeadModel`."""
+        values = super().logits(expression, features)  # (N, V)
         rest = values[:, 4:].unflatten(1, (-1, 3))  # (N, K − 1, 3)
         colors = flat_colors(values[:, :3].sigmoid(), rest, self.seen)
         return torch.cat([colors.logit(), values[:, 3:4]], 1)
