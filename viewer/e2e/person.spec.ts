@@ -1,7 +1,7 @@
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, beforeEach, describe, expect, test } from 'vitest';
 import { Browser } from '../support/browser/browser.ts';
-import { drawSeldom, refreshed } from '../support/browser/drawing.ts';
+import { drawSeldom, refreshed, stillPerson } from '../support/browser/drawing.ts';
 import { feed, noise } from '../support/sound/feeder.ts';
 import { atRest, excess, headAt, makePerson, readSteps, settle, watchSteps } from '../support/references/person.ts';
 import { finished, openPage, SHORTER, until } from '../support/browser/talk.ts';
@@ -55,14 +55,7 @@ describe('a whole person', () => {
     expect(await page.locator('#composer').isVisible()).toBe(true);
     await lookAsBundled(page, person.folder);
     for (const [i, time] of TIMES.entries()) {
-      await page.evaluate(async (seconds) => {
-        const { stage, body, head } = window.ico3d!;
-        head!.director = null;
-        stage.start();
-        await body!.show(seconds);
-        head!.express(new Float32Array(head!.expression.length));
-        await stage.still();
-      }, time);
+      await stillPerson(page, time);
       const seen = await takePixels(page);
       const right = person.pictures!.subarray(i * pixels, (i + 1) * pixels);
       console.log(`${time} s: ${psnr(seen, right).toFixed(1)} dB`);

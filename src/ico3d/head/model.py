@@ -193,17 +193,13 @@ class HeadModel(nn.Module):
 
     def hidden(self, features: Tensor, expression: Tensor) -> Tensor:
         """Input (N, hidden) of the last layer of φ; arguments as for `decode`."""
-        parts = [features, *self._positions()]
+        parts = [features, *self.encoded_positions()]
         if not self.shape.blends:
             parts.append(expression.to(self.device).expand(len(self), -1))  # (N, B)
         return nn.functional.leaky_relu(self.trunk(torch.cat(parts, 1)), 0.01)  # (N, hidden)
 
-    def encoded_positions(self) -> Tensor:
-        """γ(μ), (N, 3 + 6·L): positions relative to the head's box, their sines and cosines."""
-        return torch.cat(self._positions(), 1)
-
-    def _positions(self) -> tuple[Tensor, Tensor]:
-        """The parts of γ(μ): positions (N, 3), their sines and cosines (N, 6·L)."""
+    def encoded_positions(self) -> tuple[Tensor, Tensor]:
+        """γ(μ) in two parts: positions in the head's box (N, 3), sines and cosines (N, 6·L)."""
         center = self.means.new_tensor(self.shape.box_center)
         positions = (self.means - center) / self.shape.box_size  # (N, 3), about −1 … 1
         waves: Tensor = _Waves.apply(positions, self.shape.frequencies)  # type: ignore[assignment]

@@ -1,6 +1,7 @@
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, describe, expect, test } from 'vitest';
 import { Browser } from '../../support/browser/browser.ts';
+import { stillPerson } from '../../support/browser/drawing.ts';
 import { lookAsBundled, psnr } from '../../support/browser/pictures.ts';
 import { makePerson } from '../../support/references/person.ts';
 import { servePage } from '../../support/servers/static.ts';
@@ -44,14 +45,7 @@ describe('a page that draws without WebGL', () => {
   test('shows a person as Python draws it, before what is behind it', async () => {
     await lookAsBundled(page, person.folder);
     for (const [i, time] of TIMES.entries()) {
-      await page.evaluate(async (seconds) => {
-        const { stage, body, head } = window.ico3d!;
-        head!.director = null;
-        stage.start();
-        await body!.show(seconds);
-        head!.express(new Float32Array(head!.expression.length));
-        await stage.still();
-      }, time);
+      await stillPerson(page, time);
       const picture = person.pictures!.subarray(3 * WIDTH * HEIGHT * i, 3 * WIDTH * HEIGHT * (i + 1));
       const likeness = psnr(await shownPixels(page), picture);
       console.log(`${time} s: ${likeness.toFixed(1)} dB`);
